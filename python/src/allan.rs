@@ -30,7 +30,7 @@ impl Allan {
 
     /// The text that `mimu allan` prints.
     fn text(&self) -> String {
-        report::allan_text(&self.result)
+        report::allan_text(&self.result, false)
     }
 
     /// Tables and plots.

@@ -25,7 +25,7 @@ impl Design {
 
     /// The text that `mimu design` prints.
     fn text(&self) -> String {
-        report::design_text(&self.design)
+        report::design_text(&self.design, false)
     }
 
     /// The text within a page.

@@ -33,7 +33,7 @@ impl Fit {
 
     /// The text that `mimu fit` prints.
     fn text(&self) -> String {
-        report::fit_text(&self.result)
+        report::fit_text(&self.result, false)
     }
 
     /// Tables and plots.

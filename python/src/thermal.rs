@@ -37,7 +37,7 @@ impl ThermalFit {
 
     /// The text that `mimu thermal fit` prints.
     fn text(&self) -> String {
-        report::thermal_text(&self.result)
+        report::thermal_text(&self.result, false)
     }
 
     /// The page, as a piece of one.

@@ -26,7 +26,7 @@ impl Verification {
 
     /// The text that `mimu verify` prints.
     fn text(&self) -> String {
-        report::verify_text(&self.verified)
+        report::verify_text(&self.verified, false)
     }
 
     /// A table.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
-use mimu_recording::Recording;
+use mimu_recording::{Recording, Reference, Turntable};
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::random::Random;
@@ -23,7 +23,11 @@ pub fn gyro(random: &mut Random) -> AffineFile {
 /// The same of an accelerometer; lower triangular, so that its x axis and xy plane are the body's, which by hand nothing else
 /// defines.
 pub fn accel(random: &mut Random) -> AffineFile {
-    let mut model = affine(0.08, 1.65, random);
+    in_own_frame(affine(0.08, 1.65, random))
+}
+
+/// The model without what turns its frame: x along the sensor x, the xy plane through the sensor y.
+pub fn in_own_frame(mut model: AffineFile) -> AffineFile {
     for i in 0..3 {
         for j in i + 1..3 {
             model.matrix[i][j] = 0.0;
@@ -138,6 +142,29 @@ pub fn turning_plan(seed: u64) -> String {
     plan
 }
 
+/// Plan of a record player: in `orientations` drawn by the seed a rest and 33 1/3 and 45 rpm, each off by the share in `off`, 5 s each at 100 Hz.
+///
+/// The first six have an axis near the vertical, as a phone lies on its faces and edges; the others lean on something.
+pub fn record_player_plan(orientations: usize, off: [f64; 2], seed: u64) -> String {
+    let mut random = Random::new(seed, "orientations");
+    let mut plan =
+        String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n");
+    for k in 0..orientations {
+        let up: [f64; 3] = std::array::from_fn(|i| match k {
+            0..6 if k / 2 == i => [1.0, -1.0][k % 2],
+            0..6 => random.within(0.1),
+            _ => random.normal(),
+        });
+        for rate_dps in [0.0, 200.0 * (1.0 + off[0]), 270.0 * (1.0 + off[1])] {
+            let _ = writeln!(
+                plan,
+                "[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = 5.0"
+            );
+        }
+    }
+    plan
+}
+
 /// Plan of so many poses by hand, 3 s each at 100 Hz.
 pub fn hand_plan(poses: usize) -> String {
     format!(
@@ -153,6 +180,16 @@ pub fn written(plan: &str, file: &RigFile, seed: u64) -> tempfile::TempDir {
     let output = Output::new(&folder.path().join("recording"), &plan).expect("a name");
     write(&plan, &truth, seed, &output).expect("written");
     folder
+}
+
+/// The recording of a plan, of which nothing is known but the magnitude of the rates of `turntable`.
+pub fn on_a_turntable(plan: &str, file: &RigFile, seed: u64, turntable: Turntable) -> Prepared {
+    let folder = written(plan, file, seed);
+    let recording = Recording::open(&folder.path().join("recording"));
+    let mut recording = recording.expect("a recording");
+    recording.manifest.reference = Reference::TurntableRate;
+    recording.manifest.turntable = Some(turntable);
+    Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable")
 }
 
 /// The recording of a plan.

@@ -6,6 +6,7 @@ use mimu::fit::{Fit, Method, Options, fit};
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::Triad;
+use mimu_recording::{Turntable, TurntableRate};
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use nalgebra::SVector;
@@ -244,6 +245,35 @@ pub fn by_hand(runs: u64, quiet: bool) -> Vec<Tally> {
             options(Method::LeastSquares),
         )
         .unwrap_or_else(|e| panic!("by hand, seed {seed}: {e}"));
+        for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
+            tallies[k].add(triad(&fitted, sensor), &truths[k]);
+        }
+    })
+}
+
+/// Gyro and accelerometer on a record player, of whose rates the magnitude is known to within `rate_error` (95 %): each recording's two rates are off by
+/// errors of that size. With what they leave of the gyro's scale factors.
+pub fn on_a_record_player(runs: u64, rate_error: f64) -> Vec<Tally> {
+    // A triad whose input is known by its magnitude defines the frame.
+    let lower = [0, 3, 4, 6, 7, 8, 9, 10, 11];
+    let empty = Sensor::BOTH.map(|s| Tally::new(format!("record player, {s}"), &lower));
+    over(runs, &empty, |seed, tallies| {
+        let mut random = Random::new(seed, "unit");
+        let (gyro, accel) = (
+            bench::in_own_frame(bench::gyro(&mut random)),
+            bench::accel(&mut random),
+        );
+        let mut file = bench::clean(gyro, accel);
+        file.earth_rate = Some(true);
+        let sigma = rate_error / 1.96;
+        let off = std::array::from_fn(|_| sigma * random.normal());
+        let plan = bench::record_player_plan(14, off, seed);
+        let rates: Vec<TurntableRate> = ["200", "270"].map(|r| r.parse().expect("a rate")).into();
+        let turntable = Turntable::new(&rates, rate_error);
+        let truths = of_the_session(&plan, &file, seed);
+        let prepared = bench::on_a_turntable(&plan, &file, seed, turntable);
+        let fitted = fit(prepared, options(Method::LeastSquares))
+            .unwrap_or_else(|e| panic!("record player, seed {seed}: {e}"));
         for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
             tallies[k].add(triad(&fitted, sensor), &truths[k]);
         }

@@ -31,7 +31,7 @@ fn main() -> ExitCode {
         (Some("view"), [recording, calibration]) => {
             view(recording, Some(calibration)).and_then(json)
         }
-        _ => return mimu_cli::run(),
+        _ => return mimu_cli::run(std::env::args_os()).into(),
     };
     match answer {
         Ok(text) => {

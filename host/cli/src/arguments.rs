@@ -99,6 +99,13 @@ impl NoiseArgs {
 }
 
 #[derive(Args)]
+pub(crate) struct VerboseArgs {
+    /// Print everything in place of a summary
+    #[arg(long)]
+    pub(crate) verbose: bool,
+}
+
+#[derive(Args)]
 pub(crate) struct JsonArgs {
     /// Write the result as JSON (`-`: to standard output, in place of the text)
     #[arg(long = "json", value_name = "PATH", global = true)]

@@ -17,6 +17,7 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
         "import",
         &[
             "mimu import log.csv --columns t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,- --raw-unit count --gravity 9.81 --reference gravity -o rec",
+            "mimu import player.csv --columns t_s,gyro_x,gyro_y,gyro_z --raw-unit count --reference turntable-rate --rate-dps 200,270 --rate-error 0.3% -o player",
             "mimu import MT_00B4D6D1.txt --preset xsens --reference gravity --gravity 9.81 -o rec",
         ],
     ),
@@ -24,7 +25,8 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
         "fit",
         &[
             "mimu fit rec -o cal.toml",
-            "mimu fit rec --noise noise.toml --json -",
+            "mimu fit rec --noise noise.toml --verbose",
+            "mimu fit rec --json -",
         ],
     ),
     ("verify", &["mimu verify another --calibration cal.toml"]),
@@ -36,7 +38,7 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
         "compare",
         &[
             "mimu compare before.toml after.toml",
-            "mimu compare monday.toml tuesday.toml wednesday.toml --all",
+            "mimu compare monday.toml tuesday.toml wednesday.toml --verbose",
         ],
     ),
     (
@@ -93,9 +95,30 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
     ("man", &["mimu man -o man1"]),
 ];
 
+/// Formats of an export that have a place for noise: those of the others do not list the option.
+const WITH_NOISE: [&str; 6] = [
+    "kalibr", "openvins", "vins", "orbslam3", "liosam", "fastlio",
+];
+
+/// The formats of `mimu export`, of which only some list the option `--noise`.
+fn formats(mut export: clap::Command) -> clap::Command {
+    let names: Vec<String> = export
+        .get_subcommands()
+        .map(|c| c.get_name().to_owned())
+        .collect();
+    for name in names.iter().filter(|n| !WITH_NOISE.contains(&n.as_str())) {
+        let noise = clap::Arg::new("noise")
+            .long("noise")
+            .value_parser(clap::value_parser!(std::path::PathBuf))
+            .hide(true);
+        export = export.mut_subcommand(name, |c| c.arg(noise));
+    }
+    export
+}
+
 /// The command with its examples.
 pub(crate) fn command() -> clap::Command {
-    let mut command = Cli::command();
+    let mut command = Cli::command().mut_subcommand("export", formats);
     for (name, lines) in EXAMPLES {
         // Where there is no port there are fewer commands.
         if command.find_subcommand(name).is_none() {
@@ -110,6 +133,29 @@ pub(crate) fn command() -> clap::Command {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_formats_with_a_place_for_noise_list_it() {
+        let mut command = command();
+        command.build();
+        let export = command.find_subcommand("export").unwrap();
+        for format in export.get_subcommands().filter(|c| c.get_name() != "help") {
+            let noise = format
+                .get_arguments()
+                .find(|a| a.get_id() == "noise")
+                .unwrap();
+            let listed = WITH_NOISE.contains(&format.get_name());
+            assert_eq!(noise.is_hide_set(), !listed, "{}", format.get_name());
+        }
+        let of = |line: &str| {
+            command
+                .clone()
+                .try_get_matches_from(line.split(' '))
+                .map(|_| ())
+        };
+        of("mimu export kalibr --noise noise.toml -o imu.yaml").unwrap();
+        of("mimu export px4 --calibration cal.toml -o unit.params").unwrap();
+    }
 
     #[test]
     fn every_subcommand_has_examples_that_it_takes() {

@@ -8,13 +8,15 @@ use mimu_thermal::warning::Warning as OverTemperature;
 use mimu_wizard::waiting::Waiting;
 
 /// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
-const OF_THE_IMPORT: [&str; 13] = [
+const OF_THE_IMPORT: [&str; 15] = [
     "--columns",
     "--rate-hz",
     "--time-unit",
     "--scale",
     "--offset",
     "--reference",
+    "--rate-dps",
+    "--rate-error",
     "--where",
     "--topic",
     "--instance",
@@ -101,6 +103,8 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Scale => "--scale",
         Argument::Offset => "--offset",
         Argument::Reference => "--reference",
+        Argument::TurntableRates => "--rate-dps",
+        Argument::TurntableRateError => "--rate-error",
         Argument::Device => "--device",
         Argument::StepsGiven => "--steps given",
         Argument::StepsFound => "--steps found",
@@ -143,6 +147,15 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Drift => "--drift",
         Argument::EstimatedBy => "--by",
         Argument::Output => "-o",
+        Argument::Noise => "--noise",
+        Argument::GyroWalk => "--gyro-walk",
+        Argument::AccelWalk => "--accel-walk",
+        Argument::GyroConversion => "--gyro-si-per-raw",
+        Argument::AccelConversion => "--accel-si-per-raw",
+        Argument::GyroZero => "--gyro-zero",
+        Argument::AccelZero => "--accel-zero",
+        Argument::Prefix => "--prefix",
+        Argument::Every => "--every",
         Argument::CalibrationOfNoise => "mimu allan --calibration",
         // An argument that this version of the command has no flag for.
         _ => return None,

@@ -167,6 +167,8 @@ mod tests {
         for argument in command.get_arguments() {
             command.get_arg_conflicts_with(argument);
         }
-        command.get_subcommands().for_each(conflicts_with_what_is_there);
+        command
+            .get_subcommands()
+            .for_each(conflicts_with_what_is_there);
     }
 }

@@ -3,6 +3,8 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use anstream::AutoStream;
+use anstyle::AnsiColor;
 use indicatif::{ProgressBar, ProgressStyle};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::{Staged, stage};
@@ -69,9 +71,30 @@ pub(crate) fn print(
     show(shown)
 }
 
-/// Prints text to standard output.
+/// Beginnings of lines that stand out on a terminal.
+const HEADS: [(&str, AnsiColor); 4] = [
+    ("wrong with this recording:", AnsiColor::Red),
+    ("warning:", AnsiColor::Yellow),
+    ("verdict:", AnsiColor::Green),
+    ("next:", AnsiColor::Cyan),
+];
+
+/// `text` with the heads of its lines in colour.
+fn coloured(text: &str) -> String {
+    let line = |line: &str| match HEADS.iter().find(|(head, _)| line.starts_with(head)) {
+        Some((head, colour)) => {
+            let style = colour.on_default().bold();
+            format!("{style}{head}{style:#}{}", &line[head.len()..])
+        }
+        None => line.to_owned(),
+    };
+    text.split_inclusive('\n').map(line).collect()
+}
+
+/// Prints text to standard output: in colour on a terminal, unless NO_COLOR is set or the terminal knows none.
 pub(crate) fn show(text: &str) -> Result<()> {
-    let mut out = std::io::stdout().lock();
+    let mut out = AutoStream::auto(std::io::stdout().lock());
+    let text = coloured(text);
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         // `mimu fit ... | head` is no error.
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),

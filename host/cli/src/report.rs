@@ -16,7 +16,7 @@ pub mod fragment;
 mod import;
 mod page;
 mod svg;
-mod text;
+pub(crate) mod text;
 mod thermal;
 mod thermal_page;
 mod thermal_plan;

@@ -12,7 +12,7 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::quantity::Sensor;
-use mimu_recording::error::Result;
+use mimu_recording::error::{Argument, Result};
 
 use crate::one_temperature::{self, LETTERS, within};
 use crate::parameters::Parameter;
@@ -94,7 +94,10 @@ fn at_one_temperature(
             export.parameters.push(offset);
             if of.sensor == Sensor::Accel {
                 let name = format!("INS_ACC{}SCAL_{letter}", number(imu));
-                let remedy = "state with --accel-si-per-raw by what the driver converts";
+                let remedy = (
+                    "give the factor by which the driver converts",
+                    Argument::AccelConversion,
+                );
                 within(of.sensor, axis, (&name, of.scale[axis], ""), SCALES, remedy)?;
                 export
                     .parameters
@@ -111,7 +114,10 @@ fn offset_parameter(sensor: Sensor, axis: usize, imu: u8, offset: f64) -> Result
     let name = format!("INS_{short}{number}OFFS_{}", LETTERS[axis]);
     if sensor == Sensor::Accel {
         let range = [-MOST_OFFSET, MOST_OFFSET];
-        let remedy = "state with --accel-zero which raw reading the driver takes for no input";
+        let remedy = (
+            "give the raw reading that the driver takes for no input",
+            Argument::AccelZero,
+        );
         within(sensor, axis, (&name, offset, " m/s²"), range, remedy)?;
     }
     Ok(Parameter::real(name, offset))

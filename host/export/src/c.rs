@@ -17,7 +17,7 @@ use std::fmt::Write as _;
 use mimu::calibration::Calibration;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_core::compensation::Affine;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 use crate::remaining::{self, Places};
 use crate::{Export, Sources, heading};
@@ -46,10 +46,11 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let first = letters.next().is_some_and(|c| c.is_ascii_alphabetic());
     if !(first && letters.all(|c| c.is_ascii_alphanumeric() || c == '_')) {
         return Err(Error::new(
-            "--prefix",
+            "prefix",
             format!("{prefix:?} is no name in C"),
             "use letters, digits and underscores, a letter first",
-        ));
+        )
+        .about(Argument::Prefix));
     }
     let effects = Effects::of(calibration)?;
     let header = Header {

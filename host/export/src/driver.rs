@@ -9,7 +9,7 @@ use mimu::quantity::{PerSensor, Sensor};
 use mimu::triad::Forward;
 use mimu_core::compensation::Affine;
 use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::{Matrix3, Vector3};
 
 /// What a person knows of the driver.
@@ -64,18 +64,32 @@ impl Options {
     /// There is an option.
     pub fn unused(&self) -> Result<()> {
         let given = [
-            ("--gyro-si-per-raw", self.gyro_si_per_raw),
-            ("--accel-si-per-raw", self.accel_si_per_raw),
-            ("--gyro-zero", self.gyro_zero),
-            ("--accel-zero", self.accel_zero),
+            (
+                Argument::GyroConversion,
+                "conversion of the gyro",
+                self.gyro_si_per_raw,
+            ),
+            (
+                Argument::AccelConversion,
+                "conversion of the accelerometer",
+                self.accel_si_per_raw,
+            ),
+            (Argument::GyroZero, "zero of the gyro", self.gyro_zero),
+            (
+                Argument::AccelZero,
+                "zero of the accelerometer",
+                self.accel_zero,
+            ),
         ];
-        match given.iter().find(|(_, value)| value.is_some()) {
+        match given.iter().find(|(.., value)| value.is_some()) {
             None => Ok(()),
-            Some((name, _)) => Err(Error::new(
+            Some((argument, name, _)) => Err(Error::new(
                 *name,
                 "there is no calibration that it could be about",
-                "give --calibration too, or leave it out",
-            )),
+                "give a calibration too, or leave it out",
+            )
+            .about(*argument)
+            .about(Argument::Calibration)),
         }
     }
 

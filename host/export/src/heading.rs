@@ -41,7 +41,11 @@ pub fn of_noise(noise: &NoiseFile, export: &Export) -> Vec<String> {
             what(export.to),
             env!("CARGO_PKG_VERSION")
         ),
-        format!("from {:.0} s at rest", noise.duration_s),
+        format!(
+            "from {:.0} s at rest, evaluated {}",
+            noise.duration_s,
+            noise.created.as_deref().unwrap_or("at an unknown date")
+        ),
     ];
     lines.extend(said(export));
     lines

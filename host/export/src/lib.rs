@@ -48,7 +48,7 @@ use std::path::PathBuf;
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::noise::noise_file::NoiseFile;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use serde::Serialize;
 
 use crate::parameters::Parameter;
@@ -157,10 +157,11 @@ impl Sources<'_> {
     pub fn calibration(&self) -> Result<(&Calibration, &str)> {
         self.calibration.ok_or_else(|| {
             Error::new(
-                "--calibration",
+                "export",
                 "this format is made from a calibration, and there is none",
                 "name the file that `mimu fit -o` wrote",
             )
+            .about(Argument::Calibration)
         })
     }
 
@@ -171,15 +172,29 @@ impl Sources<'_> {
     pub fn noise(&self) -> Result<&NoiseFile> {
         self.noise.ok_or_else(|| {
             Error::new(
-                "--noise",
+                "export",
                 "this format is made from the noise of the unit, and there is none",
                 "name the file that `mimu allan -o` wrote",
             )
+            .about(Argument::Noise)
         })
     }
 }
 
 impl Format {
+    /// Whether it has a place for the noise of a unit.
+    pub fn has_noise(&self) -> bool {
+        matches!(
+            self,
+            Self::Kalibr(_)
+                | Self::OpenVins(_)
+                | Self::Vins(_)
+                | Self::OrbSlam3(_)
+                | Self::LioSam(_)
+                | Self::FastLio(_)
+        )
+    }
+
     /// Files that it reads beside its [`Sources`]: no result may take their place.
     pub fn inputs(&self) -> Vec<PathBuf> {
         match self {

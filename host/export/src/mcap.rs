@@ -26,7 +26,7 @@ use mimu::calibration::apply::Compensated;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Recording};
 use serde_json::{Map, Value, json};
 
@@ -182,7 +182,7 @@ impl File {
 
 fn refused(place: &str, error: &McapError) -> Error {
     let problem = format!("it cannot be written as MCAP: {error}");
-    Error::new(place, problem, "write fewer samples with --every")
+    Error::new(place, problem, "write fewer samples").about(Argument::Every)
 }
 
 /// Time since the stamps' zero, ns. MCAP has none before it.

@@ -9,7 +9,7 @@ use mimu::calibration::bias_cubic::Conversion;
 use mimu::quantity::{AXES, Sensor};
 use mimu::triad::Forward;
 use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::Vector3;
 
 use crate::remaining::{self, Places};
@@ -96,7 +96,7 @@ pub(crate) fn within(
     axis: usize,
     (name, value, unit): (&str, f64, &str),
     [least, most]: [f64; 2],
-    remedy: &str,
+    (remedy, argument): (&str, Argument),
 ) -> Result<()> {
     if (least..=most).contains(&value) {
         return Ok(());
@@ -105,5 +105,6 @@ pub(crate) fn within(
         format!("{sensor}, axis {}", AXES[axis]),
         format!("{name} would be {value:.3}{unit}, and is from {least} to {most}"),
         remedy,
-    ))
+    )
+    .about(argument))
 }

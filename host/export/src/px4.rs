@@ -11,7 +11,7 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::quantity::Sensor;
-use mimu_recording::error::Result;
+use mimu_recording::error::{Argument, Result};
 
 use crate::one_temperature::{self, LETTERS, Offsets, within};
 use crate::parameters::Parameter;
@@ -102,7 +102,10 @@ fn at_one_temperature(
         }
         for (axis, letter) in LETTERS.iter().enumerate() {
             let name = format!("{prefix}_{letter}SCALE");
-            let remedy = "state with --accel-si-per-raw by what the driver converts";
+            let remedy = (
+                "give the factor by which the driver converts",
+                Argument::AccelConversion,
+            );
             within(sensor, axis, (&name, scale[axis], ""), SCALES, remedy)?;
             out.push(Parameter::real(name, scale[axis]));
         }

@@ -12,7 +12,7 @@ use mimu::allan::model::Term;
 use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
 use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu::readable::STANDARD_GRAVITY;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 use crate::{Sources, yaml};
 
@@ -193,14 +193,18 @@ fn worst(
         };
     }
     let (channel, why) = missing[0];
-    let remedy = match (term, sensor) {
-        (Term::K, Sensor::Gyro) => "record for longer, or state one with --gyro-walk",
-        (Term::K, Sensor::Accel) => "record for longer, or state one with --accel-walk",
+    let remedy = match term {
+        Term::K => "record for longer, or give one",
         _ => "record again, at rest",
     };
-    Err(Error::new(
+    let error = Error::new(
         format!("{place}, channel {}", channel.name),
         format!("{} ({}): {why}", term.letter(), term.name()),
         remedy,
-    ))
+    );
+    Err(match (term, sensor) {
+        (Term::K, Sensor::Gyro) => error.about(Argument::GyroWalk),
+        (Term::K, Sensor::Accel) => error.about(Argument::AccelWalk),
+        _ => error,
+    })
 }

@@ -22,6 +22,8 @@ pub enum Fault {
     Outlying,
     /// It turns about an axis that the accelerometer may be beside of.
     Spinning,
+    /// It turns at none of the known rates of the turntable.
+    OtherRate,
     /// Samples of the channel (0..6) lie at a rail.
     Saturated(usize),
     /// The channel (0..6) repeats one value.
@@ -39,6 +41,7 @@ impl fmt::Display for Fault {
             Self::Turning => f.write_str("turning"),
             Self::Outlying => f.write_str("outlying"),
             Self::Spinning => f.write_str("spinning"),
+            Self::OtherRate => f.write_str("at another rate"),
             Self::Saturated(c) => write!(f, "{} saturated", RAW_COLUMNS[c]),
             Self::Stuck(c) => write!(f, "{} stuck", RAW_COLUMNS[c]),
             Self::Missing(c) => write!(f, "{} missing", RAW_COLUMNS[c]),

@@ -3,6 +3,7 @@
 pub(crate) mod as_came;
 mod biases;
 mod by_gravity;
+pub(crate) mod by_rate;
 pub mod change;
 mod determined;
 mod hold_out;
@@ -20,12 +21,15 @@ use crate::estimate::{Estimated, Observation};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
 use crate::signal::stillness::STILL_FACTOR;
+use crate::turntable::RatedDwells;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
 use crate::observable::Observable;
 use by_gravity::fit_gravity;
+use by_rate::fit_rates;
+pub(crate) use determined::faces_not_up;
 use known::fit_known;
 
 pub use biases::fit_biases;
@@ -108,7 +112,10 @@ impl Fit {
     pub fn estimator(&self, sensor: Sensor) -> &'static str {
         match (self.prepared.manifest.reference, sensor) {
             (Reference::Table, _) => self.options.method.name(),
-            (Reference::Gravity, Sensor::Accel) => "magnitude of specific force",
+            (Reference::TurntableRate, Sensor::Gyro) => "magnitude of the rate",
+            (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
+                "magnitude of specific force"
+            }
             (Reference::Gravity, Sensor::Gyro) => "turns and rests",
         }
     }
@@ -145,14 +152,21 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     plausible::check_readings(&prepared)?;
     let with_all = match prepared.manifest.reference {
         Reference::Gravity => outlying::leave_out(&mut prepared),
-        Reference::Table => Default::default(),
+        Reference::Table | Reference::TurntableRate => Default::default(),
     };
+    let rated = match prepared.manifest.reference {
+        Reference::TurntableRate => Some(RatedDwells::of(&prepared)?),
+        Reference::Table | Reference::Gravity => None,
+    };
+    let at_none = rated.as_ref().and_then(|r| r.set_aside(&mut prepared));
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warnings.extend(without_temperature(&prepared));
-    let mut sensors = match prepared.manifest.reference {
-        Reference::Table => fit_known(&prepared, options, &mut warnings)?,
-        Reference::Gravity => fit_gravity(&prepared, options, &mut warnings)?,
+    warnings.extend(at_none);
+    let mut sensors = match (prepared.manifest.reference, &rated) {
+        (_, Some(rated)) => fit_rates(&prepared, rated, options, &mut warnings)?,
+        (Reference::Table, None) => fit_known(&prepared, options, &mut warnings)?,
+        (_, None) => fit_gravity(&prepared, options, &mut warnings)?,
     };
     let mut changes = Vec::new();
     // The gyro is listed first, and where gravity is the only reference depends on the accelerometer.

@@ -70,12 +70,14 @@ pub mod pose_means;
 pub mod prepared;
 pub mod quantity;
 pub mod readable;
+pub mod recording_problem;
 pub mod result;
 pub mod signal;
 pub mod spectrum;
 pub mod survey;
 mod toml_layout;
 pub mod triad;
+pub mod turntable;
 pub mod warning;
 
 pub use calibration::Calibration;

@@ -86,6 +86,9 @@ impl Prepared {
             )
             .about(Argument::StillFactor));
         }
+        if manifest.is_joined() {
+            without_joins(&mut condensed);
+        }
         refuse_dead_channels(&condensed, &place)?;
         if let (Some(power), Some(first)) = (manifest.power_on_s, condensed.blocks.first())
             && power > first.start_s
@@ -455,6 +458,31 @@ impl Prepared {
         error
             .map(|e| e.remedy += remedy)
             .about(Argument::StepsGiven)
+    }
+}
+
+/// Takes the pauses between joined files out of the gaps: nothing is missing there.
+fn without_joins(condensed: &mut Condensed) {
+    let period_s = condensed.period_s;
+    let pairs = condensed.blocks.windows(2);
+    let gaps: Vec<(f64, u64)> = pairs
+        .filter(|pair| pair[1].after_gap && pair[0].step == pair[1].step)
+        .map(|pair| {
+            (
+                pair[1].start_s - pair[0].last_s - period_s,
+                pair[1].first_row,
+            )
+        })
+        .collect();
+    condensed.gaps = (gaps.len() as u64, gaps.iter().map(|g| g.0).sum());
+    condensed
+        .warnings
+        .retain(|w| !matches!(w, Warning::Gaps(..)));
+    if let Some((_, row)) = gaps.first() {
+        let (count, missing_s) = condensed.gaps;
+        condensed
+            .warnings
+            .push(Warning::Gaps(count, missing_s, row + 1));
     }
 }
 

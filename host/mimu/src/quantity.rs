@@ -23,6 +23,8 @@ pub enum Figure {
     Input,
     /// Magnitude of the compensated dwell mean minus gravity, m/s².
     GravitySize,
+    /// Magnitude of the compensated dwell mean minus the rate of the turntable, rad/s.
+    RateSize,
     /// Angle between the predicted and the measured direction of gravity after each turn, rad.
     Direction,
 }
@@ -42,11 +44,19 @@ impl Figure {
         }
     }
 
+    /// Whether only the magnitude of the input is known, so that the triad's own axes are its frame.
+    pub fn is_magnitude(self) -> bool {
+        matches!(self, Self::GravitySize | Self::RateSize)
+    }
+
     /// What it is about, as a sentence fragment.
     pub fn description(self) -> &'static str {
         match self {
             Self::Input => "compensated dwell mean minus known input, over dwells and axes",
             Self::GravitySize => "magnitude of the compensated dwell mean minus gravity",
+            Self::RateSize => {
+                "magnitude of the compensated dwell mean minus the rate of the turntable"
+            }
             Self::Direction => "angle between predicted and measured gravity after each turn",
         }
     }

@@ -133,6 +133,12 @@ pub enum Warning {
     FollowsTemperature(f64, f64, f64),
     /// Dwells, or else turns, that are outliers; the largest error, its unit, and its ratio to the median.
     Outliers(bool, Vec<String>, f64, &'static str, f64),
+    /// Rates of the turntable, deg/s, and the error of each, as a share of it.
+    RateError(Vec<f64>, f64),
+    /// Rate of the turntable, rad/s, that the other rates contradict, and the share by which the fit moves it.
+    RatesContradict(f64, f64),
+    /// Why the rests on a turntable do not calibrate the accelerometer.
+    NoRestsToFit(String),
     /// Angle between the axes and those that they are referred to, rad, and whether these are the table's.
     Turned(f64, bool),
     /// Angle of the known forces off those that were given, rad rms.

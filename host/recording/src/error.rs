@@ -69,6 +69,10 @@ pub enum Argument {
     Table,
     /// Sensor that an experiment is designed for.
     Sensor,
+    /// Magnitudes of a turntable's rates.
+    TurntableRates,
+    /// How well they are known.
+    TurntableRateError,
     /// Whether what exists is replaced.
     Replace,
     /// Serial port.
@@ -133,6 +137,24 @@ pub enum Argument {
     Output,
     /// The calibration that a noise file is made with.
     CalibrationOfNoise,
+    /// Noise of the unit.
+    Noise,
+    /// Rate random walk of the gyro, where its noise shows none.
+    GyroWalk,
+    /// That of the accelerometer.
+    AccelWalk,
+    /// SI unit per raw unit by which a driver converts a gyro's readings.
+    GyroConversion,
+    /// The same of an accelerometer's.
+    AccelConversion,
+    /// Raw reading that a driver takes for no rate.
+    GyroZero,
+    /// Raw reading that a driver takes for no force.
+    AccelZero,
+    /// Beginning of the names in a source file.
+    Prefix,
+    /// Of how many samples one is written.
+    Every,
 }
 
 /// Result with [`Error`].

@@ -39,6 +39,7 @@ mod staging;
 #[cfg(feature = "parquet")]
 mod strict_file;
 mod toml_file;
+mod turntable;
 mod warning;
 #[cfg(not(feature = "parquet"))]
 mod without_parquet;
@@ -67,5 +68,6 @@ pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};
 pub use separator::Separator;
 pub use toml_file::{parse_toml, read_text};
+pub use turntable::{Turntable, TurntableRate, rate_error};
 pub use warning::Warning;
 pub use writer::{SampleFormat, Writer};

@@ -6,7 +6,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::recorded::Recorded;
-use crate::error::{Error, Result};
+use super::turntable::Turntable;
+use crate::error::{Argument, Error, Result};
 use crate::toml_file::{parse_toml, read_text};
 
 /// Name of the manifest in a recording's directory.
@@ -44,12 +45,14 @@ pub enum RawUnit {
 
 /// What is known of the true input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Reference {
     /// The `ref_` columns hold it.
     Table,
     /// Only the magnitude of gravity, at rest.
     Gravity,
+    /// Only the magnitude of the rate, at rest and at the rates of a [`Turntable`].
+    TurntableRate,
 }
 
 impl fmt::Display for RawUnit {
@@ -67,6 +70,7 @@ impl fmt::Display for Reference {
         f.write_str(match self {
             Reference::Table => "table",
             Reference::Gravity => "gravity",
+            Reference::TurntableRate => "turntable-rate",
         })
     }
 }
@@ -95,10 +99,11 @@ impl std::str::FromStr for Reference {
         match text {
             "table" => Ok(Reference::Table),
             "gravity" => Ok(Reference::Gravity),
+            "turntable-rate" => Ok(Reference::TurntableRate),
             _ => Err(Error::new(
                 "reference",
                 format!("{} is not known", super::cell::shorten(text.as_bytes())),
-                "write table (ref_ columns hold the input) or gravity (only its size is known)",
+                "write table (ref_ columns hold the input), gravity (only its size is known) or turntable-rate (only the size of the rate)",
             )),
         }
     }
@@ -174,6 +179,9 @@ pub struct Manifest {
     /// Where readings saturate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rails: Option<Rails>,
+    /// The rates that are known, where the reference is the magnitude of the rate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turntable: Option<Turntable>,
     /// Files that it was imported from.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Source>,
@@ -201,6 +209,20 @@ impl Manifest {
         Some(recorded.unit_id.as_str()).filter(|id| id.bytes().any(|digit| digit != b'0'))
     }
 
+    /// Whether it was joined from files that follow one another, a step each.
+    pub fn is_joined(&self) -> bool {
+        let by = ["--sequence", "--faces"];
+        self.imported_with.iter().any(|a| by.contains(&a.as_str()))
+    }
+
+    /// Name of a step: its label, or its number.
+    pub fn step_name(&self, step: i32) -> String {
+        let label = usize::try_from(step)
+            .ok()
+            .and_then(|i| self.step_labels.get(i));
+        label.cloned().unwrap_or_else(|| step.to_string())
+    }
+
     /// Manifest with the keys that have no default; the others empty.
     pub fn new(
         device: impl Into<String>,
@@ -226,6 +248,7 @@ impl Manifest {
             imported_with: Vec::new(),
             recorded: None,
             rails: None,
+            turntable: None,
             sources: Vec::new(),
         }
     }
@@ -272,6 +295,27 @@ impl Manifest {
                 format!("{power} is no time"),
                 "write the t_s at which the power came, or leave the key out",
             ));
+        }
+        match (self.reference, &self.turntable) {
+            (Reference::TurntableRate, None) => {
+                let problem = "the reference is the rate of a turntable, and no rate is given";
+                let remedy = "give it in deg/s: 200 for 33 1/3 rpm, 270 for 45 rpm";
+                return Err(
+                    Error::new(at("turntable"), problem, remedy).about(Argument::TurntableRates)
+                );
+            }
+            (Reference::TurntableRate, Some(turntable)) => {
+                turntable.check(|key| at(&format!("turntable.{key}")))?;
+            }
+            (_, Some(_)) => {
+                let problem = format!(
+                    "rates of a turntable, and the reference is {}",
+                    self.reference
+                );
+                let remedy = "leave them out, or let the reference be turntable-rate";
+                return Err(Error::new(at("turntable"), problem, remedy).about(Argument::Reference));
+            }
+            (_, None) => {}
         }
         let rails = self.rails.unwrap_or_default();
         for (sensor, rails) in [("gyro", rails.gyro), ("accel", rails.accel)] {

@@ -84,6 +84,11 @@ impl Session {
             let remedy = "give the recording of samples that they were made of";
             return Err(Error::new(&prepared.place, problem, remedy));
         }
+        if manifest.reference == Reference::TurntableRate {
+            let problem = "only the magnitude of the rate is known, and curves over temperature need known inputs or gravity";
+            let remedy = "give a recording from a rate table, or of a unit that stands still (reference = \"gravity\")";
+            return Err(Error::new(&prepared.place, problem, remedy));
+        }
         let condensed = &prepared.condensed;
         let thermometer = Thermometer::of(condensed, manifest.power_on_s, &prepared.place)?;
         let found = condensed.warnings.iter().chain(&prepared.dwells.warnings);

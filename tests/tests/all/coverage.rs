@@ -16,7 +16,9 @@ use mimu_recording::{
 use mimu_rig::ideal::Ideal;
 use mimu_rig::random::Random;
 use mimu_tests::bench;
-use mimu_tests::coverage::{Dwells, Tally, by_hand, with_a_table, with_turning_inputs};
+use mimu_tests::coverage::{
+    Dwells, Tally, by_hand, on_a_record_player, with_a_table, with_turning_inputs,
+};
 use nalgebra::Vector3;
 
 /// Every parameter within 93 to 97 %, and what so many runs scatter by: 4 sigmas, as up to 60 parameters are looked at.
@@ -96,6 +98,25 @@ fn turning_inputs(runs: u64) {
 #[test]
 fn intervals_hold_the_truth_where_inputs_move_within_dwells() {
     turning_inputs(24);
+}
+
+/// Rates known to 0.3 %, which is twenty times the noise of a scale factor here, and to 0.01 %, which is below it.
+fn record_players(runs: u64) {
+    for rate_error in [0.003, 0.0001] {
+        println!("rates known to {} %", 100.0 * rate_error);
+        on_a_record_player(runs, rate_error).iter().for_each(judge);
+    }
+}
+
+#[test]
+fn intervals_hold_the_truth_on_a_record_player_of_which_the_rates_are_known_to_within_an_error() {
+    record_players(24);
+}
+
+#[test]
+#[ignore = "nightly: more recordings"]
+fn intervals_of_many_hold_the_truth_on_a_record_player() {
+    record_players(200);
 }
 
 #[test]

@@ -14,6 +14,8 @@ mod ramps;
 mod real_ferraris;
 mod real_mikoff;
 mod real_xsens;
+mod record_player;
+mod recording_problems;
 mod several_recordings;
 mod signed_low_byte;
 mod stated_noise;

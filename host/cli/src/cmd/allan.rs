@@ -13,7 +13,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use mimu_recording::{MANIFEST_FILE, Recording};
 
-use crate::arguments::JsonArgs;
+use crate::arguments::{JsonArgs, VerboseArgs};
 use crate::output::{check_outputs, print, progress};
 
 #[derive(Args)]
@@ -50,6 +50,8 @@ pub struct AllanArgs {
     /// Of readings in V or counts `design` and `export` take it only with --calibration; the others take it either way.
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -143,9 +145,11 @@ pub fn run(args: &AllanArgs) -> Result<()> {
     bar.finish_and_clear();
     let surveys = surveys?;
     let result = AllanResult::of(&surveys);
-    let mut text = report::allan_text(&result);
+    let mut text = report::allan_text(&result, args.verbose.verbose);
     let mut staged = Vec::new();
-    if let (Some(path), Some(noise)) = (&args.output, result.noise_file()) {
+    if let (Some(path), Some(mut noise)) = (&args.output, result.noise_file()) {
+        let now = jiff::Timestamp::now().round(jiff::Unit::Second);
+        noise.created = now.ok().map(|now| now.to_string());
         staged.push(stage(path, noise.to_toml())?);
         text.push_str(&format!("\nnoise: {}\n", path.display()));
     }

@@ -7,7 +7,7 @@ use mimu::calibration::Calibration;
 use mimu::calibration::comparison::compare;
 use mimu_recording::error::Result;
 
-use crate::arguments::JsonArgs;
+use crate::arguments::{JsonArgs, VerboseArgs};
 use crate::output::print;
 use crate::report::compare_text;
 
@@ -16,9 +16,8 @@ pub struct CompareArgs {
     /// Calibrations of one unit, two or more
     #[arg(required = true, num_args = 2.., value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// Print all parameters, and not only those that changed
-    #[arg(long)]
-    all: bool,
+    #[command(flatten)]
+    verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -27,5 +26,10 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let read = |path: &PathBuf| Ok((path.display().to_string(), Calibration::read(path)?));
     let all: Vec<_> = args.files.iter().map(read).collect::<Result<_>>()?;
     let result = compare(&all)?;
-    print(&args.json, &compare_text(&result, args.all), &result, None)
+    print(
+        &args.json,
+        &compare_text(&result, args.verbose.verbose),
+        &result,
+        None,
+    )
 }

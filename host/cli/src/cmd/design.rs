@@ -21,7 +21,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use nalgebra::Vector3;
 
-use crate::arguments::{JsonArgs, SensorArg};
+use crate::arguments::{JsonArgs, SensorArg, VerboseArgs};
 use crate::output::{check_outputs, print};
 
 #[derive(Args)]
@@ -103,6 +103,8 @@ pub struct DesignArgs {
     /// Plan to write, for a table or a person to carry out
     #[arg(short, value_name = "FILE", conflicts_with = "compare")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -192,7 +194,9 @@ impl DesignArgs {
             (Some(TableArg::ThreeAxis), _) | (None, Reference::Table) => Fixture::ThreeAxis,
             (Some(TableArg::TwoAxis), _) => Fixture::TwoAxis,
             (Some(TableArg::Faces), _) => Fixture::Faces,
-            (Some(TableArg::Hand), _) | (None, Reference::Gravity) => Fixture::Hand,
+            (Some(TableArg::Hand), _) | (None, Reference::Gravity | Reference::TurntableRate) => {
+                Fixture::Hand
+            }
         }
     }
 
@@ -257,6 +261,11 @@ impl DesignArgs {
             (Sensor::Gyro, Reference::Table) => {
                 Problem::gyro(Model::gyro(&self.model, span), self.fixture(), rates)
             }
+            (Sensor::Gyro, Reference::TurntableRate) => Err(Error::new(
+                "gyro, --reference turntable-rate",
+                "orientations on a record player are not designed here",
+                "design poses by gravity (--sensor accel --reference gravity --table hand): the same orientations serve a gyro",
+            )),
             (Sensor::Gyro, Reference::Gravity) => Err(Error::new(
                 "gyro, --reference gravity",
                 "by hand a gyro's known input are the turns between dwells, which are not designed here",
@@ -425,7 +434,7 @@ pub fn run(args: &DesignArgs) -> Result<()> {
         return print(&args.json, &text, &comparison, None);
     }
     let designed = args.designed()?;
-    let mut text = report::design_text(&designed);
+    let mut text = report::design_text(&designed, args.verbose.verbose);
     let mut plan = None;
     if let Some(path) = &args.output {
         plan = Some(stage(path, designed.plan(args.motion().slew))?);

@@ -28,7 +28,7 @@ pub struct DeviceArgs {
 
 #[derive(Subcommand)]
 enum DeviceCommand {
-    /// Who it is, why it started, what it can do and what it holds
+    /// Unit number, cause of the last start, abilities and stored calibration
     Info(PlainArgs),
     /// Samples as they come, as CSV
     Stream(StreamArgs),

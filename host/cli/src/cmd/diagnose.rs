@@ -12,7 +12,7 @@ use mimu::prepared::Prepared;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
-use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, StillArgs};
+use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, StillArgs, VerboseArgs};
 use crate::output::{now, print};
 use crate::reading::read;
 
@@ -42,9 +42,6 @@ pub struct DiagnoseArgs {
     /// Plan of the next experiment to write: what this recording could not show, and what it could not tell apart
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Print everything: each coefficient, the reason of every rejected effect, all residuals, notes and experiments
-    #[arg(long)]
-    all: bool,
     /// Print the experiments that would show what this recording could not show, and distinguish what it could not
     #[arg(long)]
     next: bool,
@@ -54,6 +51,8 @@ pub struct DiagnoseArgs {
     keep: KeepArgs,
     #[command(flatten)]
     noise: NoiseArgs,
+    #[command(flatten)]
+    verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -132,7 +131,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<()> {
         }
     }
     let detail = report::Detail {
-        all: args.all,
+        all: args.verbose.verbose,
         next: args.next,
     };
     print(

@@ -6,7 +6,7 @@ use clap::Args;
 use mimu::calibration::Calibration;
 use mimu::noise::noise_file::NoiseFile;
 use mimu_export::{Export, Format, Sources, heading};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::result_file::stage;
 use serde::Serialize;
 
@@ -46,6 +46,10 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         .out
         .as_deref()
         .ok_or_else(|| Error::new("-o", "it is missing", "say which file to write: -o FILE"))?;
+    if args.noise.is_some() && !args.format.has_noise() {
+        let problem = "this format has no place for the noise of a unit";
+        return Err(Error::new("export", problem, "leave it out").about(Argument::Noise));
+    }
     let sources = [args.calibration.as_deref(), args.noise.as_deref()];
     let own = args.format.inputs();
     let own = own.iter().map(PathBuf::as_path);

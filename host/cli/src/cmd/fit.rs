@@ -10,7 +10,7 @@ use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
-use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs};
+use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, VerboseArgs};
 use crate::output::{now, print};
 use crate::reading::read_samples_or_means;
 use crate::report;
@@ -40,6 +40,8 @@ pub(crate) struct FitArgs {
     /// Calibration file to write
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -82,10 +84,13 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     let inputs = [args.noise.file.as_deref()];
     let prepared = read_samples_or_means(&args.recording, args.still.finding(), &outputs, &inputs)?;
     let prepared = args.keep.apply(args.noise.state(prepared)?);
-    if args.method.is_some() && prepared.manifest.reference == Reference::Gravity {
+    if args.method.is_some() && prepared.manifest.reference != Reference::Table {
         return Err(Error::new(
             args.recording.display(),
-            "--method chooses between estimators for known inputs, and reference is \"gravity\"",
+            format!(
+                "--method chooses between estimators for known inputs, and reference is \"{}\"",
+                prepared.manifest.reference
+            ),
             "leave --method out, or give the steps their inputs (reference = \"table\")",
         ));
     }
@@ -94,7 +99,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     let fitted =
         fit(prepared, options).inspect_err(|_| eprint!("{}", report::dwell_table(&found)))?;
     let result = FitResult::of(&fitted);
-    let mut text = report::fit_text(&result);
+    let mut text = report::fit_text(&result, args.verbose.verbose);
     if args.dwells {
         text.push('\n');
         text.push_str(&report::dwell_table(&result.dwells));

@@ -10,7 +10,8 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
     BrokenLimit, ColumnList, Decimal, Face, ImportOptions, ImportSummary, Offset, Preset, RawUnit,
-    Reference, RowFilter, SampleFormat, Scale, Separator, TwosComplement, Zero, import, is_log,
+    Reference, RowFilter, SampleFormat, Scale, Separator, Turntable, TurntableRate, TwosComplement,
+    Zero, import, is_log, rate_error,
 };
 
 use crate::arguments::JsonArgs;
@@ -30,7 +31,7 @@ pub(crate) struct ImportArgs {
     /// ref_force_x_mps2.., and sample, an index from which the time follows with --rate-hz.
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     columns: Vec<ColumnList>,
-    /// Whose files they are, which says columns, units and signs where they are not given; without it, by the header
+    /// Maker or program whose layout the files have: columns, units and signs; found by the header without it
     #[arg(long, value_name = "NAME", value_parser = presets())]
     preset: Option<Preset>,
     /// The rows are means over a pose or a rate each, and no samples: mean readings, and as far as known standard deviations of a
@@ -79,9 +80,23 @@ pub(crate) struct ImportArgs {
     /// Which sensor of a log of PX4 or ArduPilot, from 0; without it, the only one
     #[arg(long, value_name = "N")]
     instance: Option<u32>,
-    /// What is known of the input: table (ref_ columns or --inputs) or gravity (its size, at rest)
+    /// What is known of the input: table (ref_ columns or --inputs), gravity (its magnitude, at rest), or turntable-rate (the magnitude of
+    /// the rate, as on a record player, with --rate-dps and --rate-error)
     #[arg(long)]
     reference: Reference,
+    /// Magnitudes of the turntable's rates, deg/s: 200 for 33 1/3 rpm, 270 for 45 rpm; of a step by its number, label or file name
+    /// (`edge=270`, `rest=0`), else the readings show which dwell has which
+    #[arg(
+        long,
+        value_name = "RATE",
+        value_delimiter = ',',
+        requires = "rate_error",
+        allow_negative_numbers = true
+    )]
+    rate_dps: Vec<TurntableRate>,
+    /// How well these rates are known: half of a 95 % interval, as `0.1%`; no number of dwells reduces it
+    #[arg(long, value_name = "PERCENT", requires = "rate_dps", value_parser = rate_error)]
+    rate_error: Option<f64>,
     /// Factor for a column, or for gyro or accel: `gyro=0.0174533`
     #[arg(long, value_name = "COLUMN=FACTOR")]
     scale: Vec<Scale>,
@@ -208,6 +223,9 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         twos_complements: args.twos_complement,
         zeros: args.zero,
         step_gap_s: args.step_gap,
+        turntable: args
+            .rate_error
+            .map(|error| Turntable::new(&args.rate_dps, error)),
         columns: args.columns,
         separator: args.separator,
         rate_hz: args.rate_hz,

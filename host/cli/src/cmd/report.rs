@@ -15,6 +15,7 @@ use mimu_recording::result_file::stage;
 use crate::arguments::{KeepArgs, NoiseArgs, StillArgs};
 use crate::output::{now, show};
 use crate::reading::read;
+use crate::report::text::problems;
 use crate::report::{Made, UnitReport, unit_page};
 
 #[derive(Args)]
@@ -132,7 +133,11 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     };
     stage(&args.out, unit_page(&unit, &made)?)?.publish()?;
     let verdict = match unit.diagnosis {
-        Some(d) => format!("{}: {}\n", d.device, d.verdict.name()),
+        Some(d) => {
+            let mut out = String::new();
+            problems(&mut out, &d.recording_problems, false);
+            out + &format!("{}: {}\n", d.device, d.verdict.name())
+        }
         None => format!("{}\n", calibration.device),
     };
     show(&format!("{verdict}page: {}\n", args.out.display()))

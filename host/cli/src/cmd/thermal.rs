@@ -18,7 +18,7 @@ use mimu_thermal::fit::{Estimator, Options, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 
-use crate::arguments::{JsonArgs, NoiseArgs, StillArgs};
+use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, VerboseArgs};
 use crate::output::{check_outputs, now, print};
 use crate::reading::read;
 use crate::report::{self, Made, thermal_plot};
@@ -78,6 +78,8 @@ struct FitArgs {
     /// The same with all figures as one HTML page
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
+    #[command(flatten)]
+    verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -176,7 +178,7 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<()> {
     };
     let fitted = fit(sessions, &verify, options)?;
     let result = ThermalResult::of(&fitted);
-    let mut text = report::thermal_text(&result);
+    let mut text = report::thermal_text(&result, args.verbose.verbose);
     let mut staged = Vec::new();
     let now = now();
     if let Some(path) = &args.output {

@@ -7,7 +7,7 @@ use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
 use mimu_recording::error::Result;
 
-use crate::arguments::{JsonArgs, NoiseArgs, StillArgs};
+use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, VerboseArgs};
 use crate::output::print;
 use crate::reading::read_samples_or_means;
 use crate::report;
@@ -24,6 +24,8 @@ pub(crate) struct VerifyArgs {
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
+    verbose: VerboseArgs,
+    #[command(flatten)]
     json: JsonArgs,
 }
 
@@ -38,5 +40,10 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     )?;
     let prepared = args.noise.state(prepared)?;
     let result = verify(&prepared, &calibration)?;
-    print(&args.json, &report::verify_text(&result), &result, None)
+    print(
+        &args.json,
+        &report::verify_text(&result, args.verbose.verbose),
+        &result,
+        None,
+    )
 }

@@ -76,7 +76,7 @@ pub(crate) struct WizardArgs {
     /// How well the unit's axes are lined up with the table's, degrees: 95 % of each angle; no dwell shows it, and it goes into the intervals
     #[arg(long, value_name = "DEG", default_value_t = 0.02, value_parser = |t: &str| number(t, 0.0, 10.0))]
     mounting: f64,
-    /// Whose estimate becomes the calibration; the other is compared with it
+    /// Which estimate becomes the calibration, the PC's or the device's; the other is compared with it
     #[arg(long, value_enum, default_value = "pc")]
     by: By,
     /// All planned dwells and no more, whatever the targets say

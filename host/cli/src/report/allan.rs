@@ -3,20 +3,33 @@
 use std::fmt::Write as _;
 
 use mimu::allan::model::Term;
-use mimu::quantity::{Sensor, duration, significant};
+use mimu::quantity::{Sensor, duration, plural, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::allan::{AllanResult, ChannelResult, RecordingResult};
 
-use crate::report::text::warn;
+use crate::report::text::{warn, warn_within};
 
-/// Result of `mimu allan`: a block for each recording.
-pub fn allan_text(result: &AllanResult) -> String {
-    let block = |recording| recording_text(result, recording);
-    let blocks: Vec<String> = result.recordings.iter().map(block).collect();
-    blocks.join("\n")
+/// Result of `mimu allan`: the coefficients of the first recording, or with `verbose` a block with everything for each.
+pub fn allan_text(result: &AllanResult, verbose: bool) -> String {
+    if verbose {
+        let block = |recording| recording_text(result, recording, true);
+        let blocks: Vec<String> = result.recordings.iter().map(block).collect();
+        return blocks.join("\n");
+    }
+    let Some(first) = result.recordings.first() else {
+        return String::new();
+    };
+    let mut out = recording_text(result, first, false);
+    let others = result.recordings.len() - 1;
+    if others > 0 {
+        let others = plural(others as u64, "more recording");
+        let _ = writeln!(out, "and {others}: --verbose");
+    }
+    out += "next: -o noise.toml for mimu fit --noise and mimu export; --verbose prints curve and reasons\n";
+    out
 }
 
-fn recording_text(result: &AllanResult, recording: &RecordingResult) -> String {
+fn recording_text(result: &AllanResult, recording: &RecordingResult, verbose: bool) -> String {
     let mut out = String::new();
     let [from, to] = recording.span_s;
     let temperature = recording.temp_c.map(|t| format!(", {t:.1} °C"));
@@ -35,12 +48,14 @@ fn recording_text(result: &AllanResult, recording: &RecordingResult) -> String {
         let channels = result.channels(&recording.recording, sensor);
         if !channels.is_empty() {
             let _ = writeln!(out);
-            sensor_text(&mut out, result.confidence, sensor, &channels);
+            sensor_text(&mut out, result.confidence, sensor, &channels, verbose);
         }
     }
-    if !recording.warnings.is_empty() {
+    if verbose && !recording.warnings.is_empty() {
         let _ = writeln!(out);
         warn(&mut out, recording.warnings.iter());
+    } else if !verbose {
+        warn_within(&mut out, recording.warnings.iter().cloned(), 2);
     }
     out
 }
@@ -70,6 +85,7 @@ fn sensor_text(
     confidence: Option<f64>,
     sensor: Sensor,
     channels: &[&ChannelResult],
+    verbose: bool,
 ) {
     let percent = 100.0 * confidence.unwrap_or(f64::NAN);
     let _ = writeln!(
@@ -82,9 +98,19 @@ fn sensor_text(
         let Some(any) = channels.iter().find_map(|c| c.get(term).ok()) else {
             continue;
         };
-        for unit in readable::noise(&any.unit) {
+        let units = readable::noise(&any.unit);
+        let shown = if verbose { units.len() } else { 1 };
+        for unit in units.into_iter().take(shown) {
             let cells = channels.iter().map(|c| match c.get(term) {
-                Ok(k) => interval(k.value, k.lower, k.upper, &unit),
+                Ok(k) if verbose => interval(k.value, k.lower, k.upper, &unit),
+                // Three of them fit in 100 columns.
+                Ok(k) => {
+                    let [low, high] = [k.lower, k.upper].map(|end| 100.0 * (end / k.value - 1.0));
+                    format!(
+                        "{} {low:+.1} {high:+.1} %",
+                        significant(k.value * unit.factor)
+                    )
+                }
                 Err(_) => "-".into(),
             });
             rows.push((format!("{}, {}", term.letter(), unit.unit), cells.collect()));
@@ -105,6 +131,9 @@ fn sensor_text(
         channels.iter().map(dwell).collect(),
     ));
     write_rows(out, &rows);
+    if !verbose {
+        return;
+    }
     if !factors.is_empty() {
         let _ = writeln!(
             out,

@@ -129,6 +129,8 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
 const BENT_AT: f64 = 0.371;
 /// Width and height that the label of a frequency takes, pixels.
 const LABEL: (f64, f64) = (54.0, 14.0);
+/// Distance of the middle of a letter from the edge of the frame, pixels.
+const EDGE: f64 = 10.0;
 
 /// Where a line bends the curves: a wedge that points at the highest of them, and the frequency above; lines that several
 /// channels have are one.
@@ -159,7 +161,9 @@ fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
         let inside = frame.x.contains(&x) && frame.y.contains(&y);
         inside.then(|| {
             let (x, y) = (frame.at_x(x), frame.at_y(y) - 5.0);
-            let (left, mut bottom) = (x + 6.0, y - 4.0);
+            // Beside the wedge, and inside the frame at its edges.
+            let left = (x + 6.0).min(frame.across.end - LABEL.0);
+            let mut bottom = (y - 4.0).max(frame.down.start + LABEL.1);
             for (other, above) in &labels {
                 if (left - other).abs() < LABEL.0 && (bottom - above).abs() < LABEL.1 {
                     bottom = above + LABEL.1;
@@ -189,7 +193,8 @@ fn marks(frame: &Frame, channels: &[&ChannelResult], term: Term, by: f64) -> Mar
     html! {
         @for (k, x, y) in &marks { circle class=(CLASSES[*k]) cx=(px(*x)) cy=(px(*y)) r="4" {} }
         @if let Some((_, x, y)) = marks.iter().min_by(|a, b| a.2.total_cmp(&b.2)) {
-            text x=(px(*x)) y=(px(y - 9.0)) text-anchor="middle" { (term.letter()) }
+            @let x = x.clamp(frame.across.start + EDGE, frame.across.end - EDGE);
+            text x=(px(x)) y=(px((y - 9.0).max(frame.down.start + LABEL.1))) text-anchor="middle" { (term.letter()) }
         }
     }
 }

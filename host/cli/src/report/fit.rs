@@ -7,13 +7,14 @@ use mimu::parameter::Kind;
 use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable;
 use mimu::result::fit::{DwellResult, FitResult, Parameter, SensorFitResult};
+use mimu::warning::Warning;
 use mimu_recording::Reference;
 
 use crate::hint;
-use crate::report::text::warn;
+use crate::report::text::{counted, kinds, problems, warn, warn_within};
 
-/// Result of `mimu fit`.
-pub fn fit_text(fit: &FitResult) -> String {
+/// Result of `mimu fit`: a summary, or with `verbose` everything.
+pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
     let mut out = String::new();
     if fit.means {
         let _ = writeln!(
@@ -24,21 +25,142 @@ pub fn fit_text(fit: &FitResult) -> String {
             fit.gravity_mps2
         );
     } else {
-        recorded(&mut out, fit);
+        recorded(&mut out, fit, verbose);
     }
-    for (name, sensor) in fit.sensors.present() {
-        let _ = writeln!(out);
-        sensor_text(&mut out, fit, name, sensor);
+    problems(&mut out, &fit.recording_problems, verbose);
+    if verbose {
+        for (name, sensor) in fit.sensors.present() {
+            let _ = writeln!(out);
+            sensor_text(&mut out, fit, name, sensor);
+        }
+    } else {
+        let _ = writeln!(out, "verdict: {}\n", verdict(fit));
+        errors_text(&mut out, fit);
+        for (name, sensor) in fit.sensors.present() {
+            let _ = writeln!(out);
+            let head = format!("{name}, ± of 95 %");
+            parameters_text(&mut out, fit, name, sensor, &head);
+        }
     }
-    if !fit.warnings.is_empty() {
-        let _ = writeln!(out);
-        warn(&mut out, fit.warnings.iter().map(hint::of_warning));
+    let others = fit.warnings.iter().filter(|w| !w.is_of_recording());
+    match verbose {
+        true => {
+            let all: Vec<String> = others.map(hint::of_warning).collect();
+            if !all.is_empty() {
+                let _ = writeln!(out);
+                warn(&mut out, all.iter());
+            }
+        }
+        false => {
+            let kinds = kinds(others, Warning::is_like);
+            let shown = kinds.map(|(warning, more)| counted(hint::of_warning(warning), more));
+            warn_within(&mut out, shown, 1);
+            let _ = writeln!(out, "next: {}", next(fit));
+        }
     }
     out
 }
 
+/// Error over that of noise alone from which on something else is in it.
+const BEYOND_NOISE: f64 = 2.0;
+
+/// Sensors whose error exceeds noise, with how many times.
+fn beyond(fit: &FitResult) -> Vec<(Sensor, f64)> {
+    let share = |s: &SensorFitResult| s.held_out_rms.unwrap_or(s.rms) / s.noise_floor;
+    let all = fit.sensors.present().map(|(name, s)| (name, share(s)));
+    all.filter(|(_, share)| *share > BEYOND_NOISE).collect()
+}
+
+/// What the fit amounts to.
+fn verdict(fit: &FitResult) -> String {
+    let names: Vec<&str> = fit.sensors.present().map(|(name, _)| name.name()).collect();
+    let calibrated = format!("{} calibrated", names.join(" and "));
+    let beyond: Vec<String> = beyond(fit)
+        .iter()
+        .map(|(name, share)| format!("{} times that of noise ({name})", significant(*share)))
+        .collect();
+    let known = fit
+        .sensors
+        .present()
+        .all(|(_, s)| s.noise_floor.is_finite());
+    let errors = match (beyond.is_empty(), known) {
+        (false, _) => format!("the error is {}", beyond.join(" and ")),
+        (true, true) => "the errors are those of noise".into(),
+        (true, false) => "no dwell shows the noise to compare the errors with".into(),
+    };
+    format!("{calibrated}; {errors}")
+}
+
+/// What to do after the fit.
+fn next(fit: &FitResult) -> String {
+    let judge = "judge it on another recording (mimu verify OTHER --calibration FILE)";
+    if !fit.recording_problems.is_empty() {
+        return format!("mend what is wrong with the recording, and record again; or {judge}");
+    }
+    match beyond(fit).is_empty() || fit.reference == Reference::TurntableRate {
+        true => format!("{judge}; --verbose prints how it was found"),
+        false => format!("find what the model lacks (mimu diagnose), then {judge}"),
+    }
+}
+
+/// Errors of both sensors in one table.
+fn errors_text(out: &mut String, fit: &FitResult) {
+    let came = fit
+        .sensors
+        .present()
+        .any(|(_, s)| s.as_they_came_rms.is_some());
+    let last = if came { "  as it came" } else { "" };
+    let _ = writeln!(
+        out,
+        "{:<18}{:>11}{:>11}{:>11}{last}",
+        "rms error", "held out", "in sample", "noise"
+    );
+    for (name, s) in fit.sensors.present() {
+        let unit = readable::error(s.unit);
+        let shown = |value: Option<f64>| match value.filter(|v| v.is_finite()) {
+            Some(value) => significant(value * unit.factor),
+            None => "-".into(),
+        };
+        let last = match (came, s.as_they_came_rms) {
+            (true, came) => shown(came),
+            (false, _) => String::new(),
+        };
+        let width = if came { 12 } else { 0 };
+        let _ = writeln!(
+            out,
+            "{:<18}{:>11}{:>11}{:>11}{last:>width$}  {}",
+            format!("{name}, {}", unit.unit),
+            shown(s.held_out_rms),
+            shown(Some(s.rms)),
+            shown(Some(s.noise_floor)),
+            used(s)
+        );
+        if let Some(rms) = s.static_rms {
+            let unit = readable::error("rad/s");
+            let held = s.static_held_out_rms.flatten();
+            let shown = |v: Option<f64>| v.map_or("-".into(), |v| significant(v * unit.factor));
+            let _ = writeln!(
+                out,
+                "{:<18}{:>11}{:>11}",
+                format!("  at rest, {}", unit.unit),
+                shown(held),
+                shown(Some(rms))
+            );
+        }
+    }
+}
+
+/// Of what the errors are, and how many there are.
+fn used(sensor: &SensorFitResult) -> String {
+    let n = sensor.residuals.len() as u64;
+    match sensor.unit {
+        "rad" => plural(n, "turn"),
+        _ => plural(sensor.dwells as u64, "dwell"),
+    }
+}
+
 /// How long the recording is, and what its dwells are.
-fn recorded(out: &mut String, fit: &FitResult) {
+fn recorded(out: &mut String, fit: &FitResult, verbose: bool) {
     let _ = writeln!(
         out,
         "{}: {} samples, {:.1} s at {:.2} Hz, gravity {} m/s²",
@@ -64,6 +186,9 @@ fn recorded(out: &mut String, fit: &FitResult) {
         }
         Some(d) => {
             let _ = writeln!(out, "{n} found, {length}");
+            if !verbose {
+                return;
+            }
             let _ = writeln!(
                 out,
                 "  still: variance over {:.1} s at most that of the quietest twentieth times {} (accel), {} (gyro);\n  {:.1} s left out at both ends; shorter than {} s not used",
@@ -157,13 +282,23 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorF
             );
         }
     }
-    parameters_text(out, fit, name, sensor);
+    parameters_text(out, fit, name, sensor, "  ± of 95 %");
 }
 
-/// The physical quantities by axis.
-fn parameters_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorFitResult) {
-    // The accelerometer's own axes are the frame then.
-    let by_choice = fit.reference == Reference::Gravity && name == Sensor::Accel;
+/// The physical quantities by axis, under `head`.
+fn parameters_text(
+    out: &mut String,
+    fit: &FitResult,
+    name: Sensor,
+    sensor: &SensorFitResult,
+    head: &str,
+) {
+    // A triad's own axes are the frame where only a magnitude is known.
+    let by_choice = match fit.reference {
+        Reference::Table => false,
+        Reference::Gravity => name == Sensor::Accel,
+        Reference::TurntableRate => true,
+    };
     let mut rows = Vec::new();
     for kind in Kind::PHYSICAL {
         if kind == Kind::Misalignment && by_choice {
@@ -192,8 +327,8 @@ fn parameters_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &Sen
     let width = 2 + cells.map(|c| c.chars().count()).max().unwrap_or(0);
     let _ = writeln!(
         out,
-        "  {:<34}{:>width$}{:>width$}{:>width$}   95 %",
-        "", "x", "y", "z"
+        "{head:<36}{:>width$}{:>width$}{:>width$}",
+        "x", "y", "z"
     );
     for (label, cells) in &rows {
         let _ = write!(out, "  {label:<34}");

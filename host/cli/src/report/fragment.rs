@@ -80,7 +80,7 @@ pub fn of_thermal(result: &ThermalResult, made: &Made) -> String {
 
 /// A design, as the command prints it.
 pub fn of_design(design: &Design) -> String {
-    fragment(&html! { pre { (design_text(design)) } })
+    fragment(&html! { pre { (design_text(design, true)) } })
 }
 
 /// A verification by the recording `name`.

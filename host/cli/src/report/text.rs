@@ -2,6 +2,9 @@
 
 use std::fmt::{Display, Write as _};
 
+use mimu::quantity::plural;
+use mimu::recording_problem::RecordingProblem;
+
 /// Width that text keeps to, characters.
 pub(crate) const COLUMNS: usize = 98;
 
@@ -33,5 +36,63 @@ pub(super) fn wrap(out: &mut String, head: &str, text: &str) {
 pub(crate) fn warn(out: &mut String, warnings: impl Iterator<Item = impl Display>) {
     for warning in warnings {
         let _ = writeln!(out, "warning: {warning}");
+    }
+}
+
+/// Lines that a summary has at most.
+pub(crate) const SUMMARY: usize = 25;
+/// Lines of a summary that what is wrong with the recording takes at most.
+const OF_PROBLEMS: usize = 7;
+
+/// What is wrong with a recording, a line each, which is not wrapped so that programs find it; without `verbose` only so many.
+pub(crate) fn problems(out: &mut String, problems: &[RecordingProblem], verbose: bool) {
+    if problems.is_empty() {
+        return;
+    }
+    let _ = writeln!(out, "wrong with this recording:");
+    let shown = if verbose { problems.len() } else { OF_PROBLEMS };
+    for problem in problems.iter().take(shown) {
+        let _ = writeln!(out, "  - {problem}");
+    }
+    if problems.len() > shown {
+        let _ = writeln!(out, "  - and {} more (--verbose)", problems.len() - shown);
+    }
+}
+
+/// The first of each kind, and how many more there are.
+pub(crate) fn kinds<'a, W: 'a>(
+    warnings: impl Iterator<Item = &'a W>,
+    is_like: impl Fn(&W, &W) -> bool,
+) -> impl Iterator<Item = (&'a W, usize)> {
+    let mut kinds: Vec<(&W, usize)> = Vec::new();
+    for warning in warnings {
+        match kinds.iter_mut().find(|(w, _)| is_like(w, warning)) {
+            Some((_, more)) => *more += 1,
+            None => kinds.push((warning, 0)),
+        }
+    }
+    kinds.into_iter()
+}
+
+/// `warning`, and that there are `more` of its kind.
+pub(crate) fn counted(warning: String, more: usize) -> String {
+    match more {
+        0 => warning,
+        more => format!("{warning} ({more} more of this kind: --verbose)"),
+    }
+}
+
+/// As many warnings, a line each, as a summary that is to have `after` more lines has room for, and how many more there are.
+pub(crate) fn warn_within(out: &mut String, warnings: impl Iterator<Item = String>, after: usize) {
+    let warnings: Vec<String> = warnings.collect();
+    let room = SUMMARY.saturating_sub(out.lines().count() + after);
+    let shown = match warnings.len() <= room {
+        true => warnings.len(),
+        false => room.saturating_sub(1),
+    };
+    warn(out, warnings.iter().take(shown));
+    let left = (warnings.len() - shown) as u64;
+    if left > 0 {
+        let _ = writeln!(out, "warning: {} (--verbose)", plural(left, "more warning"));
     }
 }

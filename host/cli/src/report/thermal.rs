@@ -10,7 +10,7 @@ use mimu_thermal::fit::Verdict;
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
 use crate::hint;
-use crate::report::text::{warn, wrap};
+use crate::report::text::{warn, warn_within, wrap};
 
 /// Temperatures at which curves are shown.
 pub(super) const SHOWN: usize = 5;
@@ -23,8 +23,11 @@ pub(super) const VERDICT_ONE_WAY: &str = "the temperature goes one way only: lag
 pub(super) const VERDICT_MISFIT: &str = "the errors that remain are far beyond noise: something other than temperature and lag moves the readings, and the \
      intervals do not hold it.";
 
-/// Result of `mimu thermal fit`.
-pub fn thermal_text(result: &ThermalResult) -> String {
+/// Temperatures side by side in a table of 100 columns.
+const ACROSS: usize = 3;
+
+/// Result of `mimu thermal fit`: a summary, or with `verbose` everything.
+pub fn thermal_text(result: &ThermalResult, verbose: bool) -> String {
     let mut out = String::new();
     let [from, to] = result.range_c;
     let _ = writeln!(
@@ -47,20 +50,24 @@ pub fn thermal_text(result: &ThermalResult) -> String {
     }
     for (name, sensor) in result.sensors.present() {
         let _ = writeln!(out);
-        sensor_text(&mut out, name, sensor);
-        curves_text(&mut out, name, result);
+        sensor_text(&mut out, name, sensor, verbose);
+        curves_text(&mut out, name, result, verbose);
     }
-    if !result.warnings.is_empty() {
+    if verbose && !result.warnings.is_empty() {
         let _ = writeln!(out);
         warn(&mut out, result.warnings.iter().map(hint::of_thermal));
+    }
+    if !verbose {
+        warn_within(&mut out, result.warnings.iter().map(hint::of_thermal), 1);
+        out += "next: --page shows all curves, --verify judges them on another recording; --verbose prints more\n";
     }
     out
 }
 
-fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult) {
+fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult, verbose: bool) {
     let unit = readable::error(&sensor.unit);
     let _ = writeln!(out, "{name}");
-    if let Some(used) = &sensor.used {
+    if let Some(used) = sensor.used.as_ref().filter(|_| verbose) {
         let _ = writeln!(out, "  used: {}", used.words());
     }
     match (&sensor.lag_s, &sensor.lag_reason) {
@@ -88,6 +95,9 @@ fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult) {
         }
         let _ = writeln!(out, ", by noise alone {}", unit.write(floor));
     }
+    if !verbose {
+        return;
+    }
     bins_text(out, sensor);
     for h in sensor.hysteresis.iter().flatten() {
         let [mean, largest] = [(h.value, h.half_width), (h.largest, h.largest_half_width)]
@@ -96,13 +106,15 @@ fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult) {
             Some(k) => format!(" ({} K)", significant(k)),
             None => String::new(),
         };
-        let _ = writeln!(
-            out,
-            "  hysteresis {}, {}: rms {}{kelvin}, largest {largest} at {:.0} °C, heating minus cooling on average {mean}",
-            h.axis,
-            unit.unit,
+        let text = format!(
+            "rms {}{kelvin}, largest {largest} at {:.0} °C, heating minus cooling on average {mean}",
             significant(h.rms * unit.factor),
             h.largest_at_c,
+        );
+        wrap(
+            out,
+            &format!("  hysteresis {}, {}: ", h.axis, unit.unit),
+            &text,
         );
     }
 }
@@ -138,32 +150,39 @@ pub(super) fn physical(curve: &CurveResult, sensor: Sensor) -> bool {
     curve.sensor == sensor && curve.of.0 != Kind::Inverse
 }
 
-/// Physical parameters at some temperatures; JSON has the inverse model too, and more temperatures.
-fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult) {
-    let curves: Vec<&CurveResult> = result.curves.iter().filter(|c| physical(c, name)).collect();
+/// Physical parameters at some temperatures, scale factors and biases at three without `verbose`; JSON has the inverse model too, and more temperatures.
+fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult, verbose: bool) {
+    let main = |c: &&CurveResult| {
+        verbose || matches!(c.of.0, Kind::Scale | Kind::Bias | Kind::BiasAndGravity)
+    };
+    let all = result.curves.iter().filter(|c| physical(c, name));
+    let curves: Vec<&CurveResult> = all.filter(main).collect();
     let Some(first) = curves.first() else {
         return;
     };
     let last = first.temp_c.len() - 1;
-    let shown: Vec<usize> = (0..SHOWN).map(|k| k * last / (SHOWN - 1)).collect();
-    let _ = write!(out, "  {:<34}", "95 % intervals at");
-    for &k in &shown {
-        let _ = write!(out, "{:>22}", format!("{:.1} °C", first.temp_c[k]));
-    }
-    let _ = writeln!(out);
-    for curve in curves {
-        let unit = readable::parameter(&curve.unit);
-        let label = curve.of;
-        let _ = write!(out, "  {:<34}", format!("{label}, {}", unit.unit));
-        for &k in &shown {
-            let half = 0.5 * (curve.upper[k] - curve.lower[k]) * unit.factor;
-            let _ = write!(
-                out,
-                "{:>22}",
-                plus_minus(curve.value[k] * unit.factor, half)
-            );
+    let count = if verbose { SHOWN } else { ACROSS };
+    let shown: Vec<usize> = (0..count).map(|k| k * last / (count - 1)).collect();
+    for shown in shown.chunks(ACROSS) {
+        let _ = write!(out, "  {:<32}", "95 % intervals at");
+        for &k in shown {
+            let _ = write!(out, "{:>22}", format!("{:.1} °C", first.temp_c[k]));
         }
         let _ = writeln!(out);
+        for curve in &curves {
+            let unit = readable::parameter(&curve.unit);
+            let label = curve.of;
+            let _ = write!(out, "  {:<32}", format!("{label}, {}", unit.unit));
+            for &k in shown {
+                let half = 0.5 * (curve.upper[k] - curve.lower[k]) * unit.factor;
+                let _ = write!(
+                    out,
+                    "{:>22}",
+                    plus_minus(curve.value[k] * unit.factor, half)
+                );
+            }
+            let _ = writeln!(out);
+        }
     }
 }
 

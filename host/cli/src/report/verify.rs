@@ -2,15 +2,20 @@
 
 use std::fmt::Write as _;
 
-use mimu::calibration::verify::Verification;
-use mimu::quantity::Figure;
+use mimu::calibration::verify::{SensorVerification, Verification};
+use mimu::quantity::{Figure, significant};
 use mimu::readable;
+use mimu::warning::Warning;
 
-use crate::report::text::warn;
+use crate::report::text::{counted, kinds, warn, warn_within, wrap};
 
-/// Result of `mimu verify`.
-pub fn verify_text(verification: &Verification) -> String {
+/// Result of `mimu verify`: a summary, or with `verbose` all warnings.
+pub fn verify_text(verification: &Verification, verbose: bool) -> String {
     let mut out = String::new();
+    for (name, s) in verification.sensors.present() {
+        wrap(&mut out, &format!("{name}: "), &verdict(s));
+    }
+    let _ = writeln!(out);
     let _ = writeln!(
         out,
         "{:<7}{:>14}{:>14}{:>14}{:>14}{:>12}",
@@ -25,7 +30,7 @@ pub fn verify_text(verification: &Verification) -> String {
             });
         let noun = match s.figure {
             Figure::Direction => "turns",
-            Figure::Input | Figure::GravitySize => "dwells",
+            Figure::Input | Figure::GravitySize | Figure::RateSize => "dwells",
         };
         let over = format!("{} {noun}", s.count);
         let _ = writeln!(
@@ -49,9 +54,42 @@ pub fn verify_text(verification: &Verification) -> String {
     for (name, s) in verification.sensors.present() {
         let _ = writeln!(out, "{name}: {}, rms", s.figure.description());
     }
-    out.push_str(
-        "one scale: the means of the calibration's scale factors and of its biases on all three axes, no misalignment\n",
+    wrap(
+        &mut out,
+        "one scale: ",
+        "the means of the calibration's scale factors and of its biases on all three axes, no misalignment",
     );
-    warn(&mut out, verification.warnings.iter());
+    match verbose {
+        true => warn(&mut out, verification.warnings.iter()),
+        false => {
+            let kinds = kinds(verification.warnings.iter(), Warning::is_like);
+            warn_within(
+                &mut out,
+                kinds.map(|(w, more)| counted(w.to_string(), more)),
+                0,
+            );
+        }
+    }
     out
+}
+
+/// What the calibration does to a sensor.
+fn verdict(s: &SensorVerification) -> String {
+    let figure = readable::error(s.unit);
+    let (other, what) = match s.rms_as_they_came {
+        Some(came) => (came, "as it came"),
+        None => (s.rms_raw, "with one scale"),
+    };
+    let [rms, before] = [s.rms, other].map(|v| figure.write(v));
+    let how = match s.rms < other {
+        true => format!("{rms} rms in place of {before} {what}"),
+        false => format!("{rms} rms, no better than the {before} {what}"),
+    };
+    match s.noise_floor.is_finite() && s.noise_floor > 0.0 {
+        true => format!(
+            "{how}; {} times the noise",
+            significant(s.rms / s.noise_floor)
+        ),
+        false => format!("{how}; the noise is not known"),
+    }
 }

@@ -25,8 +25,13 @@ fn refused(folder: &Path, arguments: &str) -> String {
     error
 }
 
+/// Everything that a command prints.
 fn done(folder: &Path, arguments: &str) -> String {
-    let out = mimu(folder, arguments);
+    let verbose = match arguments.strip_prefix("allan ") {
+        Some(rest) => &format!("allan --verbose {rest}"),
+        None => arguments,
+    };
+    let out = mimu(folder, verbose);
     let error = String::from_utf8(out.stderr).unwrap();
     assert!(out.status.success(), "{arguments}: {error}");
     String::from_utf8(out.stdout).unwrap()

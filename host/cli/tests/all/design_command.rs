@@ -49,7 +49,10 @@ fn a_parameter_that_is_not_determined_has_no_sigma() {
 fn people_read_the_same_numbers_in_their_units() {
     // Six faces: bias ± 1.96 σ/√6, scale factor ± 1.96 σ/(√2 g), P_xy the same in µrad. x² outside the model is √(4/3):
     // noticed from 3.242 σ/√(4/3) over full scale.
-    let text = |arguments: &str| String::from_utf8(mimu(Path::new("."), arguments).stdout).unwrap();
+    let text = |arguments: &str| {
+        let all = format!("{arguments} --verbose");
+        String::from_utf8(mimu(Path::new("."), &all).stdout).unwrap()
+    };
     let accel = text("--scheme six-face --sigma 0.01");
     for says in [
         "b_x ± 0.816 mg",
@@ -133,7 +136,9 @@ fn text_fits_a_hundred_columns() {
             "{arguments}: {}",
             String::from_utf8_lossy(&out.stderr)
         );
-        for line in String::from_utf8(out.stdout).unwrap().lines() {
+        let text = String::from_utf8(out.stdout).unwrap();
+        assert!(text.lines().count() <= 25, "{arguments}: {text}");
+        for line in text.lines() {
             assert!(line.chars().count() <= 100, "{arguments}: {line}");
         }
     }
@@ -150,7 +155,7 @@ fn a_lot_is_drawn_unless_the_order_is_given_and_says_its_price() {
     );
     let longer = randomised["moves_s"].as_f64().unwrap() - shortest["moves_s"].as_f64().unwrap();
     assert!(longer > 1.0 && shortest["moves_s"] == randomised["shortest_moves_s"]);
-    let text = String::from_utf8(mimu(Path::new("."), "-n 9").stdout).unwrap();
+    let text = String::from_utf8(mimu(Path::new("."), "-n 9 --verbose").stdout).unwrap();
     assert!(text.contains(&format!("{longer:.1} s longer")), "{text}");
     // The same dwells, in another order for another seed, and in the same for the same.
     let sorted = |mut list: Vec<serde_json::Value>| {

@@ -61,7 +61,7 @@ fn a_diagnosis_of_an_effect_takes_at_most_25_lines_without_all() {
         for id in not_seen {
             assert!(next.contains(&id), "{name}: {id} is in no experiment");
         }
-        let all = run(&["diagnose", name, "--all"]);
+        let all = run(&["diagnose", name, "--verbose"]);
         for id in ids("rejected") {
             assert!(all.contains(&format!("  - {id}: ")), "{name}: {id}");
         }

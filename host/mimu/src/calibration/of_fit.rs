@@ -68,7 +68,10 @@ fn range(temperatures: &[f64]) -> Option<[f64; 2]> {
 fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
     let frame = match (fit.prepared.manifest.reference, found.sensor) {
         (Reference::Table, _) => "body: the axes of the ref_ columns",
-        (Reference::Gravity, Sensor::Accel) => {
+        (Reference::TurntableRate, Sensor::Gyro) => {
+            "body: x along the gyro's x, xy plane through its y"
+        }
+        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
             "body: x along the accelerometer's x, xy plane through its y"
         }
         (Reference::Gravity, Sensor::Gyro) => {

@@ -7,14 +7,17 @@ use serde::Serialize;
 use crate::calibration::Calibration;
 use crate::calibration::die_temperature::{at_one_temperature, outside};
 use crate::effects::removal::{removable, remove_within};
+use crate::estimate::Observation;
 use crate::estimate::turn::{Turn, direction_error};
 use crate::fit::as_came::{errors, exceeds};
+use crate::fit::by_rate::variances;
 use crate::fit::refuse_wrong_gravity;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::{PerSensor, Sensor, present};
 use crate::signal::unit_in_si::restless;
 use crate::triad::Forward;
+use crate::turntable::RatedDwells;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RawUnit, Reference};
@@ -90,6 +93,15 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         warnings.push(Warning::NoTemperature);
     }
     let prepared = moved.as_ref().unwrap_or(prepared);
+    let at_rest = match manifest.reference {
+        Reference::TurntableRate => {
+            let mut at_rest = prepared.clone();
+            warnings.extend(RatedDwells::of(prepared)?.set_aside(&mut at_rest));
+            Some(at_rest)
+        }
+        Reference::Table | Reference::Gravity => None,
+    };
+    let prepared = at_rest.as_ref().unwrap_or(prepared);
     let mut sensors = PerSensor::<Option<SensorVerification>>::default();
     for sensor in Sensor::BOTH {
         if calibration.inverse(sensor).is_none() || !prepared.has(sensor) {
@@ -208,7 +220,8 @@ fn judge(
     let mut warnings = Vec::new();
     let judged = match (prepared.manifest.reference, sensor) {
         (Reference::Table, _) => known(prepared, sensor, &inverse),
-        (Reference::Gravity, Sensor::Accel) => size(prepared, &inverse),
+        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => size(prepared, &inverse),
+        (Reference::TurntableRate, Sensor::Gyro) => rate(prepared, &inverse),
         // Between the means of poses nothing says how the unit turned.
         (Reference::Gravity, Sensor::Gyro) if prepared.manifest.means => None,
         (Reference::Gravity, Sensor::Gyro) => {
@@ -316,20 +329,53 @@ fn known(
 fn size(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerification> {
     let g = prepared.manifest.gravity_mps2;
     let observations = prepared.observations(Sensor::Accel);
-    let errors = |model: &Affine<f64>| -> Vec<f64> {
-        observations
-            .iter()
-            .map(|o| model.apply(&o.raw).norm() - g)
-            .collect()
-    };
     let floor = prepared.size_floors(calibrated, &observations);
-    let after = errors(calibrated);
+    let known: Vec<(&Observation, f64)> = observations.iter().map(|o| (o, g)).collect();
+    magnitudes(prepared, Figure::GravitySize, calibrated, &known, &floor)
+}
+
+fn rate(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerification> {
+    let dwells = RatedDwells::of(prepared).ok()?;
+    let floor = variances(calibrated, &dwells.turning).into_iter();
+    let floor: Vec<f64> = floor
+        .map(|v| prepared.if_noise_known(&[Sensor::Gyro], v.sqrt()))
+        .collect();
+    let known: Vec<(&Observation, f64)> = dwells.turning.iter().zip(dwells.magnitudes()).collect();
+    let judged = magnitudes(prepared, Figure::RateSize, calibrated, &known, &floor)?;
+    let rests = dwells.rests.iter();
+    let rest: Vec<f64> = rests
+        .flat_map(|r| <[f64; 3]>::from(calibrated.apply(&r.raw)))
+        .collect();
+    Some(SensorVerification {
+        static_rms: (!rest.is_empty()).then(|| rms(&rest)),
+        ..judged
+    })
+}
+
+/// By the magnitudes that are known of the inputs.
+fn magnitudes(
+    prepared: &Prepared,
+    figure: Figure,
+    calibrated: &Affine<f64>,
+    known: &[(&Observation, f64)],
+    floor: &[f64],
+) -> Option<SensorVerification> {
+    let sensor = match figure {
+        Figure::RateSize => Sensor::Gyro,
+        _ => Sensor::Accel,
+    };
+    let errors = |model: &Affine<f64>| -> Vec<f64> {
+        let errors = known
+            .iter()
+            .map(|(o, size)| model.apply(&o.raw).norm() - size);
+        errors.collect()
+    };
     let judged = judged(
-        Sensor::Accel,
-        Figure::GravitySize,
+        sensor,
+        figure,
         &errors(&nominal(calibrated)?),
-        &after,
-        &floor,
+        &errors(calibrated),
+        floor,
     )?;
     Some(SensorVerification {
         rms_as_they_came: in_si(prepared).then(|| rms(&errors(&ONE))),

@@ -227,6 +227,14 @@ impl Recordings<'_> {
 
     /// Refuses recordings that cannot be of one unit.
     fn check(&self) -> Result<()> {
+        let all = || std::iter::once(&self.first).chain(self.later());
+        if let Some(turned) = all().find(|r| r.manifest.reference == Reference::TurntableRate) {
+            return Err(Error::new(
+                &turned.place,
+                "only the magnitude of the rate is known, and a diagnosis needs known inputs or gravity",
+                "give a recording from a rate table or by hand; a fit and a verification take this one",
+            ));
+        }
         let (unit, raw_unit) = (&self.first.manifest.device, self.first.manifest.raw_unit);
         for other in self.later() {
             if other.manifest.raw_unit != raw_unit {
@@ -292,7 +300,7 @@ fn matrices(recordings: &Recordings) -> Option<[Option<Affine<f64>>; 2]> {
         offset: Vector3::zeros(),
     };
     let never_turned = match first.manifest.reference {
-        Reference::Gravity => !first.has(Sensor::Accel),
+        Reference::Gravity | Reference::TurntableRate => !first.has(Sensor::Accel),
         Reference::Table => Sensor::BOTH.iter().all(|s| {
             let inputs: Vec<_> = first.observations(*s).iter().map(|o| o.input).collect();
             inputs.windows(2).all(|w| w[0] == w[1])

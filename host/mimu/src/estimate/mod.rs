@@ -4,7 +4,7 @@
 //! |-------------------|-----------|----------------------------------------------------------|
 //! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form, six positions |
 //! | [`moving_input`]  | table     | the same least squares where inputs move within dwells     |
-//! | [`gravity_size`]  | gravity   | accelerometer from the magnitude of gravity over many poses   |
+//! | [`magnitude`]     | gravity, turntable | accelerometer from the magnitude of gravity over many poses; gyro from that of a turntable's rate |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
 //! | [`with_turns`]    | gravity   | accelerometer from magnitudes and turns together         |
 //! | [`turn`]          | gravity   | one turn, and where a calibration carries gravity in it   |
@@ -14,9 +14,9 @@
 
 pub mod chains;
 pub mod earth;
-pub mod gravity_size;
 pub mod known_input;
 pub mod least_squares;
+pub mod magnitude;
 pub mod moving_input;
 pub mod rotation;
 pub mod turn;

@@ -1,9 +1,9 @@
 //! Accelerometer calibration from the magnitude of gravity and from the turns between the poses together.
 //!
-//! Where the poses leave an end of an axis unseen, the magnitude alone hardly determines that axis ([`super::gravity_size`]): ten poses
+//! Where the poses leave an end of an axis unseen, the magnitude alone hardly determines that axis ([`super::magnitude`]): ten poses
 //! of a fixture ended in a scale factor of 6.0 ± 9.1. But the gyro carries the direction of gravity from pose to pose, and a direction
 //! that the accelerometer measures wrongly does not meet it. Here C and o of the accelerometer (nine parameters, as in
-//! [`super::gravity_size`]) and C and o of the gyro (twelve) are fitted to the magnitudes, the turns and the readings at rest at once.
+//! [`super::magnitude`]) and C and o of the gyro (twelve) are fitted to the magnitudes, the turns and the readings at rest at once.
 //!
 //! Only the accelerometer is returned. The gyro that [`super::rotation`] fits beside it is the one of the joint minimum, and with the
 //! covariance of this accelerometer carried on has the covariance of the joint fit: that is the inverse of a matrix of blocks.

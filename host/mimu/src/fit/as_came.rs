@@ -23,13 +23,16 @@ pub(super) fn inputs<'a>(
     in_si(prepared).then(|| rms(Figure::Input, observations.map(|o| o.raw - o.input)))
 }
 
-/// Error of the magnitudes of specific force as they came.
-pub(super) fn magnitudes(prepared: &Prepared, poses: &[Observation]) -> Option<f64> {
-    let g = prepared.manifest.gravity_mps2;
-    let errors = poses
+/// Error of the magnitudes of observations as they came, each with the one that is known.
+pub(super) fn magnitudes(
+    prepared: &Prepared,
+    figure: Figure,
+    known: &[(&Observation, f64)],
+) -> Option<f64> {
+    let errors = known
         .iter()
-        .map(|o| Vector3::new(o.raw.norm() - g, 0.0, 0.0));
-    in_si(prepared).then(|| rms(Figure::GravitySize, errors))
+        .map(|(o, magnitude)| Vector3::new(o.raw.norm() - magnitude, 0.0, 0.0));
+    in_si(prepared).then(|| rms(figure, errors))
 }
 
 /// Error of the directions after turns, gyro and accelerometer both as they came.
@@ -80,7 +83,7 @@ pub(crate) fn errors(figure: Figure, count: usize) -> usize {
         * match figure {
             Figure::Input => 3,
             Figure::Direction => 2,
-            Figure::GravitySize => 1,
+            Figure::GravitySize | Figure::RateSize => 1,
         }
 }
 

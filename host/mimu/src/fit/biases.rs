@@ -76,8 +76,8 @@ pub fn fit_biases(
             let is = inverse.apply(&o.raw);
             let value = match (reference, sensor) {
                 (Reference::Table, _) => is - o.input,
-                (Reference::Gravity, Sensor::Gyro) => is,
-                (Reference::Gravity, Sensor::Accel) => {
+                (_, Sensor::Gyro) => is,
+                (_, Sensor::Accel) => {
                     Vector3::new(is.norm() - prepared.manifest.gravity_mps2, 0.0, 0.0)
                 }
             };

@@ -9,13 +9,13 @@ use super::sensor::{Residual, SensorFit, rms, typical};
 use super::{Options, as_came, finish, refuse_wrong_gravity};
 use crate::estimate::turn::{Rest, Turn, direction_error, sensitivity};
 use crate::estimate::with_turns::Together;
-use crate::estimate::{Estimated, Failure, Observation, gravity_size, rotation};
+use crate::estimate::{Estimated, Failure, Observation, magnitude, rotation};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
 use crate::triad::{Triad, slope};
 use crate::warning::Warning;
-use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{RawUnit, Reference};
 
 pub(super) fn fit_gravity(
     prepared: &Prepared,
@@ -44,8 +44,8 @@ pub(super) fn fit_gravity(
     }
     refuse_wrong_gravity(prepared, Sensor::Accel, &poses)?;
     let variances = |accel: &Affine<f64>| prepared.size_variances(accel, &poses);
-    let by_sphere = gravity_size::first_guess(&poses, g)
-        .map_or_else(|| vec![0.0; poses.len()], |a| variances(&a));
+    let by_sphere =
+        magnitude::first_guess(&poses, g).map_or_else(|| vec![0.0; poses.len()], |a| variances(&a));
     let by_poses = ByPoses {
         prepared,
         poses: &poses,
@@ -113,7 +113,8 @@ pub(super) fn fit_gravity(
         None,
         held_out.into(),
     );
-    fit.as_came = as_came::magnitudes(prepared, &poses);
+    let known: Vec<(&Observation, f64)> = poses.iter().map(|o| (o, g)).collect();
+    fit.as_came = as_came::magnitudes(prepared, Figure::GravitySize, &known);
     fit.warnings.extend(unseen);
     sensors.push(fit);
     Ok(sensors)
@@ -146,9 +147,9 @@ impl ByPoses<'_> {
     }
 
     fn estimate(&self) -> Outcome<(Estimated, Option<Guesses>)> {
-        let alone = gravity_size::estimate(self.poses, self.variances, self.gravity());
+        let alone = magnitude::by_gravity(self.poses, self.variances, self.gravity());
         let poor = !alone.as_ref().is_ok_and(|a| a.condition <= POOR_POSES);
-        let enough = self.poses.len() >= gravity_size::PARAMETERS;
+        let enough = self.poses.len() >= magnitude::PARAMETERS;
         if poor
             && enough
             && let Some(guesses) = self.guesses()
@@ -166,13 +167,15 @@ impl ByPoses<'_> {
                 matrix: nalgebra::Matrix3::identity(),
                 offset: Vector3::zeros(),
             }),
-            _ => gravity_size::first_guess(self.poses, self.gravity()),
+            _ => magnitude::first_guess(self.poses, self.gravity()),
         }
     }
 
     fn guesses(&self) -> Option<Guesses> {
         let prepared = self.prepared;
-        if prepared.manifest.means || !prepared.has(Sensor::Gyro) {
+        // Between the rests of a turntable lie its turns, of which no angle is known.
+        let by_hand = prepared.manifest.reference == Reference::Gravity;
+        if !by_hand || prepared.manifest.means || !prepared.has(Sensor::Gyro) {
             return None;
         }
         let accel = self.first_accel()?;
@@ -201,7 +204,7 @@ impl ByPoses<'_> {
             .map(|(o, v)| (*o, *v))
             .unzip();
         let Some(Guesses { accel, gyro }) = guesses else {
-            return gravity_size::estimate(&poses, &variances, self.gravity());
+            return magnitude::by_gravity(&poses, &variances, self.gravity());
         };
         let (turns, _) = self.prepared.turns(accel);
         let turns: Vec<Turn> = turns
@@ -211,7 +214,7 @@ impl ByPoses<'_> {
         let rest = self.prepared.rest(accel).into_iter();
         let rest: Vec<Rest> = rest.filter(|o| kept(o.dwell)).collect();
         // The rest says the gyro's bias; its matrix and the accelerometer have to be in the others.
-        if poses.len() + 2 * turns.len() <= gravity_size::PARAMETERS + 9 {
+        if poses.len() + 2 * turns.len() <= magnitude::PARAMETERS + 9 {
             return Err(Failure::Undetermined {
                 parameters: "accelerometer and gyro together".into(),
                 add: "add poses, and turns between them".into(),
@@ -231,7 +234,7 @@ impl ByPoses<'_> {
 
     /// The accelerometer by the magnitude of gravity in its poses.
     fn alone(&self) -> Outcome<Estimated> {
-        gravity_size::estimate(self.poses, self.variances, self.gravity())
+        magnitude::by_gravity(self.poses, self.variances, self.gravity())
     }
 
     /// `failure`, naming the faces that no pose had up.

@@ -59,8 +59,8 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
             );
         }
     }
-    // The accelerometer's own axes are the frame where gravity is the only reference.
-    if fit.figure != Figure::GravitySize {
+    // A triad's own axes are the frame where only a magnitude is known.
+    if !fit.figure.is_magnitude() {
         for (axis, e) in AXES.iter().zip(physical.misalignment) {
             if !(e.interval <= WIDEST) {
                 shown(format!("misalignment {axis}"), e.value, e.interval, "rad");
@@ -76,6 +76,7 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
         (Figure::GravitySize, None) => {
             "add poses, each axis up and down and between, and hold each still".into()
         }
+        (Figure::RateSize, _) => "lay the unit on the turntable with each axis up, down and slanted, and record rests".into(),
         // What the accelerometer errs by, whose directions the turns are judged by, is in the intervals of the gyro.
         (Figure::Direction, Some(poses)) => {
             format!("{poses}: the accelerometer says where gravity is after each turn").into()
@@ -88,7 +89,7 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
     let error = prepared.refused(failure, fit.sensor);
     Err(match prepared.manifest.reference {
         Reference::Table => error.about(Argument::Only),
-        Reference::Gravity => error,
+        Reference::Gravity | Reference::TurntableRate => error,
     })
 }
 
@@ -96,7 +97,7 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
 fn by_temperature(prepared: &Prepared, fit: &SensorFit) -> bool {
     let with = match fit.figure {
         Figure::Input => with_temperature(prepared, fit.sensor, &fit.residuals),
-        Figure::GravitySize | Figure::Direction => None,
+        Figure::GravitySize | Figure::RateSize | Figure::Direction => None,
     };
     with.is_some_and(|with| with.rms < 0.5 * fit.rms())
 }
@@ -175,7 +176,7 @@ fn directions() -> Vec<(String, Vector3<f64>)> {
 }
 
 /// The faces that no pose has up, to within 45 degrees, by a first guess of the accelerometer: `-x, +z`. `None` where all have been.
-pub(super) fn faces_not_up(guess: &Affine<f64>, raw: &[Vector3<f64>]) -> Option<String> {
+pub(crate) fn faces_not_up(guess: &Affine<f64>, raw: &[Vector3<f64>]) -> Option<String> {
     let faces = directions().into_iter().take(6);
     let unseen = faces.filter(|(_, face)| {
         let near = |u: &&Vector3<f64>| guess.apply(u).normalize().dot(face) > 0.7;

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::by_gravity::POOR_POSES;
 use crate::estimate::turn::{Turn, direction_error};
-use crate::estimate::{Estimated, Observation, gravity_size, rotation};
+use crate::estimate::{Estimated, Observation, magnitude, rotation};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{AXES, Sensor};
 use crate::signal::blocks::quantile;
@@ -125,9 +125,9 @@ const ACCEL_PARAMETERS: [&str; 9] = [
 ];
 
 fn fit_poses(prepared: &Prepared, poses: &[Observation], g: f64) -> Option<Estimated> {
-    let first = gravity_size::first_guess(poses, g)?;
+    let first = magnitude::first_guess(poses, g)?;
     let variances = prepared.size_variances(&first, poses);
-    gravity_size::estimate(poses, &variances, g).ok()
+    magnitude::by_gravity(poses, &variances, g).ok()
 }
 
 fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {

@@ -91,6 +91,14 @@ fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
     match fit.figure {
         Figure::Direction => 1.0,
         Figure::GravitySize => prepared.manifest.gravity_mps2,
+        Figure::RateSize => {
+            let rates = prepared
+                .manifest
+                .turntable
+                .iter()
+                .flat_map(|t| &t.rates_dps);
+            rates.fold(0.0, |most, rate| f64::max(most, rate.to_radians()))
+        }
         Figure::Input => {
             let dwell = |r: &Residual| prepared.dwells.list[r.dwell].input(fit.sensor);
             let means = fit.residuals.iter().filter(|r| !r.within);
@@ -115,7 +123,7 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warni
     let percent = |share: f64| format!("{} %", significant(100.0 * share));
     let with = match fit.figure {
         Figure::Input => with_temperature(prepared, fit.sensor, &fit.residuals),
-        Figure::GravitySize | Figure::Direction => None,
+        Figure::GravitySize | Figure::RateSize | Figure::Direction => None,
     };
     if let Some(with) = with.filter(|w| w.rms / spread <= FOLLOWS_NOTHING) {
         let warning = Warning::FollowsTemperature(share, with.rms / spread, with.mean_c);
@@ -124,6 +132,7 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warni
     let against = match fit.figure {
         Figure::Input => "the known inputs",
         Figure::GravitySize => "the magnitude of gravity",
+        Figure::RateSize => "the magnitude of the rate",
         Figure::Direction => "the turns of gravity",
     };
     let how = match share < 1.0 {
@@ -156,9 +165,7 @@ fn worst_first(fit: &SensorFit) -> Vec<&Residual> {
 
 fn name(prepared: &Prepared, residual: &Residual) -> String {
     let step = prepared.dwells.list[residual.dwell].step;
-    let labels = &prepared.manifest.step_labels;
-    let label = usize::try_from(step).ok().and_then(|s| labels.get(s));
-    label.cloned().unwrap_or_else(|| step.to_string())
+    prepared.manifest.step_name(step)
 }
 
 fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
@@ -205,7 +212,7 @@ fn rests(fit: &SensorFit) -> Option<Warning> {
 
 /// How the axes lie to those that they are referred to.
 fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
-    if fit.figure == Figure::GravitySize {
+    if fit.figure.is_magnitude() {
         return None; // its axes are the frame
     }
     let svd = fit.estimated.triad.inverse.matrix.svd(true, true);

@@ -86,7 +86,7 @@ pub(super) fn rms(figure: Figure, values: impl Iterator<Item = Vector3<f64>>) ->
         sum += v.norm_squared();
         n += match figure {
             Figure::Input => 3.0,
-            Figure::GravitySize | Figure::Direction => 1.0,
+            Figure::GravitySize | Figure::RateSize | Figure::Direction => 1.0,
         };
     }
     (sum / n).sqrt()

@@ -70,7 +70,7 @@ pub fn estimate(
             let n = observations.len();
             let input = |i: usize| match prepared.manifest.reference {
                 Reference::Table => observations[i].input[axis],
-                Reference::Gravity => 0.0,
+                Reference::Gravity | Reference::TurntableRate => 0.0,
             };
             let y = DVector::from_fn(n, |i, _| {
                 input(i) - (matrix.row(axis) * observations[i].raw)[(0, 0)]

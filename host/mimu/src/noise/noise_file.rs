@@ -23,6 +23,9 @@ pub struct NoiseFile {
     pub format: String,
     /// Unit under test.
     pub device: String,
+    /// When it was made, RFC 3339.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub created: Option<String>,
     /// Samples a second.
     pub sample_rate_hz: f64,
     /// Length of the record, s; of several, of the shortest.

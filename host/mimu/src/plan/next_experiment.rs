@@ -157,7 +157,7 @@ impl Setup {
         let prepared = &fit.prepared;
         let fixture = fixture.unwrap_or(match prepared.manifest.reference {
             Reference::Table => Fixture::ThreeAxis,
-            Reference::Gravity => Fixture::Hand,
+            Reference::Gravity | Reference::TurntableRate => Fixture::Hand,
         });
         let usual = Motion::of(fixture);
         let dwells = &prepared.dwells.list;

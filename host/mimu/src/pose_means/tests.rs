@@ -49,7 +49,7 @@ fn table(n: usize, reference: Reference, error: f64, known: bool, seed: u64) -> 
             averaged: [known.then_some(AVERAGED); 6],
             reference: match reference {
                 Reference::Table => input,
-                Reference::Gravity => [f64::NAN; 6],
+                Reference::Gravity | Reference::TurntableRate => [f64::NAN; 6],
             },
             temp_c: f64::NAN,
         }

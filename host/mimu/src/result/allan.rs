@@ -224,6 +224,7 @@ impl AllanResult {
         let lengths = self.recordings.iter().map(|r| r.span_s[1] - r.span_s[0]);
         Some(NoiseFile {
             format: NOISE_FORMAT.into(),
+            created: None,
             device: self.device.clone()?,
             sample_rate_hz: self.recordings.first()?.sample_rate_hz,
             duration_s: lengths.fold(f64::INFINITY, f64::min),

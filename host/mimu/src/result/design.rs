@@ -364,7 +364,7 @@ impl Design {
     pub fn subject(&self) -> String {
         let reference = match self.reference {
             Reference::Table => "known input",
-            Reference::Gravity => "magnitude of gravity",
+            Reference::Gravity | Reference::TurntableRate => "magnitude of gravity",
         };
         format!(
             "{}, {}, {reference}, {}",

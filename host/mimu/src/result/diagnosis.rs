@@ -14,6 +14,7 @@ use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::fit::Split;
 use crate::plan::next_experiment::{Confused, Next, NotExcited, NotInPlan};
 use crate::quantity::{Figure, PerSensor, Sensor, present};
+use crate::recording_problem::RecordingProblem;
 use crate::warning::Warning;
 
 /// Result of a diagnosis.
@@ -54,6 +55,8 @@ pub struct DiagnosisResult {
     pub leftover: Vec<Leftover>,
     /// What of the samples was left out.
     pub left_out: LeftOutResult,
+    /// What is wrong with the first recording, one for each kind; most are among the warnings too.
+    pub recording_problems: Vec<RecordingProblem>,
     /// What a person should know.
     pub warnings: Vec<Warning>,
     /// The calibration before and after on a recording that nothing was fitted to.
@@ -201,6 +204,7 @@ impl DiagnosisResult {
                 empty_samples: condensed.missing.iter().sum(),
                 clipped_samples: clipped.map(|m| m.clipped).sum(),
             },
+            recording_problems: RecordingProblem::of(&d.before),
             warnings,
             second: second.map(|(name, [before, after])| SecondResult {
                 recording: name.into(),

@@ -12,6 +12,7 @@ use crate::observable::Observable;
 use crate::parameter::{Kind, TriadParameter, parameters};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, PerSensor, Sensor, present, raw_unit};
+use crate::recording_problem::RecordingProblem;
 use crate::signal::dwell::Dwell;
 use crate::signal::stillness::Detection;
 use crate::triad::{Angles, Estimate};
@@ -59,6 +60,8 @@ pub struct FitResult {
     pub left_out: Vec<LeftOutResult>,
     /// What that changes: every parameter fitted with everything, and as fitted.
     pub left_out_changes: Vec<Change>,
+    /// What is wrong with the recording, one for each kind; most are among the warnings too.
+    pub recording_problems: Vec<RecordingProblem>,
     /// What a person should know.
     pub warnings: Vec<Warning>,
 }
@@ -269,6 +272,7 @@ impl FitResult {
             dwells: DwellResult::list(&fit.prepared),
             left_out: LeftOutResult::list(&fit.prepared),
             left_out_changes: fit.changes.clone(),
+            recording_problems: RecordingProblem::of(fit),
             warnings: fit.warnings.iter().chain(of_sensors).cloned().collect(),
         }
     }
@@ -295,9 +299,10 @@ impl LeftOutResult {
 impl DwellResult {
     /// All dwells of a recording, used or not.
     pub fn list(prepared: &Prepared) -> Vec<Self> {
-        let labels = &prepared.manifest.step_labels;
         let dwells = prepared.dwells.list.iter();
-        dwells.map(|d| Self::of(d, labels)).collect()
+        dwells
+            .map(|d| Self::of(d, &prepared.manifest.step_labels))
+            .collect()
     }
 
     fn of(dwell: &Dwell, labels: &[String]) -> Self {
@@ -400,7 +405,9 @@ fn excess_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
     let si = found.sensor.unit();
     match found.figure {
         Figure::Direction if group == Observable::Rest => si.into(),
-        Figure::Direction | Figure::GravitySize => found.figure.unit(found.sensor).into(),
+        Figure::Direction | Figure::GravitySize | Figure::RateSize => {
+            found.figure.unit(found.sensor).into()
+        }
         // Axes of the forward form are in raw units, of the inverse form in SI.
         Figure::Input if fit.options.method == Method::InverseForm => si.into(),
         Figure::Input => raw_unit(fit.prepared.manifest.raw_unit, si),

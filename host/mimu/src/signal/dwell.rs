@@ -267,7 +267,7 @@ impl Dwells {
         let judged = given && finding.steps != Steps::Given;
         let too_fast = match manifest.reference {
             Reference::Table => find_moving(&mut list, condensed),
-            Reference::Gravity => vec![[false; 2]; list.len()],
+            Reference::Gravity | Reference::TurntableRate => vec![[false; 2]; list.len()],
         };
         judge(&mut list, condensed, (&longest_run, &rails), judged);
         for (dwell, too_fast) in list.iter_mut().zip(too_fast) {
@@ -565,11 +565,7 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<Warning>) {
             // Whether a unit is still, and its input slow enough, is judged sensor by sensor.
             let by_sensor = matches!(fault, Fault::NotStill | Fault::TooFast);
             let whose = by_sensor.then_some(sensor);
-            let name = manifest
-                .step_labels
-                .get(dwell.step as usize)
-                .cloned()
-                .unwrap_or_else(|| dwell.step.to_string());
+            let name = manifest.step_name(dwell.step);
             match by_fault
                 .iter_mut()
                 .find(|(f, s, _)| (f, s) == (&fault, &whose))

@@ -35,6 +35,7 @@ fn said_of(
         return None;
     }
     let near = |factor: f64| (0.8..1.25).contains(&(scale / factor));
+    let rpm = |ratio: f64| (0.95..1.05).contains(&(scale / ratio));
     let degrees = 180.0 / std::f64::consts::PI;
     let by_turns = figure == Figure::Direction;
     let cause = match sensor {
@@ -44,6 +45,12 @@ fn said_of(
         }
         Sensor::Gyro if near(degrees.recip()) => {
             "the ref_ columns are not in deg/s, or the readings were converted to rad/s twice"
+        }
+        Sensor::Gyro if figure == Figure::RateSize && rpm(200.0 / 270.0) => {
+            "is the rate that of 45 rpm where it was 33 1/3 rpm?"
+        }
+        Sensor::Gyro if figure == Figure::RateSize && rpm(270.0 / 200.0) => {
+            "is the rate that of 33 1/3 rpm where it was 45 rpm?"
         }
         // Over the turns the gyro is integrated: stamps that run twice as fast halve the scale factor.
         Sensor::Gyro if by_turns && (0.1..10.0).contains(&scale) => {
@@ -59,7 +66,8 @@ fn said_of(
 
 /// What to say of dwells at rest whose readings are to be in SI. Of inputs that are known a fit says it.
 pub(crate) fn at_rest(list: &[Dwell], manifest: &Manifest) -> Vec<Warning> {
-    if manifest.reference == Reference::Table {
+    // On a turntable most dwells of the gyro are no rests, and a fit judges its readings by the rates.
+    if manifest.reference != Reference::Gravity {
         return Vec::new();
     }
     let usual = |sensor: Sensor| {

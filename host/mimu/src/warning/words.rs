@@ -171,6 +171,16 @@ impl fmt::Display for Warning {
                 let what = if *turns { "turn to dwell" } else { "dwell" };
                 write!(f, "{} ({what} {}): off by up to {} {unit}, {ratio:.0} times the median; look for the cause, as it widens all intervals", plural(names.len() as u64, "outlier"), few(names), significant(*worst))
             }
+            Self::RateError(rates, error) => {
+                let list: Vec<String> = rates.iter().map(|r| significant(*r)).collect();
+                let factors = match rates.len() {
+                    1 => "it is a factor of all scale factors",
+                    _ => "each rate has its own, and they are factors of all scale factors",
+                };
+                write!(f, "the turntable's rate of {} deg/s is known to ±{} % (95 %): {factors}, is in their intervals, and no number of dwells reduces it", list.join(" and "), significant(100.0 * error))
+            }
+            Self::RatesContradict(rate, off) => write!(f, "the rates of the turntable contradict each other: the fit has {} deg/s {:+.2} % off; look whether the rates (33 1/3 rpm is 200 deg/s, 45 rpm is 270 deg/s) and their error are right", significant(rate.to_degrees()), 100.0 * off),
+            Self::NoRestsToFit(problem) => write!(f, "not calibrated, as the dwells at rest do not determine it ({problem}); at the rates of the turntable a centripetal force acts that nothing says"),
             Self::Turned(angle, table) => {
                 let against = if *table { "those of the ref_ columns" } else { "the accelerometer's" };
                 write!(f, "its axes are turned by {:.0} degrees against {against}: unless it is mounted so, columns are swapped or have the wrong sign", angle.to_degrees())

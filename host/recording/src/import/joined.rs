@@ -209,6 +209,7 @@ impl JoinedFiles {
             options.reference,
         );
         manifest.latitude_deg = options.latitude_deg;
+        manifest.turntable = options.turntable.clone();
         manifest.imported_with = options.arguments();
         manifest
     }

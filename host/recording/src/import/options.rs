@@ -15,6 +15,7 @@ use crate::error::{Argument, Error, Result};
 use crate::manifest::{RawUnit, Reference, check_gravity, check_rate};
 use crate::separator::Separator;
 use crate::signed_low_byte::SignedLowByte;
+use crate::turntable::Turntable;
 use crate::writer::SampleFormat;
 
 /// What to import and how.
@@ -54,6 +55,8 @@ pub struct ImportOptions {
     pub device: Option<String>,
     /// Latitude in degrees.
     pub latitude_deg: Option<f64>,
+    /// The turntable of which the magnitude of the rate is known.
+    pub turntable: Option<Turntable>,
     /// Table of the known input of each step.
     pub inputs: Option<PathBuf>,
     /// Whether the files follow one another, each a step with the name of its file, in place of being joined on their times.
@@ -104,6 +107,7 @@ impl ImportOptions {
             instance: None,
             device: None,
             latitude_deg: None,
+            turntable: None,
             inputs: None,
             sequence: false,
             faces: Vec::new(),
@@ -201,6 +205,10 @@ impl ImportOptions {
                 .map_err(|e| e.about(Argument::SampleRate))?;
         }
         check_gravity(self.gravity_mps2, "import, gravity")?;
+        if self.means && self.reference == Reference::TurntableRate {
+            let problem = "the rate of a turntable is a reference of samples, and these are means";
+            return refuse(problem.to_owned(), "import the samples");
+        }
         // A source inside the recording that is to be replaced would be deleted with it.
         for file in self.files.iter().chain(&self.inputs) {
             let (Ok(file), Ok(out)) = (file.canonicalize(), out.canonicalize()) else {
@@ -257,6 +265,9 @@ impl ImportOptions {
         option("--gravity", self.gravity_mps2.to_string());
         option("--raw-unit", self.raw_unit.to_string());
         option("--reference", self.reference.to_string());
+        for (name, value) in self.turntable.iter().flat_map(Turntable::arguments) {
+            option(name, value);
+        }
         for scale in &self.scales {
             option("--scale", scale.to_string());
         }

@@ -12,10 +12,14 @@ use mimu::result::design::{Comparison, Design, Noticed, Spent, Way};
 /// Dwells listed: as many as the longest design.
 pub(super) const LISTED: usize = 200;
 
-/// Result of `mimu design`.
-pub fn design_text(report: &Design) -> String {
+/// Result of `mimu design`: a summary, or with `verbose` everything.
+pub fn design_text(report: &Design, verbose: bool) -> String {
     let mut out = String::new();
     let _ = writeln!(out, "{}", report.subject());
+    if !verbose {
+        summary(&mut out, report);
+        return out;
+    }
     let mut line = |name: &str, text: String| {
         let _ = writeln!(out, "  {name:<22}{text}");
     };
@@ -99,8 +103,67 @@ pub fn design_text(report: &Design) -> String {
         spent(&mut out, report.noise.is_some(), budget);
     }
     settings(&mut out, report);
-    parameters(&mut out, report);
+    parameters(&mut out, report, usize::MAX);
     out
+}
+
+/// Dwells side by side, and their rows, in a summary.
+const ACROSS: usize = 3;
+const ROWS: usize = 8;
+
+/// What a person needs of a design: how good it is, how long it takes, its dwells and what they determine.
+fn summary(out: &mut String, report: &Design) {
+    let mut line = |name: &str, text: String| {
+        let _ = writeln!(out, "  {name:<22}{text}");
+    };
+    line(
+        "design",
+        format!("{}, D-efficiency {:.4}", report.title, report.d_efficiency),
+    );
+    let n = report.positions.len();
+    let time = minutes(report.time_s);
+    let dwells = plural(n as u64, "dwell");
+    line(
+        "time",
+        format!("{time}: {dwells} of {} s", significant(report.dwell_s)),
+    );
+    line("sigma of a dwell mean", sigma(report));
+    let left = plural(report.dof.lack_of_fit as u64, "degree");
+    line(
+        "left over",
+        format!("{left} of freedom to notice a wrong model"),
+    );
+    if report.turned_over {
+        line(
+            "mounted",
+            "the other way up than published, turned by a half turn about x".into(),
+        );
+    }
+    let rate = if report.rates_dps.is_some() {
+        ", rate in deg/s"
+    } else {
+        ""
+    };
+    let _ = writeln!(out, "\n  dwell: direction that is up, x y z{rate}");
+    let cell = |k: usize| {
+        let [x, y, z] = report.positions[k].map(|c| round(c, 1e3));
+        let rate = report.rates_dps.as_ref().and_then(|rates| rates.get(k));
+        let rate = rate.map_or(String::new(), |r| format!("{:>8.1}", round(*r, 10.0)));
+        format!("{:>4}:{x:>7.3}{y:>7.3}{z:>7.3}{rate}", k + 1)
+    };
+    let rows = n.div_ceil(ACROSS);
+    for row in 0..rows.min(ROWS) {
+        let cells = (0..ACROSS).map(|c| c * rows + row).filter(|k| *k < n);
+        let cells: Vec<String> = cells.map(cell).collect();
+        let _ = writeln!(out, "{}", cells.join("  "));
+    }
+    if rows > ROWS {
+        let _ = writeln!(out, "  the other dwells: --verbose, -o, --json");
+    }
+    parameters(out, report, 6);
+    out.push_str(
+        "next: -o plan.toml writes it for mimu wizard and mimu record; --verbose prints more\n",
+    );
 }
 
 /// Text in lines beside a name.
@@ -200,7 +263,8 @@ fn settings(out: &mut String, report: &Design) {
     }
 }
 
-fn parameters(out: &mut String, report: &Design) {
+/// Intervals of the parameters, in so many rows at most.
+fn parameters(out: &mut String, report: &Design, most: usize) {
     let cells: Vec<String> = report
         .sigma_per_parameter
         .iter()
@@ -223,12 +287,15 @@ fn parameters(out: &mut String, report: &Design) {
         out,
         "\n  95 % intervals if the noise is known (FS: full scale, the effect at full input)"
     );
-    for row in 0..rows {
+    for row in 0..rows.min(most) {
         let line: String = (0..across)
             .filter_map(|c| cells.get(c * rows + row))
             .map(|cell| format!("{cell:<width$}"))
             .collect();
         let _ = writeln!(out, "  {}", line.trim_end());
+    }
+    if rows > most {
+        let _ = writeln!(out, "  the other parameters: --verbose, --json");
     }
     let weak = report.sigma_per_parameter.iter();
     for p in weak.filter(|p| p.inflation >= WEAK && p.value.is_finite()) {

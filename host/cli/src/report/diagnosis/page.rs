@@ -65,9 +65,9 @@ impl<'a> Sections<'a> {
         accel.map(|s| s.picture)
     }
 
-    /// The verdict, in a sentence for each sensor.
+    /// The verdict, in a sentence for each sensor, after what is wrong with the recording.
     pub fn verdict(&self) -> Markup {
-        html! { p class={ "verdict " (self.d.verdict.name()) } { (verdict(self.d)) } }
+        first(self.d)
     }
 
     /// Error before and after, on the recording and on a second one.
@@ -153,10 +153,22 @@ pub fn body(d: &DiagnosisResult, made: &Made) -> Result<Markup> {
     })
 }
 
+/// What is wrong with the recording, and the verdict.
+fn first(d: &DiagnosisResult) -> Markup {
+    html! {
+        @if !d.recording_problems.is_empty() {
+            h2 { "Wrong with this recording" }
+            ul { @for problem in &d.recording_problems { li data-problem=(problem.id()) { (problem) } } }
+        }
+        p class={ "verdict " (d.verdict.name()) } { (verdict(d)) }
+    }
+}
+
 fn head(d: &DiagnosisResult, made: &Made) -> Markup {
     let known = match d.reference {
         Reference::Table => "known from the table",
         Reference::Gravity => "only gravity is known",
+        Reference::TurntableRate => "only the magnitude of the rate is known",
     };
     let counts: Vec<String> = d
         .sensors
@@ -172,7 +184,7 @@ fn head(d: &DiagnosisResult, made: &Made) -> Markup {
         .collect();
     html! {
         h1 { "Diagnosis of " (d.device) }
-        p class={ "verdict " (d.verdict.name()) } { (verdict(d)) }
+        (first(d))
         dl {
             dt { "Recording" } dd { code { (made.recording) } }
             @for source in &d.recordings {

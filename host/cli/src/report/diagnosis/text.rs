@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use super::{meaning, remarks};
 use crate::hint;
-use crate::report::text::wrap;
+use crate::report::text::{counted, kinds, problems, wrap};
 use effect::effect;
 pub(super) use experiments::by_experiment;
 use experiments::experiments;
@@ -41,6 +41,7 @@ pub struct Detail {
 pub fn diagnosis_text(d: &DiagnosisResult, detail: Detail) -> String {
     let Detail { all, next } = detail;
     let mut out = String::new();
+    problems(&mut out, &d.recording_problems, all);
     let _ = writeln!(out, "{}: {}: {}", d.device, d.verdict.name(), meaning(d));
     for u in &d.untestable {
         wrap(&mut out, &format!("  {}: ", u.sensor), &u.reason);
@@ -62,7 +63,10 @@ pub fn diagnosis_text(d: &DiagnosisResult, detail: Detail) -> String {
         wrap(&mut out, "", FIGURES);
     } else if !d.rejected.is_empty() {
         let count = plural(d.rejected.len() as u64, "effect");
-        let _ = writeln!(out, "tried and rejected: {count}; --all prints the reasons");
+        let _ = writeln!(
+            out,
+            "tried and rejected: {count}; --verbose prints the reasons"
+        );
     }
     match all || next {
         true => experiments(&mut out, d),
@@ -196,7 +200,7 @@ fn sensor(
     for note in &s.notes {
         match all || note.advice.is_empty() {
             true => wrap(out, "  note: ", &note.to_string()),
-            false => wrap(out, "  note: ", &format!("{} (--all)", note.found)),
+            false => wrap(out, "  note: ", &format!("{} (--verbose)", note.found)),
         }
     }
     residuals(out, d, name, all);
@@ -231,7 +235,7 @@ fn residuals(out: &mut String, d: &DiagnosisResult, name: Sensor, all: bool) {
     }
     if groups.len() > listed {
         let more: usize = groups[listed..].iter().map(Vec::len).sum();
-        let _ = writeln!(out, "  and {more} more residuals (--all)");
+        let _ = writeln!(out, "  and {more} more residuals (--verbose)");
     }
 }
 
@@ -287,23 +291,9 @@ fn open(out: &mut String, d: &DiagnosisResult) {
 
 /// Warnings. Without `all` the first of each kind, and how many there are.
 fn warnings(out: &mut String, warnings: &[Warning], all: bool) {
-    let mut kinds: Vec<(&Warning, u64)> = Vec::new();
-    for warning in warnings {
-        match kinds.iter_mut().find(|(w, _)| w.is_like(warning)) {
-            Some((_, count)) if !all => *count += 1,
-            _ => kinds.push((warning, 1)),
-        }
-    }
-    for (warning, count) in kinds {
-        let warning = hint::of_warning(warning);
-        match count {
-            1 => wrap(out, "warning: ", &warning),
-            n => wrap(
-                out,
-                "warning: ",
-                &format!("{warning} ({} more of this kind: --all)", n - 1),
-            ),
-        }
+    let others = warnings.iter().filter(|w| !w.is_of_recording());
+    for (warning, more) in kinds(others, |one, other| !all && one.is_like(other)) {
+        wrap(out, "warning: ", &counted(hint::of_warning(warning), more));
     }
 }
 

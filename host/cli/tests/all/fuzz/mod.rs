@@ -271,7 +271,8 @@ fn numbers(fit: &Fit) -> std::result::Result<(), String> {
             }
         }
     }
-    report::fit_text(&result);
+    report::fit_text(&result, false);
+    report::fit_text(&result, true);
     report::dwell_table(&result.dwells);
     let made = Calibration::of(fit, &[], "2026-01-01T00:00:00Z")
         .map_err(|error| format!("the fit makes no calibration: {error}"))?;
@@ -351,7 +352,7 @@ fn verify_mutated(seeds: &Seeds, recording: &Path, random: &mut Random) -> Resul
     write_recording(recording, &manifest(reference), "samples.csv", &text);
     let prepared = Prepared::read(&Recording::open(recording)?, 10.0, |_| {})?;
     let result = verify(&prepared, &calibration)?;
-    report::verify_text(&result);
+    report::verify_text(&result, true);
     serde_json::to_string(&result).expect("a result is JSON");
     Ok(())
 }

@@ -65,7 +65,9 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: FreeParameters) -> O
     let reference = session.prepared.manifest.reference;
     let mut part = match (reference, sensor) {
         (Reference::Table, _) => builder.known(&inverse, accel),
-        (Reference::Gravity, Sensor::Accel) => builder.sizes(&inverse),
+        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => builder.sizes(&inverse),
+        // A diagnosis of a recording from a turntable is refused before.
+        (Reference::TurntableRate, Sensor::Gyro) => return None,
         (Reference::Gravity, Sensor::Gyro) => builder.turns(&inverse, accel, session.forces),
     }?;
     if let FreeParameters::Bias(_) = free {
@@ -160,7 +162,7 @@ impl Builder<'_> {
             let known = |from: usize| Vector3::from_fn(|i, _| block.reference[from + i].mean);
             let (rate, given) = match prepared.manifest.reference {
                 Reference::Table => (known(0).map(f64::to_radians), known(3)),
-                Reference::Gravity => (Vector3::zeros(), force),
+                Reference::Gravity | Reference::TurntableRate => (Vector3::zeros(), force),
             };
             // A rate table's list of rates may leave the force out: at a constant rate the accelerometer has it.
             let given = if given.iter().all(|f| f.is_finite()) {

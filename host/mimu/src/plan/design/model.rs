@@ -161,7 +161,7 @@ impl Model {
     pub fn regressions(&self) -> usize {
         match self.reference {
             Reference::Table => 3,
-            Reference::Gravity => 1,
+            Reference::Gravity | Reference::TurntableRate => 1,
         }
     }
 
@@ -197,7 +197,7 @@ impl Model {
         match self.reference {
             Reference::Table => row.extend([1.0, x.x, x.y, x.z]),
             // The error of the size is up' (dC u + do), C lower triangular.
-            Reference::Gravity => {
+            Reference::Gravity | Reference::TurntableRate => {
                 row.extend(LOWER.map(|(i, j)| x[i] * x[j]));
                 row.extend([x.x, x.y, x.z]);
             }
@@ -213,10 +213,10 @@ impl Model {
                 row.push(x[regression].powi(power))
             }
             (Reference::Table, Term::Cross) => row.extend([x.x * x.y, x.y * x.z, x.z * x.x]),
-            (Reference::Gravity, Term::Quadratic | Term::Cubic) => {
+            (Reference::Gravity | Reference::TurntableRate, Term::Quadratic | Term::Cubic) => {
                 row.extend([0, 1, 2].map(|i| x[i].powi(power + 1)));
             }
-            (Reference::Gravity, Term::Cross) => {
+            (Reference::Gravity | Reference::TurntableRate, Term::Cross) => {
                 for i in 0..3 {
                     row.extend(PRODUCTS.map(|(j, k)| x[i] * x[j] * x[k]));
                 }
@@ -231,7 +231,7 @@ impl Model {
         let span = self.span;
         let sensors: &[usize] = match self.reference {
             Reference::Table => &[regression][..],
-            Reference::Gravity => &[0, 1, 2],
+            Reference::Gravity | Reference::TurntableRate => &[0, 1, 2],
         };
         let matrix = |letter: char, i: usize, j: usize| {
             let shown = if i == j { "ppm" } else { "µrad" };
@@ -259,7 +259,7 @@ impl Model {
                 list.push(bias('b', regression));
                 list.extend((0..3).map(|j| matrix('P', regression, j)));
             }
-            Reference::Gravity => {
+            Reference::Gravity | Reference::TurntableRate => {
                 list.extend(LOWER.map(|(i, j)| matrix('C', i, j)));
                 list.extend((0..3).map(|i| bias('o', i)));
             }
@@ -318,7 +318,7 @@ impl fmt::Display for Model {
     }
 }
 
-/// Row and column of the six elements of C, as in [`crate::estimate::gravity_size`].
+/// Row and column of the six elements of C, as in [`crate::estimate::magnitude`].
 const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 /// Pairs of axes of the cross terms.
 const PRODUCTS: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];

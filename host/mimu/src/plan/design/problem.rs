@@ -202,7 +202,7 @@ fn undetermined(reach: &Reach, rows: &Rows) -> Error {
     }
     let of = match reach.model.reference {
         Reference::Table => "known inputs",
-        Reference::Gravity => "the magnitude of gravity",
+        Reference::Gravity | Reference::TurntableRate => "the magnitude of gravity",
     };
     Error::undetermined(
         place,

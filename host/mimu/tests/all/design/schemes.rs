@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use mimu::estimate::{Observation, gravity_size, known_input};
+use mimu::estimate::{Observation, known_input, magnitude};
 use mimu::plan::design::judgement::Judgement;
 use mimu::plan::design::model::{GRAVITY, Model, Term, Terms};
 use mimu::plan::design::reach::{Fixture, Rates};
@@ -97,13 +97,13 @@ fn the_estimators_claim_the_sigmas_that_the_design_promised() {
             change: Vector3::zeros(),
         })
         .collect();
-    // Columns of C or P by rows, then o or b: known_input gives P, b; gravity_size C, o.
+    // Columns of C or P by rows, then o or b: known_input gives P, b; magnitude C, o.
     let known = known_input::least_squares(&observations, None)
         .unwrap()
         .triad
         .forward_covariance;
     let variances = vec![sigma * sigma; settings.len()];
-    let size = gravity_size::estimate(&observations, &variances, GRAVITY)
+    let size = magnitude::by_gravity(&observations, &variances, GRAVITY)
         .unwrap()
         .triad;
     for (reference, covariance) in [

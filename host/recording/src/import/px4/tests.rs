@@ -282,6 +282,32 @@ fn an_instance_is_asked_for_where_there_are_several_and_the_instances_are_listed
 }
 
 #[test]
+fn a_topic_that_an_old_version_calibrated_and_nothing_undoes_is_warned_of() {
+    // Before PX4 1.11 `sensor_accel` was calibrated, which shows in that it has no time of the sample.
+    let old = SENSOR.replace("uint64_t timestamp_sample;", "");
+    let mut log = Written::new()
+        .format(&format!("sensor_accel:{old}"))
+        .subscribe(0, 1, "sensor_accel");
+    for i in 0..10_u64 {
+        let [time, device] = [(5_000 + 1_000 * i), 77].map(u64::to_le_bytes);
+        let [x, y, z, temperature] = [0.25_f32, 1.0, 9.5, 25.0].map(f32::to_le_bytes);
+        log = log.data(1, &[&time, &device[..4], &x, &y, &z, &temperature]);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut readings = open(&log.save(&folder, "old.ulg"), None, None)
+        .unwrap()
+        .remove(0);
+    let warned = readings.warnings.join(" ");
+    assert!(
+        warned.contains("sensor_accel instance 0: ") && warned.contains("as PX4 has calibrated"),
+        "{warned}"
+    );
+    let note = readings.notes.join(" ");
+    assert!(note.contains("after PX4's calibration"), "{note}");
+    assert_eq!(rows(&mut readings)[9].1[..3], [0.25, 1.0, 9.5]);
+}
+
+#[test]
 fn a_batch_of_the_sensors_buffer_ends_at_the_time_of_its_message() {
     let axes = ["x", "y", "z"]
         .map(|axis| format!("int16_t[32] {axis};"))

@@ -1,0 +1,534 @@
+//! Calibration of a triad from the magnitude of its input alone, over many orientations.
+//!
+//! At rest `|C u + o| = g` in every pose of an accelerometer (references 14 of fang and 19 of xu, among many); on a turntable that lies under a
+//! gyro in any orientation `|C u + o|` is the rate, and `C u + o = 0` at rest. A rotation of the whole leaves
+//! every magnitude as it is, so the frame has to be chosen: C is lower triangular with a positive diagonal,
+//! that is, the body frame has its x axis along the sensor x and its xy plane through the sensor y, fang (13) with
+//! `Mp = 1`. Nine parameters, and at least nine poses, or rests and six orientations; which way an axis is positive cannot be seen
+//! from magnitudes either and is taken from the raw readings.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+
+use super::least_squares::{Linearized, Observability, Scatter, excess_variance, minimize};
+use super::turn::Rest;
+use super::{Estimated, Failure, Observation};
+use crate::observable::Observable;
+use crate::quantity::{AXES, Sensor, plural};
+use crate::triad::{Part, Triad};
+use crate::warning::Warning;
+
+/// Number of parameters: six of C, three of o.
+pub const PARAMETERS: usize = 9;
+
+/// Row and column of the six elements of C.
+const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
+/// What is known of the input of a triad.
+#[derive(Debug, Clone, Copy)]
+pub struct KnownMagnitudes<'a> {
+    /// Whose input.
+    pub sensor: Sensor,
+    /// Magnitudes that occur, SI.
+    pub levels: &'a [f64],
+    /// Standard deviation of each level, as a share of it: an error that all its observations share. 0: exact.
+    pub level_sigma: f64,
+    /// Which of the levels each observation has.
+    pub level_of: &'a [usize],
+    /// Dwells whose input is known whole, as that of a gyro at rest.
+    pub rests: &'a [Rest],
+}
+
+/// Readings in units in which a perfect sensor has C = 1 and o = 0 at the largest magnitude.
+struct Sphere {
+    centre: Vector3<f64>,
+    radius: f64,
+}
+
+impl Sphere {
+    /// Sphere through the readings by linear least squares, those at rest in its centre; `shares` are the magnitudes over the largest.
+    ///
+    /// Of unknown centre c and radius r, `|u|² = 2 c·u + r² m² - |c|²`: linear in c, r² and the constant. With one magnitude the last two are one.
+    fn through(observations: &[Observation], shares: &[f64], rests: &[Rest]) -> Option<Self> {
+        let readings = || {
+            let spun = observations
+                .iter()
+                .map(|o| o.raw)
+                .zip(shares.iter().copied());
+            spun.chain(rests.iter().map(|r| (r.raw, 0.0)))
+        };
+        let count = readings().count();
+        let mean = readings().map(|(u, _)| u).sum::<Vector3<f64>>() / count as f64;
+        let unit = readings()
+            .map(|(u, _)| (u - mean).norm())
+            .fold(0.0, f64::max);
+        let at: Vec<(Vector3<f64>, f64)> = readings()
+            .map(|(u, share)| ((u - mean) / unit, share))
+            .collect();
+        let alike = at.windows(2).all(|w| w[0].1 == w[1].1);
+        let columns = if alike { 4 } else { 5 };
+        let a = DMatrix::from_fn(count, columns, |i, j| match j {
+            0..3 => 2.0 * at[i].0[j],
+            3 => 1.0,
+            _ => at[i].1 * at[i].1,
+        });
+        let y = DVector::from_fn(count, |i, _| at[i].0.norm_squared());
+        let x = a.svd(true, true).solve(&y, 1e-12).ok()?;
+        let centre = Vector3::new(x[0], x[1], x[2]);
+        let squared = match alike {
+            true => x[3] + centre.norm_squared(),
+            false => x[4],
+        };
+        let radius = squared.sqrt();
+        (radius.is_finite() && radius > 0.0).then_some(Self {
+            centre: mean + centre * unit,
+            radius: radius * unit,
+        })
+    }
+}
+
+/// Extent of the readings across a plane over that along it, below which they lie in it.
+const FLAT: f64 = 0.01;
+
+/// The axes across which the readings have no extent, if they lie in a plane or on a line: some sensor has not seen the input.
+fn flat(raw: &[Vector3<f64>]) -> Vec<usize> {
+    let mean = raw.iter().sum::<Vector3<f64>>() / raw.len() as f64;
+    let products = raw.iter().map(|u| (u - mean) * (u - mean).transpose());
+    let eigen = products.sum::<Matrix3<f64>>().symmetric_eigen();
+    let largest = eigen.eigenvalues.max();
+    // All readings equal are flat too.
+    let thin = (0..3).filter(|k| eigen.eigenvalues[*k] <= FLAT * FLAT * largest);
+    // How much of each axis lies across: the directions themselves are any two where the readings lie on a line.
+    let across = thin.fold(Vector3::zeros(), |sum: Vector3<f64>, k| {
+        let direction = eigen.eigenvectors.column(k);
+        sum + direction.component_mul(&direction)
+    });
+    let most = across.max();
+    (0..3)
+        .filter(|k| most > 0.0 && across[*k] > 0.5 * most)
+        .collect()
+}
+
+/// First guess, by the sphere through the readings: one scale factor for all axes. `None` if they lie on none.
+pub fn first_guess(observations: &[Observation], gravity: f64) -> Option<Affine<f64>> {
+    let sphere = Sphere::through(observations, &vec![1.0; observations.len()], &[])?;
+    let matrix = Matrix3::from_diagonal_element(gravity / sphere.radius);
+    Some(Affine {
+        matrix,
+        offset: -(matrix * sphere.centre),
+    })
+}
+
+/// Fits C and o of an accelerometer to `|C u + o| = gravity` (m/s²) over all observations; see [`estimate`].
+pub fn by_gravity(
+    observations: &[Observation],
+    variances: &[f64],
+    gravity: f64,
+) -> Result<Estimated, Failure> {
+    let known = KnownMagnitudes {
+        sensor: Sensor::Accel,
+        levels: &[gravity],
+        level_sigma: 0.0,
+        level_of: &vec![0; observations.len()],
+        rests: &[],
+    };
+    estimate(observations, variances, &known)
+}
+
+/// Refuses experiments that cannot determine the nine parameters, whatever the noise.
+fn refuse_too_little(observations: &[Observation], known: &KnownMagnitudes) -> Result<(), Failure> {
+    let n = observations.len();
+    let rows = n + 3 * known.rests.len();
+    // The rests show o, and nothing of C.
+    let needed = if known.rests.is_empty() {
+        PARAMETERS
+    } else {
+        PARAMETERS - 3
+    };
+    if n < needed || rows < PARAMETERS {
+        let (parameters, add) = match known.sensor {
+            Sensor::Accel => (
+                format!(
+                    "{} of the {PARAMETERS} accelerometer parameters",
+                    PARAMETERS - n
+                ),
+                format!(
+                    "{} can be used, and without a table at least {PARAMETERS} different ones are needed: add poses, each axis up and down and between",
+                    plural(n as u64, "still pose")
+                ),
+            ),
+            Sensor::Gyro => (
+                format!(
+                    "{} of the {PARAMETERS} gyro parameters",
+                    PARAMETERS.saturating_sub(rows).max(needed - n.min(needed))
+                ),
+                format!(
+                    "{} at a known rate and {} can be used, and at least {needed} orientations on the turntable are needed: add dwells with each axis up and down and between",
+                    plural(n as u64, "dwell"),
+                    plural(known.rests.len() as u64, "rest")
+                ),
+            ),
+        };
+        return Err(Failure::Undetermined {
+            parameters,
+            add: add.into(),
+        });
+    }
+    let spun = observations.iter().map(|o| o.raw);
+    let raw: Vec<Vector3<f64>> = spun.chain(known.rests.iter().map(|r| r.raw)).collect();
+    let axes: Vec<&str> = flat(&raw).into_iter().map(|k| AXES[k]).collect();
+    if axes.is_empty() {
+        return Ok(());
+    }
+    let names = axes.join(", ");
+    let add = match known.sensor {
+        Sensor::Accel => format!(
+            "all poses lie in one plane across {names}: add poses with {names} up, down and slanted, and check that the column accel_{} is what it says",
+            axes[0]
+        ),
+        Sensor::Gyro => format!(
+            "no dwell turns about {names}: lay the unit on the turntable with {names} up, down and slanted, and check that the column gyro_{} is what it says",
+            axes[0]
+        ),
+    };
+    Err(Failure::Undetermined {
+        parameters: format!("what the sensor {names} measures"),
+        add: add.into(),
+    })
+}
+
+/// Fits C and o to `|C u + o| = m` over all observations and `C u + o = x` over the rests, and the levels m to within their error.
+///
+/// `variances` are those of the magnitudes by noise, SI squared, one for each observation. The levels' errors are parameters beside the nine, each
+/// with its standard deviation as an observation: what they leave open of C cannot be averaged away, and is a part of the
+/// covariance of its own.
+pub fn estimate(
+    observations: &[Observation],
+    variances: &[f64],
+    known: &KnownMagnitudes,
+) -> Result<Estimated, Failure> {
+    refuse_too_little(observations, known)?;
+    let (n, rests) = (observations.len(), known.rests);
+    let unit = known.levels.iter().copied().fold(0.0, f64::max);
+    let shares: Vec<f64> = known
+        .level_of
+        .iter()
+        .map(|l| known.levels[*l] / unit)
+        .collect();
+    let sphere = Sphere::through(observations, &shares, rests)
+        .ok_or_else(|| Failure::NoSolution("the dwell means do not lie on a sphere".into()))?;
+    let scaled = |raw: &Vector3<f64>| (raw - sphere.centre) / sphere.radius;
+    let v: Vec<Vector3<f64>> = observations.iter().map(|o| scaled(&o.raw)).collect();
+    let resting: Vec<Vector3<f64>> = rests.iter().map(|r| scaled(&r.raw)).collect();
+    let levels = if known.level_sigma > 0.0 {
+        known.levels.len()
+    } else {
+        0
+    };
+    let parameters = PARAMETERS + levels;
+    // Magnitudes, rests by axes, levels.
+    let ends = [n, n + 3 * rests.len()];
+    let rows = ends[1] + levels;
+    let unpack = |p: &DVector<f64>| {
+        let mut c = Matrix3::zeros();
+        for (k, place) in LOWER.iter().enumerate() {
+            c[*place] = p[k];
+        }
+        (c, Vector3::new(p[6], p[7], p[8]))
+    };
+    // All in units of the largest magnitude, so that parameters and columns are of order one.
+    let evaluate = |p: &DVector<f64>, variances: &[f64]| {
+        let (c, o) = unpack(p);
+        let mut out = Linearized {
+            residuals: DVector::zeros(rows),
+            jacobian: DMatrix::zeros(rows, parameters),
+        };
+        for i in 0..n {
+            let f = c * v[i] + o;
+            let weight = variances[i].sqrt().recip();
+            let up = f / f.norm();
+            let level = known.level_of[i];
+            let off = if levels > 0 {
+                p[PARAMETERS + level]
+            } else {
+                0.0
+            };
+            out.residuals[i] = weight * (f.norm() - shares[i] * (1.0 + off));
+            for (k, (row, column)) in LOWER.iter().enumerate() {
+                out.jacobian[(i, k)] = weight * up[*row] * v[i][*column];
+            }
+            for k in 0..3 {
+                out.jacobian[(i, 6 + k)] = weight * up[k];
+            }
+            if levels > 0 {
+                out.jacobian[(i, PARAMETERS + level)] = -weight * shares[i];
+            }
+        }
+        for (r, u) in resting.iter().enumerate() {
+            let f = c * u + o - rests[r].rate / unit;
+            for axis in 0..3 {
+                let i = ends[0] + 3 * r + axis;
+                let weight = variances[i].sqrt().recip();
+                out.residuals[i] = weight * f[axis];
+                for (k, (row, column)) in LOWER.iter().enumerate() {
+                    if *row == axis {
+                        out.jacobian[(i, k)] = weight * u[*column];
+                    }
+                }
+                out.jacobian[(i, 6 + axis)] = weight;
+            }
+        }
+        for l in 0..levels {
+            let i = ends[1] + l;
+            let weight = known.level_sigma.recip();
+            out.residuals[i] = weight * p[PARAMETERS + l];
+            out.jacobian[(i, PARAMETERS + l)] = weight;
+        }
+        out
+    };
+    // A noiseless recording has none; any positive number weighs all poses alike then.
+    let to_si = unit / sphere.radius;
+    let at_rest = rests.iter().flat_map(|r| {
+        let noise = r.variance * (to_si * to_si) + r.rate_variance;
+        <[f64; 3]>::from(noise)
+    });
+    let variances: Vec<f64> = variances.iter().copied().chain(at_rest).collect();
+    let floor = (1e-12 * variances.iter().copied().fold(0.0, f64::max)).max(1e-24);
+    let variances: Vec<f64> = variances
+        .iter()
+        .map(|v| (v / (unit * unit)).max(floor))
+        .collect();
+    let lost = || {
+        let magnitude = match known.sensor {
+            Sensor::Accel => "magnitude of gravity",
+            Sensor::Gyro => "magnitude of the rate",
+        };
+        Failure::NoSolution(format!("the fit to the {magnitude} does not converge"))
+    };
+    let mut start = DVector::zeros(parameters);
+    for k in [0, 2, 5] {
+        start[k] = 1.0;
+    }
+    let alike = vec![1.0; ends[1]];
+    // What the experiment shows of the nine: levels that are known cannot make it worse by more than their error.
+    let shape_of = |p: &DVector<f64>| {
+        let all = evaluate(p, &alike).jacobian;
+        Observability::of(&all.view((0, 0), (ends[1], PARAMETERS)).into_owned())
+    };
+    let shape = shape_of(&start);
+    if !shape.is_complete() {
+        return Err(undetermined(&shape, known.sensor));
+    }
+    let first = minimize(start.clone(), |p| evaluate(p, &alike));
+    // Where nothing holds the angles between the sensors, the fit runs off towards C = 0 and |o| = g, which fits every pose.
+    let Some((mut p, _)) = first.filter(|(p, _)| is_triad(&unpack(p).0)) else {
+        let weak = weak_beside_scatter(&start, |p| evaluate(p, &alike));
+        return Err(weak.map_or_else(lost, |shape| undetermined(&shape, known.sensor)));
+    };
+    let groups = [0..ends[0], ends[0]..ends[1]];
+    let mut scatter: [Scatter; 2] = groups
+        .each_ref()
+        .map(|g| excess_variance(&[], &[], g.len() as f64));
+    let mut chi2: Option<[f64; 2]> = None;
+    let weights_of = |scatter: &[Scatter; 2]| -> Vec<f64> {
+        let each = variances.iter().enumerate();
+        each.map(|(i, v)| v + scatter[usize::from(i >= ends[0])].excess)
+            .collect()
+    };
+    for _ in 0..30 {
+        let weights = weights_of(&scatter);
+        let here;
+        (p, here) = minimize(p, |p| evaluate(p, &weights)).ok_or_else(lost)?;
+        let covariance = normal_inverse(&here.jacobian)?;
+        let before = scatter;
+        for (g, own) in groups.iter().enumerate() {
+            let j = here.jacobian.rows(own.start, own.len());
+            let taken = (j * &covariance).component_mul(&j).sum();
+            let residuals: Vec<f64> = own
+                .clone()
+                .map(|i| here.residuals[i] * weights[i].sqrt())
+                .collect();
+            scatter[g] = excess_variance(
+                &residuals,
+                &variances[own.clone()],
+                own.len() as f64 - taken,
+            );
+        }
+        chi2.get_or_insert(scatter.map(|s| s.chi2));
+        let settled =
+            |g: usize| (scatter[g].excess - before[g].excess).abs() <= 1e-6 * before[g].excess;
+        if settled(0) && settled(1) {
+            break;
+        }
+    }
+    let last = evaluate(&p, &weights_of(&scatter));
+    let shape = shape_of(&p);
+    if !shape.is_complete() {
+        return Err(undetermined(&shape, known.sensor));
+    }
+    let covariance = normal_inverse(&last.jacobian)?;
+    // Back: x = m (C' (u - centre)/radius + o').
+    let (mut c, mut o) = unpack(&p);
+    let scale = unit / sphere.radius;
+    let mut change = SMatrix::<f64, 12, 9>::zeros();
+    for (k, (row, column)) in LOWER.iter().enumerate() {
+        change[(3 * row + column, k)] = scale;
+        change[(9 + row, k)] = -scale * sphere.centre[*column];
+    }
+    for k in 0..3 {
+        change[(9 + k, 6 + k)] = unit;
+    }
+    // A row's sign cannot be seen: the raw reading decides, and flipping rows keeps sizes. What must not
+    // happen is a negative diagonal, which the start (the unit matrix) makes all but impossible.
+    let mut flips = SVector::<f64, 12>::repeat(1.0);
+    for row in 0..3 {
+        if c[(row, row)] < 0.0 {
+            c.row_mut(row).neg_mut();
+            o[row] = -o[row];
+            for k in 0..3 {
+                flips[3 * row + k] = -1.0;
+            }
+            flips[9 + row] = -1.0;
+        }
+    }
+    let change = SMatrix::from_diagonal(&flips) * change;
+    let matrix = c * scale;
+    let inverse = Affine {
+        matrix,
+        offset: o * unit - matrix * sphere.centre,
+    };
+    // From units of the largest magnitude to SI.
+    for (g, scatter) in scatter.iter_mut().enumerate() {
+        scatter.excess *= unit * unit;
+        scatter.chi2 = chi2.map_or(scatter.chi2, |first| first[g]);
+    }
+    let part = |rows: std::ops::Range<usize>, dof: f64| {
+        let j = last.jacobian.rows(rows.start, rows.len());
+        let own = &covariance * (j.transpose() * j) * &covariance;
+        let nine = SMatrix::<f64, 9, 9>::from_fn(|i, j| own[(i, j)]);
+        Part {
+            covariance: change * nine * change.transpose(),
+            dof,
+        }
+    };
+    let mut parts = vec![part(groups[0].clone(), scatter[0].variance_dof())];
+    let mut found = vec![(Observable::Magnitude, scatter[0])];
+    if !rests.is_empty() {
+        parts.push(part(groups[1].clone(), scatter[1].variance_dof()));
+        found.push((Observable::Rest, scatter[1]));
+    }
+    let mut notes = Vec::new();
+    if levels > 0 {
+        // What somebody says of a turntable is not found out from the dwells.
+        parts.push(part(ends[1]..rows, f64::INFINITY));
+        let off = (0..levels).map(|l| p[PARAMETERS + l]);
+        let worst = off
+            .enumerate()
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        if let Some((l, off)) = worst.filter(|w| w.1.abs() > CONTRADICTED * known.level_sigma) {
+            notes.push(Warning::RatesContradict(known.levels[l], off));
+        }
+    }
+    let triad = Triad::from_inverse(inverse, parts)
+        .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
+    Ok(Estimated {
+        triad,
+        scatter: found,
+        condition: shape.condition,
+        delays: None,
+        notes,
+    })
+}
+
+/// Sigmas from which on a level is not what was given: with two levels each moves by half of what they contradict each other.
+const CONTRADICTED: f64 = 2.5;
+
+fn normal_inverse(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, Failure> {
+    (jacobian.transpose() * jacobian)
+        .try_inverse()
+        .ok_or_else(|| Failure::NoSolution("the normal matrix is singular".into()))
+}
+
+/// Off-diagonal over diagonal element of C from which on this is no triad: 30 degrees from a right angle.
+const SKEWED: f64 = 0.5;
+
+/// Sigma, in units of gravity, from which on a parameter is not measured: 3 degrees, 5 %, 0.05 g. Assembly is better.
+const USELESS_SIGMA: f64 = 0.05;
+
+fn is_triad(c: &Matrix3<f64>) -> bool {
+    let mut off_diagonal = LOWER.iter().filter(|(i, j)| i != j);
+    off_diagonal.all(|&(i, j)| c[(i, j)].abs() < SKEWED * c[(i, i)].abs())
+}
+
+/// The parameters that the poses determine, but not beside their own scatter: six faces up to a degree or two. Scatter is
+/// that of scale factors and biases alone, which six faces do determine.
+fn weak_beside_scatter(
+    start: &DVector<f64>,
+    evaluate: impl Fn(&DVector<f64>) -> Linearized,
+) -> Option<Observability> {
+    let by_axis: Vec<usize> = (0..PARAMETERS)
+        .filter(|k| LOWER.get(*k).is_none_or(|(i, j)| i == j))
+        .collect();
+    let full = |q: &DVector<f64>| {
+        let mut p = start.clone();
+        for (k, value) in by_axis.iter().zip(q.iter()) {
+            p[*k] = *value;
+        }
+        p
+    };
+    let first = DVector::from_fn(by_axis.len(), |k, _| start[by_axis[k]]);
+    let (q, at) = minimize(first, |q| {
+        let all = evaluate(&full(q));
+        Linearized {
+            jacobian: all.jacobian.select_columns(&by_axis),
+            residuals: all.residuals,
+        }
+    })?;
+    let dof = at
+        .residuals
+        .len()
+        .checked_sub(by_axis.len())
+        .filter(|d| *d > 0)?;
+    let variance = at.residuals.norm_squared() / dof as f64;
+    let design = evaluate(&full(&q)).jacobian;
+    let covariance = (design.transpose() * &design).try_inverse()? * variance;
+    let undetermined: Vec<_> = (0..PARAMETERS)
+        .map(|k| (k, covariance[(k, k)].sqrt()))
+        .filter(|(_, sigma)| *sigma > USELESS_SIGMA)
+        .collect();
+    (!undetermined.is_empty()).then(|| Observability {
+        undetermined,
+        ..Observability::of(&design)
+    })
+}
+
+fn undetermined(shape: &Observability, sensor: Sensor) -> Failure {
+    let name = |k: usize| match LOWER.get(k) {
+        Some((i, j)) => format!("C_{}{}", AXES[*i], AXES[*j]),
+        None => format!("o_{}", AXES[k - 6]),
+    };
+    let names: Vec<String> = shape.undetermined.iter().map(|(k, _)| name(*k)).collect();
+    // An axis that nothing distinguishes from the others is where the poses are missing.
+    let weak: Vec<&str> = (0..3)
+        .filter(|a| {
+            shape
+                .undetermined
+                .iter()
+                .any(|(k, _)| *k == 6 + a || LOWER.get(*k) == Some(&(*a, *a)))
+        })
+        .map(|a| AXES[a])
+        .collect();
+    let poses = match sensor {
+        Sensor::Accel => "poses",
+        Sensor::Gyro => "dwells on the turntable",
+    };
+    let add = if weak.is_empty() {
+        format!("add {poses} between the axes (two or three axes off the vertical at once)")
+    } else {
+        format!("add {poses} with {} up, down and slanted", weak.join(", "))
+    };
+    Failure::Undetermined {
+        parameters: names.join(", "),
+        add: add.into(),
+    }
+}

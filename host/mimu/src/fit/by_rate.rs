@@ -1,0 +1,162 @@
+//! A gyro on a turntable in orientations that are not known: only the magnitude of the rate is.
+//!
+//! What the rates do to an accelerometer beside the axis nothing says; it is fitted by gravity, from the dwells at rest.
+
+use mimu_core::compensation::Affine;
+use nalgebra::Vector3;
+
+use super::by_gravity::fit_gravity;
+use super::hold_out::{HeldOut, Split, determined};
+use super::sensor::{Residual, SensorFit, rms, typical};
+use super::{Options, as_came, finish};
+use crate::estimate::magnitude::{self, KnownMagnitudes};
+use crate::estimate::turn::Rest;
+use crate::estimate::{Estimated, Failure, Observation};
+use crate::prepared::{Prepared, si_covariance};
+use crate::quantity::{Figure, Sensor};
+use crate::triad::{Triad, slope};
+use crate::turntable::RatedDwells;
+use crate::warning::Warning;
+use mimu_recording::error::{Error, Result};
+
+pub(super) fn fit_rates(
+    prepared: &Prepared,
+    dwells: &RatedDwells,
+    options: Options,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<SensorFit>> {
+    let mut sensors = Vec::new();
+    if options.wants(Sensor::Gyro) {
+        sensors.push(fit_gyro(prepared, dwells, options)?);
+    }
+    if prepared.has(Sensor::Accel) && options.wants(Sensor::Accel) {
+        let alone = Options {
+            only: Some(Sensor::Accel),
+            ..options
+        };
+        match fit_gravity(prepared, alone, warnings) {
+            Ok(accel) => sensors.extend(accel),
+            Err(error) if sensors.is_empty() => return Err(error),
+            // Who came with a record player came for the gyro.
+            Err(error) => warnings
+                .push(Warning::NoRestsToFit(error.refused().problem.clone()).of(Sensor::Accel)),
+        }
+    }
+    Ok(sensors)
+}
+
+fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Result<SensorFit> {
+    if dwells.turning.is_empty() {
+        let unused = prepared.dwells.unused(Sensor::Gyro);
+        let error = Error::undetermined(
+            format!("{}, gyro", prepared.place),
+            format!("no dwell turns at a known rate{unused}"),
+            "let the turntable run for ten seconds and more in each orientation, within the range of the gyro",
+        );
+        return Err(prepared.with_steps_as_given(error, Sensor::Gyro));
+    }
+    let estimate = |kept: &dyn Fn(usize) -> bool| -> std::result::Result<Estimated, Failure> {
+        let both = dwells.turning.iter().zip(&dwells.rate_of);
+        let (turning, rate_of): (Vec<Observation>, Vec<usize>) = both
+            .filter(|(o, _)| kept(o.dwell))
+            .map(|(o, r)| (*o, *r))
+            .unzip();
+        let rests: Vec<Rest> = dwells
+            .rests
+            .iter()
+            .filter(|r| kept(r.dwell))
+            .copied()
+            .collect();
+        let known = KnownMagnitudes {
+            sensor: Sensor::Gyro,
+            levels: &dwells.rates,
+            level_sigma: dwells.rate_sigma,
+            level_of: &rate_of,
+            rests: &rests,
+        };
+        // Noise is in raw units, and a sphere through the readings says well enough how much that is in SI.
+        let sphere = magnitude::first_guess(&turning, dwells.rates[0]);
+        let rough = sphere.map_or_else(|| vec![0.0; turning.len()], |s| variances(&s, &turning));
+        let first = magnitude::estimate(&turning, &rough, &known)?;
+        magnitude::estimate(&turning, &variances(&first.triad.inverse, &turning), &known)
+    };
+    let gyro = estimate(&|_| true).map_err(|f| prepared.refused(f, Sensor::Gyro))?;
+    let inverse = gyro.triad.inverse;
+    let fitted: Vec<f64> = dwells
+        .turning
+        .iter()
+        .map(|o| inverse.apply(&o.raw).norm())
+        .collect();
+    dwells.refuse_other_rate(prepared, &fitted)?;
+    let error = |triad: &Triad, o: &Observation, rate: f64| {
+        Vector3::new(triad.inverse.apply(&o.raw).norm() - rate, 0.0, 0.0)
+    };
+    let rated: Vec<(&Observation, f64)> = dwells.turning.iter().zip(dwells.magnitudes()).collect();
+    let floors = variances(&inverse, &dwells.turning);
+    let mut residuals: Vec<Residual> = rated
+        .iter()
+        .zip(floors)
+        .map(|((o, rate), variance)| Residual {
+            dwell: o.dwell,
+            within: false,
+            value: error(&gyro.triad, o, *rate),
+            held_out: None,
+            floor: prepared.if_noise_known(&[Sensor::Gyro], variance.sqrt()),
+        })
+        .collect();
+    let typical = typical(Figure::RateSize, &residuals);
+    let parts = options.holdout_blocks.min(rated.len());
+    let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
+    // The error of the rates is common to what is kept and what is held out: no refit can be judged by it.
+    let held_out = HeldOut::of(parts, |split, part| {
+        let refit = estimate(&|dwell| part_of(split, dwell) != part)?;
+        let open = rated
+            .iter()
+            .filter(|(o, _)| part_of(split, o.dwell) == part);
+        let scale = dwells.rate_sigma;
+        let open = open.map(|(o, rate)| {
+            let up = inverse.apply(&o.raw).normalize();
+            (refit.triad.variance(&slope(&up, &o.raw)) - (scale * rate).powi(2)).max(0.0)
+        });
+        determined(open, typical, (Figure::RateSize, Sensor::Gyro))?;
+        Ok(refit)
+    });
+    let without = |dwell: usize| held_out.without(part_of(held_out.split, dwell));
+    for (residual, (o, rate)) in residuals.iter_mut().zip(&rated) {
+        residual.held_out = without(o.dwell).map(|refit| error(&refit.triad, o, *rate));
+    }
+    let at_rest = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
+        let all: Vec<Vector3<f64>> = dwells.rests.iter().filter_map(rate).collect();
+        (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))
+    };
+    let static_rms = at_rest(&|r| Some(inverse.apply(&r.raw)));
+    let static_held_out = at_rest(&|r| Some(without(r.dwell)?.triad.inverse.apply(&r.raw)));
+    let mut fit = finish(
+        Sensor::Gyro,
+        gyro,
+        Figure::RateSize,
+        residuals,
+        dwells.turning.len() + dwells.rests.len(),
+        static_rms.map(|r| (r, static_held_out)),
+        held_out.into(),
+    );
+    fit.as_came = as_came::magnitudes(prepared, Figure::RateSize, &rated);
+    let rates_dps = dwells.rates.iter().map(|r| r.to_degrees()).collect();
+    let error = prepared
+        .manifest
+        .turntable
+        .as_ref()
+        .map_or(0.0, |t| t.rate_error);
+    fit.warnings
+        .push(Warning::RateError(rates_dps, error).of(Sensor::Gyro));
+    Ok(fit)
+}
+
+/// Variances of the compensated magnitudes by noise, (rad/s)²; zero where nothing shows the noise.
+pub(crate) fn variances(inverse: &Affine<f64>, observations: &[Observation]) -> Vec<f64> {
+    let along = |o: &Observation| {
+        let up = inverse.apply(&o.raw).normalize();
+        up.dot(&(si_covariance(&inverse.matrix, &o.variance) * up))
+    };
+    observations.iter().map(along).collect()
+}

@@ -1,0 +1,245 @@
+//! What is wrong with a recording: one line for each kind, for every command that judges one.
+//!
+//! Most of it is seen while the recording is read or its dwells are judged, and stands in a [`Warning`] with its figures. What only a fit shows,
+//! an offset that no accelerometer has or a pose that was never held, is looked for here.
+
+use std::fmt;
+
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
+
+use crate::fault::Fault;
+use crate::fit::{Fit, SensorFit, faces_not_up};
+use crate::quantity::{AXES, Figure, Sensor, significant};
+use crate::warning::Warning;
+use mimu_recording::RawUnit;
+
+/// Offset of an accelerometer that no data sheet allows, g: those of MEMS parts end at 0.15.
+const LARGEST_OFFSET_G: f64 = 0.5;
+/// Samples a second below which the turns of hands are too fast: between two samples at 20 Hz a hand at 200 deg/s changes its rate by a third.
+const SLOW_HZ: f64 = 40.0;
+/// Temperatures at which boards are used, °C.
+const USUAL_C: std::ops::RangeInclusive<f64> = -60.0..=150.0;
+
+/// What is wrong with a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RecordingProblem {
+    /// Readings of an axis of the accelerometer that are off by so much, g.
+    Offset(usize, f64),
+    /// Samples a second of a recording in which the unit is turned by hand.
+    SlowForTurns(f64),
+    /// Lowest and highest temperature, °C.
+    Temperatures(f64, f64),
+    /// Faces that no pose had up.
+    MissingPoses(String),
+    /// Samples that were lost between the device and the PC.
+    LostSamples(u64),
+    /// What was seen of one kind while the recording was read and its dwells were judged; at least one.
+    Seen(Seen, Vec<Warning>),
+}
+
+/// Kinds of what is seen without a fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seen {
+    /// Readings are not in the unit that they are said to be in.
+    Unit,
+    /// A channel has no noise.
+    DeadChannel,
+    /// Readings at the ends of a converter, or of a sensor's range.
+    Rails,
+    /// Dwells or turns with readings at a rail.
+    Clipping,
+    /// Readings that are repeated, because the sensor is slower than the log or stands.
+    HeldReadings,
+    /// Time stamps at another rate than the recording's.
+    Clock,
+    /// Times without samples.
+    Gaps,
+    /// Samples without a reading.
+    EmptySamples,
+    /// Values of the thermometer that are no temperatures.
+    Temperatures,
+}
+
+impl Seen {
+    /// Kind of `warning`, if it is of a recording that something is wrong with.
+    fn of(warning: &Warning) -> Option<Self> {
+        Some(match warning {
+            Warning::Of(_, warning) | Warning::Channel(_, warning) => return Self::of(warning),
+            Warning::NotSi(..) | Warning::Turning(_) => Self::Unit,
+            Warning::Dead(_) => Self::DeadChannel,
+            Warning::EndOfConverter(..) | Warning::RunAtEnd(..) | Warning::CalmEnd(..) => {
+                Self::Rails
+            }
+            Warning::Clipped(_)
+            | Warning::DwellsNotUsed(_, Fault::Saturated(_), _)
+            | Warning::TurnNotUsed(_, _, Some(Fault::Saturated(_))) => Self::Clipping,
+            Warning::Held(..)
+            | Warning::DwellsNotUsed(_, Fault::Stuck(_), _)
+            | Warning::TurnNotUsed(_, _, Some(Fault::Stuck(_))) => Self::HeldReadings,
+            Warning::RateOff(..) => Self::Clock,
+            Warning::Gaps(..) | Warning::TurnNotUsed(_, _, None) => Self::Gaps,
+            Warning::Empty(..) | Warning::DwellsNotUsed(_, Fault::Missing(_), _) => {
+                Self::EmptySamples
+            }
+            Warning::NoTemperatures(_) => Self::Temperatures,
+            _ => return None,
+        })
+    }
+
+    fn id(self) -> &'static str {
+        match self {
+            Self::Unit => "unit",
+            Self::DeadChannel => "dead_channel",
+            Self::Rails => "rails",
+            Self::Clipping => "clipping",
+            Self::HeldReadings => "held_readings",
+            Self::Clock => "clock",
+            Self::Gaps => "gaps",
+            Self::EmptySamples => "empty_samples",
+            Self::Temperatures => "temperatures",
+        }
+    }
+}
+
+impl RecordingProblem {
+    /// All of a recording that was fitted, those first that may spoil the whole of it.
+    pub fn of(fit: &Fit) -> Vec<Self> {
+        let prepared = &fit.prepared;
+        let of_sensors = fit.sensors.iter().flat_map(|s| &s.warnings);
+        let mut seen: Vec<(Seen, Vec<Warning>)> = Vec::new();
+        for warning in fit.warnings.iter().chain(of_sensors) {
+            let Some(kind) = Seen::of(warning) else {
+                continue;
+            };
+            match seen.iter_mut().find(|(k, _)| *k == kind) {
+                Some((_, all)) => all.push(warning.clone()),
+                None => seen.push((kind, vec![warning.clone()])),
+            }
+        }
+        seen.sort_by_key(|(kind, _)| *kind as usize);
+        let mut all: Vec<Self> = seen
+            .into_iter()
+            .map(|(kind, w)| Self::Seen(kind, w))
+            .collect();
+        let accel = fit.sensor(Sensor::Accel);
+        all.extend(accel.into_iter().flat_map(|accel| offsets(fit, accel)));
+        let rate_hz = prepared.condensed.period_s.recip();
+        let turns = fit
+            .sensor(Sensor::Gyro)
+            .filter(|g| g.figure == Figure::Direction);
+        if turns.is_some() && rate_hz < SLOW_HZ {
+            all.push(Self::SlowForTurns(rate_hz));
+        }
+        let missing = accel
+            .filter(|a| a.figure == Figure::GravitySize)
+            .and_then(|accel| {
+                let poses = prepared.observations(Sensor::Accel);
+                let raw: Vec<_> = poses.iter().map(|o| o.raw).collect();
+                faces_not_up(&accel.estimated.triad.inverse, &raw)
+            });
+        all.extend(missing.map(Self::MissingPoses));
+        let blocks = prepared.condensed.blocks.iter().map(|b| b.temp_c.mean);
+        let known = blocks.filter(|t| t.is_finite());
+        let [low, high] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| {
+            [low.min(t), high.max(t)]
+        });
+        if low <= high && !(USUAL_C.contains(&low) && USUAL_C.contains(&high)) {
+            all.push(Self::Temperatures(low, high));
+        }
+        let lost = prepared.manifest.recorded.as_ref().map_or(0, |r| r.missing);
+        if lost > 0 {
+            all.push(Self::LostSamples(lost));
+        }
+        all
+    }
+
+    /// Stable name of its kind.
+    pub fn id(&self) -> &'static str {
+        match self {
+            Self::Offset(..) => "offset",
+            Self::SlowForTurns(_) => "slow_for_turns",
+            Self::Temperatures(..) => Seen::Temperatures.id(),
+            Self::MissingPoses(_) => "missing_poses",
+            Self::LostSamples(_) => "lost_samples",
+            Self::Seen(kind, _) => kind.id(),
+        }
+    }
+}
+
+impl Warning {
+    /// Whether it is among what is wrong with the recording, and need not be printed twice.
+    pub fn is_of_recording(&self) -> bool {
+        Seen::of(self).is_some()
+    }
+}
+
+/// Axes of an accelerometer whose offset no part has. The zero of a converter is anywhere, but that of signed counts and of SI is 0.
+fn offsets(fit: &Fit, accel: &SensorFit) -> Vec<RecordingProblem> {
+    let prepared = &fit.prepared;
+    let channels = || Sensor::Accel.channels();
+    let blocks = || prepared.condensed.blocks.iter();
+    let signed = || blocks().any(|b| channels().any(|c| b.raw[c].n > 0 && b.raw[c].mean < 0.0));
+    let about_zero = match prepared.manifest.raw_unit {
+        RawUnit::Si => true,
+        RawUnit::Count => signed(),
+        RawUnit::Volt => false,
+    };
+    let forward = &accel.estimated.triad.forward;
+    let g = prepared.manifest.gravity_mps2;
+    let off = |axis: usize| forward.bias[axis] / (forward.matrix.row(axis).norm() * g);
+    let axes = (0..3).filter(|axis| about_zero && off(*axis).abs() > LARGEST_OFFSET_G);
+    axes.map(|axis| RecordingProblem::Offset(axis, off(axis)))
+        .collect()
+}
+
+impl fmt::Display for RecordingProblem {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Offset(axis, g) => write!(
+                f,
+                "accel_{} is off by {} g, as no working part is: look whether the part is damaged, its range is set as assumed, and its zero was subtracted",
+                AXES[*axis],
+                significant(*g)
+            ),
+            Self::SlowForTurns(hz) => write!(
+                f,
+                "{} Hz is slow for turns by hand: record at 50 Hz or more, or turn slowly",
+                significant(*hz)
+            ),
+            Self::Temperatures(low, high) => write!(
+                f,
+                "temperatures of {} to {} °C are not those of a board: convert the column temp_c, or leave it out",
+                significant(*low),
+                significant(*high)
+            ),
+            Self::MissingPoses(faces) => write!(
+                f,
+                "no pose has {faces} up: the errors there are not known, so add it"
+            ),
+            Self::LostSamples(count) => write!(
+                f,
+                "{count} samples were lost between the device and the PC: look at the cable and the load of the PC"
+            ),
+            Self::Seen(_, warnings) => {
+                let Some(first) = warnings.first() else {
+                    return Ok(());
+                };
+                write!(f, "{first}")?;
+                match warnings.len() - 1 {
+                    0 => Ok(()),
+                    more => write!(f, " (and {more} more of this kind)"),
+                }
+            }
+        }
+    }
+}
+
+impl Serialize for RecordingProblem {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut out = serializer.serialize_struct("RecordingProblem", 2)?;
+        out.serialize_field("id", self.id())?;
+        out.serialize_field("text", &self.to_string())?;
+        out.end()
+    }
+}

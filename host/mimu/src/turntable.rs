@@ -1,0 +1,354 @@
+//! Which dwells of a recording turned at which rate of the turntable, where only its magnitude is known.
+//!
+//! The manifest says it of the steps that a person named. Of the others the readings show it: those at rest are the bias, and those at a rate
+//! lie at a distance from it that is the rate times about one scale factor.
+
+use nalgebra::Vector3;
+
+use crate::estimate::earth;
+use crate::estimate::turn::Rest;
+use crate::estimate::{Observation, magnitude};
+use crate::prepared::Prepared;
+use crate::quantity::{Sensor, significant};
+use crate::signal::dwell::Fault;
+use crate::warning::Warning;
+use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{RawUnit, Turntable};
+
+/// Half of a 95 % interval of a normal variable, in sigmas.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+/// Standard deviations by which readings are expected off: at rest, over the largest rate, where a bias wanders; at a rate, over it, by scale factors
+/// that differ from axis to axis.
+const REST_SIGMA: f64 = 0.02;
+const RATE_SIGMA: f64 = 0.06;
+/// Squared sigmas that a dwell at none of the rates counts.
+const AT_NONE: f64 = 9.0;
+/// Mean of the squared sigmas from which on the readings show no rates.
+const UNLIKE: f64 = 4.0;
+/// Fewest dwells that are taken for rests: one alone may as well be a turn, as those about perpendicular axes are at two distances from it.
+const FEWEST_RESTS: f64 = 2.0;
+/// Share of its rate by which a dwell may be off in a fit of all: beyond, it turned at another rate. 33 1/3 and 45 rpm are 26 % apart.
+const OTHER_RATE: f64 = 0.1;
+/// Scale factors of readings in SI, over one, among which the dwells are assigned: wider than any part, so that a wrong rate is seen in the fit.
+const SCALE_IN_SI: [f64; 2] = [0.5, 2.0];
+
+/// How many dwells may be at none of the rates, for each that is at one. With more of them the rates are not those that were given: of a unit that turned at
+/// 200 and 270 deg/s, as often at either, and of which 200 was given, either half is at it as well as the other.
+const MOST_AT_NONE: f64 = 0.6;
+
+/// At what a dwell turned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Class {
+    Rest,
+    /// By index.
+    Rate(usize),
+    Other,
+}
+
+/// The usable dwells of the gyro by their rates.
+#[derive(Debug, Clone)]
+pub struct RatedDwells {
+    /// Magnitudes of the rates, rad/s, ascending.
+    pub rates: Vec<f64>,
+    /// Standard deviation of each, as a share of it.
+    pub rate_sigma: f64,
+    /// Dwells at a rate.
+    pub turning: Vec<Observation>,
+    /// Index of the rate of each of them.
+    pub rate_of: Vec<usize>,
+    /// Dwells at rest, where nothing but the Earth turns the gyro.
+    pub rests: Vec<Rest>,
+    /// Indices of the dwells that turned at another rate.
+    pub others: Vec<usize>,
+}
+
+impl RatedDwells {
+    /// Of a recording whose reference is the rate of a turntable.
+    ///
+    /// # Errors
+    /// A step that is named and is not there; readings that do not show which dwell has which rate.
+    pub fn of(prepared: &Prepared) -> Result<Self> {
+        let none = Turntable {
+            rates_dps: Vec::new(),
+            rate_error: 0.0,
+            step_rates_dps: Default::default(),
+        };
+        let turntable = prepared.manifest.turntable.as_ref().unwrap_or(&none);
+        let mut rates: Vec<f64> = turntable.rates_dps.iter().map(|r| r.to_radians()).collect();
+        rates.sort_by(f64::total_cmp);
+        let observations = prepared.observations(Sensor::Gyro);
+        let given = given(prepared, turntable, &observations)?;
+        let class = |dps: f64| match rates.iter().position(|r| *r == dps.to_radians()) {
+            Some(k) => Class::Rate(k),
+            None => Class::Rest,
+        };
+        let given: Vec<Option<Class>> = given.into_iter().map(|dps| dps.map(class)).collect();
+        let in_si = prepared.manifest.raw_unit == RawUnit::Si;
+        let classes = match given.iter().copied().collect::<Option<Vec<Class>>>() {
+            Some(all) => all,
+            None => assigned(&observations, &rates, &given, in_si)
+                .ok_or_else(|| unclear(prepared, &rates))?,
+        };
+        let (mut turning, mut rate_of) = (Vec::new(), Vec::new());
+        let (mut rests, mut others) = (Vec::new(), Vec::new());
+        for (o, class) in observations.into_iter().zip(classes) {
+            match class {
+                Class::Rate(rate) => {
+                    turning.push(o);
+                    rate_of.push(rate);
+                }
+                Class::Other => others.push(o.dwell),
+                // The Earth's rate lies anywhere in the frame of a gyro whose axes are not known yet.
+                Class::Rest => rests.push(Rest {
+                    dwell: o.dwell,
+                    raw: o.raw,
+                    variance: o.variance,
+                    rate: Vector3::zeros(),
+                    rate_variance: Vector3::repeat(earth::RATE * earth::RATE / 3.0),
+                }),
+            }
+        }
+        // About the vertical the Earth's rate adds to the turntable's, by 2e-5 of 200 deg/s: all dwells have the same error of it.
+        let slowest = rates.first().copied().unwrap_or(f64::INFINITY);
+        Ok(Self {
+            rate_sigma: (turntable.rate_error / NORMAL_95).hypot(earth::RATE / slowest),
+            rates,
+            turning,
+            rate_of,
+            rests,
+            others,
+        })
+    }
+
+    /// Rate of each of the turning dwells, rad/s.
+    pub fn magnitudes(&self) -> impl Iterator<Item = f64> {
+        self.rate_of.iter().map(|r| self.rates[*r])
+    }
+
+    /// Sets the turning dwells aside for the accelerometer, which beside the axis feels a centripetal force there that nothing says, and those at another
+    /// rate for both sensors; what to say of these.
+    pub fn set_aside(&self, prepared: &mut Prepared) -> Option<Warning> {
+        let turning = self.turning.iter().map(|o| o.dwell);
+        for dwell in turning.chain(self.others.iter().copied()) {
+            let dwell = &mut prepared.dwells.list[dwell];
+            dwell.accel_fault.get_or_insert(Fault::Spinning);
+        }
+        for dwell in &self.others {
+            prepared.dwells.list[*dwell].gyro_fault = Some(Fault::OtherRate);
+        }
+        let step = |dwell: &usize| prepared.dwells.list[*dwell].step;
+        let steps = self.others.iter().map(step);
+        let names: Vec<String> = steps.map(|s| prepared.manifest.step_name(s)).collect();
+        (!names.is_empty()).then_some(Warning::DwellsNotUsed(names, Fault::OtherRate, None))
+    }
+
+    /// Refuses a dwell that turns at another rate than its own by a fit of all; `fitted` are their magnitudes, rad/s.
+    pub(crate) fn refuse_other_rate(&self, prepared: &Prepared, fitted: &[f64]) -> Result<()> {
+        let off = |i: usize| (fitted[i] / self.rates[self.rate_of[i]] - 1.0).abs();
+        let worst = (0..fitted.len()).max_by(|a, b| off(*a).total_cmp(&off(*b)));
+        let Some(i) = worst.filter(|i| off(*i) > OTHER_RATE) else {
+            return Ok(());
+        };
+        let step = prepared.dwells.list[self.turning[i].dwell].step;
+        let [rate, found] =
+            [self.rates[self.rate_of[i]], fitted[i]].map(|r| significant(r.to_degrees()));
+        Err(Error::new(
+            format!("{}, dwell {}", prepared.place, prepared.manifest.step_name(step)),
+            format!("it is to turn at {rate} deg/s, and by the fit of all dwells it turns at {found} deg/s"),
+            "give this step its own rate, or leave it out if that is beyond the range of the gyro; look also whether the rates of the others are right (33 1/3 rpm is 200 deg/s, 45 rpm is 270 deg/s)",
+        )
+        .about(Argument::TurntableRates))
+    }
+}
+
+/// Rate of each observation, deg/s, where the manifest gives it by its step.
+fn given(
+    prepared: &Prepared,
+    turntable: &Turntable,
+    observations: &[Observation],
+) -> Result<Vec<Option<f64>>> {
+    let steps: Vec<i32> = prepared.dwells.list.iter().map(|d| d.step).collect();
+    let rates = &turntable.step_rates_dps;
+    let names = |step: i32| [prepared.manifest.step_name(step), step.to_string()];
+    let there = |name: &String| steps.iter().any(|s| names(*s).contains(name));
+    if let Some(name) = rates.keys().find(|name| !there(name)) {
+        let mut all: Vec<String> = steps
+            .iter()
+            .take(8)
+            .map(|s| prepared.manifest.step_name(*s))
+            .collect();
+        if steps.len() > all.len() {
+            all.push("...".into());
+        }
+        let error = Error::new(
+            format!("{}, turntable.step_rates_dps", prepared.place),
+            format!("there is no step {name}"),
+            format!("name one of the steps that there are: {}", all.join(", ")),
+        );
+        return Err(error.about(Argument::TurntableRates));
+    }
+    let of = |o: &Observation| {
+        let step = prepared.dwells.list[o.dwell].step;
+        names(step).iter().find_map(|name| rates.get(name).copied())
+    };
+    Ok(observations.iter().map(of).collect())
+}
+
+fn unclear(prepared: &Prepared, rates: &[f64]) -> Error {
+    let list: Vec<String> = rates.iter().map(|r| significant(r.to_degrees())).collect();
+    let (problem, remedy) = match rates.len() {
+        1 => (
+            format!(
+                "the dwells are not at {} deg/s and at rest: their readings have other distances from each other",
+                list[0]
+            ),
+            "give all rates of the turntable, or the rate of each step (STEP=RATE)",
+        ),
+        _ => (
+            format!(
+                "which dwell turned at which of {} deg/s does not show: there is no dwell at rest, or a rate that no dwell has",
+                list.join(", ")
+            ),
+            "give the rate of each step (STEP=RATE), or only the rates that occur, and record rests between them",
+        ),
+    };
+    Error::new(format!("{}, gyro", prepared.place), problem, remedy).about(Argument::TurntableRates)
+}
+
+/// At what each of the `observations` turned, where the readings show it; `given` are those that are known.
+///
+/// Each reading is tried as the bias, and each distance from it as each of the rates; where there is one rate only, the readings may also all be at
+/// it, about the centre of their sphere. What fits best is taken.
+fn assigned(
+    observations: &[Observation],
+    rates: &[f64],
+    given: &[Option<Class>],
+    in_si: bool,
+) -> Option<Vec<Class>> {
+    let largest = rates.last()?;
+    let n = observations.len() as f64;
+    let off = |share: f64, class: Class| match class {
+        Class::Rest => (share / REST_SIGMA).powi(2),
+        Class::Rate(k) => ((share * largest / rates[k] - 1.0) / RATE_SIGMA).powi(2),
+        // A table that turns on slowly, or a hand that turns it.
+        Class::Other => AT_NONE,
+    };
+    let nearest = |share: f64| {
+        let known = (0..rates.len())
+            .map(Class::Rate)
+            .chain([Class::Rest, Class::Other]);
+        known.min_by(|a, b| off(share, *a).total_cmp(&off(share, *b)))
+    };
+    let mut best: Option<(f64, Vec<Class>)> = None;
+    for Observation { raw: centre, .. } in observations {
+        let distances = observations.iter().map(|o| (o.raw - centre).norm());
+        let distances: Vec<f64> = distances.collect();
+        for (distance, rate) in distances
+            .iter()
+            .flat_map(|d| rates.iter().map(move |r| (d, r)))
+        {
+            let scale = distance / rate;
+            let possible = !in_si || (SCALE_IN_SI[0]..SCALE_IN_SI[1]).contains(&scale);
+            if !(scale > 0.0) || !possible {
+                continue;
+            }
+            let share = |d: &f64| d / (scale * largest);
+            let classes = distances.iter().zip(given);
+            let classes: Vec<Class> = classes
+                .filter_map(|(d, given)| given.or_else(|| nearest(share(d))))
+                .collect();
+            let occurs = |k: usize| classes.contains(&Class::Rate(k));
+            let count = |of: fn(&Class) -> bool| classes.iter().filter(|c| of(c)).count() as f64;
+            let others = count(|c| *c == Class::Other);
+            let turning = count(|c| matches!(c, Class::Rate(_)));
+            let few = count(|c| *c == Class::Rest) < FEWEST_RESTS;
+            if few || !(0..rates.len()).all(occurs) || others > MOST_AT_NONE * turning {
+                continue;
+            }
+            let errors = distances.iter().zip(&classes);
+            let cost: f64 = errors.map(|(d, class)| off(share(d), *class)).sum();
+            if best.as_ref().is_none_or(|b| cost < b.0) {
+                best = Some((cost, classes));
+            }
+        }
+    }
+    let at_one = rates.len() == 1 && given.iter().all(|g| g.is_none_or(|c| c != Class::Rest));
+    let sphere = magnitude::first_guess(observations, *largest).filter(|_| at_one);
+    if let Some(sphere) = sphere {
+        let shares = observations.iter();
+        let shares = shares.map(|o| sphere.apply(&o.raw).norm() / largest);
+        let cost: f64 = shares.map(|share| off(share, Class::Rate(0))).sum();
+        if best.as_ref().is_none_or(|b| cost < b.0) {
+            best = Some((cost, vec![Class::Rate(0); observations.len()]));
+        }
+    }
+    let (cost, classes) = best?;
+    (cost < UNLIKE * n).then_some(classes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Readings at these rates, deg/s, in these directions, by a gyro whose scale factors differ by 10 % and whose bias is 2048 counts.
+    fn readings(of: &[(f64, [f64; 3])]) -> Vec<Observation> {
+        let scale = Vector3::new(95.0, 100.0, 105.0);
+        let reading = |(dps, along): &(f64, [f64; 3])| Observation {
+            dwell: 0,
+            raw: scale.component_mul(&(Vector3::from(*along).normalize() * dps.to_radians()))
+                + Vector3::repeat(2048.0),
+            variance: Vector3::zeros(),
+            input: Vector3::repeat(f64::NAN),
+            change: Vector3::zeros(),
+        };
+        of.iter().map(reading).collect()
+    }
+
+    const DIRECTIONS: [[f64; 3]; 8] = [
+        [1.0, 0.0, 0.0],
+        [-1.0, 0.1, 0.0],
+        [0.0, 1.0, 0.1],
+        [0.0, -1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.1, 0.0, -1.0],
+        [1.0, 1.0, 0.0],
+        [0.0, 1.0, -1.0],
+    ];
+
+    /// At what dwells with these rates, deg/s, in each direction turned, where 200 and 270 deg/s, or the first of them, are known.
+    fn found(dps: &[f64], known: usize) -> Option<Vec<Class>> {
+        let rates = [200f64.to_radians(), 270f64.to_radians()];
+        let all = DIRECTIONS.iter();
+        let of: Vec<_> = all
+            .flat_map(|along| dps.iter().map(|r| (*r, *along)))
+            .collect();
+        assigned(
+            &readings(&of),
+            &rates[..known],
+            &vec![None; of.len()],
+            false,
+        )
+    }
+
+    #[test]
+    fn readings_show_which_dwells_are_at_rest_and_which_at_which_rate() {
+        let cycle = [Class::Rest, Class::Rate(0), Class::Rate(1)];
+        assert_eq!(found(&[0.0, 200.0, 270.0], 2), Some(cycle.repeat(8)));
+        assert_eq!(found(&[0.0, 200.0], 1), Some(cycle[..2].repeat(8)));
+        // A table that slows down to 60 deg/s before it turns on.
+        let with_other = [Class::Rest, Class::Rate(0), Class::Other, Class::Rate(1)];
+        assert_eq!(
+            found(&[0.0, 200.0, 60.0, 270.0], 2),
+            Some(with_other.repeat(8))
+        );
+    }
+
+    #[test]
+    fn turns_at_one_rate_without_rests_are_all_at_that_rate_and_of_two_rates_nothing_shows_which() {
+        assert_eq!(found(&[200.0], 1), Some(vec![Class::Rate(0); 8]));
+        assert_eq!(found(&[200.0], 2), None);
+        // As often at a rate that was not given as at the one that was.
+        assert_eq!(found(&[0.0, 200.0, 270.0], 1), None);
+        assert_eq!(found(&[0.0, 0.0, 200.0, 270.0], 1), None);
+    }
+}
