@@ -195,7 +195,7 @@ pub fn rejected(d: &DiagnosisResult) -> Markup {
         @if d.rejected.is_empty() {
             p { "Nothing came near." }
         } @else {
-            div class="scroll" { table class="long" {
+            div class="scroll" { table class="long told" {
                 thead { tr { th { "effect" } th { "why not" } } }
                 tbody { @for r in &d.rejected {
                     tr { td { code { (r.id) } } td { (hint::of_rejected(r)) } }
@@ -212,7 +212,7 @@ pub fn not_excited(d: &DiagnosisResult) -> Markup {
         @if by_experiment.is_empty() {
             p { "Every effect of the library would have been seen at the size that data sheets give." }
         } @else {
-            div class="scroll" { table {
+            div class="scroll" { table class="told" {
                 thead { tr { th { "effect" } th { "what would show it" } } }
                 tbody { @for (experiment, ids) in by_experiment {
                     tr {
