@@ -225,7 +225,7 @@ fn rests_between_turns_of_known_angle_show_the_noise_and_are_no_outliers() {
         (floor / expected - 1.0).abs() < 0.2,
         "{floor} and not {expected}"
     );
-    let text = right(folder, "fit turns");
+    let text = right(folder, "fit turns --verbose");
     // The three turns are fitted exactly, and the rests differ by their biases: neither is far from the others.
     assert!(!text.contains("times the median"), "{text}");
     assert!(text.contains("the residual exceeds the noise"), "{text}");

@@ -148,8 +148,9 @@ fn summary(out: &mut String, report: &Design) {
     let cell = |k: usize| {
         let [x, y, z] = report.positions[k].map(|c| round(c, 1e3));
         let rate = report.rates_dps.as_ref().and_then(|rates| rates.get(k));
-        let rate = rate.map_or(String::new(), |r| format!("{:>8.1}", round(*r, 10.0)));
-        format!("{:>4}:{x:>7.3}{y:>7.3}{z:>7.3}{rate}", k + 1)
+        // Three cells with a rate and their gaps are just a hundred columns.
+        let rate = rate.map_or(String::new(), |r| format!("{:>7.1}", round(*r, 10.0)));
+        format!("{:>3}:{x:>7.3}{y:>7.3}{z:>7.3}{rate}", k + 1)
     };
     let rows = n.div_ceil(ACROSS);
     for row in 0..rows.min(ROWS) {
