@@ -37,6 +37,8 @@ def read(
     faces: Mapping[str, Path] | None = None,
     step_gap: float | None = None,
     inputs: Path | None = None,
+    rate_dps: str | None = None,
+    rate_error: str | None = None,
     separator: str | None = None,
     skip_broken: int | str | bool = False,
     device: str | None = None,
@@ -52,7 +54,7 @@ def read(
     ``"gyro_x=wx,t_s=time"`` by the names of the header. ``raw_unit`` is ``"V"``, ``"count"`` or ``"SI"``; ``gravity`` is in m/s²,
     ``latitude`` in degrees, ``rate_hz`` in samples a second, ``step_gap`` in seconds. ``scale``, ``offset``, ``zero`` and
     ``twos_complement`` are by column or sensor: ``scale={"gyro": 0.0174533}``. ``faces`` maps the axis that was up to a file:
-    ``{"+x": "a.csv", "-x": "b.csv", ...}``. ``skip_broken=True`` leaves out up to 1 % of rows that cannot be read.
+    ``{"+x": "a.csv", "-x": "b.csv", ...}``. On a turntable of known rates ``rate_dps="200,270"`` and ``rate_error="0.3%"``. ``skip_broken=True`` leaves out up to 1 % of rows that cannot be read.
 
     The recording is kept in a temporary folder, and removed with it, or written to ``output``. Its ``imported`` and ``warnings`` are what
     the import found.
@@ -63,7 +65,7 @@ def read(
         reference=reference, gravity=gravity, latitude=latitude, raw_unit=raw_unit, columns=columns, preset=preset, rate_hz=rate_hz,
         time_unit=time_unit, scale=scale, offset=offset, zero=zero, twos_complement=twos_complement, signed_low_byte=signed_low_byte,
         where=where, topic=topic, instance=instance, means=means, sequence=sequence, faces=bool(faces), step_gap=step_gap, inputs=inputs,
-        separator=separator, skip_broken=skip_broken, device=device, format=format, replace=replace,
+        rate_dps=rate_dps, rate_error=rate_error, separator=separator, skip_broken=skip_broken, device=device, format=format, replace=replace,
     )
     named = [f"{face}={os.fspath(file)}" for face, file in (faces or {}).items()]
     # After `--`, a name that begins with a hyphen is a name.

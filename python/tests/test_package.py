@@ -32,7 +32,7 @@ def test_the_command_is_there_with_its_help_and_status() -> None:
         # Where a result goes; the faces' short options are in `faces`.
         (mimu.read, "import", {"json", "o", "x", "y", "z"}),
         # Other results than a design, and what only these take.
-        (mimu.design, "design", {"json", "o", "compare", "effects", "after", "chamber"}),
+        (mimu.design, "design", {"json", "o", "compare", "effects", "after", "chamber", "verbose"}),
     ],
 )
 def test_every_option_of_the_command_is_a_keyword(function: object, subcommand: str, elsewhere: set[str]) -> None:
