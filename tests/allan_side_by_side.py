@@ -65,7 +65,7 @@ def measured(command):
 
 def built():
     """Path of the bench, built now."""
-    command = "cargo bench -q -p mimu --bench allan --no-run --message-format=json".split()
+    command = "cargo bench -q -p mimu-allan --bench allan --no-run --message-format=json".split()
     messages = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
     artefacts = map(json.loads, messages.splitlines())
     return next(

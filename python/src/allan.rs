@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use mimu::allan::Kind;
 use mimu::result::allan::AllanResult;
 use mimu::survey::{Options, Part, survey_all};
+use mimu_allan::Deviation;
 use mimu_cli::report::{self, allan_plot, fragment};
 use mimu_recording::error::Result;
 use pyo3::exceptions::PyValueError;
@@ -93,9 +93,9 @@ pub(crate) fn allan(
     let options = Options {
         part,
         kind: match kind {
-            "allan" => Kind::Allan,
-            "modified" => Kind::Modified,
-            "hadamard" => Kind::Hadamard,
+            "allan" => Deviation::Allan,
+            "modified" => Deviation::Modified,
+            "hadamard" => Deviation::Hadamard,
             _ => return refuse(format!("kind={kind:?}: write allan, modified or hadamard")),
         },
         per_decade,

@@ -5,9 +5,9 @@
 
 use std::fmt::Write as _;
 
-use mimu::allan::model::FLOOR;
-use mimu::allan::variance::AllanModel;
 use mimu::quantity::Sensor;
+use mimu_allan::model::FLOOR;
+use mimu_allan::variance::AllanModel;
 use mimu_rig::rig_file::RigFile;
 use mimu_thermal::basis::Shape;
 use mimu_thermal::fit::{Estimator, Options, ThermalFit, fit};

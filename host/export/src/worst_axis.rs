@@ -8,10 +8,10 @@
 //! an estimator that takes a bias for steadier than it is will not follow it, one that takes it for less steady only follows it less
 //! smoothly.
 
-use mimu::allan::model::Term;
 use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
 use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu::readable::STANDARD_GRAVITY;
+use mimu_allan::model::Term;
 use mimu_recording::error::{Argument, Error, Result};
 
 use crate::{Sources, yaml};

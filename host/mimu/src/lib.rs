@@ -4,8 +4,7 @@
 //! |---|---|
 //! | [`quantity`], [`readable`] | sensors, axes, SI units, and how numbers are written for people |
 //! | [`signal`] | from samples to dwells and turns: blocks, rails, stillness, dwells; [`prepared`] is all of it for one recording |
-//! | [`noise`] | how well a dwell mean is known; [`survey`] finds it from a recording at rest |
-//! | [`allan`], [`spectrum`] | Allan deviation and noise model of a series; spectral lines, and the band in which it is white |
+//! | [`noise`] | how well a dwell mean is known; [`survey`] finds it from a recording at rest, by the Allan deviation of [`mimu_allan`] |
 //! | [`estimate`], [`triad`] | the estimators, and what they estimate: both directions, covariances, physical quantities |
 //! | [`mod@fit`] | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`] | the file; [`calibration::verify`] judges it by another recording, [`calibration::apply`] compensates one |
@@ -54,7 +53,6 @@
 //!
 //! `Cargo.toml` needs this crate alone: `mimu = { path = "mimu/host/mimu" }`. Vectors and matrices are those of [`nalgebra`].
 
-pub mod allan;
 pub mod calibration;
 pub mod diagnose;
 pub mod diagnosed;
@@ -73,7 +71,6 @@ pub mod readable;
 pub mod recording_problem;
 pub mod result;
 pub mod signal;
-pub mod spectrum;
 pub mod survey;
 mod toml_layout;
 pub mod triad;

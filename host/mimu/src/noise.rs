@@ -14,7 +14,6 @@ use mimu_core::compensation::Affine;
 
 use self::pool::{Series, block_s, pooled, within};
 use self::wander::{Slow, Span};
-use crate::allan::variance::AllanModel;
 use crate::noise::noise_file::NoiseFile;
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Block, Condensed, Rails, quantile};
@@ -22,6 +21,7 @@ use crate::signal::course::Course;
 use crate::signal::dwell::Dwell;
 use crate::signal::ramp::ramps;
 use crate::warning::Warning;
+use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 

@@ -9,6 +9,7 @@ mod masking;
 mod several;
 mod stretch;
 mod suitability;
+pub mod unit;
 mod values;
 
 use self::ahead::ahead;
@@ -17,19 +18,19 @@ pub use self::masking::Masked;
 pub use self::several::survey_all;
 pub use self::stretch::Part;
 use self::stretch::{Stretch, temperature};
+use self::unit::Unit;
 use self::values::{Read, Values};
-use crate::allan::deviation::Integrated;
-use crate::allan::model::{
-    Coefficient, Estimator, NoiseModel, Term, allan_factors, hadamard_factors,
-};
-use crate::allan::units::Unit;
-use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
 use crate::quantity::Sensor;
 use crate::signal::no_temperature;
 use crate::signal::unit_in_si::of_sizes;
-use crate::spectrum::{SetAside, set_aside_after};
 use crate::warning::{CHECK_WIRING, Warning};
+use mimu_allan::deviation::Integrated;
+use mimu_allan::model::{
+    Coefficient, Estimator, NoiseModel, Term, allan_factors, hadamard_factors,
+};
+use mimu_allan::spectrum::{SetAside, set_aside_after};
+use mimu_allan::{Deviation, NotFinite, Point, Spacing};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, NoTemperatures, RAW_COLUMNS, RawUnit, Recording};
 
@@ -39,7 +40,7 @@ pub struct Options {
     /// Which samples.
     pub part: Part,
     /// Deviation that is reported; the model is always fitted to the overlapping Allan deviation.
-    pub kind: Kind,
+    pub kind: Deviation,
     /// Averaging times in a decade.
     pub per_decade: usize,
     /// Probability of all intervals.
@@ -168,7 +169,7 @@ pub fn survey(
         let spectrum = set_aside_after(&mut rates, dt_s, options.confidence, |rates| {
             as_it_is = Some(AsItIs::of(rates, dt_s, &options));
         });
-        let without_lines = Integrated::new(rates, dt_s)?;
+        let without_lines = Integrated::new(rates, dt_s).map_err(not_finite)?;
         next();
         let mut channel = Channel::of(i, units[done], samples);
         channel.masked = values.masked;
@@ -265,6 +266,14 @@ fn units(
     indices.iter().map(unit).collect()
 }
 
+fn not_finite(bad: NotFinite) -> Error {
+    Error::new(
+        format_args!("sample {}", bad.sample),
+        format_args!("{} is not a number that can be averaged", bad.value),
+        "choose a stretch without gaps",
+    )
+}
+
 /// Curves of a channel with its lines.
 struct AsItIs {
     curve: Vec<Point>,
@@ -274,7 +283,7 @@ struct AsItIs {
 impl AsItIs {
     fn of(rates: &[f64], dt_s: f64, options: &Options) -> Result<Self> {
         let mut integrated = Integrated::empty(dt_s);
-        integrated.push(rates)?;
+        integrated.push(rates).map_err(not_finite)?;
         let times = Spacing::Samples(shown(rates.len(), options));
         Ok(Self {
             curve: integrated.curve(options.kind, &times, options.confidence),
@@ -297,7 +306,7 @@ fn shown(samples: usize, options: &Options) -> Vec<usize> {
 /// Hadamard deviation at the times that are shown.
 fn hadamard(integrated: &Integrated, options: &Options) -> Vec<Point> {
     let times = Spacing::Samples(shown(integrated.samples(), options));
-    integrated.curve(Kind::Hadamard, &times, options.confidence)
+    integrated.curve(Deviation::Hadamard, &times, options.confidence)
 }
 
 impl Channel {
@@ -345,15 +354,17 @@ impl Channel {
             }
             None => self.curve = own,
         }
-        let allan = curve(without_lines, Kind::Allan, &allan_factors(self.samples));
+        let allan = curve(
+            without_lines,
+            Deviation::Allan,
+            &allan_factors(self.samples),
+        );
         let hadamard = curve(
             without_lines,
-            Kind::Hadamard,
+            Deviation::Hadamard,
             &hadamard_factors(self.samples),
         );
-        let unit = self.unit;
-        let words = |term: Term, value: f64| unit.write(term, value);
-        self.model = estimator.and_then(|e| e.fit(&allan, &hadamard, words));
+        self.model = estimator.and_then(|e| e.fit(&allan, &hadamard));
         self.read_white_band(without_lines.dt_s(), options.confidence);
     }
 
@@ -382,12 +393,7 @@ impl Channel {
                 self.n_band_hz = Some(band);
             }
             // Neither shows it: the curve's bound may come from where a filter has bent it.
-            (None, Err(unseen)) => {
-                unseen.raise(
-                    white.interval[1],
-                    self.unit.write(Term::N, white.interval[1]),
-                );
-            }
+            (None, Err(unseen)) => unseen.raise(white.interval[1]),
             (None, Ok(_)) => {}
         }
     }
@@ -412,7 +418,7 @@ impl Channel {
             (None, None) => return,
         };
         warnings.push(Warning::Channel(self.name, Box::new(warning)));
-        if options.kind != Kind::Hadamard {
+        if options.kind != Deviation::Hadamard {
             self.hadamard = Some(hadamard());
         }
     }

@@ -4,9 +4,9 @@
 //! temperature ([`Basis`]), and the first session has no offset b_js of its own. Readings are scaled by a first affine fit, so that the
 //! same curve of any sensor has the same size: biases in SI, the rest as ratios.
 
-use mimu::allan::model::FLOOR;
-use mimu::allan::variance::AllanModel;
 use mimu::quantity::Sensor;
+use mimu_allan::model::FLOOR;
+use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Error, Result};
 use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
 

@@ -1,10 +1,10 @@
 //! One recording, from power-on to power-off, as rows: means of some seconds with their known input, and the thermometer.
 
-use mimu::allan::variance::AllanModel;
 use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::{Block, Condensed};
 use mimu::signal::dwell::Dwell;
+use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 use nalgebra::Vector3;

@@ -1,9 +1,9 @@
 //! Noise coefficients of units on the virtual bench, through their filters and converters, by what `mimu allan` computes.
 
-use mimu::allan::Kind;
-use mimu::allan::model::Term;
 use mimu::quantity::Sensor;
 use mimu::survey::{Options, Part, Survey, survey};
+use mimu_allan::Deviation;
+use mimu_allan::model::Term;
 use mimu_recording::Recording;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
@@ -43,7 +43,7 @@ fn surveyed(seed: u64) -> (Survey, [f64; 6]) {
     write(&plan, &truth, seed, &Output::new(&path, &plan).unwrap()).unwrap();
     let options = Options {
         part: Part::Whole,
-        kind: Kind::Allan,
+        kind: Deviation::Allan,
         per_decade: 3,
         confidence: 0.95,
     };

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use crate::report;
 use crate::report::allan_plot as plot;
 use clap::{Args, ValueEnum};
-use mimu::allan::Kind;
 use mimu::calibration::Calibration;
 use mimu::result::allan::AllanResult;
 use mimu::survey::{Options, Part, survey_all};
+use mimu_allan::Deviation;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use mimu_recording::{MANIFEST_FILE, Recording};
@@ -131,9 +131,9 @@ pub fn run(args: &AllanArgs) -> Result<()> {
             (None, from_s, to_s) => Part::Span { from_s, to_s },
         },
         kind: match args.kind {
-            KindArg::Allan => Kind::Allan,
-            KindArg::Modified => Kind::Modified,
-            KindArg::Hadamard => Kind::Hadamard,
+            KindArg::Allan => Deviation::Allan,
+            KindArg::Modified => Deviation::Modified,
+            KindArg::Hadamard => Deviation::Hadamard,
         },
         per_decade: usize::from(args.per_decade),
         confidence: args.confidence,

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use mimu::allan::model::Term;
 use mimu::quantity::{Sensor, duration, plural, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::allan::{AllanResult, ChannelResult, RecordingResult};
+use mimu_allan::model::Term;
 
 use crate::report::text::{warn, warn_within};
 

@@ -5,10 +5,10 @@ use std::ops::Range;
 use maud::{Markup, html};
 
 use super::svg::{Frame, px};
-use mimu::allan::model::{FLOOR, Term};
 use mimu::quantity::{Sensor, significant};
 use mimu::readable;
 use mimu::result::allan::{AllanResult, ChannelResult, ModelResult};
+use mimu_allan::model::{FLOOR, Term};
 
 /// Width and height of one panel, pixels.
 const PANEL: (f64, f64) = (640.0, 520.0);

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::allan::model::{FLOOR, Term};
-use crate::allan::variance::AllanModel;
 use crate::quantity::Sensor;
 use crate::toml_layout::to_toml;
+use mimu_allan::model::{FLOOR, Term};
+use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RAW_COLUMNS, parse_toml, read_text};
 

@@ -1,10 +1,10 @@
 //! Variances within dwells, pooled over them, and the noise model that is fitted to them.
 
 use super::ChannelNoise;
-use crate::allan::variance::AllanModel;
 use crate::signal::blocks::{Block, Condensed};
 use crate::signal::dwell::Dwell;
 use crate::signal::ramp::ramps;
+use mimu_allan::variance::AllanModel;
 
 /// Noise of `value` of the blocks within `dwells`.
 pub(super) fn within<'a>(

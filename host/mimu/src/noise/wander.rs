@@ -6,8 +6,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::allan::model::FLOOR;
-use crate::allan::variance::AllanModel;
+use mimu_allan::model::FLOOR;
+use mimu_allan::variance::AllanModel;
 
 /// Slow noise of one channel, by its spectrum: `S(f) = B²/(2π f) + K²/(2π f)²`, two-sided.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

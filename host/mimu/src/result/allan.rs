@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::TOOL;
-use crate::allan::Point;
-use crate::allan::model::{NoiseModel, Term};
 use crate::noise::noise_file::{FileCoefficient, NOISE_FORMAT, NoiseChannel, NoiseFile};
 use crate::quantity::Sensor;
-use crate::spectrum::Line;
 use crate::survey::{Channel, Survey};
 use crate::warning::Warning;
+use mimu_allan::Point;
+use mimu_allan::model::{NoiseModel, Term};
+use mimu_allan::spectrum::Line;
 
 /// Why a channel has no coefficients at all.
 const TOO_SHORT: &str = "fewer than five octaves: record for longer";
@@ -252,11 +252,11 @@ impl ChannelResult {
                         unit: channel.unit.coefficient(term),
                     });
                 }
-                Some(Err(why)) => why,
-                None => channel.dead.as_deref().unwrap_or(TOO_SHORT),
+                Some(Err(unseen)) => channel.unit.reason(term, unseen),
+                None => channel.dead.as_deref().unwrap_or(TOO_SHORT).to_owned(),
             };
             let key = term.letter().to_lowercase();
-            reasons.insert(key.clone(), why.to_string());
+            reasons.insert(key.clone(), why);
             at_most.insert(key, model.and_then(|m| m.at_most(term)));
             None
         });

@@ -3,7 +3,7 @@
 use super::masking::{Masked, mask};
 use super::stretch::{FEWEST, Part, Stretch, longest};
 use super::suitability::{Suitability, dead, suitability};
-use crate::allan::units::Unit;
+use crate::survey::unit::Unit;
 use crate::warning::Warning;
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};

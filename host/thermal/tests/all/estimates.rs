@@ -1,7 +1,7 @@
 //! What is estimated is the truth, as nearly as it says.
 
-use mimu::allan::variance::AllanModel;
 use mimu::quantity::Sensor;
+use mimu_allan::variance::AllanModel;
 use mimu_thermal::joint::{Choice, Joint, estimate};
 
 use crate::session;

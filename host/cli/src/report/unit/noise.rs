@@ -1,10 +1,10 @@
 //! Noise at rest: the coefficients, and the Allan deviation that they describe.
 
 use maud::{Markup, html};
-use mimu::allan::model::{FLOOR, Term};
 use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
 use mimu::quantity::Sensor;
 use mimu::readable;
+use mimu_allan::model::{FLOOR, Term};
 
 use crate::report::page::{number, spoken};
 use crate::report::svg::{Frame, Panel, decades};

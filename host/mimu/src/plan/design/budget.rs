@@ -7,10 +7,10 @@ use super::model::Setting;
 use super::problem::Problem;
 use super::refinement::Region as _;
 use super::tour::{Motion, Order, randomised};
-use crate::allan::model::FLOOR;
-use crate::allan::variance::AllanModel;
 use crate::noise::noise_file::NoiseFile;
 use crate::quantity::Sensor;
+use mimu_allan::model::FLOOR;
+use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Error, Result};
 
 /// Noise of a sensor as density and floor, from which the sigma of a dwell mean follows.

@@ -5,7 +5,7 @@
 //! Neighbouring differences of a long cluster are nearly the same number. Of a series of more than [`ALL_TERMS`]
 //! rates every s-th is taken, with s so that at least [`STARTS_PER_CLUSTER`] of them begin within a cluster and, of
 //! Allan and Hadamard, [`KEPT_TERMS`] are kept in all. What that costs in equivalent degrees of freedom is
-//! computed for every noise in `tests/allan_vectors`: under 0.05 % for white rate noise and redder (alpha 0 to -4),
+//! computed for every noise in `tests/all/vectors`: under 0.05 % for white rate noise and redder (alpha 0 to -4),
 //! which is all that an inertial sensor shows at such cluster lengths, and for any noise of the modified
 //! variance. For white and flicker phase noise, which forget from sample to sample, it does cost (up to a
 //! factor s for white, whose deviation is then still known to 0.6 %), and the edf of the point says so. With that
@@ -15,9 +15,8 @@
 use super::bounds::{self, Estimator};
 use super::deviation::{ALL_TERMS, BLOCK, Integrated, Plan, sums_of_squares};
 use super::power_law::power_law;
-use super::{Kind, Point, Spacing};
+use super::{Deviation, NotFinite, Point, Spacing};
 
-use mimu_recording::error::Result;
 use rayon::prelude::*;
 
 /// Of a longer one, at least so many starts in every cluster length.
@@ -28,7 +27,7 @@ pub const KEPT_TERMS: usize = 1 << 15;
 const AT_A_TIME: usize = 256;
 
 /// Deviation of rates (any unit) at every averaging time of `spacing` that the series is long enough for, with
-/// bounds at `confidence` (between 0 and 1). Empty for fewer than two rates (three for [`Kind::Hadamard`]).
+/// bounds at `confidence` (between 0 and 1). Empty for fewer than two rates (three for [`Deviation::Hadamard`]).
 ///
 /// # Errors
 /// The first rate that is not a finite number. A gap must not be closed up or filled either: both put a step into
@@ -36,10 +35,10 @@ const AT_A_TIME: usize = 256;
 pub fn curve(
     rates: &[f64],
     dt_s: f64,
-    kind: Kind,
+    kind: Deviation,
     spacing: &Spacing,
     confidence: f64,
-) -> Result<Vec<Point>> {
+) -> Result<Vec<Point>, NotFinite> {
     let mut integrated = Integrated::empty(dt_s);
     integrated.push(rates)?;
     Ok(integrated.curve(kind, spacing, confidence))
@@ -52,10 +51,10 @@ pub fn curve(
 pub fn curve_of_phase(
     phase: &[f64],
     dt_s: f64,
-    kind: Kind,
+    kind: Deviation,
     spacing: &Spacing,
     confidence: f64,
-) -> Result<Vec<Point>> {
+) -> Result<Vec<Point>, NotFinite> {
     Ok(Integrated::of_phase(phase, dt_s)?.curve(kind, spacing, confidence))
 }
 
@@ -85,12 +84,12 @@ impl Spacing {
 impl Integrated {
     /// Deviation at every averaging time of `spacing` that has at least one difference, ascending, with bounds at
     /// `confidence` (between 0 and 1).
-    pub fn curve(&self, kind: Kind, spacing: &Spacing, confidence: f64) -> Vec<Point> {
+    pub fn curve(&self, kind: Deviation, spacing: &Spacing, confidence: f64) -> Vec<Point> {
         let x = self.x();
         let longest = match kind {
-            Kind::Allan => x.len().saturating_sub(1) / 2,
-            Kind::Hadamard => x.len().saturating_sub(1) / 3,
-            Kind::Modified => x.len() / 3,
+            Deviation::Allan => x.len().saturating_sub(1) / 2,
+            Deviation::Hadamard => x.len().saturating_sub(1) / 3,
+            Deviation::Modified => x.len() / 3,
         };
         let plan = |m| Plan {
             m,
@@ -112,15 +111,15 @@ impl Integrated {
             .collect()
     }
 
-    fn point(&self, kind: Kind, plan: &Plan, sum_of_squares: f64, confidence: f64) -> Point {
+    fn point(&self, kind: Deviation, plan: &Plan, sum_of_squares: f64, confidence: f64) -> Point {
         let &Plan { m, stride, all } = plan;
         let x = self.x();
         let terms = all.div_ceil(stride);
         let (tau, mean) = (m as f64, sum_of_squares / terms as f64);
         let variance = match kind {
-            Kind::Allan => mean / (2.0 * tau.powi(2)),
-            Kind::Hadamard => mean / (6.0 * tau.powi(2)),
-            Kind::Modified => mean / (2.0 * tau.powi(4)),
+            Deviation::Allan => mean / (2.0 * tau.powi(2)),
+            Deviation::Hadamard => mean / (6.0 * tau.powi(2)),
+            Deviation::Modified => mean / (2.0 * tau.powi(4)),
         };
         let deviation = variance.sqrt() / self.step();
         let alpha = power_law(x, kind, m);
@@ -149,16 +148,16 @@ impl Integrated {
 }
 
 /// Every how many-th difference of clusters of `m` is used, for so many `points` of the integral.
-fn stride(kind: Kind, points: usize, m: usize) -> usize {
+fn stride(kind: Deviation, points: usize, m: usize) -> usize {
     if points <= ALL_TERMS + 1 {
         return 1;
     }
     let by_starts = m / STARTS_PER_CLUSTER;
     let stride = match kind {
-        Kind::Allan | Kind::Hadamard => by_starts.min(kind.terms(points, m) / KEPT_TERMS),
+        Deviation::Allan | Deviation::Hadamard => by_starts.min(kind.terms(points, m) / KEPT_TERMS),
         // A term is cheap to skip to only from a kept sum. Nothing is lost with the rest: the mean over the cluster
         // takes from phase noises, too, what they forget within it.
-        Kind::Modified => by_starts / BLOCK * BLOCK,
+        Deviation::Modified => by_starts / BLOCK * BLOCK,
     };
     stride.max(1)
 }

@@ -109,9 +109,9 @@ impl<'a> Selection<'a> {
     }
 
     /// Letters of the terms that some model has in the place of `term`, or it in the place of.
-    pub fn instead_of(&self, term: Term) -> Vec<&'static str> {
+    pub fn instead_of(&self, term: Term) -> Vec<Term> {
         let (k, best) = (term as usize, self.best());
-        let mut letters = Vec::new();
+        let mut terms = Vec::new();
         for model in self.within(if k == RAMP { RAMP_PLAUSIBLE } else { PLAUSIBLE }) {
             let (with, without) = match (model.terms.contains(&k), best.terms.contains(&k)) {
                 (true, false) => (model, best),
@@ -119,11 +119,11 @@ impl<'a> Selection<'a> {
                 _ => continue,
             };
             let others = without.terms.iter().filter(|t| !with.terms.contains(t));
-            letters.extend(others.map(|t| Term::ALL[*t].letter()));
+            terms.extend(others.map(|t| Term::ALL[*t]));
         }
-        letters.sort_unstable();
-        letters.dedup();
-        letters
+        terms.sort_by_key(|t| t.letter());
+        terms.dedup();
+        terms
     }
 
     /// Whether the curve, whose shortest point was (`m`, `y`), falls below white noise there as behind a low-pass filter.

@@ -12,4 +12,4 @@ mod terms;
 mod unseen;
 
 pub use self::estimator::{Estimator, allan_factors, hadamard_factors};
-pub use self::terms::{Coefficient, FLOOR, NoiseModel, Term, Unseen};
+pub use self::terms::{Coefficient, FLOOR, NoiseModel, Reason, Term, Unseen};

@@ -1,12 +1,12 @@
 //! The definitions, term by term, and what follows from them.
 
-use mimu::allan::curve::{curve, curve_of_phase};
-use mimu::allan::deviation::ALL_TERMS;
-use mimu::allan::{Kind, Point, Spacing};
+use mimu_allan::curve::{curve, curve_of_phase};
+use mimu_allan::deviation::ALL_TERMS;
+use mimu_allan::{Deviation, Point, Spacing};
 
 use super::Random;
 
-fn at(rates: &[f64], kind: Kind, m: usize) -> Point {
+fn at(rates: &[f64], kind: Deviation, m: usize) -> Point {
     curve(rates, 1.0, kind, &Spacing::Samples(vec![m]), 0.95).expect("finite")[0]
 }
 
@@ -23,18 +23,18 @@ fn root(terms: Vec<f64>, divisor: f64) -> (f64, usize) {
 
 /// SP 1065 in rates: (8) of fang with its inner sum, the mean of m neighbouring such differences, the second
 /// difference.
-fn by_definition(rates: &[f64], kind: Kind, m: usize) -> (f64, usize) {
+fn by_definition(rates: &[f64], kind: Deviation, m: usize) -> (f64, usize) {
     let n = rates.len();
     let step = |j: usize| mean(rates, j + m, m) - mean(rates, j, m);
     match kind {
-        Kind::Allan => root((0..n + 1 - 2 * m).map(step).collect(), 2.0),
-        Kind::Modified => root(
+        Deviation::Allan => root((0..n + 1 - 2 * m).map(step).collect(), 2.0),
+        Deviation::Modified => root(
             (0..n + 2 - 3 * m)
                 .map(|j| (j..j + m).map(step).sum::<f64>() / m as f64)
                 .collect(),
             2.0,
         ),
-        Kind::Hadamard => root(
+        Deviation::Hadamard => root(
             (0..n + 1 - 3 * m).map(|j| step(j + m) - step(j)).collect(),
             6.0,
         ),
@@ -45,9 +45,9 @@ fn by_definition(rates: &[f64], kind: Kind, m: usize) -> (f64, usize) {
 fn every_cluster_length_of_a_short_series_is_the_definition_term_by_term() {
     let rates = Random(1).white(200);
     for (kind, longest) in [
-        (Kind::Allan, 100),
-        (Kind::Modified, 67),
-        (Kind::Hadamard, 66),
+        (Deviation::Allan, 100),
+        (Deviation::Modified, 67),
+        (Deviation::Hadamard, 66),
     ] {
         let all = Spacing::Samples((0..300).collect());
         let points = curve(&rates, 0.01, kind, &all, 0.95).expect("finite");
@@ -66,8 +66,8 @@ fn every_cluster_length_of_a_short_series_is_the_definition_term_by_term() {
 fn long_runs_of_the_modified_variance_are_the_definition_too() {
     let rates = Random(2).white(20_000);
     for m in [1, 63, 64, 65, 200] {
-        let (deviation, _) = by_definition(&rates, Kind::Modified, m);
-        let error = at(&rates, Kind::Modified, m).deviation / deviation - 1.0;
+        let (deviation, _) = by_definition(&rates, Deviation::Modified, m);
+        let error = at(&rates, Deviation::Modified, m).deviation / deviation - 1.0;
         assert!(error.abs() < 1e-11, "{m}: {error:.1e}");
     }
 }
@@ -81,7 +81,7 @@ fn the_phase_of_a_series_has_its_deviations() {
         angle += 0.01 * rate;
         angle
     }));
-    for kind in [Kind::Allan, Kind::Modified, Kind::Hadamard] {
+    for kind in [Deviation::Allan, Deviation::Modified, Deviation::Hadamard] {
         let of_rates = curve(&rates, 0.01, kind, &Spacing::Octave, 0.95).expect("finite");
         let of_phase = curve_of_phase(&phase, 0.01, kind, &Spacing::Octave, 0.95).expect("finite");
         assert!(of_rates.len() > 10);
@@ -101,17 +101,17 @@ fn a_ramp_has_the_deviation_of_its_coefficient_and_no_hadamard_deviation() {
     for m in [1, 7, 300, 3000] {
         // sigma = R tau / sqrt 2.
         let expected = m as f64 / 256.0 / 2_f64.sqrt();
-        for kind in [Kind::Allan, Kind::Modified] {
+        for kind in [Deviation::Allan, Deviation::Modified] {
             let deviation = at(&rates, kind, m).deviation;
             assert!((deviation / expected - 1.0).abs() < 1e-9, "{kind:?} {m}");
         }
-        assert!(at(&rates, Kind::Hadamard, m).deviation < 1e-8 * expected);
+        assert!(at(&rates, Deviation::Hadamard, m).deviation < 1e-8 * expected);
     }
 }
 
 #[test]
 fn a_series_that_does_not_vary_has_no_deviation_and_bounds_that_are_numbers() {
-    for kind in [Kind::Allan, Kind::Modified, Kind::Hadamard] {
+    for kind in [Deviation::Allan, Deviation::Modified, Deviation::Hadamard] {
         for point in curve(&[2.5; 1000], 1.0, kind, &Spacing::Octave, 0.95).expect("finite") {
             assert_eq!((point.deviation, point.lower, point.upper), (0.0, 0.0, 0.0));
             assert!(point.edf >= 1.0 && point.sigma_independent == 0.0);
@@ -144,22 +144,26 @@ fn differences_that_are_left_out_of_a_long_series_are_not_missed() {
         sum
     };
     for m in [200, 5000, 100_000] {
-        for kind in [Kind::Allan, Kind::Hadamard, Kind::Modified] {
+        for kind in [Deviation::Allan, Deviation::Hadamard, Deviation::Modified] {
             let all: Vec<f64> = match kind {
-                Kind::Allan => (0..x.len() - 2 * m)
+                Deviation::Allan => (0..x.len() - 2 * m)
                     .map(|j| x[j + 2 * m] - 2.0 * x[j + m] + x[j])
                     .collect(),
-                Kind::Hadamard => (0..x.len() - 3 * m)
+                Deviation::Hadamard => (0..x.len() - 3 * m)
                     .map(|j| x[j + 3 * m] - 3.0 * (x[j + 2 * m] - x[j + m]) - x[j])
                     .collect(),
-                Kind::Modified => (0..x.len() + 1 - 3 * m)
+                Deviation::Modified => (0..x.len() + 1 - 3 * m)
                     .map(|j| {
                         (window[j + 3 * m] - 3.0 * (window[j + 2 * m] - window[j + m]) - window[j])
                             / m as f64
                     })
                     .collect(),
             };
-            let divisor = if kind == Kind::Hadamard { 6.0 } else { 2.0 } * (m as f64).powi(2);
+            let divisor = if kind == Deviation::Hadamard {
+                6.0
+            } else {
+                2.0
+            } * (m as f64).powi(2);
             let (expected, terms) = root(all, divisor);
             let point = at(&rates, kind, m);
             assert!(point.terms <= terms);
@@ -181,7 +185,7 @@ fn differences_that_are_left_out_of_a_long_series_are_not_missed() {
 fn times_are_ascending_each_once_and_none_is_too_long() {
     let rates = Random(6).white(1000);
     let clusters = |spacing| -> Vec<usize> {
-        let points = curve(&rates, 1.0, Kind::Allan, &spacing, 0.95).expect("finite");
+        let points = curve(&rates, 1.0, Deviation::Allan, &spacing, 0.95).expect("finite");
         points.iter().map(|p| p.m).collect()
     };
     assert_eq!(
@@ -202,7 +206,11 @@ fn times_are_ascending_each_once_and_none_is_too_long() {
 fn series_too_short_for_a_difference_have_no_points() {
     for n in 0..6 {
         let rates = vec![1.0; n];
-        for (kind, least) in [(Kind::Allan, 2), (Kind::Modified, 2), (Kind::Hadamard, 3)] {
+        for (kind, least) in [
+            (Deviation::Allan, 2),
+            (Deviation::Modified, 2),
+            (Deviation::Hadamard, 3),
+        ] {
             let points = curve(&rates, 1.0, kind, &Spacing::Octave, 0.95).expect("finite");
             assert_eq!(points.is_empty(), n < least, "{n} {kind:?}");
         }
@@ -214,6 +222,6 @@ fn a_gap_is_refused_with_the_sample_where_it_begins() {
     let mut rates = vec![1.0; 10_000];
     rates[7000] = f64::NAN;
     rates[9000] = f64::INFINITY;
-    let error = curve(&rates, 1.0, Kind::Allan, &Spacing::Octave, 0.95).expect_err("a gap");
+    let error = curve(&rates, 1.0, Deviation::Allan, &Spacing::Octave, 0.95).expect_err("a gap");
     assert!(error.to_string().starts_with("sample 7000: NaN"), "{error}");
 }

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::super::bounds::Sampling;
-use mimu_recording::error::{Error, Result};
+use crate::NotFinite;
+use crate::bounds::Sampling;
 
 /// Samples that are summed by themselves before they are added to the integral.
 const CHUNK: usize = 4096;
@@ -42,7 +42,7 @@ impl Integrated {
     ///
     /// # Errors
     /// The first rate that is not a finite number.
-    pub fn new(mut rates: Vec<f64>, dt_s: f64) -> Result<Self> {
+    pub fn new(mut rates: Vec<f64>, dt_s: f64) -> Result<Self, NotFinite> {
         let mut integrated = Self::empty(dt_s);
         if rates.is_empty() {
             return Ok(integrated);
@@ -76,7 +76,7 @@ impl Integrated {
     ///
     /// # Errors
     /// The first rate that is not a finite number; nothing of the slice is then taken in.
-    pub fn push(&mut self, rates: &[f64]) -> Result<()> {
+    pub fn push(&mut self, rates: &[f64]) -> Result<(), NotFinite> {
         self.refuse_not_finite(rates)?;
         let reference = match self.reference {
             Some(reference) => reference,
@@ -108,7 +108,7 @@ impl Integrated {
     ///
     /// # Errors
     /// The first sample that is not a finite number.
-    pub fn of_phase(phase: &[f64], dt_s: f64) -> Result<Self> {
+    pub fn of_phase(phase: &[f64], dt_s: f64) -> Result<Self, NotFinite> {
         let mut integrated = Self {
             x: Vec::new(),
             sampling: Sampling::Means,
@@ -120,12 +120,12 @@ impl Integrated {
     }
 
     /// The integral.
-    pub(in crate::allan) fn x(&self) -> &[f64] {
+    pub(crate) fn x(&self) -> &[f64] {
         &self.x
     }
 
     /// Rates that it is of.
-    pub(crate) fn samples(&self) -> usize {
+    pub fn samples(&self) -> usize {
         self.x.len() - 1
     }
 
@@ -135,20 +135,20 @@ impl Integrated {
     }
 
     /// What the integral's samples stand for.
-    pub(in crate::allan) fn sampling(&self) -> Sampling {
+    pub(crate) fn sampling(&self) -> Sampling {
         self.sampling
     }
 
     /// What a difference of the integral over one sample is divided by to be a rate: rates are summed over
     /// samples, a phase is an integral over seconds.
-    pub(in crate::allan) fn step(&self) -> f64 {
+    pub(crate) fn step(&self) -> f64 {
         match self.sampling {
             Sampling::Instants => 1.0,
             Sampling::Means => self.dt_s,
         }
     }
 
-    fn refuse_not_finite(&self, next: &[f64]) -> Result<()> {
+    fn refuse_not_finite(&self, next: &[f64]) -> Result<(), NotFinite> {
         // A chunk at a time and without leaving it early, for the vector unit.
         let sound = |chunk: &[f64]| chunk.iter().fold(true, |ok, v| ok & v.is_finite());
         let Some(chunk) = next.chunks(CHUNK).position(|c| !sound(c)) else {
@@ -161,11 +161,10 @@ impl Integrated {
                 .position(not_finite)
                 .unwrap_or(0);
         let before = self.x.len().saturating_sub(1);
-        Err(Error::new(
-            format_args!("sample {}", before + at),
-            format_args!("{} is not a number that can be averaged", next[at]),
-            "choose a stretch without gaps",
-        ))
+        Err(NotFinite {
+            sample: before + at,
+            value: next[at],
+        })
     }
 }
 

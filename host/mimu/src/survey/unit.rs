@@ -1,8 +1,8 @@
 //! Units of deviations and coefficients.
 
-use super::model::Term;
-use crate::quantity::Sensor;
+use crate::quantity::{Sensor, duration};
 use crate::readable;
+use mimu_allan::model::{Reason, Term, Unseen};
 use mimu_recording::RawUnit;
 
 /// Unit of a channel's deviations.
@@ -67,8 +67,41 @@ impl Unit {
         }
     }
 
-    /// A coefficient as people read it.
-    pub fn write(&self, term: Term, value: f64) -> String {
-        readable::noise(&self.coefficient(term))[0].write(value)
+    /// Why `term` has no coefficient, for people.
+    pub fn reason(&self, term: Term, unseen: &Unseen) -> String {
+        let read = |value| readable::noise(&self.coefficient(term))[0].write(value);
+        let at_most = match unseen.at_most {
+            Some(value) => format!("at most {}", read(value)),
+            None => "the other terms leave nothing to tell it by".into(),
+        };
+        match &unseen.why {
+            Reason::Filtered => {
+                "at short times the curve is below white noise, as behind a low-pass filter".into()
+            }
+            Reason::Hidden => {
+                "at short times the curve follows none of the five terms, which would hide it"
+                    .into()
+            }
+            Reason::NotInSpectrum => {
+                format!("seen neither in the curve nor in the spectrum: {at_most}")
+            }
+            Reason::Small { instead, longer_s } => {
+                let letters: Vec<&str> = instead.iter().map(|t| t.letter()).collect();
+                let mut text = match letters.is_empty() {
+                    true => format!("not seen: {at_most}"),
+                    false => format!(
+                        "not told apart from {} by this record: {at_most}",
+                        letters.join(" or ")
+                    ),
+                };
+                if let Some(longer) = longer_s {
+                    text += &format!(
+                        "; to see one of half that, record at least {} longer",
+                        duration(*longer)
+                    );
+                }
+                text
+            }
+        }
     }
 }

@@ -1,20 +1,20 @@
 //! Time and memory of the deviations: how the cost grows from 1e6 to 1e8 samples, and six channels of three hours
 //! at 1 kHz.
 //!
-//! `cargo bench -p mimu --bench allan`. Prints figures and asserts nothing: times drift on shared machines. With
+//! `cargo bench -p mimu-allan --bench allan`. Prints figures and asserts nothing: times drift on shared machines. With
 //! `-- --file RATES KIND PER_DECADE` it prints the curve of a file of little-endian doubles at 1 Hz instead,
 //! which is what `tests/allan_side_by_side.py` compares with AllanTools.
 
 use std::io::Read;
 use std::time::{Duration, Instant};
 
-use mimu::allan::deviation::Integrated;
-use mimu::allan::{Kind, Point, Spacing};
+use mimu_allan::deviation::Integrated;
+use mimu_allan::{Deviation, Point, Spacing};
 
-const KINDS: [(&str, Kind); 3] = [
-    ("allan", Kind::Allan),
-    ("modified", Kind::Modified),
-    ("hadamard", Kind::Hadamard),
+const KINDS: [(&str, Deviation); 3] = [
+    ("allan", Deviation::Allan),
+    ("modified", Deviation::Modified),
+    ("hadamard", Deviation::Hadamard),
 ];
 
 fn main() {
@@ -49,7 +49,7 @@ fn generator() -> impl FnMut(&mut [f64]) {
 fn curve(
     n: usize,
     mut next: impl FnMut(&mut [f64]),
-    kind: Kind,
+    kind: Deviation,
     spacing: &Spacing,
 ) -> (Vec<Point>, Duration) {
     let mut integrated = Integrated::empty(1.0);
@@ -102,7 +102,7 @@ fn six_channels() {
             curve(
                 10_800_000,
                 generator(),
-                Kind::Allan,
+                Deviation::Allan,
                 &Spacing::PerDecade(10),
             )
             .1

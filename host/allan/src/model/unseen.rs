@@ -5,17 +5,11 @@ use super::differences::Differences;
 use super::estimate::{Curve, Fitted};
 use super::estimator::{Estimator, points};
 use super::selection::{SEEN, Selection};
-use super::terms::Term;
-use crate::quantity::duration;
+use super::terms::{Reason, Term, Unseen};
 
 impl Estimator {
-    /// Upper end of the interval of a `term` that is not shown, and what it says.
-    pub(super) fn bound(
-        &self,
-        selection: &Selection,
-        term: Term,
-        unit: &impl Fn(Term, f64) -> String,
-    ) -> (Option<f64>, String) {
+    /// Upper end of the interval of a `term` that is not shown, and why.
+    pub(super) fn unseen(&self, selection: &Selection, term: Term, instead: Vec<Term>) -> Unseen {
         let (k, curve, excess) = (term as usize, &selection.curve, selection.excess);
         let upper = |model: &Fitted| match model.terms.contains(&k) {
             true => curve.end(model, k, -self.z, excess),
@@ -23,23 +17,24 @@ impl Estimator {
         };
         let ends = selection.plausible().into_iter().filter_map(upper);
         let Some(most) = ends.reduce(f64::max) else {
-            return (None, "the other terms leave nothing to tell it by".into());
+            return Unseen {
+                at_most: None,
+                why: Reason::Small {
+                    instead,
+                    longer_s: None,
+                },
+            };
         };
-        let at_most = term.coefficient(most, self.dt_s);
-        let bound = format!("at most {}", unit(term, at_most));
         // A longer record has more of the long times only.
         let longer_s = match (term, selection.without(term)) {
             (Term::Q | Term::N, _) | (_, None) => None,
             // A quarter of the variance, which is half the coefficient.
             (_, Some(without)) => self.longer_s(curve, without, k, 0.25 * most, excess),
         };
-        let bound = match longer_s.map(duration) {
-            Some(longer) => {
-                format!("{bound}; to see one of half that, record at least {longer} longer")
-            }
-            None => bound,
-        };
-        (Some(at_most), bound)
+        Unseen {
+            at_most: Some(term.coefficient(most, self.dt_s)),
+            why: Reason::Small { instead, longer_s },
+        }
     }
 
     /// How much longer a record than that of `curve` has to be for a term of amplitude `a` beside those of `without` to be [`SEEN`] times its

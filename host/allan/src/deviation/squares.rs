@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::super::Kind;
+use super::super::Deviation;
 use super::differences::{difference, sums};
 use super::window_sums::WindowSums;
 
@@ -37,14 +37,14 @@ impl Plan {
 /// Differences of one kind of a series.
 pub struct Squares<'a> {
     x: &'a [f64],
-    kind: Kind,
+    kind: Deviation,
     windows: Option<WindowSums<'a>>,
 }
 
 impl<'a> Squares<'a> {
-    /// One pass over the series for [`Kind::Modified`].
-    pub fn new(x: &'a [f64], kind: Kind) -> Self {
-        let windows = (kind == Kind::Modified).then(|| WindowSums::new(x));
+    /// One pass over the series for [`Deviation::Modified`].
+    pub fn new(x: &'a [f64], kind: Deviation) -> Self {
+        let windows = (kind == Deviation::Modified).then(|| WindowSums::new(x));
         Self { x, kind, windows }
     }
 
@@ -53,7 +53,7 @@ impl<'a> Squares<'a> {
         if let Some(windows) = &self.windows {
             return windows.sum_of_squares(m, stride, positions);
         }
-        let [sum] = if self.kind == Kind::Hadamard {
+        let [sum] = if self.kind == Deviation::Hadamard {
             sums(self.x, [0, m, 2 * m, 3 * m], stride, positions, |taps| {
                 [difference(&taps).powi(2)]
             })
@@ -67,7 +67,7 @@ impl<'a> Squares<'a> {
 }
 
 /// For each of `plans`, which have ascending clusters. The order of additions does not depend on the number of threads.
-pub fn sums_of_squares(x: &[f64], kind: Kind, plans: &[Plan]) -> Vec<f64> {
+pub fn sums_of_squares(x: &[f64], kind: Deviation, plans: &[Plan]) -> Vec<f64> {
     let squares = Squares::new(x, kind);
     let (near, far) = plans.split_at(plans.partition_point(|plan| plan.m < NEAR));
     let mut sums = tiled(near, |from| {

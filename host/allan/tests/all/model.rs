@@ -1,8 +1,8 @@
 //! Whether the intervals of the noise model cover the truth as often as they say, on noise made by other code.
 
-use mimu::allan::Point;
-use mimu::allan::model::{
-    Coefficient, Estimator, NoiseModel, Term, allan_factors, hadamard_factors,
+use mimu_allan::Point;
+use mimu_allan::model::{
+    Coefficient, Estimator, NoiseModel, Reason, Term, allan_factors, hadamard_factors,
 };
 use mimu_rig::noise::{Coefficients, Noise};
 use mimu_rig::random::Random;
@@ -112,11 +112,7 @@ fn curves(rates: &[f64], dt_s: f64) -> [Vec<Point>; 2] {
 
 fn fitted(estimator: &Estimator, rates: &[f64]) -> NoiseModel {
     let [allan, hadamard] = curves(rates, 1.0);
-    estimator.fit(&allan, &hadamard, words).unwrap()
-}
-
-fn words(term: Term, value: f64) -> String {
-    format!("{} = {value:.3e}", term.letter())
+    estimator.fit(&allan, &hadamard).unwrap()
 }
 
 fn models(truth: &Truth, dt_s: f64, runs: u64) -> Vec<NoiseModel> {
@@ -125,7 +121,7 @@ fn models(truth: &Truth, dt_s: f64, runs: u64) -> Vec<NoiseModel> {
         .into_par_iter()
         .map(|seed| {
             let [allan, hadamard] = curves(&series(truth, dt_s, seed), dt_s);
-            estimator.fit(&allan, &hadamard, words).unwrap()
+            estimator.fit(&allan, &hadamard).unwrap()
         })
         .collect()
 }
@@ -294,7 +290,7 @@ fn white_noise_behind_a_filter_keeps_its_coefficient_and_is_no_quantization() {
             *rate = state;
         }
         let model = fitted(&estimator, &rates);
-        assert!(model.filtered && model.get(Term::Q).unwrap_err().contains("low-pass"));
+        assert!(model.filtered && model.get(Term::Q).unwrap_err().why == Reason::Filtered);
         !covers(model.get(Term::N).unwrap(), 1.0)
     };
     // 95 % of 200 are 190; fewer than 180 have a probability of 1e-3.
@@ -322,22 +318,23 @@ fn a_vibration_is_told_to_be_none_of_the_terms() {
 
 #[test]
 fn a_coefficient_that_is_not_seen_says_how_much_longer_to_record() {
-    // Half the bound seen by a record that is longer by what the sentence says: of 20 such records most show it.
+    // A record that is longer by what was said: of 20 with half the upper end most show it.
     let truth = Truth {
         n: 1.0,
         samples: 1 << 12,
         ..Truth::default()
     };
     let model = &models(&truth, 1.0, 1)[0];
-    let why = model.get(Term::K).unwrap_err();
-    let number = |after: &str, unit: &str| -> f64 {
-        let rest = why.split(after).nth(1).unwrap();
-        rest.split(unit).next().unwrap().trim().parse().unwrap()
+    let unseen = model.get(Term::K).unwrap_err();
+    let Reason::Small {
+        longer_s: Some(longer_s),
+        ..
+    } = unseen.why
+    else {
+        panic!("{unseen:?}");
     };
-    let bound = number("K = ", ";");
-    let longer_s = 3600.0 * number("at least", "h longer");
     let long = Truth {
-        k: 0.5 * bound,
+        k: 0.5 * unseen.at_most.unwrap(),
         samples: truth.samples + longer_s as usize,
         ..truth
     };
@@ -345,7 +342,7 @@ fn a_coefficient_that_is_not_seen_says_how_much_longer_to_record() {
         .iter()
         .filter(|m| m.get(Term::K).is_ok())
         .count();
-    assert!(seen >= 10, "{why}: {seen} of 20");
+    assert!(seen >= 10, "{unseen:?}: {seen} of 20");
 }
 
 #[test]

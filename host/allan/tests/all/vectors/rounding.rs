@@ -1,13 +1,13 @@
 //! What rounding costs in long series. Rates are whole multiples of 2^-30, so that integers give the integral, and
 //! its differences and their sums, without any.
 
-use mimu::allan::curve::curve;
-use mimu::allan::deviation::{ALL_TERMS, Integrated};
-use mimu::allan::{Kind, Point, Spacing};
+use mimu_allan::curve::curve;
+use mimu_allan::deviation::{ALL_TERMS, Integrated};
+use mimu_allan::{Deviation, Point, Spacing};
 
 use super::Random;
 
-const KINDS: [Kind; 3] = [Kind::Allan, Kind::Modified, Kind::Hadamard];
+const KINDS: [Deviation; 3] = [Deviation::Allan, Deviation::Modified, Deviation::Hadamard];
 const UNIT: f64 = 1.0 / (1 << 30) as f64;
 
 fn whole(rate: f64) -> i64 {
@@ -30,20 +30,20 @@ fn running(parts: impl IntoIterator<Item = i128>) -> Vec<i128> {
 }
 
 /// The deviation over those differences that `point` used.
-fn exact(steps: &[i64], kind: Kind, point: &Point) -> f64 {
+fn exact(steps: &[i64], kind: Deviation, point: &Point) -> f64 {
     let m = point.m;
     let x = running(steps.iter().map(|&s| i128::from(s)));
     let (s, span, divisor) = match kind {
-        Kind::Allan => (x, 2 * m, 2.0),
-        Kind::Hadamard => (x, 3 * m, 6.0),
-        Kind::Modified => (running(x), 3 * m, 2.0 * (m as f64).powi(2)),
+        Deviation::Allan => (x, 2 * m, 2.0),
+        Deviation::Hadamard => (x, 3 * m, 6.0),
+        Deviation::Modified => (running(x), 3 * m, 2.0 * (m as f64).powi(2)),
     };
     let all = s.len() - span;
     let stride = (1..)
         .find(|stride| all.div_ceil(*stride) == point.terms)
         .expect("a stride");
     let difference = |j: usize| match kind {
-        Kind::Allan => s[j + 2 * m] - 2 * s[j + m] + s[j],
+        Deviation::Allan => s[j + 2 * m] - 2 * s[j + m] + s[j],
         _ => s[j + 3 * m] - 3 * (s[j + 2 * m] - s[j + m]) - s[j],
     };
     let square = |j| (difference(j) as f64 * UNIT).powi(2);
@@ -130,7 +130,7 @@ fn a_ramp_costs_less_than_one_in_1e8_and_leaves_1e_4_of_it_to_the_hadamard_devia
     let spacing = Spacing::Samples(vec![1]);
     let at_one =
         |kind| curve(&rates(&steps), 1.0, kind, &spacing, 0.95).expect("finite")[0].deviation;
-    assert!(at_one(Kind::Hadamard) < 1e-4 * at_one(Kind::Allan));
+    assert!(at_one(Deviation::Hadamard) < 1e-4 * at_one(Deviation::Allan));
 }
 
 #[test]

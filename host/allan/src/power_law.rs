@@ -1,7 +1,7 @@
 //! Power law of the noise at one averaging time: Riley and Greenhall, "Power law noise identification using the lag 1
 //! autocorrelation", EFTF 2004, and Howe et al., PTTI 2000, where too few samples are left for it.
 
-use super::Kind;
+use super::Deviation;
 use super::deviation::{ALL_TERMS, Squares, difference, sums};
 
 /// Cluster means that the lag 1 autocorrelation needs (Riley and Greenhall 2004).
@@ -18,12 +18,12 @@ const PHASE_NOISE_IS_PLAIN: usize = 256;
 const ENOUGH_FOR_R: usize = 64;
 
 /// Exponent of `S(f) ~ f^alpha` of the rates that dominates at clusters of `m`, from the integral `x`: 2 white
-/// phase, 1 flicker phase, 0 white rate, -1 flicker rate, -2 random walk of the rate, and for [`Kind::Hadamard`]
+/// phase, 1 flicker phase, 0 white rate, -1 flicker rate, -2 random walk of the rate, and for [`Deviation::Hadamard`]
 /// down to -4.
 ///
 /// With fewer than four cluster means nothing can be told; then -2, for which the bounds are the widest. 0 for a
 /// series that does not vary at all.
-pub fn power_law(x: &[f64], kind: Kind, m: usize) -> i32 {
+pub fn power_law(x: &[f64], kind: Deviation, m: usize) -> i32 {
     // The reddest noise for which the variance exists.
     let reddest = 2 - 2 * kind.order() as i32;
     let means = x.len().saturating_sub(1) / m;
@@ -94,9 +94,9 @@ fn lag_1<const TAPS: usize>(x: &[f64], m: usize, n: usize) -> Option<f64> {
 /// N in B1 is the number of means. Stable32 takes the number of overlapping differences instead, as its outputs
 /// for a caesium clock show (71 of 71 exponents follow with that N, 7 with the means), which moves its limits so
 /// far up that flicker and random walk of 4 to 29 means come out as white, with bounds that are too tight.
-fn by_variance_ratio(x: &[f64], kind: Kind, m: usize, means: usize) -> i32 {
+fn by_variance_ratio(x: &[f64], kind: Deviation, m: usize, means: usize) -> i32 {
     let y: Vec<f64> = (0..means).map(|k| x[(k + 1) * m] - x[k * m]).collect();
-    let alpha = by_b1(&y, if kind == Kind::Hadamard { 2 } else { 1 });
+    let alpha = by_b1(&y, if kind == Deviation::Hadamard { 2 } else { 1 });
     if alpha > -3 {
         return alpha;
     }
@@ -148,12 +148,12 @@ fn expected_b1(n: f64, mu: i32) -> f64 {
 fn by_modified_variance(x: &[f64], m: usize) -> i32 {
     let n = m.min(ENOUGH_FOR_R);
     let x: Vec<f64> = (0..x.len()).step_by(m / n).map(|i| x[i]).collect();
-    let mean = |kind: Kind| {
+    let mean = |kind: Deviation| {
         let terms = kind.terms(x.len(), n);
         Squares::new(&x, kind).sum(n, 1, 0..terms) / terms as f64
     };
     let n = n as f64;
-    let ratio = mean(Kind::Modified) / (n * n * mean(Kind::Allan));
+    let ratio = mean(Deviation::Modified) / (n * n * mean(Deviation::Allan));
     let flicker = 3.37 / (1.04 + 3.0 * (std::f64::consts::PI * n).ln());
     if ratio < (flicker / n).sqrt() {
         2

@@ -1,7 +1,7 @@
 //! Equivalent degrees of freedom of an estimate, Greenhall and Riley 2003 ("GR" below; also NIST SP 1065, section
 //! 5.4).
 
-use super::super::Kind;
+use super::super::Deviation;
 
 /// Largest sum that the combined algorithm of GR evaluates term by term.
 const J_MAX: usize = 100;
@@ -21,7 +21,7 @@ pub enum Sampling {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Estimator {
     /// Which differences.
-    pub kind: Kind,
+    pub kind: Deviation,
     /// Of which samples.
     pub sampling: Sampling,
     /// Cluster length, samples.
@@ -42,7 +42,7 @@ enum Filter {
 
 impl Estimator {
     /// Equivalent degrees of freedom of the variance for noise with exponent `alpha` (2 to -2; to -4 for
-    /// [`Kind::Hadamard`]); at least 1.
+    /// [`Deviation::Hadamard`]); at least 1.
     ///
     /// With every difference used, the combined algorithm of GR, as Stable32 has it; otherwise the sum that it
     /// approximates, GR (13).
@@ -73,7 +73,7 @@ impl Estimator {
 
     /// Over one sample it is the Allan variance, of which GR's continuous mean over the cluster knows nothing.
     fn modified(&self) -> bool {
-        self.kind == Kind::Modified && self.m > 1
+        self.kind == Deviation::Modified && self.m > 1
     }
 
     fn filter(&self, alpha: i32, d: usize) -> Filter {

@@ -4,7 +4,7 @@
 //! covariance of two such means is twice the mean of the squared cross-covariance of the two series (Isserlis), and that follows
 //! from the generalized covariance of x: Greenhall and Riley (2003) for one averaging time, here for every pair. Quantization is
 //! uniform and not Gaussian, which makes its mean squares steadier: by Isserlis alone its 95 % intervals covered in 99 % of the
-//! runs of `allan_model`.
+//! runs of `tests/all/model.rs`.
 
 use rayon::prelude::*;
 

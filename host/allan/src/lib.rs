@@ -1,4 +1,4 @@
-//! Noise from a recording at rest: Allan, modified and Hadamard deviation, and the noise model that follows from them.
+//! Noise of a series at rest: Allan, modified and Hadamard deviation, the noise model behind them, and the lines of its spectrum.
 //!
 //! | module       | what                                                                       |
 //! |--------------|----------------------------------------------------------------------------|
@@ -8,19 +8,21 @@
 //! | [`curve`]    | all of these at any averaging times                                        |
 //! | [`model`]    | N, B, K, Q and R fitted to the whole curve, with intervals                 |
 //! | [`variance`] | N, B and K alone, as the variance of a mean                                |
-//! | [`units`]    | units of the coefficients in files                                         |
+//! | [`spectrum`] | lines and bumps that are no noise of the sensor, and the band in which it is white |
 
 pub mod bounds;
 pub mod curve;
 pub mod deviation;
 pub mod model;
 mod power_law;
-pub mod units;
+pub mod spectrum;
 pub mod variance;
 
-/// Which variance of second or third differences.
+use std::fmt;
+
+/// Which deviation: of second or of third differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum Deviation {
     /// Overlapping Allan, fang (8).
     Allan,
     /// Modified Allan: tells white from flicker phase noise, that is quantization from what is just above it.
@@ -29,7 +31,7 @@ pub enum Kind {
     Hadamard,
 }
 
-impl Kind {
+impl Deviation {
     /// Name.
     pub fn name(self) -> &'static str {
         match self {
@@ -40,9 +42,9 @@ impl Kind {
     }
 }
 
-impl Kind {
+impl Deviation {
     /// Differences of the rates: 2 for the second difference of the integral, 3 for the third.
-    pub(super) fn order(self) -> usize {
+    pub(crate) fn order(self) -> usize {
         match self {
             Self::Allan | Self::Modified => 2,
             Self::Hadamard => 3,
@@ -50,7 +52,7 @@ impl Kind {
     }
 
     /// Number of differences that `points` of the integral have at cluster length `m`.
-    pub(super) fn terms(self, points: usize, m: usize) -> usize {
+    pub(crate) fn terms(self, points: usize, m: usize) -> usize {
         match self {
             Self::Allan => points.saturating_sub(2 * m),
             Self::Hadamard => points.saturating_sub(3 * m),
@@ -58,6 +60,27 @@ impl Kind {
         }
     }
 }
+
+/// A sample that cannot be averaged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NotFinite {
+    /// Its index in the series.
+    pub sample: usize,
+    /// The sample.
+    pub value: f64,
+}
+
+impl fmt::Display for NotFinite {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { sample, value } = self;
+        write!(
+            f,
+            "sample {sample}: {value} is not a number that can be averaged"
+        )
+    }
+}
+
+impl std::error::Error for NotFinite {}
 
 /// Averaging times to compute.
 #[derive(Debug, Clone, PartialEq)]

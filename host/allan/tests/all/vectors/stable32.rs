@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use flate2::read::GzDecoder;
-use mimu::allan::bounds::{Estimator, Sampling, interval};
-use mimu::allan::curve::{curve, curve_of_phase};
-use mimu::allan::{Kind, Point, Spacing};
+use mimu_allan::bounds::{Estimator, Sampling, interval};
+use mimu_allan::curve::{curve, curve_of_phase};
+use mimu_allan::{Deviation, Point, Spacing};
 
 /// One line of a result.
 #[derive(Debug)]
@@ -103,13 +103,13 @@ fn samples(folder: &Path, record: &Record) -> Vec<f64> {
 }
 
 /// Ours at the times of `lines`.
-fn points(samples: &[f64], phase: bool, kind: Kind, lines: &[Line]) -> Vec<Point> {
+fn points(samples: &[f64], phase: bool, kind: Deviation, lines: &[Line]) -> Vec<Point> {
     let spacing = Spacing::Samples(lines.iter().map(|l| l.m).collect());
     let curve = if phase { curve_of_phase } else { curve };
     curve(samples, 1.0, kind, &spacing, 0.683).expect("finite")
 }
 
-const KINDS: [Kind; 3] = [Kind::Allan, Kind::Modified, Kind::Hadamard];
+const KINDS: [Deviation; 3] = [Deviation::Allan, Deviation::Modified, Deviation::Hadamard];
 
 /// Stable32 prints five digits, the last rounded: 5e-5 at most.
 fn assert_deviations(points: &[Point], lines: &[Line]) {
@@ -198,24 +198,24 @@ fn noise_is_identified_as_by_stable32_wherever_there_are_thirty_means() {
 #[test]
 fn bounds_are_those_of_stable32_for_the_noise_that_it_found() {
     let Some(folder) = folder() else { return };
-    let runs: [(Record, &[(Kind, &str)]); 3] = [
+    let runs: [(Record, &[(Deviation, &str)]); 3] = [
         (
             PHASE_DAT,
             &[
-                (Kind::Allan, "phase_dat_oadev_octave.txt"),
-                (Kind::Modified, "phase_dat_mdev_octave.txt"),
-                (Kind::Hadamard, "phase_dat_ohdev_octave.txt"),
+                (Deviation::Allan, "phase_dat_oadev_octave.txt"),
+                (Deviation::Modified, "phase_dat_mdev_octave.txt"),
+                (Deviation::Hadamard, "phase_dat_ohdev_octave.txt"),
             ],
         ),
         (
             CAESIUM,
             &[
-                (Kind::Allan, "oadev_decade.txt"),
-                (Kind::Modified, "mdev_decade.txt"),
-                (Kind::Hadamard, "ohdev_decade.txt"),
+                (Deviation::Allan, "oadev_decade.txt"),
+                (Deviation::Modified, "mdev_decade.txt"),
+                (Deviation::Hadamard, "ohdev_decade.txt"),
             ],
         ),
-        (FLICKER, &[(Kind::Allan, "s32_oadev_octave.txt")]),
+        (FLICKER, &[(Deviation::Allan, "s32_oadev_octave.txt")]),
     ];
     for (record, files) in runs {
         let samples = samples(&folder, &record);
@@ -230,7 +230,7 @@ fn bounds_are_those_of_stable32_for_the_noise_that_it_found() {
     }
 }
 
-fn assert_bounds(kind: Kind, point: &Point, line: &Line, phase: bool) {
+fn assert_bounds(kind: Deviation, point: &Point, line: &Line, phase: bool) {
     let estimator = Estimator {
         kind,
         sampling: Sampling::Means,
@@ -273,8 +273,8 @@ fn a_mean_that_is_left_in_costs_the_digits_that_it_cost_stable32() {
     });
     let phase: Vec<f64> = std::iter::once(0.0).chain(sum).collect();
     let lines = lines(&folder.join(QUARTZ.name).join("oadev_octave.txt"));
-    assert_deviations(&points(&phase, true, Kind::Allan, &lines), &lines);
-    let clean = points(&rates, false, Kind::Allan, &lines);
+    assert_deviations(&points(&phase, true, Deviation::Allan, &lines), &lines);
+    let clean = points(&rates, false, Deviation::Allan, &lines);
     let worst = clean
         .iter()
         .zip(&lines)

@@ -2,10 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use mimu::allan::deviation::Integrated;
-use mimu::allan::model::{Estimator, Term, allan_factors, hadamard_factors};
-use mimu::allan::{Kind, Spacing};
-use mimu::spectrum::{Line, set_aside, white_band};
+use mimu_allan::deviation::Integrated;
+use mimu_allan::model::{Estimator, Term, allan_factors, hadamard_factors};
+use mimu_allan::spectrum::{Line, set_aside, white_band};
+use mimu_allan::{Deviation, Spacing};
 use mimu_rig::noise::{Coefficients, Noise};
 use mimu_rig::random::Random;
 use rayon::prelude::*;
@@ -206,11 +206,9 @@ fn a_line_that_is_set_aside_leaves_the_coefficients_of_the_noise_beneath() {
         let mut of = Integrated::empty(DT_S);
         of.push(rates).unwrap();
         let curve = |kind, m| of.curve(kind, &Spacing::Samples(m), 0.95);
-        let allan = curve(Kind::Allan, allan_factors(SAMPLES));
-        let hadamard = curve(Kind::Hadamard, hadamard_factors(SAMPLES));
-        estimator
-            .fit(&allan, &hadamard, |_, _| String::new())
-            .unwrap()
+        let allan = curve(Deviation::Allan, allan_factors(SAMPLES));
+        let hadamard = curve(Deviation::Hadamard, hadamard_factors(SAMPLES));
+        estimator.fit(&allan, &hadamard).unwrap()
     };
     let models: Vec<_> = (0..runs)
         .into_par_iter()

@@ -1,7 +1,7 @@
 //! The test suite of NIST SP 1065, section 12: nine hand-sized values and a thousand by rule.
 
-use mimu::allan::curve::curve;
-use mimu::allan::{Kind, Point, Spacing};
+use mimu_allan::curve::curve;
+use mimu_allan::{Deviation, Point, Spacing};
 
 /// Rates of table 30's series ("NBS14", section 12.2).
 const NINE: [f64; 9] = [892., 809., 823., 798., 671., 644., 883., 903., 677.];
@@ -16,12 +16,12 @@ fn thousand() -> Vec<f64> {
         .collect()
 }
 
-fn points(rates: &[f64], kind: Kind, clusters: &[usize], confidence: f64) -> Vec<Point> {
+fn points(rates: &[f64], kind: Deviation, clusters: &[usize], confidence: f64) -> Vec<Point> {
     let spacing = Spacing::Samples(clusters.to_vec());
     curve(rates, 1.0, kind, &spacing, confidence).expect("finite")
 }
 
-fn assert_table(rates: &[f64], clusters: &[usize], table: [(Kind, &[f64]); 3]) {
+fn assert_table(rates: &[f64], clusters: &[usize], table: [(Deviation, &[f64]); 3]) {
     for (kind, expected) in table {
         let points = points(rates, kind, clusters, 0.683);
         assert_eq!(points.len(), expected.len(), "{kind:?}");
@@ -44,9 +44,9 @@ fn nine_rates_have_the_deviations_of_table_30() {
         &NINE,
         &[1, 2],
         [
-            (Kind::Allan, &[91.22945, 85.95287]),
-            (Kind::Modified, &[91.22945, 74.78849]),
-            (Kind::Hadamard, &[70.80607, 85.61487]),
+            (Deviation::Allan, &[91.22945, 85.95287]),
+            (Deviation::Modified, &[91.22945, 74.78849]),
+            (Deviation::Hadamard, &[70.80607, 85.61487]),
         ],
     );
 }
@@ -57,9 +57,15 @@ fn a_thousand_rates_have_the_deviations_of_table_31() {
         &thousand(),
         &[1, 10, 100],
         [
-            (Kind::Allan, &[2.922319e-1, 9.159953e-2, 3.241343e-2]),
-            (Kind::Modified, &[2.922319e-1, 6.172376e-2, 2.170921e-2]),
-            (Kind::Hadamard, &[2.943883e-1, 9.581083e-2, 3.237638e-2]),
+            (Deviation::Allan, &[2.922319e-1, 9.159953e-2, 3.241343e-2]),
+            (
+                Deviation::Modified,
+                &[2.922319e-1, 6.172376e-2, 2.170921e-2],
+            ),
+            (
+                Deviation::Hadamard,
+                &[2.943883e-1, 9.581083e-2, 3.237638e-2],
+            ),
         ],
     );
 }

@@ -23,8 +23,27 @@ pub struct Coefficient {
 pub struct Unseen {
     /// Upper end of the confidence interval, in the unit of its [`Term`]; `None` where nothing of the curve tells it.
     pub at_most: Option<f64>,
-    /// The sentence why it is not shown.
-    pub why: String,
+    /// Why it is not shown.
+    pub why: Reason,
+}
+
+/// Why a curve does not show a term.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reason {
+    /// At short times the curve is below white noise, as behind a low-pass filter.
+    Filtered,
+    /// At short times the curve follows none of the terms, and what it follows would hide this one.
+    Hidden,
+    /// Models without the term fit the curve as well.
+    Small {
+        /// Terms that these have in its place; none where the term is simply small.
+        instead: Vec<Term>,
+        /// Seconds of record beyond the present ones that would show a term of half the upper end; `None` where a longer record does not
+        /// help.
+        longer_s: Option<f64>,
+    },
+    /// The curve is bent, and the spectrum, which gives a higher upper end, does not show the term either.
+    NotInSpectrum,
 }
 
 /// Terms of the model, in the order of their powers of τ.
@@ -43,11 +62,11 @@ pub enum Term {
 }
 
 impl Unseen {
-    /// Raises a bound that is below `at_most`, which is written as `words`.
-    pub fn raise(&mut self, at_most: f64, words: String) {
-        if self.at_most.is_none_or(|bound| bound < at_most) {
-            self.at_most = Some(at_most);
-            self.why = format!("not seen, in the spectrum neither: at most {words}");
+    /// Raises an upper end that is below that of the spectrum.
+    pub fn raise(&mut self, by_spectrum: f64) {
+        if self.at_most.is_none_or(|bound| bound < by_spectrum) {
+            self.at_most = Some(by_spectrum);
+            self.why = Reason::NotInSpectrum;
         }
     }
 }
@@ -108,10 +127,8 @@ pub struct NoiseModel {
 
 impl NoiseModel {
     /// The coefficient of `term`, or why there is none.
-    pub fn get(&self, term: Term) -> Result<&Coefficient, &str> {
-        self.coefficients[term as usize]
-            .as_ref()
-            .map_err(|unseen| unseen.why.as_str())
+    pub fn get(&self, term: Term) -> Result<&Coefficient, &Unseen> {
+        self.coefficients[term as usize].as_ref()
     }
 
     /// Upper end of the confidence interval of `term`, whether it is shown or not.

@@ -1,21 +1,21 @@
 //! Equivalent degrees of freedom against covariances, and intervals against what they claim.
 
-use mimu::allan::bounds::{Estimator, Sampling, interval};
-use mimu::allan::curve::curve;
-use mimu::allan::{Kind, Spacing};
+use mimu_allan::bounds::{Estimator, Sampling, interval};
+use mimu_allan::curve::curve;
+use mimu_allan::{Deviation, Spacing};
 use mimu_rig::noise::{Coefficients, Noise};
 
 use super::Random;
 
-const KINDS: [Kind; 3] = [Kind::Allan, Kind::Modified, Kind::Hadamard];
+const KINDS: [Deviation; 3] = [Deviation::Allan, Deviation::Modified, Deviation::Hadamard];
 
 /// Weights of the integral's samples in one difference.
-fn weights(kind: Kind, m: usize) -> Vec<f64> {
+fn weights(kind: Deviation, m: usize) -> Vec<f64> {
     let taps: &[f64] = match kind {
-        Kind::Allan | Kind::Modified => &[1.0, -2.0, 1.0],
-        Kind::Hadamard => &[-1.0, 3.0, -3.0, 1.0],
+        Deviation::Allan | Deviation::Modified => &[1.0, -2.0, 1.0],
+        Deviation::Hadamard => &[-1.0, 3.0, -3.0, 1.0],
     };
-    let width = if kind == Kind::Modified { m } else { 1 };
+    let width = if kind == Deviation::Modified { m } else { 1 };
     let mut weights = vec![0.0; (taps.len() - 1) * m + width];
     for (k, tap) in taps.iter().enumerate() {
         for i in 0..width {
@@ -27,7 +27,7 @@ fn weights(kind: Kind, m: usize) -> Vec<f64> {
 
 /// Degrees of freedom by their definition, `2 E(s²)²/var(s²)`, for normal noise whose integral is white noise
 /// summed `sums` times: white phase 0, white rate 1.
-fn by_definition(kind: Kind, m: usize, stride: usize, terms: usize, sums: usize) -> f64 {
+fn by_definition(kind: Deviation, m: usize, stride: usize, terms: usize, sums: usize) -> f64 {
     let mut response = weights(kind, m);
     for _ in 0..sums {
         // Summation of the noise is summation of the weights, from the other end.
@@ -46,7 +46,7 @@ fn by_definition(kind: Kind, m: usize, stride: usize, terms: usize, sums: usize)
     terms as f64 * zero / (zero + sum)
 }
 
-fn edf(kind: Kind, m: usize, stride: usize, terms: usize, alpha: i32) -> f64 {
+fn edf(kind: Deviation, m: usize, stride: usize, terms: usize, alpha: i32) -> f64 {
     Estimator {
         kind,
         sampling: Sampling::Instants,
@@ -72,7 +72,7 @@ fn degrees_of_freedom_for_white_noise_are_those_of_its_covariances() {
                     // cluster, the definition sums it; 4.8 % fewer at m = 2, where bounds are 2.4 % wider than
                     // need be.
                     let tolerance = match kind {
-                        Kind::Modified if alpha == 0 && m > 1 => 0.1 / m as f64,
+                        Deviation::Modified if alpha == 0 && m > 1 => 0.1 / m as f64,
                         _ => 1e-12,
                     };
                     assert!(
@@ -123,9 +123,9 @@ fn degrees_of_freedom_with_differences_left_out_are_those_of_their_covariances()
 fn differences_left_out_cost_under_a_twentieth_of_a_percent_for_white_rates_and_redder() {
     let m = 1 << 16;
     for kind in KINDS {
-        let reddest = if kind == Kind::Hadamard { -4 } else { -2 };
+        let reddest = if kind == Deviation::Hadamard { -4 } else { -2 };
         // The mean over a cluster forgets phase noises, too, only with the cluster.
-        let bluest = if kind == Kind::Modified { 2 } else { 0 };
+        let bluest = if kind == Deviation::Modified { 2 } else { 0 };
         for clusters in [4, 10, 1000] {
             for alpha in reddest..=bluest {
                 let [dense, sparse] =
@@ -147,7 +147,7 @@ fn white_rates_on_a_drift_are_white_to_the_hadamard_variance() {
         for (i, rate) in rates.iter_mut().enumerate() {
             *rate += 0.1 * i as f64;
         }
-        let points = curve(&rates, 1.0, Kind::Hadamard, &spacing, 0.95).expect("finite");
+        let points = curve(&rates, 1.0, Deviation::Hadamard, &spacing, 0.95).expect("finite");
         for (white, point) in white.iter_mut().zip(points) {
             *white += u32::from(point.alpha == 0);
         }
@@ -158,7 +158,7 @@ fn white_rates_on_a_drift_are_white_to_the_hadamard_variance() {
 /// GR's sum loses all digits for clusters of more than 1e6, where ours is in samples.
 #[test]
 fn flicker_phase_noise_in_long_clusters_keeps_its_digits() {
-    for kind in [Kind::Allan, Kind::Hadamard] {
+    for kind in [Deviation::Allan, Deviation::Hadamard] {
         let by_length: Vec<f64> = [1e4, 1e5, 1e6, 1e7, 1e8]
             .map(|m| edf(kind, m as usize, 1, 50, 1))
             .to_vec();
@@ -246,9 +246,9 @@ fn intervals_hold_the_true_deviation_of_flicker_noise_as_often_as_they_say() {
         let rates: Vec<f64> = (0..4096).map(|_| noise.step()).collect();
         for (kind, held) in KINDS.into_iter().zip(&mut held) {
             let factor = match kind {
-                Kind::Allan => 2.0 * 2_f64.ln(),
-                Kind::Modified => (27.0 * 3_f64.ln() - 32.0 * 2_f64.ln()) / 8.0,
-                Kind::Hadamard => 0.5 * (256.0_f64 / 27.0).ln(),
+                Deviation::Allan => 2.0 * 2_f64.ln(),
+                Deviation::Modified => (27.0 * 3_f64.ln() - 32.0 * 2_f64.ln()) / 8.0,
+                Deviation::Hadamard => 0.5 * (256.0_f64 / 27.0).ln(),
             };
             let truth = (factor / std::f64::consts::PI).sqrt();
             let points = curve(&rates, 1.0, kind, &spacing, 0.95).expect("finite");
@@ -268,7 +268,7 @@ fn intervals_hold_the_true_deviation_of_flicker_noise_as_often_as_they_say() {
 }
 
 /// Deviation of unit white noise, or of its sum, at clusters of `m`.
-fn expected(kind: Kind, m: usize, walk: bool) -> f64 {
+fn expected(kind: Deviation, m: usize, walk: bool) -> f64 {
     let mut response = weights(kind, m);
     for _ in 0..1 + usize::from(walk) {
         for i in (1..response.len()).rev() {
@@ -279,8 +279,8 @@ fn expected(kind: Kind, m: usize, walk: bool) -> f64 {
     let sum: f64 = response[1..].iter().map(|w| w * w).sum();
     let m = m as f64;
     match kind {
-        Kind::Allan => (sum / 2.0).sqrt() / m,
-        Kind::Hadamard => (sum / 6.0).sqrt() / m,
-        Kind::Modified => (sum / 2.0).sqrt() / (m * m),
+        Deviation::Allan => (sum / 2.0).sqrt() / m,
+        Deviation::Hadamard => (sum / 6.0).sqrt() / m,
+        Deviation::Modified => (sum / 2.0).sqrt() / (m * m),
     }
 }

@@ -8,8 +8,8 @@ use super::covariance::Covariances;
 use super::differences::{Differences, Order};
 use super::estimate::Curve;
 use super::selection::{FEWEST, SEEN, Selection};
-use super::terms::{Coefficient, NoiseModel, Term, Unseen};
-use crate::allan::Point;
+use super::terms::{Coefficient, NoiseModel, Reason, Term, Unseen};
+use crate::Point;
 
 /// Third differences over second ones that are no more than rounding errors.
 const ROUNDING: f64 = 1e-6;
@@ -30,7 +30,7 @@ pub struct Estimator {
 /// What lies between the octaves repeats them: every sample is in every one of the difference series. It would only make the
 /// covariance of the points nearly singular. The half is a single difference, but the only one that goes through the whole
 /// record: to squares of shorter ones a random walk there and back again is a ramp. Of 1000 ramps that are hard to see ("N, weak R" in
-/// `tests/allan_model.rs`) 457 were told with it and 35 without.
+/// `tests/all/model.rs`) 457 were told with it and 35 without.
 pub fn allan_factors(samples: usize) -> Vec<usize> {
     octaves(samples)
         .chain((samples >= 4).then_some(samples / 2))
@@ -77,15 +77,10 @@ impl Estimator {
     }
 
     /// Fits a model to an overlapping Allan curve that has the points of [`allan_factors`] and a Hadamard curve that has those of
-    /// [`hadamard_factors`]. `unit` writes a coefficient with its unit, for the sentences about those that are not seen.
+    /// [`hadamard_factors`].
     ///
     /// `None` if the Allan curve has fewer than six such points above zero.
-    pub fn fit(
-        &self,
-        allan: &[Point],
-        hadamard: &[Point],
-        unit: impl Fn(Term, f64) -> String,
-    ) -> Option<NoiseModel> {
+    pub fn fit(&self, allan: &[Point], hadamard: &[Point]) -> Option<NoiseModel> {
         let at = |curve: &[Point], m| {
             let found = curve.binary_search_by_key(&m, |p| p.m).ok();
             found.map(|i| curve[i].deviation)
@@ -122,15 +117,10 @@ impl Estimator {
         let coefficients = Term::ALL.map(|term| {
             if term == Term::Q && (filtered || selection.shortened) {
                 let why = match filtered {
-                    true => {
-                        "at short times the curve is below white noise, as behind a low-pass filter"
-                    }
-                    false => "at short times the curve is none of the terms', which would hide it",
+                    true => Reason::Filtered,
+                    false => Reason::Hidden,
                 };
-                return Err(Unseen {
-                    at_most: None,
-                    why: why.into(),
-                });
+                return Err(Unseen { at_most: None, why });
             }
             let instead = selection.instead_of(term);
             // What is in a model that does not fit may be there to mend it.
@@ -140,15 +130,7 @@ impl Estimator {
             if best.a[k] > 0.0 && instead.is_empty() && shown {
                 return Ok(self.coefficient(&selection, term));
             }
-            let (at_most, bound) = self.bound(&selection, term, &unit);
-            let why = match instead.is_empty() {
-                true => format!("not seen: {bound}"),
-                false => format!(
-                    "not told apart from {} by this record: {bound}",
-                    instead.join(" or ")
-                ),
-            };
-            Err(Unseen { at_most, why })
+            Err(self.unseen(&selection, term, instead))
         });
         Some(NoiseModel {
             coefficients,
