@@ -37,7 +37,7 @@ use triad::{Memory, Triad, put};
 
 pub use code::FARTHEST_ZERO;
 pub use directions::Directions;
-pub use effect::{Converter, DeviceEffect, Refused, TIME_CONSTANT_RANGE_S, Variable};
+pub use effect::{Converter, DeviceEffect, EffectError, TIME_CONSTANT_RANGE_S, Variable};
 
 /// Temperature that temperature offsets count from, °C.
 pub const REFERENCE_C: f64 = 25.0;
@@ -198,7 +198,7 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
     }
 
     /// Adds one.
-    pub fn push(&mut self, effect: DeviceEffect<T>) -> Result<(), Refused> {
+    pub fn push(&mut self, effect: DeviceEffect<T>) -> Result<(), EffectError> {
         self.triads[effect.sensor].push(&effect.kind())
     }
 

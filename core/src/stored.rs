@@ -98,7 +98,7 @@ pub struct Stored {
 
 /// Why bytes are not a calibration that this build can use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Refused {
+pub enum StoredError {
     /// They do not begin as a calibration does.
     NotACalibration,
     /// They end too early, or go on after the end.
@@ -138,7 +138,7 @@ pub enum Refused {
     Header,
 }
 
-impl core::fmt::Display for Refused {
+impl core::fmt::Display for StoredError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NotACalibration => f.write_str("the bytes do not begin as a calibration does"),
@@ -164,7 +164,7 @@ impl core::fmt::Display for Refused {
     }
 }
 
-impl core::error::Error for Refused {}
+impl core::error::Error for StoredError {}
 
 /// Writes a calibration to the beginning of `out`; returns its length. `found_with`: C that the effects were found with. [`decode`] judges what
 /// is written, not this.
@@ -210,7 +210,7 @@ pub fn encode(
 }
 
 /// The calibration in `bytes`, all of them.
-pub fn decode(bytes: &[u8]) -> Result<Stored, Refused> {
+pub fn decode(bytes: &[u8]) -> Result<Stored, StoredError> {
     read(bytes, |_| {}, |_| {})
 }
 
@@ -220,28 +220,30 @@ pub fn read(
     bytes: &[u8],
     node: impl FnMut(&Node<f32>),
     show: impl FnMut(&DeviceEffect<f32>),
-) -> Result<Stored, Refused> {
+) -> Result<Stored, StoredError> {
     let mut from = Reader(bytes);
     if from.bytes::<4>() != Some(MAGIC) {
-        return Err(Refused::NotACalibration);
+        return Err(StoredError::NotACalibration);
     }
-    let version = from.u16().ok_or(Refused::Length)?;
+    let version = from.u16().ok_or(StoredError::Length)?;
     if version != VERSION {
-        return Err(Refused::Version { found: version });
+        return Err(StoredError::Version { found: version });
     }
-    let length = from.u16().ok_or(Refused::Length)?;
+    let length = from.u16().ok_or(StoredError::Length)?;
     if usize::from(length) != bytes.len() || bytes.len() < HEADER + CHECK {
-        return Err(Refused::Length);
+        return Err(StoredError::Length);
     }
-    let (body, check) = bytes.split_last_chunk::<CHECK>().ok_or(Refused::Length)?;
+    let (body, check) = bytes
+        .split_last_chunk::<CHECK>()
+        .ok_or(StoredError::Length)?;
     if CRC.checksum(body) != u32::from_le_bytes(*check) {
-        return Err(Refused::Check);
+        return Err(StoredError::Check);
     }
-    let mut from = Reader(body.get(LENGTH_AT + 2..).ok_or(Refused::Length)?);
-    let [nodes, effects, thermometer, known] = from.bytes().ok_or(Refused::Length)?;
-    let origin = Origin::read(&mut from).ok_or(Refused::Length)?;
+    let mut from = Reader(body.get(LENGTH_AT + 2..).ok_or(StoredError::Length)?);
+    let [nodes, effects, thermometer, known] = from.bytes().ok_or(StoredError::Length)?;
+    let origin = Origin::read(&mut from).ok_or(StoredError::Length)?;
     let both = PerSensor::from_fn(|_| directions(&mut from)).transpose();
-    let both = both.ok_or(Refused::Length)?;
+    let both = both.ok_or(StoredError::Length)?;
     let head = curves::Head {
         nodes,
         thermometer,
@@ -249,7 +251,7 @@ pub fn read(
     };
     let (table, lags_s) = curves::read(&mut from, head, node)?;
     if !both.gyro.are_inverse() || !both.accel.are_inverse() {
-        return Err(Refused::Singular);
+        return Err(StoredError::Singular);
     }
     let none = Effects::of(both).within(table.limits());
     let all = read_effects(&mut from, effects, none, show)?;
@@ -264,7 +266,7 @@ pub fn read(
             lags_s,
             effect_count: effects,
         }),
-        false => Err(Refused::Length),
+        false => Err(StoredError::Length),
     }
 }
 
@@ -273,17 +275,17 @@ fn read_effects(
     count: u8,
     mut all: Effects<f32, ROOM>,
     mut show: impl FnMut(&DeviceEffect<f32>),
-) -> Result<Effects<f32, ROOM>, Refused> {
+) -> Result<Effects<f32, ROOM>, StoredError> {
     for at in 0..count {
-        let effect = effect::read(from).ok_or(Refused::Length)?;
+        let effect = effect::read(from).ok_or(StoredError::Length)?;
         effect
             .inspect(&mut show)
             .and_then(|effect| all.push(effect))
             .map_err(|refused| match refused {
-                effects::Refused::Unknown => Refused::EffectUnknown { at },
-                effects::Refused::Full => Refused::EffectsFull { at },
-                effects::Refused::Count { .. } | effects::Refused::Value => {
-                    Refused::EffectValue { at }
+                effects::EffectError::Unknown => StoredError::EffectUnknown { at },
+                effects::EffectError::Full => StoredError::EffectsFull { at },
+                effects::EffectError::Count { .. } | effects::EffectError::Value => {
+                    StoredError::EffectValue { at }
                 }
             })?;
     }

@@ -76,7 +76,7 @@ impl<T: RealField + Copy> Node<T> {
 
 /// Why nodes are not a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refused {
+pub enum TableError {
     /// There is no node, or more than N.
     Count,
     /// The temperature of this node is not above that of the one before.
@@ -87,7 +87,7 @@ pub enum Refused {
     Range,
 }
 
-impl core::fmt::Display for Refused {
+impl core::fmt::Display for TableError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Count => f.write_str("there is no temperature node, or there are too many"),
@@ -102,7 +102,7 @@ impl core::fmt::Display for Refused {
     }
 }
 
-impl core::error::Error for Refused {}
+impl core::error::Error for TableError {}
 
 /// Nodes in the order of their temperatures: immutable, for any number of streams.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,11 +136,11 @@ pub struct State<T: RealField> {
 
 impl<T: RealField + Copy, const N: usize> Table<T, N> {
     /// A table of 1 to N nodes of strictly increasing temperature.
-    pub fn new(nodes: impl IntoIterator<Item = Node<T>>) -> Result<Self, Refused> {
+    pub fn new(nodes: impl IntoIterator<Item = Node<T>>) -> Result<Self, TableError> {
         let mut nodes = nodes.into_iter();
-        let first = nodes.next().ok_or(Refused::Count)?;
+        let first = nodes.next().ok_or(TableError::Count)?;
         if !first.is_finite() {
-            return Err(Refused::NotFinite(0));
+            return Err(TableError::NotFinite(0));
         }
         let mut before = first.temp_c;
         let mut table = Self {
@@ -151,16 +151,16 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         for node in nodes {
             let at = table.len();
             if at == N {
-                return Err(Refused::Count);
+                return Err(TableError::Count);
             }
             if !node.is_finite() {
-                return Err(Refused::NotFinite(at));
+                return Err(TableError::NotFinite(at));
             }
             if !(node.temp_c > before) {
-                return Err(Refused::Order(at));
+                return Err(TableError::Order(at));
             }
             before = node.temp_c;
-            table.others.push(node).map_err(|_| Refused::Count)?;
+            table.others.push(node).map_err(|_| TableError::Count)?;
         }
         Ok(table)
     }
@@ -175,11 +175,11 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
     }
 
     /// The same nodes, found from dies of these temperatures, °C.
-    pub fn with_range(mut self, range_c: [T; 2]) -> Result<Self, Refused> {
+    pub fn with_range(mut self, range_c: [T; 2]) -> Result<Self, TableError> {
         let [from, to] = range_c;
         match from.is_finite() && to.is_finite() && from <= to {
             true => self.range_c = Some(range_c),
-            false => return Err(Refused::Range),
+            false => return Err(TableError::Range),
         }
         Ok(self)
     }

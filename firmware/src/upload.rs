@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(over, Err(Refusal::TooLong { room: 9 }));
         upload.chunk(8, b"9").unwrap();
         // The hash holds; it is no calibration.
-        let foreign = Refusal::NotUsable(stored::Refused::NotACalibration);
+        let foreign = Refusal::NotUsable(stored::StoredError::NotACalibration);
         assert_eq!(upload.check(&UNIT).err(), Some(foreign));
         upload.chunk(0, b"0").unwrap();
         assert!(matches!(

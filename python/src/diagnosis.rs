@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use crate::calibration::Calibration;
 use crate::error::raised;
 use crate::noise::Noise;
-use crate::preparation::{Kept, Preparation};
+use crate::preparation::{KeptSteps, Preparation};
 use crate::recording::{Recording, Source, sources};
 use crate::work::{computed, json};
 
@@ -72,7 +72,7 @@ pub(crate) fn diagnose(
     accept: Vec<String>,
     still: Option<f64>,
     steps: Option<&str>,
-    keep: Option<Kept>,
+    keep: Option<KeptSteps>,
     noise: Option<&Noise>,
 ) -> PyResult<Diagnosis> {
     let by = Preparation::of(still, steps, keep, noise)?;

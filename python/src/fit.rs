@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 
 use crate::calibration::{Calibration, named};
 use crate::noise::Noise;
-use crate::preparation::{Kept, Preparation};
+use crate::preparation::{KeptSteps, Preparation};
 use crate::recording::Recording;
 use crate::work::{computed, json};
 
@@ -75,7 +75,7 @@ pub(crate) fn fit(
     only: Option<&str>,
     still: Option<f64>,
     steps: Option<&str>,
-    keep: Option<Kept>,
+    keep: Option<KeptSteps>,
     noise: Option<&Noise>,
 ) -> PyResult<Fit> {
     if holdout == 1 || holdout > 1000 {

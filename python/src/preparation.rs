@@ -23,7 +23,7 @@ pub(crate) struct Preparation {
 
 /// Dwells that are kept: `all`, or their numbers.
 #[derive(FromPyObject)]
-pub(crate) enum Kept {
+pub(crate) enum KeptSteps {
     Word(String),
     Numbers(Vec<i32>),
 }
@@ -36,7 +36,7 @@ impl Preparation {
     pub(crate) fn of(
         still: Option<f64>,
         steps: Option<&str>,
-        keep: Option<Kept>,
+        keep: Option<KeptSteps>,
         noise: Option<&Noise>,
     ) -> PyResult<Self> {
         let unknown = |what: String| Err(PyValueError::new_err(what));
@@ -51,9 +51,9 @@ impl Preparation {
             },
             keep: match keep {
                 None => Keep::default(),
-                Some(Kept::Numbers(steps)) => Keep::Steps(steps),
-                Some(Kept::Word(word)) if word == "all" => Keep::Everything,
-                Some(Kept::Word(other)) => {
+                Some(KeptSteps::Numbers(steps)) => Keep::Steps(steps),
+                Some(KeptSteps::Word(word)) if word == "all" => Keep::Everything,
+                Some(KeptSteps::Word(other)) => {
                     let problem = "write all, or a list of numbers of dwells";
                     return unknown(format!("keep={other:?}: {problem}"));
                 }

@@ -9,14 +9,14 @@ use crate::converter::RawUnit;
 /// What a sensor measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum MeasuredQuantity {
     /// Angular rate; the catalog's input unit is deg/s.
     Gyro,
     /// Specific force; the catalog's input unit is g.
     Accel,
 }
 
-impl Kind {
+impl MeasuredQuantity {
     /// SI in one input unit of the catalog.
     pub fn si(self) -> f64 {
         match self {
@@ -33,7 +33,7 @@ pub struct Sensor {
     /// Name in rig files.
     pub name: String,
     /// What it measures.
-    pub kind: Kind,
+    pub kind: MeasuredQuantity,
     /// Unit of the output.
     pub output: RawUnit,
     /// Packages that three axes take: each is turned on the board by itself.
@@ -96,6 +96,6 @@ pub fn sensors() -> &'static [Sensor] {
 }
 
 /// The sensor of that kind and name.
-pub fn sensor(kind: Kind, name: &str) -> Option<&'static Sensor> {
+pub fn sensor(kind: MeasuredQuantity, name: &str) -> Option<&'static Sensor> {
     sensors().iter().find(|s| s.kind == kind && s.name == name)
 }

@@ -299,7 +299,7 @@ impl Samples {
 
 /// What `mimu verify` says of a calibration by other people.
 #[derive(Debug, Clone, Copy)]
-pub struct Verdict {
+pub struct Verification {
     /// Size of gravity over dwell means, m/s².
     pub size_mps2: f64,
     /// Direction of gravity after turns, rad.
@@ -309,7 +309,7 @@ pub struct Verdict {
 }
 
 /// Judges the calibration `accel`, `gyro` (raw to SI) by the dwells and turns of `fit`.
-pub fn verdict(fit: &Fit, accel: &Affine<f64>, gyro: &Affine<f64>) -> Result<Verdict> {
+pub fn verdict(fit: &Fit, accel: &Affine<f64>, gyro: &Affine<f64>) -> Result<Verification> {
     use mimu::calibration::Calibration;
     let mut calibration = Calibration::of(fit, &[], "2020-01-01T00:00:00Z")?;
     let tables = [&mut calibration.accel, &mut calibration.gyro];
@@ -322,7 +322,7 @@ pub fn verdict(fit: &Fit, accel: &Affine<f64>, gyro: &Affine<f64>) -> Result<Ver
     let judged = verified.sensors.transpose();
     let judged = judged.expect("both sensors can be judged");
     let (accel, gyro) = (judged.accel, judged.gyro);
-    Ok(Verdict {
+    Ok(Verification {
         size_mps2: accel.rms,
         direction_rad: gyro.rms,
         rest_rps: gyro.static_rms.expect("judged by turns"),

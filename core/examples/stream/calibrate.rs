@@ -6,7 +6,7 @@ pub fn calibrate(
     sample_rate_hz: f32,
     stream: impl Iterator<Item = ([f32; 3], [f32; 3], f32)>,
     mut out: impl FnMut(Sample<f32>, Place),
-) -> Result<(), stored::Refused> {
+) -> Result<(), stored::StoredError> {
     let compensator = stored::decode(calibration)?.compensator;
     let mut state = compensator.state(sample_rate_hz);
     for (gyro, accel, temp_c) in stream {

@@ -66,7 +66,7 @@ pub const TIME_CONSTANT_RANGE_S: [f64; 2] = [1e-3, 1e7];
 
 /// Why an effect is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refused {
+pub enum EffectError {
     /// No effect of this name can be removed here.
     Unknown,
     /// It takes another number of coefficients, or a term another number of variables.
@@ -81,7 +81,7 @@ pub enum Refused {
     Full,
 }
 
-impl core::fmt::Display for Refused {
+impl core::fmt::Display for EffectError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Unknown => f.write_str("no effect of this name can be removed here"),
@@ -94,7 +94,7 @@ impl core::fmt::Display for Refused {
     }
 }
 
-impl core::error::Error for Refused {}
+impl core::error::Error for EffectError {}
 
 /// An effect with its numbers, as a device takes it: there is none of numbers that it would refuse.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -167,16 +167,16 @@ impl<T> Converter<T> {
 impl<T: RealField + Copy> DeviceEffect<T> {
     /// The effect of a public id like `gyro_scale_cubic`, with all of its coefficients (SI, those of a matrix by rows) and the
     /// nonlinear constant of one that has any: a time constant, s.
-    pub fn named(id: &str, coefficients: &[T], nonlinear: Option<T>) -> Result<Self, Refused> {
+    pub fn named(id: &str, coefficients: &[T], nonlinear: Option<T>) -> Result<Self, EffectError> {
         let (sensor, name) = match (id.strip_prefix("gyro_"), id.strip_prefix("accel_")) {
             (Some(name), _) => (Sensor::Gyro, name),
             (_, Some(name)) => (Sensor::Accel, name),
-            _ => return Err(Refused::Unknown),
+            _ => return Err(EffectError::Unknown),
         };
-        let law: &'static Law<T> = Law::named(name).ok_or(Refused::Unknown)?;
+        let law: &'static Law<T> = Law::named(name).ok_or(EffectError::Unknown)?;
         if coefficients.len() != law.coefficients {
             let needed = law.coefficients;
-            return Err(Refused::Count { needed });
+            return Err(EffectError::Count { needed });
         }
         let nonlinear = match (law.nonlinear, nonlinear) {
             (Nonlinear::None, None) => None,
@@ -186,12 +186,12 @@ impl<T: RealField + Copy> DeviceEffect<T> {
             {
                 Some(value)
             }
-            _ => return Err(Refused::Value),
+            _ => return Err(EffectError::Value),
         };
         let mut all = [T::zero(); COEFFICIENTS];
         for (all, coefficient) in all.iter_mut().zip(coefficients) {
             if !coefficient.is_finite() {
-                return Err(Refused::Value);
+                return Err(EffectError::Value);
             }
             *all = *coefficient;
         }
@@ -211,13 +211,13 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         axis: usize,
         coefficient: T,
         variables: &[Variable],
-    ) -> Result<Self, Refused> {
+    ) -> Result<Self, EffectError> {
         let needed = FACTORS;
         if variables.is_empty() || variables.len() > needed {
-            return Err(Refused::Count { needed });
+            return Err(EffectError::Count { needed });
         }
         if axis >= 3 || !coefficient.is_finite() {
-            return Err(Refused::Value);
+            return Err(EffectError::Value);
         }
         let mut all = [None; FACTORS];
         for (one, variable) in all.iter_mut().zip(variables) {
@@ -238,7 +238,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
     /// `weight`: of bit 0, the highest, raw; each of the nine bits has half the weight of the one before. `errors`: what a reading has too
     /// much where the bit is set, in units of `weight`. `zero`: the reading of code 0, raw; not 0 where something was subtracted from the
     /// readings. A reading of less than 1/65536 of `weight` below the turn of a bit counts as one of the turn, whichever way it was
-    /// rounded. The code of all nine bits set, and one more, is again 0: what lies beyond is not distinguished. Refused where a number is not
+    /// rounded. The code of all nine bits set, and one more, is again 0: what lies beyond is not distinguished. EffectError where a number is not
     /// finite, the weight not positive, or `zero` farther from a reading of 0 than [`FARTHEST_ZERO`] weights.
     ///
     /// ```
@@ -262,7 +262,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         errors: &[T; BITS],
         weight: T,
         zero: T,
-    ) -> Result<Self, Refused> {
+    ) -> Result<Self, EffectError> {
         // What is not finite in single precision is not in this one, or becomes it in the tables.
         let codes = convert::<_, T>(256.0) / weight;
         let most = errors.iter().fold(T::zero(), |sum, e| sum + e.abs()) * weight;
@@ -270,7 +270,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         let near = zero.abs() <= convert::<_, T>(FARTHEST_ZERO) * weight;
         let axis_known = axis.is_none_or(|axis| axis < 3);
         if !(finite && near && weight > T::zero() && axis_known) {
-            return Err(Refused::Value);
+            return Err(EffectError::Value);
         }
         Ok(Self {
             sensor,

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, RealField, Vector3};
 
 use super::code::Code;
 use super::directions::Directions;
-use super::effect::{Kind, Refused};
+use super::effect::{EffectError, Kind};
 use super::law::{Ambient, Conditions, Fast, Slow, Slowly, Values};
 use crate::Sensor;
 use crate::die::lagged;
@@ -63,7 +63,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         }
     }
 
-    pub fn push(&mut self, effect: &Kind<'_, T>) -> Result<(), Refused> {
+    pub fn push(&mut self, effect: &Kind<'_, T>) -> Result<(), EffectError> {
         match effect {
             Kind::Code {
                 axes,
@@ -74,7 +74,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
                 // All are looked at before any is set: what is refused changes nothing.
                 let mut both = self.code.iter().zip(axes);
                 if both.any(|(code, meant)| *meant && code.is_some()) {
-                    return Err(Refused::Full);
+                    return Err(EffectError::Full);
                 }
                 let new = Code::new(errors, *weight, *zero);
                 for (code, meant) in self.code.iter_mut().zip(axes) {
@@ -83,8 +83,8 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
                     }
                 }
             }
-            Kind::Fast(fast) => self.fast.push(*fast).map_err(|_| Refused::Full)?,
-            Kind::Slow(slow) => self.slow.push(*slow).map_err(|_| Refused::Full)?,
+            Kind::Fast(fast) => self.fast.push(*fast).map_err(|_| EffectError::Full)?,
+            Kind::Slow(slow) => self.slow.push(*slow).map_err(|_| EffectError::Full)?,
         }
         Ok(())
     }

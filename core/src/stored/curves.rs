@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::bytes::{Reader, TooLong, Writer};
-use super::{NODES, Refused};
+use super::{NODES, StoredError};
 use crate::PerSensor;
 use crate::compensation::{Affine, Compensation};
 use crate::die::DieLag;
@@ -81,13 +81,13 @@ pub(super) fn read(
     from: &mut Reader<'_>,
     head: Head,
     show: impl FnMut(&Node<f32>),
-) -> Result<(Table<f32, NODES>, Option<PerSensor<f32>>), Refused> {
-    let mut number = || from.f32().ok_or(Refused::Length);
+) -> Result<(Table<f32, NODES>, Option<PerSensor<f32>>), StoredError> {
+    let mut number = || from.f32().ok_or(StoredError::Length);
     let range_c = [number()?, number()?];
     let lags_s = PerSensor::from([number()?, number()?]);
     let table = read_nodes(from, head.nodes, show)?;
     if head.known & !(RANGE_KNOWN | LAGS_KNOWN) != 0 {
-        return Err(Refused::Header);
+        return Err(StoredError::Header);
     }
     let known = |bit: u8| head.known & bit != 0;
     let no_lags = lags_s.map(DieLag::new).transpose().is_none();
@@ -96,12 +96,12 @@ pub(super) fn read(
         || known(LAGS_KNOWN) && no_lags
         || known(RANGE_KNOWN) && no_range
     {
-        return Err(Refused::Temperature);
+        return Err(StoredError::Temperature);
     }
     let table = match known(RANGE_KNOWN) {
         true => table
             .with_range(range_c)
-            .map_err(|_| Refused::Temperature)?,
+            .map_err(|_| StoredError::Temperature)?,
         false => table,
     };
     Ok((table, known(LAGS_KNOWN).then_some(lags_s)))
@@ -111,7 +111,7 @@ fn read_nodes(
     from: &mut Reader<'_>,
     count: u8,
     mut show: impl FnMut(&Node<f32>),
-) -> Result<Table<f32, NODES>, Refused> {
+) -> Result<Table<f32, NODES>, StoredError> {
     let (mut short, mut wrong) = (false, None);
     let read = (0..count).map_while(|at| {
         let node = node(from);
@@ -123,15 +123,17 @@ fn read_nodes(
     });
     let table = Table::new(read);
     if short {
-        return Err(Refused::Length);
+        return Err(StoredError::Length);
     }
     if let Some(at) = wrong {
-        return Err(Refused::Node { at });
+        return Err(StoredError::Node { at });
     }
     table.map_err(|refused| match refused {
-        table::Refused::Count => Refused::Node { at: count },
-        table::Refused::Order(at) | table::Refused::NotFinite(at) => Refused::Node { at: at as u8 },
-        table::Refused::Range => Refused::Temperature,
+        table::TableError::Count => StoredError::Node { at: count },
+        table::TableError::Order(at) | table::TableError::NotFinite(at) => {
+            StoredError::Node { at: at as u8 }
+        }
+        table::TableError::Range => StoredError::Temperature,
     })
 }
 

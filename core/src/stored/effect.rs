@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use super::bytes::{Reader, TooLong, Writer};
 use crate::Sensor;
-use crate::effects::{DeviceEffect, Refused, Variable};
+use crate::effects::{DeviceEffect, EffectError, Variable};
 
 const NAMED: u8 = 0;
 const TERM: u8 = 1;
@@ -16,13 +16,13 @@ const COEFFICIENTS: usize = 9;
 /// Most variables of a term.
 const FACTORS: usize = 3;
 
-fn sensor(number: u8) -> Result<Sensor, Refused> {
+fn sensor(number: u8) -> Result<Sensor, EffectError> {
     let all = Sensor::BOTH.get(usize::from(number));
-    all.copied().ok_or(Refused::Unknown)
+    all.copied().ok_or(EffectError::Unknown)
 }
 
 /// `None` if the bytes end in it.
-pub(super) fn read(from: &mut Reader<'_>) -> Option<Result<DeviceEffect<f32>, Refused>> {
+pub(super) fn read(from: &mut Reader<'_>) -> Option<Result<DeviceEffect<f32>, EffectError>> {
     match from.u8()? {
         NAMED => {
             let length = from.u8()?;
@@ -30,7 +30,7 @@ pub(super) fn read(from: &mut Reader<'_>) -> Option<Result<DeviceEffect<f32>, Re
             let count = usize::from(from.u8()?);
             let mut coefficients = Vec::<f32, COEFFICIENTS>::new();
             if coefficients.resize(count, 0.0).is_err() {
-                return Some(Err(Refused::Unknown));
+                return Some(Err(EffectError::Unknown));
             }
             for coefficient in &mut coefficients {
                 *coefficient = from.f32()?;
@@ -47,7 +47,7 @@ pub(super) fn read(from: &mut Reader<'_>) -> Option<Result<DeviceEffect<f32>, Re
                 .resize(usize::from(count), Variable::Time)
                 .is_err()
             {
-                return Some(Err(Refused::Count { needed: FACTORS }));
+                return Some(Err(EffectError::Count { needed: FACTORS }));
             }
             let mut known = true;
             for variable in &mut variables {
@@ -60,7 +60,7 @@ pub(super) fn read(from: &mut Reader<'_>) -> Option<Result<DeviceEffect<f32>, Re
             let coefficient = from.f32()?;
             let sensor = match sensor(triad) {
                 Ok(sensor) if known => sensor,
-                _ => return Some(Err(Refused::Unknown)),
+                _ => return Some(Err(EffectError::Unknown)),
             };
             let axis = usize::from(axis);
             Some(DeviceEffect::term(sensor, axis, coefficient, &variables))
@@ -77,7 +77,7 @@ pub(super) fn read(from: &mut Reader<'_>) -> Option<Result<DeviceEffect<f32>, Re
             Some(sensor(triad).and_then(of))
         }
         // Of a kind that a later version has.
-        _ => Some(Err(Refused::Unknown)),
+        _ => Some(Err(EffectError::Unknown)),
     }
 }
 

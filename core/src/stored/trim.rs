@@ -1,7 +1,7 @@
 //! Offsets of a stored calibration set anew, everything else kept.
 
 use super::bytes::Reader;
-use super::{CHECK, CRC, HEADER, Refused, curves, decode};
+use super::{CHECK, CRC, HEADER, StoredError, curves, decode};
 use crate::PerSensor;
 
 /// Where the time of the trim stands.
@@ -20,29 +20,29 @@ const OFFSETS_AT: PerSensor<usize> = PerSensor {
 ///
 /// # Errors
 /// Why the bytes are no calibration, before or after.
-pub fn trim(bytes: &mut [u8], add: PerSensor<[f32; 3]>, trimmed_s: u64) -> Result<(), Refused> {
+pub fn trim(bytes: &mut [u8], add: PerSensor<[f32; 3]>, trimmed_s: u64) -> Result<(), StoredError> {
     decode(bytes)?;
-    let nodes = usize::from(*bytes.get(HEADER - 4).ok_or(Refused::Length)?);
+    let nodes = usize::from(*bytes.get(HEADER - 4).ok_or(StoredError::Length)?);
     put(bytes, TRIMMED_AT, &trimmed_s.to_le_bytes())?;
     for node in 0..nodes {
         for (_, (triad, at)) in add.zip(OFFSETS_AT) {
             for (axis, add) in triad.iter().enumerate() {
                 let at = NODES_AT + NODE * node + at + 4 * axis;
-                let mut from = Reader(bytes.get(at..).ok_or(Refused::Length)?);
-                let offset = from.f32().ok_or(Refused::Length)?;
+                let mut from = Reader(bytes.get(at..).ok_or(StoredError::Length)?);
+                let offset = from.f32().ok_or(StoredError::Length)?;
                 put(bytes, at, &(offset + add).to_le_bytes())?;
             }
         }
     }
     let (body, check) = bytes
         .split_last_chunk_mut::<CHECK>()
-        .ok_or(Refused::Length)?;
+        .ok_or(StoredError::Length)?;
     *check = CRC.checksum(body).to_le_bytes();
     decode(bytes).map(|_| ())
 }
 
-fn put(bytes: &mut [u8], at: usize, new: &[u8]) -> Result<(), Refused> {
-    let room = bytes.get_mut(at..).ok_or(Refused::Length)?;
+fn put(bytes: &mut [u8], at: usize, new: &[u8]) -> Result<(), StoredError> {
+    let room = bytes.get_mut(at..).ok_or(StoredError::Length)?;
     for (room, byte) in room.iter_mut().zip(new) {
         *room = *byte;
     }

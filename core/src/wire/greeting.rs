@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::extensible;
-use crate::effects::{DeviceEffect, Refused};
+use crate::effects::{DeviceEffect, EffectError};
 use crate::stored;
 
 /// First bytes of every greeting.
@@ -130,7 +130,7 @@ pub fn effects_of_this_build() -> u32 {
     let known = |id| {
         !matches!(
             DeviceEffect::<f32>::named(id, &[], None),
-            Err(Refused::Unknown)
+            Err(EffectError::Unknown)
         )
     };
     let bits = EFFECTS.iter().enumerate();
@@ -202,7 +202,7 @@ pub enum Slot {
     /// A calibration that was whole once and is not any more.
     Damaged,
     /// A whole calibration that this version of the firmware cannot use.
-    NotUsable(stored::Refused),
+    NotUsable(stored::StoredError),
     /// Something that this build does not know; never sent.
     #[default]
     #[serde(skip)]

@@ -195,7 +195,7 @@ pub enum Refusal {
         found: u64,
     },
     /// What was received is not a calibration that this device can use.
-    NotUsable(crate::stored::Refused),
+    NotUsable(crate::stored::StoredError),
     /// The flash did not take it; the calibration before is still there.
     FlashFailed,
     /// No bank of this triad runs.

@@ -1,7 +1,7 @@
 //! Errors by the code of a converter.
 
 use mimu_core::compensation::Sample;
-use mimu_core::effects::{DeviceEffect, Effects, FARTHEST_ZERO, Refused};
+use mimu_core::effects::{DeviceEffect, EffectError, Effects, FARTHEST_ZERO};
 use mimu_core::{PerSensor, Sensor};
 use nalgebra::Vector3;
 
@@ -246,30 +246,39 @@ fn a_code_that_cannot_be_removed_is_refused() {
         for zero in [-FARTHEST_ZERO, FARTHEST_ZERO] {
             assert!(code(axis, &errors, 1.0, zero).is_ok());
             let beyond = code(axis, &errors, 1.0, 1.01 * zero);
-            assert_eq!(beyond.err(), Some(Refused::Value));
+            assert_eq!(beyond.err(), Some(EffectError::Value));
         }
         for weight in [0.0, -1.0, none, last] {
-            assert_eq!(code(axis, &errors, weight, 0.0).err(), Some(Refused::Value));
+            assert_eq!(
+                code(axis, &errors, weight, 0.0).err(),
+                Some(EffectError::Value)
+            );
         }
         for zero in [none, last, -last] {
-            assert_eq!(code(axis, &errors, 1.0, zero).err(), Some(Refused::Value));
+            assert_eq!(
+                code(axis, &errors, 1.0, zero).err(),
+                Some(EffectError::Value)
+            );
         }
         for (bit, error) in (0..9).flat_map(|bit| [(bit, none), (bit, last)]) {
             let mut errors = errors;
             errors[bit] = error;
-            assert_eq!(code(axis, &errors, 1.0, 0.0).err(), Some(Refused::Value));
+            assert_eq!(
+                code(axis, &errors, 1.0, 0.0).err(),
+                Some(EffectError::Value)
+            );
         }
     }
     // Finite, and not what becomes of them in single precision.
     let single =
         |error, weight| DeviceEffect::code(Sensor::Gyro, None, &[error; 9], weight, 0.0_f32);
     for (error, weight) in [(1e-3, 1e-37), (1e20, 1e20), (1e38, 1.0)] {
-        assert_eq!(single(error, weight).err(), Some(Refused::Value));
+        assert_eq!(single(error, weight).err(), Some(EffectError::Value));
     }
     for axis in [3, 255, usize::MAX] {
         assert_eq!(
             code(Some(axis), &errors, 1.0, 0.0).err(),
-            Some(Refused::Value)
+            Some(EffectError::Value)
         );
     }
 
@@ -287,19 +296,19 @@ fn a_code_that_cannot_be_removed_is_refused() {
     let read = of(Sensor::Gyro, Vector3::repeat(1.5), Vector3::repeat(1.5));
     let removed = |effects: &Eight| read.gyro - effects.without_code_errors(&read).gyro;
     for (axis, result, after) in [
-        (None, Err(Refused::Full), [0.0, 0.25, 0.0]),
-        (Some(1), Err(Refused::Full), [0.0, 0.25, 0.0]),
+        (None, Err(EffectError::Full), [0.0, 0.25, 0.0]),
+        (Some(1), Err(EffectError::Full), [0.0, 0.25, 0.0]),
         (Some(2), Ok(()), [0.0, 0.25, 0.125]),
-        (None, Err(Refused::Full), [0.0, 0.25, 0.125]),
+        (None, Err(EffectError::Full), [0.0, 0.25, 0.125]),
         (Some(0), Ok(()), [0.125, 0.25, 0.125]),
-        (Some(0), Err(Refused::Full), [0.125, 0.25, 0.125]),
+        (Some(0), Err(EffectError::Full), [0.125, 0.25, 0.125]),
     ] {
         assert_eq!(effects.push(rank(axis, 0.125).unwrap()), result);
         assert_eq!(removed(&effects), Vector3::from(after));
     }
     let other = DeviceEffect::code(Sensor::Accel, None, &errors, 1.0, 0.0).unwrap();
     assert_eq!(effects.push(other), Ok(()));
-    assert_eq!(effects.push(other), Err(Refused::Full));
+    assert_eq!(effects.push(other), Err(EffectError::Full));
 }
 
 #[test]

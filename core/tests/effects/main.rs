@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use mimu_core::compensation::{Affine, Sample};
 use mimu_core::effects::{
-    DeviceEffect, Effects, RATE_LAG_S, REFERENCE_C, Refused, State, Variable,
+    DeviceEffect, EffectError, Effects, RATE_LAG_S, REFERENCE_C, State, Variable,
 };
 use mimu_core::{PerSensor, Sensor};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
@@ -443,33 +443,39 @@ fn terms_are_products_of_what_they_name() {
 #[test]
 fn what_cannot_be_removed_is_refused() {
     let refused = |id, c: &[f64], form| DeviceEffect::named(id, c, form).unwrap_err();
-    assert_eq!(refused("gyro_magnetic", &[0.0; 3], None), Refused::Unknown);
-    assert_eq!(refused("earth_rate", &[0.0; 3], None), Refused::Unknown);
+    assert_eq!(
+        refused("gyro_magnetic", &[0.0; 3], None),
+        EffectError::Unknown
+    );
+    assert_eq!(refused("earth_rate", &[0.0; 3], None), EffectError::Unknown);
     assert_eq!(
         refused("gyro_scale_cubic", &[0.0; 2], None),
-        Refused::Count { needed: 3 }
+        EffectError::Count { needed: 3 }
     );
     assert_eq!(
         refused("gyro_scale_cubic", &[f64::NAN; 3], None),
-        Refused::Value
+        EffectError::Value
     );
-    assert_eq!(refused("gyro_warm_up", &[0.0; 3], None), Refused::Value);
+    assert_eq!(refused("gyro_warm_up", &[0.0; 3], None), EffectError::Value);
     for form in [None, Some(1.0)] {
         let code = refused("gyro_readout_code", &[0.0; 9], form);
-        assert_eq!(code, Refused::Unknown);
+        assert_eq!(code, EffectError::Unknown);
     }
     assert_eq!(
         refused("gyro_warm_up", &[0.0; 3], Some(0.0)),
-        Refused::Value
+        EffectError::Value
     );
     assert_eq!(
         refused("gyro_scale_cubic", &[0.0; 3], Some(9.0)),
-        Refused::Value
+        EffectError::Value
     );
     let term = |axis, v: &[Variable]| DeviceEffect::term(Sensor::Accel, axis, 1.0, v).unwrap_err();
-    assert_eq!(term(3, &[Variable::Time]), Refused::Value);
-    assert_eq!(term(0, &[]), Refused::Count { needed: 3 });
-    assert_eq!(term(0, &[Variable::Time; 4]), Refused::Count { needed: 3 });
+    assert_eq!(term(3, &[Variable::Time]), EffectError::Value);
+    assert_eq!(term(0, &[]), EffectError::Count { needed: 3 });
+    assert_eq!(
+        term(0, &[Variable::Time; 4]),
+        EffectError::Count { needed: 3 }
+    );
     let mut two = Effects::<f64, 2>::new(&PerSensor::both(si())).unwrap();
     let fast = named("gyro_scale_cubic", &[0.0; 3]);
     let slow = named("gyro_thermal_scale", &[0.0; 3]);

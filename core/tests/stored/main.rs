@@ -6,7 +6,7 @@ use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::effects::{self, DeviceEffect, Variable};
 use mimu_core::single;
 use mimu_core::stored::{
-    Curves, MAX_LENGTH, NODES, Origin, ROOM, Refused, decode, encode, hash, read, trim,
+    Curves, MAX_LENGTH, NODES, Origin, ROOM, StoredError, decode, encode, hash, read, trim,
 };
 use mimu_core::table::Node;
 use mimu_core::{PerSensor, Sensor};
@@ -255,7 +255,7 @@ fn a_trim_moves_the_curves_as_they_are_and_nothing_else() {
     }
     assert_eq!(
         trim(&mut after, PerSensor::both([f32::NAN; 3]), 1).err(),
-        Some(Refused::Node { at: 0 })
+        Some(StoredError::Node { at: 0 })
     );
 }
 
@@ -272,7 +272,7 @@ fn a_range_a_lag_or_a_thermometer_that_makes_no_sense_is_refused() {
         };
         decode(&with_curves(&curves, &[])).err()
     };
-    let no = Some(Refused::Temperature);
+    let no = Some(StoredError::Temperature);
     assert_eq!(
         refused(Some([10.0, 40.0]), Some([-120.0, 0.0].into())),
         None
@@ -299,7 +299,7 @@ fn a_range_a_lag_or_a_thermometer_that_makes_no_sense_is_refused() {
 fn numbers_that_no_unit_has_are_refused_by_their_node() {
     let [good, other] = [node(0.0, &regular()), node(50.0, &regular())];
     let refused = |second: Node<f32>| decode(&bytes(&[good, second], &[])).err();
-    let at_1 = Some(Refused::Node { at: 1 });
+    let at_1 = Some(StoredError::Node { at: 1 });
     assert_eq!(refused(other), None);
     for temp_c in [1e30, 251.0] {
         assert_eq!(refused(Node { temp_c, ..other }), at_1, "{temp_c}");
@@ -310,7 +310,7 @@ fn numbers_that_no_unit_has_are_refused_by_their_node() {
     };
     assert_eq!(
         decode(&bytes(&[cold, other], &[])).err(),
-        Some(Refused::Node { at: 0 })
+        Some(StoredError::Node { at: 0 })
     );
     let mut alike = Matrix3::from_diagonal_element(3.5);
     // Sensors y and z 0.03° apart.
@@ -353,7 +353,7 @@ fn bits_of_a_later_version_and_lags_that_nothing_follows_are_refused() {
         later[11] |= 1 << bit;
         assert_eq!(
             decode(&resealed(later)).err(),
-            Some(Refused::Header),
+            Some(StoredError::Header),
             "{bit}"
         );
     }
@@ -365,7 +365,7 @@ fn bits_of_a_later_version_and_lags_that_nothing_follows_are_refused() {
         decode(&with_curves(&curves, &[])).err()
     };
     for lag_s in [1e-30, -1e-30, 9e-4] {
-        assert_eq!(lag(lag_s), Some(Refused::Temperature), "{lag_s}");
+        assert_eq!(lag(lag_s), Some(StoredError::Temperature), "{lag_s}");
     }
     assert_eq!((lag(0.0), lag(1e-3), lag(-1e-3)), (None, None, None));
     for (constant, refused) in [
@@ -378,13 +378,13 @@ fn bits_of_a_later_version_and_lags_that_nothing_follows_are_refused() {
         let effect = |constant| DeviceEffect::named("gyro_thermal_lag", &[1e-3; 3], Some(constant));
         assert_eq!(
             effect(constant).err(),
-            refused.then_some(effects::Refused::Value)
+            refused.then_some(effects::EffectError::Value)
         );
         // The same from bytes: the constant is the last number before the check.
         let mut all = bytes(&one, &[effect(60.0).unwrap()]);
         let at = all.len() - 8;
         all[at..at + 4].copy_from_slice(&constant.to_le_bytes());
-        let expected = refused.then_some(Refused::EffectValue { at: 0 });
+        let expected = refused.then_some(StoredError::EffectValue { at: 0 });
         assert_eq!(decode(&resealed(all)).err(), expected, "{constant}");
     }
 }
@@ -408,12 +408,12 @@ fn a_code_of_no_axis_is_not_one_of_all() {
         let mut all = bytes(&[node(0.0, &regular())], &[code(Some(1))]);
         let at = all.len() - 4 - 4 * 11 - 1;
         all[at] = axis;
-        let expected = (axis > 3).then_some(Refused::EffectValue { at: 0 });
+        let expected = (axis > 3).then_some(StoredError::EffectValue { at: 0 });
         assert_eq!(decode(&resealed(all)).err(), expected, "{axis}");
         let made = DeviceEffect::code(Sensor::Accel, Some(axis.into()), &[0.0; 9], 1.0, 0.0);
-        assert_eq!(made.err(), Some(effects::Refused::Value), "{axis}");
+        assert_eq!(made.err(), Some(effects::EffectError::Value), "{axis}");
     }
-    let full = Some(Refused::EffectsFull { at: 1 });
+    let full = Some(StoredError::EffectsFull { at: 1 });
     assert_eq!(refused(&[code(None), code(Some(1))]), full);
     assert_eq!(refused(&[code(Some(1)), code(None)]), full);
 }
@@ -459,27 +459,30 @@ fn every_refusal_has_its_name() {
     };
     let refused = |bytes: &[u8]| decode(bytes).err();
     assert_eq!(refused(&good), None);
-    assert_eq!(refused(b""), Some(Refused::NotACalibration));
-    assert_eq!(refused(&with(0, b'x')), Some(Refused::NotACalibration));
-    assert_eq!(refused(&with(4, 1)), Some(Refused::Version { found: 1 }));
-    assert_eq!(refused(&with(8, 0)), Some(Refused::Node { at: 0 }));
-    assert_eq!(refused(&with(8, 1)), Some(Refused::Length));
-    assert_eq!(refused(&with(8, 3)), Some(Refused::Length));
+    assert_eq!(refused(b""), Some(StoredError::NotACalibration));
+    assert_eq!(refused(&with(0, b'x')), Some(StoredError::NotACalibration));
+    assert_eq!(
+        refused(&with(4, 1)),
+        Some(StoredError::Version { found: 1 })
+    );
+    assert_eq!(refused(&with(8, 0)), Some(StoredError::Node { at: 0 }));
+    assert_eq!(refused(&with(8, 1)), Some(StoredError::Length));
+    assert_eq!(refused(&with(8, 3)), Some(StoredError::Length));
     for end in 4..good.len() {
-        assert_eq!(refused(&good[..end]), Some(Refused::Length), "{end}");
+        assert_eq!(refused(&good[..end]), Some(StoredError::Length), "{end}");
     }
     let longer = [&good[..], &[0]].concat();
-    assert_eq!(refused(&longer), Some(Refused::Length));
+    assert_eq!(refused(&longer), Some(StoredError::Length));
     let nodes = |temperatures: &[f32]| {
         let all: Vec<_> = temperatures.iter().map(|t| node(*t, &regular())).collect();
         refused(&bytes(&all, &[]))
     };
-    assert_eq!(nodes(&[0.0, 0.0]), Some(Refused::Node { at: 1 }));
-    assert_eq!(nodes(&[0.0, 9.0, 5.0]), Some(Refused::Node { at: 2 }));
-    assert_eq!(nodes(&[f32::NAN]), Some(Refused::Node { at: 0 }));
+    assert_eq!(nodes(&[0.0, 0.0]), Some(StoredError::Node { at: 1 }));
+    assert_eq!(nodes(&[0.0, 9.0, 5.0]), Some(StoredError::Node { at: 2 }));
+    assert_eq!(nodes(&[f32::NAN]), Some(StoredError::Node { at: 0 }));
     let many: Vec<f32> = (0..=NODES).map(|k| k as f32).collect();
     assert_eq!(nodes(&many[..NODES]), None);
-    assert_eq!(nodes(&many), Some(Refused::Node { at: 17 }));
+    assert_eq!(nodes(&many), Some(StoredError::Node { at: 17 }));
     let flat = Matrix3::zeros();
     let mut out = [0; MAX_LENGTH];
     let length = encode(
@@ -490,7 +493,7 @@ fn every_refusal_has_its_name() {
         &mut out,
     )
     .unwrap();
-    assert_eq!(refused(&out[..length]), Some(Refused::Singular));
+    assert_eq!(refused(&out[..length]), Some(StoredError::Singular));
 
     let one = [node(0.0, &regular())];
     let effects = |all: &[DeviceEffect<f32>]| refused(&bytes(&one, all));
@@ -502,7 +505,7 @@ fn every_refusal_has_its_name() {
     unknown[at] = b'x';
     assert_eq!(
         refused(&resealed(unknown)),
-        Some(Refused::EffectUnknown { at: 1 })
+        Some(StoredError::EffectUnknown { at: 1 })
     );
     // Two coefficients and a constant, where there have to be three.
     let mut short = bytes(&one, &[known]);
@@ -513,12 +516,12 @@ fn every_refusal_has_its_name() {
     short[6..8].copy_from_slice(&length.to_le_bytes());
     assert_eq!(
         refused(&resealed(short)),
-        Some(Refused::EffectValue { at: 0 })
+        Some(StoredError::EffectValue { at: 0 })
     );
     let eight = [known; 8];
     assert_eq!(effects(&eight), None);
     let nine = [known; 9];
-    assert_eq!(effects(&nine), Some(Refused::EffectsFull { at: 8 }));
+    assert_eq!(effects(&nine), Some(StoredError::EffectsFull { at: 8 }));
 }
 
 #[test]

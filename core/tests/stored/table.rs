@@ -53,7 +53,7 @@ fn outside_the_nodes_the_end_slope_goes_on_for_five_kelvin_and_is_then_held() {
         assert_eq!(state.model.accel, accel.model.accel);
     }
     let none = Table::<f32, 16>::new([]);
-    assert_eq!(none.err(), Some(mimu_core::table::Refused::Count));
+    assert_eq!(none.err(), Some(mimu_core::table::TableError::Count));
 }
 
 #[test]

@@ -142,7 +142,10 @@ fn older_newer_and_foreign_devices_are_told_apart() {
 fn every_effect_in_the_list_is_one_that_this_build_removes() {
     assert_eq!(effects_of_this_build(), (1 << EFFECTS.len()) - 1);
     let unknown = DeviceEffect::<f32>::named("gyro_no_such_thing", &[], None);
-    assert_eq!(unknown.unwrap_err(), mimu_core::effects::Refused::Unknown);
+    assert_eq!(
+        unknown.unwrap_err(),
+        mimu_core::effects::EffectError::Unknown
+    );
 }
 
 proptest! {

@@ -176,7 +176,7 @@ fn greetings() {
         (Slot::Whole { generation: 128 }, "03 01 8001"),
         (Slot::Unfinished, "01 02"),
         (Slot::Damaged, "01 03"),
-        (Slot::NotUsable(stored::Refused::Check), "02 04 03"),
+        (Slot::NotUsable(stored::StoredError::Check), "02 04 03"),
     ] {
         let bytes = hex(&format!(
             "{BEFORE} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00 01 ac02",
@@ -281,30 +281,30 @@ fn refusals() {
         (Refusal::Incomplete { received: 5 }, "05 05"),
         (Refusal::WrongHash { found: 128 }, "06 8001"),
         (
-            Refusal::NotUsable(stored::Refused::NotACalibration),
+            Refusal::NotUsable(stored::StoredError::NotACalibration),
             "07 00",
         ),
-        (Refusal::NotUsable(stored::Refused::Length), "07 01"),
+        (Refusal::NotUsable(stored::StoredError::Length), "07 01"),
         (
-            Refusal::NotUsable(stored::Refused::Version { found: 300 }),
+            Refusal::NotUsable(stored::StoredError::Version { found: 300 }),
             "07 02 ac02",
         ),
-        (Refusal::NotUsable(stored::Refused::Check), "07 03"),
+        (Refusal::NotUsable(stored::StoredError::Check), "07 03"),
         (
-            Refusal::NotUsable(stored::Refused::Node { at: 200 }),
+            Refusal::NotUsable(stored::StoredError::Node { at: 200 }),
             "07 04 c8",
         ),
-        (Refusal::NotUsable(stored::Refused::Singular), "07 05"),
+        (Refusal::NotUsable(stored::StoredError::Singular), "07 05"),
         (
-            Refusal::NotUsable(stored::Refused::EffectUnknown { at: 1 }),
+            Refusal::NotUsable(stored::StoredError::EffectUnknown { at: 1 }),
             "07 06 01",
         ),
         (
-            Refusal::NotUsable(stored::Refused::EffectValue { at: 2 }),
+            Refusal::NotUsable(stored::StoredError::EffectValue { at: 2 }),
             "07 07 02",
         ),
         (
-            Refusal::NotUsable(stored::Refused::EffectsFull { at: 3 }),
+            Refusal::NotUsable(stored::StoredError::EffectsFull { at: 3 }),
             "07 08 03",
         ),
         (Refusal::FlashFailed, "08"),

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::identity::Hash;
 use super::origin;
-use mimu::calibration::{Calibration, Kept};
+use mimu::calibration::{Calibration, DeviceCalibration};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
@@ -81,7 +81,7 @@ pub struct Inverse {
 }
 
 /// What stands in `bytes`. Refused where the device would refuse it.
-pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::Refused> {
+pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::StoredError> {
     let (mut nodes, mut effects) = (Vec::new(), Vec::new());
     let stored = stored::read(
         bytes,
@@ -128,7 +128,7 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
         Error::device(place, problem, "upload a calibration again")
     })?;
     let origin = stored.origin;
-    let kept = Kept {
+    let stored = DeviceCalibration {
         device: device.to_owned(),
         unit_id: origin.unit_id.as_ref().map(origin::digits),
         created: origin.created_s.and_then(origin::date),
@@ -139,7 +139,7 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
         lags_s: stored.lags_s,
         effects,
     };
-    Calibration::kept(&kept, place)
+    Calibration::of_device(&stored, place)
 }
 
 /// The lag of the gyros' dies, and that of the accelerometer's if it is another, s.

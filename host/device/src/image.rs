@@ -88,7 +88,7 @@ impl Image {
     }
 
     /// The image of bytes that a device has stored.
-    pub(super) fn stored_before(bytes: Vec<u8>) -> std::result::Result<Self, stored::Refused> {
+    pub(super) fn stored_before(bytes: Vec<u8>) -> std::result::Result<Self, stored::StoredError> {
         let (mut node_temp_c, mut effects) = (Vec::new(), Vec::new());
         let stored = stored::read(
             &bytes,
@@ -180,7 +180,7 @@ impl Image {
     }
 
     /// The same calibration as the device computes with it.
-    pub fn stored(&self) -> std::result::Result<Stored, stored::Refused> {
+    pub fn stored(&self) -> std::result::Result<Stored, stored::StoredError> {
         stored::decode(&self.bytes)
     }
 }

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use mimu_core::compensation::Sample;
-use mimu_core::stored::{self, Refused};
+use mimu_core::stored::{self, StoredError};
 use serde::Serialize;
 
 use super::identity::Hash;
@@ -100,7 +100,7 @@ pub fn trim(
 ) -> Result<Trimmed> {
     let mut bytes = download(session)?;
     let held = Hash(stored::hash(&bytes));
-    // Refused before the time is spent: the numbers do not matter.
+    // StoredError before the time is spent: the numbers do not matter.
     stored::trim(&mut bytes.clone(), PerSensor::default(), trimmed_s)
         .map_err(|refused| refuse(session, &refused))?;
     let before = average(session, duration, |share| progress(0.45 * share))?;
@@ -190,7 +190,7 @@ fn check_size(
     Ok(())
 }
 
-fn refuse(session: &Session, refused: &Refused) -> Error {
+fn refuse(session: &Session, refused: &StoredError) -> Error {
     let problem = format!("its calibration cannot be trimmed: {}", refused);
     let remedy = "upload the calibration file again, then trim";
     Error::device(session.port(), problem, remedy)

@@ -6,15 +6,15 @@ mod check;
 pub mod comparison;
 pub mod die_temperature;
 mod effect;
-mod kept;
 mod of_curves;
+mod of_device;
 mod of_fit;
 mod on_device;
 mod over_temperature;
 pub mod verify;
 
-pub use kept::Kept;
 pub use of_curves::{CurvesOfUnit, TriadOfCurves};
+pub use of_device::DeviceCalibration;
 pub use on_device::compensator;
 pub use over_temperature::{
     Curves, DieTable, NodeTable, OverTemperature, TemperatureNode, reference_node,

@@ -21,8 +21,10 @@ use crate::estimate::{Estimated, Observation};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
 use crate::signal::stillness::STILL_FACTOR;
+use crate::triad::Triad;
 use crate::turntable::RatedDwells;
 use crate::warning::Warning;
+use mimu_core::PerSensor;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
@@ -31,6 +33,7 @@ use by_gravity::fit_gravity;
 use by_rate::fit_rates;
 pub(crate) use determined::faces_not_up;
 use known::fit_known;
+use outlying::Outlying;
 
 pub use biases::fit_biases;
 pub use hold_out::{HoldOut, Split};
@@ -150,10 +153,12 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         .about(Argument::Only));
     }
     plausible::check_readings(&prepared)?;
-    let with_all = match prepared.manifest.reference {
-        Reference::Gravity => outlying::leave_out(&mut prepared),
-        Reference::Table | Reference::TurntableRate => Default::default(),
-    };
+    let mut with_all = PerSensor::default();
+    if prepared.manifest.reference == Reference::Gravity {
+        // Turns go from one dwell to the next that is not left out.
+        with_all.accel = leave_out(&mut prepared, outlying::poses);
+        with_all.gyro = leave_out(&mut prepared, outlying::turns);
+    }
     let rated = match prepared.manifest.reference {
         Reference::TurntableRate => Some(RatedDwells::of(&prepared)?),
         Reference::Table | Reference::Gravity => None,
@@ -181,7 +186,7 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     }
     for sensor in &mut sensors {
         as_came::compare(sensor);
-        if let Some(before) = &with_all[sensor.sensor as usize] {
+        if let Some(before) = &with_all[sensor.sensor] {
             let raw = prepared.manifest.raw_unit;
             let of_sensor = change::changes(sensor.sensor, raw, before, &sensor.estimated.triad);
             sensor.warnings.extend(change::described(&of_sensor));
@@ -195,6 +200,14 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         changes,
         warnings,
     })
+}
+
+/// Leaves out what `find` finds. The answer is what everything together determines, where anything was left out.
+fn leave_out(prepared: &mut Prepared, find: impl Fn(&Prepared) -> Outlying) -> Option<Triad> {
+    let mut found = find(prepared);
+    prepared.leave_out(&found.left_out);
+    prepared.dwells.warnings.append(&mut found.warnings);
+    found.with_all()
 }
 
 /// A bias of 0.1 deg/s per °C is ordinary for these sensors: five degrees are half a degree a second.

@@ -8,9 +8,9 @@ use serde::{Serialize, Serializer};
 use crate::quantity::{AXES, Sensor, inverse_names, raw_unit, scale_unit};
 use crate::triad::{Angles, Estimate, Triad};
 
-/// Kind of a parameter of a triad.
+/// ParameterKind of a parameter of a triad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ParameterKind {
     /// Element of the inverse model: of C by rows, then of o.
     Inverse,
     /// Scale factor.
@@ -27,9 +27,9 @@ pub enum Kind {
 
 /// A parameter of a triad: its kind, and which of that kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TriadParameter(pub Kind, pub usize);
+pub struct TriadParameter(pub ParameterKind, pub usize);
 
-impl Kind {
+impl ParameterKind {
     /// The kinds that people know.
     pub const PHYSICAL: [Self; 4] = [
         Self::Scale,
@@ -56,8 +56,8 @@ impl TriadParameter {
     pub fn axis(self) -> String {
         let Self(kind, k) = self;
         match kind {
-            Kind::Inverse => inverse_names()[k].clone(),
-            Kind::NonOrthogonality => ["yz", "zy", "zx"][k].into(),
+            ParameterKind::Inverse => inverse_names()[k].clone(),
+            ParameterKind::NonOrthogonality => ["yz", "zy", "zx"][k].into(),
             _ => AXES[k].into(),
         }
     }
@@ -67,12 +67,12 @@ impl TriadParameter {
 impl fmt::Display for TriadParameter {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let name = match self.0 {
-            Kind::Inverse => return f.write_str(&self.axis()),
-            Kind::Scale => "scale",
-            Kind::Bias => "bias",
-            Kind::BiasAndGravity => "bias_and_gravity",
-            Kind::Misalignment => "misalignment",
-            Kind::NonOrthogonality => "non_orthogonality",
+            ParameterKind::Inverse => return f.write_str(&self.axis()),
+            ParameterKind::Scale => "scale",
+            ParameterKind::Bias => "bias",
+            ParameterKind::BiasAndGravity => "bias_and_gravity",
+            ParameterKind::Misalignment => "misalignment",
+            ParameterKind::NonOrthogonality => "non_orthogonality",
         };
         write!(f, "{name}_{}", self.axis())
     }
@@ -98,14 +98,18 @@ pub fn parameters(
     let inverse = triad.inverse_estimates().into_iter().enumerate();
     let inverse = inverse.map(|(k, estimate)| {
         let unit = if k < 9 { &inverse_unit } else { si };
-        (TriadParameter(Kind::Inverse, k), estimate, unit.to_string())
+        (
+            TriadParameter(ParameterKind::Inverse, k),
+            estimate,
+            unit.to_string(),
+        )
     });
     let physical = triad.physical(Angles::Exact);
-    let physical = Kind::PHYSICAL.into_iter().flat_map(|kind| {
+    let physical = ParameterKind::PHYSICAL.into_iter().flat_map(|kind| {
         let (estimates, unit) = match kind {
-            Kind::Scale => (physical.scale, scale_unit(raw, si)),
-            Kind::Misalignment => (physical.misalignment, "rad".into()),
-            Kind::NonOrthogonality => (physical.non_orthogonality, "rad".into()),
+            ParameterKind::Scale => (physical.scale, scale_unit(raw, si)),
+            ParameterKind::Misalignment => (physical.misalignment, "rad".into()),
+            ParameterKind::NonOrthogonality => (physical.non_orthogonality, "rad".into()),
             _ => (physical.bias, raw_unit(raw, si)),
         };
         let each = estimates.into_iter().enumerate();

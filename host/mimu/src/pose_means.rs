@@ -59,7 +59,7 @@ impl Prepared {
         };
         Ok(Self {
             manifest,
-            condensed,
+            condensed: condensed.into(),
             dwells,
             noise: Noise::of_table(
                 Sensor::BOTH.map(|s| means.poses.iter().all(|p| knows_noise(p, s))),

@@ -3,7 +3,7 @@
 use mimu::triad::{Angles, Covariance, Forward, Part, Triad};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use crate::regression::{Kind, Problem};
+use crate::regression::{CurveKind, Problem};
 use crate::smoothness::{Smoothness, TriadFit};
 
 /// An estimate for one lag.
@@ -175,7 +175,7 @@ impl TriadCurves {
     /// The same of one axis for one lag: change and variance.
     fn bias_change_of(&self, fit: &TriadFit, axis: usize, temps: [f64; 2]) -> [f64; 2] {
         let (problem, fitted) = (&self.problem, &fit.axes[axis]);
-        let basis = problem.basis(Kind::Bias);
+        let basis = problem.basis(CurveKind::Bias);
         let parts = problem.parts(axis);
         let first = parts
             .iter()
@@ -197,7 +197,7 @@ impl TriadCurves {
     }
 
     /// Standard deviation that the smoothness of `kind` leaves a curve to depart from a line over the range; zero for a line.
-    pub fn departure(&self, kind: Kind) -> f64 {
+    pub fn departure(&self, kind: CurveKind) -> f64 {
         let span = self.range_c[1] - self.range_c[0];
         let mean: f64 = self
             .fits

@@ -23,7 +23,11 @@ pub fn compare(sessions: &[Session], lag_s: Option<f64>) -> Option<[f64; 2]> {
     let miss = |shape| {
         let joint = estimate(&first, Choice { shape, lag_s }).ok()?;
         let own = joint.recorded();
-        let same = own.map(|c| c.problem().basis(crate::regression::Kind::Bias).shape());
+        let same = own.map(|c| {
+            c.problem()
+                .basis(crate::regression::CurveKind::Bias)
+                .shape()
+        });
         // A span too short for curvature has fitted lines twice.
         let rich = shape == Shape::Line || same.into_iter().all(|s| s == shape);
         rich.then(|| last_third(sessions, &joint, &split)).flatten()

@@ -59,7 +59,7 @@ const MISFIT: f64 = 10.0;
 /// Whether the recording distinguishes lag and slope, and the curves describe the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum FitVerdict {
     /// Heating and cooling, or plateaus, tell them apart.
     Fitted,
     /// They cannot be told apart: the temperature goes one way only.
@@ -68,7 +68,7 @@ pub enum Verdict {
     Misfit,
 }
 
-impl Verdict {
+impl FitVerdict {
     /// As in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -104,7 +104,7 @@ pub struct ThermalFit {
     /// As asked for.
     pub options: Options,
     /// Whether lag and slope are told apart.
-    pub verdict: Verdict,
+    pub verdict: FitVerdict,
     /// Figures of the triads: SI, raw where only biases are estimated.
     pub judged: PerSensor<Option<Judged>>,
     /// What a person should know.
@@ -146,9 +146,9 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         floor > 0.0 && own > MISFIT * floor
     };
     let verdict = match joint.one_way {
-        _ if estimated && judged.present().any(|(_, j)| misfits(j)) => Verdict::Misfit,
-        true => Verdict::OneWay,
-        false => Verdict::Fitted,
+        _ if estimated && judged.present().any(|(_, j)| misfits(j)) => FitVerdict::Misfit,
+        true => FitVerdict::OneWay,
+        false => FitVerdict::Fitted,
     };
     Ok(ThermalFit {
         joint,

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::basis::{Basis, Shape};
 use crate::curves::TriadCurves;
-use crate::regression::{Kind, Normal, Problem};
+use crate::regression::{CurveKind, Normal, Problem};
 use crate::smoothness::{Penalties, TriadFit, fixed, largest};
 
 /// Forward model at one temperature: P by rows, then b, raw per SI and raw, with variances.
@@ -36,7 +36,7 @@ pub fn curves(sensor: Sensor, points: &[Point], shape: Shape) -> Option<TriadCur
         rows: Vec::new(),
         gain: Vector3::from_fn(|i, _| mean(3 * i + i).abs()),
         null: Vector3::from_fn(|i, _| mean(9 + i)),
-        bases: Kind::ALL.map(|_| basis.clone()),
+        bases: CurveKind::ALL.map(|_| basis.clone()),
         offsets: 1,
         biases_only: false,
         samples: 1.0,

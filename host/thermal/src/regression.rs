@@ -16,7 +16,7 @@ use crate::session::Session;
 
 /// What a curve is the temperature dependence of; its smoothness is estimated for each of these.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum CurveKind {
     /// Bias.
     Bias,
     /// Scale factor: diagonal of P.
@@ -25,7 +25,7 @@ pub enum Kind {
     Cross,
 }
 
-impl Kind {
+impl CurveKind {
     /// All kinds.
     pub const ALL: [Self; 3] = [Self::Bias, Self::Scale, Self::Cross];
 }
@@ -60,7 +60,7 @@ pub struct Problem {
     pub gain: Vector3<f64>,
     /// Raw reading without input.
     pub null: Vector3<f64>,
-    /// Functions of temperature of each [`Kind`].
+    /// Functions of temperature of each [`CurveKind`].
     pub bases: [Basis; 3],
     /// Number of bias offsets with the first, which is zero: one for each power-on, and in recordings without a table one for each pose.
     pub offsets: usize,
@@ -80,7 +80,7 @@ pub struct Part {
     /// Input that multiplies it; none of a bias.
     pub input: Option<usize>,
     /// What it is.
-    pub kind: Kind,
+    pub kind: CurveKind,
     /// Its first column.
     pub from: usize,
 }
@@ -122,7 +122,7 @@ impl Problem {
             rows,
             gain: Vector3::repeat(1.0),
             null: Vector3::zeros(),
-            bases: Kind::ALL.map(|_| Basis::new(shape, range)),
+            bases: CurveKind::ALL.map(|_| Basis::new(shape, range)),
             offsets,
             biases_only,
             samples,
@@ -171,7 +171,7 @@ impl Problem {
     }
 
     /// Functions of temperature of curves of `kind`.
-    pub fn basis(&self, kind: Kind) -> &Basis {
+    pub fn basis(&self, kind: CurveKind) -> &Basis {
         &self.bases[kind as usize]
     }
 
@@ -181,9 +181,9 @@ impl Problem {
         let mut from = 0;
         let curves = inputs.chain([None]).map(|input| {
             let kind = match input {
-                None => Kind::Bias,
-                Some(i) if i == axis => Kind::Scale,
-                Some(_) => Kind::Cross,
+                None => CurveKind::Bias,
+                Some(i) if i == axis => CurveKind::Scale,
+                Some(_) => CurveKind::Cross,
             };
             let part = Part { input, kind, from };
             from += self.basis(kind).len();

@@ -1,6 +1,6 @@
 //! `mimu-thermal/1`: what a fit over temperature found. SI and raw units throughout; what is not a number is null.
 
-use mimu::parameter::{Kind, TriadParameter, parameters};
+use mimu::parameter::{ParameterKind, TriadParameter, parameters};
 use mimu::quantity::{PerSensor, Sensor, present, raw_unit};
 use mimu::triad::Estimate;
 use mimu_recording::RawUnit;
@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::coverage;
 use crate::curves::TriadCurves;
-use crate::fit::{ThermalFit, Verdict, range};
+use crate::fit::{FitVerdict, ThermalFit, range};
 use crate::judge::{Bin, DwellError, Hysteresis, rms};
 use crate::profile::{Lag, RANGE};
 use crate::used::Used;
@@ -31,7 +31,7 @@ pub struct ThermalResult {
     /// How it was estimated.
     pub estimator: &'static str,
     /// Whether it distinguishes lag and slope, and describes the readings.
-    pub verdict: Verdict,
+    pub verdict: FitVerdict,
     /// Lowest and highest temperature of the dies, °C.
     pub range_c: [f64; 2],
     /// Figures of the triads.
@@ -272,8 +272,8 @@ fn biases(
     let [model, _] = curves.forward(temp_c);
     let covariance = curves.covariance(temp_c);
     let kind = match sensor {
-        Sensor::Gyro => Kind::Bias,
-        Sensor::Accel => Kind::BiasAndGravity,
+        Sensor::Gyro => ParameterKind::Bias,
+        Sensor::Accel => ParameterKind::BiasAndGravity,
     };
     (0..3)
         .map(|k| {

@@ -3,14 +3,14 @@
 //! A curve is a line plus a function that bends: its second derivative has the variance τ² per kelvin, which is the Bayesian reading of
 //! the penalty ∫f''²/τ² (Wahba 1978), and so has its fourth derivative one of its own. With the first alone a sensor whose curves are
 //! cubics, as most are nearly, gets curves that waver about them: the error of the biases was 1.6 times its bound, where it is 1.2 times
-//! with both. The variances are estimated for each [`Kind`] of a triad from all of its axes, by the fixed point of Fellner and Schall as
+//! with both. The variances are estimated for each [`CurveKind`] of a triad from all of its axes, by the fixed point of Fellner and Schall as
 //! Wood and Fasiolo (2017) give it, within what data sheets allow.
 
 use mimu::quantity::Sensor;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::basis::Shape;
-use crate::regression::{Kind, Normal, Problem};
+use crate::regression::{CurveKind, Normal, Problem};
 
 /// Departure from a line over 100 K that no data sheet of a MEMS sensor exceeds: bias (SI), scale factor, cross terms (ratios).
 const GYRO_DEPARTURE: [f64; 3] = [0.05, 0.05, 0.02];
@@ -86,8 +86,8 @@ pub struct Penalties {
 impl Penalties {
     /// Of the bases of `problem`.
     pub fn of(problem: &Problem) -> Self {
-        let whole = Kind::ALL.map(|kind| problem.basis(kind).penalties());
-        let bending = Kind::ALL.map(|kind| {
+        let whole = CurveKind::ALL.map(|kind| problem.basis(kind).penalties());
+        let bending = CurveKind::ALL.map(|kind| {
             let pair = &whole[kind as usize];
             let basis = problem.basis(kind);
             if basis.shape() != Shape::Spline {

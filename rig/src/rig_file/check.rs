@@ -1,7 +1,7 @@
 //! What a rig file must not say.
 
 use super::{AxesFile, FORMAT, Parts, RigFile};
-use crate::catalog::{Kind, Sensor, sensor, sensors};
+use crate::catalog::{MeasuredQuantity, Sensor, sensor, sensors};
 use crate::converter::RawUnit;
 use crate::effects::specs;
 use crate::located::written;
@@ -40,8 +40,8 @@ impl RigFile {
                 format!("write \"{FORMAT}\""),
             );
         }
-        let gyro = self.sensors(Kind::Gyro)?;
-        let accel = self.sensors(Kind::Accel)?;
+        let gyro = self.sensors(MeasuredQuantity::Gyro)?;
+        let accel = self.sensors(MeasuredQuantity::Accel)?;
         let unit = &self.unit;
         axes("unit.gyro_axes", &unit.gyro_axes, &gyro)?;
         axes("unit.accel_axes", &unit.accel_axes, &accel)?;
@@ -193,10 +193,10 @@ impl RigFile {
     }
 
     /// Catalog entries of the three axes, which must agree in what concerns all three.
-    pub(super) fn sensors(&self, kind: Kind) -> Result<[&'static Sensor; 3], Refusal> {
+    pub(super) fn sensors(&self, kind: MeasuredQuantity) -> Result<[&'static Sensor; 3], Refusal> {
         let (path, parts, usual) = match kind {
-            Kind::Gyro => ("unit.gyro", &self.unit.gyro, "ADXRS300"),
-            Kind::Accel => ("unit.accel", &self.unit.accel, "MMA7260QT"),
+            MeasuredQuantity::Gyro => ("unit.gyro", &self.unit.gyro, "ADXRS300"),
+            MeasuredQuantity::Accel => ("unit.accel", &self.unit.accel, "MMA7260QT"),
         };
         let names = match parts {
             None => [usual; 3],

@@ -3,7 +3,7 @@
 use std::array::from_fn;
 
 use super::{AxesFile, EffectFile, RigFile};
-use crate::catalog::{Kind, Sensor};
+use crate::catalog::{MeasuredQuantity, Sensor};
 use crate::converter::{ConverterTruth, RawUnit};
 use crate::effects::{EffectTruth, draw_ids};
 use crate::flaws::FlawsTruth;
@@ -45,8 +45,8 @@ impl RigTruth {
         file.check()?;
         let mut file = file.clone();
         let random = |cause: &str| Random::new(seed, cause);
-        let gyro = file.sensors(Kind::Gyro)?;
-        let accel = file.sensors(Kind::Accel)?;
+        let gyro = file.sensors(MeasuredQuantity::Gyro)?;
+        let accel = file.sensors(MeasuredQuantity::Accel)?;
 
         let effects = effects(&mut file, seed)?;
         let earth_rate = *file.earth_rate.get_or_insert(true);

@@ -8,7 +8,7 @@
 use core::hint::black_box;
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
-use mimu_core::effects::{DeviceEffect, Directions, Effects, Refused, State, Variable};
+use mimu_core::effects::{DeviceEffect, Directions, EffectError, Effects, State, Variable};
 use mimu_core::kalman::Bank;
 use mimu_core::single;
 use mimu_core::stored::ROOM;
@@ -77,7 +77,7 @@ fn main() -> ! {
     let term = DeviceEffect::term(Sensor::Gyro, 1, 1e-3, &TERM);
     // Those that run with every sample.
     let fast =
-        |effect: &Result<DeviceEffect<f32>, Refused>| matches!(effect, Ok(e) if !e.is_slow());
+        |effect: &Result<DeviceEffect<f32>, EffectError>| matches!(effect, Ok(e) if !e.is_slow());
     let named = EFFECTS.iter().map(|id| named(id)).filter(fast);
     for effect in named.chain([term]) {
         let mut all = none();
@@ -117,9 +117,9 @@ fn main() -> ! {
 /// Variables of a term, as many as there can be.
 const TERM: [Variable; 3] = [Variable::RateX, Variable::ForceY, Variable::ForceZ];
 
-fn named(id: &str) -> Result<DeviceEffect<f32>, Refused> {
+fn named(id: &str) -> Result<DeviceEffect<f32>, EffectError> {
     match DeviceEffect::named(id, &[1e-4; 9], None) {
-        Err(Refused::Count { .. }) => DeviceEffect::named(id, &[1e-4; 3], None),
+        Err(EffectError::Count { .. }) => DeviceEffect::named(id, &[1e-4; 3], None),
         other => other,
     }
 }

@@ -8,7 +8,7 @@
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::compensator::{self, Compensator};
 use mimu_core::die::{self, DieLag};
-use mimu_core::effects::{DeviceEffect, Directions, Effects, Refused, State, Variable};
+use mimu_core::effects::{DeviceEffect, Directions, EffectError, Effects, State, Variable};
 use mimu_core::kalman::{Bank, Filter, Innovation, Rejected};
 use mimu_core::single;
 use mimu_core::stored::{self, Curves, NODES, Origin, ROOM, Stored, TooLong};
@@ -38,7 +38,7 @@ pub fn effect_named(
     id: &str,
     coefficients: &[f32],
     form: Option<f32>,
-) -> Result<DeviceEffect<f32>, Refused> {
+) -> Result<DeviceEffect<f32>, EffectError> {
     DeviceEffect::named(id, coefficients, form)
 }
 
@@ -49,7 +49,7 @@ pub fn effect_term(
     axis: usize,
     coefficient: f32,
     variables: &[Variable],
-) -> Result<DeviceEffect<f32>, Refused> {
+) -> Result<DeviceEffect<f32>, EffectError> {
     DeviceEffect::term(sensor, axis, coefficient, variables)
 }
 
@@ -61,7 +61,7 @@ pub fn effect_code(
     errors: &[f32; 9],
     weight: f32,
     zero: f32,
-) -> Result<DeviceEffect<f32>, Refused> {
+) -> Result<DeviceEffect<f32>, EffectError> {
     DeviceEffect::code(sensor, axis, errors, weight, zero)
 }
 
@@ -70,7 +70,7 @@ pub fn effect_code(
 pub fn effects_push(
     effects: &mut Effects<f32, 8>,
     effect: DeviceEffect<f32>,
-) -> Result<(), Refused> {
+) -> Result<(), EffectError> {
     effects.push(effect)
 }
 
@@ -157,7 +157,7 @@ pub fn effects_of(of: PerSensor<Directions<f32>>, state: &mut State<f32, 8>) -> 
 
 /// [`Table::new`].
 #[inline(never)]
-pub fn table_new(nodes: &[Node<f32>]) -> Result<Table<f32, 16>, table::Refused> {
+pub fn table_new(nodes: &[Node<f32>]) -> Result<Table<f32, 16>, table::TableError> {
     Table::new(nodes.iter().copied())
 }
 
@@ -175,7 +175,7 @@ pub fn table_within(
     table: Table<f32, 16>,
     range_c: [f32; 2],
     effects: Effects<f32, 8>,
-) -> Result<(Table<f32, 16>, Effects<f32, 8>), table::Refused> {
+) -> Result<(Table<f32, 16>, Effects<f32, 8>), table::TableError> {
     let table = table.with_range(range_c)?;
     let effects = effects.within(table.limits());
     Ok((table, effects))
@@ -204,7 +204,7 @@ pub fn stored_encode(
 
 /// [`stored::decode`] and [`stored::hash`].
 #[inline(never)]
-pub fn stored_decode(bytes: &[u8]) -> (u64, Result<Stored, stored::Refused>) {
+pub fn stored_decode(bytes: &[u8]) -> (u64, Result<Stored, stored::StoredError>) {
     (stored::hash(bytes), stored::decode(bytes))
 }
 
@@ -214,7 +214,7 @@ pub fn stored_trim(
     bytes: &mut [u8],
     add: PerSensor<[f32; 3]>,
     trimmed_s: u64,
-) -> Result<(), stored::Refused> {
+) -> Result<(), stored::StoredError> {
     stored::trim(bytes, add, trimmed_s)
 }
 
@@ -300,7 +300,7 @@ pub fn readme_program(
     calibration: &[u8],
     samples: &[([f32; 3], [f32; 3], f32)],
     out: &mut dyn FnMut(Sample<f32>, table::Place),
-) -> Result<(), stored::Refused> {
+) -> Result<(), stored::StoredError> {
     readme::calibrate(calibration, 1000.0, samples.iter().copied(), out)
 }
 

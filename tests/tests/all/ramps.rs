@@ -1,6 +1,8 @@
 //! What a fit and a diagnosis say of recordings whose temperature ramps: the noise floor, the warning, and what is found. The truth is the
 //! bench's.
 
+use std::sync::Arc;
+
 use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::fit::{Method, Options, fit};
@@ -84,7 +86,7 @@ fn at_a_constant_temperature_the_noise_floor_is_that_of_two_successive_means() {
     for seed in [1, 2, 3] {
         let with = bench::recorded(&constant, &unit(seed), seed);
         let mut without = with.clone();
-        for block in &mut without.condensed.blocks {
+        for block in &mut Arc::make_mut(&mut without.condensed).blocks {
             block.temp_c.mean = f64::NAN;
         }
         let floor = |p: &Prepared| {

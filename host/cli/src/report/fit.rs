@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use mimu::fit::Split;
-use mimu::parameter::Kind;
+use mimu::parameter::ParameterKind;
 use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable;
 use mimu::result::fit::{DwellResult, FitResult, Parameter, SensorFitResult};
@@ -300,8 +300,8 @@ fn parameters_text(
         Reference::TurntableRate => true,
     };
     let mut rows = Vec::new();
-    for kind in Kind::PHYSICAL {
-        if kind == Kind::Misalignment && by_choice {
+    for kind in ParameterKind::PHYSICAL {
+        if kind == ParameterKind::Misalignment && by_choice {
             continue;
         }
         let triple: Vec<&Parameter> = sensor.of_kind(kind).collect();
@@ -309,7 +309,7 @@ fn parameters_text(
             continue;
         };
         let label = match kind {
-            Kind::NonOrthogonality => "non-orthogonality yz, zy, zx",
+            ParameterKind::NonOrthogonality => "non-orthogonality yz, zy, zx",
             other => other.words(),
         };
         let shown = readable::parameter(&first.unit);

@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use mimu::parameter::Kind;
+use mimu::parameter::ParameterKind;
 use mimu::quantity::{Sensor, plus_minus, significant};
 use mimu::readable;
 use mimu_thermal::compare::Comparison;
-use mimu_thermal::fit::Verdict;
+use mimu_thermal::fit::FitVerdict;
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
 use crate::hint;
@@ -44,9 +44,9 @@ pub fn thermal_text(result: &ThermalResult, verbose: bool) -> String {
         result.verdict.name()
     );
     match result.verdict {
-        Verdict::Fitted => {}
-        Verdict::OneWay => wrap(&mut out, "", VERDICT_ONE_WAY),
-        Verdict::Misfit => wrap(&mut out, "", VERDICT_MISFIT),
+        FitVerdict::Fitted => {}
+        FitVerdict::OneWay => wrap(&mut out, "", VERDICT_ONE_WAY),
+        FitVerdict::Misfit => wrap(&mut out, "", VERDICT_MISFIT),
     }
     for (name, sensor) in result.sensors.present() {
         let _ = writeln!(out);
@@ -147,13 +147,17 @@ fn bins_text(out: &mut String, sensor: &SensorResult) {
 
 /// Whether a curve is one of `sensor`'s that people know: not of C and o.
 pub(super) fn physical(curve: &CurveResult, sensor: Sensor) -> bool {
-    curve.sensor == sensor && curve.of.0 != Kind::Inverse
+    curve.sensor == sensor && curve.of.0 != ParameterKind::Inverse
 }
 
 /// Physical parameters at some temperatures, scale factors and biases at three without `verbose`; JSON has the inverse model too, and more temperatures.
 fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult, verbose: bool) {
     let main = |c: &&CurveResult| {
-        verbose || matches!(c.of.0, Kind::Scale | Kind::Bias | Kind::BiasAndGravity)
+        verbose
+            || matches!(
+                c.of.0,
+                ParameterKind::Scale | ParameterKind::Bias | ParameterKind::BiasAndGravity
+            )
     };
     let all = result.curves.iter().filter(|c| physical(c, name));
     let curves: Vec<&CurveResult> = all.filter(main).collect();

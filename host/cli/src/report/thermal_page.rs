@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 use mimu::quantity::{Sensor, plus_minus};
 use mimu::readable;
-use mimu_thermal::fit::Verdict;
+use mimu_thermal::fit::FitVerdict;
 use mimu_thermal::judge::{Bin, Hysteresis};
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
@@ -56,12 +56,12 @@ fn head(result: &ThermalResult, made: &Made) -> Markup {
     let [from, to] = result.range_c;
     html! {
         h1 { (result.device) " over temperature" }
-        p class={ "verdict " @if result.verdict == Verdict::Fitted { "explained" } @else { "unexplained" } } {
+        p class={ "verdict " @if result.verdict == FitVerdict::Fitted { "explained" } @else { "unexplained" } } {
             strong { (result.verdict.name()) } ": dies at " (written(&format!("{from:.1}"))) " to " (written(&format!("{to:.1}"))) " °C. "
             @match result.verdict {
-                Verdict::Fitted => { "Heating and cooling, or plateaus, tell the lag of the dies from the slopes of the curves." }
-                Verdict::Misfit => { (VERDICT_MISFIT) }
-                Verdict::OneWay => { (VERDICT_ONE_WAY) }
+                FitVerdict::Fitted => { "Heating and cooling, or plateaus, tell the lag of the dies from the slopes of the curves." }
+                FitVerdict::Misfit => { (VERDICT_MISFIT) }
+                FitVerdict::OneWay => { (VERDICT_ONE_WAY) }
             }
         }
         dl {

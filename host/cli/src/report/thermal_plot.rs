@@ -6,7 +6,7 @@ use std::ops::Range;
 use maud::{Markup, html};
 
 use super::svg::{Frame, px, range};
-use mimu::parameter::Kind;
+use mimu::parameter::ParameterKind;
 use mimu::quantity::{AXES, Sensor};
 use mimu::readable;
 use mimu_thermal::judge::DwellError;
@@ -38,7 +38,7 @@ struct Drawn(String, Markup);
 fn rows(result: &ThermalResult) -> Vec<Vec<Drawn>> {
     let mut rows = Vec::new();
     for (sensor, found) in result.sensors.present() {
-        let kinds = Kind::PHYSICAL.into_iter();
+        let kinds = ParameterKind::PHYSICAL.into_iter();
         let of_curves = kinds.filter_map(|kind| {
             let label = format!("{sensor}: {} over temperature", kind.words());
             Some(Drawn(label, curves(result, sensor, kind)?))
@@ -64,7 +64,7 @@ fn rows(result: &ThermalResult) -> Vec<Vec<Drawn>> {
 pub fn svg(result: &ThermalResult) -> String {
     let rows = rows(result);
     let (width, height) = (
-        PANEL.0 * Kind::PHYSICAL.len() as f64,
+        PANEL.0 * ParameterKind::PHYSICAL.len() as f64,
         PANEL.1 * rows.len() as f64,
     );
     let mut placed: Vec<(f64, f64, &Markup)> = Vec::new();
@@ -108,14 +108,16 @@ fn frame(result: &ThermalResult, y: Range<f64>) -> Frame {
 type Points = Vec<(f64, f64, f64, f64)>;
 
 /// One kind of numbers of a sensor, if it has them.
-fn curves(result: &ThermalResult, sensor: Sensor, kind: Kind) -> Option<Markup> {
+fn curves(result: &ThermalResult, sensor: Sensor, kind: ParameterKind) -> Option<Markup> {
     // The bias of the accelerometer in one pose has gravity in it.
-    let ours = |of: Kind| of == kind || (of == Kind::BiasAndGravity && kind == Kind::Bias);
+    let ours = |of: ParameterKind| {
+        of == kind || (of == ParameterKind::BiasAndGravity && kind == ParameterKind::Bias)
+    };
     let found = result.curves.iter().filter(|c| c.sensor == sensor);
     let found: Vec<&CurveResult> = found.filter(|c| ours(c.of.0)).collect();
     let first = found.first()?;
     // Scale factors are shown relative to themselves.
-    let relative = kind == Kind::Scale;
+    let relative = kind == ParameterKind::Scale;
     let unit = readable::parameter(&first.unit);
     let all: Vec<(String, Points)> = found
         .iter()

@@ -1,6 +1,8 @@
 //! A recording under a calibration over temperature: where the dies were, how far that is outside what the calibration is for, and what the
 //! sensors would have read at one temperature.
 
+use std::sync::Arc;
+
 use mimu_core::compensation::Affine;
 use mimu_core::die::{BEYOND_C, DieLag, State};
 use nalgebra::{Matrix3, Vector3};
@@ -113,7 +115,8 @@ pub fn at_one_temperature(
 /// Has the readings of a triad, from channel `from` on, moved block by block.
 fn move_sensor(out: &mut Prepared, prepared: &Prepared, from: usize, moved: &[Affine<f64>]) {
     let blocks = &prepared.condensed.blocks;
-    for (block, by) in out.condensed.blocks.iter_mut().zip(moved) {
+    let corrected = Arc::make_mut(&mut out.condensed);
+    for (block, by) in corrected.blocks.iter_mut().zip(moved) {
         let raw = Vector3::from_fn(|i, _| block.raw[from + i].mean);
         let new = by.apply(&raw);
         for i in 0..3 {
@@ -121,7 +124,7 @@ fn move_sensor(out: &mut Prepared, prepared: &Prepared, from: usize, moved: &[Af
         }
     }
     if from == Sensor::Gyro.channels().start {
-        for piece in &mut out.condensed.increments {
+        for piece in &mut corrected.increments {
             let t_s = piece.end_s - 0.5 * piece.duration_s;
             let at = blocks.partition_point(|b| b.last_s < t_s);
             let by = &moved[at.min(moved.len() - 1)];

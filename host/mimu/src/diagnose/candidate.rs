@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::rows::Rows;
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::converter::{self, Converter};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
@@ -17,7 +17,7 @@ const FIRST_BITS: usize = 4;
 impl Candidate {
     /// An effect in `rows`; `None` where it goes by codes that the steps of the readings would have to say, and they have none.
     pub fn effect_in(effect: &'static Effect, rows: &Rows) -> Option<Self> {
-        let candidate = Self::new(rows.sensor, Kind::Effect(effect));
+        let candidate = Self::new(rows.sensor, CandidateKind::Effect(effect));
         if !candidate.reads_code() {
             return Some(candidate);
         }
@@ -138,9 +138,9 @@ impl Candidate {
     /// Columns of a term or a jump as an error of each of `axes`; `None` of an effect.
     pub fn columns_by_axis(&self, rows: &Rows, axes: &[usize]) -> Option<DMatrix<f64>> {
         match &self.kind {
-            Kind::Term(_, product) => Some(rows.term(product, axes)),
-            Kind::Jump { session, t_s, .. } => Some(rows.jump(*session, *t_s, axes)),
-            Kind::Effect(_) => None,
+            CandidateKind::Term(_, product) => Some(rows.term(product, axes)),
+            CandidateKind::Jump { session, t_s, .. } => Some(rows.jump(*session, *t_s, axes)),
+            CandidateKind::Effect(_) => None,
         }
     }
 

@@ -21,7 +21,7 @@ use super::rejected::{ErrorRms, NotChosen, Passed, Reason, Rejected};
 use super::rows::Rows;
 use super::search::{Chosen, FALSE_LISTED, Found, MOST, Search, beside};
 use super::variance::Fitted;
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::fitted::FittedEffect;
 use crate::effects::quantity::Quantity;
@@ -192,7 +192,7 @@ pub fn decide(
     let mut jumps = Vec::new();
     for one in chosen {
         match one.candidate.kind {
-            Kind::Jump { .. } => jumps.push(one),
+            CandidateKind::Jump { .. } => jumps.push(one),
             _ => kept.push(one),
         }
     }
@@ -218,7 +218,7 @@ pub fn decide(
             failed_any = true;
             let candidate = kept.remove(failed.at).candidate;
             // More dwells may prove it: it is asked for in the next experiment.
-            if let Kind::Effect(effect) = &candidate.kind
+            if let CandidateKind::Effect(effect) = &candidate.kind
                 && failed.too_few_dwells
                 && !not_excited.iter().any(|n| n.id == effect.id)
             {
@@ -457,7 +457,7 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
         Note::new(found, "")
     }));
     for candidate in chosen.iter().map(|c| &c.candidate) {
-        if let Kind::Effect(effect) = &candidate.kind
+        if let CandidateKind::Effect(effect) = &candidate.kind
             && !candidate.inseparable.is_empty()
         {
             let names = candidate
@@ -476,7 +476,7 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
     let only_force = |p: &Product| p.parts().all(|(q, _)| matches!(q, Quantity::Force(_)));
     let level = chosen
         .iter()
-        .filter(|c| matches!(&c.candidate.kind, Kind::Term(_, m) if only_force(m)));
+        .filter(|c| matches!(&c.candidate.kind, CandidateKind::Term(_, m) if only_force(m)));
     let level: Vec<String> = level.map(|c| c.candidate.id()).collect();
     if !level.is_empty() && chosen.iter().any(|c| !c.candidate.is_error()) {
         let found = format!(

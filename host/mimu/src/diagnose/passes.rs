@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 use super::as_written::AsWritten;
 use super::decision::{Decision, decide, noisier};
 use super::rejected::{Reason, Rejected};
-use super::rows::{Figure, ForceErrors, FreeParameters, Rows, Session};
+use super::rows::{ForceErrors, FreeParameters, RowFigure, Rows, Session};
 use super::search::Chosen;
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
@@ -96,8 +96,8 @@ impl Pass {
     /// What its readings err by as a function of their own input, where rows are not linear in them: on a table the input is known.
     fn about(&self) -> Vec<FittedEffect> {
         match self.rows.figure {
-            Figure::Input | Figure::Rest => Vec::new(),
-            Figure::Size | Figure::Direction => {
+            RowFigure::Input | RowFigure::Rest => Vec::new(),
+            RowFigure::Size | RowFigure::Direction => {
                 let found = self.found.iter().filter(|e| e.is_of_own_input());
                 found.cloned().collect()
             }

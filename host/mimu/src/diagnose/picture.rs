@@ -20,7 +20,7 @@ use crate::quantity::Sensor;
 
 /// What residuals are of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Kind {
+pub enum ResidualKind {
     /// Angle by which gravity is missed after a turn, rad.
     Angle,
     /// Input of the sensor, its SI unit.
@@ -46,7 +46,7 @@ pub struct Track {
     /// Of what: an axis, a direction across gravity.
     pub name: String,
     /// What they are of.
-    pub kind: Kind,
+    pub kind: ResidualKind,
     /// Rows of it.
     pub samples: Vec<Sample>,
     #[serde(skip)]
@@ -218,9 +218,9 @@ fn tracks(rows: &Rows, sample: impl Fn(usize, f64) -> Sample) -> Vec<Track> {
                     _ => format!("{}, second direction", stratum.name),
                 },
                 kind: if directions > 1 {
-                    Kind::Angle
+                    ResidualKind::Angle
                 } else {
-                    Kind::Input
+                    ResidualKind::Input
                 },
                 samples: of_it.iter().map(|r| sample(*r, sigma(*r))).collect(),
                 rows: of_it,

@@ -67,7 +67,7 @@ pub struct Stratum {
 
 /// What the error figures of some rows are about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Figure {
+pub enum RowFigure {
     /// Error of a known input, SI.
     Input,
     /// Magnitude of the specific force minus gravity, m/s².
@@ -78,12 +78,12 @@ pub enum Figure {
     Rest,
 }
 
-impl From<Figure> for quantity::Figure {
-    fn from(figure: Figure) -> Self {
+impl From<RowFigure> for quantity::Figure {
+    fn from(figure: RowFigure) -> Self {
         match figure {
-            Figure::Input | Figure::Rest => Self::Input,
-            Figure::Size => Self::GravitySize,
-            Figure::Direction => Self::Direction,
+            RowFigure::Input | RowFigure::Rest => Self::Input,
+            RowFigure::Size => Self::GravitySize,
+            RowFigure::Direction => Self::Direction,
         }
     }
 }
@@ -150,7 +150,7 @@ pub struct Rows {
     /// Strata, which cover the rows in order.
     pub strata: Vec<Stratum>,
     /// What the error figures are about.
-    pub figure: Figure,
+    pub figure: RowFigure,
     /// How many of the rows, from the first on, the error figures are about, and how many of these make one dwell or turn.
     pub judged: (usize, usize),
     /// Step that the readings of the three axes alike are multiples of, raw, in all recordings; `None` where they are not.
@@ -252,7 +252,7 @@ impl Rows {
     /// For each dwell the first that is in the same pose of the same recording, by the direction of gravity: all of these err alike if the unit
     /// stood badly, and are one witness. On a table, whose input is known, and where there is one pose only, each dwell is its own.
     pub fn witnesses(&self) -> Vec<usize> {
-        if self.figure == Figure::Input {
+        if self.figure == RowFigure::Input {
             return (0..self.dwell_count()).collect();
         }
         let mut ups = vec![Vector3::repeat(f64::NAN); self.dwell_count()];

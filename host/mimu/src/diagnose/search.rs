@@ -14,7 +14,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::rows::Rows;
 use super::variance::{Fitted, LikelihoodKind, VarianceModel};
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
 use refine::{Beside, With};
@@ -62,7 +62,7 @@ pub struct Alternative {
     pub id: String,
     /// What it is.
     #[serde(skip)]
-    pub kind: Kind,
+    pub kind: CandidateKind,
     /// By how much its score is worse.
     pub score_worse_by: f64,
 }
@@ -82,7 +82,7 @@ impl From<(&'static Effect, f64)> for Alternative {
     fn from((effect, score_worse_by): (&'static Effect, f64)) -> Self {
         Self {
             id: effect.id.into(),
-            kind: Kind::Effect(effect),
+            kind: CandidateKind::Effect(effect),
             score_worse_by,
         }
     }
@@ -295,7 +295,7 @@ impl<'a> Search<'a> {
     pub fn complete(&self, chosen: &mut [Chosen], now: &mut Fitted) {
         for k in 0..chosen.len() {
             let before = chosen[k].clone();
-            let Kind::Effect(effect) = before.candidate.kind else {
+            let CandidateKind::Effect(effect) = before.candidate.kind else {
                 continue;
             };
             let mut more = before.candidate.siblings();
@@ -459,7 +459,7 @@ impl<'a> Search<'a> {
             model: self.model(rest),
             null: &null,
         };
-        let law = Candidate::new(self.rows.sensor, Kind::Effect(law));
+        let law = Candidate::new(self.rows.sensor, CandidateKind::Effect(law));
         let best_of = |parameter| beside_these.law(&law, parameter);
         let found = law.parameters().into_par_iter().filter_map(best_of);
         let (parameter, with) = found.max_by(|a, b| a.1.drop.total_cmp(&b.1.drop))?;
@@ -642,7 +642,7 @@ impl<'a> Search<'a> {
 fn score(c: &Chosen) -> f64 {
     let coefficients = c.columns.ncols() as f64 + if c.parameter > 0.0 { 2.0 } else { 0.0 };
     let order = match &c.candidate.kind {
-        Kind::Term(_, product) => f64::from(product.order()),
+        CandidateKind::Term(_, product) => f64::from(product.order()),
         _ => 0.0,
     };
     c.drop - price(&c.candidate) * coefficients - order - c.unlikely
@@ -697,15 +697,15 @@ impl Candidate {
     /// Whether both are the same but for the choice of coefficients.
     fn is_variant_of(&self, other: &Self) -> bool {
         match (&self.kind, &other.kind) {
-            (Kind::Effect(a), Kind::Effect(b)) => a.id == b.id,
-            (Kind::Term(i, a), Kind::Term(j, b)) => i == j && a == b,
+            (CandidateKind::Effect(a), CandidateKind::Effect(b)) => a.id == b.id,
+            (CandidateKind::Term(i, a), CandidateKind::Term(j, b)) => i == j && a == b,
             (
-                Kind::Jump {
+                CandidateKind::Jump {
                     axis: i,
                     session: r,
                     t_s: a,
                 },
-                Kind::Jump {
+                CandidateKind::Jump {
                     axis: j,
                     session: s,
                     t_s: b,
@@ -718,12 +718,12 @@ impl Candidate {
     /// Whether both are a term or a jump, and the same but for the axis.
     fn is_same_of_another_axis(&self, other: &Self) -> bool {
         match (&self.kind, &other.kind) {
-            (Kind::Term(_, a), Kind::Term(_, b)) => a == b,
+            (CandidateKind::Term(_, a), CandidateKind::Term(_, b)) => a == b,
             (
-                Kind::Jump {
+                CandidateKind::Jump {
                     session: r, t_s: a, ..
                 },
-                Kind::Jump {
+                CandidateKind::Jump {
                     session: s, t_s: b, ..
                 },
             ) => r == s && a == b,
@@ -734,7 +734,7 @@ impl Candidate {
     /// How many independent tests it counts for, beside the choices that it is the best of.
     fn tests(&self) -> f64 {
         match self.kind {
-            Kind::Effect(_) if self.parameter().is_some() => 4.0,
+            CandidateKind::Effect(_) if self.parameter().is_some() => 4.0,
             _ => 1.0,
         }
     }

@@ -8,7 +8,7 @@ use super::rows::{ForceErrors, Rows, Session};
 use super::search::beside;
 use super::variance::VarianceModel;
 use crate::effects;
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Quantity;
 use crate::prepared::Prepared;
@@ -89,7 +89,7 @@ pub fn of_forces(session: &Session, sizes: &Rows, decision: &Decision) -> Option
         add(&one.candidate, one.parameter, &|_| 0.0);
     }
     for effect in effects::all().filter(|e| is_of_force(e)) {
-        let candidate = Candidate::new(Sensor::Accel, Kind::Effect(effect));
+        let candidate = Candidate::new(Sensor::Accel, CandidateKind::Effect(effect));
         if accepted.iter().all(|c| c.candidate.id() != candidate.id()) {
             let typical = |k: usize| effect.coefficients[k].typical.powi(-2);
             add(&candidate, 0.0, &typical);

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::rows::Rows;
 use factor::{Axes, Factor, Separable};
 
-pub use factor::{Kept, Whitener};
+pub use factor::{DecorrelatedChoice, Whitener};
 
 /// Variances of each stratum beside the known ones.
 #[derive(Debug, Clone, PartialEq)]
@@ -208,7 +208,7 @@ impl<'a> VarianceModel<'a> {
     }
 
     /// What decorrelates some of the rows, given in ascending order, by themselves.
-    pub fn kept(&self, at: &Components, kept: &[usize]) -> Option<Kept> {
+    pub fn kept(&self, at: &Components, kept: &[usize]) -> Option<DecorrelatedChoice> {
         let mut parts = Vec::new();
         for (s, stratum) in self.rows.strata.iter().enumerate() {
             let from = kept.partition_point(|r| *r < stratum.rows.start);
@@ -232,7 +232,7 @@ impl<'a> VarianceModel<'a> {
                 parts.push((from, Cholesky::new(v)?));
             }
         }
-        Some(Kept { parts })
+        Some(DecorrelatedChoice { parts })
     }
 
     fn share(

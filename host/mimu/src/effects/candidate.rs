@@ -13,7 +13,7 @@ use crate::quantity::Sensor;
 
 /// What a candidate is.
 #[derive(Debug, Clone)]
-pub enum Kind {
+pub enum CandidateKind {
     /// A named effect.
     Effect(&'static Effect),
     /// A term found from the data, of one axis.
@@ -35,7 +35,7 @@ pub struct Candidate {
     /// Sensor.
     pub sensor: Sensor,
     /// What it is.
-    pub kind: Kind,
+    pub kind: CandidateKind,
     /// Which of its coefficients the experiment can tell.
     pub active: Vec<usize>,
     /// Of errors by the code: the converter of each axis that has one. Two axes may share one.
@@ -70,9 +70,11 @@ impl Candidate {
     /// Stable name; of a jump what a person reads.
     pub fn id(&self) -> String {
         match &self.kind {
-            Kind::Effect(e) => e.id.into(),
-            Kind::Term(axis, m) => format!("term:{}_{}~{}", self.sensor, AXES[*axis], m.name()),
-            Kind::Jump { axis, session, t_s } => {
+            CandidateKind::Effect(e) => e.id.into(),
+            CandidateKind::Term(axis, m) => {
+                format!("term:{}_{}~{}", self.sensor, AXES[*axis], m.name())
+            }
+            CandidateKind::Jump { axis, session, t_s } => {
                 let place = match session {
                     0 => String::new(),
                     later => format!(" of recording {}", later + 1),
@@ -87,22 +89,24 @@ impl Candidate {
 
     /// Whether it is an effect of the library.
     pub fn is_listed(&self) -> bool {
-        matches!(self.kind, Kind::Effect(_))
+        matches!(self.kind, CandidateKind::Effect(_))
     }
 
     /// Its physics in a line.
     pub fn about(&self) -> &'static str {
         match self.kind {
-            Kind::Effect(e) => e.about,
-            Kind::Term(..) => "a product of what was recorded; no effect of this name is known",
-            Kind::Jump { .. } => "the bias is another from here on",
+            CandidateKind::Effect(e) => e.about,
+            CandidateKind::Term(..) => {
+                "a product of what was recorded; no effect of this name is known"
+            }
+            CandidateKind::Jump { .. } => "the bias is another from here on",
         }
     }
 
     /// Its nonlinear parameter.
     pub fn parameter(&self) -> Option<NonlinearParameter> {
         match self.kind {
-            Kind::Effect(e) => e.parameter,
+            CandidateKind::Effect(e) => e.parameter,
             _ => None,
         }
     }
@@ -117,13 +121,13 @@ impl Candidate {
     }
 
     /// A candidate with all of its coefficients but those of the recording alone.
-    pub fn new(sensor: Sensor, kind: Kind) -> Self {
+    pub fn new(sensor: Sensor, kind: CandidateKind) -> Self {
         let active = match &kind {
-            Kind::Effect(e) => {
+            CandidateKind::Effect(e) => {
                 let lasting = |k: &usize| e.coefficients[*k].scope != Scope::Recording;
                 (0..e.coefficients.len()).filter(lasting).collect()
             }
-            Kind::Term(..) | Kind::Jump { .. } => vec![0],
+            CandidateKind::Term(..) | CandidateKind::Jump { .. } => vec![0],
         };
         Self {
             sensor,
@@ -147,12 +151,12 @@ impl Candidate {
 
     /// Whether its errors are a function of the converter's code.
     pub fn reads_code(&self) -> bool {
-        matches!(self.kind, Kind::Effect(e) if e.reads_code())
+        matches!(self.kind, CandidateKind::Effect(e) if e.reads_code())
     }
 
     /// Coefficients of the recording alone, of the axes that are active.
     pub(crate) fn of_recording(&self) -> Vec<usize> {
-        let Kind::Effect(e) = &self.kind else {
+        let CandidateKind::Effect(e) = &self.kind else {
             return Vec::new();
         };
         let is_active = |axis| self.active.iter().any(|k| e.coefficients[*k].axis == axis);
@@ -165,7 +169,7 @@ impl Candidate {
     /// The coefficient without which coefficient `k` means nothing: the slope of a curvature, since the temperature that a curvature counts
     /// from is a convention, and the lasting coefficient of the axis of one that is specific to the recording.
     pub(crate) fn rests_on(&self, k: usize) -> Option<usize> {
-        let Kind::Effect(e) = &self.kind else {
+        let CandidateKind::Effect(e) = &self.kind else {
             return None;
         };
         let own = &e.coefficients[k];
@@ -180,7 +184,7 @@ impl Candidate {
     /// The excited coefficients that are like one of the active ones, on another axis. What moves one axis moves the others too: their
     /// coefficients are found with it however small they are, as the intervals of the calibration would be too narrow without.
     pub fn siblings(&self) -> Vec<usize> {
-        let Kind::Effect(e) = &self.kind else {
+        let CandidateKind::Effect(e) = &self.kind else {
             return Vec::new();
         };
         let like = |a: &usize, b: &usize| e.coefficients[*a].typical == e.coefficients[*b].typical;
@@ -193,7 +197,7 @@ impl Candidate {
     /// By how much coefficients of `values` beyond the size of data sheets speak against it, in units of the deviance: a size is believed
     /// to be log-normal, and a factor of ten is two sigmas.
     pub(crate) fn unlikely(&self, values: &[f64]) -> f64 {
-        let Kind::Effect(e) = &self.kind else {
+        let CandidateKind::Effect(e) = &self.kind else {
             return 0.0;
         };
         let each = self.active.iter().zip(values).map(|(k, value)| {
@@ -206,12 +210,12 @@ impl Candidate {
     /// Regressors of its active coefficients; of a jump none.
     fn active_regressors(&self) -> Vec<Regressor> {
         match &self.kind {
-            Kind::Effect(e) => {
+            CandidateKind::Effect(e) => {
                 let each = self.active.iter().map(|k| e.coefficients[*k].regressor);
                 each.collect()
             }
-            Kind::Term(_, product) => vec![Regressor::Product(*product)],
-            Kind::Jump { .. } => Vec::new(),
+            CandidateKind::Term(_, product) => vec![Regressor::Product(*product)],
+            CandidateKind::Jump { .. } => Vec::new(),
         }
     }
 
@@ -239,19 +243,19 @@ impl Candidate {
     /// Whether the readings err by it.
     pub fn is_error(&self) -> bool {
         match &self.kind {
-            Kind::Effect(e) => e.is_error(),
-            Kind::Term(..) | Kind::Jump { .. } => true,
+            CandidateKind::Effect(e) => e.is_error(),
+            CandidateKind::Term(..) | CandidateKind::Jump { .. } => true,
         }
     }
 
     /// Whether it is specific to a session.
     pub fn is_of_session(&self) -> bool {
-        matches!(self.kind, Kind::Effect(e) if e.is_of_session())
+        matches!(self.kind, CandidateKind::Effect(e) if e.is_of_session())
     }
 
     /// It and the values of its active coefficients without those that are of a recording alone.
     pub fn lasting(&self, values: &[f64]) -> (Self, Vec<f64>) {
-        let Kind::Effect(e) = &self.kind else {
+        let CandidateKind::Effect(e) = &self.kind else {
             return (self.clone(), values.to_vec());
         };
         let lasting = |(k, _): &(usize, f64)| e.coefficients[*k].scope != Scope::Recording;
@@ -268,7 +272,7 @@ impl Candidate {
     /// Place among the active coefficients, and axis, of each of its regressors.
     pub fn slots(&self) -> Vec<(usize, usize)> {
         match &self.kind {
-            Kind::Effect(e) => {
+            CandidateKind::Effect(e) => {
                 let axes = self.active.iter().map(|k| e.coefficients[*k].axis);
                 let slots = axes.enumerate().flat_map(|(at, axis)| match axis {
                     Some(axis) => vec![(at, axis)],
@@ -276,7 +280,7 @@ impl Candidate {
                 });
                 slots.collect()
             }
-            Kind::Term(axis, _) | Kind::Jump { axis, .. } => vec![(0, *axis)],
+            CandidateKind::Term(axis, _) | CandidateKind::Jump { axis, .. } => vec![(0, *axis)],
         }
     }
 
@@ -350,22 +354,26 @@ impl Candidate {
     /// Name and unit of each of its active coefficients.
     pub fn names(&self) -> Vec<(String, String)> {
         match &self.kind {
-            Kind::Effect(e) => {
+            CandidateKind::Effect(e) => {
                 let of = |k: &usize| {
                     let coefficient = &e.coefficients[*k];
                     (coefficient.name.into(), coefficient.unit(self.sensor))
                 };
                 self.active.iter().map(of).collect()
             }
-            Kind::Term(axis, product) => vec![(AXES[*axis].into(), product.term_unit(self.sensor))],
-            Kind::Jump { axis, .. } => vec![(AXES[*axis].into(), self.sensor.unit().into())],
+            CandidateKind::Term(axis, product) => {
+                vec![(AXES[*axis].into(), product.term_unit(self.sensor))]
+            }
+            CandidateKind::Jump { axis, .. } => {
+                vec![(AXES[*axis].into(), self.sensor.unit().into())]
+            }
         }
     }
 
     /// Writes the regressors of its active coefficients under some conditions, one for each slot.
     pub fn regressors(&self, at: &Conditions, parameter: f64, out: &mut [f64]) {
         match &self.kind {
-            Kind::Effect(e) => {
+            CandidateKind::Effect(e) => {
                 let at = match self.reads_code() {
                     true => &at.in_bits(&self.codes),
                     false => at,
@@ -381,8 +389,8 @@ impl Candidate {
                     }
                 }
             }
-            Kind::Term(axis, product) => out[0] = product.value(at, *axis),
-            Kind::Jump { session, t_s, .. } => {
+            CandidateKind::Term(axis, product) => out[0] = product.value(at, *axis),
+            CandidateKind::Jump { session, t_s, .. } => {
                 let since = at.session == *session && at.t_s >= *t_s;
                 out[0] = f64::from(u8::from(since));
             }
@@ -400,7 +408,7 @@ impl Candidate {
 
     /// Whether it moves with temperature or time.
     pub fn is_slow(&self) -> bool {
-        let jumps = matches!(self.kind, Kind::Jump { .. });
+        let jumps = matches!(self.kind, CandidateKind::Jump { .. });
         jumps || self.active_regressors().iter().any(Regressor::is_slow)
     }
 
@@ -418,8 +426,10 @@ impl Candidate {
     /// Lag of the temperature that its regressors want, s.
     pub fn lag_s(&self, parameter: f64) -> Option<f64> {
         match &self.kind {
-            Kind::Effect(e) if e.parameter.is_some_and(|p| p.role == Role::Lag) => Some(parameter),
-            Kind::Term(_, p) if p.parts().any(|f| f.0 == Quantity::TemperatureRate) => {
+            CandidateKind::Effect(e) if e.parameter.is_some_and(|p| p.role == Role::Lag) => {
+                Some(parameter)
+            }
+            CandidateKind::Term(_, p) if p.parts().any(|f| f.0 == Quantity::TemperatureRate) => {
                 Some(RATE_LAG_S)
             }
             _ => None,

@@ -6,7 +6,7 @@ mod written;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::candidate::{Candidate, Kind};
+use super::candidate::{Candidate, CandidateKind};
 use super::effect::NonlinearParameter;
 use super::quantity::{Conditions, Need};
 use crate::quantity::{Sensor, rounded};
@@ -110,7 +110,7 @@ impl FittedEffect {
     pub fn coefficients(&self) -> Vec<WrittenCoefficient> {
         let candidate = &self.candidate;
         let typical = |k: usize| match candidate.kind {
-            Kind::Effect(e) => e.coefficients.get(k).map(|c| c.typical),
+            CandidateKind::Effect(e) => e.coefficients.get(k).map(|c| c.typical),
             _ => None,
         };
         let names = candidate.names().into_iter().zip(&candidate.active);

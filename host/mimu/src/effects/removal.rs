@@ -1,5 +1,7 @@
 //! Taking effects out of readings, by what the device itself measures.
 
+use std::sync::Arc;
+
 use mimu_core::compensation::Affine;
 use mimu_core::die::BEYOND_C;
 use nalgebra::{Matrix3, Vector3};
@@ -100,17 +102,13 @@ pub fn remove_within(
         return remove(prepared, gyro, accel, effects);
     };
     let mut seen = prepared.clone();
-    for block in &mut seen.condensed.blocks {
+    for block in &mut Arc::make_mut(&mut seen.condensed).blocks {
         // Of what is not a number clamp() leaves that.
         block.temp_c.mean = block.temp_c.mean.clamp(from - BEYOND_C, to + BEYOND_C);
     }
     let mut out = remove(&seen, gyro, accel, effects)?;
-    for (block, read) in out
-        .condensed
-        .blocks
-        .iter_mut()
-        .zip(&prepared.condensed.blocks)
-    {
+    let blocks = &mut Arc::make_mut(&mut out.condensed).blocks;
+    for (block, read) in blocks.iter_mut().zip(&prepared.condensed.blocks) {
         block.temp_c = read.temp_c;
     }
     Some(out)
@@ -247,8 +245,9 @@ fn of_sensor(
         let [rate, force] = [0, 1].map(|s| apply(models[s], raw(at, 3 * s)));
         of_block.push(all.error(&conditions(at, *t_s, rate, force), at));
     }
+    let corrected = Arc::make_mut(&mut out.condensed);
     if sensor == Sensor::Gyro {
-        for piece in &mut out.condensed.increments {
+        for piece in &mut corrected.increments {
             let t_s = piece.end_s - 0.5 * piece.duration_s;
             let at = blocks
                 .partition_point(|b| b.last_s < t_s)
@@ -264,7 +263,7 @@ fn of_sensor(
             }
         }
     }
-    for (block, error) in out.condensed.blocks.iter_mut().zip(&of_block) {
+    for (block, error) in corrected.blocks.iter_mut().zip(&of_block) {
         for i in 0..3 {
             block.raw[from + i].mean -= scale[i] * error[i];
         }

@@ -3,7 +3,7 @@
 use mimu_recording::RawUnit;
 use serde::Serialize;
 
-use crate::parameter::{Kind, TriadParameter, parameters};
+use crate::parameter::{ParameterKind, TriadParameter, parameters};
 use crate::quantity::{Sensor, plus_minus};
 use crate::readable;
 use crate::triad::{Estimate, Triad};
@@ -60,7 +60,7 @@ pub(super) fn changes(
 ) -> Vec<Change> {
     let [before, after] = [with_all, fitted].map(|t| parameters(t, sensor, raw));
     let both = before.into_iter().zip(after);
-    both.filter(|(before, _)| before.0.0 != Kind::Inverse)
+    both.filter(|(before, _)| before.0.0 != ParameterKind::Inverse)
         .map(|((parameter, before, unit), (_, fitted, _))| Change {
             sensor,
             parameter,

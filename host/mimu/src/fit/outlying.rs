@@ -15,7 +15,7 @@ use crate::estimate::{Estimated, Observation, magnitude, rotation};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{AXES, Sensor};
 use crate::signal::blocks::quantile;
-use crate::signal::dwell::{Dwells, Fault, LeftOut};
+use crate::signal::dwell::LeftOut;
 use crate::triad::Triad;
 use crate::warning::Warning;
 use deletion::{Judged, Row, against_others, contradicted};
@@ -42,73 +42,68 @@ fn outlying(found: &[(f64, f64)], most: usize) -> Vec<usize> {
     all
 }
 
-/// Triads of gyro and accelerometer with everything in them, where something was left out.
-pub(super) type WithAll = [Option<Triad>; 2];
+/// What the others of a recording contradict, of one sensor.
+#[derive(Debug, Default)]
+pub(super) struct Outlying {
+    /// Dwells of the accelerometer, or turns of the gyro, to be left out.
+    pub left_out: Vec<LeftOut>,
+    /// What is said of these, and of those that cannot be spared.
+    pub warnings: Vec<Warning>,
+    /// What everything together determines.
+    with_all: Option<Triad>,
+}
 
-/// Marks what is outlying in a recording with gravity as its only reference, dwells first. They keep their places in the list of
-/// dwells, and whoever asks for observations or turns afterwards gets neither. The answer is what would have been fitted with them.
-pub(super) fn leave_out(prepared: &mut Prepared) -> WithAll {
-    let mut with_all = WithAll::default();
-    if !prepared.has(Sensor::Accel) || prepared.dwells.keep.everything() {
-        return with_all;
+impl Outlying {
+    /// What would have been determined with everything, where something is left out.
+    pub fn with_all(self) -> Option<Triad> {
+        self.with_all.filter(|_| !self.left_out.is_empty())
+    }
+}
+
+/// Whether anything may be left out: gravity is the only reference, and the user did not keep everything.
+fn applies(prepared: &Prepared) -> bool {
+    prepared.has(Sensor::Accel) && !prepared.dwells.keep.everything()
+}
+
+/// Dwells of the accelerometer that the others contradict by the size of gravity.
+pub(super) fn poses(prepared: &Prepared) -> Outlying {
+    let mut out = Outlying::default();
+    if !applies(prepared) {
+        return out;
     }
     let poses = prepared.observations(Sensor::Accel);
     // Of fewer, none may be left out.
     if poses.len() < ONE_IN {
-        return with_all;
+        return out;
     }
-    let g = prepared.manifest.gravity_mps2;
-    let accel = fit_poses(prepared, &poses, g);
     // Where the poses hardly determine the accelerometer, they contradict nothing.
-    let Some(accel) = accel.filter(|a| a.condition <= POOR_POSES) else {
-        return with_all;
-    };
-    let model = accel.triad.inverse;
-    let found = outlying_poses(prepared, &poses, &model);
-    for judged in found {
+    let accel = fit_poses(prepared, &poses).filter(|a| a.condition <= POOR_POSES);
+    let Some(accel) = accel else { return out };
+    for judged in outlying_poses(prepared, &poses, &accel.triad.inverse) {
         let index = poses[judged.row].dwell;
-        let Dwells {
-            list,
-            warnings,
-            left_out,
-            keep,
-            ..
-        } = &mut prepared.dwells;
-        let step = list[index].step;
-        if keep.keeps(step) {
+        let step = prepared.dwells.list[index].step;
+        if prepared.dwells.keep.keeps(step) {
             continue;
         }
         if !judged.can_be_spared() {
             let (parameter, grows) = judged.grows;
             let parameter = ACCEL_PARAMETERS[parameter];
-            warnings.push(Warning::DwellKept(step, judged.error, parameter, grows));
+            let kept = Warning::DwellKept(step, judged.error, parameter, grows);
+            out.warnings.push(kept);
             continue;
         }
-        warnings.push(Warning::DwellLeftOut(step, judged.error, judged.sigmas));
-        list[index].accel_fault = Some(Fault::Outlying);
-        left_out.push(LeftOut {
+        let left_out = Warning::DwellLeftOut(step, judged.error, judged.sigmas);
+        out.warnings.push(left_out);
+        out.left_out.push(LeftOut {
             sensor: Sensor::Accel,
             from: index,
             to: index,
             error: judged.error,
             sigmas: judged.sigmas,
         });
-        with_all[1] = Some(accel.triad.clone());
     }
-    if !prepared.has(Sensor::Gyro) {
-        return with_all;
-    }
-    let poses = prepared.observations(Sensor::Accel);
-    let Some(accel) = fit_poses(prepared, &poses, g) else {
-        return with_all;
-    };
-    let (found, gyro, warnings) = outlying_turns(prepared, &accel, g);
-    prepared.dwells.warnings.extend(warnings);
-    if !found.is_empty() {
-        with_all[0] = gyro;
-    }
-    prepared.dwells.left_out.extend(found);
-    with_all
+    out.with_all = Some(accel.triad);
+    out
 }
 
 /// Parameters of the accelerometer that the rows of its poses are derived by.
@@ -124,7 +119,8 @@ const ACCEL_PARAMETERS: [&str; 9] = [
     "the bias of z",
 ];
 
-fn fit_poses(prepared: &Prepared, poses: &[Observation], g: f64) -> Option<Estimated> {
+fn fit_poses(prepared: &Prepared, poses: &[Observation]) -> Option<Estimated> {
+    let g = prepared.manifest.gravity_mps2;
     let first = magnitude::first_guess(poses, g)?;
     let variances = prepared.size_variances(&first, poses);
     magnitude::by_gravity(poses, &variances, g).ok()
@@ -164,22 +160,28 @@ fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64
     contradicted(&rows, rows.len(), 1.0, &suspects)
 }
 
-/// The outlying turns, the gyro with all of them, and what is said of those that cannot be spared.
-fn outlying_turns(
-    prepared: &Prepared,
-    accel: &Estimated,
-    g: f64,
-) -> (Vec<LeftOut>, Option<Triad>, Vec<Warning>) {
-    let none = (Vec::new(), None, Vec::new());
+/// Turns of the gyro that the others contradict by the direction of gravity. Begins and ends in dwells that are not left out.
+pub(super) fn turns(prepared: &Prepared) -> Outlying {
+    let mut out = Outlying::default();
+    if !applies(prepared) || !prepared.has(Sensor::Gyro) {
+        return out;
+    }
+    let poses = prepared.observations(Sensor::Accel);
+    if poses.len() + prepared.dwells.left_out.len() < ONE_IN {
+        return out;
+    }
+    let accel = fit_poses(prepared, &poses).filter(|a| a.condition <= POOR_POSES);
+    let Some(accel) = accel else { return out };
+    let g = prepared.manifest.gravity_mps2;
     let model = &accel.triad.inverse;
     let (turns, _) = prepared.turns(model);
     if turns.len() < ONE_IN {
-        return none;
+        return out;
     }
     let rest = prepared.rest(&accel.triad.inverse);
     let motions = prepared.motions(model);
     let Ok(gyro) = rotation::estimate(&turns, &rest, &accel.triad, &motions, None, g) else {
-        return none;
+        return out;
     };
     let Affine { matrix, offset } = gyro.triad.inverse;
     let mean_square = matrix.norm_squared() / 3.0;
@@ -202,11 +204,10 @@ fn outlying_turns(
         }),
     );
     let Some(found) = against_others(&rows, turns.len(), 2.0) else {
-        return none;
+        return out;
     };
     let suspects = outlying(&found, turns.len() / ONE_IN);
     let step = |dwell: usize| prepared.dwells.list[dwell].step;
-    let (mut left_out, mut warnings) = (Vec::new(), Vec::new());
     for judged in contradicted(&rows, turns.len(), 2.0, &suspects) {
         let turn = &turns[judged.row];
         if prepared.dwells.keep.keeps(step(turn.to)) {
@@ -222,7 +223,7 @@ fn outlying_turns(
                 ),
                 _ => format!("the bias of gyro {}", AXES[parameter - 9]),
             };
-            warnings.push(Warning::TurnKept(
+            out.warnings.push(Warning::TurnKept(
                 step(turn.from),
                 step(turn.to),
                 name,
@@ -230,7 +231,7 @@ fn outlying_turns(
             ));
             continue;
         }
-        left_out.push(LeftOut {
+        out.left_out.push(LeftOut {
             sensor: Sensor::Gyro,
             from: turn.from,
             to: turn.to,
@@ -238,7 +239,8 @@ fn outlying_turns(
             sigmas: judged.sigmas,
         });
     }
-    (left_out, Some(gyro.triad), warnings)
+    out.with_all = Some(gyro.triad);
+    out
 }
 
 /// Derivatives of the direction error of a turn by C (rows first) and o, by differences.

@@ -45,19 +45,19 @@ struct Point {
     /// Differences that share no sample, as the weight of the point.
     count: f64,
     /// Which variance.
-    kind: Kind,
+    kind: Differences,
 }
 
 /// What the means are compared by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum Differences {
     /// Differences of two successive means, halved: the Allan variance.
     Allan,
     /// Second differences of three, over six: the Hadamard variance, in which an even drift has no part.
     Hadamard,
 }
 
-impl Kind {
+impl Differences {
     const BOTH: [Self; 2] = [Self::Allan, Self::Hadamard];
 
     /// Means that one difference takes.
@@ -105,10 +105,10 @@ impl Kind {
 }
 
 /// Variances of one kind of series of means over `block_s`, by octave of the length.
-fn points(kind: Kind, all: &[Series], block_s: f64) -> Vec<Point> {
+fn points(kind: Differences, all: &[Series], block_s: f64) -> Vec<Point> {
     // Sum of squared differences, their number, and that of those which share no sample.
     let mut octaves: Vec<(f64, f64, f64)> = Vec::new();
-    let of_kind = |s: &&Series| s.ramps == (kind == Kind::Hadamard);
+    let of_kind = |s: &&Series| s.ramps == (kind == Differences::Hadamard);
     for Series { means, .. } in all.iter().filter(of_kind) {
         let mut sums = Vec::with_capacity(means.len() + 1);
         sums.push(0.0);
@@ -145,7 +145,7 @@ fn points(kind: Kind, all: &[Series], block_s: f64) -> Vec<Point> {
 /// Noise of series of means over `block_s`, pooled.
 pub(super) fn pooled(series: impl Iterator<Item = Series>, block_s: f64) -> ChannelNoise {
     let all: Vec<Series> = series.collect();
-    let of_kinds = Kind::BOTH.map(|kind| points(kind, &all, block_s));
+    let of_kinds = Differences::BOTH.map(|kind| points(kind, &all, block_s));
     let model = fit(&of_kinds.concat());
     // A variance of n independent differences is known to √(2/n) of itself.
     let fits = |p: &Point| {
@@ -279,7 +279,7 @@ mod tests {
                 tau_s: t,
                 variance: truth.variance(t),
                 count: 1e4,
-                kind: Kind::Allan,
+                kind: Differences::Allan,
             })
             .collect();
         let found = fit(&points);
@@ -300,7 +300,7 @@ mod tests {
                 tau_s: t,
                 variance: 4e-6 / t,
                 count: 10.0,
-                kind: Kind::Allan,
+                kind: Differences::Allan,
             })
             .collect();
         let found = fit(&points);

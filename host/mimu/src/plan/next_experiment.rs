@@ -20,7 +20,7 @@ use serde::{Serialize, Serializer};
 
 use crate::diagnose::Diagnosis;
 use crate::diagnose::search::Alternative;
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::fitted::FittedEffect;
 use crate::fit::Fit;
@@ -404,7 +404,7 @@ impl Pair<'_> {
         let Self { found, other } = self;
         let candidate = &found.candidate;
         // A jump is of one recording only.
-        let jump = matches!(other.kind, Kind::Jump { .. });
+        let jump = matches!(other.kind, CandidateKind::Jump { .. });
         let target = (!jump).then(|| Target {
             candidate: candidate.clone(),
             sizes: found.values.clone(),
@@ -419,8 +419,8 @@ impl Pair<'_> {
         let experiment = shown.map(|s| s.words).unwrap_or_else(|| {
             // Of the two, what no dwell is planned for.
             let words = match (&candidate.kind, &other.kind) {
-                (_, Kind::Effect(effect)) => effect.needs,
-                (Kind::Effect(found), Kind::Term(..)) => found.needs,
+                (_, CandidateKind::Effect(effect)) => effect.needs,
+                (CandidateKind::Effect(found), CandidateKind::Term(..)) => found.needs,
                 _ => "Make the same recording again: a jump does not come back where it was.",
             };
             words.to_string()

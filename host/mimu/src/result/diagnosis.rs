@@ -9,7 +9,7 @@ use crate::diagnose::decision::{Accepted, Decision, Leftover, Undecided};
 use crate::diagnose::note::Note;
 use crate::diagnose::picture::Picture;
 use crate::diagnose::rejected::Rejected;
-use crate::diagnose::rows::Figure as Judged;
+use crate::diagnose::rows::RowFigure;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::fit::Split;
 use crate::plan::next_experiment::{Confused, Next, NotExcited, NotInPlan};
@@ -238,8 +238,8 @@ fn figures(d: &Diagnosis, found: &SensorDiagnosis) -> SensorDiagnosisResult {
     let figure = fit.map_or(Figure::Input, |f| f.figure);
     let (count, together) = found.rows.judged;
     let of_one = match found.rows.figure {
-        Judged::Direction | Judged::Size => together,
-        Judged::Input | Judged::Rest => 3 * together,
+        RowFigure::Direction | RowFigure::Size => together,
+        RowFigure::Input | RowFigure::Rest => 3 * together,
     };
     let dwells = &d.before.prepared.dwells;
     SensorDiagnosisResult {

@@ -9,7 +9,7 @@ use super::TOOL;
 use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
 use crate::observable::Observable;
-use crate::parameter::{Kind, TriadParameter, parameters};
+use crate::parameter::{ParameterKind, TriadParameter, parameters};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, PerSensor, Sensor, present, raw_unit};
 use crate::recording_problem::RecordingProblem;
@@ -378,7 +378,7 @@ impl SensorFitResult {
     }
 
     /// The parameters of a kind.
-    pub fn of_kind(&self, kind: Kind) -> impl Iterator<Item = &Parameter> {
+    pub fn of_kind(&self, kind: ParameterKind) -> impl Iterator<Item = &Parameter> {
         self.parameters.iter().filter(move |p| p.of.0 == kind)
     }
 }

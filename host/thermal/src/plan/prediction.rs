@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::Request;
 use super::procedure::{Procedure, Schedule, Step};
 use crate::basis::Basis;
-use crate::regression::{AxisNoise, Kind, Normal, Part, Problem, ProblemRow};
+use crate::regression::{AxisNoise, CurveKind, Normal, Part, Problem, ProblemRow};
 
 /// Longest row, s. Shorter ones say no more of noise that wanders over many minutes.
 const ROW_S: f64 = 10.0;
@@ -52,7 +52,7 @@ fn of(request: &Request, schedule: &Schedule, sensor: Sensor) -> SensorPredictio
         rows,
         gain: Vector3::repeat(1.0),
         null: Vector3::zeros(),
-        bases: Kind::ALL.map(|_| Basis::new(request.shape, request.range_c)),
+        bases: CurveKind::ALL.map(|_| Basis::new(request.shape, request.range_c)),
         offsets: 1,
         biases_only: request.procedure == Procedure::RestRamp,
         samples,
@@ -70,9 +70,9 @@ fn of(request: &Request, schedule: &Schedule, sensor: Sensor) -> SensorPredictio
         let worst = |kind| worst(&problem, &covariances, kind, temp_c);
         At {
             temp_c,
-            bias: worst(Kind::Bias),
-            scale: worst(Kind::Scale),
-            cross: worst(Kind::Cross),
+            bias: worst(CurveKind::Bias),
+            scale: worst(CurveKind::Scale),
+            cross: worst(CurveKind::Cross),
         }
     });
     SensorPrediction {
@@ -156,7 +156,7 @@ fn inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 fn worst(
     problem: &Problem,
     covariances: &[Option<DMatrix<f64>>; 3],
-    kind: Kind,
+    kind: CurveKind,
     temp_c: f64,
 ) -> Option<f64> {
     let mut largest = None;

@@ -1,7 +1,7 @@
 //! Recordings at rest without a table: biases of the gyro, and what one pose shows of the accelerometer.
 
 use mimu::{Manifest, RawUnit, Reference, Samples};
-use mimu_thermal::fit::{Estimator, Options, Verdict, fit};
+use mimu_thermal::fit::{Estimator, FitVerdict, Options, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::warning::Warning;
 use nalgebra::Vector3;
@@ -50,7 +50,7 @@ fn there_and_back_shows_the_biases_of_the_gyro_and_names_what_is_inseparable() {
     let recording = at_rest(&Experiment::ramp(60.0, true), 3);
     let found = fit(vec![session(recording).unwrap()], &[], JOINT).unwrap();
     let result = ThermalResult::of(&found);
-    assert_eq!(result.verdict, Verdict::Fitted);
+    assert_eq!(result.verdict, FitVerdict::Fitted);
     let lag = result.sensors.gyro.as_ref().unwrap().lag_s.unwrap();
     assert!(lag.lower < 66.0 && lag.upper > 54.0, "{lag:?}");
     let accel = result.sensors.accel.as_ref().unwrap();
@@ -107,7 +107,7 @@ fn a_cold_start_goes_one_way() {
     };
     let found = fit(vec![session(at_rest(&cold, 4)).unwrap()], &[], JOINT).unwrap();
     let result = ThermalResult::of(&found);
-    assert_eq!(result.verdict, Verdict::OneWay);
+    assert_eq!(result.verdict, FitVerdict::OneWay);
     assert!(
         result
             .sensors
@@ -244,7 +244,7 @@ fn a_cubesats_gyro_cooled_one_way_has_straight_lines() {
         "{} to {} °C: {:?}",
         result.range_c[0], result.range_c[1], result.warnings
     );
-    assert_eq!(result.verdict, Verdict::OneWay);
+    assert_eq!(result.verdict, FitVerdict::OneWay);
     assert!(
         result
             .warnings

@@ -3,7 +3,7 @@
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
 use mimu::{Manifest, RawUnit, Reference, Samples};
-use mimu_thermal::fit::{ThermalFit, Verdict, fit};
+use mimu_thermal::fit::{FitVerdict, ThermalFit, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 use mimu_thermal::warning::Warning;
@@ -115,7 +115,7 @@ fn a_bias_that_drifts_with_the_temperature_is_no_even_turn() {
         assert!(used.used_c[0] < -16.0 && used.used_c[1] > 72.5, "{used:?}");
     }
     assert!(result.range_c[0] < -16.0, "{:?}", result.range_c);
-    assert_eq!(result.verdict, Verdict::Fitted);
+    assert_eq!(result.verdict, FitVerdict::Fitted);
     assert_biases(&result);
 }
 
@@ -130,7 +130,7 @@ fn bursts_of_less_than_a_second_are_used_like_longer_ones() {
     let result = ThermalResult::of(&desk.fitted(2, Steps::AsRecorded).unwrap());
     let used = result.sensors.gyro.as_ref().unwrap().used.unwrap();
     assert!(used.samples > 0.98 && used.temperatures > 0.98, "{used:?}");
-    assert_eq!(result.verdict, Verdict::Fitted);
+    assert_eq!(result.verdict, FitVerdict::Fitted);
     assert_biases(&result);
 }
 
@@ -239,7 +239,7 @@ fn errors_far_beyond_the_noise_are_no_fit() {
     };
     let found = desk.fitted(6, Steps::AtRest).unwrap();
     let result = ThermalResult::of(&found);
-    assert_eq!(result.verdict, Verdict::Misfit);
+    assert_eq!(result.verdict, FitVerdict::Misfit);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_thermal::classic::Classic;
 use mimu_thermal::compare::compare;
-use mimu_thermal::fit::{Estimator, Options, ThermalFit, Verdict, fit};
+use mimu_thermal::fit::{Estimator, FitVerdict, Options, ThermalFit, fit};
 use mimu_thermal::judge::rms;
 use mimu_thermal::result::ThermalResult;
 use nalgebra::Vector3;
@@ -38,7 +38,7 @@ fn error_at(calibration: &Calibration, sensor: Sensor, temp_c: f64, input: &Vect
 fn a_whole_cycle_is_fitted_and_its_file_compensates_the_unit_at_all_temperatures() {
     let whole = fitted(&Experiment::ramp(60.0, true), 11, JOINT);
     let result = ThermalResult::of(&whole);
-    assert_eq!(result.verdict, Verdict::Fitted);
+    assert_eq!(result.verdict, FitVerdict::Fitted);
     for sensor in [&result.sensors.gyro, &result.sensors.accel] {
         let sensor = sensor.as_ref().unwrap();
         let (held_out, floor) = (sensor.held_out_rms.unwrap(), sensor.noise_floor.unwrap());
@@ -107,7 +107,7 @@ fn the_files_pieces_between_nodes_are_the_curves() {
 fn half_a_cycle_is_one_way_and_has_no_lag() {
     let half = fitted(&Experiment::ramp(60.0, false), 13, JOINT);
     let result = ThermalResult::of(&half);
-    assert_eq!(result.verdict, Verdict::OneWay);
+    assert_eq!(result.verdict, FitVerdict::OneWay);
     let gyro = result.sensors.gyro.unwrap();
     assert!(gyro.lag_s.is_none() && gyro.lag_reason.unwrap().contains("one way"));
     let file = half.calibration("2026-01-01T00:00:00Z").unwrap();
@@ -209,7 +209,7 @@ fn a_soak_finds_all_parameters_and_as_printed_only_scale_factors_and_biases() {
             ..JOINT
         },
     );
-    assert_eq!(ThermalResult::of(&full).verdict, Verdict::Fitted);
+    assert_eq!(ThermalResult::of(&full).verdict, FitVerdict::Fitted);
     let curves = full.joint.curves.accel.as_ref().unwrap();
     for t in [0.0, 30.0, 60.0] {
         let [model, _] = curves.forward(t);

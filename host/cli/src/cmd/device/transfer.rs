@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::report;
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu_core::stored::{Refused, VERSION};
+use mimu_core::stored::{StoredError, VERSION};
 use mimu_device::{
     DeviceResult, Image, calibration, contents, download, outside_now, unit_name, upload,
 };
@@ -81,10 +81,10 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
     let mut contents = contents(&bytes).map_err(|refused| {
         let problem = format!("this program cannot read what it stores: {}", refused);
         let remedy = match refused {
-            Refused::Version { found } if found < VERSION => {
+            StoredError::Version { found } if found < VERSION => {
                 "upload the calibration file again: the device keeps the numbers in an older layout"
             }
-            Refused::Version { .. } => "update mimu on this computer",
+            StoredError::Version { .. } => "update mimu on this computer",
             _ => "upload the calibration file again",
         };
         Error::new(port, problem, remedy)

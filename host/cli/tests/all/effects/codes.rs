@@ -2,7 +2,7 @@
 
 use mimu::calibration::Calibration;
 use mimu::effects;
-use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::effects::fitted::FittedEffect;
 use mimu::effects::removal::remove;
 use mimu::effects::{converter::Converter, readout::first_of};
@@ -20,7 +20,7 @@ use super::unit::{
 /// Converters of the accelerometer, as the recording is made.
 fn converters() -> FittedEffect {
     let effect = effects::by_id("accel_readout_code").unwrap();
-    let mut candidate = Candidate::new(Sensor::Accel, Kind::Effect(effect));
+    let mut candidate = Candidate::new(Sensor::Accel, CandidateKind::Effect(effect));
     candidate.active.clear();
     let mut values = Vec::new();
     for axis in 0..3 {

@@ -1,5 +1,7 @@
 //! Effects taken out of recordings that lack something: samples, a temperature, the time since power-on.
 
+use std::sync::Arc;
+
 use mimu::calibration::Calibration;
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::effects::fitted::FittedEffect;
@@ -55,7 +57,7 @@ fn samples_that_are_missing_from_the_other_triad_do_not_make_an_error() {
     let mut holes = whole.clone();
     let blocks = whole.dwells.list[5].blocks.clone();
     for at in blocks.start + 2..blocks.start + 5 {
-        holes.condensed.blocks[at].raw[3..].fill(Moments::default());
+        Arc::make_mut(&mut holes.condensed).blocks[at].raw[3..].fill(Moments::default());
     }
     let after = fitted_effect(&holes, &calibration);
     for axis in 0..3 {
@@ -68,7 +70,7 @@ fn samples_that_are_missing_from_the_other_triad_do_not_make_an_error() {
     // Nothing at all in a dwell: it is left out, and said.
     let mut hole = whole.clone();
     for at in blocks {
-        hole.condensed.blocks[at].raw[3..].fill(Moments::default());
+        Arc::make_mut(&mut hole.condensed).blocks[at].raw[3..].fill(Moments::default());
     }
     for mean in &mut hole.dwells.list[5].raw[3..] {
         mean.n = 0;
@@ -86,12 +88,12 @@ fn samples_that_are_missing_from_the_other_triad_do_not_make_an_error() {
 fn a_lag_begins_at_the_first_temperature() {
     let (mut whole, calibration) = unit(&[("gyro_thermal_lag", 1e-3, 3)]);
     let first = whole.condensed.blocks[0].temp_c;
-    for block in &mut whole.condensed.blocks {
+    for block in &mut Arc::make_mut(&mut whole.condensed).blocks {
         block.temp_c = first;
     }
     // At one temperature all the time there is no lag, whatever the temperature and when it was first read.
     let mut late = whole.clone();
-    for block in &mut late.condensed.blocks[..30] {
+    for block in &mut Arc::make_mut(&mut late.condensed).blocks[..30] {
         block.temp_c.mean = f64::NAN;
     }
     let after = fitted_effect(&late, &calibration);
@@ -108,7 +110,7 @@ fn beyond_the_temperatures_of_the_calibration_an_effect_is_held_as_on_the_device
     let inverse = calibration.inverse(Sensor::Gyro).unwrap();
     let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
     let mut bias_at = |temp_c: f64| {
-        for block in &mut whole.condensed.blocks {
+        for block in &mut Arc::make_mut(&mut whole.condensed).blocks {
             block.temp_c.mean = temp_c;
         }
         let effects = calibration.effects();
@@ -178,7 +180,7 @@ fn a_given_calibration_has_to_fit_the_recording() {
         "{said}"
     );
     let mut cold = from;
-    for block in &mut cold.condensed.blocks {
+    for block in &mut Arc::make_mut(&mut cold.condensed).blocks {
         block.temp_c.mean = f64::NAN;
     }
     let said = refusal(cold, &calibration);

@@ -1,7 +1,7 @@
 //! The calibration that a device keeps, fetched: what every command makes of it.
 
 use mimu::calibration::Calibration;
-use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::effects::converter::Converter;
 use mimu::effects::readout::first_of;
 use mimu::quantity::Sensor;
@@ -28,7 +28,7 @@ fn every_effect_is_fetched_as_it_was_sent() {
     let fit = fitted(&path);
     // Converters of their own of two axes of the accelerometer, in place of one of all.
     let effect = mimu::effects::by_id("accel_readout_code").unwrap();
-    let mut own = Candidate::new(Sensor::Accel, Kind::Effect(effect));
+    let mut own = Candidate::new(Sensor::Accel, CandidateKind::Effect(effect));
     own.active = vec![first_of(0), first_of(2) + 3];
     own.codes = [
         Some(Converter::of(BIT_0_V, 0.123)),

@@ -1,7 +1,7 @@
 //! The device evaluates every effect as its data say, under any conditions.
 
 use mimu::effects;
-use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::effects::effect::OnDevice;
 use mimu::effects::quantity::{Conditions, REFERENCE_C, Reading};
 use mimu::effects::temperature::lagged;
@@ -82,7 +82,7 @@ fn every_effect_is_evaluated_by_the_device_as_its_data_say() {
                 lagged_temperature: lagged(&signal, parameter.unwrap_or(1.0))[1],
                 reading: Reading::NONE,
             };
-            let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
+            let candidate = Candidate::new(effect.sensor, CandidateKind::Effect(effect));
             let mut error = Vector3::zeros();
             candidate.add_error(&at, parameter.unwrap_or(0.0), &values, &mut error);
             let of_host = directions.to_body * error;

@@ -13,7 +13,7 @@ use std::process::Command;
 
 use mimu::calibration::Calibration;
 use mimu::effects;
-use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::effects::converter::Converter;
 use mimu::effects::effect::OnDevice;
 use mimu::effects::fitted::FittedEffect;
@@ -34,7 +34,7 @@ fn every_effect() -> Vec<FittedEffect> {
         .filter(|effect| effect.on_device() != OnDevice::Never)
         .enumerate()
         .map(|(n, effect)| {
-            let mut candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
+            let mut candidate = Candidate::new(effect.sensor, CandidateKind::Effect(effect));
             if candidate.reads_code() {
                 let zero = 0.123;
                 let weight = BIT_0_V;
@@ -57,7 +57,7 @@ fn every_effect() -> Vec<FittedEffect> {
         .collect();
     let term = |sensor, axis, v: &[Quantity], value| {
         fitted_effect(
-            Candidate::new(sensor, Kind::Term(axis, Product::term(v).unwrap())),
+            Candidate::new(sensor, CandidateKind::Term(axis, Product::term(v).unwrap())),
             0.0,
             &[value],
         )

@@ -2,7 +2,7 @@
 
 use mimu::calibration::Calibration;
 use mimu::effects;
-use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::quantity::Sensor;
 
 use super::unit::{fitted, fitted_effect, named, record};
@@ -14,7 +14,7 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
     record(&path, false, true);
     let fit = fitted(&path);
     let effect = effects::by_id("gyro_warm_up").unwrap();
-    let candidate = Candidate::new(Sensor::Gyro, Kind::Effect(effect));
+    let candidate = Candidate::new(Sensor::Gyro, CandidateKind::Effect(effect));
     let warm_up = fitted_effect(candidate, 90.0, &[1e-3, 2e-3, 3e-3]);
     let sag = named("gyro_g_sensitivity", &[1e-5; 9]);
     let text = Calibration::of(&fit, &[warm_up, sag], "2026-01-01T00:00:00Z")

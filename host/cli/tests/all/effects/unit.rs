@@ -1,7 +1,7 @@
 //! The unit of these tests, a recording of it, and effects to give it.
 
 use mimu::effects;
-use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::effects::fitted::FittedEffect;
 use mimu::effects::readout::TYPICAL;
 use mimu::fit::{Fit, Method, Options, fit};
@@ -171,7 +171,7 @@ pub fn fitted_effect(candidate: Candidate, parameter: f64, values: &[f64]) -> Fi
 pub fn named(id: &str, values: &[f64]) -> FittedEffect {
     let effect = effects::by_id(id).unwrap();
     fitted_effect(
-        Candidate::new(effect.sensor, Kind::Effect(effect)),
+        Candidate::new(effect.sensor, CandidateKind::Effect(effect)),
         0.0,
         values,
     )

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::diagnose::rows::{Figure, Rows};
+use crate::diagnose::rows::{RowFigure, Rows};
 use crate::diagnose::search::{Chosen, Search, unit_columns};
 use crate::diagnose::variance::Fitted;
 use crate::fit::Split;
@@ -77,7 +77,7 @@ pub(in crate::diagnose) fn held_out(
 /// Root mean square of the rows at rest, SI, where the judged rows are turns; `None` where there are none.
 pub(super) fn rms_at_rest(rows: &Rows, residuals: &DVector<f64>) -> Option<f64> {
     let count = rows.y.len() - rows.judged.0;
-    (rows.figure == Figure::Direction && count > 0)
+    (rows.figure == RowFigure::Direction && count > 0)
         .then(|| (residuals.rows(rows.judged.0, count).norm_squared() / count as f64).sqrt())
 }
 

@@ -9,7 +9,7 @@ use super::together::PLAUSIBLE;
 use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search, beside};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 
 /// Adds to the alternatives of each of the kept effects that move a bias with time or temperature the others that do so and whose score is
@@ -50,7 +50,7 @@ fn worse_with(
     with: &Fitted,
 ) -> Option<f64> {
     let axes = kept[i].candidate.axes();
-    let mut candidate = Candidate::new(search.rows.sensor, Kind::Effect(rival));
+    let mut candidate = Candidate::new(search.rows.sensor, CandidateKind::Effect(rival));
     candidate.without_self_heating = kept[i].candidate.without_self_heating;
     let of_axes = |k: &usize| {
         rival.coefficients[*k]

@@ -10,7 +10,7 @@ use crate::diagnose::search::{COEFFICIENT, CONFUSED, Chosen, Search, beside};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
 use crate::effects::alternatives::one_at_a_constant_input;
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::quantity::AXES;
 
@@ -67,7 +67,7 @@ fn part(
     (rival, axis): (&'static Effect, usize),
     with: &Fitted,
 ) -> Option<Part> {
-    let Kind::Effect(effect) = kept[i].candidate.kind else {
+    let CandidateKind::Effect(effect) = kept[i].candidate.kind else {
         return None;
     };
     let of_axis = |k: &usize| effect.coefficients[*k].axis == Some(axis);
@@ -86,7 +86,7 @@ fn part(
         return None;
     }
     // Those of the rival that follow the same temperature; coefficients of it one after the other, the best first.
-    let mut candidate = Candidate::new(search.rows.sensor, Kind::Effect(rival));
+    let mut candidate = Candidate::new(search.rows.sensor, CandidateKind::Effect(rival));
     candidate.without_self_heating = kept[i].candidate.without_self_heating;
     let all = candidate.columns(search.rows, 0.0);
     let finite = |k: &usize| all.column(*k).iter().all(|v| v.is_finite());

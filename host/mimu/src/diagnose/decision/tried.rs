@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{EXCITED, LARGEST, SEPARATE, Search};
 use crate::effects;
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::regressor::{Product, Regressor};
 
@@ -79,7 +79,7 @@ pub(super) fn candidates(
     let terms: Vec<Vec<Candidate>> = Product::terms()
         .into_par_iter()
         .map(|product| {
-            let term = |axis| Candidate::new(sensor, Kind::Term(axis, product));
+            let term = |axis| Candidate::new(sensor, CandidateKind::Term(axis, product));
             let columns = rows.term(&product, &[0, 1, 2]);
             let seen = across(&columns);
             // A table that turns about one axis at a time has rates about the others of rounding's size: with a coefficient of
@@ -101,7 +101,7 @@ pub(super) fn candidates(
         .collect();
     all.extend(terms.into_iter().flatten());
     for &(session, t_s) in dwell_ends {
-        let jump = |axis| Kind::Jump { axis, session, t_s };
+        let jump = |axis| CandidateKind::Jump { axis, session, t_s };
         all.extend((0..3).map(|axis| Candidate::new(sensor, jump(axis))));
     }
     (all, not_excited)

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::quantity::{Quantity, REFERENCE_C};
 use crate::effects::regressor::Regressor;
 
@@ -92,7 +92,7 @@ pub fn abscissa(on: &Dependence, candidate: &Candidate, k: usize, axis: usize) -
                 .and_then(|u| u.strip_prefix('/'))
                 .map_or_else(|| format!("({})/({unit})", sensor.unit()), String::from);
             let name = match (&candidate.kind, fields[..].is_empty()) {
-                (Kind::Term(_, product), _) => product.name(),
+                (CandidateKind::Term(_, product), _) => product.name(),
                 (_, true) => format!("regressor of {coefficient}"),
                 _ => {
                     // Of many the axes are too long to tell.
@@ -123,7 +123,7 @@ mod tests {
 
     fn on(id: &str, k: usize) -> (Dependence, Abscissa) {
         let effect = effects::by_id(id).unwrap();
-        let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
+        let candidate = Candidate::new(effect.sensor, CandidateKind::Effect(effect));
         let on = dependence(&candidate, k);
         let axis = effect.coefficients[k].axis.unwrap();
         let abscissa = abscissa(&on, &candidate, k, axis);

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::abscissa::{Dependence, abscissa, dependence};
-use super::{Abscissa, Kind, Track};
+use super::{Abscissa, ResidualKind, Track};
 use crate::diagnose::decision::Accepted;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::Search;
@@ -66,7 +66,7 @@ pub struct Panel {
     /// Axis, and coefficients.
     pub title: String,
     /// What the ordinate is of.
-    pub kind: Kind,
+    pub kind: ResidualKind,
     /// Abscissa.
     pub against: Against,
     /// Rows.
@@ -133,13 +133,13 @@ pub(super) fn panels(
 ) -> Option<Vec<Panel>> {
     let mut panels = Vec::new();
     if one.chosen.candidate.reads_code() {
-        let input = tracks.iter().filter(|t| t.kind == Kind::Input);
+        let input = tracks.iter().filter(|t| t.kind == ResidualKind::Input);
         panels.extend(input.filter_map(|t| coded(rows, one, t)));
     }
     for group in groups(one) {
         let of_axis = tracks
             .iter()
-            .filter(|t| t.kind == Kind::Input && t.axis == Some(group.axis));
+            .filter(|t| t.kind == ResidualKind::Input && t.axis == Some(group.axis));
         for track in of_axis {
             panels.extend(variable(rows, search, one, &group, track));
         }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use super::{Figure, FreeParameters, Row, Session, Stratum};
+use super::{FreeParameters, Row, RowFigure, Session, Stratum};
 use crate::effects::quantity::{Conditions, Reading};
 use crate::effects::temperature::offsets;
 use crate::noise::wander::{Slow, Span};
@@ -31,7 +31,7 @@ pub(super) struct Part {
     /// Strata.
     pub strata: Vec<Stratum>,
     /// What the judged rows are about.
-    pub figure: Figure,
+    pub figure: RowFigure,
     /// As in [`super::Rows`].
     pub judged: (usize, usize),
     /// As in [`super::Rows`], of this recording.
@@ -209,7 +209,7 @@ impl Builder<'_> {
         (nuisance, parameters, by_matrix): (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>),
         biases: Vec<usize>,
         strata: Vec<Stratum>,
-        figure: (Figure, usize, usize),
+        figure: (RowFigure, usize, usize),
     ) -> Option<Part> {
         (!y.is_empty()).then(|| Part {
             reference: self.prepared.manifest.reference,

@@ -6,7 +6,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SVector, Vector3};
 
 use super::build::{Builder, Part};
-use super::{Figure, ForceErrors, Row, Stratum};
+use super::{ForceErrors, Row, RowFigure, Stratum};
 use crate::effects::quantity::Conditions;
 use crate::estimate::Observation;
 use crate::estimate::chains::Chains;
@@ -109,7 +109,7 @@ impl Builder<'_> {
             within: false,
         }];
         let nuisance = (nuisance, shapes.parameters, by_matrix);
-        self.finish(y, nuisance, vec![6, 7, 8], strata, (Figure::Size, n, 1))
+        self.finish(y, nuisance, vec![6, 7, 8], strata, (RowFigure::Size, n, 1))
     }
 
     /// Three rows for each pose: the error of the force, of which [`Self::sizes`] see the part along it. What they cannot see goes into
@@ -143,7 +143,7 @@ impl Builder<'_> {
             nuisance,
             vec![6, 7, 8],
             strata,
-            (Figure::Size, n, 3),
+            (RowFigure::Size, n, 3),
         )
     }
 
@@ -318,8 +318,8 @@ impl Builder<'_> {
             });
         }
         let figure = match m {
-            0 => (Figure::Rest, 3 * n, 1),
-            m => (Figure::Direction, m, 2),
+            0 => (RowFigure::Rest, 3 * n, 1),
+            m => (RowFigure::Direction, m, 2),
         };
         // What is constant of an error of C is a bias.
         let mut by_matrix = nuisance.columns(0, 9).into_owned();

@@ -6,7 +6,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::build::{Builder, Part};
-use super::{Figure, Row, Stratum};
+use super::{Row, RowFigure, Stratum};
 use crate::estimate::Observation;
 use crate::observable::{Observable, StratumName};
 use crate::quantity::Sensor;
@@ -128,7 +128,7 @@ impl Builder<'_> {
                 within: true,
             });
         }
-        let figure = (Figure::Input, count, 1);
+        let figure = (RowFigure::Input, count, 1);
         let parameters = by_forward(inverse, &scale).resize_horizontally(columns, 0.0);
         // A delay is the session's own, as a bias is: the clocks are.
         let biases = [0, 4, 8].into_iter().chain(DELAYS..columns).collect();

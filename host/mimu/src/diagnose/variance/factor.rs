@@ -238,11 +238,11 @@ impl Whitener<'_> {
 }
 
 /// Decorrelates a choice of rows.
-pub struct Kept {
+pub struct DecorrelatedChoice {
     pub(super) parts: Vec<(usize, Cholesky<f64, Dyn>)>,
 }
 
-impl Kept {
+impl DecorrelatedChoice {
     /// `matrix`, a row for each of the chosen rows, decorrelated and in sigmas.
     pub fn whiten(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let mut out = matrix.clone();

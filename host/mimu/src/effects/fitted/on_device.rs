@@ -3,12 +3,12 @@
 use std::fmt;
 
 use mimu_core::RealField;
-use mimu_core::effects::{DeviceEffect, Refused, Variable};
+use mimu_core::effects::{DeviceEffect, EffectError, Variable};
 use mimu_core::wire::EFFECTS;
 use nalgebra::convert;
 
 use super::{FittedEffect, candidate};
-use crate::effects::candidate::{Kind, OfConverter};
+use crate::effects::candidate::{CandidateKind, OfConverter};
 use crate::effects::converter::Converter;
 use crate::effects::quantity::Quantity;
 use crate::effects::readout;
@@ -45,10 +45,12 @@ impl FittedEffect {
     pub fn on_device<T: RealField + Copy>(&self) -> Result<Vec<DeviceEffect<T>>, NotOnDevice> {
         let candidate = &self.candidate;
         let sensor = candidate.sensor;
-        let numbers = |made: Result<_, Refused>| made.map_err(|_| NotOnDevice::Numbers);
+        let numbers = |made: Result<_, EffectError>| made.map_err(|_| NotOnDevice::Numbers);
         match &candidate.kind {
-            Kind::Effect(effect) if !EFFECTS.contains(&effect.id) => Err(NotOnDevice::NoLaw),
-            Kind::Effect(_) if candidate.reads_code() => {
+            CandidateKind::Effect(effect) if !EFFECTS.contains(&effect.id) => {
+                Err(NotOnDevice::NoLaw)
+            }
+            CandidateKind::Effect(_) if candidate.reads_code() => {
                 let of = |c: OfConverter| {
                     let (weight, zero) = (convert(c.converter.weight), convert(c.converter.zero));
                     let errors = c.errors.map(convert);
@@ -57,7 +59,7 @@ impl FittedEffect {
                 let all = candidate.by_converter(&self.values);
                 all.into_iter().map(of).collect()
             }
-            Kind::Effect(effect) => {
+            CandidateKind::Effect(effect) => {
                 // Those of a recording stand last; no file has them, and the device takes none.
                 let mut coefficients = vec![T::zero(); effect.of_unit().count()];
                 for (k, value) in candidate.active.iter().zip(&self.values) {
@@ -69,7 +71,7 @@ impl FittedEffect {
                 let named = DeviceEffect::named(effect.id, &coefficients, nonlinear);
                 Ok(vec![numbers(named)?])
             }
-            Kind::Term(axis, product) => {
+            CandidateKind::Term(axis, product) => {
                 let value = self.values.first().copied().unwrap_or_default();
                 let mut variables = Vec::new();
                 for (quantity, power) in product.parts() {
@@ -79,7 +81,7 @@ impl FittedEffect {
                 let term = DeviceEffect::term(sensor, *axis, convert(value), &variables);
                 Ok(vec![numbers(term)?])
             }
-            Kind::Jump { .. } => Err(NotOnDevice::Jump),
+            CandidateKind::Jump { .. } => Err(NotOnDevice::Jump),
         }
     }
 
@@ -87,7 +89,7 @@ impl FittedEffect {
     ///
     /// # Errors
     /// The first that this program does not know.
-    pub fn kept(on_device: &[DeviceEffect<f32>]) -> Result<Vec<Self>, DeviceEffect<f32>> {
+    pub fn all_of_device(on_device: &[DeviceEffect<f32>]) -> Result<Vec<Self>, DeviceEffect<f32>> {
         let mut all: Vec<Self> = Vec::new();
         for one in on_device {
             let effect = Self::of_device(one).ok_or(*one)?;

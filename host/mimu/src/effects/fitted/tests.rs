@@ -12,10 +12,12 @@ fn every_term_is_found_again_by_its_id() {
     for sensor in Sensor::BOTH {
         for term in Product::terms() {
             for axis in 0..3 {
-                let id = Candidate::new(sensor, Kind::Term(axis, term)).id();
+                let id = Candidate::new(sensor, CandidateKind::Term(axis, term)).id();
                 let found = candidate(&id).unwrap();
                 assert_eq!((found.id(), found.sensor), (id, sensor));
-                assert!(matches!(&found.kind, Kind::Term(a, m) if *a == axis && *m == term));
+                assert!(
+                    matches!(&found.kind, CandidateKind::Term(a, m) if *a == axis && *m == term)
+                );
             }
         }
     }
@@ -70,7 +72,7 @@ fn both_sides_count_warmth_from_the_same_temperature_and_filter_its_rate_alike()
 #[test]
 fn every_effect_that_a_calibration_holds_can_be_removed_by_the_device() {
     for effect in effects::all().filter(|e| e.on_device() != HowRemoved::Never) {
-        let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
+        let candidate = Candidate::new(effect.sensor, CandidateKind::Effect(effect));
         let values = vec![1.0; candidate.active.len()];
         let fitted = FittedEffect::new(candidate, 60.0, values);
         assert!(fitted.on_device::<f32>().is_ok(), "{}", effect.id);
@@ -89,13 +91,13 @@ fn an_effect_that_the_device_lacks_is_refused() {
         needs: "a compass",
         taken_for: "",
     };
-    let jump = Kind::Jump {
+    let jump = CandidateKind::Jump {
         axis: 0,
         session: 0,
         t_s: 9.0,
     };
     for (kind, why) in [
-        (Kind::Effect(&MAGNETIC), NotOnDevice::NoLaw),
+        (CandidateKind::Effect(&MAGNETIC), NotOnDevice::NoLaw),
         (jump, NotOnDevice::Jump),
     ] {
         let candidate = Candidate::new(Sensor::Gyro, kind);
@@ -185,7 +187,7 @@ fn an_effect_in_a_file_is_the_one_that_was_fitted() {
     assert_eq!(read, lag);
     assert_eq!(read.interval, lag.interval);
     // And the one that comes back from a device, but for what that does not keep.
-    let kept = FittedEffect::kept(&lag.on_device().unwrap()).unwrap();
+    let kept = FittedEffect::all_of_device(&lag.on_device().unwrap()).unwrap();
     assert_eq!(kept[0].candidate.active, [0, 2]);
     assert_eq!(kept[0].values, [f64::from(1e-3_f32), f64::from(-2e-3_f32)]);
     assert_eq!(kept[0].parameter, 60.0);

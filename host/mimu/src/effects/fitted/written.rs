@@ -4,7 +4,7 @@ use mimu_core::effects::FARTHEST_ZERO;
 use serde::{Deserialize, Serialize};
 
 use super::{FittedEffect, Interval};
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::converter::{Codes, Converter};
 use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
@@ -310,7 +310,7 @@ impl WrittenEffect {
 pub(crate) fn candidate(id: &str) -> Option<Candidate> {
     let Some(term) = id.strip_prefix("term:") else {
         let effect = crate::effects::by_id(id).filter(|e| e.is_error() && !e.is_of_session())?;
-        return Some(Candidate::new(effect.sensor, Kind::Effect(effect)));
+        return Some(Candidate::new(effect.sensor, CandidateKind::Effect(effect)));
     };
     let (of, product) = term.split_once('~')?;
     let (sensor, axis) = of.split_once('_')?;
@@ -326,5 +326,5 @@ pub(crate) fn candidate(id: &str) -> Option<Candidate> {
     }
     // One spelling for each.
     let term = Product::term(&quantities).filter(|p| p.name() == product)?;
-    Some(Candidate::new(sensor, Kind::Term(axis, term)))
+    Some(Candidate::new(sensor, CandidateKind::Term(axis, term)))
 }

@@ -5,7 +5,7 @@ use nalgebra::{DVector, Vector3};
 use super::Setup;
 use super::recipe::Experiment;
 use crate::effects;
-use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::{Effect, NonlinearParameter};
 use crate::effects::quantity::{Conditions, Reading};
 use crate::plan::design::information::{Inverse, Rows};
@@ -62,9 +62,10 @@ impl Target {
     /// The rate of the Earth, which is no error, is nobody's rival and has none: at rest it is a g-sensitivity to the last digit, and
     /// what tells them apart is the latitude.
     pub fn listed(effect: &'static Effect) -> Self {
-        let candidate = apart_from_bias(Candidate::new(effect.sensor, Kind::Effect(effect)));
+        let candidate =
+            apart_from_bias(Candidate::new(effect.sensor, CandidateKind::Effect(effect)));
         let others = effects::all().filter(|e| e.sensor == effect.sensor && e.id != effect.id);
-        let rivals = others.map(|e| Candidate::new(e.sensor, Kind::Effect(e)));
+        let rivals = others.map(|e| Candidate::new(e.sensor, CandidateKind::Effect(e)));
         let slow = candidate.is_slow();
         Self {
             sizes: candidate

@@ -5,7 +5,7 @@ use std::ops::Range;
 use maud::{Markup, html};
 
 use crate::report::svg::{Frame, power_of_ten, px, range, times_ten};
-use mimu::diagnose::picture::{Against, Kind, Panel, Picture, Quantile, Track};
+use mimu::diagnose::picture::{Against, Panel, Picture, Quantile, ResidualKind, Track};
 use mimu::observable::Observable;
 use mimu::quantity::Figure;
 use mimu::quantity::Sensor;
@@ -22,10 +22,10 @@ const GAP: f64 = 18.0;
 const MINUTE_S: f64 = 60.0;
 
 /// Factor and unit in which a person reads residuals.
-pub fn unit(kind: Kind, sensor: Sensor) -> (f64, &'static str) {
+pub fn unit(kind: ResidualKind, sensor: Sensor) -> (f64, &'static str) {
     match kind {
-        Kind::Angle => Figure::Direction.readable(sensor),
-        Kind::Input => Figure::Input.readable(sensor),
+        ResidualKind::Angle => Figure::Direction.readable(sensor),
+        ResidualKind::Input => Figure::Input.readable(sensor),
     }
 }
 
@@ -62,7 +62,12 @@ struct Ordinate {
 
 impl Ordinate {
     /// Of `values`, SI, and zero.
-    fn new(kind: Kind, sensor: Sensor, what: &str, values: impl Iterator<Item = f64>) -> Self {
+    fn new(
+        kind: ResidualKind,
+        sensor: Sensor,
+        what: &str,
+        values: impl Iterator<Item = f64>,
+    ) -> Self {
         let (factor, unit) = unit(kind, sensor);
         let ends = range(values.map(|v| v * factor).chain([0.0]));
         let power = power_of_ten(&ends);

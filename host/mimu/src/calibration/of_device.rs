@@ -18,7 +18,7 @@ use mimu_recording::error::{Error, Result};
 
 /// What a device keeps of a calibration, raw in V: numbers of single precision, each as it is.
 #[derive(Debug, Clone)]
-pub struct Kept {
+pub struct DeviceCalibration {
     /// Name of the unit.
     pub device: String,
     /// As in [`Calibration::unit_id`].
@@ -45,10 +45,10 @@ impl Calibration {
     ///
     /// # Errors
     /// An effect that this program does not know; `place` is where it comes from.
-    pub fn kept(kept: &Kept, place: &str) -> Result<Self> {
+    pub fn of_device(stored: &DeviceCalibration, place: &str) -> Result<Self> {
         let singular = || Error::new(place, "C is singular", "upload a calibration again");
-        let temperatures: Vec<f64> = kept.nodes.iter().map(|n| f64::from(n.temp_c)).collect();
-        let reference = reference_node(&temperatures).map(|at| kept.nodes[at]);
+        let temperatures: Vec<f64> = stored.nodes.iter().map(|n| f64::from(n.temp_c)).collect();
+        let reference = reference_node(&temperatures).map(|at| stored.nodes[at]);
         let empty = || Error::new(place, "it keeps no node", "upload a calibration again");
         let node = reference.ok_or_else(empty)?;
         let unknown = |effect| {
@@ -56,17 +56,17 @@ impl Calibration {
             Error::new(place, problem, "update mimu on this computer")
         };
         let triad = |model, sensor| triad_table(model, sensor).ok_or_else(singular);
-        let temperature = over_temperature(kept);
-        let range_c = kept.range_c.map(|range| range.map(f64::from));
+        let temperature = over_temperature(stored);
+        let range_c = stored.range_c.map(|range| range.map(f64::from));
         let calibration = Self {
             format: Self::format_of(temperature.is_some()).into(),
-            device: kept.device.clone(),
-            unit_id: kept.unit_id.clone(),
-            created: kept.created.clone(),
-            trimmed: kept.trimmed.clone(),
+            device: stored.device.clone(),
+            unit_id: stored.unit_id.clone(),
+            created: stored.created.clone(),
+            trimmed: stored.trimmed.clone(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             recording: Origin {
-                sha256: kept.sha256.clone(),
+                sha256: stored.sha256.clone(),
                 reference: None,
                 raw_unit: RawUnit::Volt,
                 gravity_mps2: None,
@@ -76,21 +76,21 @@ impl Calibration {
             gyro: Some(triad(&node.model.gyro, Sensor::Gyro)?),
             accel: Some(triad(&node.model.accel, Sensor::Accel)?),
             temperature,
-            effects: FittedEffect::kept(&kept.effects).map_err(unknown)?,
+            effects: FittedEffect::all_of_device(&stored.effects).map_err(unknown)?,
         };
         calibration.checked(place)
     }
 }
 
 /// The nodes, unless there is one that does not change with temperature and no lag, which is a calibration at one temperature.
-fn over_temperature(kept: &Kept) -> Option<OverTemperature> {
+fn over_temperature(stored: &DeviceCalibration) -> Option<OverTemperature> {
     let plain = |node: &Node<f32>| *node == Node::constant(node.temp_c, node.model);
-    if let ([node], None) = (kept.nodes.as_slice(), kept.lags_s)
+    if let ([node], None) = (stored.nodes.as_slice(), stored.lags_s)
         && plain(node)
     {
         return None;
     }
-    let ends = [kept.nodes.first()?.temp_c, kept.nodes.last()?.temp_c];
+    let ends = [stored.nodes.first()?.temp_c, stored.nodes.last()?.temp_c];
     let table = |model: &Affine<f32>, slope: &Affine<f32>| NodeTable {
         C: rows(&model.matrix.map(f64::from)),
         o: exact(&model.offset.map(f64::from)),
@@ -99,16 +99,16 @@ fn over_temperature(kept: &Kept) -> Option<OverTemperature> {
         sigma_C: None,
         sigma_o: None,
     };
-    let nodes = kept.nodes.iter().map(|node| TemperatureNode {
+    let nodes = stored.nodes.iter().map(|node| TemperatureNode {
         temp_c: f64::from(node.temp_c),
         gyro: Some(table(&node.model.gyro, &node.slope.gyro)),
         accel: Some(table(&node.model.accel, &node.slope.accel)),
     });
     Some(OverTemperature {
-        range_c: kept.range_c.unwrap_or(ends).map(f64::from),
+        range_c: stored.range_c.unwrap_or(ends).map(f64::from),
         biases_only: false,
         dies: PerSensor::from_fn(|sensor| DieTable {
-            lag_s: kept.lags_s.map(|lags_s| f64::from(lags_s[sensor])),
+            lag_s: stored.lags_s.map(|lags_s| f64::from(lags_s[sensor])),
             ..DieTable::default()
         }),
         nodes: nodes.collect(),
