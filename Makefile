@@ -13,7 +13,7 @@ ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic --exclude mi
 
 MDBOOK := 0.5.4
 LOWEST := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
-PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device mimu-export mimu-wizard mimu-cli
+PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device mimu-equipment mimu-export mimu-wizard mimu-cli
 
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python

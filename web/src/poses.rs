@@ -64,7 +64,7 @@ pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
         map: cells().map(|up| [up.x, up.y, up.z, gain(up)]).collect(),
         next: best.filter(|(_, gain)| *gain > 0.0).map(|(up, gain)| Next {
             up: up.into(),
-            words: mimu_wizard::step::words(&up),
+            words: mimu_equipment::step::words(&up),
             gain,
         }),
     }

@@ -6,6 +6,7 @@
 //! | `heard`      | bytes into messages; what is garbled is counted                                        |
 //! | `line`, `session` | calls, each repeated until it is answered or refused                              |
 //! | `who`        | the greeting: what is there, and whether it can be talked to                           |
+//! | `nominal`    | the sensors by their data sheets                                                       |
 //! | `image`      | a calibration file as the bytes that the device stores                                 |
 //! | `origin`     | of which unit, from when and of what recording a calibration is                        |
 //! | `upload`     | sending them and fetching them back                                                    |
@@ -27,6 +28,7 @@ mod identity;
 mod image;
 mod kalman;
 mod line;
+mod nominal;
 mod origin;
 mod port;
 pub mod record;
@@ -44,6 +46,7 @@ pub use heard::{Answer, Event, Heard, LineCount, Receiver, Samples};
 pub use identity::{Hash, Held, Identity, Room, Started, unit_name};
 pub use image::{Image, remembers};
 pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
+pub use nominal::nominal;
 pub use port::{BAUD, Port, Ports, SerialPair, ports, serial_pair};
 pub use result::{Counted, DeviceResult};
 pub use self_test::{Passed, SelfTested, self_test};

@@ -2,30 +2,16 @@
 
 use std::time::{Duration, Instant};
 
-use mimu_core::compensation::Affine;
 use mimu_core::wire::{Request, flags};
 use mimu_device::record::shortest;
 use mimu_device::{Event, Samples, Session, Started};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
-use nalgebra::{Matrix3, Vector3};
 
 use crate::source::{Chunk, Heard, Source, Unit};
 
 /// Silence after which the device is asked whether it is still there.
 const SILENCE: Duration = Duration::from_secs(2);
-
-/// What the sensors' data sheets say: ADXRS300, 2.5 V and 5 mV per deg/s; MMA7260QT at 1.5 g, 1.65 V and 800 mV/g.
-pub(crate) fn nominal() -> [Affine<f64>; 2] {
-    let triad = |null: f64, raw_per_si: f64| Affine {
-        matrix: Matrix3::identity() / raw_per_si,
-        offset: Vector3::repeat(-null / raw_per_si),
-    };
-    [
-        triad(2.5, 0.005 * 1f64.to_degrees()),
-        triad(1.65, 0.8 / mimu::readable::STANDARD_GRAVITY),
-    ]
-}
 
 /// The raw stream of a device.
 #[derive(Debug)]
@@ -72,7 +58,7 @@ impl DeviceSource {
             name: format!("mimu-{}", who.unit_id),
             raw_unit: RawUnit::Volt,
             rate_hz: f64::from(who.sample_rate_hz),
-            nominal: Some(nominal()),
+            nominal: Some(mimu_device::nominal()),
             told,
             is_device: true,
             start: (who.start != Started::PowerOn).then(|| who.start.to_string()),

@@ -8,9 +8,9 @@ use serde::{Serialize, Serializer};
 
 use crate::folder::Part;
 use crate::refit::Progress;
-use crate::step::Step;
 use crate::verdict::Judged;
 use crate::waiting::{Interruption, Waiting};
+use mimu_equipment::step::Step;
 
 /// Something that has happened.
 #[derive(Debug, Clone, PartialEq, Serialize)]

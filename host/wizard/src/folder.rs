@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::bank::ByDevice;
 use crate::procedure::SessionConfig;
-use crate::step::Step;
+use mimu_equipment::step::Step;
 
 /// Which recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,9 +1,10 @@
 //! The wizard: from an uncalibrated board to a verified one. It says what to do, watches whether that was done, fits after every dwell,
 //! and stores only what kept its promise in poses that were not used.
 //!
+//! What turns and warms the unit is [`mimu_equipment`].
+//!
 //! | module | what it is |
 //! |---|---|
-//! | [`step`] | a dwell that is wanted: which way is up, how fast it turns, how long |
 //! | [`procedure`] | what is asked of a session; the steps to begin with, the next best one, those that verify |
 //! | [`source`], [`device`] | where samples come from |
 //! | [`text`], [`text_line`], [`regular`] | a board of another maker: its port, its lines, and their times as a regular rate |
@@ -15,8 +16,6 @@
 //! | [`unit_session`] | one of the units: its dwells, accepted or discarded |
 //! | [`axes`] | whether the axes are those that their names say |
 //! | [`bank`] | the device's own Kalman filters beside it |
-//! | [`drive`] | what turns and warms the unit: a person, or a table and a chamber that take text commands |
-//! | [`carry_out`] | a procedure over temperature: chamber and table led through a plan, and one recording of it |
 //! | [`event`] | what a session says and asks; views show it |
 //! | [`wizard`] | which step comes next, and who has had it |
 //! | [`store`] | into the device, back, and over a loss of the supply |
@@ -26,9 +25,7 @@
 
 pub mod axes;
 pub mod bank;
-pub mod carry_out;
 pub mod device;
-pub mod drive;
 pub mod event;
 pub mod folder;
 pub mod procedure;
@@ -38,7 +35,6 @@ pub mod resumed;
 pub mod session;
 pub mod source;
 pub mod station;
-pub mod step;
 pub mod store;
 pub mod text;
 pub mod text_line;

@@ -11,7 +11,7 @@ use mimu_recording::Reference;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::step::Step;
+use mimu_equipment::step::Step;
 
 /// What carries the unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -12,7 +12,6 @@ use mimu_recording::result_file::stage;
 use serde::Serialize;
 
 use crate::axes;
-use crate::drive::Driver;
 use crate::event::{Event, Phase, Question, View};
 use crate::folder::{Begun, Entry, Folder, Part};
 use crate::procedure::{Fixture, SessionConfig};
@@ -23,6 +22,7 @@ use crate::station::Station;
 use crate::unit_session::UnitSession;
 use crate::verdict::{Judged, judge, prepared};
 use crate::wizard::{Ended, Wizard};
+use mimu_equipment::drive::Driver;
 
 /// A unit to calibrate: how it is opened, and where its folder is.
 pub struct UnitSpec {

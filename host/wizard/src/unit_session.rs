@@ -21,9 +21,9 @@ use crate::procedure::{Fixture, SessionConfig};
 use crate::refit::{Parameter, Progress, calibrate, progress};
 use crate::source::Chunk;
 use crate::station::{Station, StationEvent};
-use crate::step::Step;
 use crate::waiting::{Interruption, Waiting};
 use crate::watch::{Seen, Watch, force, guessed};
+use mimu_equipment::step::Step;
 
 /// Part of the second before that belongs to a dwell already: it was as still.
 const BEFORE_S: f64 = 0.5;

@@ -9,7 +9,7 @@ use mimu_recording::error::Error;
 use nalgebra::Vector3;
 use serde::{Serialize, Serializer};
 
-use crate::step::words;
+use mimu_equipment::step::words;
 
 /// Why a unit waits. JSON has the sentence.
 #[derive(Debug, Clone, PartialEq)]

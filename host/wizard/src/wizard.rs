@@ -5,13 +5,13 @@ use std::time::{Duration, Instant};
 use mimu_recording::error::{Error, Result};
 
 use crate::axes;
-use crate::drive::Driver;
 use crate::event::{Event, Phase, Question, Standing, View, Wish};
 use crate::folder::{Entry, Part};
 use crate::procedure::{Fixture, SessionConfig, next_step};
-use crate::step::Step;
 use crate::unit_session::{Round, UnitSession};
 use crate::waiting::Waiting;
+use mimu_equipment::drive::Driver;
+use mimu_equipment::step::Step;
 
 /// How often the standing is shown.
 const SHOWN: Duration = Duration::from_millis(100);

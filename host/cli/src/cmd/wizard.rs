@@ -12,15 +12,15 @@ use mimu::quantity::normal_gravity;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::warning::Warning;
+use mimu_equipment::drive::{Driver, Person, TextDriver, Together};
+use mimu_equipment::step::Step;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, Parents, RawUnit};
 use mimu_wizard::device::DeviceSource;
-use mimu_wizard::drive::{Driver, Person, TextDriver, Together};
 use mimu_wizard::event::View;
 use mimu_wizard::procedure::{Fixture, SessionConfig, Targets, first_steps, verification};
 use mimu_wizard::session::{UnitSpec, run as carry_out};
 use mimu_wizard::source::{Opener, Source};
-use mimu_wizard::step::Step;
 use mimu_wizard::text::{Text, TextOpener};
 use mimu_wizard::text_line::Columns;
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use mimu::quantity::duration;
-use mimu_wizard::carry_out::{CarriedOut, Progress};
+use mimu_equipment::carry_out::{CarriedOut, Progress};
 
 use super::record_text;
 

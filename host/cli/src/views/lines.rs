@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::io::Write;
 
+use mimu_equipment::step::sketch;
 use mimu_wizard::event::{Event, Question, Standing, View, Wish};
-use mimu_wizard::step::sketch;
 
 use super::answers::{Beforehand, Typed};
 use crate::report;

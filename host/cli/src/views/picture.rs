@@ -6,9 +6,9 @@ mod table;
 mod unit;
 
 use mimu::quantity::minutes;
+use mimu_equipment::step::sketch;
 use mimu_wizard::event::{Phase, Standing};
 use mimu_wizard::refit::Progress;
-use mimu_wizard::step::sketch;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style, Stylize as _};

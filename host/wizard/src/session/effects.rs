@@ -15,9 +15,9 @@ use super::{OpenSession, Plain, WITH_EFFECTS, mounted, now};
 use crate::event::{Event, Phase, Question};
 use crate::folder::{Entry, Part};
 use crate::procedure::verification;
-use crate::step::Step;
 use crate::verdict::{judge_all, prepared};
 use crate::wizard::Ended;
+use mimu_equipment::step::Step;
 
 /// What the diagnosis of a unit has brought.
 pub(super) struct Found {

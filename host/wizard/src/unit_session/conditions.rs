@@ -9,9 +9,9 @@ use nalgebra::Vector3;
 use super::{Round, UnitSession};
 use crate::event::Event;
 use crate::procedure::{Fixture, SAME_POSE_DEG, SessionConfig};
-use crate::step::Step;
 use crate::waiting::Waiting;
 use crate::watch::Seen;
+use mimu_equipment::step::Step;
 
 /// Share of the samples of a second that may be missing where only means matter, and where turns are integrated as well.
 const LOST_SHARE: [f64; 2] = [0.5, 0.1];

@@ -4,7 +4,7 @@ use mimu::estimate::earth::Earth;
 use mimu_recording::Batch;
 
 use crate::procedure::SessionConfig;
-use crate::step::Step;
+use mimu_equipment::step::Step;
 
 /// Known inputs of a step on a table: rates, deg/s, and specific forces, m/s².
 pub(super) fn known(step: &Step, asked: &SessionConfig) -> [f64; 6] {

@@ -8,10 +8,10 @@ use indicatif::ProgressBar;
 use mimu::plan::Plan;
 use mimu_device::Session;
 use mimu_device::record::{Procedure, RecordOptions, Steps};
+use mimu_equipment::carry_out::{Equipped, Progress, carry_out};
+use mimu_equipment::drive::{Driver, TextDriver};
 use mimu_recording::Growing;
 use mimu_recording::error::Result;
-use mimu_wizard::carry_out::{Equipped, Progress, carry_out};
-use mimu_wizard::drive::{Driver, TextDriver};
 
 use crate::arguments::JsonArgs;
 use crate::cmd::device::{PortArgs, interruption};
@@ -100,7 +100,7 @@ fn begin(procedure: &Procedure, equipped: &Equipped) {
     if !equipped.has_table()
         && let Some(up) = first.up
     {
-        let words = mimu_wizard::step::words(&up.into());
+        let words = mimu_equipment::step::words(&up.into());
         eprintln!(
             "no table is driven: the unit lies still, {words}, and gravity is all that is known"
         );

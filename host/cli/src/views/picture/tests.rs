@@ -5,9 +5,9 @@ mod svg;
 use std::path::Path;
 
 use mimu::quantity::Sensor;
+use mimu_equipment::step::Step;
 use mimu_wizard::event::UnitStanding;
 use mimu_wizard::refit::{Aim, Aims, Parameter};
-use mimu_wizard::step::Step;
 use mimu_wizard::waiting::{Interruption, Waiting};
 use nalgebra::Vector3;
 use ratatui::Terminal;

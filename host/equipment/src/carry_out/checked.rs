@@ -2,11 +2,11 @@
 //! would make known inputs of false ones.
 
 use mimu::plan::Planned;
+use mimu_device::nominal;
 use mimu_device::record::Standing;
 use mimu_recording::error::Error;
 use nalgebra::Vector3;
 
-use crate::device::nominal;
 use crate::step::words;
 
 /// Angle between what is up and what was planned that is no other pose, degrees. Wrong axes are off by 90 or more; biases of a unit
