@@ -344,6 +344,16 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         matches!(self.kind(), Kind::Slow(_))
     }
 
+    /// Whether it depends on the temperature of some minutes ago, by a lag or by the rate of change, so that whoever begins in the middle of a
+    /// stream cannot know it.
+    pub fn remembers(&self) -> bool {
+        match &self.numbers {
+            Numbers::Named { law, .. } => law.nonlinear == Nonlinear::Lag,
+            Numbers::Term { variables, .. } => variables.contains(&Some(Variable::TemperatureRate)),
+            Numbers::Code { .. } => false,
+        }
+    }
+
     /// How it is removed.
     pub(super) fn kind(&self) -> Kind<'_, T> {
         match &self.numbers {

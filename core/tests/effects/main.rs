@@ -396,6 +396,22 @@ fn thermal_errors_are_those_of_a_sensor_at_that_temperature() {
 }
 
 #[test]
+fn an_effect_of_the_temperature_of_before_says_that_it_remembers() {
+    let named = |id: &str, nonlinear| {
+        let three = DeviceEffect::<f32>::named(id, &[1e-3; 3], nonlinear);
+        three.unwrap().remembers()
+    };
+    assert!(named("gyro_thermal_lag", Some(60.0)) && named("accel_thermal_lag", Some(60.0)));
+    assert!(!named("gyro_warm_up", Some(60.0)) && !named("gyro_scale_cubic", None));
+    let term = |variables: &[Variable]| {
+        let term = DeviceEffect::<f32>::term(Sensor::Gyro, 0, 1e-3, variables);
+        term.unwrap().remembers()
+    };
+    assert!(term(&[Variable::RateX, Variable::TemperatureRate]));
+    assert!(!term(&[Variable::RateX, Variable::Temperature]));
+}
+
+#[test]
 fn a_late_die_lags_behind_a_ramp_by_slope_times_lag() {
     let lag_s = 120.0;
     let effect = DeviceEffect::named("gyro_thermal_lag", &[1e-3, 0.0, -2e-3], Some(lag_s)).unwrap();

@@ -4,12 +4,13 @@ mod twin;
 
 use std::time::{Duration, Instant};
 
+use mimu_core::effects::DeviceEffect;
 use mimu_core::wire::Request;
 use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::heard::{Event, Samples};
-use super::image::{Image, remembers};
+use super::image::{Image, effects_of};
 use super::session::Session;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
@@ -70,6 +71,9 @@ pub fn check(
     mut progress: impl FnMut(f64),
 ) -> Result<Checked> {
     let image = Image::new(calibration, place)?;
+    let effects = effects_of(calibration, place)?;
+    let remembering = effects.iter().filter(|e| e.remembers());
+    let not_judged_for = remembering.map(DeviceEffect::to_string).collect();
     let who = session.hello()?;
     let held = who.stored.as_ref().map(|s| s.hash);
     let powered_for_ms = who.powered_for_ms;
@@ -95,12 +99,7 @@ pub fn check(
         die_temperature_k: None,
         die_range_c: None,
         holds: false,
-        not_judged_for: image
-            .effects
-            .iter()
-            .filter(|id| remembers(id))
-            .cloned()
-            .collect(),
+        not_judged_for,
     };
     let both = Request::Stream {
         raw: true,

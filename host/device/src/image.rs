@@ -245,7 +245,7 @@ fn model(calibration: &Calibration, sensor: Sensor, place: &str) -> Result<Affin
 }
 
 /// The effects of a calibration in the words of the device; refused by name is one that no device removes.
-fn effects_of(calibration: &Calibration, place: &str) -> Result<Vec<DeviceEffect<f32>>> {
+pub(super) fn effects_of(calibration: &Calibration, place: &str) -> Result<Vec<DeviceEffect<f32>>> {
     let parts = calibration.effects().iter().map(|effect| {
         effect.on_device().map_err(|why| {
             let at = format!("{place}, [[effect]] {}", effect.id());
@@ -273,10 +273,4 @@ fn check_room(effects: &[DeviceEffect<f32>], room: usize, place: &str) -> Result
         }
     }
     Ok(())
-}
-
-/// Whether the effects of these ids remember what was before, so that a comparison that begins in the middle cannot know it: the
-/// temperature of some minutes ago, in lags and in its rate of change.
-pub fn remembers(id: &str) -> bool {
-    id.ends_with("_thermal_lag") || id.contains("temp_rate")
 }

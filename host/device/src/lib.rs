@@ -44,7 +44,7 @@ pub use contents::{Contents, Inverse, NodeContents, calibration, contents};
 pub use flagged::Flagged;
 pub use heard::{Answer, Event, Heard, LineCount, Receiver, Samples};
 pub use identity::{Hash, Held, Identity, Room, Started, unit_name};
-pub use image::{Image, remembers};
+pub use image::Image;
 pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
 pub use nominal::nominal;
 pub use port::{BAUD, Port, Ports, SerialPair, ports, serial_pair};
