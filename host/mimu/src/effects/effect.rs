@@ -153,7 +153,7 @@ pub enum OnDevice {
     ByCode,
     /// With every sample.
     EverySample,
-    /// Folded into a bias and a matrix, as temperature and time move.
+    /// Folded into a bias and a matrix, when temperature or time changes.
     Folded,
 }
 
@@ -201,7 +201,7 @@ impl Effect {
             };
             let formula = match c.scope {
                 Scope::Recording => {
-                    format!("{formula} (not of the unit: neither written nor removed)")
+                    format!("{formula} (specific to the session: neither written nor removed)")
                 }
                 _ => formula,
             };
@@ -226,10 +226,10 @@ impl Effect {
         };
         let device = match self.on_device() {
             OnDevice::Never if self.is_error() => "never: it is specific to a session",
-            OnDevice::Never => "never: it is no error",
-            OnDevice::ByCode => "with every sample, by the code",
+            OnDevice::Never => "never: it is a true input",
+            OnDevice::ByCode => "with every sample, from the code",
             OnDevice::EverySample => "with every sample",
-            OnDevice::Folded => "as temperature and time move",
+            OnDevice::Folded => "when temperature or time changes",
         };
         format!(
             "| `{}` | {} | {}{parameter} | {} in {unit} | {} | {device} | {} | {} |",
