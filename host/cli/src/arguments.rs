@@ -68,7 +68,7 @@ fn keep(text: &str) -> std::result::Result<Keep, String> {
         text.split(',').map(|n| n.trim().parse()).collect();
     steps
         .map(Keep::Steps)
-        .map_err(|_| "write `all`, or the numbers of dwells with commas between: 3,12".into())
+        .map_err(|_| "write `all`, or the numbers of dwells separated by commas: 3,12".into())
 }
 
 fn still(text: &str) -> std::result::Result<f64, String> {

@@ -113,7 +113,7 @@ impl Image {
             Some(of) => Err(Error::new(
                 place,
                 format!(
-                    "it is of the unit {of}, and the device is the unit {}",
+                    "it is of unit {of}, and the device is the unit {}",
                     who.unit_id
                 ),
                 "upload the calibration of this unit, or insist",

@@ -253,7 +253,7 @@ fn units(
             return Err(Error::new(
                 format!("{}, calibration", RAW_COLUMNS[i]),
                 format!(
-                    "it is for readings in {}, and the recording is in {raw}",
+                    "it is for readings in {}, and those of the recording are in {raw}",
                     table.raw_unit
                 ),
                 "give the calibration of this unit",

@@ -202,7 +202,7 @@ fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<Lag, String> {
         });
     }
     if fit.joint.one_way {
-        return Err("the temperature goes one way only: lag and slope cannot be told apart".into());
+        return Err("the temperature goes one way only: lag and slope cannot be distinguished".into());
     }
     if !found.is_determined() {
         return Err(format!(

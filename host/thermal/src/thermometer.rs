@@ -257,7 +257,7 @@ fn missing(place: &str, problem: &str) -> Error {
     Error::new(place, problem, remedy)
 }
 
-/// Refuses samples without a temperature for longer than can be interpolated. Where there are no samples, none is missing.
+/// Refuses samples without a temperature for longer than can be interpolated. Where the recording has no samples, none is missing.
 fn check_gaps(blocks: &[Block], place: &str) -> Result<()> {
     let runs = blocks.chunk_by(|a, b| a.temp_c.mean.is_nan() == b.temp_c.mean.is_nan());
     let without = runs.filter(|run| run[0].temp_c.mean.is_nan());

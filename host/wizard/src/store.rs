@@ -159,7 +159,7 @@ impl Wizard<'_> {
             .station
             .with(move |session| check(session, &given, &file, COMPARED, |_| {}))?;
         if !checked.holds && checked.not_judged_for.is_empty() {
-            let problem = "the device compensates otherwise than the PC, by more than rounding";
+            let problem = "the device's compensation differs from the PC's by more than rounding";
             let remedy = "update device and program to the same version";
             return Err(Error::device(name, problem, remedy));
         }

@@ -80,7 +80,7 @@ impl Plan {
         if raw.step.is_empty() {
             return Err(source.error(
                 &(usize::MAX..usize::MAX),
-                "there is no step",
+                "the table has no row",
                 "add a `[[step]]` with `up` and `dwell_s`",
             ));
         }
@@ -92,7 +92,7 @@ impl Plan {
         let (rounds, round_s) = reader.rounds(&raw)?;
         if let (Some(first), Pose::Here) = (steps.first(), steps[0].pose) {
             let remedy = "add `up`, the body direction that points up";
-            let problem = "the first step has no pose to begin in";
+            let problem = "the first entry has no pose to begin in";
             return Err(source.error(&first.at.pose, problem, remedy));
         }
         reader.length(lead_in_s, sample_rate_hz, &steps, rounds)?;

@@ -85,7 +85,7 @@ pub fn run(args: &AllanArgs) -> Result<()> {
         return Err(Error::new(
             "--plot",
             format!(
-                "it shows one recording, and there are {}",
+                "the plot shows one recording, but {} were given",
                 args.recordings.len()
             ),
             "plot one recording at a time",

@@ -263,13 +263,13 @@ impl DesignArgs {
             }
             (Sensor::Gyro, Reference::TurntableRate) => Err(Error::new(
                 "gyro, --reference turntable-rate",
-                "orientations on a record player are not designed here",
+                "this command does not design orientations on a record player",
                 "design poses by gravity (--sensor accel --reference gravity --table hand): the same orientations serve a gyro",
             )),
             (Sensor::Gyro, Reference::Gravity) => Err(Error::new(
                 "gyro, --reference gravity",
-                "by hand a gyro's known input are the turns between dwells, which are not designed here",
-                "design the accelerometer's dwells and turn by a quarter or more between them",
+                "by hand a gyro's known inputs are the turns between dwells, which this command does not design",
+                "design the accelerometer's dwells, and turn by 90 degrees or more between them",
             )),
         }
     }
@@ -279,7 +279,7 @@ impl DesignArgs {
         match (&self.rates, self.sensor()) {
             (Some(_), Sensor::Accel) => Err(Error::new(
                 "--rates",
-                "an accelerometer is designed at rest",
+                "dwells of an accelerometer are at rest",
                 "leave it out, or use --sensor gyro",
             )),
             (Some(list), Sensor::Gyro) => {
@@ -333,7 +333,7 @@ impl DesignArgs {
             return Err(Error::new(
                 format!("--scheme {}", scheme.name()),
                 format!(
-                    "not all of its poses are within reach of --table {}",
+                    "--table {} cannot reach all of its poses",
                     self.fixture().name()
                 ),
                 "use --table three-axis",

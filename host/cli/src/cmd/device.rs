@@ -224,13 +224,13 @@ fn run_self_test(args: &PlainArgs) -> Result<()> {
         _ if failed.is_empty() => Ok(()),
         Some(moved) => Err(Error::new(
             port,
-            format!("the self-test failed ({failed}), and the unit moved during it: {moved}"),
+            format!("the self-test failed ({failed}); the unit moved during it: {moved}"),
             "keep the unit still and test again",
         )),
         None => Err(Error::new(
             port,
             format!("the self-test failed: {failed}"),
-            "check the wiring of these, and of the self-test pins",
+            "check the wiring of these sensors and of the self-test pins",
         )),
     }
 }

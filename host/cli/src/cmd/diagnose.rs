@@ -109,7 +109,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<()> {
                     path.display()
                 )
             }
-            None => "\nplan of the next experiment: none written, as there is nothing that one of this kind would settle\n".into(),
+            None => "\nplan of the next experiment: none written, because no plan of this kind would show or distinguish more\n".into(),
         };
     }
     let named: Vec<String> = args

@@ -45,9 +45,9 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let path = args
         .out
         .as_deref()
-        .ok_or_else(|| Error::new("-o", "it is missing", "say which file to write: -o FILE"))?;
+        .ok_or_else(|| Error::new("-o", "it is missing", "name the file to write: -o FILE"))?;
     if args.noise.is_some() && !args.format.has_noise() {
-        let problem = "this format has no place for the noise of a unit";
+        let problem = "this format cannot contain the noise of a unit";
         return Err(Error::new("export", problem, "leave it out").about(Argument::Noise));
     }
     let sources = [args.calibration.as_deref(), args.noise.as_deref()];

@@ -62,7 +62,7 @@ enum MethodArg {
 fn holdout(text: &str) -> std::result::Result<usize, String> {
     let count = text.strip_prefix("blocks=").unwrap_or(text);
     match count.parse() {
-        Ok(1) => Err("one block leaves nothing to fit to: at least 2, or 0 for none".into()),
+        Ok(1) => Err("with one block nothing remains to be fitted: write at least 2, or 0 for none".into()),
         Ok(n) if n <= 1000 => Ok(n),
         _ => Err("write blocks=N with N from 2 to 1000, or blocks=0 for none".into()),
     }
@@ -91,7 +91,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
                 "--method chooses between estimators for known inputs, and reference is \"{}\"",
                 prepared.manifest.reference
             ),
-            "leave --method out, or give the steps their inputs (reference = \"table\")",
+            "leave --method out, or give the dwells their inputs (reference = \"table\")",
         ));
     }
     let found = DwellResult::list(&prepared);

@@ -164,7 +164,7 @@ fn faces(args: &ImportArgs) -> Result<(Vec<PathBuf>, Vec<Face>)> {
     for file in &args.files {
         let text = file.to_string_lossy();
         let (face, path) = text.split_once('=').ok_or_else(|| {
-            let problem = "no axis is given that was up while it was recorded";
+            let problem = "the axis that was up is missing";
             Error::new(file.display(), problem, format!("write it like +x={text}"))
         })?;
         both.push((face.parse::<Face>()?, PathBuf::from(path)));
@@ -202,7 +202,7 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         ),
         (None, Some(latitude)) => (normal_gravity(latitude), None),
         (None, None) if args.reference == Reference::Table => (9.80665, None),
-        (None, None) => (9.80665, Some("gravity is taken to be 9.80665 m/s²; it ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer with it: give --gravity or --latitude".to_string())),
+        (None, None) => (9.80665, Some("gravity is assumed to be 9.80665 m/s². It ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude".to_string())),
     };
     let chosen = match (&args.preset, args.columns.is_empty()) {
         (None, false) => None,
@@ -215,7 +215,7 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         .or(logs.then_some(RawUnit::Si))
         .ok_or_else(|| {
             let remedy = "give --raw-unit: V, count or SI (rad/s and m/s²)";
-            Error::new("import", "the unit of the readings is not known", remedy)
+            Error::new("import", "the unit of the readings is unknown", remedy)
         })?;
     let options = ImportOptions {
         topic: args.topic,
@@ -267,7 +267,7 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         && summary.sample_rate_hz < SLOW_HZ
     {
         summary.warnings.push(format!(
-            "{} Hz is slow for an inertial unit: if the times are not in {unit}, give their unit (--time-unit)",
+            "{} Hz is a low rate for an inertial unit: if the times are not in {unit}, give their unit (--time-unit)",
             summary.sample_rate_hz
         ));
     }

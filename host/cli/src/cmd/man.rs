@@ -19,7 +19,7 @@ pub struct ManArgs {
 pub fn run(args: &ManArgs) -> Result<()> {
     let folder = &args.output;
     if folder.exists() && !folder.is_dir() {
-        let problem = "a file is where the folder of the pages should be";
+        let problem = "a file has the name of the folder for the pages";
         return Err(Error::new(folder.display(), problem, "name a folder"));
     }
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;

@@ -70,7 +70,7 @@ impl RecordingArgs {
             (None, Some(latitude)) => normal_gravity(latitude),
             (None, None) => {
                 eprintln!(
-                    "warning: gravity is taken to be 9.80665 m/s²; it ranges from 9.78 to 9.83, and every scale factor of the accelerometer with it: give --gravity or --latitude"
+                    "warning: gravity is assumed to be 9.80665 m/s². It ranges from 9.78 to 9.83, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude"
                 );
                 9.80665
             }
@@ -133,8 +133,8 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     let (known, table) = match (&plan, &args.plan, &args.inputs) {
         (Some(plan), Some(path), _) => {
             if args.transit.is_some() && plan.is_procedure() {
-                let problem = "its turns or rounds take as long as the table does, and no fixed transit fits them";
-                let remedy = "have `mimu thermal record` carry it out, or mark the dwells: --steps";
+                let problem = "its turns or rounds take as long as the table needs, so no fixed transit time fits";
+                let remedy = "carry it out with `mimu thermal record`, or mark the dwells with --steps";
                 return Err(Error::new(path.display(), problem, remedy));
             }
             let dwells = plan.dwells(gravity_mps2, &path.display().to_string())?;
@@ -157,14 +157,14 @@ pub fn run(args: &RecordArgs) -> Result<()> {
             let (place, remedy) = match &args.plan {
                 Some(_) => (
                     "--plan",
-                    "give --steps and press Enter at each, or the time in between: --transit 5s",
+                    "give --steps and press Enter at each dwell, or give the time in between: --transit 5s",
                 ),
                 None => (
                     "--inputs",
-                    "give --steps and press Enter at each, or --step-every",
+                    "give --steps and press Enter at each dwell, or give --step-every",
                 ),
             };
-            let problem = "nothing says when a dwell begins and ends";
+            let problem = "the beginnings and ends of the dwells are not given";
             return Err(Error::new(place, problem, remedy));
         }
         _ => Steps::Detected,
@@ -217,7 +217,7 @@ fn titles(known: &Known) -> Vec<String> {
 /// The line that a terminal shows.
 fn told(standing: &Standing, steps: bool, titles: &[String]) -> String {
     if standing.waiting {
-        return "the port has vanished, and is waited for; Ctrl-C ends the recording".into();
+        return "the port has vanished: waiting for it; Ctrl-C ends the recording".into();
     }
     let title = |dwell: usize| {
         let title = titles.get(dwell).map(|title| format!(" ({title})"));

@@ -65,7 +65,7 @@ impl Inputs {
                 return Err(Error::new(
                     folder.display(),
                     "this session has no recording yet",
-                    "go on with it: mimu wizard -o FOLDER",
+                    "continue it: mimu wizard -o FOLDER",
                 ));
             };
             inputs.recordings.push(calibration);

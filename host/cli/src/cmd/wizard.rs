@@ -194,8 +194,8 @@ impl WizardArgs {
                 let remedy = "write one of gyro-bias, gyro-scale, gyro-angle, accel-bias, accel-scale, accel-angle, =, and a number above 0";
                 Error::new(format!("--target {text}"), problem, remedy)
             };
-            let (name, value) = text.split_once('=').ok_or_else(|| wrong("there is no ="))?;
-            let value: f64 = value.parse().map_err(|_| wrong("this is no number"))?;
+            let (name, value) = text.split_once('=').ok_or_else(|| wrong("the = is missing"))?;
+            let value: f64 = value.parse().map_err(|_| wrong("the value is not a number"))?;
             if !(value > 0.0) {
                 return Err(wrong("it is not above 0"));
             }
@@ -206,7 +206,7 @@ impl WizardArgs {
                 "accel-bias" => &mut targets.accel_bias_mg,
                 "accel-scale" => &mut targets.accel_scale_ppm,
                 "accel-angle" => &mut targets.accel_angle_urad,
-                _ => return Err(wrong("there is no such parameter")),
+                _ => return Err(wrong("the parameter is unknown")),
             };
             *target = value;
         }
@@ -217,7 +217,7 @@ impl WizardArgs {
         let fixture = self.fixture.fixture();
         if self.by == By::Device && (fixture != Fixture::Table || self.text.text.is_some()) {
             let problem =
-                "the device's Kalman filters have to be told the input, which only a table knows";
+                "the device's Kalman filters need the known input, and only a table gives it";
             let remedy = "use --fixture table with a mimu device, or leave --by device out";
             return Err(Error::new("--by device", problem, remedy));
         }
@@ -238,7 +238,7 @@ impl WizardArgs {
             eprintln!("warning: {warning}");
         }
         let Some(gravity_mps2) = gravity else {
-            let problem = "local gravity is not known, and every scale factor of the accelerometer goes by it";
+            let problem = "local gravity is unknown, and every scale factor of the accelerometer is proportional to it";
             return Err(Error::new(
                 "wizard",
                 problem,
@@ -284,7 +284,7 @@ impl WizardArgs {
                 let mimu_device::Ports { of_boards, others } = mimu_device::ports();
                 let there = [of_boards, others].concat().join(", ");
                 let problem =
-                    format!("which port writes the lines is not said; there are: {there}");
+                    format!("the port that writes the lines is not given; there are: {there}");
                 return Err(Error::new("--text", problem, "name it with --port"));
             }
             (ports, _) => ports.iter().cloned().map(Some).collect(),
@@ -318,7 +318,7 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
     for (k, dwell) in (1..).zip(plan.dwells(gravity_mps2, &place)?) {
         let Some(up) = dwell.up else {
             let at = format!("{place}, dwell {k}");
-            let problem = "the plan leaves the pose to the bench, and a person has to be told one";
+            let problem = "the plan gives no pose for a person: it leaves the choice to the bench";
             return Err(Error::new(
                 at,
                 problem,
@@ -327,13 +327,13 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
         };
         if dwell.turn.is_some() {
             let at = format!("{place}, dwell {k}");
-            let problem = "it is a turn by an angle, and the wizard has dwells only";
-            let remedy = "have `mimu thermal record` carry it out, or give another plan";
+            let problem = "it is a turn by an angle; the wizard makes dwells only";
+            let remedy = "carry it out with `mimu thermal record`, or give another plan";
             return Err(Error::new(at, problem, remedy));
         }
         if dwell.rate_dps != 0.0 && fixture != Fixture::Table {
             let at = format!("{place}, dwell {k}");
-            let problem = "it turns, and nothing but a table holds a rate";
+            let problem = "it turns at a rate, which only a table can hold";
             return Err(Error::new(
                 at,
                 problem,
@@ -365,7 +365,7 @@ fn end_in_time(stop: Arc<AtomicBool>, ends: Duration, on_screen: bool) -> Result
         if on_screen {
             ratatui::restore();
         }
-        eprintln!("ended; the same command goes on from here");
+        eprintln!("ended; the same command resumes here");
         std::process::exit(130);
     };
     let begun = std::thread::Builder::new().name("end".into()).spawn(watch);
@@ -448,7 +448,7 @@ pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
         false => Err(Error::new(
             args.output.display(),
             failed.join(", "),
-            "look at the page, mend the setup, and begin anew in another folder",
+            "read the page, correct the setup, and start a new session in another folder",
         )),
     }
 }

@@ -61,7 +61,7 @@ fn a_preset_is_reported_and_what_it_leaves_open_is_asked_for() {
         &format!("import acc.txt --preset imu_tk {gravity} tk"),
     );
     assert!(
-        error.contains("the unit of the readings is not known"),
+        error.contains("the unit of the readings is unknown"),
         "{error}"
     );
     let error = refused(

@@ -94,8 +94,8 @@ impl Candidate {
     pub fn about(&self) -> &'static str {
         match self.kind {
             Kind::Effect(e) => e.about,
-            Kind::Term(..) => "a product of what was recorded; no effect of this name is known",
-            Kind::Jump { .. } => "the bias is another from here on",
+            Kind::Term(..) => "a product of recorded quantities without a physical name here",
+            Kind::Jump { .. } => "the bias changes here",
         }
     }
 

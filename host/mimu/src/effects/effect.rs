@@ -196,7 +196,7 @@ impl Effect {
         for c in self.coefficients {
             // Coefficients of each axis with the same law are one formula; those of a matrix are told apart by the other axis.
             let formula = match c.regressor {
-                Regressor::Bit(_) => "bit set or not, in the mean over the noise".into(),
+                Regressor::Bit(_) => "probability, over the noise, that the bit is set".into(),
                 regressor => regressor.formula(None),
             };
             let formula = match c.scope {

@@ -421,7 +421,7 @@ impl Pair<'_> {
             let words = match (&candidate.kind, &other.kind) {
                 (_, Kind::Effect(effect)) => effect.needs,
                 (Kind::Effect(found), Kind::Term(..)) => found.needs,
-                _ => "Make the same recording again: a jump does not come back where it was.",
+                _ => "Make the same recording again: a jump does not recur at the same place.",
             };
             words.to_string()
         });

@@ -50,8 +50,8 @@ impl FromStr for BrokenLimit {
             (None, Ok(rows)) => Ok(Self::Rows(rows)),
             _ => Err(Error::new(
                 "broken rows",
-                format!("{} is no limit", shorten(text.as_bytes())),
-                "give a number of rows, as in 20, or a share of at most 50%",
+                format!("{} is not a limit", shorten(text.as_bytes())),
+                "give a number of rows (20), or a share of at most 50%",
             )),
         }
     }
@@ -137,9 +137,9 @@ impl Fault {
     fn words(self) -> &'static str {
         match self {
             Fault::Width => "another number of cells",
-            Fault::Reading => "a cell that is no reading",
+            Fault::Reading => "a cell that is not a reading",
             Fault::Time => "no time",
-            Fault::Step => "a step that is none",
+            Fault::Step => "an invalid number in step",
         }
     }
 }

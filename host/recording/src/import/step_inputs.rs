@@ -120,7 +120,7 @@ impl StepInputs {
         let names: Vec<String> = steps.iter().take(10).map(name).collect();
         let (count, names) = (steps.len(), names.join(", "));
         Some(format!(
-            "the inputs of {count} steps are not known: {names}"
+            "the inputs of {count} dwells are unknown: {names}"
         ))
     }
 

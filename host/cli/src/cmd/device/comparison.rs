@@ -79,7 +79,7 @@ pub fn run_check(args: &CheckArgs) -> Result<()> {
         true => Ok(()),
         false => Err(Error::new(
             port,
-            "the device compensates otherwise than the PC, by more than rounding",
+            "the device's compensation differs from the PC's by more than rounding",
             "update device and program to the same version, and upload the calibration again",
         )),
     }

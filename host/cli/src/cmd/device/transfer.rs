@@ -79,10 +79,10 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
     let bytes = download(&mut session)?;
     let port = session.port();
     let mut contents = contents(&bytes).map_err(|refused| {
-        let problem = format!("this program cannot read what it stores: {}", refused);
+        let problem = format!("this program cannot read its stored calibration: {}", refused);
         let remedy = match refused {
             Refused::Version { found } if found < VERSION => {
-                "upload the calibration file again: the device keeps the numbers in an older layout"
+                "upload the calibration file again: the device stores it in an older layout"
             }
             Refused::Version { .. } => "update mimu on this computer",
             _ => "upload the calibration file again",

@@ -102,13 +102,13 @@ fn begin(procedure: &Procedure, equipped: &Equipped) {
     {
         let words = mimu_wizard::step::words(&up.into());
         eprintln!(
-            "no table is driven: the unit lies still, {words}, and gravity is all that is known"
+            "no driver moves a table: the unit lies still, {words}, and only gravity is known"
         );
     }
     if !equipped.has_chamber() {
         let [low, high] = procedure.range_c();
         eprintln!(
-            "no chamber is driven, and no temperature is set: warm the unit from {low} to {high} °C as the lines say"
+            "no driver sets a chamber: warm the unit from {low} to {high} °C as the lines below say"
         );
     }
 }

@@ -114,7 +114,7 @@ fn log() -> Vec<String> {
         "warm-up: until the temperature changes by less than 0.5 °C/min; leave the unit still",
         "calibration: 12 dwells are planned",
         "waiting: it moves (accel 3.2 times the limit)",
-        "thrown away, once more: it moves (accel 1.8 times the limit)",
+        "discarded, repeat: it moves (accel 1.8 times the limit)",
         "waiting: wrong pose: +z face up, 90 degrees off what is wanted",
     ]
     .map(String::from)

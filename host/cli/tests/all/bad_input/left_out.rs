@@ -222,7 +222,7 @@ fn temperatures_that_are_none_are_counted_in_the_same_words_by_every_command() {
     let place = Place::with(&samples);
     let (recording, calibration) = (place.text("rec"), place.text("cal.toml"));
     let words = |of: usize| {
-        format!("30 of {of} values are no temperatures in °C, the first is -7049 at {first:.1} s")
+        format!("30 of {of} values cannot be temperatures in °C, the first is -7049 at {first:.1} s")
     };
     let all = samples.rows.len();
     let warned = |arguments: &[&str], of: usize| {

@@ -67,7 +67,7 @@ fn what_only_its_owner_can_judge_is_a_warning() {
             "nothing but poses on the table",
             || on_table_at(&[0.0], &[0, 1, 2]),
             |_| {},
-            &["gyro: all dwells have the same input, so it is not calibrated"],
+            &["gyro: not calibrated: all dwells have the same input"],
         ),
     ];
     for (name, base, damage, words) in cases {

@@ -59,7 +59,7 @@ fn a_calibration_of_no_known_unit_is_stored_with_a_warning() {
     assert!(warning.contains("of which unit"), "{warning}");
     assert!(stored["unit_id"].is_null());
     let shown = device(&place, &peer, &["info"]).stdout;
-    assert!(shown.contains("of no known unit, made 2026"), "{shown}");
+    assert!(shown.contains("of an unknown unit, made 2026"), "{shown}");
 }
 
 #[test]

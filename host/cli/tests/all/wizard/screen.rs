@@ -127,7 +127,7 @@ fn the_terminal_is_given_back_after_the_end_by_a_key_and_by_control_c() {
         assert!(entered < left, "{seen:?}");
         let rest = &seen[left..];
         assert!(
-            rest.contains("ended; the same command goes on from here"),
+            rest.contains("ended; the same command resumes here"),
             "{rest:?}"
         );
         assert_eq!(code, Some(0), "{seen:?}");

@@ -163,8 +163,8 @@ impl Integrated {
         let before = self.x.len().saturating_sub(1);
         Err(Error::new(
             format_args!("sample {}", before + at),
-            format_args!("{} is not a number that can be averaged", next[at]),
-            "choose a stretch without gaps",
+            format_args!("{} cannot be averaged", next[at]),
+            "choose a segment without gaps",
         ))
     }
 }

@@ -123,9 +123,9 @@ impl Estimator {
             if term == Term::Q && (filtered || selection.shortened) {
                 let why = match filtered {
                     true => {
-                        "at short times the curve is below white noise, as behind a low-pass filter"
+                        "at short times the curve is below white noise, as after a low-pass filter"
                     }
-                    false => "at short times the curve is none of the terms', which would hide it",
+                    false => "at short times the curve does not have the shape of any term, which would hide this one",
                 };
                 return Err(Unseen {
                     at_most: None,
@@ -144,7 +144,7 @@ impl Estimator {
             let why = match instead.is_empty() {
                 true => format!("not seen: {bound}"),
                 false => format!(
-                    "not told apart from {} by this record: {bound}",
+                    "this record does not distinguish it from {}: {bound}",
                     instead.join(" or ")
                 ),
             };

@@ -47,7 +47,7 @@ impl Unseen {
     pub fn raise(&mut self, at_most: f64, words: String) {
         if self.at_most.is_none_or(|bound| bound < at_most) {
             self.at_most = Some(at_most);
-            self.why = format!("not seen, in the spectrum neither: at most {words}");
+            self.why = format!("not seen, nor in the spectrum: at most {words}");
         }
     }
 }

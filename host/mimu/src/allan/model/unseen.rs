@@ -23,7 +23,7 @@ impl Estimator {
         };
         let ends = selection.plausible().into_iter().filter_map(upper);
         let Some(most) = ends.reduce(f64::max) else {
-            return (None, "the other terms leave nothing to tell it by".into());
+            return (None, "the other terms leave no data that show it".into());
         };
         let at_most = term.coefficient(most, self.dt_s);
         let bound = format!("at most {}", unit(term, at_most));
@@ -35,7 +35,7 @@ impl Estimator {
         };
         let bound = match longer_s.map(duration) {
             Some(longer) => {
-                format!("{bound}; to see one of half that, record at least {longer} longer")
+                format!("{bound}; to see half of that, record at least {longer} more")
             }
             None => bound,
         };

@@ -60,7 +60,7 @@ impl DwellNoise {
             return Err(Error::new(
                 &file.place,
                 format!("there is no channel of the {sensor}"),
-                "run mimu allan on a recording that has it",
+                "run `mimu allan` on a recording that has this channel",
             ));
         }
         for channel in channels {
@@ -207,7 +207,7 @@ impl Session {
             None => Err(Error::new(
                 format!("budget of {} min", self.time_s / 60.0),
                 format!("{least} dwells of {SHORTEST_S} s and the moves between them take longer"),
-                "allow more time, or a table that moves faster",
+                "allow more time, or use a table that moves faster",
             )),
         }
     }
