@@ -178,7 +178,7 @@ mod tests {
         };
         assert_eq!(
             line(&error, &command(&["rate-hz", "still"])),
-            "log.csv: the rate is not known; give it (--rate-hz)"
+            "log.csv: the rate is unknown; give it (--rate-hz)"
         );
         let short = Error::new("out", "it is not empty", "give another").about(Argument::Output);
         let has = clap::Command::new("wizard").arg(clap::Arg::new("output").short('o'));
@@ -202,7 +202,7 @@ mod tests {
         let flags = "or accept it (--verify, --accept term:accel_x~rate_y*force_z)";
         assert!(said.ends_with(flags), "{said}");
         let said = of_rejected(&rejected(Reason::OneDwell(0.83)));
-        assert_eq!(said, "it rests to 83 % on one dwell");
+        assert_eq!(said, "one dwell contains 83 % of its information");
     }
 
     #[test]

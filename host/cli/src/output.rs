@@ -57,8 +57,13 @@ pub(crate) fn print(
     result: &impl Serialize,
     files: impl IntoIterator<Item = Staged>,
 ) -> Result<()> {
-    let mut pretty = serde_json::to_string_pretty(result)
-        .map_err(|e| Error::new("--json", e, "report this error: the result cannot be written"))?;
+    let mut pretty = serde_json::to_string_pretty(result).map_err(|e| {
+        Error::new(
+            "--json",
+            e,
+            "report this error: the result cannot be written",
+        )
+    })?;
     pretty.push('\n');
     let file = json.file().map(|path| stage(path, pretty.clone()));
     for staged in files.into_iter().chain(file.transpose()?) {

@@ -283,7 +283,8 @@ pub(crate) fn refuse_wrong_gravity(
         sizes.sort_by(f64::total_cmp);
         let typical = sizes.get(sizes.len() / 2).copied().unwrap_or(g);
         if (0.8..1.2).contains(&typical) {
-            let problem = format!("the known forces have a magnitude of {typical:.3}, so they are in g");
+            let problem =
+                format!("the known forces have a magnitude of {typical:.3}, so they are in g");
             return Err(Error::new(
                 format!("{}, ref_force_*_mps2", prepared.place),
                 problem,

@@ -243,7 +243,11 @@ impl Plan {
         }
         if plan.format != FORMAT {
             let problem = format!("format is {:?}; that of a plan is {FORMAT:?}", plan.format);
-            return Err(Error::new(place, problem, "name a plan of `mimu design` or `mimu thermal plan`"));
+            return Err(Error::new(
+                place,
+                problem,
+                "name a plan of `mimu design` or `mimu thermal plan`",
+            ));
         }
         Ok(plan)
     }
@@ -273,7 +277,8 @@ impl Plan {
                 let dwell = step.planned(self.carrier, gravity_mps2, &mut stands, &at)?;
                 let count = step.repeat as usize * step.poses.unwrap_or(1) as usize;
                 if all.len() + count > MOST_DWELLS {
-                    let problem = format!("up to this entry the plan has more than {MOST_DWELLS} dwells");
+                    let problem =
+                        format!("up to this entry the plan has more than {MOST_DWELLS} dwells");
                     return Err(Error::new(at, problem, "plan fewer"));
                 }
                 all.extend(std::iter::repeat_n(dwell, count));
@@ -349,7 +354,8 @@ impl Step {
     fn check_turn(&self, carrier: Carrier, at: &str) -> Result<()> {
         let refuse = |problem: &str, remedy: &str| Err(Error::new(at, problem, remedy));
         if carrier == Carrier::Hands && (self.turn_axis.is_some() || self.stay) {
-            let problem = "a person cannot turn the unit by an exact angle, nor stay without a pose";
+            let problem =
+                "a person cannot turn the unit by an exact angle, nor stay without a pose";
             return refuse(problem, "write up = [x, y, z], or carrier = \"table\"");
         }
         if self.turn_axis.is_none() && self.turn_deg.or(self.turn_dps).is_some() {
@@ -357,7 +363,10 @@ impl Step {
             return refuse("turn_deg or turn_dps without turn_axis", remedy);
         }
         if self.stay && self.up.is_some() {
-            return refuse("stay contradicts the pose of the same entry", "keep one of them");
+            return refuse(
+                "stay contradicts the pose of the same entry",
+                "keep one of them",
+            );
         }
         Ok(())
     }
@@ -378,7 +387,10 @@ impl Step {
             (None, Some(_), Carrier::Hands) => Ok(None),
             (None, Some(_), Carrier::Table) => {
                 let problem = "poses lets the bench choose the attitudes, so they are unknown";
-                refuse(problem, "write the direction that points up in each entry: up")
+                refuse(
+                    problem,
+                    "write the direction that points up in each entry: up",
+                )
             }
             (None, None, Carrier::Table) if stays => match stands {
                 Some(angles) => Ok(Some(angles.up())),

@@ -97,8 +97,7 @@ impl Prepared {
                 "power_on_s is {power:?} s, and the first sample at {:?} s",
                 first.start_s
             );
-            let remedy =
-                "write the t_s of the power-on to recording.toml, or remove the key";
+            let remedy = "write the t_s of the power-on to recording.toml, or remove the key";
             return Err(Error::new(place, problem, remedy));
         }
         let mut dwells = Dwells::find(&condensed, &manifest, finding)
@@ -454,7 +453,8 @@ impl Prepared {
         if !self.dwells.are_judged_not_still(sensor) {
             return error;
         }
-        let remedy = "; or, if the numbers of the step column are right, take these dwells as given";
+        let remedy =
+            "; or, if the numbers of the step column are right, take these dwells as given";
         error
             .map(|e| e.remedy += remedy)
             .about(Argument::StepsGiven)

@@ -380,7 +380,9 @@ impl Cursor {
                     false => value as f64,
                 })
             }
-            _ => Err(ParquetError::General("the column does not contain numbers".into())),
+            _ => Err(ParquetError::General(
+                "the column does not contain numbers".into(),
+            )),
         })
     }
 
@@ -396,7 +398,9 @@ impl Cursor {
         }
         self.advance(count, |reader, levels, count| {
             let ColumnReader::Int64ColumnReader(reader) = reader else {
-                return Err(ParquetError::General("the column does not contain INT64".into()));
+                return Err(ParquetError::General(
+                    "the column does not contain INT64".into(),
+                ));
             };
             let (start, mut stored) = (wholes.len(), Vec::with_capacity(count));
             let (rows, _, _) = reader.read_records(count, Some(levels), None, &mut stored)?;
@@ -419,7 +423,9 @@ impl Cursor {
     ) -> std::result::Result<(), String> {
         self.advance(count, |reader, levels, count| {
             let ColumnReader::ByteArrayColumnReader(reader) = reader else {
-                return Err(ParquetError::General("the column does not contain text".into()));
+                return Err(ParquetError::General(
+                    "the column does not contain text".into(),
+                ));
             };
             let start = texts.len();
             let (rows, _, _) = reader.read_records(count, Some(levels), None, texts)?;

@@ -143,7 +143,10 @@ impl Turntable {
             return refuse("step_rates_dps", problem, "add it to rates_dps");
         }
         if !(0.0..=LARGEST_ERROR).contains(&self.rate_error) {
-            let problem = format!("{} % cannot be the error of a known rate", 100.0 * self.rate_error);
+            let problem = format!(
+                "{} % cannot be the error of a known rate",
+                100.0 * self.rate_error
+            );
             let remedy = "write the half of a 95 % interval, in % of the rate, from 0 to 20";
             return Err(Error::new(place("rate_error"), problem, remedy)
                 .about(Argument::TurntableRateError));
@@ -197,8 +200,8 @@ mod tests {
             let checked = Turntable::new(&rates(list), error).check(|key| key.to_owned());
             checked.unwrap_err().to_string()
         };
-        assert!(refused("rest=0", 0.01).contains("no rate of the turntable"));
-        assert!(refused("200,201", 0.01).contains("too near"));
+        assert!(refused("rest=0", 0.01).contains("the rate of the turntable is missing"));
+        assert!(refused("200,201", 0.01).contains("too close"));
         assert!(refused("200", 0.5).contains("50 %"));
         assert!(refused("200", f64::NAN).contains("rate_error"));
     }

@@ -18,10 +18,10 @@ use crate::output::{check_outputs, print};
 pub struct ExportArgs {
     #[command(subcommand)]
     format: Format,
-    /// Calibration, by `mimu fit -o`, `mimu diagnose -o` or `mimu thermal fit -o`
+    /// Calibration file of `mimu fit -o`, `mimu diagnose -o` or `mimu thermal fit -o`
     #[arg(long, value_name = "FILE", global = true)]
     calibration: Option<PathBuf>,
-    /// Noise of the unit, by `mimu allan -o`
+    /// Noise file of the unit (`mimu allan -o`)
     #[arg(long, value_name = "FILE", global = true)]
     noise: Option<PathBuf>,
     /// File to write

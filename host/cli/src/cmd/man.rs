@@ -11,7 +11,7 @@ use crate::examples;
 
 #[derive(Args)]
 pub struct ManArgs {
-    /// Folder for the pages, `mimu.1`, `mimu-fit.1` and so on; made if it is not there
+    /// Folder for the pages (`mimu.1`, `mimu-fit.1`, ...); created if it does not exist
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
 }

@@ -283,7 +283,9 @@ fn reasons(out: &mut String, channels: &[&ChannelResult]) {
             let from = duration(model.range_s[0]);
             give(
                 channel.name,
-                format!("fitted from {from} on: at shorter times the terms do not describe the curve"),
+                format!(
+                    "fitted from {from} on: at shorter times the terms do not describe the curve"
+                ),
             );
         }
         if let Some(excess) = model.excess {

@@ -35,7 +35,10 @@ pub fn check_text(result: &DeviceResult<Checked>) -> String {
         );
     }
     if let Some([low, high]) = found.die_range_c {
-        line!(out, "temperature of the dies during the comparison: {low:.2} to {high:.2} °C");
+        line!(
+            out,
+            "temperature of the dies during the comparison: {low:.2} to {high:.2} °C"
+        );
     }
     if let Some(off) = found.die_temperature_k {
         line!(

@@ -32,11 +32,15 @@ fn meaning(d: &DiagnosisResult) -> &'static str {
             "with the effects below, noise and biases that wander as much as usual explain what remains"
         }
         Verdict::Explained => "with the effects below, noise explains what remains",
-        Verdict::Untestable => "no effect was found, and the recording has too little data to judge",
+        Verdict::Untestable => {
+            "no effect was found, and the recording has too little data to judge"
+        }
         Verdict::Unexplained if d.unexplained().next().is_some() => {
             "an error of unknown origin remains"
         }
-        Verdict::Unexplained => "an unlisted alternative model fits as well as an effect that was found",
+        Verdict::Unexplained => {
+            "an unlisted alternative model fits as well as an effect that was found"
+        }
     }
 }
 
@@ -49,7 +53,8 @@ fn remarks(s: &SensorDiagnosisResult, with_share: bool) -> Vec<String> {
         );
     } else if s.held_out == Split::Interleaved {
         all.push(
-            "held out: every fourth dwell, because a single block of time contains the evidence".into(),
+            "held out: every fourth dwell, because a single block of time contains the evidence"
+                .into(),
         );
     }
     if s.reference_rms > s.noise_floor {

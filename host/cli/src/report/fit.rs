@@ -86,7 +86,9 @@ fn verdict(fit: &FitResult) -> String {
     let errors = match (beyond.is_empty(), known) {
         (false, _) => format!("the error is {}", beyond.join(" and ")),
         (true, true) => "the errors are those of noise".into(),
-        (true, false) => "no dwell shows the noise, so the errors cannot be compared with it".into(),
+        (true, false) => {
+            "no dwell shows the noise, so the errors cannot be compared with it".into()
+        }
     };
     format!("{calibrated}; {errors}")
 }

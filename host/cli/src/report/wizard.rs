@@ -41,10 +41,9 @@ pub(crate) fn wizard_lines(event: &Event) -> Vec<String> {
             Part::Calibration => Vec::new(),
             _ => vec![format!("    dwell {number} done")],
         },
-        Event::Thrown { why, .. } => vec![format!(
-            "    discarded, repeat: {}",
-            hint::of_waiting(why)
-        )],
+        Event::Thrown { why, .. } => {
+            vec![format!("    discarded, repeat: {}", hint::of_waiting(why))]
+        }
         Event::Redo { number } => vec![format!("    dwell {number} will be repeated")],
         Event::Progress { progress, .. } => vec![format!("    {}", progress_line(progress))],
         Event::Interrupted { why, .. } => vec![format!("    {why}")],

@@ -95,7 +95,9 @@ impl Calibration {
         let expected = if curves { FORMAT_OF_CURVES } else { FORMAT };
         let problem = match self.format.as_str() {
             format if format == expected => return Ok(()),
-            FORMAT => "the file has a [temperature], but its format is that of a calibration without one",
+            FORMAT => {
+                "the file has a [temperature], but its format is that of a calibration without one"
+            }
             FORMAT_OF_CURVES => {
                 "the file has no [temperature], but its format is that of a calibration with one"
             }

@@ -74,7 +74,9 @@ pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
         if ours != theirs {
             return Err(Error::new(
                 file,
-                format!("it is for readings in {theirs}, but {first_file} is for readings in {ours}"),
+                format!(
+                    "it is for readings in {theirs}, but {first_file} is for readings in {ours}"
+                ),
                 "compare calibrations of the same readings",
             ));
         }

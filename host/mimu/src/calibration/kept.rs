@@ -52,7 +52,8 @@ impl Calibration {
         let empty = || Error::new(place, "it stores no node", "upload a calibration again");
         let node = reference.ok_or_else(empty)?;
         let unknown = |effect| {
-            let problem = format!("it stores the effect \"{effect}\", which this program does not know");
+            let problem =
+                format!("it stores the effect \"{effect}\", which this program does not know");
             Error::new(place, problem, "update mimu on this computer")
         };
         let triad = |model, sensor| triad_table(model, sensor).ok_or_else(singular);

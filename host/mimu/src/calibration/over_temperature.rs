@@ -140,7 +140,9 @@ impl NodeTable {
         let positive = |x: &f64| x.is_finite() && *x >= 0.0;
         let sigma_c = self.sigma_C.iter().flatten().flatten();
         if !sigma_c.chain(self.sigma_o.iter().flatten()).all(positive) {
-            return Some("sigma_C or sigma_o has an entry that cannot be a standard deviation".into());
+            return Some(
+                "sigma_C or sigma_o has an entry that cannot be a standard deviation".into(),
+            );
         }
         implausible(&self.model(), Some(&self.slope()))
     }
@@ -175,8 +177,9 @@ impl OverTemperature {
         let [from, to] = self.range_c;
         let [least, most] = TEMPERATURE_RANGE_C;
         if !(is_temperature(from) && is_temperature(to) && from <= to) {
-            let problem =
-                format!("range_c is [{from}, {to}]; it has to increase, from {least} °C at least to {most} °C at most");
+            let problem = format!(
+                "range_c is [{from}, {to}]; it has to increase, from {least} °C at least to {most} °C at most"
+            );
             return refuse("", problem);
         }
         if let Some(problem) = self.problem_of_lags() {
@@ -185,7 +188,10 @@ impl OverTemperature {
         let all = [self.dies.gyro.hysteresis, self.dies.accel.hysteresis];
         let sizes = all.iter().flatten().flatten().flatten();
         if let Some(size) = sizes.copied().find(|h| !(*h >= 0.0 && h.is_finite())) {
-            return refuse("", format!("a hysteresis is {size}; write a number that is not negative"));
+            return refuse(
+                "",
+                format!("a hysteresis is {size}; write a number that is not negative"),
+            );
         }
         if self.nodes.is_empty() || self.nodes.len() > NODES {
             let problem = format!(
@@ -258,7 +264,9 @@ impl OverTemperature {
         for sensor in Sensor::BOTH {
             match (node.table(sensor), has[sensor]) {
                 (Some(_), false) => {
-                    return Some(format!("it has [{sensor}], but the calibration has no such sensor"));
+                    return Some(format!(
+                        "it has [{sensor}], but the calibration has no such sensor"
+                    ));
                 }
                 (None, _) if self.has(sensor) => {
                     return Some(format!("it has no [{sensor}], but another node has one"));

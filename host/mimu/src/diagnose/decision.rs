@@ -502,6 +502,9 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
         ids.join(", "),
         if order > 0.0 { "rises" } else { "falls" },
     );
-    notes.push(Note::new(found, "let the temperature return within one recording"));
+    notes.push(Note::new(
+        found,
+        "let the temperature return within one recording",
+    ));
     notes
 }

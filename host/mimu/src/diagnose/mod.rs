@@ -230,7 +230,7 @@ impl Recordings<'_> {
         if let Some(turned) = all().find(|r| r.manifest.reference == Reference::TurntableRate) {
             return Err(Error::new(
                 &turned.place,
-                "only the magnitude of the rate is known, and a diagnosis needs known inputs or gravity",
+                "only the magnitude of the rate is known, but a diagnosis needs known inputs or gravity",
                 "give a recording from a rate table or by hand; a fit and a verification take this one",
             ));
         }

@@ -87,7 +87,11 @@ const CHANCE: f64 = 0.5;
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::OneDwell(share) => write!(f, "one dwell contains {:.0} % of its information", 100.0 * share),
+            Self::OneDwell(share) => write!(
+                f,
+                "one dwell contains {:.0} % of its information",
+                100.0 * share
+            ),
             Self::HeldOut([without, with]) => write!(
                 f,
                 "the held-out error does not go down: {without} without, {with} with"
@@ -125,9 +129,9 @@ impl fmt::Display for Reason {
                 f,
                 "the calibration file with it has a larger error on {recording}: {without} without effects, {with} with them"
             ),
-            Self::OtherPredictsBetter => {
-                f.write_str("another effect predicts better, together with the calibration that then results")
-            }
+            Self::OtherPredictsBetter => f.write_str(
+                "another effect predicts better, together with the calibration that then results",
+            ),
             Self::NotCalibrated(error) => write!(
                 f,
                 "after its removal the readings cannot be calibrated: {}",

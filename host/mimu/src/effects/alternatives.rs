@@ -85,8 +85,7 @@ const fn by_turning(sensor: Sensor) -> Effect {
     law("by_turning", sensor, about, &TURNING, None)
 }
 
-const BY_HAND: &str =
-    "the same rates from another supply, and turned by hand: errors of codes do not depend on what turns the unit";
+const BY_HAND: &str = "the same rates from another supply, and turned by hand: errors of codes do not depend on what turns the unit";
 
 const LONGER: &str =
     "a cold start recorded for several hours: an exponential ends, a logarithm does not";

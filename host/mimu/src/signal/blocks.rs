@@ -287,10 +287,7 @@ impl Condensed {
             if length != 0 && length != samples.len() {
                 return Err(Error::new(
                     format!("samples in memory, column {}", column.name()),
-                    format!(
-                        "it has {length} rows, and t_s has {}",
-                        samples.len()
-                    ),
+                    format!("it has {length} rows, and t_s has {}", samples.len()),
                     "give every column a value for each time, or leave the column out",
                 ));
             }

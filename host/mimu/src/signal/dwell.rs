@@ -201,9 +201,8 @@ impl Dwells {
         let given = match finding.steps {
             Steps::Given if !condensed.has_steps => {
                 let problem = "the dwells were requested from the column step, and the recording has no such column";
-                return Err(
-                    Error::new("dwells", problem, "let mimu find the dwells").about(Argument::StepsFound)
-                );
+                return Err(Error::new("dwells", problem, "let mimu find the dwells")
+                    .about(Argument::StepsFound));
             }
             Steps::Given | Steps::AsRecorded => condensed.has_steps,
             Steps::Found | Steps::AtRest => false,

@@ -235,7 +235,8 @@ pub fn refuse_dead_channels(condensed: &Condensed, place: &str) -> Result<()> {
                     unsigned_zero(first.min),
                     significant(step)
                 );
-                let remedy = "record turns as well: they distinguish a coarse channel from a stuck one";
+                let remedy =
+                    "record turns as well: they distinguish a coarse channel from a stuck one";
                 return Err(Error::new(column, problem, remedy));
             }
             return Err(Error::new(

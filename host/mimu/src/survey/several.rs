@@ -69,10 +69,7 @@ fn refuse_another_unit(first: &Recording, other: &Recording) -> Result<()> {
     };
     Err(Error::new(
         place(other),
-        format!(
-            "its {what} is {here}; that of {} is {there}",
-            place(first)
-        ),
+        format!("its {what} is {here}; that of {} is {there}", place(first)),
         "give recordings of one unit with the same settings",
     ))
 }

@@ -54,7 +54,7 @@ fn warnings(unit: &Unit, seed: u64, method: Method) -> Vec<String> {
 
 const SAYS: [&str; 2] = [
     "accel: the errors are perpendicular to the known force, as if the dwells were off level by ",
-    " deg rms: level the faces, or leave the directions out (reference = \"gravity\")",
+    " deg rms: level the faces, or use only the magnitude of gravity (reference = \"gravity\")",
 ];
 
 /// The angle that is said, deg.

@@ -112,7 +112,10 @@ impl FromStr for ColumnList {
                     let all: Vec<&str> = Role::all().map(Role::name).collect();
                     Error::new(
                         PLACE,
-                        format!("{} is not a column of a recording", shorten(known.as_bytes())),
+                        format!(
+                            "{} is not a column of a recording",
+                            shorten(known.as_bytes())
+                        ),
                         format!("write - to skip a column, or one of {}", all.join(", ")),
                     )
                 })?),
@@ -313,7 +316,7 @@ mod tests {
             ("t_s,acc_x", "acc_x"),
             ("t_s,gyro_x,t_s", "twice"),
             ("t_s=a,t_s=b", "twice"),
-            ("t_s,gyro_x=wx", "by position and some by name"),
+            ("t_s,gyro_x=wx", "by position, others by name"),
             ("", "no column"),
         ] {
             let error = text.parse::<ColumnList>().unwrap_err().to_string();

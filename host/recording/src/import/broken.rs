@@ -12,7 +12,7 @@ use crate::error::{Argument, Error, Result};
 const LISTED: usize = 5;
 /// After so many broken rows, and if most are, no more are read: the file is another one than was said.
 const ENOUGH: u64 = 10_000;
-/// Share beyond which what is left is no recording.
+/// Above this share the remaining rows are not a usable recording.
 const LARGEST_SHARE: f64 = 0.5;
 
 /// How many broken rows may be left out.

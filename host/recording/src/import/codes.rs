@@ -77,7 +77,10 @@ impl FromStr for Zero {
             (Some(channels), Some(code)) => Ok(Self { channels, code }),
             _ => Err(Error::new(
                 "zero",
-                format!("{} is not a raw column with a code", shorten(text.as_bytes())),
+                format!(
+                    "{} is not a raw column with a code",
+                    shorten(text.as_bytes())
+                ),
                 "write it like gyro=2048, for gyro, accel or a single column such as gyro_x",
             )),
         }

@@ -117,7 +117,8 @@ impl ForeignFile {
             .is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
         let mut parts = 1;
         if is_log(path) && how.list.is_some() {
-            let problem = "a list of columns is given, but the messages of a log have fixed columns";
+            let problem =
+                "a list of columns is given, but the messages of a log have fixed columns";
             return Err(
                 Error::new(path.display(), problem, "leave it out").about(Argument::Columns)
             );

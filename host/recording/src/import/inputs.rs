@@ -204,7 +204,10 @@ impl Inputs {
         }
         let place = at("step");
         if self.steps.insert(label.clone(), step).is_some() {
-            let problem = format!("{} appears twice in the column step", shorten(label.as_bytes()));
+            let problem = format!(
+                "{} appears twice in the column step",
+                shorten(label.as_bytes())
+            );
             return Err(Error::new(place, problem, "keep one row for each dwell"));
         }
         Ok(())
@@ -321,8 +324,8 @@ mod tests {
     #[test]
     fn a_bad_table_is_refused_with_row_and_column() {
         for (text, words) in [
-            ("", "no step"),
-            ("step,turn_x_deg\n", "no step"),
+            ("", "no row"),
+            ("step,turn_x_deg\n", "no row"),
             ("turn_x_deg\n1\n", "column step"),
             ("step\n1\n", "no column"),
             ("step,turn_w_deg\n", "turn_w_deg"),
@@ -330,7 +333,7 @@ mod tests {
             ("step,turn_x_deg\na,1\na,2\n", "row 3, column step"),
             ("step,turn_x_deg\na,b\n", "row 2, column turn_x_deg"),
             ("step,turn_x_deg\na\n", "row 2: the row has 1"),
-            ("step,turn_x_deg,ref_rate_x_dps\na,1,1\n", "both the rate"),
+            ("step,turn_x_deg,ref_rate_x_dps\na,1,1\n", "both rate"),
             ("step,turn_x_deg\n,1\n", "empty"),
         ] {
             let error = parse(text).unwrap_err().to_string();

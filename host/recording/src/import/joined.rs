@@ -142,7 +142,8 @@ impl JoinedFiles {
         // The same rules as for a recording's header: nothing twice, all axes of a sensor.
         let columns = Layout::from_names(&names, "import, all columns together")?.columns;
         if by_pauses && inputs.as_ref().is_some_and(StepInputs::has_turns) {
-            let problem = "the table of inputs has angles of turns, but pauses do not separate turns";
+            let problem =
+                "the table of inputs has angles of turns, but pauses do not separate turns";
             return Err(Error::new(
                 "import",
                 problem,

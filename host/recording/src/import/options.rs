@@ -165,7 +165,8 @@ impl ImportOptions {
             );
         }
         if self.step_gap_s.is_some() && (self.is_sequence() || self.means) {
-            let problem = "dwells are to be separated by pauses, but each file or row is a dwell already";
+            let problem =
+                "dwells are to be separated by pauses, but each file or row is a dwell already";
             return refuse(problem.to_owned(), "leave out one of the two");
         }
         if let Some((_, face)) = (1..)

@@ -259,7 +259,10 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
     }
     if options.inputs.is_some() {
         let remedy = "write the known inputs into the table: ref_rate_x_dps, ref_force_x_mps2 and the others";
-        return refuse("a table of inputs is given in addition to a table of means", remedy);
+        return refuse(
+            "a table of inputs is given in addition to a table of means",
+            remedy,
+        );
     }
     if is_log(path)
         || path

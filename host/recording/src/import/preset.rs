@@ -207,7 +207,10 @@ impl Preset {
             .ok_or_else(|| {
                 let sets: Vec<String> = self.in_folder.iter().map(|s| s.join(" and ")).collect();
                 let problem = match sets.is_empty() {
-                    true => format!("this is a folder, but the preset {} is for files", self.name),
+                    true => format!(
+                        "this is a folder, but the preset {} is for files",
+                        self.name
+                    ),
                     false => format!(
                         "this folder has no files of the preset {}: {}",
                         self.name,
@@ -268,10 +271,7 @@ impl Preset {
         }
         match nearest {
             None => refused(
-                format!(
-                    "the preset {} has no file of this name",
-                    self.name
-                ),
+                format!("the preset {} has no file of this name", self.name),
                 "rename it as its maker names it, or name the columns",
             ),
             // The names are there, and something else is wrong.

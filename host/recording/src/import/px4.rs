@@ -158,10 +158,7 @@ impl Log {
         };
         if !has(of_raw) {
             let what = choice.topic.unwrap_or("sensor of its own");
-            let problem = format!(
-                "the log has no {what}; it has: {}",
-                self.listed()
-            );
+            let problem = format!("the log has no {what}; it has: {}", self.listed());
             let remedy = "choose one of these, or log the raw sensors (SDLOG_PROFILE)";
             let error = Error::new(path.display(), problem, remedy);
             return Err(error.about(Argument::Topic).about(Argument::Instance));
@@ -317,7 +314,9 @@ impl Log {
             );
         }
         let why = match sparse {
-            true => ", because the topics of the single sensors have too few samples (SDLOG_PROFILE)",
+            true => {
+                ", because the topics of the single sensors have too few samples (SDLOG_PROFILE)"
+            }
             false => "",
         };
         readings
@@ -343,9 +342,8 @@ impl Log {
         }
         match ended {
             Completeness::Complete => {}
-            Completeness::Truncated => warnings.push(
-                "the log is cut within a record: everything before it was read".into(),
-            ),
+            Completeness::Truncated => warnings
+                .push("the log is cut within a record: everything before it was read".into()),
             Completeness::MalformedRecord(what) => warnings.push(format!(
                 "a record of the log is damaged: everything before it was read ({what})"
             )),

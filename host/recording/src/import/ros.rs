@@ -261,9 +261,9 @@ pub(super) fn read_db3(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>>
     let mut beside = path.as_os_str().to_owned();
     beside.push("-wal");
     if std::fs::metadata(&beside).is_ok_and(|beside| beside.len() > 0) {
-        let problem =
-            "the bag was not closed: some of its messages are in the file beside it that ends in -wal";
-        let remedy = "open the bag once with ros2 bag info or sqlite3, which moves them into the bag";
+        let problem = "the bag was not closed: some of its messages are in the file beside it that ends in -wal";
+        let remedy =
+            "open the bag once with ros2 bag info or sqlite3, which moves them into the bag";
         return Err(Error::new(path.display(), problem, remedy));
     }
     File::open(path).map_err(|error| Error::io(path, &error))?;

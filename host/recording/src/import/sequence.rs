@@ -171,7 +171,8 @@ fn labels(options: &ImportOptions) -> Result<Vec<String>> {
     let labels: Vec<String> = options.files.iter().map(stem).collect();
     let mut seen = BTreeSet::new();
     if let Some(twice) = labels.iter().find(|label| !seen.insert(label.as_str())) {
-        let problem = format!("two files have the name {twice}, but the names are the labels of the dwells");
+        let problem =
+            format!("two files have the name {twice}, but the names are the labels of the dwells");
         return Err(Error::new("import", problem, "give them different names"));
     }
     Ok(labels)

@@ -24,9 +24,9 @@ const LINE_S: f64 = 60.0;
 
 #[derive(Args)]
 pub(super) struct RecordArgs {
-    /// Plan of the procedure, by `mimu thermal plan -o`
+    /// Plan of the procedure (`mimu thermal plan -o`)
     plan: PathBuf,
-    /// Driver file of a table, a chamber, or both; may be repeated. Without one a person warms a unit that lies still
+    /// Driver file of a table, a chamber, or both; may be repeated [default: a person warms the unit, which lies still]
     #[arg(long = "driver", value_name = "FILE")]
     drivers: Vec<PathBuf>,
     #[command(flatten)]

@@ -193,7 +193,9 @@ fn sigma(report: &Design) -> String {
 /// Order of the dwells, and what it costs.
 fn order(report: &Design) -> String {
     let name = match report.order {
-        "shortest" => return "shortest found; neighbouring dwells share drift (see --order)".into(),
+        "shortest" => {
+            return "shortest found; neighbouring dwells share drift (see --order)".into();
+        }
         "randomised" => "in a randomised order",
         _ => "as published",
     };

@@ -151,7 +151,7 @@ fn the_terminal_is_given_back_before_an_error_is_told() {
     let (seen, same, code) = Sitting::begin([80, 24], &arguments).end();
     let left = seen.rfind(LEFT).unwrap();
     assert!(seen.contains(ENTERED) && same, "{seen:?}");
-    assert!(seen[left..].contains("there is no such port"), "{seen:?}");
+    assert!(seen[left..].contains("the port does not exist"), "{seen:?}");
     assert_ne!(code, Some(0));
 }
 

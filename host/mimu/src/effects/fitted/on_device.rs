@@ -31,7 +31,9 @@ impl fmt::Display for NotOnDevice {
         f.write_str(match self {
             Self::NoLaw => "devices do not remove this effect",
             Self::NoFactor => "it has a factor that devices do not know",
-            Self::Jump => "a bias that has jumped once may jump again, so the jump cannot be removed later",
+            Self::Jump => {
+                "a bias that has jumped once may jump again, so the jump cannot be removed later"
+            }
             Self::Numbers => "its numbers are invalid for the device",
         })
     }

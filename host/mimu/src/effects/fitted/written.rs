@@ -272,7 +272,9 @@ impl WrittenEffect {
         match (candidate.reads_code(), self.converters.is_empty()) {
             (true, true) => return Err("it has no converters".into()),
             (false, false) => {
-                return Err("it has converters, although the effect does not depend on their codes".into());
+                return Err(
+                    "it has converters, although the effect does not depend on their codes".into(),
+                );
             }
             _ => {}
         }

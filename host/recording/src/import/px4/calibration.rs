@@ -98,12 +98,12 @@ impl Parameters {
         let as_they_are = |why: String| Undone {
             values: readings.to_vec(),
             said: "after PX4's calibration".into(),
-            warnings: vec![format!(
-                "{why}: PX4's calibration is not undone"
-            )],
+            warnings: vec![format!("{why}: PX4's calibration is not undone")],
         };
         if devices.is_empty() {
-            return as_they_are("the log does not name the device that its calibration belongs to".into());
+            return as_they_are(
+                "the log does not name the device that its calibration belongs to".into(),
+            );
         }
         if self.epochs.is_empty() {
             return as_they_are("the log has no parameters".into());
