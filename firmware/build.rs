@@ -22,7 +22,7 @@ fn main() {
     let directory = PathBuf::from(env::var("OUT_DIR").unwrap());
     // A copy, and not the workspace itself on the search path, where the linker would look for
     // every other file too.
-    fs::copy(&from, directory.join("memory.x")).expect("memory.x stands at the workspace root");
+    fs::copy(&from, directory.join("memory.x")).expect("memory.x is at the workspace root");
     println!("cargo:rustc-link-search={}", directory.display());
     for source in SOURCES {
         println!("cargo:rerun-if-changed={source}");

@@ -68,13 +68,13 @@ impl core::fmt::Display for Implausible {
                 let [least, most] = SCALE_RANGE;
                 write!(
                     f,
-                    "a column of C is not from {least:e} to {most:e} SI per raw unit long"
+                    "a column of C has a length outside {least:e} to {most:e} SI per raw unit"
                 )
             }
             Self::Singular => f.write_str("C is singular"),
             Self::Offset => write!(f, "o is beyond {MOST_OFFSET:e} SI"),
             Self::Slope => f.write_str(
-                "within a kelvin, C would change by more than itself, or o beyond all sizes",
+                "within a kelvin, C would change by more than its own size, or o by an impossible amount",
             ),
         }
     }

@@ -141,18 +141,18 @@ pub enum StoredError {
 impl core::fmt::Display for StoredError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::NotACalibration => f.write_str("the bytes do not begin as a calibration does"),
-            Self::Length => f.write_str("the bytes are not as many as they say"),
+            Self::NotACalibration => f.write_str("the bytes do not begin like a calibration"),
+            Self::Length => f.write_str("the number of bytes differs from the one in the header"),
             Self::Version { found } => write!(
                 f,
-                "the layout has version {found}, and this program reads {VERSION}"
+                "the layout has version {found}; this program reads {VERSION}"
             ),
             Self::Check => f.write_str("the CRC is wrong"),
             Self::Node { at } => write!(
                 f,
-                "temperature node {at} has numbers that no sensor has, is not warmer than the one before, or is one too many"
+                "temperature node {at} has impossible numbers, is not warmer than the one before, or exceeds the room"
             ),
-            Self::Singular => f.write_str("the C that the effects were found with is singular"),
+            Self::Singular => f.write_str("the C with which the effects were found is singular"),
             Self::EffectUnknown { at } => write!(f, "effect {at} is unknown"),
             Self::EffectValue { at } => write!(f, "effect {at} has an impossible coefficient"),
             Self::EffectsFull { at } => write!(f, "there is no room for effect {at}"),

@@ -90,7 +90,7 @@ pub enum TableError {
 impl core::fmt::Display for TableError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Count => f.write_str("there is no temperature node, or there are too many"),
+            Self::Count => f.write_str("the table has no temperature node, or too many"),
             Self::Order(at) => write!(f, "temperature node {at} is not warmer than the one before"),
             Self::NotFinite(at) => {
                 write!(f, "temperature node {at} has an entry that is not a number")

@@ -46,7 +46,7 @@ impl Allan {
     /// What the other functions take as noise.
     fn noise(&self) -> PyResult<Noise> {
         let file = self.result.noise_file();
-        let file = file.ok_or_else(|| PyValueError::new_err("there is no recording"))?;
+        let file = file.ok_or_else(|| PyValueError::new_err("no recording is given"))?;
         Ok(Noise {
             file: Arc::new(file),
         })
@@ -82,7 +82,9 @@ pub(crate) fn allan(
     let part = match (step, from_s, to_s) {
         (None, None, None) => Part::Whole,
         (Some(step), None, None) => Part::Step(step),
-        (Some(_), ..) => return refuse("step and times both choose what is used: give one".into()),
+        (Some(_), ..) => {
+            return refuse("both step and times choose the segment: give only one".into());
+        }
         (None, Some(from), Some(to)) if !(from < to) => {
             return refuse(format!(
                 "from_s={from} is not before to_s={to}: exchange them"

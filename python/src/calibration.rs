@@ -107,7 +107,7 @@ impl Calibration {
         match gyro.and_then(|gyro| gyro.cast::<Recording>().ok()) {
             Some(recording) if accel.is_none() => self.apply_to_recording(py, recording.get()),
             Some(_) => Err(PyTypeError::new_err(
-                "a recording has both sensors: leave accel out",
+                "a recording contains both sensors: leave accel out",
             )),
             None => self.apply_to_arrays(py, gyro, accel),
         }
@@ -173,7 +173,7 @@ impl Calibration {
             _ => None,
         };
         if let Some(problem) = more {
-            let remedy = "give a mimu.Recording in place of arrays";
+            let remedy = "give a mimu.Recording instead of arrays";
             return Err(raised(py, &Error::new(&self.name, problem, remedy)));
         }
         let one = |sensor: Sensor, readings: Option<&Bound<'py, PyAny>>| -> PyResult<_> {
@@ -230,7 +230,7 @@ pub(crate) fn named(sensor: &str) -> PyResult<Sensor> {
         "gyro" => Ok(Sensor::Gyro),
         "accel" => Ok(Sensor::Accel),
         _ => Err(PyValueError::new_err(format!(
-            "{sensor:?} is no sensor: write gyro or accel"
+            "{sensor:?} is not a sensor: write gyro or accel"
         ))),
     }
 }

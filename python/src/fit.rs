@@ -96,7 +96,7 @@ pub(crate) fn fit(
             return Err(Error::new(
                 &prepared.place,
                 "method chooses between estimators for known inputs, and reference is \"gravity\"",
-                "leave method out, or give the steps their inputs (reference = \"table\")",
+                "leave method out, or give the dwells their inputs (reference = \"table\")",
             ));
         }
         let fit = mimu::fit(prepared, options)?;

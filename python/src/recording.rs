@@ -74,8 +74,8 @@ impl Source {
             Self::Samples(recording) => Ok(recording),
             Self::Means(means) => Err(Error::new(
                 &means.manifest.device,
-                "it holds the means of poses, and this needs samples",
-                "give the recording of samples that they were made of",
+                "it contains means of poses, but this function needs samples",
+                "give the recording of samples from which they were computed",
             )),
         }
     }
@@ -120,11 +120,11 @@ impl InMemory for Arrays {
     /// Under the interpreter's lock, so that Python cannot write into an array meanwhile: for a piece of 65,536 rows at a time.
     fn append(&self, column: Column, rows: Range<usize>, values: &mut Vec<f64>) -> Result<()> {
         let changed = || {
-            let problem = "the array was given another size, or is being written to";
+            let problem = "the array was resized, or is being written to";
             Error::new(
                 column.name(),
                 problem,
-                "leave it as it is until the work is done",
+                "leave the array unchanged until the function returns",
             )
         };
         Python::attach(|py| {
@@ -193,7 +193,7 @@ fn column<'py>(
         Ok(column) if fits(column) => Ok(column.clone()),
         _ => {
             let all = rows.map_or("n".into(), |rows| rows.to_string());
-            let problem = format!("its shape is {}, and ({all},) is wanted", shape(&array));
+            let problem = format!("its shape is {}, but ({all},) is needed", shape(&array));
             let error = Error::new(name, problem, "give a number for each sample");
             Err(raised(value.py(), &error))
         }
@@ -214,7 +214,7 @@ pub(crate) fn triad<'py>(
         Ok(triad) if fits(triad) => Ok(triad.clone()),
         _ => {
             let all = rows.map_or("n".into(), |rows| rows.to_string());
-            let problem = format!("its shape is {}, and ({all}, 3) is wanted", shape(&array));
+            let problem = format!("its shape is {}, but ({all}, 3) is needed", shape(&array));
             let error = Error::new(name, problem, "give x, y and z of each sample in a row");
             Err(raised(value.py(), &error))
         }
@@ -258,7 +258,7 @@ impl Recording {
                 PyArray1::from_iter(py, times)
             }
             _ => {
-                let problem = "there are neither times nor a sample rate";
+                let problem = "neither times nor a sample rate are given";
                 let remedy = "give the times in seconds as t, or rate_hz";
                 let error = Error::new("t", problem, remedy).about(Argument::SampleRate);
                 return Err(raised(py, &error));
@@ -552,7 +552,7 @@ fn gravity_at(
         (None, None) => (
             STANDARD_GRAVITY,
             (reference == Reference::Gravity).then(|| {
-                "gravity is taken to be 9.80665 m/s², and every scale factor of the accelerometer is in error as it is: give gravity or latitude_deg"
+                "gravity is assumed to be 9.80665 m/s²; every scale factor of the accelerometer errs by the same ratio as gravity: give gravity or latitude_deg"
                     .to_owned()
             }),
         ),
@@ -604,7 +604,7 @@ pub(crate) fn read(
     })
 }
 
-/// Refuses what is no recording, by the name of the argument.
+/// Refuses what is not a recording, by the name of the argument.
 pub(crate) fn sources(recordings: &[PyRef<'_, Recording>], name: &str) -> PyResult<Vec<Source>> {
     if recordings.is_empty() {
         return Err(PyTypeError::new_err(format!(

@@ -76,7 +76,7 @@ fn estimator(name: &str) -> PyResult<Estimator> {
     let found = all.into_iter().find(|estimator| estimator.name() == name);
     found.ok_or_else(|| {
         let known = all.map(Estimator::name).join(", ");
-        PyValueError::new_err(format!("estimator={name:?}: choose of {known}"))
+        PyValueError::new_err(format!("estimator={name:?}: choose one of {known}"))
     })
 }
 

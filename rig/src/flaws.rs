@@ -35,7 +35,7 @@ pub struct FlawsTruth {
     pub settle_mrad: f64,
     /// Length of it, s, or as much of it as there is before the next turn.
     pub settle_s: f64,
-    /// In so many dwells by hand the unit turns evenly and does not rest.
+    /// In so many dwells by hand the unit turns evenly instead of resting.
     pub turning_rests: u32,
     /// The rate of that, deg/s, about any axis.
     pub turning_dps: f64,

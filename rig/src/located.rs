@@ -44,7 +44,7 @@ impl Source {
             }
             Ok(bytes) => bytes,
             Err(e) if e.kind() == ErrorKind::NotFound => {
-                return Err(format!("{name}: there is no such file; check the path"));
+                return Err(format!("{name}: the file does not exist; check the path"));
             }
             Err(_) if path.is_dir() => {
                 return Err(format!("{name}: is a directory; name the TOML file in it"));

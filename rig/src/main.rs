@@ -28,16 +28,15 @@ enum Command {
 
 /// Carry out a plan with a virtual unit and write the recording.
 ///
-/// The unit's truth is written beside the recording, as a rig file: with --rig and the same plan and seed
-/// it makes the same samples again. What the rig file leaves open is drawn from the seed, within the
-/// tolerances of the data sheets.
+/// The truth of the unit is written beside the recording, as a rig file. With --rig, the same plan and the same seed it makes the same
+/// samples again. Parameters that the rig file omits are drawn from the seed, within the tolerances of the data sheets.
 #[derive(clap::Args)]
 #[command(after_help = KEYS)]
 struct Record {
-    /// What to do: poses, rates, temperatures.
+    /// Plan: poses, rates, temperatures.
     #[arg(value_name = "PLAN.toml")]
     plan: PathBuf,
-    /// The unit, the converter, the table and the person; everything in it is optional.
+    /// Parameters of the unit, the converter, the table and the person; all are optional.
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
     /// Another seed is another unit, another person, and other noise.
@@ -46,13 +45,13 @@ struct Record {
     /// Folder of the recording.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// File of the truth [default: DIR.truth.toml]
+    /// File for the truth [default: DIR.truth.toml]
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Storage of the samples [default: as the plan says]
+    /// Format of the samples [default: that of the plan]
     #[arg(long)]
     format: Option<Format>,
-    /// Replace a recording, and its truth, that are there.
+    /// Replace an existing recording and its truth.
     #[arg(long)]
     replace: bool,
 }

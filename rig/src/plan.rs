@@ -239,29 +239,28 @@ impl Limits {
                 return refused(
                     &step.at.pose,
                     format!(
-                        "`up` needs the middle axis at {:.1} degrees, and the table has {:.1} to {:.1}",
+                        "`up` needs the middle axis at {:.1} degrees, but its range is {:.1} to {:.1}",
                         middle.to_degrees(),
                         self.middle[0].to_degrees(),
                         self.middle[1].to_degrees()
                     ),
-                    "take a pose within reach, or remount the unit",
+                    "choose a pose within reach, or remount the unit",
                 );
             }
             if !self.outer {
                 let upright = up[0].hypot(up[1]) < UPRIGHT;
                 let remedy = "use `spin_dps`, or turn the inner axis upright (`up` along z)";
                 if step.rate != 0.0 && !upright {
-                    let problem = "`rate_dps` is about the vertical, where the table has no axis in this pose";
+                    let problem = "`rate_dps` is about the vertical, but the table has no vertical axis in this pose";
                     return refused(&step.at.rate, problem.into(), remedy);
                 }
                 if step.heading.is_some_and(|h| h != 0.0) && !upright {
-                    let problem = "`heading_deg` needs an outer axis, and the table has none";
+                    let problem = "`heading_deg` needs an outer axis, but the table has none";
                     return refused(&step.at.heading, problem.into(), "leave it out");
                 }
             }
         } else if !self.outer && step.rate != 0.0 {
-            let problem =
-                "`rate_dps` is about the vertical, where the table need not have an axis here";
+            let problem = "`rate_dps` is about the vertical, but the table may have no vertical axis in this pose";
             return refused(&step.at.rate, problem.into(), "use `spin_dps`");
         }
         let (outer, inner) = if self.outer {

@@ -137,7 +137,7 @@ impl Output {
     pub fn new(folder: &Path, plan: &Plan) -> Result<Self, String> {
         let Some(name) = folder.file_name() else {
             return Err(format!(
-                "{}: has no name of its own; give a folder to make",
+                "{}: has no name; give the folder to be made",
                 folder.display()
             ));
         };

@@ -6,7 +6,7 @@ use std::{env, fs, path::PathBuf};
 fn main() {
     let from = PathBuf::from(env::var("CARGO_MANIFEST_DIR").unwrap()).join("../../memory.x");
     let directory = PathBuf::from(env::var("OUT_DIR").unwrap());
-    fs::copy(&from, directory.join("memory.x")).expect("memory.x stands at the workspace root");
+    fs::copy(&from, directory.join("memory.x")).expect("memory.x is at the workspace root");
     fs::write(directory.join("defmt.x"), "").expect("a file can be written there");
     println!("cargo:rustc-link-search={}", directory.display());
     println!("cargo:rerun-if-changed={}", from.display());

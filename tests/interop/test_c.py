@@ -40,7 +40,7 @@ U = 2.0**-24
 def compiler(name):
     path = shutil.which(name)
     if path is None:
-        pytest.skip(f"there is no {name} here")
+        pytest.skip(f"{name} is missing here")
     return path
 
 

@@ -101,7 +101,7 @@ def test_densities_are_those_of_the_worst_axis(noise, tmp_path):
 
 
 def test_an_option_that_nothing_uses_is_refused(noise, tmp_path):
-    with pytest.raises(AssertionError, match=r"there is no calibration that it could be about.*\(--gyro-zero\)"):
+    with pytest.raises(AssertionError, match=r"this option needs a calibration.*\(--gyro-zero\)"):
         run("export", "kalibr", "--noise", noise, "-o", "imu.yaml", "--gyro-zero", 3, cwd=tmp_path)
 
 

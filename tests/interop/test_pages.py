@@ -60,7 +60,7 @@ def pages(unit, thermal_unit):
     noise = noise_of_a_unit.write(thermal_unit.folder)
     text = noise.read_text()
     # One coefficient that the record did not show, with its reason.
-    reason = 'k_reason = "not seen: at most 2.00 mg/√h; to see one of half that, record at least 27.0 min longer"\n'
+    reason = 'k_reason = "not seen: at most 2.00 mg/√h; to see half of that, record at least 27.0 min more"\n'
     head, last = text[: text.rindex("[channel.k]")].rsplit("[channel.n]", 1)
     noise.write_text(f"{head}{reason}[channel.n]{last}")
     run("report", "--calibration", "cal.toml", "--noise", noise, "-o", "thermal.html", cwd=thermal_unit.folder)

@@ -24,7 +24,7 @@ function broken(trap) {
   const memory = /memory allocation of (\d+) bytes failed/.exec(trap.stderr ?? "");
   if (memory) return `the page has no memory left (${memory[1]} bytes wanted); use the command mimu, or give a part of the recording`;
   const why = panic ? panic[1] : trap.message;
-  return `the program broke down (${why}); write the file again from its source, and if that helps nothing, report this`;
+  return `the program broke down (${why}); make the file again from its source, and if that helps nothing, report this`;
 }
 
 const answers = {

@@ -85,7 +85,7 @@ impl core::fmt::Display for EffectError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Unknown => f.write_str("no effect of this name can be removed here"),
-            Self::Count { needed } => write!(f, "the effect takes {needed} numbers"),
+            Self::Count { needed } => write!(f, "the effect needs {needed} numbers"),
             Self::Value => {
                 f.write_str("the effect has an impossible coefficient or nonlinear parameter")
             }

@@ -8,7 +8,7 @@ pub struct TooLong;
 
 impl core::fmt::Display for TooLong {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("the calibration is longer than there is room for")
+        f.write_str("the calibration is longer than the room for it")
     }
 }
 

@@ -144,7 +144,7 @@ pub enum Start<'a> {
     PowerOn,
     /// The reset pin: the button, or the debugger.
     ResetPin,
-    /// The watchdog: the program did not come round for too long.
+    /// The watchdog: the program stopped sampling for too long.
     Watchdog,
     /// The program asked for it.
     Software,

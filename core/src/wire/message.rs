@@ -47,7 +47,7 @@ pub enum Request<'a> {
         length: u32,
         /// [`stored::hash`](crate::stored::hash) over all of them.
         hash: u64,
-        /// Whether it is also stored if it is of another unit. One of no known unit always is.
+        /// Whether it is also stored if it is of another unit. One of an unknown unit always is.
         other_unit: bool,
     },
     /// Part of it, in order of the offset and without gaps; a part that was received already may be repeated. → [`Reply::Done`]

@@ -73,10 +73,7 @@ pub struct NotFinite {
 impl fmt::Display for NotFinite {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { sample, value } = self;
-        write!(
-            f,
-            "sample {sample}: {value} is not a number that can be averaged"
-        )
+        write!(f, "sample {sample}: {value} cannot be averaged")
     }
 }
 

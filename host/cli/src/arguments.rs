@@ -12,19 +12,19 @@ use mimu_recording::error::Result;
 
 #[derive(Args)]
 pub(crate) struct StillArgs {
-    /// Without a step column: largest variance of a still window, times that of the quietest
+    /// For dwells that are found: largest variance of a still window, as a multiple of the quietest
     #[arg(long = "still", value_name = "FACTOR", default_value_t = STILL_FACTOR, value_parser = still)]
     pub(crate) factor: f64,
-    /// Dwells by the step column as they are, or by stillness; without it the step column where there is one
+    /// Where dwells come from: given by the column step, or found by stillness [default: the column if there is one]
     #[arg(long = "steps", value_enum, value_name = "WHENCE")]
     pub(crate) steps: Option<StepsArg>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 pub(crate) enum StepsArg {
-    /// By the step column, none of them judged not to be still
+    /// From the column step, without a test for stillness
     Given,
-    /// By stillness, whatever the step column says
+    /// By stillness; the column step is ignored
     Found,
 }
 
@@ -44,10 +44,10 @@ impl StillArgs {
 
 #[derive(Args)]
 pub(crate) struct KeepArgs {
-    /// Fit with dwells and turns that the others contradict: `all`, or the numbers of dwells, 3,12
+    /// Keep dwells and turns that the others contradict: `all`, or numbers of dwells, like 3,12
     ///
-    /// A turn is kept with the dwell that it ends in. Without it, a dwell or turn that errs by far more than the others predict is
-    /// left out, with gravity as the only reference, and named.
+    /// A turn is kept with the dwell that it ends in. Without this option, if gravity is the only reference, a dwell or turn with a much
+    /// larger error than the others predict is left out and named.
     #[arg(long = "keep", value_name = "all|N,...", value_parser = keep)]
     keep: Option<Keep>,
 }
@@ -68,7 +68,7 @@ fn keep(text: &str) -> std::result::Result<Keep, String> {
         text.split(',').map(|n| n.trim().parse()).collect();
     steps
         .map(Keep::Steps)
-        .map_err(|_| "write `all`, or the numbers of dwells with commas between: 3,12".into())
+        .map_err(|_| "write `all`, or the numbers of dwells separated by commas: 3,12".into())
 }
 
 fn still(text: &str) -> std::result::Result<f64, String> {
@@ -80,10 +80,10 @@ fn still(text: &str) -> std::result::Result<f64, String> {
 
 #[derive(Args)]
 pub(crate) struct NoiseArgs {
-    /// Noise of the unit at rest, by `mimu allan -o`; without it, the noise within the dwells
+    /// Noise file of the unit at rest (`mimu allan -o`) [default: the noise within the dwells]
     ///
-    /// It also says how the bias wanders from dwell to dwell, which no dwell can tell. For readings in V or counts it has to be
-    /// of raw readings of the same unit, with or without a calibration.
+    /// The file also contains the wander of the bias from dwell to dwell, which dwells do not show. For readings in V or counts it has to
+    /// come from raw readings of the same unit, with or without a calibration.
     #[arg(long = "noise", value_name = "FILE")]
     pub(crate) file: Option<PathBuf>,
 }
@@ -100,14 +100,14 @@ impl NoiseArgs {
 
 #[derive(Args)]
 pub(crate) struct VerboseArgs {
-    /// Print everything in place of a summary
+    /// Print everything instead of a summary
     #[arg(long)]
     pub(crate) verbose: bool,
 }
 
 #[derive(Args)]
 pub(crate) struct JsonArgs {
-    /// Write the result as JSON (`-`: to standard output, in place of the text)
+    /// Write the result as JSON (`-`: to standard output, instead of the text)
     #[arg(long = "json", value_name = "PATH", global = true)]
     pub(crate) path: Option<PathBuf>,
 }

@@ -171,14 +171,14 @@ mod tests {
     #[test]
     fn an_error_names_the_flag_of_what_it_is_about() {
         let error =
-            Error::new("log.csv", "the rate is not known", "give it").about(Argument::SampleRate);
+            Error::new("log.csv", "the rate is unknown", "give it").about(Argument::SampleRate);
         let command = |flags: &[&'static str]| {
             let args = flags.iter().map(|f| clap::Arg::new(*f).long(*f));
             clap::Command::new("import").args(args)
         };
         assert_eq!(
             line(&error, &command(&["rate-hz", "still"])),
-            "log.csv: the rate is not known; give it (--rate-hz)"
+            "log.csv: the rate is unknown; give it (--rate-hz)"
         );
         let short = Error::new("out", "it is not empty", "give another").about(Argument::Output);
         let has = clap::Command::new("wizard").arg(clap::Arg::new("output").short('o'));
@@ -199,10 +199,10 @@ mod tests {
             reason,
         };
         let said = of_rejected(&rejected(Reason::Suggestion(1e-9)));
-        let flags = "or your word (--verify, --accept term:accel_x~rate_y*force_z)";
+        let flags = "or accept it (--verify, --accept term:accel_x~rate_y*force_z)";
         assert!(said.ends_with(flags), "{said}");
         let said = of_rejected(&rejected(Reason::OneDwell(0.83)));
-        assert_eq!(said, "it rests to 83 % on one dwell");
+        assert_eq!(said, "one dwell contains 83 % of its information");
     }
 
     #[test]

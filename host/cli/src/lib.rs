@@ -33,8 +33,7 @@ use cmd::{device, record, wizard};
 
 /// Calibration of inertial units made of analog MEMS sensors.
 ///
-/// Exit status 0: done; 1: the data were refused, with one line that says what is wrong, where, and
-/// what to do; 2: wrong usage.
+/// Exit status 0: done; 1: the data were refused, and one line gives the fault, its place and the remedy; 2: wrong usage.
 #[derive(Parser)]
 #[command(name = "mimu", version, max_term_width = 100)]
 struct Cli {
@@ -45,39 +44,39 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     #[cfg(not(target_family = "wasm"))]
-    /// From an uncalibrated board to a verified one: says what to do, watches, fits, stores and verifies
+    /// Calibrate a board interactively: gives instructions, checks each dwell, fits, verifies and stores
     Wizard(wizard::WizardArgs),
-    /// Make a recording of foreign files
+    /// Make a recording from foreign files
     Import(Box<import::ImportArgs>),
     /// Calibrate the gyro and the accelerometer of a recording
     Fit(fit::FitArgs),
-    /// Judge a calibration by another recording
+    /// Judge a calibration on another recording
     Verify(verify::VerifyArgs),
-    /// Write a recording compensated by a calibration
+    /// Apply a calibration to a recording and write the result
     Apply(apply::ApplyArgs),
-    /// What changed between calibrations of one unit, beyond their intervals
+    /// Show what changed between calibrations of one unit by more than their intervals
     Compare(cmd::compare::CompareArgs),
-    /// Find the effect behind the residual of a calibrated unit
+    /// Find the effect that causes the residual of a calibrated unit
     Diagnose(diagnose::DiagnoseArgs),
-    /// Design the experiment: which attitudes and rates, how many, for how long
+    /// Design an experiment: which attitudes and rates, how many, for how long
     Design(design::DesignArgs),
-    /// Curves over temperature, and the lag of the dies behind the thermometer: fit, compare, plan
+    /// Calibrate over temperature: plan, record, fit and compare curves
     Thermal(thermal::ThermalArgs),
-    /// Noise of a unit at rest: Allan deviation, N, B, K, Q and R
+    /// Determine the noise of a unit at rest: Allan deviation, N, B, K, Q and R
     Allan(allan::AllanArgs),
     /// Write a calibration, or noise, in the format of another program
     Export(cmd::export::ExportArgs),
-    /// Everything that is known of a unit as one page, to keep: verdict, errors, calibration, effects, noise, recordings
+    /// Write one page with everything that is known of a unit: verdict, errors, calibration, effects, noise, recordings
     Report(cmd::report::ReportArgs),
     #[cfg(not(target_family = "wasm"))]
     /// Record the raw stream of a device
     Record(record::RecordArgs),
     #[cfg(not(target_family = "wasm"))]
-    /// Talk with a device: info, stream, upload, download, self-test, counters, check, kalman
+    /// Control a device: info, stream, upload, download, trim, self-test, counters, check, kalman
     Device(device::DeviceArgs),
-    /// Print a script with which a shell completes subcommands, flags and values
+    /// Print the completion script of a shell
     Completions(cmd::completions::CompletionsArgs),
-    /// Write the manual: one page for each subcommand
+    /// Write the manual pages, one for each subcommand
     Man(cmd::man::ManArgs),
 }
 
@@ -162,7 +161,8 @@ mod tests {
         examples::command().debug_assert();
     }
 
-    /// `debug_assert` lets a conflict with an argument pass that does not exist; then nothing is refused, and completions for zsh cannot be made.
+    /// `debug_assert` lets a conflict with an argument pass that does not exist; then nothing is refused, and completions for zsh cannot be
+    /// made.
     fn conflicts_with_what_is_there(command: &clap::Command) {
         for argument in command.get_arguments() {
             command.get_arg_conflicts_with(argument);

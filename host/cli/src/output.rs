@@ -25,7 +25,7 @@ pub(crate) fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Resu
         let full = path.canonicalize().unwrap_or_else(|_| folder.join(name));
         if !full.exists() || full.is_file() {
             if taken.contains(&full) {
-                let problem = "this is an input, or another result goes there";
+                let problem = "an input or another result has this name";
                 return Err(Error::new(path.display(), problem, "choose another name"));
             }
             taken.push(full);
@@ -57,8 +57,13 @@ pub(crate) fn print(
     result: &impl Serialize,
     files: impl IntoIterator<Item = Staged>,
 ) -> Result<()> {
-    let mut pretty = serde_json::to_string_pretty(result)
-        .map_err(|e| Error::new("--json", e, "report this: the result cannot be written"))?;
+    let mut pretty = serde_json::to_string_pretty(result).map_err(|e| {
+        Error::new(
+            "--json",
+            e,
+            "report this error: the result cannot be written",
+        )
+    })?;
     pretty.push('\n');
     let file = json.file().map(|path| stage(path, pretty.clone()));
     for staged in files.into_iter().chain(file.transpose()?) {
@@ -73,7 +78,7 @@ pub(crate) fn print(
 
 /// Beginnings of lines that stand out on a terminal.
 const HEADS: [(&str, AnsiColor); 4] = [
-    ("wrong with this recording:", AnsiColor::Red),
+    ("problems of this recording:", AnsiColor::Red),
     ("warning:", AnsiColor::Yellow),
     ("verdict:", AnsiColor::Green),
     ("next:", AnsiColor::Cyan),

@@ -79,9 +79,9 @@ pub fn check(
     let powered_for_ms = who.powered_for_ms;
     if held != Some(image.hash) {
         let problem = match held {
-            None => "the device holds no calibration".to_string(),
+            None => "the device stores no calibration".to_string(),
             Some(hash) => format!(
-                "the device holds another calibration ({hash}) than that of the file ({})",
+                "the device stores another calibration ({hash}) than the file ({})",
                 image.hash
             ),
         };
@@ -122,15 +122,15 @@ pub fn check(
                     None => found.unpaired += batch.values.len() as u64,
                 }
                 if found.unpaired > wanted.max(1000) {
-                    let problem = "more samples are lost on the line than compared";
-                    let remedy = "check the cable, and end what else keeps the computer busy";
+                    let problem = "more samples were lost on the line than compared";
+                    let remedy = "check the cable, and close other programs";
                     return Err(Error::device(session.port(), problem, remedy));
                 }
                 heard = Instant::now();
                 progress(found.samples as f64 / wanted as f64);
             }
             Some(Event::Started(_)) => {
-                let remedy = "run it again; `mimu device info` says why it restarted";
+                let remedy = "run it again; `mimu device info` shows the reset cause";
                 return Err(Error::device(
                     session.port(),
                     "the device restarted meanwhile",
@@ -139,7 +139,7 @@ pub fn check(
             }
             Some(Event::Kalman(_)) => {}
             None if heard.elapsed() > SILENCE => {
-                let problem = "the compensated stream does not come";
+                let problem = "the compensated stream does not arrive";
                 return Err(Error::device(
                     session.port(),
                     problem,

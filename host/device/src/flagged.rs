@@ -55,31 +55,30 @@ impl Flagged {
         };
         warn(
             self.saturated,
-            "in batches with a reading where a sensor's output ends",
+            "in batches with a reading at the end of a sensor's range",
         );
         warn(
             self.without_reference,
-            "without the gyros' reference: their drift with the supply is in them; check its pin",
+            "without the gyros' reference, so they drift with the supply; check its pin",
         );
         for (axis, count) in AXES.iter().zip(self.temperature_left_out) {
             let what = format!(
-                "whose temperature leaves gyro {axis} out: its TEMP pin is out of range, disagrees with the others, \
-                 has made a step or stands still; check its wiring"
+                "whose temperature ignores gyro {axis}: its TEMP pin is out of range, disagrees with the others, has jumped or is stuck; check its wiring"
             );
             warn(count, &what);
         }
         warn(
             self.without_temperature,
-            "at the last good temperature: no TEMP pin is left; check their wiring",
+            "at the last good temperature, because no TEMP pin is usable; check their wiring",
         );
         warn(
             self.power_on_unknown,
-            "of a device that does not know when its power came: it takes a warm-up for over",
+            "without a known power-on, so a warm-up counts as over",
         );
         warn(self.self_test, "while the self-test deflected the sensors");
         warn(
             self.outside_range,
-            "at temperatures that the stored calibration was not made from: its curves go on straight for 5 K, and are held farther out",
+            "outside the temperatures of the stored calibration: its curves continue in a straight line for 5 K and are constant beyond",
         );
         all
     }
@@ -102,7 +101,7 @@ mod tests {
         );
         let told = flagged.warnings();
         assert_eq!(told.len(), 2);
-        assert!(told[1].starts_with("27 samples whose temperature leaves gyro y out"));
+        assert!(told[1].starts_with("27 samples whose temperature ignores gyro y"));
         for flag in [
             flags::NO_REFERENCE,
             flags::NO_TEMPERATURE,

@@ -131,12 +131,12 @@ impl fmt::Display for Started {
         match self {
             Self::PowerOn => f.write_str("power-on"),
             Self::ResetPin => f.write_str("reset pin"),
-            Self::Watchdog => f.write_str("watchdog: the program did not come round"),
+            Self::Watchdog => f.write_str("watchdog: the program stopped sampling"),
             Self::Software => f.write_str("restarted by the program"),
             Self::Panic { file, line } => write!(f, "panic in {file}, line {line}"),
             Self::Fault { pc, cfsr } => write!(f, "fault at {pc:#010x}, CFSR {cfsr:#010x}"),
             Self::Other => f.write_str("unknown"),
-            Self::NotKnown => f.write_str("a reason that this program does not know"),
+            Self::NotKnown => f.write_str("a cause that this program does not know"),
         }
     }
 }
@@ -231,10 +231,10 @@ fn version_warning(device: Version) -> Option<String> {
     match device.minor.cmp(&PROTOCOL.minor) {
         std::cmp::Ordering::Equal => None,
         std::cmp::Ordering::Less => Some(format!(
-            "the device is older than this program ({versions}): it refuses what it does not know yet"
+            "the device is older than this program ({versions}): it refuses messages that it does not know"
         )),
         std::cmp::Ordering::Greater => Some(format!(
-            "the device is newer than this program ({versions}): what it has learned since is not used"
+            "the device is newer than this program ({versions}): its additional functions are not used"
         )),
     }
 }
@@ -275,7 +275,7 @@ pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()>
         Compatibility::NotMimu => Err(Error::device(
             port,
             format!(
-                "wrong firmware: it greets as \"{}\", and not as \"{}\"",
+                "wrong firmware: it greets as \"{}\" instead of \"{}\"",
                 magic.escape_ascii(),
                 MAGIC.escape_ascii()
             ),
@@ -297,7 +297,7 @@ pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()>
 
 fn versions(device: Version) -> String {
     format!(
-        "it speaks protocol {}.{}, and this program {}.{}",
+        "its protocol is {}.{}, that of this program {}.{}",
         device.major, device.minor, PROTOCOL.major, PROTOCOL.minor
     )
 }
@@ -312,9 +312,9 @@ fn slot(slot: &Slot) -> String {
     match slot {
         Slot::Empty => "empty".into(),
         Slot::Whole { generation } => format!("whole, number {generation}"),
-        Slot::Unfinished => "unfinished: its writing, or its erasing, was cut off".into(),
-        Slot::Damaged => "damaged: it was whole once".into(),
+        Slot::Unfinished => "unfinished: writing or erasing was interrupted".into(),
+        Slot::Damaged => "damaged: it was complete before".into(),
         Slot::NotKnown => "something that this program does not know".into(),
-        Slot::NotUsable(refused) => format!("whole, and not usable: {}", refused),
+        Slot::NotUsable(refused) => format!("complete, but not usable: {}", refused),
     }
 }

@@ -113,10 +113,10 @@ impl Image {
             Some(of) => Err(Error::new(
                 place,
                 format!(
-                    "it is of the unit {of}, and the device is the unit {}",
+                    "it belongs to unit {of}, but the device is unit {}",
                     who.unit_id
                 ),
-                "upload the calibration of this unit, or insist",
+                "upload the calibration of this unit, or confirm that another one is meant",
             )
             .about(Argument::OtherUnit)),
         }
@@ -135,7 +135,7 @@ impl Image {
         };
         if who.raw_unit != "V" {
             let unit = &who.raw_unit;
-            let problem = format!("it is for raw readings in V, and the device's are in {unit}");
+            let problem = format!("it is for raw readings in V, but the device's are in {unit}");
             return refuse(place.into(), problem);
         }
         let layout = Capabilities::CURVES.and(Capabilities::TWO_LAGS);
@@ -166,14 +166,14 @@ impl Image {
         if nodes > room {
             return refuse(
                 place.into(),
-                format!("it has {nodes} temperature nodes, and the device has room for {room}"),
+                format!("it has {nodes} temperature nodes, but the device has room for {room}"),
             );
         }
         let (length, room) = (self.bytes.len(), who.room.bytes);
         if length > room as usize {
             return refuse(
                 place.into(),
-                format!("it takes {length} bytes, and the device has room for {room}"),
+                format!("it needs {length} bytes, but the device has room for {room}"),
             );
         }
         Ok(())
@@ -195,7 +195,7 @@ fn nodes(
     let Some(temperature) = &calibration.temperature else {
         let temp_c = calibration.recording.temp_c.unwrap_or_else(|| {
             warnings.push(format!(
-                "{place}: the temperature is not known; the device uses the calibration at all of them, and lists it at {REFERENCE_C} °C"
+                "{place}: its temperature is unknown; the device uses it at all temperatures and lists it at {REFERENCE_C} °C"
             ));
             REFERENCE_C
         });
@@ -224,14 +224,14 @@ fn nodes(
 fn model(calibration: &Calibration, sensor: Sensor, place: &str) -> Result<Affine<f32>> {
     let at = || format!("{place}, [{sensor}]");
     let Some(table) = calibration.table(sensor) else {
-        let problem = "it is not there, and the device needs both sensors";
+        let problem = "it is missing, and the device needs both sensors";
         return Err(Error::new(at(), problem, "calibrate both sensors"));
     };
     if table.raw_unit != RawUnit::Volt {
         return Err(Error::new(
             at(),
             format!(
-                "raw_unit is \"{}\", and the device measures V",
+                "raw_unit is \"{}\", but the device measures V",
                 table.raw_unit
             ),
             "calibrate from a recording of the device (`mimu record`)",
@@ -251,7 +251,7 @@ pub(super) fn effects_of(calibration: &Calibration, place: &str) -> Result<Vec<D
             let at = format!("{place}, [[effect]] {}", effect.id());
             let remedy = match why {
                 NotOnDevice::Numbers => "diagnose the recording again",
-                _ => "use the calibration without it, on the PC alone",
+                _ => "use a calibration without it, or apply it on the PC only",
             };
             Error::new(at, why.to_string(), remedy)
         })
@@ -269,7 +269,7 @@ fn check_room(effects: &[DeviceEffect<f32>], room: usize, place: &str) -> Result
         if *count > room {
             let at = format!("{place}, [[effect]] {effect}");
             let problem = format!("the device has room for {room} effects of a kind and triad");
-            return Err(Error::new(at, problem, "use the calibration without it"));
+            return Err(Error::new(at, problem, "use a calibration without it"));
         }
     }
     Ok(())

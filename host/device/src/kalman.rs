@@ -238,7 +238,7 @@ impl Log {
             }
             Some(Event::Kalman(state)) if state.sensor == sensor => self.reports.push(*state),
             Some(Event::Started(_)) => {
-                let remedy = "run it again; `mimu device info` says why it restarted";
+                let remedy = "run it again; `mimu device info` shows the reset cause";
                 return Err(Error::device(
                     session.port(),
                     "the device restarted meanwhile",
@@ -247,7 +247,7 @@ impl Log {
             }
             Some(_) => {}
             None if self.heard.elapsed() > SILENCE => {
-                let problem = "the raw stream does not come";
+                let problem = "the raw stream does not arrive";
                 return Err(Error::device(
                     session.port(),
                     problem,
@@ -291,7 +291,7 @@ fn taken_in(
             .iter()
             .find(|r| r.updates > before && r.updates < *end);
         let Some(report) = within else {
-            let problem = "the bank's reports were lost on the line, so its samples are not known";
+            let problem = "the bank's reports were lost on the line, so its samples are unknown";
             return Err(Error::device(port, problem, "run it again"));
         };
         let first = report.last.wrapping_sub(report.updates - before - 1);
@@ -335,8 +335,7 @@ fn replay(
         }
     }
     if missing > 0 {
-        let problem =
-            format!("{missing} of the samples that the bank took in were lost on the line");
+        let problem = format!("{missing} of the bank's samples were lost on the line");
         return Err(Error::device(port, problem, "run it again"));
     }
     Ok(bank.axes.map(|filter| {

@@ -102,7 +102,7 @@ impl Line {
                 // Of this protocol, whose greeting is read whatever its length.
                 Err(Error::device(
                     self.port.name(),
-                    "the device greets in this program's protocol, and its greeting cannot be read",
+                    "the device uses this program's protocol, but its greeting cannot be read",
                     "flash the firmware that belongs to this program (README, flashing)",
                 ))
             }

@@ -9,7 +9,7 @@ pub(super) fn of(calibration: &Calibration, place: &str, warnings: &mut Vec<Stri
     let unit_id = calibration.unit_id.as_deref().and_then(bytes);
     if unit_id.is_none() {
         warnings.push(format!(
-            "{place}: the calibration does not say of which unit it is, so that nothing tells it from that of another one; fit a recording of `mimu record`, or write unit_id into the file"
+            "{place}: the calibration does not contain the number of its unit, so it may belong to another one; fit a recording of `mimu record`, or write unit_id into the file"
         ));
     }
     let seconds = |date: &Option<String>| {

@@ -64,7 +64,7 @@ impl Port {
                 Err(e) if matches!(e.kind(), Io::TimedOut | Io::WouldBlock) => {
                     patience -= 1;
                     if patience == 0 {
-                        let problem = "the port takes no bytes";
+                        let problem = "the port accepts no bytes";
                         let remedy = "unplug the board and plug it in again";
                         return Err(Error::device(&self.name, problem, remedy));
                     }
@@ -173,7 +173,7 @@ impl Ports {
     /// What there is to choose from, as a remedy.
     pub(super) fn listed(&self) -> String {
         match [&self.of_boards[..], &self.others].concat().as_slice() {
-            [] => "no serial port is there: plug the board in".into(),
+            [] => "this computer has no serial port: plug the board in".into(),
             names => format!("name one of {}", names.join(", ")),
         }
     }
@@ -182,7 +182,10 @@ impl Ports {
     pub(super) fn left_alone(&self) -> String {
         match self.others.as_slice() {
             [] => String::new(),
-            others => format!(", left alone as no board of ours: {}", others.join(", ")),
+            others => format!(
+                ", ignored because they are not mimu boards: {}",
+                others.join(", ")
+            ),
         }
     }
 }
@@ -190,10 +193,10 @@ impl Ports {
 fn not_opened(name: &str, error: &serialport::Error) -> Error {
     // A pseudo-terminal or a board that was just pulled out can fail in ways of its own: the system's words then.
     let (problem, remedy) = match error.kind() {
-        ErrorKind::Io(Io::NotFound) => ("there is no such port".into(), ports().listed()),
+        ErrorKind::Io(Io::NotFound) => ("the port does not exist".into(), ports().listed()),
         ErrorKind::Io(Io::PermissionDenied) => (
             "no permission to open the port".into(),
-            "join the group that owns it (`sudo usermod -aG dialout $USER` on Debian) and log in again"
+            "join the group that owns the port (`sudo usermod -aG dialout $USER` on Debian) and log in again"
                 .into(),
         ),
         // What `serialport` makes of EBUSY, and of a lock that another program holds.
@@ -255,7 +258,7 @@ mod tests {
     #[test]
     fn every_reason_why_a_port_does_not_open_is_told_apart() {
         for (kind, word) in [
-            (ErrorKind::Io(Io::NotFound), "no such port"),
+            (ErrorKind::Io(Io::NotFound), "does not exist"),
             (ErrorKind::Io(Io::PermissionDenied), "no permission"),
             (ErrorKind::NoDevice, "busy"),
             (ErrorKind::Unknown, "the system's words"),

@@ -48,7 +48,7 @@ impl Session {
             (Some(_), _) => refuse("more than one device greets".into(), ports.listed()),
             (None, _) => {
                 let problem = match reasons.is_empty() {
-                    true => "no serial port of a board is there (ST-LINK, or the board's own USB)"
+                    true => "this computer has no serial port of a board (ST-LINK, or the board's own USB)"
                         .to_string(),
                     false => format!(
                         "no device greets ({})",
@@ -109,7 +109,7 @@ impl Session {
         Ok(&self.who)
     }
 
-    /// Makes a call until it is answered; `purpose` ends the sentence "it was asked ...". A refusal is an error here.
+    /// Makes a call until it is answered; `purpose` completes "the request ...". A refusal is an error here.
     pub fn call(&mut self, request: Request<'_>, purpose: &str, wait: Duration) -> Result<Answer> {
         match self.attempt(request, purpose, wait)? {
             Answer::Refused(refusal) => Err(refused(self.line.port.name(), purpose, &refusal)),
@@ -137,7 +137,7 @@ impl Session {
             None => Err(Error::device(
                 self.line.port.name(),
                 format!(
-                    "the device does not answer: it was asked {purpose}, {ATTEMPTS} times in {:.0} s ({} frames were garbled)",
+                    "the device does not answer the request {purpose}, made {ATTEMPTS} times in {:.0} s ({} frames were garbled)",
                     wait.as_secs_f64() * f64::from(ATTEMPTS),
                     self.line.ear.count().garbled
                 ),
@@ -150,7 +150,7 @@ impl Session {
     pub fn unexpected(&self, purpose: &str) -> Error {
         Error::device(
             self.line.port.name(),
-            format!("it was asked {purpose} and has answered something else"),
+            format!("its answer to the request {purpose} has another type"),
             "report this, with the output of `mimu device info`",
         )
     }
@@ -163,7 +163,7 @@ impl Session {
         if self.line.overflowed > 0 {
             return Err(Error::device(
                 self.line.port.name(),
-                format!("{} events came while nobody looked", self.line.overflowed),
+                format!("{} events arrived and were not read", self.line.overflowed),
                 "close other programs and run it again",
             ));
         }
@@ -201,12 +201,16 @@ fn no_greeting(port: &str, count: &LineCount) -> Error {
         ),
         (bytes, 0) => Error::device(
             port,
-            format!("garbage: {bytes} bytes came and no whole frame, so this is not a mimu device"),
+            format!(
+                "garbage: {bytes} bytes came but no complete frame, so this is not a mimu device"
+            ),
             "choose another port, or flash mimu-firmware (1 Mbaud, 8N1)",
         ),
         (_, frames) => Error::device(
             port,
-            format!("{frames} whole frames came and no greeting, so this is not mimu's firmware"),
+            format!(
+                "{frames} complete frames came but no greeting, so this is not mimu's firmware"
+            ),
             "choose another port, or flash mimu-firmware",
         ),
     }
@@ -216,15 +220,15 @@ fn no_greeting(port: &str, count: &LineCount) -> Error {
 pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
     let (why, remedy) = match refusal {
         Refusal::Unknown => (
-            "it knows no such request".into(),
+            "it does not know this request".into(),
             "flash the firmware that belongs to this program",
         ),
         Refusal::NoCalibration => (
-            "it holds no calibration".into(),
+            "it stores no calibration".into(),
             "upload one: `mimu device upload CAL`",
         ),
         Refusal::NoUpload => (
-            "it knows of no upload: it has restarted, or another program has ended it".into(),
+            "it has no upload in progress: it has restarted, or another program has ended the upload".into(),
             "upload again",
         ),
         Refusal::TooLong { room } => (
@@ -239,19 +243,19 @@ pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
             "upload again",
         ),
         Refusal::WrongHash { found } => (
-            format!("what it received has the hash {found:016x}, which is another"),
+            format!("the received bytes have another hash, {found:016x}"),
             "upload again",
         ),
         Refusal::NotUsable(reason) => (
-            format!("the bytes are no calibration that it can use: {}", reason),
+            format!("it cannot use the bytes as a calibration: {}", reason),
             "update device and program to the same version",
         ),
         Refusal::FlashFailed => (
-            "its flash did not take or give it; the calibration before is still in use".into(),
-            "upload again; if it stays so, the flash is worn out",
+            "its flash failed to write or read it; the previous calibration is still in use".into(),
+            "upload again; if that fails too, the flash is worn out",
         ),
         Refusal::NoBank => (
-            "no Kalman bank of this triad runs: it has restarted, or it was ended".into(),
+            "no Kalman bank of this triad is running: the device has restarted, or the bank was ended".into(),
             "run it again",
         ),
         Refusal::BadNumber => (
@@ -263,15 +267,19 @@ pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
             "wait a few seconds and run it again",
         ),
         Refusal::OtherUnit { unit_id } => (
-            format!("it is of the unit {}", origin::digits(unit_id)),
-            "upload the calibration of this unit, or insist",
+            format!("it belongs to unit {}", origin::digits(unit_id)),
+            "upload the calibration of this unit, or confirm that another one is meant",
         ),
         Refusal::NotKnown => (
-            "for a reason that this program does not know".into(),
+            "for a cause that this program does not know".into(),
             "update mimu on this computer",
         ),
     };
-    let error = Error::device(port, format!("the device refuses {purpose}: {why}"), remedy);
+    let error = Error::device(
+        port,
+        format!("the device refuses the request {purpose}: {why}"),
+        remedy,
+    );
     match refusal {
         Refusal::OtherUnit { .. } => error.about(Argument::OtherUnit),
         _ => error,

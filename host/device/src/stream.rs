@@ -111,7 +111,7 @@ pub fn stream(
             (Some(Event::Raw(batch)), Stream::Raw)
             | (Some(Event::Compensated(batch)), Stream::Compensated) => batch,
             (Some(Event::Started(_)), _) => {
-                let remedy = "run it again; `mimu device info` says why it restarted";
+                let remedy = "run it again; `mimu device info` shows the reset cause";
                 return Err(Error::device(
                     session.port(),
                     "the device restarted meanwhile",
@@ -120,7 +120,7 @@ pub fn stream(
             }
             (Some(_), _) => continue,
             (None, _) if heard.elapsed() > SILENCE => {
-                let problem = "the stream does not come";
+                let problem = "the stream does not arrive";
                 return Err(Error::device(
                     session.port(),
                     problem,

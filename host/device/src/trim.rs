@@ -105,7 +105,7 @@ pub fn trim(
         .map_err(|refused| refuse(session, &refused))?;
     let before = average(session, duration, |share| progress(0.45 * share))?;
     if let Some(motion) = before.motion() {
-        let remedy = "let it lie still and trim again; the calibration is as it was";
+        let remedy = "let it lie still and trim again; the calibration is unchanged";
         return Err(Error::device(session.port(), motion, remedy));
     }
     let input = PerSensor {
@@ -152,7 +152,7 @@ fn warnings(before: &Average, after: &Average) -> Vec<String> {
     }
     if let Some(motion) = after.motion() {
         all.push(format!(
-            "{motion} after the calibration was stored: the figures after it are of a unit that moved; look again with `mimu device stream compensated`"
+            "{motion} after the calibration was stored, so the figures after it are invalid; check with `mimu device stream compensated`"
         ));
     }
     all
@@ -172,7 +172,7 @@ fn check_size(
         for (axis, error) in AXES.iter().zip(error) {
             if !(error.abs() <= MOST[sensor]) {
                 let problem = format!(
-                    "{sensor} {axis} is off by {error:.3} {unit}, and a drift is at most {} {unit}",
+                    "{sensor} {axis} is off by {error:.3} {unit}; a drift is at most {} {unit}",
                     MOST[sensor]
                 );
                 let remedy = match sensor {

@@ -71,7 +71,7 @@ pub fn upload(
             restarts += 1;
             if restarts == BEGINNINGS {
                 let problem = format!("the device restarted in each of {BEGINNINGS} uploads");
-                let remedy = "check its supply; `mimu device info` says why it restarted";
+                let remedy = "check its supply; `mimu device info` shows the reset cause";
                 let error = Error::device(session.port(), problem, remedy);
                 return Err(told(session, image, error));
             }
@@ -81,8 +81,8 @@ pub fn upload(
     if back != image.bytes {
         return Err(Error::device(
             session.port(),
-            "what is read back is not what was sent",
-            "upload again; if it stays so, the flash is worn out",
+            "the bytes read back differ from those sent",
+            "upload again; if that fails too, the flash is worn out",
         ));
     }
     progress(1.0);
@@ -156,7 +156,7 @@ fn send(
     {
         return Err(Error::device(
             session.port(),
-            "it says that the calibration is stored, and greets with another",
+            "it reports the calibration as stored, but greets with another one",
             "upload again",
         ));
     }
@@ -177,7 +177,7 @@ pub fn outside_now(session: &mut Session, calibration: &Calibration) -> Result<O
     let away_k = (from - seen.temp_c).max(seen.temp_c - to);
     Ok((away_k > margin_k).then(|| {
         format!(
-            "the device is at {:.1} °C, {away_k:.1} K outside the {from:.1} to {to:.1} °C that the calibration was made from",
+            "the device is at {:.1} °C, {away_k:.1} K outside the {from:.1} to {to:.1} °C of the calibration",
             seen.temp_c
         )
     }))
@@ -187,11 +187,11 @@ pub fn outside_now(session: &mut Session, calibration: &Calibration) -> Result<O
 fn told(session: &mut Session, image: &Image, error: Error) -> Error {
     let holds = match session.hello() {
         Ok(who) => match &who.stored {
-            None => "the device holds no calibration, as before".to_string(),
-            Some(s) if s.hash == image.hash => "the device holds the new calibration".to_string(),
+            None => "the device stores no calibration, as before".to_string(),
+            Some(s) if s.hash == image.hash => "the device stores the new calibration".to_string(),
             Some(s) => format!("the device keeps the calibration {}", s.hash),
         },
-        Err(_) => "the device holds the old calibration or the new one, whole: `mimu device info` says which".into(),
+        Err(_) => "the device stores the old calibration or the new one, complete: `mimu device info` says which".into(),
     };
     error.map(|e| e.problem = format!("{}; {holds}", e.problem).replace("; ", ", "))
 }
@@ -202,7 +202,7 @@ pub fn download(session: &mut Session) -> Result<Vec<u8>> {
         let [a, b] = &session.who().slots;
         return Err(Error::device(
             session.port(),
-            format!("the device holds no calibration (its two places: {a}, {b})"),
+            format!("the device stores no calibration (its two places: {a}, {b})"),
             "upload one: `mimu device upload CAL`",
         ));
     };
@@ -227,12 +227,12 @@ pub fn download(session: &mut Session) -> Result<Vec<u8>> {
         return Err(Error::device(
             session.port(),
             format!(
-                "{} bytes of hash {found} came, and {} of {} are stored",
+                "{} bytes with hash {found} came, but {} with hash {} are stored",
                 all.len(),
                 info.bytes,
                 info.hash
             ),
-            "download again; if it stays so, upload the calibration again",
+            "download again; if that fails too, upload the calibration again",
         ));
     }
     Ok(all)

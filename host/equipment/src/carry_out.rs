@@ -61,7 +61,7 @@ fn each_as_words<S: Serializer>(of: &[Error], to: S) -> std::result::Result<S::O
 /// Carries out `procedure` with `equipped`, and records into what `options` say. `stop` is asked many times a second whether somebody
 /// has had enough; `show` is shown how it stands; `finishing` as of [`record`].
 ///
-/// An error means that there is no recording. The table is at rest and the chamber at its temperature of rest whatever happens.
+/// An error means that no recording was made. The table is at rest and the chamber at its temperature of rest whatever happens.
 pub fn carry_out(
     session: &mut Session,
     options: &RecordOptions,
@@ -103,7 +103,7 @@ pub fn carry_out(
     };
     let cut_short = recorded.broken_off.clone().or(run.cut_short);
     let whole = format!(
-        "; {done} of {planned} dwells and turns were had, and what was recorded is kept in {}",
+        "; {done} of {planned} dwells and turns were recorded; they are kept in {}",
         recorded.recording
     );
     Ok(CarriedOut {
@@ -146,8 +146,11 @@ impl Run<'_> {
         if stop() {
             let place = standing.last_s.unwrap_or_default();
             let place = format!("at {place:.1} s");
-            let problem = "it was interrupted, and is cut short";
-            return self.end(Error::new(place, problem, "begin anew for the rest"), false);
+            let problem = "it was interrupted and is incomplete";
+            return self.end(
+                Error::new(place, problem, "record the rest as a new recording"),
+                false,
+            );
         }
         let seen = Seen {
             now_s: self.sequence.clock(standing),

@@ -40,7 +40,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, _) = from.calibration()?;
     let mut export = Export::new("ardupilot");
     export.notes.push("ArduPilot measures gyro offsets again at every start (INS_GYR_CAL), at the temperature of that start.".into());
-    export.notes.push("It takes an accelerometer for calibrated only if INS_ACC_ID is its device id: give --accel-id, or calibrate there once and then load this file.".into());
+    export.notes.push("It accepts an accelerometer as calibrated only if INS_ACC_ID is its device id: give --accel-id, or calibrate there once and then load this file.".into());
     for (sensor, id) in options.ids() {
         let name = format!("INS_{}{}_ID", short(sensor), number(options.imu));
         export
@@ -52,7 +52,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
             let [from_c, to_c] = over.range_c;
             let range_c = [from_c.max(RANGE_C[0]), to_c.min(RANGE_C[1])];
             if range_c != [from_c, to_c] {
-                let note = "The range is cut to the -70 to 80 °C that ArduPilot has.";
+                let note = "The range is limited to ArduPilot's -70 to 80 °C.";
                 export.notes.push(note.into());
             }
             px4::cubics(calibration, options, range_c, REFERENCE_C, &mut export)?;
@@ -87,7 +87,7 @@ fn at_one_temperature(
     export: &mut Export,
 ) -> Result<()> {
     let imu = options.imu;
-    export.notes.push(format!("ArduPilot subtracts INS_TCAL{imu}_* too: set INS_TCAL{imu}_ENABLE to 0, unless they are of a calibration without these offsets."));
+    export.notes.push(format!("ArduPilot subtracts INS_TCAL{imu}_* too: set INS_TCAL{imu}_ENABLE to 0, unless they come from a calibration without these offsets."));
     for of in one_temperature::offsets(calibration, options, export)? {
         for (axis, letter) in LETTERS.iter().enumerate() {
             let offset = offset_parameter(of.sensor, axis, imu, of.offset[axis])?;
@@ -115,7 +115,7 @@ fn offset_parameter(sensor: Sensor, axis: usize, imu: u8, offset: f64) -> Result
     if sensor == Sensor::Accel {
         let range = [-MOST_OFFSET, MOST_OFFSET];
         let remedy = (
-            "give the raw reading that the driver takes for no input",
+            "give the raw reading that the driver treats as zero input",
             Argument::AccelZero,
         );
         within(sensor, axis, (&name, offset, " m/s²"), range, remedy)?;

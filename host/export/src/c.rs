@@ -1,4 +1,4 @@
-//! A C99 header: constants, and functions that make SI of raw readings as `mimu apply` does, in single precision.
+//! A C99 header: constants, and functions that convert raw readings to SI as `mimu apply` does, in single precision.
 //!
 //! It needs no library but `<math.h>`, and that only where something follows temperature or time. What it computes is what
 //! [`mimu_core::compensator`] does, in the same order:
@@ -47,7 +47,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     if !(first && letters.all(|c| c.is_ascii_alphanumeric() || c == '_')) {
         return Err(Error::new(
             "prefix",
-            format!("{prefix:?} is no name in C"),
+            format!("{prefix:?} is not a name in C"),
             "use letters, digits and underscores, a letter first",
         )
         .about(Argument::Prefix));
@@ -129,7 +129,7 @@ impl Header<'_> {
             false => String::new(),
         };
         let follow = match self.follows() {
-            true => format!("some times a second {prefix}_follow(&s, dt_s, temp_c); "),
+            true => format!("several times per second {prefix}_follow(&s, dt_s, temp_c); "),
             false => String::new(),
         };
         let of = |sensor: Sensor| match self.has_curves(sensor) {
@@ -145,11 +145,11 @@ impl Header<'_> {
         lines.push(format!("Use: {}.", all.trim_end_matches("; ")));
         if self.follows() {
             lines.push(format!(
-                "{prefix}_follow takes the time in s since its last call (the first one: since power-on) and the thermometer in degrees Celsius, NAN where it has no reading."
+                "{prefix}_follow takes the time in s since its last call (first call: since power-on) and the thermometer in degrees Celsius, NAN if it has no reading."
             ));
         }
         if self.follows_dies() {
-            lines.push("Over temperature C and o are cubic Hermite pieces between nodes, on along the slope for 5 K outside, then held.".into());
+            lines.push("Over temperature C and o are cubic Hermite segments between nodes; outside they continue along the slope for 5 K and are constant beyond.".into());
         }
         if !self.effects.written.is_empty() {
             lines.push(format!(

@@ -85,8 +85,8 @@ impl Options {
             None => Ok(()),
             Some((argument, name, _)) => Err(Error::new(
                 *name,
-                "there is no calibration that it could be about",
-                "give a calibration too, or leave it out",
+                "this option needs a calibration",
+                "give a calibration too, or leave the option out",
             )
             .about(*argument)
             .about(Argument::Calibration)),
@@ -149,7 +149,7 @@ impl Readings {
         let list = |values: [f64; 3]| values.map(|v| format!("{v:.6e}")).join(", ");
         let (sensor, unit) = (self.sensor, self.sensor.unit());
         if (factors, zeros) == ([1.0; 3], [0.0; 3]) {
-            return format!("{sensor}: the program's readings are those that were recorded.");
+            return format!("{sensor}: the program's readings are the recorded ones.");
         }
         let raw = match zeros {
             [0.0, 0.0, 0.0] => "raw".into(),
@@ -157,7 +157,7 @@ impl Readings {
         };
         let factors = list(factors);
         format!(
-            "{sensor}: readings of the program = [{factors}] {raw}, axis by axis, raw to {unit}: the driver has to convert like this."
+            "{sensor}: readings of the program = [{factors}] {raw}, axis by axis, raw to {unit}: the driver has to convert in this way."
         )
     }
 

@@ -36,7 +36,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     export.remaining.retain(|r| r.sensor == Sensor::Accel);
     if calibration.gyro.is_some() {
         let gyro = options.readings(calibration, place, Sensor::Gyro)?;
-        export.notes.push("gyro: imu_calib subtracts the mean of the first messages, and has nothing else of it. Keep the unit still then.".into());
+        export.notes.push("gyro: imu_calib only subtracts the mean of the first messages. Keep the unit still during them.".into());
         export.notes.push(gyro.line());
         export
             .remaining

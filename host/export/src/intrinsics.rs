@@ -120,7 +120,7 @@ impl Intrinsics {
             let bias = readings.forward.bias;
             export.notes.push(readings.line());
             export.notes.push(format!(
-                "{sensor}: the program estimates the bias of these readings, which was [{:.4}, {:.4}, {:.4}] {}.",
+                "{sensor}: the program estimates the bias of these readings; it was [{:.4}, {:.4}, {:.4}] {}.",
                 bias.x,
                 bias.y,
                 bias.z,

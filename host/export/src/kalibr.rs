@@ -36,7 +36,7 @@ pub struct Options {
         arg(long, value_name = "TOPIC", default_value = "/imu0")
     )]
     pub rostopic: String,
-    /// Layout of Kalibr's result, below imu0, for programs that read that one
+    /// Layout of Kalibr's result (below imu0), for programs that read this layout
     #[cfg_attr(feature = "clap", arg(long))]
     pub result: bool,
     /// What all files of noise have to be told.
@@ -142,7 +142,7 @@ fn write_intrinsics(out: &mut String, indent: &str, known: &Intrinsics, export: 
         "  x_i = R x_body, body the frame of the calibration, R = {}",
         rows(&accel.rotation)
     ));
-    export.notes.push("Kalibr estimates the intrinsics itself (--imu-models scale-misalignment) and does not start from these: they are to compare with, and for programs that read Kalibr's result.".into());
+    export.notes.push("Kalibr estimates the intrinsics itself (--imu-models scale-misalignment) and does not start from these. They serve for comparison, and for programs that read Kalibr's result.".into());
 }
 
 /// A matrix in one line.

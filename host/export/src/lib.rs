@@ -58,11 +58,11 @@ use crate::remaining::Remaining;
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Subcommand))]
 pub enum Format {
-    /// A C99 header: constants, and functions that make SI of raw readings
+    /// A C99 header: constants, and functions that convert raw readings to SI
     C(c::Options),
     /// Constants and a function for Rust programs with mimu-core
     Rust,
-    /// JSON with everything that the calibration file has, and a schema
+    /// JSON with the contents of the calibration file, and a schema
     Json,
     /// Noise and intrinsics for Kalibr: imu.yaml
     Kalibr(kalibr::Options),
@@ -94,7 +94,7 @@ pub enum Format {
     /// Parameters of ArduPilot: INS_TCAL* over temperature, INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS at one
     #[cfg_attr(feature = "clap", command(name = "ardupilot"))]
     ArduPilot(ardupilot::Options),
-    /// MCAP for Foxglove: samples raw and compensated, and poses on the sphere of gravity
+    /// MCAP for Foxglove: raw and compensated samples, and poses on the sphere of gravity
     Mcap(mcap::Options),
     /// The bytes that a device stores, for programs with mimu-core
     Core,
@@ -158,8 +158,8 @@ impl Sources<'_> {
         self.calibration.ok_or_else(|| {
             Error::new(
                 "export",
-                "this format is made from a calibration, and there is none",
-                "name the file that `mimu fit -o` wrote",
+                "this format needs a calibration",
+                "name a file of `mimu fit -o`",
             )
             .about(Argument::Calibration)
         })
@@ -173,8 +173,8 @@ impl Sources<'_> {
         self.noise.ok_or_else(|| {
             Error::new(
                 "export",
-                "this format is made from the noise of the unit, and there is none",
-                "name the file that `mimu allan -o` wrote",
+                "this format needs the noise of the unit",
+                "name a file of `mimu allan -o`",
             )
             .about(Argument::Noise)
         })

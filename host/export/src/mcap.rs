@@ -41,7 +41,7 @@ pub struct Options {
     /// Recording to compensate
     #[cfg_attr(feature = "clap", arg(long, value_name = "REC"))]
     pub recording: PathBuf,
-    /// Write every Nth sample only; each takes some 480 bytes
+    /// Write only every Nth sample; each needs about 480 bytes
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..)))]
     pub every: u32,
 }
@@ -57,7 +57,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ())?;
     let mut export = Export::new("mcap");
     export.formulas.push(
-        "x = C u + o, raw to SI, and what else the calibration holds: as `mimu apply` computes it."
+        "x = C u + o, raw to SI, and the other parts of the calibration, as `mimu apply` computes it."
             .into(),
     );
     let places = Places {
@@ -98,7 +98,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
             }
         }
         false => export.notes.push(
-            "There is no scene: it shows the accelerometer, and it is not calibrated.".into(),
+            "The scene is left out: it shows the accelerometer, which is not calibrated.".into(),
         ),
     }
     let head = heading::of_calibration(calibration, &export);

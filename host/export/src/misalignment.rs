@@ -32,7 +32,7 @@ impl Misalignment {
                         "only {:.0} % of its sensitivity is along {axis} of the body",
                         100.0 * share
                     ),
-                    "permute the columns as the body has its axes, and calibrate again",
+                    "order the columns as the body's axes, and calibrate again",
                 ));
             }
         }

@@ -38,10 +38,10 @@ pub(crate) fn offsets(
 ) -> Result<Vec<Offsets>> {
     let known = options.conversions();
     export.formulas.push(
-        "x = (v - offset) scale on each axis, raw to SI, with v what the driver makes of a raw reading; a gyro has no scale.".into(),
+        "x = (v - offset) scale on each axis, raw to SI; v is the driver's output for a raw reading; a gyro has no scale.".into(),
     );
     export.notes.push(
-        "Axes are those of the recording, which have to be those of the sensor in the autopilot."
+        "Axes are those of the recording; they have to be those of the sensor in the autopilot."
             .into(),
     );
     let places = Places {
@@ -53,7 +53,7 @@ pub(crate) fn offsets(
     let mut all = Vec::new();
     for sensor in Sensor::BOTH {
         let Some(forward) = calibration.inverse(sensor).as_ref().and_then(Forward::of) else {
-            let note = format!("The calibration has no {sensor}: nothing is written of it.");
+            let note = format!("The calibration has no {sensor}, so nothing is written for it.");
             export.notes.push(note);
             continue;
         };
@@ -69,7 +69,7 @@ pub(crate) fn offsets(
             known[sensor].si_per_raw.is_none() && calibration.recording.raw_unit != RawUnit::Si;
         if assumed {
             export.notes.push(format!(
-                "{sensor}: the driver is taken to convert by the scale factors of the calibration. State by which it does with --{sensor}-si-per-raw."
+                "{sensor}: the driver is assumed to convert with the scale factors of the calibration. Give its factors with --{sensor}-si-per-raw."
             ));
         }
         let gain = conversion.gain(&forward);
@@ -103,7 +103,7 @@ pub(crate) fn within(
     }
     Err(Error::new(
         format!("{sensor}, axis {}", AXES[axis]),
-        format!("{name} would be {value:.3}{unit}, and is from {least} to {most}"),
+        format!("{name} would be {value:.3}{unit}, but its range is {least} to {most}"),
         remedy,
     )
     .about(argument))

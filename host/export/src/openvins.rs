@@ -82,7 +82,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let comments = match from.calibration {
         None => {
             options.driver.unused()?;
-            let note = "Intrinsics are the identity: the readings have to be calibrated ones.";
+            let note = "Intrinsics are the identity: the program needs calibrated readings.";
             export.notes.push(note.into());
             heading::of_noise(noise, &export)
         }

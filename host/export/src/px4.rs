@@ -37,7 +37,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
             None => ["CAL_GYRO", "CAL_ACC"],
         };
         export.notes.push(format!(
-            "Set {gyro}{n}_ID and {accel}{n}_ID to the sensors' device ids where they are missing here: PX4 finds a table by its id only."
+            "Set {gyro}{n}_ID and {accel}{n}_ID to the sensors' device ids if they are missing here: PX4 finds a table by its id only."
         ));
     }
     match &calibration.temperature {
@@ -45,7 +45,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         None => at_one_temperature(calibration, options, &mut export)?,
     }
     if !options.qgc {
-        export.notes.push("MAVProxy's `param load` skips changes of less than 1e-6, such as X2 and X3: load this file by another program, or write it for QGroundControl.".into());
+        export.notes.push("MAVProxy's `param load` skips changes of less than 1e-6, such as X2 and X3: load this file with another program, or write it for QGroundControl.".into());
     }
     let comments = heading::comments("#", &heading::of_calibration(calibration, &export));
     export.content = options.text(&comments, &export.parameters).into_bytes();
@@ -75,7 +75,7 @@ fn at_one_temperature(
     export: &mut Export,
 ) -> Result<()> {
     export.notes.push(
-        "PX4 subtracts TC_* too: set TC_G_ENABLE and TC_A_ENABLE to 0, unless they are of a calibration without these offsets.".into(),
+        "PX4 subtracts TC_* too: set TC_G_ENABLE and TC_A_ENABLE to 0, unless they come from a calibration without these offsets.".into(),
     );
     let ids = options.ids();
     let n = options.imu - 1;
@@ -123,14 +123,15 @@ pub(crate) fn cubics(
 ) -> Result<()> {
     let mut conversions = options.conversions();
     export.notes.push(
-        "Axes are those of the recording, which have to be those of the sensor in the autopilot."
+        "Axes are those of the recording; they have to be those of the sensor in the autopilot."
             .into(),
     );
     for sensor in Sensor::BOTH {
         let known = std::mem::take(&mut conversions[sensor]);
         let Some(cubics) = BiasCubics::of(calibration, sensor, &known, range_c, reference_c)?
         else {
-            let note = format!("The calibration has no curves of the {sensor}: none are written.");
+            let note =
+                format!("The calibration has no curves of the {sensor}, so none are written.");
             export.notes.push(note);
             continue;
         };

@@ -32,7 +32,7 @@ const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 pub enum Layout {
     /// Bytes of the camera's EEPROM
     Eeprom,
-    /// As calibration.json of Intel's script
+    /// calibration.json, as of Intel's script
     Json,
 }
 
@@ -65,7 +65,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         "output = sensitivity reading - bias, SI to SI, in the frame of the calibration; {matrices}; bias of the accelerometer in m/s^2, of the gyro in {gyro_unit}"
     ));
     export.notes.extend([accel.line(), gyro.line()]);
-    export.notes.push("Axes have to be those of the depth sensor, and the recording made with the camera's motion correction off.".into());
+    export.notes.push("Axes have to be those of the depth sensor; the recording has to be made with the camera's motion correction off.".into());
     export.notes.extend(heading::temperature(calibration));
     let places = Places {
         cross_terms: true,
@@ -75,7 +75,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     export.remaining = remaining::of(calibration, places)?;
     export.content = match options.layout {
         Layout::Eeprom => {
-            export.notes.push("The table of serial numbers is left empty, and there is no extrinsic calibration, as Intel's script leaves them.".into());
+            export.notes.push("The table of serial numbers is empty and there is no extrinsic calibration, as in the files of Intel's script.".into());
             eeprom(&accel.inverse, &gyro.inverse)
         }
         Layout::Json => {

@@ -36,7 +36,7 @@ pub fn export(from: &Sources) -> Result<Export> {
     let mut export = Export::new("rust");
     export.formulas = vec![
         "x = C u + o, raw to SI. compensator() makes it; state(), follow() and apply() of mimu_core::compensator::Compensator run it.".into(),
-        format!("The same as the device computes with the calibration of hash {}, to the last bit.", image.hash),
+        format!("It computes the same as the device with the calibration of hash {}, to the last bit.", image.hash),
     ];
     export.notes.extend(image.warnings);
     let places = Places {

@@ -40,7 +40,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         "Of one sample at {rate:.3} Hz: acc_n = N sqrt(rate), acc_w = K sqrt(rate), and so for the gyro; the worst axis, {} % interval of N and K behind each.",
         100.0 * noise.confidence
     ));
-    export.notes.push("VINS counts the two readings of a step as independent: times 1.41, acc_n and gyr_n give the covariance that such readings have.".into());
+    export.notes.push("VINS treats the two readings at the ends of an interval as independent. Multiplied by 1.41, acc_n and gyr_n give the right covariance.".into());
     export.notes.push("Copy these keys into the configuration of VINS; its other keys are those of cameras and tracking.".into());
     export.notes.extend(heading::needs_calibrated(from));
     let mut out = "%YAML:1.0\n\n".to_owned();

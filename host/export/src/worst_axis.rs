@@ -142,12 +142,12 @@ fn worst(
     let Some(first) = channels.first() else {
         return Err(Error::new(
             place,
-            format!("there is no channel of the {sensor}"),
+            format!("it has no channel of the {sensor}"),
             "record both sensors: the file needs both",
         ));
     };
     if let Err(other) = first.model_in(sensor.unit()) {
-        let problem = format!("it is in {} and not in {}", other.found, sensor.unit());
+        let problem = format!("its unit is {}, not {}", other.found, sensor.unit());
         return Err(other.refused(format!("{place}, channel {}", first.name), problem));
     }
     let mut largest: Option<(f64, String)> = None;

@@ -58,16 +58,16 @@ const HEADER_OF_KEYS: &str = "\
 ";
 
 const HEADER_OF_CURVES: &str = "\
-# [gyro] and [accel] hold at recording.temp_c. Over temperature C and o follow the nodes of [temperature], by the temperature of the dies:
+# [gyro] and [accel] are valid at recording.temp_c. Over temperature C and o follow the nodes of [temperature], at the temperature of the dies:
 # between two nodes, h apart, with w from 0 to 1, a number p and its slope s are
 #   (1+2w)(1-w)^2 p0 + w^2(3-2w) p1 + h w(1-w)^2 s0 - h w^2(1-w) s1;
-# outside they go on along the slope for 5 kelvin, and are held from there on. The dies of a triad follow the thermometer with the lag_s of
+# outside they continue along the slope for 5 kelvin and are constant beyond. The dies of a triad follow the thermometer with the lag_s of
 # [temperature.dies].
 ";
 
 const HEADER_OF_KEPT: &str = "\
-# Fetched from a device, which keeps no standard deviations, no covariance and no error figures: how well it is known is not in here.
-# Numbers are of single precision. temp_c is the temperature that the device lists it at, in degrees Celsius.
+# Fetched from a device, which stores no standard deviations, no covariance and no error figures: its uncertainty is unknown.
+# Numbers have single precision. temp_c is the temperature at which the device lists it, in degrees Celsius.
 ";
 
 /// A calibration as a file holds it.

@@ -46,8 +46,8 @@ pub fn diagnosed(
     if given.is_some_and(|given| given.temperature.is_some()) {
         return Err(Error::new(
             format!("{given_name}, [temperature]"),
-            "a diagnosis goes by one model for all temperatures, and the curves would be left out",
-            "compensate the recording first (`mimu apply`), and diagnose that",
+            "a diagnosis uses one model for all temperatures and would ignore these curves",
+            "compensate the recording first (`mimu apply`), and diagnose the result",
         ));
     }
     let other = recordings.second.clone();
@@ -58,7 +58,7 @@ pub fn diagnosed(
     let mut effects = known.clone();
     for effect in found {
         effect.join(&mut effects).map_err(|problem| {
-            let remedy = "diagnose with a calibration without it";
+            let remedy = "diagnose with a calibration that lacks this effect";
             Error::new(given_name, problem, remedy)
         })?;
     }

@@ -136,8 +136,8 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     {
         return Err(Error::new(
             &prepared.place,
-            format!("there is no {only} to fit alone"),
-            format!("fit the other one, or add {only}_x, {only}_y, {only}_z"),
+            format!("the recording has no {only}"),
+            format!("fit the other sensor, or add the columns {only}_x, {only}_y, {only}_z"),
         )
         .about(Argument::Only));
     }
@@ -147,8 +147,8 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     {
         return Err(Error::undetermined(
             &prepared.place,
-            "the gyro is calibrated by turns, which need samples, and this is a table of means",
-            "give it steps of known rate (ref_rate_ columns, reference = \"table\"), or record samples",
+            "turns calibrate the gyro; they need samples, and this is a table of means",
+            "give it dwells at known rates (ref_rate_ columns, reference = \"table\"), or record samples",
         )
         .about(Argument::Only));
     }
@@ -296,11 +296,12 @@ pub(crate) fn refuse_wrong_gravity(
         sizes.sort_by(f64::total_cmp);
         let typical = sizes.get(sizes.len() / 2).copied().unwrap_or(g);
         if (0.8..1.2).contains(&typical) {
-            let problem = format!("the known forces have a size of {typical:.3}, so they are in g");
+            let problem =
+                format!("the known forces have a magnitude of {typical:.3}, so they are in g");
             return Err(Error::new(
                 format!("{}, ref_force_*_mps2", prepared.place),
                 problem,
-                format!("write them in m/s² (times {g})"),
+                format!("write them in m/s² (multiply by {g})"),
             ));
         }
     }

@@ -254,8 +254,10 @@ impl Noise {
                     _ => raw.as_str(),
                 };
                 let model = channel.model_in(unit).map_err(|other| {
-                    let problem =
-                        format!("it is in {}, and the readings are in {unit}", other.found);
+                    let problem = format!(
+                        "its unit is {}, and that of the readings is {unit}",
+                        other.found
+                    );
                     other.refused(format!("{}, channel {name}", file.place), problem)
                 })?;
                 nodes.push((channel.temp_c.unwrap_or(f64::NAN), model));
@@ -263,15 +265,15 @@ impl Noise {
             if nodes.is_empty() {
                 return Err(Error::new(
                     &file.place,
-                    format!("there is no channel {name}"),
-                    "run mimu allan on a recording that has it",
+                    format!("it has no channel {name}"),
+                    "run `mimu allan` on a recording that has this channel",
                 ));
             }
             if nodes.len() > 1 && nodes.iter().any(|n| n.0.is_nan()) {
                 return Err(Error::new(
                     format!("{}, channel {name}", file.place),
-                    "it is there more than once, and not always with a temperature",
-                    "run mimu allan on recordings with temp_c, or on one",
+                    "it occurs more than once, and not always with a temperature",
+                    "run `mimu allan` on recordings with temp_c, or on a single recording",
                 ));
             }
             nodes.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -234,7 +234,7 @@ impl Plan {
     pub fn read(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
         let text = read_text(path)?;
-        let again = "have `mimu design` or `mimu thermal plan` write the plan";
+        let again = "write the plan with `mimu design` or `mimu thermal plan`";
         let plan: Self = parse_toml(&text, &place, Some(again))?;
         if !(1..=MOST_DWELLS).contains(&(plan.rounds as usize)) {
             let problem = format!("rounds is {}", plan.rounds);
@@ -242,8 +242,12 @@ impl Plan {
             return Err(Error::new(place, problem, remedy));
         }
         if plan.format != FORMAT {
-            let problem = format!("format is {:?}, and a plan is {FORMAT:?}", plan.format);
-            return Err(Error::new(place, problem, "give the plan of an experiment"));
+            let problem = format!("format is {:?}; that of a plan is {FORMAT:?}", plan.format);
+            return Err(Error::new(
+                place,
+                problem,
+                "name a plan of `mimu design` or `mimu thermal plan`",
+            ));
         }
         Ok(plan)
     }
@@ -273,14 +277,15 @@ impl Plan {
                 let dwell = step.planned(self.carrier, gravity_mps2, &mut stands, &at)?;
                 let count = step.repeat as usize * step.poses.unwrap_or(1) as usize;
                 if all.len() + count > MOST_DWELLS {
-                    let problem = format!("the plan has more than {MOST_DWELLS} dwells by here");
+                    let problem =
+                        format!("up to this entry the plan has more than {MOST_DWELLS} dwells");
                     return Err(Error::new(at, problem, "plan fewer"));
                 }
                 all.extend(std::iter::repeat_n(dwell, count));
             }
         }
         match all.is_empty() {
-            true => Err(Error::new(place, "it has no dwell", "add a [[step]]")),
+            true => Err(Error::new(place, "the plan has no dwell", "add a [[step]]")),
             false => Ok(all),
         }
     }
@@ -349,7 +354,8 @@ impl Step {
     fn check_turn(&self, carrier: Carrier, at: &str) -> Result<()> {
         let refuse = |problem: &str, remedy: &str| Err(Error::new(at, problem, remedy));
         if carrier == Carrier::Hands && (self.turn_axis.is_some() || self.stay) {
-            let problem = "by hand nobody turns by an angle, or stays without a pose";
+            let problem =
+                "a person cannot turn the unit by an exact angle, nor stay without a pose";
             return refuse(problem, "write up = [x, y, z], or carrier = \"table\"");
         }
         if self.turn_axis.is_none() && self.turn_deg.or(self.turn_dps).is_some() {
@@ -357,7 +363,10 @@ impl Step {
             return refuse("turn_deg or turn_dps without turn_axis", remedy);
         }
         if self.stay && self.up.is_some() {
-            return refuse("stay in a step with a pose", "keep one of them");
+            return refuse(
+                "stay contradicts the pose of the same entry",
+                "keep one of them",
+            );
         }
         Ok(())
     }
@@ -377,17 +386,20 @@ impl Step {
             }
             (None, Some(_), Carrier::Hands) => Ok(None),
             (None, Some(_), Carrier::Table) => {
-                let problem = "poses lets the bench choose the attitudes, so that none is known";
-                refuse(problem, "write the direction that points up in each: up")
+                let problem = "poses lets the bench choose the attitudes, so they are unknown";
+                refuse(
+                    problem,
+                    "write the direction that points up in each entry: up",
+                )
             }
             (None, None, Carrier::Table) if stays => match stands {
                 Some(angles) => Ok(Some(angles.up())),
                 None => refuse(
-                    "the first step has no pose to begin in",
+                    "the first entry has no pose to begin in",
                     "add up = [x, y, z]",
                 ),
             },
-            _ => refuse("there has to be up, or poses", "write up = [x, y, z]"),
+            _ => refuse("up or poses is missing", "write up = [x, y, z]"),
         }
     }
 
@@ -396,9 +408,9 @@ impl Step {
         let refuse = |problem: &str, remedy: &str| Err(Error::new(at, problem, remedy));
         let turns_up = up.z.abs() < 1.0 - PARALLEL;
         if self.spin_dps != 0.0 && turns_up {
-            let problem = "spin_dps turns the direction of gravity within the dwell, so that it has no one input";
+            let problem = "spin_dps turns gravity through the sensors within the dwell, so its input is not constant";
             let remedy =
-                "record it without a plan, its steps marked, and import it with ref_ columns";
+                "record it without a plan, number its dwells, and import it with ref_ columns";
             return refuse(problem, remedy).map_err(|e| e.about(Argument::StepTimes));
         }
         // A turn about the vertical is one about the body direction that points up.
@@ -413,7 +425,7 @@ impl Step {
         let length = Duration::try_from_secs_f64(self.dwell_s.unwrap_or_default());
         match length.unwrap_or_default() {
             Duration::ZERO => {
-                let problem = "dwell_s is no length of time";
+                let problem = "dwell_s is not a length of time";
                 Err(Error::new(at, problem, "write seconds above 0"))
             }
             length => Ok(length),
@@ -439,8 +451,8 @@ impl Step {
         };
         let more = self.dwell_s.is_some() || self.poses.is_some() || self.repeat != 1;
         if more || self.rate_dps != 0.0 || self.spin_dps != 0.0 {
-            let remedy = "make the dwell a step of its own";
-            return refuse("a turn by an angle is no dwell besides", remedy);
+            let remedy = "make the dwell a separate [[step]]";
+            return refuse("a turn by an angle cannot be a dwell too", remedy);
         }
         let (turn, to) = from.turn(axis, deg, dps);
         *stands = Some(to);

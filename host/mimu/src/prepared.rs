@@ -59,7 +59,7 @@ impl Prepared {
     pub fn of(manifest: Manifest, samples: &Batch, finding: impl Into<Finding>) -> Result<Self> {
         manifest.check("manifest in memory")?;
         if samples.is_empty() {
-            let remedy = "give each sample its time in t_s and its readings in raw";
+            let remedy = "give as many readings as times: t_s and raw have one row for each sample";
             return Err(Error::new("samples in memory", "there are none", remedy));
         }
         let integrate = manifest.reference == Reference::Gravity;
@@ -83,7 +83,7 @@ impl Prepared {
         if !(1.0..f64::INFINITY).contains(&still_factor) {
             return Err(Error::new(
                 "still_factor",
-                format!("{still_factor} is no factor over the quietest variance"),
+                format!("{still_factor} cannot be a factor of the quietest variance"),
                 "give a number of at least 1; STILL_FACTOR is the usual one",
             )
             .about(Argument::StillFactor));
@@ -99,8 +99,7 @@ impl Prepared {
                 "power_on_s is {power:?} s, and the first sample at {:?} s",
                 first.start_s
             );
-            let remedy =
-                "write the t_s at which the power came to recording.toml, or leave the key out";
+            let remedy = "write the t_s of the power-on to recording.toml, or remove the key";
             return Err(Error::new(place, problem, remedy));
         }
         let mut dwells = Dwells::find(&condensed, &manifest, finding)
@@ -124,7 +123,7 @@ impl Prepared {
     /// With the noise that a record at rest has shown in place of that within the dwells. Errors: see [`Noise::state`].
     pub fn with_noise(mut self, file: &NoiseFile) -> Result<Self> {
         if self.manifest.means {
-            let problem = "a noise file says how a mean over some seconds errs, and these means have no lengths";
+            let problem = "a noise file gives the error of a mean over some seconds, and these means have no durations";
             return Err(Error::new(&self.place, problem, "leave it out"));
         }
         let Dwells { list, warnings, .. } = &mut self.dwells;
@@ -453,7 +452,7 @@ impl Prepared {
             e.place = format!("{}, {}", self.place, e.place);
             e.problem += &unused;
             if undetermined && !unused.is_empty() {
-                e.remedy = format!("mend the dwells that are not used, or {}", e.remedy);
+                e.remedy = format!("correct the dwells that are not used, or {}", e.remedy);
             }
         });
         self.with_steps_as_given(error, sensor)
@@ -464,7 +463,8 @@ impl Prepared {
         if !self.dwells.are_judged_not_still(sensor) {
             return error;
         }
-        let remedy = "; or, if the dwells of the step column are right, take them as given";
+        let remedy =
+            "; or, if the numbers of the step column are right, take these dwells as given";
         error
             .map(|e| e.remedy += remedy)
             .about(Argument::StepsGiven)

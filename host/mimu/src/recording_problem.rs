@@ -198,28 +198,28 @@ impl fmt::Display for RecordingProblem {
         match self {
             Self::Offset(axis, g) => write!(
                 f,
-                "accel_{} is off by {} g, as no working part is: look whether the part is damaged, its range is set as assumed, and its zero was subtracted",
+                "accel_{} has an offset of {} g, more than any working part: check that the part is undamaged, that its range is set as assumed, and that its zero was subtracted",
                 AXES[*axis],
                 significant(*g)
             ),
             Self::SlowForTurns(hz) => write!(
                 f,
-                "{} Hz is slow for turns by hand: record at 50 Hz or more, or turn slowly",
+                "{} Hz is a low rate for turns by hand: record at 50 Hz or more, or turn slowly",
                 significant(*hz)
             ),
             Self::Temperatures(low, high) => write!(
                 f,
-                "temperatures of {} to {} °C are not those of a board: convert the column temp_c, or leave it out",
+                "temperatures of {} to {} °C are implausible for a board: convert the column temp_c, or leave it out",
                 significant(*low),
                 significant(*high)
             ),
             Self::MissingPoses(faces) => write!(
                 f,
-                "no pose has {faces} up: the errors there are not known, so add it"
+                "no pose has {faces} up, so the errors there are unknown: add such poses"
             ),
             Self::LostSamples(count) => write!(
                 f,
-                "{count} samples were lost between the device and the PC: look at the cable and the load of the PC"
+                "{count} samples were lost between the device and the PC: check the cable and the load of the PC"
             ),
             Self::Seen(_, warnings) => {
                 let Some(first) = warnings.first() else {

@@ -254,7 +254,7 @@ fn units(
             return Err(Error::new(
                 format!("{}, calibration", RAW_COLUMNS[i]),
                 format!(
-                    "it is for readings in {}, and the recording is in {raw}",
+                    "it is for readings in {}, and those of the recording are in {raw}",
                     table.raw_unit
                 ),
                 "give the calibration of this unit",
@@ -269,8 +269,8 @@ fn units(
 fn not_finite(bad: NotFinite) -> Error {
     Error::new(
         format_args!("sample {}", bad.sample),
-        format_args!("{} is not a number that can be averaged", bad.value),
-        "choose a stretch without gaps",
+        format_args!("{} cannot be averaged", bad.value),
+        "choose a segment without gaps",
     )
 }
 

@@ -154,8 +154,8 @@ impl RatedDwells {
             [self.rates[self.rate_of[i]], fitted[i]].map(|r| significant(r.to_degrees()));
         Err(Error::new(
             format!("{}, dwell {}", prepared.place, prepared.manifest.step_name(step)),
-            format!("it is to turn at {rate} deg/s, and by the fit of all dwells it turns at {found} deg/s"),
-            "give this step its own rate, or leave it out if that is beyond the range of the gyro; look also whether the rates of the others are right (33 1/3 rpm is 200 deg/s, 45 rpm is 270 deg/s)",
+            format!("its given rate is {rate} deg/s, and by the fit of all dwells its rate is {found} deg/s"),
+            "give this dwell its true rate, or leave it out if that exceeds the range of the gyro; check the rates of the others too (33 1/3 rpm is 200 deg/s, 45 rpm is 270 deg/s)",
         )
         .about(Argument::TurntableRates))
     }
@@ -182,8 +182,8 @@ fn given(
         }
         let error = Error::new(
             format!("{}, turntable.step_rates_dps", prepared.place),
-            format!("there is no step {name}"),
-            format!("name one of the steps that there are: {}", all.join(", ")),
+            format!("no dwell has the number or label {name}"),
+            format!("name one of these: {}", all.join(", ")),
         );
         return Err(error.about(Argument::TurntableRates));
     }
@@ -199,17 +199,17 @@ fn unclear(prepared: &Prepared, rates: &[f64]) -> Error {
     let (problem, remedy) = match rates.len() {
         1 => (
             format!(
-                "the dwells are not at {} deg/s and at rest: their readings have other distances from each other",
+                "the readings of the dwells do not fit {} deg/s and rest: the differences between them have other ratios",
                 list[0]
             ),
-            "give all rates of the turntable, or the rate of each step (STEP=RATE)",
+            "give all rates of the turntable, or the rate of each dwell (STEP=RATE)",
         ),
         _ => (
             format!(
-                "which dwell turned at which of {} deg/s does not show: there is no dwell at rest, or a rate that no dwell has",
+                "the readings do not show which dwell turned at which of {} deg/s: no dwell is at rest, or no dwell has one of the rates",
                 list.join(", ")
             ),
-            "give the rate of each step (STEP=RATE), or only the rates that occur, and record rests between them",
+            "give the rate of each dwell (STEP=RATE), or give only the rates that occur and record rests between them",
         ),
     };
     Error::new(format!("{}, gyro", prepared.place), problem, remedy).about(Argument::TurntableRates)

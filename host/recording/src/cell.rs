@@ -60,7 +60,7 @@ pub(super) fn number(cell: &[u8]) -> Result<f64, Refusal> {
 pub(super) fn no_number(cell: &[u8]) -> Refusal {
     Refusal::new(
         format!("{} is not a number", shorten(cell)),
-        "correct the cell, or leave it empty where nothing was measured",
+        "correct the cell, or leave it empty if nothing was measured",
     )
 }
 
@@ -70,7 +70,7 @@ pub(super) fn no_reading(value: f64, shown: &str) -> Refusal {
         true => format!("{shown} is infinite"),
         false => format!("{shown} is too large for a reading"),
     };
-    Refusal::new(problem, "leave the cell empty where nothing was measured")
+    Refusal::new(problem, "leave the cell empty if nothing was measured")
 }
 
 /// What to say about a row without a time.
@@ -92,8 +92,8 @@ pub(super) fn step_from_value(value: f64, text: &dyn Fn() -> String) -> Result<i
         Ok(value as i32)
     } else {
         Err(Refusal::new(
-            format!("{} is not the number of a step", text()),
-            "number the steps 0, 1, 2 …; empty or -1 is in transit",
+            format!("{} is not the number of a dwell", text()),
+            "number the dwells 0, 1, 2 …; empty or -1 is in transit",
         ))
     }
 }

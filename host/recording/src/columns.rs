@@ -140,7 +140,7 @@ impl Layout {
             return Err(Error::new(
                 place,
                 format!("column t_s is missing (the header is {found})"),
-                "name the column of the time in seconds t_s, or bring the file in with `mimu import`",
+                "name the column of the time in seconds t_s, or import the file with `mimu import`",
             ));
         }
         let mut sensors = [false; 2];
@@ -156,15 +156,15 @@ impl Layout {
                 return Err(Error::new(
                     place,
                     format!("column {} is missing", missing.join(", ")),
-                    "a sensor has all three of its axes or none; add the missing ones",
+                    "a sensor needs all three axes; add the missing ones, or remove the others",
                 ));
             }
         }
         if sensors == [false, false] {
             return Err(Error::new(
                 place,
-                "neither the gyro_ nor the accel_ columns are there",
-                "a recording needs the three columns of one sensor at least",
+                "both the gyro_ and the accel_ columns are missing",
+                "a recording needs the three columns of at least one sensor",
             ));
         }
         let columns = Columns {

@@ -57,7 +57,7 @@ impl CsvFile {
             None => {
                 return Err(Error::new(
                     place,
-                    "there is no line break in the first MiB",
+                    "the first MiB has no line break",
                     "give a text file with one row a line",
                 ));
             }
@@ -81,7 +81,7 @@ impl CsvFile {
         if head[end..].trim_ascii().is_empty() && length == head.len() as u64 {
             return Err(Error::new(
                 format!("{place}, row 2"),
-                "there is a header and no row",
+                "the file has a header but no row of data",
                 "record it again",
             ));
         }
@@ -146,7 +146,7 @@ impl CsvFile {
         if rows == 0 {
             return Err(Error::new(
                 place,
-                "there is no row of data",
+                "the file has no row of data",
                 "record it again",
             ));
         }
@@ -363,7 +363,7 @@ impl<'a> Worker<'a> {
             }
         } else {
             Refusal {
-                problem: format!("the row has {cells} cells and the header {expected}"),
+                problem: format!("the row has {cells} cells, the header {expected}"),
                 remedy: "correct the row",
             }
         }

@@ -40,8 +40,8 @@ impl CsvWriter {
         let file = File::options().append(true).open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
         if length < bytes {
-            let problem = format!("it has {length} bytes, and had {bytes}");
-            return Err(Error::new(path.display(), problem, "begin a new recording"));
+            let problem = format!("it has {length} bytes, but had {bytes} before");
+            return Err(Error::new(path.display(), problem, "start a new recording"));
         }
         file.set_len(bytes).map_err(io)?;
         Ok(CsvWriter {

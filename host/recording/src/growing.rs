@@ -106,8 +106,8 @@ impl Growing {
         if let Some(column) = batch.ragged(&self.columns) {
             return Err(Error::new(
                 format!("{}, column {}", self.directory.display(), column.name()),
-                "the rows to write do not have the columns that were announced",
-                "report this: it is a mistake in the program",
+                "the rows to be written do not have the announced columns",
+                "report this error: it is a mistake in the program",
             ));
         }
         if self
@@ -201,7 +201,7 @@ impl Growing {
             Ok(done) => done.map_err(|error| Error::io(&self.directory, &error)),
             Err(_) => Err(Error::new(
                 self.directory.display(),
-                "the thread that waits for the disk broke down",
+                "the thread that writes to the disk failed",
                 "report this",
             )),
         }

@@ -88,9 +88,7 @@ impl Held {
     pub fn words(&self, sensor: &str, rate_hz: f64) -> String {
         let per_reading = self.rows_per_reading;
         format!(
-            "the {sensor} repeats its reading in {} of {} rows: a new one comes every {per_reading:.2} rows, at {:.1} Hz where the log has \
-             {rate_hz:.1} Hz. A mean is as certain as its readings are many, and not its rows, and noise quicker than that says nothing of \
-             the sensor",
+            "the {sensor} repeats its reading in {} of {} rows: a new reading comes every {per_reading:.2} rows, at {:.1} Hz, but the log has {rate_hz:.1} Hz. The certainty of a mean depends on the number of readings, not of rows, and faster noise is not the sensor's",
             self.repeated,
             self.rows,
             rate_hz / per_reading,

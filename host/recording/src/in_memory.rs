@@ -41,8 +41,8 @@ pub fn usual_rate_hz(times: &[f64]) -> Result<f64> {
         Some(period_s) if period_s > 0.0 && period_s.is_finite() => Ok(1.0 / period_s),
         _ => Err(Error::new(
             "t",
-            "the times do not say how many samples there are in a second",
-            "give times in seconds that go on, or the sample rate in their place",
+            "the times do not give the sample rate",
+            "give increasing times in seconds, or the sample rate instead",
         )
         .about(Argument::SampleRate)),
     }

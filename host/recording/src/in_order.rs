@@ -109,8 +109,8 @@ where
 pub(super) fn broke_down(place: &str) -> Error {
     Error::new(
         place,
-        "the reader broke down on the contents",
-        "the file is damaged: write it again from its source",
+        "the reader failed on the contents",
+        "the file is damaged: make it again from its source",
     )
 }
 
@@ -160,6 +160,6 @@ mod tests {
             |_, ()| Ok(()),
         )
         .unwrap_err();
-        assert!(error.to_string().starts_with("file: the reader broke down"));
+        assert!(error.to_string().starts_with("file: the reader failed"));
     }
 }

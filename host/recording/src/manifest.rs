@@ -85,7 +85,7 @@ impl std::str::FromStr for RawUnit {
             "SI" | "si" => Ok(RawUnit::Si),
             _ => Err(Error::new(
                 "raw unit",
-                format!("{} is not known", super::cell::shorten(text.as_bytes())),
+                format!("{} is unknown", super::cell::shorten(text.as_bytes())),
                 "write V, count or SI (rad/s and m/s²)",
             )),
         }
@@ -102,8 +102,8 @@ impl std::str::FromStr for Reference {
             "turntable-rate" => Ok(Reference::TurntableRate),
             _ => Err(Error::new(
                 "reference",
-                format!("{} is not known", super::cell::shorten(text.as_bytes())),
-                "write table (ref_ columns hold the input), gravity (only its size is known) or turntable-rate (only the size of the rate)",
+                format!("{} is unknown", super::cell::shorten(text.as_bytes())),
+                "write table (ref_ columns give the input), gravity (only its magnitude is known) or turntable-rate (only the magnitude of the rate)",
             )),
         }
     }
@@ -292,13 +292,13 @@ impl Manifest {
         {
             return Err(Error::new(
                 at("power_on_s"),
-                format!("{power} is no time"),
-                "write the t_s at which the power came, or leave the key out",
+                format!("{power} is not a time"),
+                "write the t_s of the power-on, or remove the key",
             ));
         }
         match (self.reference, &self.turntable) {
             (Reference::TurntableRate, None) => {
-                let problem = "the reference is the rate of a turntable, and no rate is given";
+                let problem = "reference is \"turntable-rate\", but no rate is given";
                 let remedy = "give it in deg/s: 200 for 33 1/3 rpm, 270 for 45 rpm";
                 return Err(
                     Error::new(at("turntable"), problem, remedy).about(Argument::TurntableRates)
@@ -309,10 +309,10 @@ impl Manifest {
             }
             (_, Some(_)) => {
                 let problem = format!(
-                    "rates of a turntable, and the reference is {}",
+                    "rates of a turntable are given, but reference is {}",
                     self.reference
                 );
-                let remedy = "leave them out, or let the reference be turntable-rate";
+                let remedy = "remove them, or set the reference to turntable-rate";
                 return Err(Error::new(at("turntable"), problem, remedy).about(Argument::Reference));
             }
             (_, None) => {}
@@ -364,13 +364,13 @@ pub(super) fn check_gravity(gravity: f64, place: &str) -> Result<()> {
     if (0.9..=1.1).contains(&gravity) {
         return Err(Error::new(
             place,
-            format!("{gravity} looks like g, and m/s² is asked for"),
-            "write 9.80665, or the local value if it is known",
+            format!("{gravity} looks like g, but m/s² is needed"),
+            "write 9.80665, or the local value if you know it",
         ));
     }
     Err(Error::new(
         place,
-        format!("{gravity} is no gravity on Earth"),
+        format!("{gravity} is not a gravity on Earth"),
         "write the local value in m/s², between 9.7 and 9.9",
     ))
 }

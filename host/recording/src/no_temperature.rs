@@ -22,7 +22,7 @@ impl NoTemperatures {
     pub fn problem(&self) -> Option<String> {
         let (c, at) = self.first.as_ref()?;
         Some(format!(
-            "{} of {} values are no temperatures in °C, the first is {c} {at}",
+            "{} of {} values cannot be temperatures in °C, the first is {c} {at}",
             self.count, self.of
         ))
     }

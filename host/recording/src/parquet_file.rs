@@ -73,12 +73,12 @@ impl ParquetFile {
                 .ok()
                 .and_then(|count| rows.checked_add(count))
                 .filter(|&rows| rows < 1 << 48)
-                .ok_or_else(|| damaged(&place, &"its footer counts rows that cannot be"))?;
+                .ok_or_else(|| damaged(&place, &"its footer has an impossible number of rows"))?;
         }
         if rows == 0 {
             return Err(Error::new(
                 place,
-                "there is no row of data",
+                "the file has no row of data",
                 "record it again",
             ));
         }
@@ -118,7 +118,7 @@ impl ParquetFile {
                     .first()
                     .is_some_and(|part| part == name)
             })
-            .ok_or_else(|| Error::new(&place, "there is no such column", "check the name"))?;
+            .ok_or_else(|| Error::new(&place, "the column is missing", "check the name"))?;
         let info = column.self_type().get_basic_info();
         let repeated = info.has_repetition() && info.repetition() == Repetition::REPEATED;
         if column.path().parts().len() != 1 || repeated {
@@ -154,7 +154,7 @@ impl ParquetFile {
             );
             return Err(Error::new(
                 place,
-                format!("a column of type {kind} holds no plain numbers"),
+                format!("a column of type {kind} does not contain plain numbers"),
                 "write it as DOUBLE, FLOAT, INT32 or INT64",
             ));
         }
@@ -304,7 +304,7 @@ fn decode_slice(
     };
     let mut values = Vec::new();
     cursor.read(count, &mut values).map_err(|problem| {
-        let remedy = "write the file again from its source";
+        let remedy = "make the file again from its source";
         fault(values.len().min(count - 1), Refusal { problem, remedy })
     })?;
     if column == Column::Step {
@@ -380,7 +380,9 @@ impl Cursor {
                     false => value as f64,
                 })
             }
-            _ => Err(ParquetError::General("the column holds no numbers".into())),
+            _ => Err(ParquetError::General(
+                "the column does not contain numbers".into(),
+            )),
         })
     }
 
@@ -396,7 +398,9 @@ impl Cursor {
         }
         self.advance(count, |reader, levels, count| {
             let ColumnReader::Int64ColumnReader(reader) = reader else {
-                return Err(ParquetError::General("the column holds no INT64".into()));
+                return Err(ParquetError::General(
+                    "the column does not contain INT64".into(),
+                ));
             };
             let (start, mut stored) = (wholes.len(), Vec::with_capacity(count));
             let (rows, _, _) = reader.read_records(count, Some(levels), None, &mut stored)?;
@@ -419,7 +423,9 @@ impl Cursor {
     ) -> std::result::Result<(), String> {
         self.advance(count, |reader, levels, count| {
             let ColumnReader::ByteArrayColumnReader(reader) = reader else {
-                return Err(ParquetError::General("the column holds no text".into()));
+                return Err(ParquetError::General(
+                    "the column does not contain text".into(),
+                ));
             };
             let start = texts.len();
             let (rows, _, _) = reader.read_records(count, Some(levels), None, texts)?;
@@ -525,7 +531,7 @@ fn unreadable(error: &ParquetError) -> String {
 fn damaged(place: &str, error: &dyn std::fmt::Display) -> Error {
     Error::new(
         place,
-        format!("this is no readable Parquet file: {error}"),
-        "write it again from its source",
+        format!("this is not a readable Parquet file: {error}"),
+        "make it again from its source",
     )
 }

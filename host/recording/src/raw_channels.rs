@@ -14,7 +14,7 @@ impl RawChannels {
     pub fn named(text: &str) -> Result<Self, String> {
         match text == "gyro" || text == "accel" || RAW_COLUMNS.contains(&text) {
             true => Ok(Self(text.to_owned())),
-            false => Err(format!("{} is no raw column", shorten(text.as_bytes()))),
+            false => Err(format!("{} is not a raw column", shorten(text.as_bytes()))),
         }
     }
 

@@ -54,16 +54,16 @@ impl Recording {
         let manifest = directory.join(MANIFEST_FILE);
         if !manifest.is_file() {
             let (problem, remedy) = if !directory.exists() {
-                ("there is no such directory", "check the path")
+                ("the directory does not exist", "check the path")
             } else if !directory.is_dir() {
                 (
-                    "this is a file, and a recording is a directory",
-                    "bring a foreign file in with `mimu import`",
+                    "this is a file, but a recording is a directory",
+                    "import a foreign file with `mimu import`",
                 )
             } else {
                 (
                     "the directory has no recording.toml",
-                    "bring foreign files in with `mimu import`",
+                    "import foreign files with `mimu import`",
                 )
             };
             return Err(Error::new(directory.display(), problem, remedy));
@@ -72,8 +72,8 @@ impl Recording {
         if manifest.means {
             return Err(Error::new(
                 directory.display(),
-                "it holds the means of poses, which fit and verify can use: everything else needs samples",
-                "run mimu fit or mimu verify, or import a recording of samples",
+                "it contains means of poses, which only fit and verify can use; this command needs samples",
+                "use `mimu fit` or `mimu verify`, or import a recording of samples",
             ));
         }
         let csv = directory.join("samples.csv");
@@ -83,14 +83,14 @@ impl Recording {
             (true, true) => {
                 return Err(Error::new(
                     directory.display(),
-                    "there are both samples.csv and samples.parquet",
-                    "remove the one that is not meant",
+                    "it contains both samples.csv and samples.parquet",
+                    "remove the wrong one",
                 ));
             }
             (false, false) => {
                 return Err(Error::new(
                     directory.display(),
-                    "there is neither samples.csv nor samples.parquet",
+                    "it contains neither samples.csv nor samples.parquet",
                     "add the samples, or import the recording again",
                 ));
             }
@@ -110,7 +110,7 @@ impl Recording {
                     if file.leaf(name)?.is_text() {
                         return Err(Error::new(
                             format!("{}, column {name}", parquet.display()),
-                            "the column holds text",
+                            "the column contains text",
                             "write it as DOUBLE, FLOAT, INT32 or INT64",
                         ));
                     }
@@ -139,7 +139,7 @@ impl Recording {
         let refuse = |problem, remedy| Err(Error::new(place.display(), problem, remedy));
         if samples.rows() == 0 {
             let remedy = "give each sample its time and readings";
-            return refuse("there are no samples", remedy);
+            return refuse("the recording has no samples", remedy);
         }
         if !(columns.gyro || columns.accel) {
             let remedy = "give those of the gyro, of the accelerometer, or both";

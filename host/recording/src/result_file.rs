@@ -25,7 +25,7 @@ pub fn stage(path: &Path, content: impl Into<Vec<u8>>) -> Result<Staged> {
     let path = path.to_owned();
     match std::fs::metadata(&path) {
         Ok(there) if there.is_dir() => {
-            let problem = "this is a directory, and a file is to be written";
+            let problem = "this is a directory, but a file is to be written";
             return Err(Error::new(path.display(), problem, "name a file in it"));
         }
         // A device or a pipe is written to, never replaced: `/dev/null` has to stay what it is.

@@ -254,7 +254,10 @@ fn a_directory_that_is_no_recording_says_why() {
     let nowhere = Recording::open(&folder.path().join("x"))
         .unwrap_err()
         .to_string();
-    assert!(nowhere.contains("no such directory"), "{nowhere}");
+    assert!(
+        nowhere.contains("the directory does not exist"),
+        "{nowhere}"
+    );
     let file = Recording::open(&folder.path().join(MANIFEST_FILE))
         .unwrap_err()
         .to_string();

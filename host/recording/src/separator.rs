@@ -118,7 +118,7 @@ impl FromStr for Separator {
             " " | "whitespace" => Ok(Separator::Whitespace),
             _ => Err(Error::new(
                 "separator",
-                format!("{} is not known", shorten(text.as_bytes())),
+                format!("{} is unknown", shorten(text.as_bytes())),
                 "write comma, semicolon, tab or whitespace",
             )),
         }

@@ -106,7 +106,7 @@ pub(super) fn check_target(target: &Path, replace: Option<bool>) -> Result<()> {
         Ok(metadata) => metadata,
     };
     if !metadata.is_dir() {
-        return refuse("there is a file of this name", "choose another name");
+        return refuse("a file has this name", "choose another name");
     }
     let entries = fs::read_dir(target).map_err(|error| Error::io(target, &error))?;
     let mut names = Vec::new();
@@ -118,7 +118,7 @@ pub(super) fn check_target(target: &Path, replace: Option<bool>) -> Result<()> {
         let refused = |remedy| Error::new(target.display(), "it exists already", remedy);
         return Err(match replace {
             None => refused("choose another name"),
-            Some(_) => refused("choose another name, or have it replaced").about(Argument::Replace),
+            Some(_) => refused("choose another name, or replace it").about(Argument::Replace),
         });
     }
     match names
@@ -128,8 +128,8 @@ pub(super) fn check_target(target: &Path, replace: Option<bool>) -> Result<()> {
         None => Ok(()),
         // What a person has put there is not for this program to delete.
         Some(other) => refuse(
-            &format!("it holds {other}, which belongs to no recording"),
-            "move that elsewhere, or choose another name",
+            &format!("it contains {other}, which does not belong to a recording"),
+            "move that file elsewhere, or choose another name",
         ),
     }
 }
@@ -139,7 +139,7 @@ fn sibling(target: &Path, purpose: &str) -> Result<PathBuf> {
     let Some(name) = target.file_name() else {
         return Err(Error::new(
             target.display(),
-            "this is no name for a recording",
+            "this cannot be the name of a recording",
             "give the path of a directory that does not exist yet",
         ));
     };
@@ -162,7 +162,7 @@ fn sibling(target: &Path, purpose: &str) -> Result<PathBuf> {
     }
     Err(Error::new(
         parent.display(),
-        "left-over temporary directories are in the way",
+        "temporary directories of earlier runs are in the way",
         "remove the hidden directories whose names end in -new or -old and a number",
     ))
 }

@@ -46,7 +46,7 @@ impl FromStr for TurntableRate {
             Some((step, number)) => (Some(step.trim().to_owned()), number),
             None => (None, text),
         };
-        let remedy = "write deg/s, as 200 for 33 1/3 rpm and 270 for 45 rpm, or STEP=RATE";
+        let remedy = "write deg/s (200 for 33 1/3 rpm, 270 for 45 rpm), or STEP=RATE";
         let wrong = |what: &str| {
             Error::new(
                 "rate",
@@ -54,10 +54,10 @@ impl FromStr for TurntableRate {
                 remedy,
             )
         };
-        let dps: f64 = number.trim().parse().map_err(|_| wrong("is no rate"))?;
+        let dps: f64 = number.trim().parse().map_err(|_| wrong("is not a rate"))?;
         let at_rest = dps == 0.0 && step.is_some();
         if !(at_rest || (dps > 0.0 && dps <= LARGEST_DPS)) || step.as_deref() == Some("") {
-            return Err(wrong("is no rate of a turntable"));
+            return Err(wrong("is not a rate of a turntable"));
         }
         Ok(Self { step, dps })
     }
@@ -112,15 +112,15 @@ impl Turntable {
             let remedy = "give it in deg/s: 200 for 33 1/3 rpm, 270 for 45 rpm";
             return refuse(
                 "rates_dps",
-                "no rate of the turntable is given".into(),
+                "the rate of the turntable is missing".into(),
                 remedy,
             );
         }
         if let Some(wrong) = self.rates_dps.iter().find(|r| !possible(r)) {
-            let remedy = "write deg/s without a sign, as 200 for 33 1/3 rpm";
+            let remedy = "write deg/s without a sign (200 for 33 1/3 rpm)";
             return refuse(
                 "rates_dps",
-                format!("{wrong} is no rate of a turntable"),
+                format!("{wrong} is not a rate of a turntable"),
                 remedy,
             );
         }
@@ -128,22 +128,25 @@ impl Turntable {
         sorted.sort_by(f64::total_cmp);
         if let Some(pair) = sorted.windows(2).find(|w| w[1] - w[0] < ALIKE * w[1]) {
             let problem = format!(
-                "{} and {} deg/s are too near to be told apart",
+                "{} and {} deg/s are too close to be distinguished",
                 pair[0], pair[1]
             );
             return refuse(
                 "rates_dps",
                 problem,
-                "give rates that differ by 5 % and more",
+                "give rates that differ by at least 5 %",
             );
         }
         let known = |r: &f64| *r == 0.0 || self.rates_dps.contains(r);
         if let Some((step, rate)) = self.step_rates_dps.iter().find(|(_, r)| !known(r)) {
-            let problem = format!("the rate of step {step}, {rate} deg/s, is not among rates_dps");
-            return refuse("step_rates_dps", problem, "add it there");
+            let problem = format!("the rate of dwell {step}, {rate} deg/s, is not among rates_dps");
+            return refuse("step_rates_dps", problem, "add it to rates_dps");
         }
         if !(0.0..=LARGEST_ERROR).contains(&self.rate_error) {
-            let problem = format!("{} % is no error of a known rate", 100.0 * self.rate_error);
+            let problem = format!(
+                "{} % cannot be the error of a known rate",
+                100.0 * self.rate_error
+            );
             let remedy = "write the half of a 95 % interval, in % of the rate, from 0 to 20";
             return Err(Error::new(place("rate_error"), problem, remedy)
                 .about(Argument::TurntableRateError));
@@ -159,8 +162,8 @@ pub fn rate_error(text: &str) -> Result<f64> {
     percent.map(|p| 0.01 * p).ok_or_else(|| {
         Error::new(
             "rate error",
-            format!("{} is no share", shorten(text.as_bytes())),
-            "write it in per cent, as 0.1%",
+            format!("{} is not a percentage", shorten(text.as_bytes())),
+            "write per cent, like 0.1%",
         )
     })
 }
@@ -197,8 +200,8 @@ mod tests {
             let checked = Turntable::new(&rates(list), error).check(|key| key.to_owned());
             checked.unwrap_err().to_string()
         };
-        assert!(refused("rest=0", 0.01).contains("no rate of the turntable"));
-        assert!(refused("200,201", 0.01).contains("too near"));
+        assert!(refused("rest=0", 0.01).contains("the rate of the turntable is missing"));
+        assert!(refused("200,201", 0.01).contains("too close"));
         assert!(refused("200", 0.5).contains("50 %"));
         assert!(refused("200", f64::NAN).contains("rate_error"));
     }

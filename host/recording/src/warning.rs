@@ -17,10 +17,10 @@ impl fmt::Display for Warning {
         match self {
             Self::Unfinished(folder, cut) => write!(
                 f,
-                "{}: the recording was not ended (its program was killed, or still records); what is there is used{}",
+                "{}: the recording is unfinished (its program was killed, or is still recording); the existing rows are used{}",
                 folder.display(),
                 if *cut {
-                    " but for its last row, which is cut"
+                    " except for the last one, which is cut"
                 } else {
                     ""
                 }

@@ -41,7 +41,7 @@ impl std::str::FromStr for SampleFormat {
             "parquet" => Ok(SampleFormat::Parquet),
             _ => Err(Error::new(
                 "format of the samples",
-                format!("{} is not known", super::cell::shorten(text.as_bytes())),
+                format!("{} is unknown", super::cell::shorten(text.as_bytes())),
                 "write csv or parquet",
             )),
         }
@@ -76,8 +76,8 @@ impl Writer {
         if !columns.gyro && !columns.accel {
             return Err(Error::new(
                 target.display(),
-                "a recording without a sensor is asked for",
-                "give the three columns of one sensor at least",
+                "the recording would have no sensor",
+                "give the three columns of at least one sensor",
             ));
         }
         let staging = Staging::create(target, replace)?;
@@ -105,8 +105,8 @@ impl Writer {
         if let Some(column) = batch.ragged(&self.columns) {
             return Err(Error::new(
                 format!("{}, column {}", at(0), column.name()),
-                "the rows to write do not have the columns that were announced",
-                "report this: it is a mistake in the program",
+                "the rows to be written do not have the announced columns",
+                "report this error: it is a mistake in the program",
             ));
         }
         // What the reader refuses is not written either.
@@ -116,16 +116,16 @@ impl Writer {
             if let Some(row) = values.iter().position(bad) {
                 return Err(Error::new(
                     format!("{}, column {}", at(row), column.name()),
-                    format!("{:e} is no reading", values[row]),
-                    "leave the value out where nothing was measured; every row needs its time",
+                    format!("{:e} is not a reading", values[row]),
+                    "leave the cell empty if nothing was measured; every row needs its time",
                 ));
             }
         }
         if let Some(row) = batch.step.iter().position(|&step| step < -1) {
             return Err(Error::new(
                 format!("{}, column step", at(row)),
-                format!("{} is not the number of a step", batch.step[row]),
-                "number the steps 0, 1, 2 …; -1 is in transit",
+                format!("{} is not the number of a dwell", batch.step[row]),
+                "number the dwells 0, 1, 2 …; -1 is in transit",
             ));
         }
         match &mut self.samples {
@@ -149,8 +149,8 @@ impl Writer {
         if self.rows == 0 {
             return Err(Error::new(
                 target.display(),
-                "there is no row to write",
-                "a recording needs one row at least",
+                "there are no rows to be written",
+                "a recording needs at least one row",
             ));
         }
         match self.samples {

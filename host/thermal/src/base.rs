@@ -118,31 +118,30 @@ fn check(fit: &ThermalFit, base: &Calibration) -> Result<f64> {
     };
     if !alike {
         let problem = format!(
-            "it is the calibration of {:?}, and the recording is of {:?}",
+            "the calibration belongs to {:?}, but the recording to {:?}",
             base.device, first.device
         );
         return refuse(problem, "give the calibration of the same unit");
     }
     if base.recording.raw_unit != first.raw_unit {
         let problem = format!(
-            "it takes readings in {}, and those of the recording are in {}",
+            "it is for readings in {}, but those of the recording are in {}",
             base.recording.raw_unit, first.raw_unit
         );
-        return refuse(problem, "record both by the same program");
+        return refuse(problem, "record both with the same raw unit");
     }
     if base.temperature.is_some() {
-        let problem = "it has curves over temperature already".into();
+        let problem = "it contains curves over temperature already".into();
         return refuse(problem, "give the calibration at one temperature");
     }
     if !base.is_uncertain() {
-        let problem =
-            "it does not say how well it is known, as it was fetched from a device".into();
+        let problem = "it has no covariance, because it was read from a device".into();
         return refuse(problem, "give the file that was uploaded to the device");
     }
     let mut thermal = base.effects().iter().filter(|e| e.candidate.is_thermal());
     if let Some(effect) = thermal.next() {
         let problem = format!(
-            "its effect {} follows the temperature, and so do the curves: they would be applied twice",
+            "its effect {} depends on temperature, and so do the curves: the effect would be applied twice",
             effect.candidate.id()
         );
         return refuse(problem, "give a calibration without that effect");
@@ -155,7 +154,7 @@ fn check(fit: &ThermalFit, base: &Calibration) -> Result<f64> {
         return refuse(problem, "give the calibration of the same unit");
     }
     let Some(at_c) = base.recording.temp_c else {
-        let problem = "it does not say at which temperature it holds".into();
+        let problem = "it does not give the temperature at which it is valid".into();
         let remedy =
             "make it from a recording with a temp_c column, or write recording.temp_c into it";
         return refuse(problem, remedy);
@@ -163,9 +162,12 @@ fn check(fit: &ThermalFit, base: &Calibration) -> Result<f64> {
     let [from, to] = range(&fit.joint);
     if at_c < from - NEAR_C || at_c > to + NEAR_C {
         let problem = format!(
-            "it holds at {at_c:.1} °C, and the dies were at {from:.1} to {to:.1} °C: what the biases are between is not known"
+            "it is valid at {at_c:.1} °C, but the dies were at {from:.1} to {to:.1} °C: the biases in between are unknown"
         );
-        return refuse(problem, "record through the temperature of the calibration");
+        return refuse(
+            problem,
+            "make a recording that crosses the temperature of the calibration",
+        );
     }
     Ok(at_c)
 }

@@ -87,7 +87,7 @@ pub fn estimate(
     curves(sensor, &points, shape).map(Some).ok_or_else(|| {
         Error::undetermined(
             format!("{sensor}, estimator {}", classic.name()),
-            format!("only {count} temperatures have all the poses and turns that it needs"),
+            format!("only {count} temperatures have all poses and turns that this estimator needs"),
             "use the joint estimator, or repeat the whole scheme at five temperatures or more",
         )
         .about(Argument::Estimator)

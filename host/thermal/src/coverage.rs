@@ -72,10 +72,10 @@ pub fn check(sessions: &[Session], warnings: &mut Vec<Warning>) -> Result<()> {
         } = used;
         if samples < FEWEST_SAMPLES || temperatures < FEWEST_TEMPERATURES {
             let problem = format!(
-                "of the {sensor} only {} are found to be at rest",
+                "of the {sensor}'s samples only {} are found to be at rest",
                 used.words()
             );
-            let remedy = "record the unit at rest, or declare that it was";
+            let remedy = "record the unit at rest, or declare that it was at rest";
             return Err(
                 Error::undetermined(&sessions[0].place, problem, remedy).about(Argument::AtRest)
             );

@@ -44,7 +44,7 @@ impl<'a> Evaluator<'a> {
         let problem = Problem::new(sessions, sensor, shape, range, gravity)?;
         let penalties = Penalties::of(&problem);
         let white = noise::white(&problem).ok_or_else(|| {
-            let problem = "no dwell is long enough to see its noise";
+            let problem = "no dwell is long enough to show its noise";
             let remedy = "dwell for a second or longer";
             Error::undetermined(format!("{}, {sensor}", sessions[0].place), problem, remedy)
         })?;

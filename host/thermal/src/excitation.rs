@@ -42,14 +42,14 @@ pub fn check(gram: &Matrix4<f64>, sensor: Sensor) -> Result<()> {
     let (problem, remedy) = match sensor {
         Sensor::Gyro => (
             format!(
-                "no turn tells its scale factors along {} from its biases",
+                "no turn distinguishes its scale factors along {} from its biases",
                 AXES[axis]
             ),
-            "turn about every axis both ways at all temperatures",
+            "turn about every axis in both directions at all temperatures",
         ),
         Sensor::Accel => (
             format!(
-                "no pose tells its scale factors along {} from its biases",
+                "no pose distinguishes its scale factors along {} from its biases",
                 AXES[axis]
             ),
             "point every axis up and down at all temperatures",

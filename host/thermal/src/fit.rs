@@ -214,7 +214,7 @@ fn check_verifying(sessions: &[Session], verify: &[Session]) -> Result<()> {
     for other in verify {
         if other.device != first.device {
             let problem = format!(
-                "this is a recording of {:?}, not of {:?}",
+                "this recording belongs to {:?}, not to {:?}",
                 other.device, first.device
             );
             let remedy = "verify with a recording of the same unit";
@@ -233,7 +233,7 @@ fn check_range(joint: &Joint, wanted: Option<[f64; 2]>) -> Result<()> {
         return Ok(());
     }
     let problem = format!(
-        "the dies were at {low:.1} to {high:.1} °C, and the curves are to cover {from} to {to} °C"
+        "the dies were at {low:.1} to {high:.1} °C, but the curves are to cover {from} to {to} °C"
     );
     let remedy = "heat and cool the unit through the whole range, with time for the dies to follow";
     Err(Error::undetermined("range", problem, remedy))

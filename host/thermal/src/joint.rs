@@ -269,7 +269,7 @@ fn no_solution(sessions: &[Session]) -> Error {
     let place = sessions.first().map_or("thermal", |s| s.place.as_str());
     Error::undetermined(
         place,
-        "the rows do not determine the curves at any lag",
+        "the data do not determine the curves at any lag",
         "excite every axis at all temperatures",
     )
 }

@@ -45,7 +45,7 @@ pub fn over_temperature(joint: &Joint) -> Result<OverTemperature> {
     if !(range_c[0] <= range_c[1]) {
         return Err(Error::undetermined(
             "calibration",
-            "only biases were estimated, and a calibration needs scale factors and misalignments too",
+            "only biases were estimated, but a calibration needs scale factors and misalignments too",
             "give the unit's calibration at one temperature, fit a recording with a table, or write no calibration",
         )
         .about(Argument::Base));

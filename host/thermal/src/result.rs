@@ -176,7 +176,7 @@ impl SensorResult {
             lag_s: lag.as_ref().ok().copied(),
             lag_reason: lag.err(),
             inseparable: gravity.then_some(
-                "in one pose the bias along gravity and the scale factor times gravity are one number: the curves are of their sum",
+                "in one pose only the sum of the bias along gravity and the scale factor times gravity is known: the curves are those of the sum",
             ),
             judged_by: if curves.biases_only() { "pieces" } else { "dwells" },
             bins: judged.map(|j| j.bins.clone()).unwrap_or_default(),
@@ -202,7 +202,9 @@ fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<Lag, String> {
         });
     }
     if fit.joint.one_way {
-        return Err("the temperature goes one way only: lag and slope cannot be told apart".into());
+        return Err(
+            "the temperature goes one way only: lag and slope cannot be distinguished".into(),
+        );
     }
     if !found.is_determined() {
         return Err(format!(
@@ -212,7 +214,7 @@ fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<Lag, String> {
     }
     if let Some([from, to]) = fit.joint.contradicted[sensor] {
         return Err(format!(
-            "not determined: the axes contradict each other, by themselves they want {from:.0} to {to:.0} s, where one lag for all would be {value:.1} s ({lower:.1} to {upper:.1} s)"
+            "not determined: the axes contradict each other. Separately their lags are {from:.0} to {to:.0} s; one lag for all would be {value:.1} s ({lower:.1} to {upper:.1} s)"
         ));
     }
     Ok(found)

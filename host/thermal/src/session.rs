@@ -80,12 +80,12 @@ impl Session {
     pub fn of(prepared: &Prepared) -> Result<Self> {
         let manifest = &prepared.manifest;
         if manifest.means {
-            let problem = "these are means of poses, without times and without a thermometer";
-            let remedy = "give the recording of samples that they were made of";
+            let problem = "these are means of poses, without times and temperatures";
+            let remedy = "give the recording of samples from which they were computed";
             return Err(Error::new(&prepared.place, problem, remedy));
         }
         if manifest.reference == Reference::TurntableRate {
-            let problem = "only the magnitude of the rate is known, and curves over temperature need known inputs or gravity";
+            let problem = "only the magnitude of the rate is known, but curves over temperature need known inputs or gravity";
             let remedy = "give a recording from a rate table, or of a unit that stands still (reference = \"gravity\")";
             return Err(Error::new(&prepared.place, problem, remedy));
         }
@@ -188,7 +188,7 @@ fn unused(prepared: &Prepared) -> String {
     let outside = 1.0 - within as f64 / prepared.condensed.rows.max(1) as f64;
     let sensor = Sensor::BOTH.into_iter().find(|s| prepared.has(*s));
     format!(
-        "{:.1} % of the samples lie in no dwell{}",
+        "{:.1} % of the samples are outside of dwells{}",
         100.0 * outside,
         sensor.map_or_else(String::new, |sensor| dwells.unused(sensor))
     )

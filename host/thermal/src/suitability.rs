@@ -31,15 +31,15 @@ pub fn check_alike(sessions: &[Session]) -> Result<()> {
         };
         if !alike {
             let problem = format!(
-                "this is a recording of {:?}, and {} is one of {:?}: two units have two sets of curves",
+                "this recording belongs to {:?}, but {} belongs to {:?}: two units have two sets of curves",
                 other.device, first.place, first.device
             );
-            let remedy = "fit the recordings of each unit by themselves";
+            let remedy = "fit the recordings of each unit separately";
             return Err(Error::new(&other.place, problem, remedy));
         }
         if first.raw_unit != other.raw_unit || first.reference != other.reference {
             let problem = format!(
-                "its readings are in {} with reference {:?}, those of {} in {} with reference {:?}",
+                "its readings are in {} with reference {:?}, but those of {} are in {} with reference {:?}",
                 other.raw_unit, other.reference, first.place, first.raw_unit, first.reference
             );
             let remedy = "fit recordings of one kind together";
@@ -140,7 +140,7 @@ impl Spans {
         } else if shows(used) {
             (
                 format!(
-                    "its dwells span {}, and no more than {} within one recording, each of which has biases of its own: {needs}",
+                    "its dwells span {}, but at most {} within one recording, and each recording has separate biases: {needs}",
                     words(used),
                     words(widest)
                 ),
@@ -150,12 +150,12 @@ impl Spans {
         } else if shows(column) {
             (
                 format!(
-                    "the column spans {}, and the dwells that are used {}, as {}: {needs}",
+                    "the column spans {}, but the dwells that are used span {}, because {}: {needs}",
                     words(column),
                     words(used),
                     sessions[0].unused
                 ),
-                "hold the unit still at more temperatures, or declare that it was",
+                "hold the unit still at more temperatures, or declare that it was at rest",
                 true,
             )
         } else {
@@ -183,7 +183,7 @@ pub fn check_speed(sessions: &[Session], lag: &Lag, span: f64) -> Result<()> {
         let behind = fastest * lag.value.abs();
         if behind > BEHIND_SHARE * span {
             let problem = format!(
-                "the ramp of {} K/min is too fast: the dies are {} K off the thermometer by their lag of {}",
+                "the ramp of {} K/min is too fast: the dies differ from the thermometer by {} K because of their lag of {}",
                 significant(fastest * 60.0),
                 significant(behind),
                 duration(lag.value.abs())

@@ -61,7 +61,7 @@ impl Thermometer {
         };
         check_possible(&condensed.no_temperatures, &place)?;
         if known.is_empty() {
-            return Err(missing(&place, "there is no temperature"));
+            return Err(missing(&place, "temp_c is empty throughout"));
         }
         check_gaps(&condensed.blocks, &place)?;
         check_stuck(&known, &place)?;
@@ -253,11 +253,11 @@ fn extremes(values: &[f64]) -> [f64; 2] {
 
 fn missing(place: &str, problem: &str) -> Error {
     let remedy =
-        "record the thermometer with every sample: curves over temperature need it all the way";
+        "record the thermometer with every sample: curves over temperature need it throughout";
     Error::new(place, problem, remedy)
 }
 
-/// Refuses samples without a temperature for longer than can be interpolated. Where there are no samples, none is missing.
+/// Refuses samples without a temperature for longer than can be interpolated. Where the recording has no samples, none is missing.
 fn check_gaps(blocks: &[Block], place: &str) -> Result<()> {
     let runs = blocks.chunk_by(|a, b| a.temp_c.mean.is_nan() == b.temp_c.mean.is_nan());
     let without = runs.filter(|run| run[0].temp_c.mean.is_nan());
@@ -266,7 +266,7 @@ fn check_gaps(blocks: &[Block], place: &str) -> Result<()> {
         .max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
     match longest {
         Some([from, to]) if to - from > LONGEST_GAP_S => {
-            let problem = format!("there is no temperature from {from:.1} s to {to:.1} s");
+            let problem = format!("temp_c has no value from {from:.1} s to {to:.1} s");
             Err(missing(place, &problem))
         }
         _ => Ok(()),
@@ -301,7 +301,7 @@ fn check_stuck(known: &[(f64, f64)], place: &str) -> Result<()> {
     match longest {
         Some([from, to]) if to - from > SHORTEST_STUCK_S.max(STUCK_FACTOR * usual) => {
             let problem = format!(
-                "the thermometer sticks: from {from:.1} s on it repeats one value for {}, where it usually keeps one for {}",
+                "the thermometer sticks: from {from:.1} s on it repeats one value for {}, usually for {} only",
                 duration(to - from),
                 duration(usual)
             );
@@ -335,7 +335,7 @@ fn check_jumps(series: &Thermometer, power_on_s: f64, place: &str) -> Result<()>
         let around = [at.saturating_sub(1), (at + 2).min(series.temp_c.len() - 1)];
         let whole = (series.temp_c[around[1]] - series.temp_c[around[0]]).abs();
         let problem = format!(
-            "the thermometer jumps by {} K at {:.0} s, where all but one second in two hundred change it by less than {} K",
+            "the thermometer jumps by {} K at {:.0} s; in all but one of two hundred seconds it changes by less than {} K",
             significant(whole.max(jump)),
             series.start_s + at as f64 * STEP_S,
             significant(usual)

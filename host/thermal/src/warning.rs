@@ -47,13 +47,13 @@ impl fmt::Display for Warning {
                 )?;
                 match turned {
                     0 => f.write_str("three bias offsets of the accelerometer")?,
-                    turned if turned == moved => f.write_str("six bias offsets of its own")?,
+                    turned if turned == moved => f.write_str("six separate bias offsets")?,
                     turned => write!(
                         f,
                         "bias offsets of the accelerometer, and {turned} of them bias offsets of the gyro as well"
                     )?,
                 }
-                f.write_str(", as gravity adds to them")
+                f.write_str(", because gravity adds to them")
             }
             Self::BiasJumps(jumps, raw_unit) => {
                 let size = |jump: &BiasJump| {
@@ -70,39 +70,34 @@ impl fmt::Display for Warning {
                 let more = if jumps.len() > NAMED { ", ..." } else { "" };
                 write!(
                     f,
-                    "the gyro's bias jumps {}, {}{more}, while gravity stays within a tenth of where it was: no move of the unit does that, so \
-                     the readings before and after are kept, the curves go between them, and the intervals hold the jumps as they hold the \
-                     wander of a bias",
+                    "the gyro's bias jumps {}, {}{more}, while gravity changes by less than a tenth, so the unit was not moved. The readings before and after are kept, the curves pass between them, and the intervals include the jumps like the wander of a bias",
                     plural(jumps.len() as u64, "time"),
                     each.join(", ")
                 )
             }
             Self::Coverage(sensor, used) => write!(
                 f,
-                "the {sensor} uses {}: the rest is not found to be at rest, or is clipped",
+                "the {sensor} uses {}: the other samples are not found to be at rest, or are clipped",
                 used.words()
             ),
             Self::NotCrossed([low, high]) => write!(
                 f,
-                "no recording crosses {low:.1} to {high:.1} °C: what the biases do in between is drawn from one power-on to another, and the \
-                 intervals hold nothing of how well they repeat"
+                "no recording crosses {low:.1} to {high:.1} °C: there the curves connect biases of different power-ons, and the intervals do not include their repeatability"
             ),
             Self::StraightLines(span) => write!(
                 f,
-                "the recordings span {} K: curves are straight lines, as curvature needs 20 K",
+                "the recordings span {} K: curves are straight lines, because curvature needs 20 K",
                 significant(*span)
             ),
             Self::CurvatureRefused(times) => write!(
                 f,
-                "curvature refused: fitted to the first two thirds, curves miss the last third {} times as far as straight lines do, and a \
-                 drift in time is not told from curvature where the temperature goes one way only",
+                "curvature refused: fitted to the first two thirds, curves miss the last third by {} times as much as straight lines do. If the temperature goes one way only, a drift in time cannot be distinguished from curvature",
                 significant(*times)
             ),
             Self::WithoutNoise => f.write_str(
-                "intervals of the biases hold the wander that the recordings show, and nothing of what is slower: a noise file, which mimu allan \
-                 writes of the unit at rest for hours, shows it",
+                "intervals of the biases include only the wander that the recordings show. A noise file shows slower wander: run `mimu allan` on the unit at rest for hours",
             ),
-            Self::TwoUnits(a, b) => write!(f, "they are of two units, {a:?} and {b:?}"),
+            Self::TwoUnits(a, b) => write!(f, "they belong to two units, {a:?} and {b:?}"),
         }
     }
 }

@@ -70,7 +70,7 @@ pub fn mirrored(shown: &[[Vector3<f64>; 2]], limit_deg: f64) -> Option<String> {
         .into_iter()
         .find(|by| shown.iter().all(|s| is(by, s)))?;
     Some(format!(
-        "{others} of {} poses came otherwise than they were asked for, all in the same way: {}",
+        "{others} of {} poses differ from the requested ones, all in the same way: {}",
         shown.len(),
         words(Sensor::Accel, &by)
     ))
@@ -105,14 +105,14 @@ pub fn frames_apart(fit: &Fit) -> Option<String> {
         );
     }
     Some(format!(
-        "axes of gyro and accelerometer of the same name are {most:.0} degrees apart, as if {}",
+        "axes of gyro and accelerometer with the same name are {most:.0} degrees apart, as if {}",
         causes.join(", or ")
     ))
 }
 
 /// What to do about it.
 pub const REMEDY: &str =
-    "check wiring, signs and the order of the columns, and begin anew in another folder";
+    "check wiring, signs and the order of the columns, and start a new session in another folder";
 
 #[cfg(test)]
 mod tests {

@@ -139,7 +139,7 @@ impl DeviceBanks {
             return Err(why.clone());
         }
         if !self.runs {
-            return Err("they have taken in no dwell".into());
+            return Err("they have received no dwell".into());
         }
         self.runs = false;
         let spoiled = self.spoiled;
@@ -190,7 +190,7 @@ impl ByDevice {
             let triad = inverse.and_then(|c| Triad::from_inverse(c, before.inverse_parts()));
             let Some(triad) = triad else {
                 let problem = format!("the device's estimate of the {} is singular", sensor.sensor);
-                let remedy = "run it again, and have the PC estimate the calibration";
+                let remedy = "run it again with the PC's estimate";
                 return Err(Error::new(unit, problem, remedy).about(Argument::EstimatedBy));
             };
             let both = before.forward_estimates().into_iter();
@@ -209,13 +209,13 @@ impl ByDevice {
         let (apart, name) = most;
         if !(apart <= MOST_APART) {
             let problem = format!(
-                "the device's Kalman filters and the PC's fit of the same dwells are {apart:.1} standard deviations apart in {name}"
+                "the device's Kalman filters and the PC's fit of the same dwells differ by {apart:.1} standard deviations in {name}"
             );
-            let remedy = "run it again, have the PC estimate the calibration, and report this";
+            let remedy = "run it again with the PC's estimate, and report this";
             return Err(Error::new(unit, problem, remedy).about(Argument::EstimatedBy));
         }
         Ok(format!(
-            "the calibration is the device's own estimate; from the PC's it is {apart:.2} standard deviations away at most ({name})"
+            "the calibration is the device's estimate; it differs from the PC's by at most {apart:.2} standard deviations ({name})"
         ))
     }
 }

@@ -48,10 +48,10 @@ impl DeviceSource {
             who.board, who.firmware, who.unit_id
         )];
         told.push(match &who.stored {
-            None => "it holds no calibration".into(),
-            Some(held) => format!("it holds the calibration {}", held.hash),
+            None => "it stores no calibration".into(),
+            Some(held) => format!("it stores the calibration {}", held.hash),
         });
-        told.push(format!("it started by: {}", who.start));
+        told.push(format!("last reset cause: {}", who.start));
         told.extend(who.warnings.iter().cloned());
         let unit = Unit {
             id: who.unit_id.clone(),

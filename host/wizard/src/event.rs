@@ -312,13 +312,13 @@ impl Question {
     pub fn words(&self) -> String {
         match self {
             Self::PowerCycled => {
-                "unplug the board, plug it in again, and say yes; no leaves that out".into()
+                "unplug the board, plug it in again, and answer yes; no skips this test".into()
             }
             Self::StoreEffects(effects) => {
                 format!("verify and store the calibration with {effects}?")
             }
-            Self::StoreRough(why) => format!("{why}; store it all the same?"),
-            Self::GoOn(why) => format!("{why}; go on all the same?"),
+            Self::StoreRough(why) => format!("{why}; store it anyway?"),
+            Self::GoOn(why) => format!("{why}; continue anyway?"),
         }
     }
 }

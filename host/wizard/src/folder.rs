@@ -160,7 +160,7 @@ impl Folder {
         }
         let text = mimu_recording::read_text(&file)?;
         let begun: Begun = serde_json::from_str(&text).map_err(|e| {
-            let remedy = "give another folder, or remove this one";
+            let remedy = "name another folder, or remove this one";
             Error::new(file.display(), e, remedy).about(Argument::Output)
         })?;
         Ok(Some(begun))
@@ -169,7 +169,7 @@ impl Folder {
     /// Begins a session in a new folder.
     pub fn create(path: &Path, begun: &Begun) -> Result<Self> {
         if path.exists() && fs::read_dir(path).is_ok_and(|mut d| d.next().is_some()) {
-            let problem = "the folder is not empty, and holds no session";
+            let problem = "the folder is not empty and contains no session";
             let error = Error::new(path.display(), problem, "give another folder");
             return Err(error.about(Argument::Output));
         }
@@ -195,7 +195,7 @@ impl Folder {
         for (k, line) in (1..).zip(text[..whole].lines()) {
             let entry = serde_json::from_str(line).map_err(|e| {
                 let place = format!("{}, line {k}", file.display());
-                Error::new(place, e, "begin anew in another folder")
+                Error::new(place, e, "start a new session in another folder")
             })?;
             entries.push(entry);
         }
@@ -367,10 +367,10 @@ impl OpenRecording {
                 )?;
                 if samples.len() as u64 != rows {
                     let problem = format!(
-                        "it holds {} rows, and the journal says {rows}",
+                        "it has {} rows, but by the journal it should have {rows}",
                         samples.len()
                     );
-                    let remedy = "begin anew in another folder";
+                    let remedy = "start a new session in another folder";
                     return Err(Error::new(directory.display(), problem, remedy));
                 }
                 growing

@@ -102,7 +102,7 @@ impl SessionConfig {
             false => "as given",
         };
         format!(
-            "gravity is taken to be {:.4} m/s² ({source}): each ppm that it is off is a ppm of every scale factor of the accelerometer, in no interval",
+            "gravity is assumed to be {:.4} m/s² ({source}): each ppm of its error is a ppm of every scale factor of the accelerometer, and no interval includes it",
             self.gravity_mps2
         )
     }

@@ -53,19 +53,19 @@ pub fn resumed(begun: &SessionConfig, now: &SessionConfig, place: &Path) -> Resu
     let (mut arguments, mut differ): (Vec<Argument>, Vec<String>) = both
         .filter(|(begun, now)| begun != now)
         .map(|((argument, name, begun), (.., now))| {
-            (argument, format!("{name} was {begun} and is {now}"))
+            (argument, format!("{name} was {begun}, now it is {now}"))
         })
         .unzip();
     if differ.is_empty() && begun.steps != now.steps {
-        differ.push("the planned poses are others".into());
+        differ.push("the planned poses differ".into());
         arguments.extend([Argument::Plan, Argument::Seed]);
     }
     if !differ.is_empty() {
         let problem = format!(
-            "the session was begun with something else: {}",
+            "the session was started with other settings: {}",
             differ.join(", ")
         );
-        let remedy = "give what it was begun with, or another folder";
+        let remedy = "give the same settings, or another folder";
         arguments.push(Argument::Output);
         let error = Error::new(place.display(), problem, remedy);
         return Err(arguments.into_iter().fold(error, Error::about));

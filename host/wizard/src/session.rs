@@ -175,7 +175,7 @@ fn finished(path: &Path, now: &SessionConfig) -> Result<Option<UnitOutcome>> {
         effects: effects.unwrap_or_default(),
         stored: existing(WITH_EFFECTS).or(existing(PLAIN)),
         page: existing("diagnosis.html"),
-        notes: vec!["the session was finished before, and nothing was done now; another begins in another folder".into()],
+        notes: vec!["the session is finished already, so nothing was done; for a new session name another folder".into()],
         ..UnitOutcome::default()
     }))
 }
@@ -226,9 +226,11 @@ impl OpenSession<'_> {
         let limit = wizard.asked.warm_c_per_min;
         let words = match limit {
             Some(limit) => format!(
-                "until the temperature changes by less than {limit} °C/min; leave the unit still"
+                "until the temperature changes by less than {limit} °C/min; leave the unit at rest"
             ),
-            None => "until it is known how quiet the unit can be; leave it still".into(),
+            None => {
+                "until the noise of the unit at rest is measured; leave the unit at rest".into()
+            }
         };
         wizard.begin_phase(Phase::WarmUp, words);
         or_cancelled!(wizard.warm_up());
@@ -262,12 +264,12 @@ impl OpenSession<'_> {
         }
         let wizard = &mut self.wizard;
         let steps = wizard.asked.verification.clone();
-        let words = format!("{} poses that were not used", steps.len());
+        let words = format!("{} poses that the fit has not used", steps.len());
         wizard.begin_phase(Phase::Verification, words);
         or_cancelled!(wizard.dwells(Part::Verification, &steps));
         self.finish()?;
         self.wizard
-            .begin_phase(Phase::Store, "what was verified is stored".into());
+            .begin_phase(Phase::Store, "storing the verified calibration".into());
         let mut plain = Vec::new();
         for (k, fitted) in fits.into_iter().enumerate() {
             let created = self.wizard.units[k]
@@ -279,7 +281,7 @@ impl OpenSession<'_> {
             let rough = judged.rough().filter(|_| judged.passed());
             match &rough {
                 Some(why) => {
-                    let words = format!("{why}: what errs is looked for before anything is stored");
+                    let words = format!("{why}: the error is diagnosed before anything is stored");
                     self.wizard.tell(Event::Note { words });
                 }
                 None if judged.passed() => or_cancelled!(self.store(k, PLAIN, &calibration)),
@@ -292,8 +294,10 @@ impl OpenSession<'_> {
                 rough,
             });
         }
-        self.wizard
-            .begin_phase(Phase::Diagnosis, "what still errs".into());
+        self.wizard.begin_phase(
+            Phase::Diagnosis,
+            "looking for the cause of the remaining error".into(),
+        );
         let mut found = Vec::new();
         for (k, plain) in plain.iter().enumerate() {
             found.push(self.diagnose(k, plain)?);
@@ -352,7 +356,7 @@ impl OpenSession<'_> {
                 found.replace(fitted, &name)?
             }
             Err(why) => format!(
-                "the calibration is the PC's fit, as the device's filters have not had all dwells: {why}"
+                "the calibration is the PC's fit, because the device's filters lack dwells: {why}"
             ),
         };
         self.outcomes[k].notes.push(words.clone());

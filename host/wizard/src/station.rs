@@ -104,8 +104,8 @@ impl Station {
                 Some(session) => errand(session),
                 None => Err(Error::device(
                     "device",
-                    "the line to the device is lost, or it is no mimu device",
-                    "plug it in again and run the same command: the session goes on",
+                    "the line to the device is lost, or it is not a mimu device",
+                    "plug it in again and run the same command: the session resumes",
                 )),
             };
             let _ = back.send(done);
@@ -142,8 +142,8 @@ fn broken() -> Error {
 fn other(found: &str, wanted: &str) -> Error {
     Error::device(
         "port",
-        format!("unit {found} is there, and the session is of unit {wanted}"),
-        format!("plug unit {wanted} in, or begin another session in another folder"),
+        format!("unit {found} is at the port, but the session belongs to unit {wanted}"),
+        format!("plug unit {wanted} in, or start another session in another folder"),
     )
     .about(Argument::Output)
 }

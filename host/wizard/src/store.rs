@@ -65,10 +65,10 @@ impl Wizard<'_> {
             let failed = tested.passed.all().into_iter().filter(|s| !s.1);
             let failed: Vec<&str> = failed.map(|s| s.0).collect();
             let words = match (failed.is_empty(), &tested.moved) {
-                (true, _) => "all sensors answer as their data sheets state".to_string(),
-                (false, None) => format!("not as the data sheets state: {}", failed.join(", ")),
+                (true, _) => "all sensors respond as in their data sheets".to_string(),
+                (false, None) => format!("not as in the data sheets: {}", failed.join(", ")),
                 (false, Some(moved)) => {
-                    format!("{} failed, and the unit moved: {moved}", failed.join(", "))
+                    format!("{} failed; the unit moved: {moved}", failed.join(", "))
                 }
             };
             let passed = failed.is_empty();
@@ -143,11 +143,11 @@ impl Wizard<'_> {
                     );
                 }
                 (_, true) => {
-                    break "not proven to be kept over a loss of the supply: the driver turned it off and on, and the device did not start by power-on since".into();
+                    break "not proven to be kept over a loss of the supply: the driver turned the supply off and on, but the device has not started by power-on since".into();
                 }
                 (_, false) => {
                     let words = format!(
-                        "{name}: it has not lost its supply since the question; another supply may keep it on"
+                        "{name}: it has not lost its supply since the question; perhaps another supply keeps it on"
                     );
                     self.tell(Event::Note { words });
                 }
@@ -159,14 +159,14 @@ impl Wizard<'_> {
             .station
             .with(move |session| check(session, &given, &file, COMPARED, |_| {}))?;
         if !checked.holds && checked.not_judged_for.is_empty() {
-            let problem = "the device compensates otherwise than the PC, by more than rounding";
+            let problem = "the device's compensation differs from the PC's by more than rounding";
             let remedy = "update device and program to the same version";
             return Err(Error::device(name, problem, remedy));
         }
         self.tell(Event::Stored {
             unit: name,
             hash: shown,
-            words: format!("stored, read back, {kept}, and computed with as the PC does"),
+            words: format!("stored, read back, {kept}; device and PC compute the same"),
         });
         Ok(Ended::Done)
     }
@@ -183,12 +183,11 @@ impl Wizard<'_> {
                 Ok(Some(found)) if found == hash => return Ok(()),
                 Ok(_) => {
                     let name = self.units[k].name();
-                    let problem =
-                        "the device has not kept the calibration over the loss of its supply";
+                    let problem = "the device lost the calibration when its supply was off";
                     return Err(Error::device(
                         name,
                         problem,
-                        "store it again; if it stays so, its flash is worn out",
+                        "store it again; if that fails too, its flash is worn out",
                     ));
                 }
                 Err(error) if since.elapsed() > BACK => return Err(error),

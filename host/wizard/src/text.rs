@@ -157,7 +157,7 @@ impl TextSource {
                 0 => self.nothing_fits(),
                 _ => Error::device(
                     &self.port,
-                    "the lines have stopped before their rate was known",
+                    "the lines stopped before their rate was known",
                     "reset the board and run it again",
                 ),
             });
@@ -165,8 +165,8 @@ impl TextSource {
         let rate_hz = self.regular.rate_hz().unwrap_or(f64::NAN);
         self.unit.rate_hz = rate_hz;
         if !(4.0..=50_000.0).contains(&rate_hz) {
-            let problem = format!("{rate_hz:.3} lines come a second");
-            let remedy = "have the board write 20 to 1000 lines a second, or check the unit of its clock column";
+            let problem = format!("{rate_hz:.3} lines arrive per second");
+            let remedy = "let the board write 20 to 1000 lines per second, or check the unit of its clock column";
             return Err(Error::device(&self.port, problem, remedy));
         }
         let clock = match self.lines.has_clock() {
@@ -179,7 +179,7 @@ impl TextSource {
         ];
         if let Some(factor) = self.clock_factor.filter(|f| (f - 1.0).abs() > CLOCK_SHARE) {
             self.unit.told.push(format!(
-                "the board's clock goes {factor:.3} times as fast as this computer's, and every rate of the gyro errs by that: unless this is a replay, check what the board writes"
+                "the board's clock runs {factor:.3} times as fast as this computer's, and every rate of the gyro errs by that factor: unless this is a replay, check the clock that the board writes"
             ));
         }
         self.unit.told.extend(self.lines.others_in_words());
@@ -209,11 +209,11 @@ impl TextSource {
             return Ok(());
         }
         let problem = format!(
-            "its clock goes {} times as fast as this computer's, as if its column were {}",
+            "its clock runs {} times as fast as this computer's, as if its column were {}",
             mimu::quantity::significant(factor),
             self.lines.clock_in_words(factor)
         );
-        let remedy = "name the column t_us, t_ms or t_s by what the board writes, or `-` to have the lines timed by this computer";
+        let remedy = "name the column t_us, t_ms or t_s as the board writes it, or `-` to use this computer's clock";
         Err(Error::device(&self.port, problem, remedy))
     }
 
@@ -222,8 +222,8 @@ impl TextSource {
         if seen.is_empty() {
             return Error::device(
                 &self.port,
-                "no line of text has come within 5 s",
-                "check that the board writes to this port, and its bits a second",
+                "no line of text arrived within 5 s",
+                "check that the board writes to this port, and its bits per second",
             )
             .about(Argument::Baud);
         }
@@ -233,7 +233,7 @@ impl TextSource {
             self.lines.description(),
             shown.join(", ")
         );
-        let remedy = "name the columns in their order, `-` for one that is not needed; where the lines are garbage, give the board's bits a second";
+        let remedy = "name the columns in their order, `-` for one that is not needed; if the lines are garbage, give the board's bits per second";
         Error::device(&self.port, problem, remedy)
             .about(Argument::TextColumns)
             .about(Argument::Baud)
@@ -323,7 +323,7 @@ impl Source for TextSource {
         if self.heard.elapsed() > SILENCE {
             return Err(Error::device(
                 &self.port,
-                "no line of numbers has come for 5 s",
+                "no line of numbers arrived for 5 s",
                 "check the cable, and reset the board",
             ));
         }

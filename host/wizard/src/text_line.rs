@@ -67,18 +67,18 @@ impl Columns {
                 _ => {
                     let known = channel.map(Column::Raw).or(Column::from_name(name));
                     let known = known.filter(|c| matches!(c, Column::Raw(_) | Column::Temperature));
-                    let none = || refused(format!("there is no column {name:?}"));
+                    let none = || refused(format!("{name:?} is not a column"));
                     Some(known.ok_or_else(none)?)
                 }
             };
             if column.is_some() && columns.contains(&column) {
-                return Err(refused(format!("{name} is there a second time")));
+                return Err(refused(format!("{name} occurs twice")));
             }
             columns.push(column);
         }
         for (k, name) in CHANNELS.iter().enumerate() {
             if !columns.contains(&Some(Column::Raw(k))) {
-                return Err(refused(format!("there is no {name}")));
+                return Err(refused(format!("{name} is missing")));
             }
         }
         Ok(Self {
@@ -255,7 +255,7 @@ impl Lines {
         self.refused += count;
         self.count -= count.min(self.count);
         if count > 0 && self.first_seen.is_empty() {
-            self.first_seen.push("a time that cannot be".into());
+            self.first_seen.push("an impossible time".into());
         }
     }
 
@@ -418,7 +418,7 @@ mod tests {
         assert_eq!(readings[0].raw, [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]);
         assert_eq!(readings[0].temp_c, 25.5);
         let error = Columns::parse("ax,ay,az,gx,gy,gz,accel_x").unwrap_err();
-        assert!(error.to_string().contains("accel_x is there a second time"));
+        assert!(error.to_string().contains("accel_x occurs twice"));
     }
 
     #[test]
@@ -434,10 +434,10 @@ mod tests {
     #[test]
     fn columns_that_cannot_be_are_refused_with_the_name() {
         for (names, says) in [
-            ("ax,ay,az,gx,gy", "there is no gz"),
-            ("ax,ay,az,gx,gy,gz,ax", "ax is there a second time"),
-            ("t_s,t_ms,ax,ay,az,gx,gy,gz", "t_ms is there a second time"),
-            ("ax,ay,az,gx,gy,gz,mx", "there is no column \"mx\""),
+            ("ax,ay,az,gx,gy", "gz is missing"),
+            ("ax,ay,az,gx,gy,gz,ax", "ax occurs twice"),
+            ("t_s,t_ms,ax,ay,az,gx,gy,gz", "t_ms occurs twice"),
+            ("ax,ay,az,gx,gy,gz,mx", "\"mx\" is not a column"),
         ] {
             let error = Columns::parse(names).unwrap_err().to_string();
             assert!(error.contains(says), "{error}");

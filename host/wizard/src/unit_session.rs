@@ -185,9 +185,9 @@ impl UnitSession {
         self.number = had.max().unwrap_or(0);
         self.banks = (asked.by_device && part == Part::Calibration).then(|| match self.number {
             0 => DeviceBanks::default(),
-            _ => DeviceBanks::lacking(
-                "the session was ended in between, and they lack the dwells before",
-            ),
+            _ => {
+                DeviceBanks::lacking("the session was interrupted, so they lack the dwells before")
+            }
         });
         // What waits is of the time before.
         while self.station.news()?.is_some() {}
@@ -235,7 +235,7 @@ impl UnitSession {
                     }
                     self.interrupted(Interruption::Restarted(why), tell)?;
                     if let Some(banks) = &mut self.banks {
-                        banks.lacks("the device has restarted, and they lack the dwells before");
+                        banks.lacks("the device restarted, so they lack the dwells before");
                     }
                 }
                 StationEvent::Note(words) => tell.push(Event::Note {
@@ -537,10 +537,10 @@ impl UnitSession {
         let moved = seen.temp_c - first;
         if moved.abs() > asked.most_drift_c {
             let problem = format!(
-                "the temperature has moved from {first:.1} to {:.1} °C since the first dwell, and a calibration holds at one",
+                "the temperature has changed from {first:.1} to {:.1} °C since the first dwell, but a calibration is valid at one temperature",
                 seen.temp_c
             );
-            let remedy = "let the unit come to a steady temperature, and begin anew in another folder; or allow more";
+            let remedy = "let the unit reach a steady temperature and start a new session in another folder, or allow a larger change";
             return Err(Error::new(self.name(), problem, remedy).about(Argument::Drift));
         }
         Ok(())
@@ -588,7 +588,7 @@ impl UnitSession {
         let part = self.part;
         self.folder.add(Entry::Redo { part, number })?;
         if let Some(banks) = &mut self.banks {
-            banks.lacks("a dwell that they had taken in was had again");
+            banks.lacks("a dwell that they had received was repeated");
         }
         if let Some(taking) = &mut self.taking {
             taking.drop_dwell(number);

@@ -64,7 +64,7 @@ impl SensorJudged {
         let promised = self.promised.unwrap_or(0.0).hypot(self.floor);
         if !(self.after < self.before) {
             return Some(format!(
-                "{}: {} errs by {} {} with the calibration and by {} without",
+                "{}: the error of the {} is {} {} with the calibration and {} without",
                 self.sensor,
                 self.figure.description(),
                 mimu::quantity::significant(self.after),
@@ -74,7 +74,7 @@ impl SensorJudged {
         }
         (self.after > BROKEN * promised).then(|| {
             format!(
-                "{}: {} errs by {} {} in poses that were not used, and {} were promised",
+                "{}: the error of the {} is {} {} in poses that the fit has not used; {} were predicted",
                 self.sensor,
                 self.figure.description(),
                 mimu::quantity::significant(self.after),
@@ -92,7 +92,7 @@ impl SensorJudged {
         rough.then(|| {
             let shown = |si: f64| mimu::quantity::significant(si);
             format!(
-                "{}: {} errs by {} {} in poses that were not used, {:.1} times the noise, where a data sheet leaves {}",
+                "{}: the error of the {} is {} {} in poses that the fit has not used, {:.1} times the noise; with the data sheet's values it is {}",
                 self.sensor,
                 self.figure.description(),
                 shown(self.after),
@@ -172,7 +172,7 @@ fn judged(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> R
         let judged = sensors.iter().any(|s| s.sensor == sensor);
         if calibration.inverse(sensor).is_some() && !judged {
             broken.push(format!(
-                "{sensor}: the verification has nothing to judge it by"
+                "{sensor}: the verification has no data to judge it"
             ));
         }
     }

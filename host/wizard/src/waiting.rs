@@ -57,21 +57,21 @@ impl fmt::Display for Waiting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Interrupted(why) => write!(f, "{why}"),
-            Self::TrendUnknown => f.write_str("its temperature is watched"),
+            Self::TrendUnknown => f.write_str("its temperature is being watched"),
             Self::Warming(trend, limit) => {
                 write!(
                     f,
-                    "warming up: {trend:+.2} °C/min, {limit} is the limit"
+                    "warming up: {trend:+.2} °C/min, limit {limit}"
                 )
             }
             Self::TableMoves => f.write_str("the table moves"),
             Self::Stuck(c) => write!(f, "{} repeats one value: check its wiring", RAW_COLUMNS[*c]),
             Self::SamplesLost(missing, of) => write!(
                 f,
-                "samples are lost, {missing} of the last {of:.0}: check the cable"
+                "samples are missing, {missing} of the last {of:.0}: check the cable"
             ),
             Self::Saturated => f.write_str("a reading is at the end of its range"),
-            Self::Exchanged => f.write_str("the gyro's readings follow the pose and the accelerometer's do not: are the columns ax,ay,az and gx,gy,gz exchanged?"),
+            Self::Exchanged => f.write_str("the gyro's readings follow the pose, but the accelerometer's do not: are the columns ax,ay,az and gx,gy,gz exchanged?"),
             Self::Moves(sensor, times) => write!(f, "it moves ({sensor} {times:.1} times the limit)"),
             Self::Turns(dps) => write!(f, "it turns at {dps:.1} deg/s"),
             Self::Unsteady(sensor, times) => {
@@ -79,19 +79,19 @@ impl fmt::Display for Waiting {
             }
             Self::OtherRate(is, wanted) if is * wanted < 0.0 => write!(
                 f,
-                "it turns the other way: {is:+.0} deg/s, {wanted:+.0} wanted"
+                "it turns the wrong way: {is:+.0} deg/s, requested {wanted:+.0}"
             ),
             Self::OtherRate(is, wanted) => {
-                write!(f, "it turns at {is:+.1} deg/s, {wanted:+.1} wanted")
+                write!(f, "it turns at {is:+.1} deg/s, requested {wanted:+.1}")
             }
             Self::WrongPose(up, off_deg) => write!(
                 f,
-                "wrong pose: {}, {off_deg:.0} degrees off what is wanted",
+                "wrong pose: {}, {off_deg:.0} degrees from the requested one",
                 words(up)
             ),
             Self::RepeatedPose(up, wanted) => write!(
                 f,
-                "pose had already ({}): turn it on, to {}",
+                "pose recorded already ({}): turn to {}",
                 words(up),
                 words(wanted)
             ),
@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn a_rate_with_the_other_sign_turns_the_other_way() {
         let other = Waiting::OtherRate(-98.0, 100.0).to_string();
-        assert_eq!(other, "it turns the other way: -98 deg/s, +100 wanted");
+        assert_eq!(other, "it turns the wrong way: -98 deg/s, requested +100");
         let slow = Waiting::OtherRate(61.3, 100.0).to_string();
         assert_eq!(slow, "it turns at +61.3 deg/s, +100.0 wanted");
     }

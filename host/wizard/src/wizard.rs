@@ -167,10 +167,10 @@ impl<'a> Wizard<'a> {
                     let name = silent.map_or_else(String::new, UnitSession::name);
                     let (problem, remedy) = match silent.is_some_and(|u| u.standing.samples > 0) {
                         true => (
-                            "it does not come to rest: no two seconds in a row read alike",
-                            "leave it still until the first step, and run it again",
+                            "it does not come to rest: no two successive seconds have the same readings",
+                            "leave it at rest until the first dwell, and run it again",
                         ),
-                        false => ("no samples come", "reset the board and run it again"),
+                        false => ("no samples arrive", "reset the board and run it again"),
                     };
                     return Err(Error::device(name, problem, remedy));
                 }
@@ -259,7 +259,7 @@ impl<'a> Wizard<'a> {
         self.later.push(*step);
         self.queue.sort_by_key(|s| self.later.contains(s));
         let words = format!(
-            "that was {}, and {} was asked for: it comes later",
+            "that was {}; {} was requested and follows later",
             had.words(),
             step.words()
         );
@@ -343,7 +343,7 @@ impl<'a> Wizard<'a> {
                 return Err(Error::device(
                     "table",
                     why,
-                    "close it and run the same command",
+                    "close that program and run the same command",
                 ));
             }
         }
@@ -383,10 +383,10 @@ impl<'a> Wizard<'a> {
                 let why = self.units.iter().filter(|u| !u.done);
                 let why = why.filter_map(|u| u.standing.waiting.as_ref()).next();
                 let problem = format!(
-                    "the step {:?} does not come about: {}",
+                    "the conditions for {:?} are not met: {}",
                     step.words(),
                     why.map_or_else(
-                        || "the dwell is broken off again and again".into(),
+                        || "the dwell is interrupted again and again".into(),
                         Waiting::to_string
                     )
                 );
@@ -394,7 +394,7 @@ impl<'a> Wizard<'a> {
                     true => {
                         "check the axes of the driver file, and wiring, signs and order of the accelerometer's axes"
                     }
-                    false => "mend it and run the same command: the session goes on",
+                    false => "correct this and run the same command: the session resumes",
                 };
                 return Err(Error::device("session", problem, remedy));
             }

@@ -124,7 +124,7 @@ impl Commanded {
         self.end.store(true, Ordering::Relaxed);
         match self.thread.take().map(JoinHandle::join) {
             Some(Ok(ran)) => ran,
-            _ => Err("the board's thread broke down".into()),
+            _ => Err("the board's thread failed".into()),
         }
     }
 }

@@ -84,8 +84,7 @@ impl Front {
         for (kind, triad) in [("gyro", &truth.unit.gyro), ("accel", &truth.unit.accel)] {
             if !triad.analog {
                 return Err(format!(
-                    "rig: `unit.{kind}` is a digital part, and the board's pins are analog; name one with \
-                     output in volts"
+                    "rig: `unit.{kind}` is a digital part, but the board's pins are analog; name a part with output in volts"
                 ));
             }
         }
@@ -228,9 +227,7 @@ impl Front {
             Self::Still(_) => Err(NO_UNIT.into()),
             Self::Bench(bench) => match &mut bench.carrier {
                 Carried::Plan(_) => Err(
-                    "the unit is carried through a plan; serve it with a control from the \
-                                         start"
-                        .into(),
+                    "the unit follows a plan; start the bench with --control to command it".into(),
                 ),
                 Carried::Commands(carrier) => Ok(&mut **carrier),
             },
@@ -256,7 +253,7 @@ impl fmt::Debug for Front {
 }
 
 /// What is said where voltages stand in the place of a unit.
-const NO_UNIT: &str = "no unit is at the pins of the board; serve one";
+const NO_UNIT: &str = "no unit is at the pins of the board; start the bench with --unit";
 
 /// What carries the unit, and by what.
 enum Carried {

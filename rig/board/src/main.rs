@@ -32,53 +32,52 @@ enum Command {
 
 /// Run the firmware on an emulated board and print the path of its serial port.
 ///
-/// The place is that of the plan, without a plan latitude 30.5° with gravity 9.793 m/s², and is printed at the start.
-/// The port is a pseudo-terminal in raw mode; its speed does not matter. The unit is carried through the plan from
-/// the moment that the board is switched on, and stays where the plan ends; or it is moved by commands, with --control.
-/// Runs until it is interrupted.
+/// The place is that of the plan, or without a plan latitude 30.5° with gravity 9.793 m/s²; it is printed at the start. The port is a
+/// pseudo-terminal in raw mode; its speed does not matter. The unit follows the plan from the power-on of the board, and keeps its last
+/// state; with --control, commands move it. Runs until it is interrupted.
 #[derive(clap::Args)]
 #[command(after_help = KEYS)]
 struct Serve {
     /// Firmware, an ELF file [default: the release image in the target directory]
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
-    /// The unit, the table and the person; everything in it is optional.
+    /// Parameters of the unit, the table and the person; all are optional.
     #[arg(long, value_name = "RIG.toml")]
     unit: Option<PathBuf>,
-    /// What is done to the unit [default: it lies still]
+    /// Plan that the unit follows [default: it lies still]
     #[arg(long, value_name = "PLAN.toml")]
     plan: Option<PathBuf>,
-    /// TCP address for commands that move the unit and disturb the line, as 127.0.0.1:0 for any free port.
+    /// TCP address for commands that move the unit and disturb the line; 127.0.0.1:0 chooses a free port.
     ///
-    /// It is printed behind the port. Of the plan the unit has carrier, place, lead-in, chamber and the first pose, in which
-    /// it stands; the steps are not carried out. Whoever reaches the address may command.
+    /// It is printed after the port. From the plan come carrier, place, lead-in, chamber and the first pose; its entries are not carried
+    /// out. There is no password: everyone who reaches the address can send commands.
     #[arg(long, value_name = "ADDRESS")]
     control: Option<String>,
-    /// What carries the unit under --control where no plan says it [default: table]
+    /// What moves the unit, with --control and without a plan [default: table]
     #[arg(long, requires = "control", conflicts_with = "plan")]
     carrier: Option<Carrier>,
-    /// Symbolic link to the port, which is kept current when the line is unplugged and plugged in again.
+    /// Symbolic link to the port; it follows when the line is unplugged and plugged in again.
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
     /// Another seed is another unit, another person, and other noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Number of the unit, 24 hexadecimal digits, which the part's maker would have written to it [default: the seed]
+    /// The part's unique number, 24 hexadecimal digits [default: the seed]
     #[arg(long, value_name = "HEX", value_parser = unit_id)]
     unit_id: Option<[u8; 12]>,
-    /// How fast virtual time goes.
+    /// Speed of virtual time.
     #[arg(long, default_value = "wall")]
     pace: Pace,
-    /// File that keeps what the device stores in its flash; made if it is not there.
+    /// File with the contents of the device's flash; created if it does not exist.
     #[arg(long, value_name = "FILE")]
     flash: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Pace {
-    /// With the clock on the wall. What nobody reads in time is lost, as on a real line.
+    /// Virtual time follows the wall clock. Bytes that nobody reads in time are lost, as on a real line.
     Wall,
-    /// As fast as the machine can and as whoever has the port open reads; it waits for them.
+    /// As fast as the machine and the reader of the port allow; without a reader, time stands still.
     Fast,
 }
 
@@ -104,7 +103,7 @@ fn main() -> ExitCode {
 /// Reads 24 hexadecimal digits.
 fn unit_id(text: &str) -> Result<[u8; 12], String> {
     let mut id = [0; 12];
-    let refused = || format!("{text:?} is no unit id: write 24 hexadecimal digits");
+    let refused = || format!("{text:?} is not a unit id: write 24 hexadecimal digits");
     if text.len() != 2 * id.len() || !text.is_ascii() {
         return Err(refused());
     }
@@ -166,7 +165,7 @@ impl Serve {
         served.start()?;
         // A host that calibrates by another gravity finds scale factors that are wrong by the ratio, and nothing that says so.
         eprintln!(
-            "mimu-board: gravity here is {:.5} m/s², at latitude {}°: give the host the same (--gravity, --latitude)",
+            "mimu-board: gravity here is {:.5} m/s², at latitude {}°: give the same to the host (--gravity, --latitude)",
             plan.place.gravity, plan.place.latitude_deg
         );
         println!("{}", served.path().display());
@@ -174,7 +173,7 @@ impl Serve {
             println!("control: {address}");
             if let Some(plan) = &self.plan {
                 eprintln!(
-                    "mimu-board: {}: its steps are not carried out; the commands of the control move the unit",
+                    "mimu-board: {}: its entries are not carried out; the commands of the control move the unit",
                     plan.display()
                 );
             }
@@ -188,7 +187,7 @@ impl Serve {
             }
             if lost != told.0 {
                 eprintln!(
-                    "mimu-board: {lost} bytes lost: whoever has the port open does not read them"
+                    "mimu-board: {lost} bytes lost: the program at the port does not read them"
                 );
             }
             if behind > told.1 + BETWEEN_WARNINGS / 10 {

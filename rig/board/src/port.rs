@@ -35,7 +35,7 @@ impl Port {
         match fs::symlink_metadata(link) {
             Ok(there) if !there.is_symlink() => {
                 return Err(format!(
-                    "{}: is there, and is no symbolic link; name another one",
+                    "{}: exists and is not a symbolic link; name another one",
                     link.display()
                 ));
             }

@@ -18,7 +18,7 @@ mod orders;
 pub use orders::COMMANDS;
 use orders::Desk;
 
-/// How fast virtual time goes.
+/// Speed of virtual time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
     /// With the clock on the wall, or as near as the machine can.
@@ -321,7 +321,7 @@ impl StoreFile {
                 file.read_to_end(&mut bytes).map_err(refused)?;
                 if bytes.len() as u64 != BANK {
                     return Err(format!(
-                        "{name}: {} bytes, and a stored flash bank has {BANK}; name another file",
+                        "{name}: {} bytes, but a stored flash bank has {BANK}; name another file",
                         bytes.len()
                     ));
                 }

@@ -309,7 +309,7 @@ pub fn spec(id: &str) -> Option<&'static Spec> {
 pub fn draw(ids: &[&str], amplitude: f64, seed: u64) -> Result<Vec<EffectTruth>, String> {
     let one = |id: &&str| {
         EffectTruth::draw(id, BTreeMap::new(), amplitude, seed)
-            .ok_or_else(|| format!("no effect is called `{id}`; take one of `effects::specs`"))
+            .ok_or_else(|| format!("no effect has the id `{id}`; use one of `effects::specs`"))
     };
     ids.iter().map(one).collect()
 }

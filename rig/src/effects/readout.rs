@@ -30,52 +30,52 @@ const LOW_PART: [Parameter; 1] = [scalar("codes", 256.0)];
 pub(super) const SPECS: &[Spec] = &[
     Spec {
         id: "gyro_readout_code",
-        about: "each of the six top bits of the code, when set, is worth so much more",
+        about: "each of the six top bits of the code, when set, adds this error",
         parameters: &MISMATCH,
         build: |b| mismatch(b, b.sensors.gyro, |pins| &mut pins.gyro_v),
     },
     Spec {
         id: "accel_readout_code",
-        about: "each of the six top bits of the code, when set, is worth so much more",
+        about: "each of the six top bits of the code, when set, adds this error",
         parameters: &MISMATCH,
         build: |b| mismatch(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },
     // The charge that a capacitor array has lost by the middle of its range: codes that never come.
     Spec {
         id: "gyro_missing_codes",
-        about: "from a code on, this fraction of the converter's range up, all codes are so many too high (digital: of 16 bits)",
+        about: "from a code at this fraction of the converter's range, all codes are too high by this number (digital: of 16 bits)",
         parameters: &MISSING,
         build: |b| missing(b, b.sensors.gyro, |pins| &mut pins.gyro_v),
     },
     Spec {
         id: "accel_missing_codes",
-        about: "from a code on, this fraction of the converter's range up, all codes are so many too high (digital: of 16 bits)",
+        about: "from a code at this fraction of the converter's range, all codes are too high by this number (digital: of 16 bits)",
         parameters: &MISSING,
         build: |b| missing(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },
     // Three converters, as of a part for each axis, with a bias register that is added before the bits are found.
     Spec {
         id: "gyro_converters",
-        about: "each axis has a converter of its own, whose codes begin elsewhere: its six top bits, when set, are worth so much more",
+        about: "each axis has a separate converter whose code 0 is at another input; each of its six top bits, when set, adds this error",
         parameters: &CONVERTERS,
         build: |b| converters(b, b.sensors.gyro, |pins| &mut pins.gyro_v),
     },
     Spec {
         id: "accel_converters",
-        about: "each axis has a converter of its own, whose codes begin elsewhere: its six top bits, when set, are worth so much more",
+        about: "each axis has a separate converter whose code 0 is at another input; each of its six top bits, when set, adds this error",
         parameters: &CONVERTERS,
         build: |b| converters(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },
     // A firmware that puts a code together from two bytes and takes the low one for a signed number: from 128 on it counts 256 less.
     Spec {
         id: "gyro_sign_extension",
-        about: "the low part of a code is taken for a signed number: a code whose low part is in its upper half is too low by all of it, the power of two nearest to the size (256: a byte)",
+        about: "the low part of a code is read as a signed number: if it is in its upper half, the code is too low by the power of two nearest to the size (256: a byte)",
         parameters: &LOW_PART,
         build: |b| sign_extension(b, b.sensors.gyro, |pins| &mut pins.gyro_v),
     },
     Spec {
         id: "accel_sign_extension",
-        about: "the low part of a code is taken for a signed number: a code whose low part is in its upper half is too low by all of it, the power of two nearest to the size (256: a byte)",
+        about: "the low part of a code is read as a signed number: if it is in its upper half, the code is too low by the power of two nearest to the size (256: a byte)",
         parameters: &LOW_PART,
         build: |b| sign_extension(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },

@@ -27,7 +27,7 @@ pub(super) const SPECS: &[Spec] = &[
     // Size assumed.
     Spec {
         id: "x_accel_stress_hysteresis",
-        about: "error ±size by the direction in which the force last moved by more than twice the play",
+        about: "error of plus or minus the size, by the direction of the last change of force that exceeded twice the play",
         parameters: &[axes("mg", 3.0), form("play_g", 0.1, 0.5)],
         build: |b| {
             let size = b.list::<3>("mg");

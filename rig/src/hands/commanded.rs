@@ -148,7 +148,8 @@ impl Commanded for Hands {
                 }
             }
             Command::Rate(_) | Command::Spin(_) | Command::Turn(_) => {
-                let problem = "by hand nobody turns at a steady rate; serve a bench with a table";
+                let problem =
+                    "by hand a person cannot turn at a constant rate; serve a bench with a table";
                 done = Err(problem.into());
             }
             Command::Fidget(every) => (told.every, told.poses) = (every, 0),

@@ -50,7 +50,7 @@ impl Plan {
         if raw.format.get_ref() != "mimu-plan/1" {
             return Err(source.error(
                 &raw.format.span(),
-                format_args!("format \"{}\" is not a plan's", raw.format.get_ref()),
+                format_args!("format \"{}\" is not that of a plan", raw.format.get_ref()),
                 "give a plan, with format = \"mimu-plan/1\"",
             ));
         }
@@ -58,8 +58,8 @@ impl Plan {
         if device.trim().is_empty() || device.contains(char::is_control) {
             return Err(source.error(
                 &raw.device.span(),
-                "`device` is no name",
-                "name the unit in one line, or leave the key out",
+                "`device` is not a name",
+                "name the unit in one line, or remove the key",
             ));
         }
         let sample_rate_hz =
@@ -80,7 +80,7 @@ impl Plan {
         if raw.step.is_empty() {
             return Err(source.error(
                 &(usize::MAX..usize::MAX),
-                "there is no step",
+                "the plan has no entry",
                 "add a `[[step]]` with `up` and `dwell_s`",
             ));
         }
@@ -92,7 +92,7 @@ impl Plan {
         let (rounds, round_s) = reader.rounds(&raw)?;
         if let (Some(first), Pose::Here) = (steps.first(), steps[0].pose) {
             let remedy = "add `up`, the body direction that points up";
-            let problem = "the first step has no pose to begin in";
+            let problem = "the first entry has no pose to begin in";
             return Err(source.error(&first.at.pose, problem, remedy));
         }
         reader.length(lead_in_s, sample_rate_hz, &steps, rounds)?;
@@ -167,7 +167,7 @@ impl Reader<'_> {
             return Err(self.source.error(&key.span(), "`rounds` is 0", remedy));
         }
         if let (Some(key), CarriedBy::Hands) = (&raw.round_s, raw.carrier) {
-            let problem = "`round_s` by hand: nobody keeps such times";
+            let problem = "`round_s` by hand: a person cannot keep such times";
             let remedy = "remove it, or set `carrier = \"table\"`";
             return Err(self.source.error(&key.span(), problem, remedy));
         }
@@ -192,7 +192,7 @@ impl Reader<'_> {
             let count = u64::from(rounds) * step.dwells();
             seconds += count as f64 * step.dwell_s;
             dwells += count;
-            let what = "up to this step the plan has";
+            let what = "up to this entry the plan has";
             too_long(self.source, &step.at.pose, what, dwells, seconds, rate_hz)?;
         }
         Ok(())
@@ -208,7 +208,7 @@ impl Reader<'_> {
                 return Err(self.source.error(&point.span(), problem, remedy));
             }
             if t <= last {
-                let problem = format!("`chamber_c`: time {t} s does not come after the one before");
+                let problem = format!("`chamber_c`: time {t} s is not later than the one before");
                 return Err(self.source.error(
                     &point.span(),
                     problem,

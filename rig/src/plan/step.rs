@@ -44,7 +44,7 @@ impl Reader<'_> {
         if let (Some(stay), true) = (&raw.stay, raw.up.is_some() || raw.poses.is_some()) {
             return refuse(
                 &stay.span(),
-                &"`stay` in a step with a pose",
+                &"`stay` contradicts the pose of the same entry",
                 "keep one of them",
             );
         }
@@ -70,7 +70,7 @@ impl Reader<'_> {
             (Some(_), Some(poses)) => {
                 return refuse(
                     &poses.span(),
-                    &"`up` and `poses` in one step",
+                    &"`up` and `poses` in one entry",
                     "keep one of them",
                 );
             }
@@ -105,7 +105,7 @@ impl Reader<'_> {
             return refuse(
                 &r.span(),
                 &"`repeat` is 0",
-                "give one or more, or remove the step",
+                "give one or more, or remove the entry",
             );
         }
         Ok(Step {
@@ -138,8 +138,8 @@ impl Reader<'_> {
         if carrier == CarriedBy::Table {
             return Ok(());
         }
-        let steady = "nobody turns at a steady rate";
-        let stays = "nobody stays without a pose";
+        let steady = "a person cannot turn at a constant rate";
+        let stays = "a person needs a pose";
         for (key, span, why) in [
             ("rate_dps", raw.rate_dps.as_ref().map(Spanned::span), steady),
             ("spin_dps", raw.spin_dps.as_ref().map(Spanned::span), steady),

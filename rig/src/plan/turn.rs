@@ -83,8 +83,8 @@ impl Reader<'_> {
         ];
         for (key, span) in foreign {
             if let Some(span) = span {
-                let problem = format!("`{key}` in a step that turns by an angle");
-                let remedy = "remove it, or make it a step of its own";
+                let problem = format!("`{key}` in an entry that turns by an angle");
+                let remedy = "remove it, or make it a separate [[step]]";
                 return Err(self.source.error(&span, problem, remedy));
             }
         }

@@ -53,15 +53,15 @@ pub(super) fn check(output: &Output) -> Result<(), String> {
     let place = |path: &Path| match (parent(path).canonicalize(), path.file_name()) {
         (Ok(parent), Some(name)) if parent.is_dir() => Ok(parent.join(name)),
         _ => {
-            let problem = "the folder that it is to stand in is not there";
-            Err(said(path, problem, "make it first"))
+            let problem = "the folder for it does not exist";
+            Err(said(path, problem, "make that folder first"))
         }
     };
     if place(truth)?.starts_with(place(folder)?) {
-        let remedy = "write it elsewhere: who reads the recording must not see it";
+        let remedy = "write it elsewhere: a reader of the recording must not see the truth";
         return Err(said(
             truth,
-            "the truth would stand in the recording",
+            "the truth would be inside the recording",
             remedy,
         ));
     }
@@ -69,14 +69,14 @@ pub(super) fn check(output: &Output) -> Result<(), String> {
         if !is_recording(folder) {
             return Err(said(
                 folder,
-                "is there and is no recording",
+                "exists and is not a recording",
                 "give another name",
             ));
         }
         if !output.replace {
             return Err(said(
                 folder,
-                "is there already",
+                "exists already",
                 "give another name, or --replace",
             ));
         }
@@ -86,14 +86,14 @@ pub(super) fn check(output: &Output) -> Result<(), String> {
         if !begins || !has_format(truth, rig_file::FORMAT) {
             return Err(said(
                 truth,
-                "is there and is no truth",
+                "exists and is not a truth",
                 "give another name with --truth",
             ));
         }
         if !output.replace {
             return Err(said(
                 truth,
-                "is there already",
+                "exists already",
                 "give another name with --truth, or --replace",
             ));
         }
@@ -142,7 +142,7 @@ pub(super) fn write(
             said(
                 &path,
                 format_args!("cannot be written: {e}"),
-                "see to space and permissions",
+                "check space and permissions",
             )
         }
     };
@@ -180,8 +180,8 @@ pub(super) fn write(
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     let text = format!(
         "{TRUTH}{name}, made with seed {seed}. As a rig file, with the same plan and seed, it\n\
-         # makes the same samples again. It judges estimates; whatever makes them must not read it.\n\
-         # On a long ramp the dies (gyros x, y, z, accelerometer) are behind temp_c by {} s.\n\n{}",
+         # makes the same samples again. It is for judging estimates; estimators must not read it.\n\
+         # On a long ramp the dies (gyros x, y, z, accelerometer) lag temp_c by {} s.\n\n{}",
         truth
             .unit
             .die_lag_behind_reported_s()

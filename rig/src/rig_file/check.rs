@@ -65,7 +65,7 @@ impl RigFile {
                 if stated {
                     return refuse(
                         format!("unit.{name}_axes.{key}"),
-                        format!("`{key}` is stated twice: [unit.{name}_affine] has it too"),
+                        format!("`{key}` is given twice: [unit.{name}_affine] has it too"),
                         "remove one of them",
                     );
                 }
@@ -80,7 +80,7 @@ impl RigFile {
         if self.converter.raw_unit == Some(RawUnit::V) && !(analog[0] && analog[1]) {
             return refuse(
                 "converter.raw_unit",
-                "a digital part gives no volts",
+                "a digital part has no output in volts",
                 "write \"count\"",
             );
         }
@@ -98,16 +98,16 @@ impl RigFile {
         if self.draw_effects.is_some_and(|n| n > left) {
             return refuse(
                 "draw_effects",
-                "more effects than there are besides the stated ones",
+                "more effects than there are beside the given ones",
                 format!("give at most {left}"),
             );
         }
         for (i, effect) in self.effect.iter().enumerate() {
             if self.effect[..i].iter().any(|other| other.id == effect.id) {
-                let remedy = "remove one, or put all of it into the other";
+                let remedy = "remove one, or move its contents into the other";
                 return refuse(
                     format!("effect.{i}.id"),
-                    format!("effect `{}` stands twice", effect.id),
+                    format!("effect `{}` occurs twice", effect.id),
                     remedy,
                 );
             }
@@ -208,8 +208,8 @@ impl RigFile {
             for other in [y, z] {
                 let alike = |s: &Sensor| (s.output, s.packages, s.ratiometric);
                 if alike(x) != alike(other) {
-                    let problem = format!("{} and {} do not make one triad", x.name, other.name);
-                    let remedy = "take parts with the same kind of output and package";
+                    let problem = format!("{} and {} cannot be in one triad", x.name, other.name);
+                    let remedy = "choose parts with the same kind of output and package";
                     refuse(path, problem, remedy)?;
                 }
             }
@@ -223,8 +223,8 @@ impl RigFile {
             .collect();
         Err(Refusal {
             path: path.to_owned(),
-            problem: format!("no sensor is called \"{unknown}\""),
-            remedy: format!("known here: {}", known.join(", ")),
+            problem: format!("no sensor has the name \"{unknown}\""),
+            remedy: format!("known are: {}", known.join(", ")),
         })
     }
 }

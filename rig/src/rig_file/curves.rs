@@ -234,7 +234,7 @@ impl Triad<'_> {
         }
         if let Some(pair) = points.windows(2).find(|pair| pair[1][0] <= pair[0][0]) {
             let problem = format!(
-                "`noise_at_c_raw`: {} °C comes after {} °C",
+                "`noise_at_c_raw`: {} °C follows {} °C",
                 written(pair[1][0]),
                 written(pair[0][0])
             );

@@ -15,7 +15,7 @@ impl EffectFile {
             remedy,
         };
         if self.id == "earth_rate" {
-            let problem = "the Earth's rate is no effect here but the truth".to_owned();
+            let problem = "Earth rate is a true input here, not an effect".to_owned();
             return Err(wrong(
                 "id",
                 problem,
@@ -24,14 +24,14 @@ impl EffectFile {
         }
         let Some(spec) = spec(&self.id) else {
             let known: Vec<_> = specs().map(|s| s.id).collect();
-            let problem = format!("no effect is called `{}`", self.id);
+            let problem = format!("no effect has the id `{}`", self.id);
             return Err(wrong("id", problem, format!("known: {}", known.join(", "))));
         };
         let mut numbers = BTreeMap::new();
         for (key, value) in &self.parameters {
             let Some(parameter) = spec.parameters.iter().find(|p| p.key == key) else {
                 let keys: Vec<_> = spec.parameters.iter().map(|p| p.key).collect();
-                let remedy = format!("known here: {}", keys.join(", "));
+                let remedy = format!("known are: {}", keys.join(", "));
                 return Err(wrong(key, format!("`{}` has no `{key}`", self.id), remedy));
             };
             let values = layout(value, parameter.shape).ok_or_else(|| {

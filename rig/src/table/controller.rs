@@ -72,7 +72,7 @@ impl Controller {
         // The ends of dwells are sums: a rounding error beyond the time is none.
         if self.now() > due_s + 1e-6 {
             let problem = format!(
-                "round {round} is due at {due_s} s, and the one before takes until {:.1} s",
+                "round {round} is due at {due_s} s, but the one before ends at {:.1} s",
                 self.now()
             );
             return Err(Beyond::rounds(plan, problem, "give `round_s` more"));
@@ -178,12 +178,12 @@ impl Controller {
         let name = turn.axis.name();
         let fastest = self.truth.max_rate_dps[turn.axis.number()];
         let (problem, remedy) = if turn.axis == TableAxis::Outer && !self.limits.outer {
-            let problem = "a turn about the outer axis, and the table has none".to_owned();
-            (problem, "turn the inner axis upright and take that one")
+            let problem = "a turn about the outer axis, but the table has none".to_owned();
+            (problem, "turn the inner axis upright and use that one")
         } else if turn.axis == TableAxis::Middle && !self.limits.reaches(to) {
             let [low, high] = self.limits.middle.map(f64::to_degrees);
             let problem = format!(
-                "the turn ends with the middle axis at {:.1} degrees, and the table has {low:.1} to {high:.1}",
+                "the turn ends with the middle axis at {:.1} degrees, but its range is {low:.1} to {high:.1}",
                 to.to_degrees()
             );
             (problem, "turn less, or the other way")
@@ -270,7 +270,7 @@ impl Controller {
     pub(super) fn turn_from(&mut self, t_s: f64, turn: Turn) -> Result<(), (String, &'static str)> {
         // On the way to a pose nobody could say where the turn begins.
         if t_s < self.busy_s || self.rates != [0.0; 2] {
-            let problem = "a turn by an angle begins at rest, and the table moves".to_owned();
+            let problem = "a turn by an angle starts from rest, but the table is moving".to_owned();
             return Err((problem, "send `STOP`, and wait until `BUSY?` is 0"));
         }
         let i = turn.axis.number();

@@ -342,7 +342,7 @@ fn what_is_wrong_with_curves_and_thermometer_is_named_with_its_line() {
         ),
         (
             "[curves.accel]\nnoise_at_c_raw = [[10, 1, 1, 1], [0, 1, 1, 1]]",
-            "3: `noise_at_c_raw`: 0 °C comes after 10 °C; give [°C, x, y, z] in order of temperature",
+            "3: `noise_at_c_raw`: 0 °C follows 10 °C; give [°C, x, y, z] in order of temperature",
         ),
         (
             "[flaws]\nthermometer_sticks_s = [30, 20]",
@@ -375,7 +375,7 @@ fn the_head_of_a_truth_gives_the_lags_of_the_dies() {
     let output = record::Output::new(&folder.path().join("rec"), &plan).unwrap();
     record::write(&plan, &rig, 1, &output).unwrap();
     let text = fs::read_to_string(&output.truth).unwrap();
-    assert!(text.contains("are behind temp_c by 60.000, 60.000, 60.000, 30.000 s."));
+    assert!(text.contains("lag temp_c by 60.000, 60.000, 60.000, 30.000 s."));
 }
 
 #[test]

@@ -243,7 +243,7 @@ fn nothing_is_overwritten_unasked_and_nothing_but_a_recording_ever() {
     assert!(
         bench
             .refused("table.toml --seed 2 -o rec")
-            .contains("rec: is there already")
+            .contains("rec: exists already")
     );
     assert!(fs::read(bench.path().join("rec/samples.parquet")).unwrap() == before);
     bench.record("table.toml --seed 2 -o rec --replace --format csv");
@@ -256,23 +256,23 @@ fn nothing_is_overwritten_unasked_and_nothing_but_a_recording_ever() {
     assert!(
         bench
             .refused("table.toml --seed 2 -o rec --replace")
-            .contains("is no recording")
+            .contains("is not a recording")
     );
     assert_eq!(bench.read("rec/notes.txt"), "dear diary");
     fs::create_dir(bench.path().join("empty")).unwrap();
     assert!(
         bench
             .refused("table.toml --seed 2 -o empty --replace")
-            .contains("is no recording")
+            .contains("is not a recording")
     );
     assert!(
         bench
             .refused("table.toml --seed 2 -o table.toml --replace")
-            .contains("is no recording")
+            .contains("is not a recording")
     );
     let complaint = bench.refused("table.toml --seed 2 -o new --truth table.toml --replace");
     assert!(
-        complaint.contains("table.toml: is there and is no truth"),
+        complaint.contains("table.toml: exists and is not a truth"),
         "{complaint}"
     );
     assert_eq!(bench.read("table.toml"), TABLE);
@@ -280,7 +280,7 @@ fn nothing_is_overwritten_unasked_and_nothing_but_a_recording_ever() {
     let complaint =
         bench.refused("table.toml --rig rig.toml --seed 2 -o new --truth rig.toml --replace");
     assert!(
-        complaint.contains("rig.toml: is there and is no truth"),
+        complaint.contains("rig.toml: exists and is not a truth"),
         "{complaint}"
     );
     assert_eq!(bench.read("rig.toml"), RIG);
@@ -310,12 +310,12 @@ fn a_run_that_fails_leaves_nothing_behind() {
     assert!(
         bench
             .refused("table.toml --seed 1 -o no/such/rec")
-            .contains("make it first")
+            .contains("make that folder first")
     );
     assert!(
         bench
             .refused("table.toml --seed 1 -o rec --truth rec/truth.toml")
-            .contains("not there")
+            .contains("does not exist")
     );
     assert!(
         bench
@@ -325,7 +325,7 @@ fn a_run_that_fails_leaves_nothing_behind() {
     assert!(
         bench
             .refused("table.toml --seed 1 -o ..")
-            .contains("has no name of its own")
+            .contains("has no name")
     );
     assert_eq!(bench.names(), there);
     assert_eq!(bench.run("table.toml -o rec").status.code(), Some(2));
@@ -335,7 +335,7 @@ fn a_run_that_fails_leaves_nothing_behind() {
             "table.toml --seed 1 -o rec --truth {truth} --replace"
         ));
         assert!(
-            complaint.contains("would stand in the recording"),
+            complaint.contains("would be inside the recording"),
             "{complaint}"
         );
     }

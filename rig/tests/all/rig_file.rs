@@ -185,11 +185,11 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[unit]\n\ngyro = \"ADXRS301\"",
-            "4: no sensor is called \"ADXRS301\"; known here: ADXRS300, MPU6050-gyro, MSG7100D-300, MSG7100D-3600",
+            "4: no sensor has the name \"ADXRS301\"; known are: ADXRS300, MPU6050-gyro, MSG7100D-300, MSG7100D-3600",
         ),
         (
             "[unit]\ngyro = [\"ADXRS300\", \"ADXRS300\", \"MPU6050-gyro\"]",
-            "3: ADXRS300 and MPU6050-gyro do not make one triad; take parts with the same kind of output and package",
+            "3: ADXRS300 and MPU6050-gyro cannot be in one triad; choose parts with the same kind of output and package",
         ),
         (
             "[unit.gyro_axes]\nwhite_si = [0, -1, 0]",
@@ -209,7 +209,7 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[unit.gyro_axes]\nnull_raw = [0, 0, 0]\n[unit.gyro_affine]\nmatrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nbias = [0, 0, 0]",
-            "3: `null_raw` is stated twice: [unit.gyro_affine] has it too; remove one of them",
+            "3: `null_raw` is given twice: [unit.gyro_affine] has it too; remove one of them",
         ),
         (
             "[thermal]\ndie_lag_s = [1, 1, 0, 1]",
@@ -222,11 +222,11 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[unit]\naccel = \"MPU6050-accel\"\n[converter]\nraw_unit = \"V\"",
-            "5: a digital part gives no volts; write \"count\"",
+            "5: a digital part has no output in volts; write \"count\"",
         ),
         (
             "[[effect]]\nid = \"earth_rate\"\n\n[[effect]]\nid = \"accel_size_effect\"\narms_cm = [[0, 0, 0], [0, 0, 0], [0, 0, 0]]",
-            "3: the Earth's rate is no effect here but the truth; write `earth_rate = true` or false at the top",
+            "3: Earth rate is a true input here, not an effect; write `earth_rate = true` or false at the top",
         ),
         (
             "[[effect]]\nid = \"accel_size_effect\"\narms_cm = [[0, 0, 0], [0, 0, 0], [0, 0, 0]]",
@@ -275,7 +275,7 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[[effect]]\nid = \"gyro_warm_up\"\n[[effect]]\nid = \"gyro_warm_up\"",
-            "5: effect `gyro_warm_up` stands twice; remove one, or put all of it into the other",
+            "5: effect `gyro_warm_up` stands twice; remove one, or move its contents into the other",
         ),
     ] {
         assert_eq!(parse(text).unwrap_err(), format!("RIG.toml:{complaint}"));
@@ -283,13 +283,13 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
     let all = specs().count();
     let one_stated = format!("draw_effects = {all}\n[[effect]]\nid = \"gyro_warm_up\"");
     for (text, most) in [("draw_effects = 1000", all), (one_stated.as_str(), all - 1)] {
-        let says = "2: more effects than there are besides the stated ones; give at most";
+        let says = "2: more effects than there are beside the given ones; give at most";
         assert_eq!(parse(text).unwrap_err(), format!("RIG.toml:{says} {most}"));
     }
     let unknown = parse("[[effect]]\nid = \"gyro_g\"").unwrap_err();
     assert!(
         unknown
-            .starts_with("RIG.toml:3: no effect is called `gyro_g`; known: gyro_g_sensitivity, "),
+            .starts_with("RIG.toml:3: no effect has the id `gyro_g`; known: gyro_g_sensitivity, "),
         "{unknown}"
     );
     let format = RigFile::parse(&Source::new("RIG.toml", "format = \"mimu-plan/1\"")).unwrap_err();

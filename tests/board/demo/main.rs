@@ -117,10 +117,10 @@ fn demo(seed: u64, folder: &Path) -> Result<(), String> {
         println!("Note: {}", note.as_str().unwrap_or_default());
     }
     let listed = match is_listed(effect) {
-        true => "which mimu knows",
-        false => "which is on no list of mimu's",
+        true => "which is on mimu's list of effects",
+        false => "which is unlisted",
     };
-    println!("What was wrong with the unit, which nobody had said: {effect}, {listed}.");
+    println!("The unit's undeclared error: {effect}, {listed}.");
     println!(
         "Page: {}  ({:.0} s)",
         unit["page"].as_str().unwrap_or_default(),

@@ -163,7 +163,10 @@ fn a_step_with_the_rate_of_another_speed_is_named() {
         "{error}"
     );
     let error = refused(&plan, turntable("200,270,edge=270", 0.001));
-    assert!(error.contains("there is no step edge"), "{error}");
+    assert!(
+        error.contains("no dwell has the number or label edge"),
+        "{error}"
+    );
     let error = refused(&plan, turntable("200", 0.001));
     assert!(error.contains("give all rates of the turntable"), "{error}");
 }
@@ -211,7 +214,7 @@ fn rates_that_contradict_each_other_are_said_and_readings_in_si_tell_33_rpm_from
     assert!(!said_of("200").contains("33 1/3 rpm"), "{}", said_of("200"));
     let wrong = said_of("270");
     assert!(
-        wrong.contains("is the rate that of 45 rpm where it was 33 1/3 rpm?"),
+        wrong.contains("was the turntable at 33 1/3 rpm while the rate of 45 rpm is given?"),
         "{wrong}"
     );
 }
@@ -236,5 +239,5 @@ fn a_rate_beyond_the_range_of_the_gyro_is_refused_with_a_dwell_that_shows_it() {
     let error = fit(prepared, Options::default())
         .expect_err("is refused")
         .to_string();
-    assert!(error.contains("beyond the range of the gyro"), "{error}");
+    assert!(error.contains("exceeds the range of the gyro"), "{error}");
 }

@@ -92,7 +92,7 @@ fn the_list_is_first_and_a_summary_has_at_most_25_lines_of_100_columns() {
         let problems = RecordingProblem::of(&fit);
         let headed = summary
             .lines()
-            .position(|l| l == "wrong with this recording:");
+            .position(|l| l == "problems of this recording:");
         assert_eq!(headed.is_some(), !problems.is_empty());
         let verdict = summary.lines().position(|l| l.starts_with("verdict:"));
         assert!(headed < verdict, "{summary}");

@@ -372,7 +372,7 @@ fn what_the_temperature_does_to_bias_and_scale_in_one_pose_is_named_together() {
             .collect::<Vec<_>>()
             .join("\n");
         assert!(
-            notes.contains("does as well, as the input along the axis"),
+            notes.contains("fits as well, because the input along the axis"),
             "{notes}"
         );
     }

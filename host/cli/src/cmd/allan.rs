@@ -18,7 +18,7 @@ use crate::output::{check_outputs, print, progress};
 
 #[derive(Args)]
 pub struct AllanArgs {
-    /// Directory of the recording, of a unit at rest; several of one unit are at a temperature each
+    /// Directory of a recording of the unit at rest; several of one unit, each at another temperature
     #[arg(required = true, value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
     /// First time stamp, s
@@ -27,19 +27,19 @@ pub struct AllanArgs {
     /// Last time stamp, s
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time)]
     to: Option<f64>,
-    /// One dwell of the step column
+    /// Number of a dwell in the column step
     #[arg(long, value_name = "N", conflicts_with_all = ["from", "to"], allow_negative_numbers = true, value_parser = clap::value_parser!(i32).range(0..))]
     step: Option<i32>,
     /// Deviation to report; the model is always fitted to the overlapping Allan deviation
     #[arg(long, value_enum, default_value = "allan")]
     kind: KindArg,
-    /// Averaging times in a decade
+    /// Averaging times per decade
     #[arg(long, value_name = "K", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=100))]
     per_decade: u16,
     /// Probability of the intervals
     #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = confidence)]
     confidence: f64,
-    /// Calibration of the unit: readings in V or counts are divided by its scale factors, which go into the noise file
+    /// Calibration of the unit: readings in V or counts are divided by its scale factors, which are stored in the noise file
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// Plot to write
@@ -47,7 +47,7 @@ pub struct AllanArgs {
     plot: Option<PathBuf>,
     /// Noise file to write, for `mimu fit`, `verify`, `diagnose`, `design` and `export`
     ///
-    /// Of readings in V or counts `design` and `export` take it only with --calibration; the others take it either way.
+    /// For readings in V or counts `design` and `export` need it to be made with --calibration; the others do not.
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -62,7 +62,7 @@ enum KindArg {
     Allan,
     /// Modified Allan
     Modified,
-    /// Overlapping Hadamard, blind to drift
+    /// Overlapping Hadamard, insensitive to drift
     Hadamard,
 }
 
@@ -85,7 +85,7 @@ pub fn run(args: &AllanArgs) -> Result<()> {
         return Err(Error::new(
             "--plot",
             format!(
-                "it shows one recording, and there are {}",
+                "the plot shows one recording, but {} were given",
                 args.recordings.len()
             ),
             "plot one recording at a time",

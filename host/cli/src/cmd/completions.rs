@@ -9,7 +9,7 @@ use crate::output::show;
 
 #[derive(Args)]
 pub struct CompletionsArgs {
-    /// Shell that reads the script
+    /// Shell for which the script is
     shell: Shell,
 }
 

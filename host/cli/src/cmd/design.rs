@@ -30,22 +30,22 @@ pub struct DesignArgs {
     /// Sensor to calibrate
     #[arg(long, value_enum, default_value = "accel")]
     sensor: SensorArg,
-    /// What is known of the input: table (all of it) or gravity (its size, at rest)
+    /// What is known of the input: table (all of it) or gravity (its magnitude at rest)
     #[arg(long, default_value = "table")]
     reference: Reference,
-    /// Terms to determine: affine and any of quadratic, cubic, cross, g-sensitivity
+    /// Terms to be determined: affine, and any of quadratic, cubic, cross, g-sensitivity
     #[arg(long, value_name = "LIST", default_value = "affine")]
     model: Terms,
     /// Find the best design of N dwells
     #[arg(short, value_name = "N", value_parser = dwells, allow_negative_numbers = true)]
     n: Option<u16>,
-    /// Find how many dwells and how long are best within so many minutes, moves included
+    /// Find the best number and length of dwells within this time in minutes, moves included
     #[arg(long, value_name = "MINUTES", value_parser = |t: &str| number(t, 0.1, 2880.0))]
     budget: Option<f64>,
     /// Judge a published scheme
     #[arg(long, value_enum, value_name = "NAME")]
     scheme: Option<SchemeArg>,
-    /// Judge all published schemes beside the best designs of as many dwells
+    /// Compare all published schemes with the best designs of as many dwells
     #[arg(long)]
     compare: bool,
     /// Find the smallest experiment that shows these effects (see `mimu diagnose`)
@@ -55,52 +55,51 @@ pub struct DesignArgs {
     /// With --effects: a recording of the unit, for its noise, sensors, rates and fixture
     #[arg(long, value_name = "REC", requires = "effects")]
     after: Option<PathBuf>,
-    /// With --effects: temperatures of the chamber, °C: where it begins and ends, and the two farthest from it
+    /// With --effects: temperatures of the chamber, °C: the one at the beginning and the end, and the two extremes
     #[arg(long, value_name = "C,C,C", requires = "effects", allow_hyphen_values = true, value_parser = effects::chamber)]
     chamber: Option<[f64; 3]>,
-    /// What carries the unit; without it three-axis, or hand with --reference gravity
+    /// What holds the unit [default: three-axis, or hand with --reference gravity]
     #[arg(long, value_enum)]
     table: Option<TableArg>,
     /// Length of a dwell, s
     ///
-    /// Without it 20 s; with a noise file, from which on a longer one has a sigma at most 5 % smaller.
+    /// By default 20 s; with a noise file, the length beyond which longer dwells reduce sigma by at most 5 %.
     #[arg(long, value_name = "S", conflicts_with = "budget",
           value_parser = |t: &str| number(t, 0.1, 86400.0))]
     dwell: Option<f64>,
-    /// Order of the dwells: randomised without it, and published schemes as published
+    /// Order of the dwells [default: randomised; published schemes as published]
     ///
-    /// Sensors wander, and what neighbouring dwells share of that goes into the parameters that the difference of their
-    /// inputs determines. With 22 dwells and a bias that walks, scale factors and misalignments have 9 times the
-    /// variance that a fit claims in the shortest order, and what it claims in a randomised one. That
-    /// takes longer: what it costs is printed.
+    /// Biases wander, and neighbouring dwells share most of it. If their inputs are similar, the shared part enters the parameters. With 22
+    /// dwells and a random walk of the bias, the true variance of scale factors and misalignments is 9 times what the fit claims in the
+    /// shortest order, and equals it in a randomised one. The additional time is printed.
     #[arg(long, value_enum)]
     order: Option<OrderArg>,
-    /// Rates of the table for a gyro, deg/s: `10,100,300`, or `..300` for any up to 300, which it is without it
+    /// Rates of the table for a gyro, deg/s: `10,100,300`, or `..300` for any up to 300 [default: ..300]
     #[arg(long, value_name = "LIST", conflicts_with_all = ["scheme", "compare"])]
     rates: Option<RateList>,
-    /// Rate at which the attitude is changed, deg/s; without it 10 on a table, 45 by hand
+    /// Rate of moves between attitudes, deg/s [default: 10 on a table, 45 by hand]
     #[arg(long, value_name = "DPS", value_parser = |t: &str| number(t, 0.01, 10000.0))]
     slew: Option<f64>,
     /// Time from the end of a move to the dwell, s
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = |t: &str| number(t, 0.0, 3600.0))]
     settle: f64,
-    /// Sigma of a dwell mean, m/s² or rad/s; without it, from --noise and --instability
+    /// Sigma of a dwell mean, m/s² or rad/s [default: from --noise, --instability and --walk]
     #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 1e-12, 1e3),
           conflicts_with_all = ["budget", "noise", "instability", "walk"])]
     sigma: Option<f64>,
-    /// White noise N, m/s² or rad/s per √Hz, or the noise file of the unit; without it that of fang's sensors
+    /// White noise N, m/s² or rad/s per √Hz, or the noise file of the unit [default: that of fang's sensors]
     #[arg(long, value_name = "SI|FILE")]
     noise: Option<NoiseArg>,
-    /// Bias instability B, m/s² or rad/s; without it, what --noise averages to in 20 s
+    /// Bias instability B, m/s² or rad/s [default: the mean that --noise gives in 20 s]
     #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 0.0, 1e3))]
     instability: Option<f64>,
-    /// Random walk K, m/s² or rad/s per √s; without it none
+    /// Random walk K, m/s² or rad/s per √s [default: 0]
     #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 0.0, 1e3))]
     walk: Option<f64>,
-    /// Seed of the search and of the lots
+    /// Seed of the search and of the random order
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Plan to write, for a table or a person to carry out
+    /// Plan to write, for a table or a person
     #[arg(short, value_name = "FILE", conflicts_with = "compare")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -263,13 +262,13 @@ impl DesignArgs {
             }
             (Sensor::Gyro, Reference::TurntableRate) => Err(Error::new(
                 "gyro, --reference turntable-rate",
-                "orientations on a record player are not designed here",
+                "this command does not design orientations on a record player",
                 "design poses by gravity (--sensor accel --reference gravity --table hand): the same orientations serve a gyro",
             )),
             (Sensor::Gyro, Reference::Gravity) => Err(Error::new(
                 "gyro, --reference gravity",
-                "by hand a gyro's known input are the turns between dwells, which are not designed here",
-                "design the accelerometer's dwells and turn by a quarter or more between them",
+                "by hand a gyro's known inputs are the turns between dwells, which this command does not design",
+                "design the accelerometer's dwells, and turn by 90 degrees or more between them",
             )),
         }
     }
@@ -279,7 +278,7 @@ impl DesignArgs {
         match (&self.rates, self.sensor()) {
             (Some(_), Sensor::Accel) => Err(Error::new(
                 "--rates",
-                "an accelerometer is designed at rest",
+                "dwells of an accelerometer are at rest",
                 "leave it out, or use --sensor gyro",
             )),
             (Some(list), Sensor::Gyro) => {
@@ -333,7 +332,7 @@ impl DesignArgs {
             return Err(Error::new(
                 format!("--scheme {}", scheme.name()),
                 format!(
-                    "not all of its poses are within reach of --table {}",
+                    "--table {} cannot reach all of its poses",
                     self.fixture().name()
                 ),
                 "use --table three-axis",

@@ -28,29 +28,29 @@ pub struct DeviceArgs {
 
 #[derive(Subcommand)]
 enum DeviceCommand {
-    /// Unit number, cause of the last start, abilities and stored calibration
+    /// Show unit number, last reset cause, abilities and stored calibration
     Info(PlainArgs),
-    /// Samples as they come, as CSV
+    /// Print the samples as they come, as CSV
     Stream(StreamArgs),
     /// Store a calibration on the device
     Upload(transfer::UploadArgs),
     /// Fetch the stored calibration
     Download(transfer::DownloadArgs),
-    /// Set the offsets of the stored calibration anew; the unit has to lie still
+    /// Correct the offsets of the stored calibration at today's temperature; the unit has to lie still
     Trim(trim::TrimArgs),
-    /// Deflect the sensors electrically and measure it; the unit has to stand still
+    /// Deflect the sensors electrically and measure the deflection; the unit has to stand still
     SelfTest(PlainArgs),
-    /// What it has counted: lost samples, garbled frames, flash errors
+    /// Show the counters: lost samples, garbled frames, flash errors
     Counters(CountersArgs),
     /// Compare its compensated stream with the PC's compensation of its raw stream
     Check(comparison::CheckArgs),
-    /// Run its Kalman bank under known inputs and compare it with the PC's on the same samples
+    /// Run its Kalman bank with known inputs and compare it with the PC's on the same samples
     Kalman(comparison::KalmanArgs),
 }
 
 #[derive(Args)]
 pub struct PortArgs {
-    /// Serial port; without it, the only one at which a device greets
+    /// Serial port [default: the only one at which a device greets]
     #[arg(id = "port", long = "port", value_name = "PATH")]
     pub path: Option<String>,
 }
@@ -67,16 +67,16 @@ struct PlainArgs {
 enum StreamArg {
     /// Readings, V at the sensors
     Raw,
-    /// Compensated on the device, rad/s and m/s²
+    /// Readings compensated on the device, rad/s and m/s²
     Compensated,
 }
 
 #[derive(Args)]
 struct StreamArgs {
-    /// Which samples
+    /// Samples to print
     #[arg(value_enum, default_value = "raw")]
     which: StreamArg,
-    /// How long (`10s`, `500ms`, `2min`), by the device's time; without it until Ctrl-C
+    /// Duration by the device's clock (`10s`, `500ms`, `2min`) [default: until Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = duration)]
     duration: Option<Duration>,
     #[command(flatten)]
@@ -87,7 +87,7 @@ struct StreamArgs {
 
 #[derive(Args)]
 struct CountersArgs {
-    /// Set them to zero afterwards
+    /// Reset the counters afterwards
     #[arg(long)]
     reset: bool,
     #[command(flatten)]
@@ -224,13 +224,13 @@ fn run_self_test(args: &PlainArgs) -> Result<()> {
         _ if failed.is_empty() => Ok(()),
         Some(moved) => Err(Error::new(
             port,
-            format!("the self-test failed ({failed}), and the unit moved during it: {moved}"),
+            format!("the self-test failed ({failed}); the unit moved during it: {moved}"),
             "keep the unit still and test again",
         )),
         None => Err(Error::new(
             port,
             format!("the self-test failed: {failed}"),
-            "check the wiring of these, and of the self-test pins",
+            "check the wiring of these sensors and of the self-test pins",
         )),
     }
 }

@@ -18,31 +18,31 @@ use crate::reading::read;
 
 #[derive(Args)]
 pub struct DiagnoseArgs {
-    /// Directory of the recording, and of more of the same unit: effects are found in all of them, each with its own biases;
-    /// the calibration is that of the first
+    /// Directory of the recording; several of one unit are diagnosed together, each with its own biases, and the calibration is that of the
+    /// first
     #[arg(required = true, value_name = "REC")]
     recordings: Vec<PathBuf>,
-    /// Another recording of the unit, which nothing is found in: an effect that it contradicts is not accepted
+    /// Another recording of the unit, for judging only: an effect that it contradicts is not accepted
     #[arg(long, value_name = "REC")]
     verify: Option<PathBuf>,
-    /// Keep the matrices of this calibration, and find the biases only: for a unit that is never turned, like in a chamber
+    /// Keep the matrices of this calibration and estimate the biases only, for a unit that is never turned (in a chamber)
     ///
-    /// Its effects are taken out first, and go into the new file.
+    /// Its effects are removed first, and are written to the new file too.
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
-    /// Take this term, though nothing but this recording speaks for it: `term:...`, as the report says
+    /// Accept this product (`term:...`) on the evidence of this recording alone
     #[arg(long, value_name = "ID")]
     accept: Vec<String>,
-    /// Calibration file to write, with the effects
+    /// Calibration file to write, with the effects that were found
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Page to write: residuals, effects and figures as one HTML file
+    /// HTML page to write: residuals, effects and figures
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
-    /// Plan of the next experiment to write: what this recording could not show, and what it could not tell apart
+    /// Plan to write: the next experiment, for what this recording could not show or distinguish
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Print the experiments that would show what this recording could not show, and distinguish what it could not
+    /// Print the experiments for what this recording could not show or distinguish
     #[arg(long)]
     next: bool,
     #[command(flatten)]
@@ -109,7 +109,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<()> {
                     path.display()
                 )
             }
-            None => "\nplan of the next experiment: none written, as there is nothing that one of this kind would settle\n".into(),
+            None => "\nplan of the next experiment: none written, because no plan of this kind would show or distinguish more\n".into(),
         };
     }
     let named: Vec<String> = args

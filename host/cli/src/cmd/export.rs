@@ -18,10 +18,10 @@ use crate::output::{check_outputs, print};
 pub struct ExportArgs {
     #[command(subcommand)]
     format: Format,
-    /// Calibration, by `mimu fit -o`, `mimu diagnose -o` or `mimu thermal fit -o`
+    /// Calibration file of `mimu fit -o`, `mimu diagnose -o` or `mimu thermal fit -o`
     #[arg(long, value_name = "FILE", global = true)]
     calibration: Option<PathBuf>,
-    /// Noise of the unit, by `mimu allan -o`
+    /// Noise file of the unit (`mimu allan -o`)
     #[arg(long, value_name = "FILE", global = true)]
     noise: Option<PathBuf>,
     /// File to write
@@ -45,9 +45,9 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let path = args
         .out
         .as_deref()
-        .ok_or_else(|| Error::new("-o", "it is missing", "say which file to write: -o FILE"))?;
+        .ok_or_else(|| Error::new("-o", "it is missing", "name the file to write: -o FILE"))?;
     if args.noise.is_some() && !args.format.has_noise() {
-        let problem = "this format has no place for the noise of a unit";
+        let problem = "this format cannot contain the noise of a unit";
         return Err(Error::new("export", problem, "leave it out").about(Argument::Noise));
     }
     let sources = [args.calibration.as_deref(), args.noise.as_deref()];

@@ -19,13 +19,13 @@ use crate::report;
 pub(crate) struct FitArgs {
     /// Directory of the recording, of samples or of means
     recording: PathBuf,
-    /// Refit without each of N contiguous blocks of time and report the error on it
+    /// Hold out N contiguous blocks in turn, refit without each, and report the error on it
     #[arg(long, value_name = "blocks=N", default_value = "blocks=4", value_parser = holdout)]
     holdout: usize,
-    /// Estimator where the input is known (reference = "table"); least-squares without it
+    /// Estimator if the input is known (reference = "table") [default: least-squares]
     #[arg(long, value_enum)]
     method: Option<MethodArg>,
-    /// Calibrate one of the two only: when the experiment does not determine the other
+    /// Calibrate one sensor only, if the experiment does not determine the other
     #[arg(long, value_enum, value_name = "SENSOR")]
     only: Option<SensorArg>,
     #[command(flatten)]
@@ -62,7 +62,9 @@ enum MethodArg {
 fn holdout(text: &str) -> std::result::Result<usize, String> {
     let count = text.strip_prefix("blocks=").unwrap_or(text);
     match count.parse() {
-        Ok(1) => Err("one block leaves nothing to fit to: at least 2, or 0 for none".into()),
+        Ok(1) => Err(
+            "with one block nothing remains to be fitted: write at least 2, or 0 for none".into(),
+        ),
         Ok(n) if n <= 1000 => Ok(n),
         _ => Err("write blocks=N with N from 2 to 1000, or blocks=0 for none".into()),
     }
@@ -91,7 +93,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
                 "--method chooses between estimators for known inputs, and reference is \"{}\"",
                 prepared.manifest.reference
             ),
-            "leave --method out, or give the steps their inputs (reference = \"table\")",
+            "leave --method out, or give the dwells their inputs (reference = \"table\")",
         ));
     }
     let found = DwellResult::list(&prepared);

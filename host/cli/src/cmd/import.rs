@@ -20,29 +20,29 @@ use crate::report;
 
 #[derive(Args)]
 pub(crate) struct ImportArgs {
-    /// Text files (any separator), Parquet, bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap), logs of PX4 (.ulg) and ArduPilot (.bin), or
-    /// the folder of a preset; the later ones are joined onto the times of the first
+    /// Text files (any separator), Parquet, bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap), logs of PX4 (.ulg) and ArduPilot (.bin), or the
+    /// folder of a preset; later files are interpolated at the times of the first
     #[arg(required_unless_present = "faces")]
     files: Vec<PathBuf>,
-    /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header
-    /// (`gyro_x=wx,t_s=time`); once for each file
+    /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header (`gyro_x=wx,t_s=time`); one list for
+    /// each file
     ///
-    /// Known are t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., ref_rate_x_dps..,
-    /// ref_force_x_mps2.., and sample, an index from which the time follows with --rate-hz.
+    /// Names of columns: t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., ref_rate_x_dps.., ref_force_x_mps2.., and sample, an
+    /// index that gives the time with --rate-hz.
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     columns: Vec<ColumnList>,
-    /// Maker or program whose layout the files have: columns, units and signs; found by the header without it
+    /// Maker or program whose columns, units and signs the files have [default: recognised by the header]
     #[arg(long, value_name = "NAME", value_parser = presets())]
     preset: Option<Preset>,
-    /// The rows are means over a pose or a rate each, and no samples: mean readings, and as far as known standard deviations of a
-    /// sample (`accel_x_sd`), numbers of samples (`averaged`, `accel_x_averaged`), inputs (ref_ columns) and names (`step`)
+    /// Each row is the mean over a pose or a rate, not a sample. Optional columns: standard deviation of a sample (`accel_x_sd`), number of
+    /// samples (`averaged`, `accel_x_averaged`), inputs (ref_ columns) and names (`step`)
     #[arg(long)]
     means: bool,
-    /// The files follow one another, as those of six faces: each is a step with the name of its file, and one list of columns serves all
+    /// The files follow one another, like those of six faces: each is a dwell with the name of its file; one list of columns applies to all
     #[arg(long, conflicts_with = "means")]
     sequence: bool,
-    /// One file for each face, with the axis that was up: `--faces +x=a.csv -x=b.csv +y=c.csv -y=d.csv +z=e.csv -z=f.csv`; with
-    /// --reference table the specific forces follow
+    /// One file for each face, named with the axis that was up: `--faces +x=a.csv -x=b.csv +y=c.csv -y=d.csv +z=e.csv -z=f.csv`; with
+    /// --reference table the faces give the specific forces
     #[arg(long, conflicts_with_all = ["means", "sequence", "inputs"])]
     faces: bool,
     /// With --faces: the file with x down
@@ -54,38 +54,39 @@ pub(crate) struct ImportArgs {
     /// With --faces: the file with z down
     #[arg(short = 'z', value_name = "FILE", requires = "faces")]
     z_down: Vec<PathBuf>,
-    /// Rows after a pause of more than so many seconds are a new step, as where nothing was recorded between the poses
+    /// A pause of more than this number of seconds begins a new dwell, for files without rows between the poses
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["means", "sequence", "faces"])]
     step_gap: Option<f64>,
-    /// Only the rows in which a column has this value, as one of several sensors in a file: `channel=3`; repeated, all must hold
+    /// Import only the rows in which a column has this value, for one of several sensors in a file: `channel=3`; if repeated, a row must
+    /// satisfy all
     #[arg(long = "where", value_name = "COLUMN=VALUE", conflicts_with = "means")]
     filters: Vec<RowFilter>,
-    /// Sample rate, Hz, of files without a time column. Of others it is the rate of their time stamps, which this one checks;
-    /// it decides where stamps in bursts can be read in two ways
+    /// Sample rate, Hz. Files without a time column need it; in others it checks the rate of the stamps, and decides if stamps in bursts
+    /// are ambiguous
     #[arg(long, allow_negative_numbers = true)]
     rate_hz: Option<f64>,
-    /// Unit of the time stamps: s, ms, us or ns; found out without it, and asked for where two are possible
+    /// Unit of the time stamps: s, ms, us or ns [default: recognised; required if two are possible]
     #[arg(long, value_name = "UNIT")]
     time_unit: Option<Decimal>,
-    /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
+    /// Local gravity, m/s² [default: normal gravity at sea level at --latitude, or 9.80665 with a warning]
     #[arg(long, allow_negative_numbers = true)]
     gravity: Option<f64>,
-    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²); bags, logs and most presets have SI without it
+    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²) [default of bags, logs and most presets: SI]
     #[arg(long, value_name = "UNIT")]
     raw_unit: Option<RawUnit>,
-    /// Topic of a bag with sensor_msgs/Imu, of a PX4 log (sensor_gyro, sensor_combined) or message of an ArduPilot log (IMU, GYR, IMT);
-    /// without it, the only or the best one
+    /// Topic of a bag (sensor_msgs/Imu) or of a PX4 log (sensor_gyro, sensor_combined), or message of an ArduPilot log (IMU, GYR, IMT)
+    /// [default: the only or the best one]
     #[arg(long)]
     topic: Option<String>,
-    /// Which sensor of a log of PX4 or ArduPilot, from 0; without it, the only one
+    /// Sensor of a PX4 or ArduPilot log, counted from 0 [default: the only one]
     #[arg(long, value_name = "N")]
     instance: Option<u32>,
-    /// What is known of the input: table (ref_ columns or --inputs), gravity (its magnitude, at rest), or turntable-rate (the magnitude of
-    /// the rate, as on a record player, with --rate-dps and --rate-error)
+    /// What is known of the input: table (ref_ columns or --inputs), gravity (its magnitude at rest), or turntable-rate (the magnitude of
+    /// the rate, as on a record player; needs --rate-dps and --rate-error)
     #[arg(long)]
     reference: Reference,
-    /// Magnitudes of the turntable's rates, deg/s: 200 for 33 1/3 rpm, 270 for 45 rpm; of a step by its number, label or file name
-    /// (`edge=270`, `rest=0`), else the readings show which dwell has which
+    /// Magnitudes of the turntable's rates, deg/s: 200 for 33 1/3 rpm, 270 for 45 rpm. The readings show which dwell has which rate, unless
+    /// it is given by number, label or file name (`edge=270`, `rest=0`)
     #[arg(
         long,
         value_name = "RATE",
@@ -94,42 +95,42 @@ pub(crate) struct ImportArgs {
         allow_negative_numbers = true
     )]
     rate_dps: Vec<TurntableRate>,
-    /// How well these rates are known: half of a 95 % interval, as `0.1%`; no number of dwells reduces it
+    /// Error of these rates: half of a 95 % interval, like `0.1%`; no number of dwells reduces it
     #[arg(long, value_name = "PERCENT", requires = "rate_dps", value_parser = rate_error)]
     rate_error: Option<f64>,
     /// Factor for a column, or for gyro or accel: `gyro=0.0174533`
     #[arg(long, value_name = "COLUMN=FACTOR")]
     scale: Vec<Scale>,
-    /// What is added to a column after its factor: `temp_c=36.53`
+    /// Number added to a column after its factor: `temp_c=36.53`
     #[arg(long, value_name = "COLUMN=VALUE", allow_hyphen_values = true)]
     offset: Vec<Offset>,
-    /// Columns of which the firmware took the low byte for a signed number: gyro, accel or a column; mended exactly, before --scale
+    /// Columns whose low byte the firmware read as a signed number: gyro, accel or a column; corrected exactly, before --scale
     ///
-    /// `(high << 8) + (int8_t)low` reads 256 counts low where the low byte is 128 or more. The readings have to be whole counts.
+    /// `(high << 8) + (int8_t)low` is 256 counts too low if the low byte is 128 or more. The readings have to be whole counts.
     #[arg(long, value_name = "COLUMN", conflicts_with = "means")]
     signed_low_byte: Vec<SignedLowByte>,
     /// Raw columns of unsigned codes in two's complement, with their bits: `accel=12`
     #[arg(long, value_name = "COLUMN=BITS", conflicts_with = "means")]
     twos_complement: Vec<TwosComplement>,
-    /// Code that raw columns have at an input of 0, subtracted before --scale: `gyro=2048`
+    /// Code of raw columns at zero input, subtracted before --scale: `gyro=2048`
     #[arg(long, value_name = "COLUMN=CODE", conflicts_with = "means")]
     zero: Vec<Zero>,
-    /// Name of the unit; without it, the name of the recording
+    /// Name of the unit [default: the name of the recording]
     #[arg(long)]
     device: Option<String>,
     /// Latitude, degrees
     #[arg(long, allow_negative_numbers = true)]
     latitude: Option<f64>,
-    /// CSV with the known input of each step: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
+    /// CSV file with the known input of each dwell or turn: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
     ///
-    /// One row for each step of the column step, by its number or label; what is not known stays empty:
-    /// `step,turn_x_deg,ref_force_x_mps2`, then `face_up,,9.81` and `about_x,360,`.
+    /// One row for each number or label of the column step; leave unknown inputs empty: `step,turn_x_deg,ref_force_x_mps2`, then
+    /// `face_up,,9.81` and `about_x,360,`.
     #[arg(long, value_name = "FILE")]
     inputs: Option<PathBuf>,
-    /// Separator of text files: comma, semicolon, tab or space; found out without it
+    /// Separator of text files: comma, semicolon, tab or space [default: recognised]
     #[arg(long)]
     separator: Option<Separator>,
-    /// Leave out rows that cannot be read: so many (`=20`), or a share of each file (`=2%`); 1 % of it where neither is given
+    /// Leave out rows that cannot be read: at most this number (`=20`), or this share of each file (`=2%`) [without a value: 1%]
     #[arg(long, value_name = "LIMIT", num_args = 0..=1, require_equals = true, default_missing_value = "1%", conflicts_with = "means")]
     skip_broken: Option<BrokenLimit>,
     /// Format of the samples: parquet or csv
@@ -164,7 +165,7 @@ fn faces(args: &ImportArgs) -> Result<(Vec<PathBuf>, Vec<Face>)> {
     for file in &args.files {
         let text = file.to_string_lossy();
         let (face, path) = text.split_once('=').ok_or_else(|| {
-            let problem = "no axis is given that was up while it was recorded";
+            let problem = "the axis that was up is missing";
             Error::new(file.display(), problem, format!("write it like +x={text}"))
         })?;
         both.push((face.parse::<Face>()?, PathBuf::from(path)));
@@ -202,7 +203,7 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         ),
         (None, Some(latitude)) => (normal_gravity(latitude), None),
         (None, None) if args.reference == Reference::Table => (9.80665, None),
-        (None, None) => (9.80665, Some("gravity is taken to be 9.80665 m/s²; it ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer with it: give --gravity or --latitude".to_string())),
+        (None, None) => (9.80665, Some("gravity is assumed to be 9.80665 m/s². It ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude".to_string())),
     };
     let chosen = match (&args.preset, args.columns.is_empty()) {
         (None, false) => None,
@@ -215,7 +216,7 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         .or(logs.then_some(RawUnit::Si))
         .ok_or_else(|| {
             let remedy = "give --raw-unit: V, count or SI (rad/s and m/s²)";
-            Error::new("import", "the unit of the readings is not known", remedy)
+            Error::new("import", "the unit of the readings is unknown", remedy)
         })?;
     let options = ImportOptions {
         topic: args.topic,
@@ -267,7 +268,7 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         && summary.sample_rate_hz < SLOW_HZ
     {
         summary.warnings.push(format!(
-            "{} Hz is slow for an inertial unit: if the times are not in {unit}, give their unit (--time-unit)",
+            "{} Hz is a low rate for an inertial unit: if the times are not in {unit}, give their unit (--time-unit)",
             summary.sample_rate_hz
         ));
     }

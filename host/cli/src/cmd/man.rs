@@ -11,7 +11,7 @@ use crate::examples;
 
 #[derive(Args)]
 pub struct ManArgs {
-    /// Folder for the pages, `mimu.1`, `mimu-fit.1` and so on; made if it is not there
+    /// Folder for the pages (`mimu.1`, `mimu-fit.1`, ...); created if it does not exist
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
 }
@@ -19,7 +19,7 @@ pub struct ManArgs {
 pub fn run(args: &ManArgs) -> Result<()> {
     let folder = &args.output;
     if folder.exists() && !folder.is_dir() {
-        let problem = "a file is where the folder of the pages should be";
+        let problem = "a file has the name of the folder for the pages";
         return Err(Error::new(folder.display(), problem, "name a folder"));
     }
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;

@@ -24,19 +24,19 @@ use mimu::warning::Warning;
 /// What every recording of a device has, whoever moves the unit.
 #[derive(Args)]
 pub(crate) struct RecordingArgs {
-    /// How long to wait for a port that has vanished, as when the cable was pulled; 0 ends the recording
+    /// Longest wait for a port that has vanished (a pulled cable); 0: the recording ends at once
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = patience)]
     pub(crate) reconnect: Duration,
-    /// Name of the unit; without it, that of the plan, or the number of its microcontroller
+    /// Name of the unit [default: that of the plan, or the number of its microcontroller]
     #[arg(long)]
     device: Option<String>,
-    /// Local gravity, m/s²; without it, that of the plan, normal gravity at sea level of --latitude, or 9.80665 and a warning
+    /// Local gravity, m/s² [default: that of the plan; normal gravity at sea level at --latitude; or 9.80665 with a warning]
     #[arg(long, allow_negative_numbers = true)]
     gravity: Option<f64>,
     /// Latitude, degrees
     #[arg(long, allow_negative_numbers = true)]
     latitude: Option<f64>,
-    /// Format of the samples in the end: csv or parquet. While it records it is CSV, which can be read at any time
+    /// Final format of the samples: csv or parquet; during the recording it is CSV, which can be read at any time
     #[arg(long, default_value = "csv")]
     pub(crate) format: SampleFormat,
 }
@@ -70,7 +70,7 @@ impl RecordingArgs {
             (None, Some(latitude)) => normal_gravity(latitude),
             (None, None) => {
                 eprintln!(
-                    "warning: gravity is taken to be 9.80665 m/s²; it ranges from 9.78 to 9.83, and every scale factor of the accelerometer with it: give --gravity or --latitude"
+                    "warning: gravity is assumed to be 9.80665 m/s². It ranges from 9.78 to 9.83, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude"
                 );
                 9.80665
             }
@@ -85,25 +85,25 @@ pub struct RecordArgs {
     /// Directory of the new recording
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
-    /// How long (`60s`, `10min`, `4h`), by the device's time; without it until Ctrl-C
+    /// Duration by the device's clock (`60s`, `10min`, `4h`) [default: until Ctrl-C]
     #[arg(long = "for", value_name = "TIME", value_parser = duration)]
     duration: Option<Duration>,
-    /// Mark the dwells: each line on standard input (Enter) begins one, or ends the one that runs
+    /// Mark the dwells by hand: each Enter (a line on standard input) begins a dwell or ends the current one
     #[arg(long, conflicts_with_all = ["step_every", "transit"])]
     steps: bool,
-    /// Mark the dwells by time: so long a dwell, so long in transit, again and again (`10s,5s`)
+    /// Mark the dwells by time: duration of a dwell and of the transit after it, repeated (`10s,5s`)
     #[arg(long, value_name = "DWELL,TRANSIT", value_parser = every)]
     step_every: Option<(Duration, Duration)>,
-    /// Plan of the experiment (`mimu design -o`): its dwells with their inputs, marked by hand (--steps) or by time (--transit); the
-    /// recording ends with the last of them
+    /// Plan of the experiment (`mimu design -o`): gives the dwells with their inputs; mark them by hand (--steps) or by time (--transit);
+    /// the recording ends with the last dwell
     #[arg(long, value_name = "PLAN", conflicts_with_all = ["step_every", "inputs"])]
     plan: Option<PathBuf>,
-    /// With --plan: so long in transit between two dwells
+    /// With --plan: duration of the transit between two dwells
     #[arg(long, value_name = "TIME", value_parser = duration, requires = "plan")]
     transit: Option<Duration>,
-    /// CSV with the known input of each dwell, as `mimu import` takes it: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
+    /// CSV file with the known input of each dwell, as for `mimu import`: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
     ///
-    /// One row for each dwell, by its number from 0; if the rows have labels in place of numbers, in the order of the rows.
+    /// One row for each dwell, by its number from 0. If the rows have labels instead of numbers, their order counts.
     #[arg(long, value_name = "FILE")]
     inputs: Option<PathBuf>,
     #[command(flatten)]
@@ -133,8 +133,9 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     let (known, table) = match (&plan, &args.plan, &args.inputs) {
         (Some(plan), Some(path), _) => {
             if args.transit.is_some() && plan.is_procedure() {
-                let problem = "its turns or rounds take as long as the table does, and no fixed transit fits them";
-                let remedy = "have `mimu thermal record` carry it out, or mark the dwells: --steps";
+                let problem = "its turns or rounds take as long as the table needs, so no fixed transit time fits";
+                let remedy =
+                    "carry it out with `mimu thermal record`, or mark the dwells with --steps";
                 return Err(Error::new(path.display(), problem, remedy));
             }
             let dwells = plan.dwells(gravity_mps2, &path.display().to_string())?;
@@ -157,14 +158,14 @@ pub fn run(args: &RecordArgs) -> Result<()> {
             let (place, remedy) = match &args.plan {
                 Some(_) => (
                     "--plan",
-                    "give --steps and press Enter at each, or the time in between: --transit 5s",
+                    "give --steps and press Enter at each dwell, or give the time in between: --transit 5s",
                 ),
                 None => (
                     "--inputs",
-                    "give --steps and press Enter at each, or --step-every",
+                    "give --steps and press Enter at each dwell, or give --step-every",
                 ),
             };
-            let problem = "nothing says when a dwell begins and ends";
+            let problem = "the beginnings and ends of the dwells are not given";
             return Err(Error::new(place, problem, remedy));
         }
         _ => Steps::Detected,
@@ -217,7 +218,7 @@ fn titles(known: &Known) -> Vec<String> {
 /// The line that a terminal shows.
 fn told(standing: &Standing, steps: bool, titles: &[String]) -> String {
     if standing.waiting {
-        return "the port has vanished, and is waited for; Ctrl-C ends the recording".into();
+        return "the port has vanished: waiting for it; Ctrl-C ends the recording".into();
     }
     let title = |dwell: usize| {
         let title = titles.get(dwell).map(|title| format!(" ({title})"));

@@ -20,13 +20,13 @@ use crate::report::{Made, UnitReport, unit_page};
 
 #[derive(Args)]
 pub struct ReportArgs {
-    /// Folder of a session of the wizard, or recordings of one unit
+    /// Folder of a wizard session, or recordings of one unit
     #[arg(value_name = "SESSION|REC", required_unless_present = "calibration")]
     folders: Vec<PathBuf>,
-    /// Other recordings of the unit, which nothing is fitted to
+    /// Other recordings of the unit, for judging only
     #[arg(long, value_name = "REC")]
     verify: Vec<PathBuf>,
-    /// Calibration to show; without it that of the session, or the one that the recordings give
+    /// Calibration to show [default: that of the session, or a new fit of the recordings]
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// Page to write
@@ -65,7 +65,7 @@ impl Inputs {
                 return Err(Error::new(
                     folder.display(),
                     "this session has no recording yet",
-                    "go on with it: mimu wizard -o FOLDER",
+                    "continue it: mimu wizard -o FOLDER",
                 ));
             };
             inputs.recordings.push(calibration);

@@ -35,47 +35,47 @@ enum ThermalCommand {
     Fit(FitArgs),
     /// Compare two calibrations over temperature, curve by curve
     Compare(CompareArgs),
-    /// Plan a procedure: how long it takes, and how well the curves are known afterwards
+    /// Plan a procedure; prints its duration and the expected uncertainty of the curves
     Plan(plan::PlanArgs),
     #[cfg(not(target_family = "wasm"))]
-    /// Carry a plan out: lead the chamber, move the table, and record the device
+    /// Carry out a plan: set the chamber, move the table, and record the device
     Record(record::RecordArgs),
 }
 
 #[derive(Args)]
 struct FitArgs {
-    /// Directories of the recordings of one unit, one for each time that the power came
+    /// Directories of the recordings of one unit, one for each power-on
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
-    /// Recording that is only judged by: a sweep at another rate, or a soak
+    /// Recording for judging only: a sweep at another rate, or a soak
     #[arg(long, value_name = "REC")]
     verify: Vec<PathBuf>,
-    /// Estimator; all but the first are there for comparison
+    /// Estimator; all but the first are for comparison
     #[arg(long, value_enum, default_value = "joint")]
     estimator: EstimatorArg,
-    /// Lag of the dies where it is known; 0 for none
+    /// Lag of the dies if it is known; 0: no lag
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = lag)]
     lag: Option<f64>,
-    /// Temperatures of the dies that the curves have to cover, or nothing is written
+    /// Temperatures of the dies that the curves have to cover; otherwise nothing is written
     #[arg(long, value_name = "FROM..TO", allow_hyphen_values = true, value_parser = range)]
     range: Option<[f64; 2]>,
-    /// Calibration of the unit at one temperature, which the biases of recordings at rest are added to: with it they give a calibration
+    /// Calibration of the unit at one temperature; recordings at rest add the biases over temperature to it
     #[arg(long, value_name = "FILE")]
     base: Option<PathBuf>,
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
     still: StillArgs,
-    /// The unit lay still throughout, whatever its biases do: no turning is looked for, and no sample is left out for it
+    /// Declare that the unit lay still throughout: mimu does not search for turns, and leaves out no sample because of them
     #[arg(long, conflicts_with_all = ["steps", "factor"])]
     at_rest: bool,
     /// Calibration file to write
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Draw all curves with their bands, and the errors while it heats and cools, as SVG
+    /// SVG file to write: all curves with their bands, and the errors during heating and cooling
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// The same with all figures as one HTML page
+    /// HTML page to write: the same, with all figures
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
     #[command(flatten)]
@@ -88,7 +88,7 @@ struct FitArgs {
 struct CompareArgs {
     /// Calibration file
     first: PathBuf,
-    /// Another one; the differences are this one minus the first
+    /// The second calibration file; differences are second minus first
     second: PathBuf,
     #[command(flatten)]
     json: JsonArgs,
@@ -96,15 +96,15 @@ struct CompareArgs {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum EstimatorArg {
-    /// Smooth curves of all parameters and the lag at once, with the noise
+    /// Smooth curves of all parameters, the lag and the noise, estimated together
     Joint,
     /// The same with one cubic for each parameter
     Cubic,
-    /// An affine fit in every 10 K, without a lag
+    /// An affine fit in each bin of 10 K, without a lag
     Nodes,
-    /// Ramp of niu: each cycle of the scheme, and cubics through them
+    /// Ramp of niu: a fit of each cycle of the scheme, and cubics through these
     RampNiu,
-    /// Soak: each plateau with all 24 parameters
+    /// Soak: a fit of all 24 parameters at each plateau
     Soak,
     /// Soak by fang (33), (34) as printed: one scalar a pose
     SoakFang,

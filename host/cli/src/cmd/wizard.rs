@@ -35,19 +35,19 @@ use crate::views::screen::Screen;
 
 #[derive(Args)]
 pub(crate) struct WizardArgs {
-    /// Folder of the session; one that was begun goes on
+    /// Folder of the session; an unfinished session is resumed
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
-    /// Serial port; without it, the only one at which a device greets. Several: boards on one fixture
+    /// Serial port; repeat the option for several boards on one fixture [default: the only one at which a device greets]
     #[arg(long = "port", value_name = "PATH")]
     ports: Vec<String>,
     /// What carries the unit
     #[arg(long, value_enum, default_value = "hands")]
     fixture: FixtureArg,
-    /// Driver file of a turntable; without it a person is told what to do. Several: tables that are all told the same
+    /// Driver file of a turntable; if repeated, all tables get the same commands [default: a person moves the unit]
     #[arg(long = "driver", value_name = "FILE")]
     drivers: Vec<PathBuf>,
-    /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude
+    /// Local gravity, m/s² [default: normal gravity at sea level at --latitude]
     #[arg(long)]
     gravity: Option<f64>,
     /// Latitude, degrees
@@ -61,43 +61,45 @@ pub(crate) struct WizardArgs {
     /// Largest rate of the table, deg/s
     #[arg(long, value_name = "DPS", default_value_t = 100.0, value_parser = |t: &str| number(t, 1.0, 10000.0))]
     rate: f64,
-    /// Largest change of temperature of a unit that has warmed up, °C/min; 0: it is not waited for
+    /// Rate of temperature change below which the unit counts as warmed up, °C/min; 0: do not wait
     #[arg(long, value_name = "C_PER_MIN", default_value_t = 0.5, value_parser = |t: &str| number(t, 0.0, 100.0))]
     warm_up: f64,
-    /// Largest change of temperature from the first dwell on, °C
+    /// Largest change of temperature since the first dwell, °C
     #[arg(long, value_name = "C", default_value_t = 5.0, value_parser = |t: &str| number(t, 0.1, 200.0))]
     drift: f64,
-    /// Half-width of a 95 % interval that is wanted: gyro-bias=0.05 (deg/s), gyro-scale=2000 (ppm), gyro-angle=2000 (µrad), accel-bias=1 (mg), accel-scale=1000, accel-angle=1000; may be repeated
+    /// Target for the half-width of a 95 % interval: gyro-bias=0.05 (deg/s), gyro-scale=2000 (ppm), gyro-angle=2000 (µrad), accel-bias=1
+    /// (mg), accel-scale=1000, accel-angle=1000; may be repeated
     #[arg(long = "target", value_name = "NAME=VALUE")]
     targets: Vec<String>,
-    /// Plan of `mimu design` to begin with; without it one is made
+    /// Plan of `mimu design` for the first dwells [default: the wizard makes one]
     #[arg(long, value_name = "PLAN")]
     plan: Option<PathBuf>,
-    /// How well the unit's axes are lined up with the table's, degrees: 95 % of each angle; no dwell shows it, and it goes into the intervals
+    /// How well the unit's axes are aligned with the table's, degrees: 95 % of each angle; no dwell shows it, so the intervals include it
     #[arg(long, value_name = "DEG", default_value_t = 0.02, value_parser = |t: &str| number(t, 0.0, 10.0))]
     mounting: f64,
-    /// Which estimate becomes the calibration, the PC's or the device's; the other is compared with it
+    /// Whose estimate becomes the calibration; the other one is compared with it
     #[arg(long, value_enum, default_value = "pc")]
     by: By,
-    /// All planned dwells and no more, whatever the targets say
+    /// Make exactly the planned dwells, whatever the targets
     #[arg(long)]
     as_planned: bool,
-    /// Most dwells of the calibration
+    /// Largest number of dwells of the calibration
     #[arg(long, value_name = "N", default_value_t = 60)]
     most: usize,
-    /// Without a person: so long a step may take to come about, s
+    /// Without a person: longest wait for the conditions of a dwell, s
     #[arg(long, value_name = "S", default_value_t = 120.0, value_parser = |t: &str| number(t, 1.0, 1e5))]
     patience: f64,
-    /// Order of the planned dwells
+    /// Seed of the random order of the planned dwells
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Answer all questions beforehand: effects that are found are stored, and a failed self-test ends the session
+    /// Answer all questions in advance: store effects that are found; store nothing beyond the limits; end at a failed self-test; do not
+    /// unplug the board
     #[arg(long)]
     yes: bool,
-    /// Write what happens as JSON lines (`-`: to standard output)
+    /// Write the events as JSON lines (`-`: to standard output)
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
-    /// Lines of text, also on a terminal of 80 x 24 characters and more, which gets a full screen otherwise
+    /// Write lines of text even on a terminal that is large enough for the full screen (80 x 24)
     #[arg(long)]
     plain: bool,
     #[command(flatten)]
@@ -107,17 +109,17 @@ pub(crate) struct WizardArgs {
 /// A board of another maker, which writes its readings as lines of text.
 #[derive(Args)]
 struct TextArgs {
-    /// The board writes lines of text: names of the numbers of a line in their order, of ax, ay, az, gx, gy, gz, t_us, t_ms or t_s (the
-    /// board's clock), temp_c, and `-` for one that is not needed. MotionCal's `Raw:` is known by itself
+    /// The board writes lines of text. Names of the numbers of a line in their order: ax, ay, az, gx, gy, gz; t_us, t_ms or t_s (the
+    /// board's clock); temp_c; `-` for one that is not needed. MotionCal's `Raw:` is recognised
     #[arg(long, value_name = "NAMES", num_args = 0..=1, default_missing_value = "ax,ay,az,gx,gy,gz")]
     text: Option<String>,
-    /// Bits a second of a board that writes lines of text
+    /// Bits per second of a board that writes lines of text
     #[arg(long, value_name = "N", default_value_t = 115_200, requires = "text")]
     baud: u32,
     /// Unit of its readings: count, V, or SI (rad/s and m/s²)
     #[arg(long, value_name = "UNIT", default_value = "count", value_parser = raw_unit, requires = "text")]
     raw_unit: RawUnit,
-    /// What it is called; without it, as its port
+    /// Name of the unit [default: its port]
     #[arg(long, value_name = "NAME", requires = "text")]
     device: Option<String>,
 }
@@ -160,9 +162,9 @@ impl TextArgs {
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum By {
-    /// The fit of this program
+    /// The PC's fit
     Pc,
-    /// The device's own Kalman filters, which need a table
+    /// The device's Kalman filters, which need a table
     Device,
 }
 
@@ -170,7 +172,7 @@ enum By {
 enum FixtureArg {
     /// A turntable: attitudes and rates are known
     Table,
-    /// A box with six faces, also held by its edges
+    /// A box with six faces; poses are faces, edges and corners
     Cube,
     /// Hands: any attitude
     Hands,
@@ -194,8 +196,12 @@ impl WizardArgs {
                 let remedy = "write one of gyro-bias, gyro-scale, gyro-angle, accel-bias, accel-scale, accel-angle, =, and a number above 0";
                 Error::new(format!("--target {text}"), problem, remedy)
             };
-            let (name, value) = text.split_once('=').ok_or_else(|| wrong("there is no ="))?;
-            let value: f64 = value.parse().map_err(|_| wrong("this is no number"))?;
+            let (name, value) = text
+                .split_once('=')
+                .ok_or_else(|| wrong("the = is missing"))?;
+            let value: f64 = value
+                .parse()
+                .map_err(|_| wrong("the value is not a number"))?;
             if !(value > 0.0) {
                 return Err(wrong("it is not above 0"));
             }
@@ -206,7 +212,7 @@ impl WizardArgs {
                 "accel-bias" => &mut targets.accel_bias_mg,
                 "accel-scale" => &mut targets.accel_scale_ppm,
                 "accel-angle" => &mut targets.accel_angle_urad,
-                _ => return Err(wrong("there is no such parameter")),
+                _ => return Err(wrong("the parameter is unknown")),
             };
             *target = value;
         }
@@ -217,7 +223,7 @@ impl WizardArgs {
         let fixture = self.fixture.fixture();
         if self.by == By::Device && (fixture != Fixture::Table || self.text.text.is_some()) {
             let problem =
-                "the device's Kalman filters have to be told the input, which only a table knows";
+                "the device's Kalman filters need the known input, and only a table gives it";
             let remedy = "use --fixture table with a mimu device, or leave --by device out";
             return Err(Error::new("--by device", problem, remedy));
         }
@@ -238,7 +244,7 @@ impl WizardArgs {
             eprintln!("warning: {warning}");
         }
         let Some(gravity_mps2) = gravity else {
-            let problem = "local gravity is not known, and every scale factor of the accelerometer goes by it";
+            let problem = "local gravity is unknown, and every scale factor of the accelerometer is proportional to it";
             return Err(Error::new(
                 "wizard",
                 problem,
@@ -284,7 +290,7 @@ impl WizardArgs {
                 let mimu_device::Ports { of_boards, others } = mimu_device::ports();
                 let there = [of_boards, others].concat().join(", ");
                 let problem =
-                    format!("which port writes the lines is not said; there are: {there}");
+                    format!("the port that writes the lines is not given; there are: {there}");
                 return Err(Error::new("--text", problem, "name it with --port"));
             }
             (ports, _) => ports.iter().cloned().map(Some).collect(),
@@ -318,7 +324,7 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
     for (k, dwell) in (1..).zip(plan.dwells(gravity_mps2, &place)?) {
         let Some(up) = dwell.up else {
             let at = format!("{place}, dwell {k}");
-            let problem = "the plan leaves the pose to the bench, and a person has to be told one";
+            let problem = "the plan gives no pose for a person: it leaves the choice to the bench";
             return Err(Error::new(
                 at,
                 problem,
@@ -327,13 +333,13 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
         };
         if dwell.turn.is_some() {
             let at = format!("{place}, dwell {k}");
-            let problem = "it is a turn by an angle, and the wizard has dwells only";
-            let remedy = "have `mimu thermal record` carry it out, or give another plan";
+            let problem = "it is a turn by an angle; the wizard makes dwells only";
+            let remedy = "carry it out with `mimu thermal record`, or give another plan";
             return Err(Error::new(at, problem, remedy));
         }
         if dwell.rate_dps != 0.0 && fixture != Fixture::Table {
             let at = format!("{place}, dwell {k}");
-            let problem = "it turns, and nothing but a table holds a rate";
+            let problem = "it turns at a rate, which only a table can hold";
             return Err(Error::new(
                 at,
                 problem,
@@ -365,7 +371,7 @@ fn end_in_time(stop: Arc<AtomicBool>, ends: Duration, on_screen: bool) -> Result
         if on_screen {
             ratatui::restore();
         }
-        eprintln!("ended; the same command goes on from here");
+        eprintln!("ended; the same command resumes here");
         std::process::exit(130);
     };
     let begun = std::thread::Builder::new().name("end".into()).spawn(watch);
@@ -448,7 +454,7 @@ pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
         false => Err(Error::new(
             args.output.display(),
             failed.join(", "),
-            "look at the page, mend the setup, and begin anew in another folder",
+            "read the page, correct the setup, and start a new session in another folder",
         )),
     }
 }

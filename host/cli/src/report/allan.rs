@@ -25,7 +25,7 @@ pub fn allan_text(result: &AllanResult, verbose: bool) -> String {
         let others = plural(others as u64, "more recording");
         let _ = writeln!(out, "and {others}: --verbose");
     }
-    out += "next: -o noise.toml for mimu fit --noise and mimu export; --verbose prints curve and reasons\n";
+    out += "next: -o noise.toml writes the file for mimu fit --noise and mimu export; --verbose prints curve and reasons\n";
     out
 }
 
@@ -137,7 +137,7 @@ fn sensor_text(
     if !factors.is_empty() {
         let _ = writeln!(
             out,
-            "  of the calibrated unit: that of the readings divided by the scale factors {}",
+            "  calibrated: noise of the readings divided by the scale factors {}",
             factors.join(", ")
         );
     }
@@ -158,7 +158,7 @@ fn lines_text(out: &mut String, channels: &[&ChannelResult]) {
             };
             let _ = writeln!(
                 out,
-                "  {}: set aside: {} Hz, {width}, rms {} {}, {:.0} dB above the floor",
+                "  {}: line removed: {} Hz, {width}, rms {} {}, {:.0} dB above the floor",
                 channel.name,
                 frequency(line.frequency_hz, line.resolution_hz),
                 interval(line.rms, lower, upper, unit),
@@ -169,7 +169,7 @@ fn lines_text(out: &mut String, channels: &[&ChannelResult]) {
         if let Some([from, to]) = channel.n_band_hz {
             let _ = writeln!(
                 out,
-                "  {}: N by the spectrum, which is white from {} to {} Hz",
+                "  {}: N from the spectrum, which is white from {} to {} Hz",
                 channel.name,
                 significant(from),
                 significant(to)
@@ -207,7 +207,7 @@ fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
     let unit = &readable::noise(channels[0].unit)[0];
     let _ = writeln!(
         out,
-        "  deviation, {}; bounds, and in brackets one sigma of independent clusters, %",
+        "  deviation, {}; 95 % bounds in %; in brackets the textbook one-sigma value",
         unit.unit
     );
     let mut rows = Rows::new();
@@ -283,14 +283,16 @@ fn reasons(out: &mut String, channels: &[&ChannelResult]) {
             let from = duration(model.range_s[0]);
             give(
                 channel.name,
-                format!("fitted from {from} on: the terms do not describe the curve below"),
+                format!(
+                    "fitted from {from} on: at shorter times the terms do not describe the curve"
+                ),
             );
         }
         if let Some(excess) = model.excess {
             give(
                 channel.name,
                 format!(
-                    "the terms do not describe the curve: the intervals are {} times wider for it",
+                    "the terms do not describe the curve, so the intervals are widened by a factor of {}",
                     significant(excess.sqrt())
                 ),
             );

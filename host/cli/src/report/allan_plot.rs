@@ -91,7 +91,7 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
         if let Some(quiet) = &channel.adev_without_lines {
             let class = format!("{class} quiet");
             curves.push(line(&class, curve(&channel.tau_s, quiet)));
-            key.push((class, format!("{}, lines set aside", channel.name)));
+            key.push((class, format!("{}, lines removed", channel.name)));
         }
         if let Some(hadamard) = &channel.hadamard {
             let class = format!("{class} hadamard");

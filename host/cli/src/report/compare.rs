@@ -14,7 +14,7 @@ pub fn compare_text(result: &Comparison, all: bool) -> String {
     let _ = match (judged, changed) {
         (0, _) => writeln!(
             out,
-            "{} calibrations; none says how well it is known, so that no change can be judged",
+            "{} calibrations without uncertainties: no change can be judged",
             result.files.len()
         ),
         (_, 0) => writeln!(

@@ -27,7 +27,7 @@ pub fn check_text(result: &DeviceResult<Checked>) -> String {
         let unit = printed(d.unit);
         line!(
             out,
-            "{sensor:<6} same precision {} ulps ({} {unit}), double precision {} {unit}, {:.0} % of what rounding allows",
+            "{sensor:<6} same precision {} ulps ({} {unit}), double precision {} {unit}, {:.0} % of the limit of rounding",
             d.ulps,
             significant(d.single),
             significant(d.double),
@@ -35,12 +35,15 @@ pub fn check_text(result: &DeviceResult<Checked>) -> String {
         );
     }
     if let Some([low, high]) = found.die_range_c {
-        line!(out, "the dies were at {low:.2} to {high:.2} °C meanwhile");
+        line!(
+            out,
+            "temperature of the dies during the comparison: {low:.2} to {high:.2} °C"
+        );
     }
     if let Some(off) = found.die_temperature_k {
         line!(
             out,
-            "temperature of the dies behind the lag: {} K off",
+            "lagged temperature of the dies: difference {} K",
             significant(off)
         );
     }

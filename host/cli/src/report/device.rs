@@ -29,13 +29,13 @@ pub fn info_text(result: &DeviceResult<&Identity>) -> String {
     );
     line!(
         out,
-        "started       {}, {} since power came",
+        "started       {}, {} since power-on",
         who.start,
         starts(who.starts)
     );
     let powered = match who.powered_for_ms {
         Some(ms) => format!("{:.1} s before sampling began", f64::from(ms) / 1000.0),
-        None => "not known: a reset has lost it".into(),
+        None => "unknown: a reset has lost it".into(),
     };
     line!(out, "power-on      {powered}");
     line!(
@@ -115,7 +115,7 @@ pub fn upload_text(result: &DeviceResult<Uploaded>) -> String {
     if done.repeated > 0 || done.restarts > 0 {
         line!(
             out,
-            "messages sent again: {}, restarts of the device: {}",
+            "messages repeated: {}, restarts of the device: {}",
             done.repeated,
             done.restarts
         );
@@ -151,7 +151,7 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
         line!(out, "offsets trimmed {at}");
     }
     if let Some([from, to]) = found.range_c {
-        line!(out, "for {from} to {to} °C of the dies");
+        line!(out, "valid for dies at {from} to {to} °C");
     }
     if let Some(lag_s) = found.lag_s {
         let accel = found.accel_lag_s;
@@ -199,7 +199,7 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
         if let Some(converter) = effect.converter() {
             line!(
                 out,
-                "  converter of {}: bit 0 is worth {} V, code 0 reads {} V",
+                "  converter of {}: bit 0 weighs {} V, code 0 is {} V",
                 converter.axes(),
                 converter.weight,
                 converter.zero
@@ -209,7 +209,7 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
     if let Some(file) = &found.file {
         line!(
             out,
-            "\ncalibration: {file} (without standard deviations and covariance, which the device does not keep)"
+            "\ncalibration: {file} (without standard deviations and covariance, which the device does not store)"
         );
     }
     if let Some(file) = &found.bytes_file {
@@ -221,10 +221,10 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
 /// Of which unit a calibration is, beside the one that holds it, and from when.
 fn origin(of: Option<&str>, held_by: Option<&str>, created: Option<&str>) -> String {
     let unit = match (of, held_by) {
-        (None, _) => "of no known unit".to_string(),
+        (None, _) => "of an unknown unit".to_string(),
         (Some(of), Some(unit)) if of == unit => "of this unit".to_string(),
         (Some(of), Some(_)) => format!("of ANOTHER unit, {of}"),
-        (Some(of), None) => format!("of the unit {of}"),
+        (Some(of), None) => format!("of unit {of}"),
     };
     let made = created.map_or("unknown when".to_string(), |at| format!("made {at}"));
     format!("{unit}, {made}")
@@ -247,7 +247,7 @@ pub fn self_test_text(result: &DeviceResult<SelfTested>) -> String {
                 "finest range {:.3} V, coarsest {:.3} V",
                 found.accel_fine_v[i], found.accel_coarse_v[i]
             ),
-            6 => "seen by the three of them together".into(),
+            6 => "judged from all three axes together".into(),
             7..10 => format!("{:.2} °C", found.gyro_temps_c[(k - 7) % 3]),
             10 => format!("{:.3} V", found.reference_v),
             _ => format!("{:.3} V", found.supply_v),
@@ -257,7 +257,7 @@ pub fn self_test_text(result: &DeviceResult<SelfTested>) -> String {
     if !found.accel_not_shown.is_empty() {
         line!(
             out,
-            "not shown in this pose: accel {}, across gravity, where one that is stuck reads the same; test again with it up",
+            "not shown in this pose: accel {} is perpendicular to gravity, where a stuck axis reads the same; test again with this axis up",
             found.accel_not_shown.join(", ")
         );
     }
@@ -292,7 +292,7 @@ pub fn counters_text(result: &DeviceResult<Counted>) -> String {
     let mut out = String::new();
     line!(
         out,
-        "{}: counted since the start, or since they were reset",
+        "{}: counted since the start, or since the last reset of the counters",
         result.port
     );
     for (name, value) in counters(&result.found.counters) {
@@ -379,7 +379,7 @@ pub fn record_text(summary: &RecordSummary) -> String {
     warnings.extend(s.warnings.iter().cloned());
     if s.reconnected > 0 {
         warnings.push(format!(
-            "the port vanished and came back {} times: the time in between is missing",
+            "the port vanished and came back {} times: the samples in between are missing",
             s.reconnected
         ));
     }

@@ -22,21 +22,25 @@ fn meaning(d: &DiagnosisResult) -> &'static str {
     let usual = d.leftover.iter().any(|l| l.usual);
     match d.verdict {
         Verdict::Clean if d.sensors.present().any(|(_, s)| open(s)) => {
-            "noise, and what the poses leave open of the accelerometer, explain what the affine calibration leaves"
+            "noise, and the accelerometer's uncertainty in these poses, explain the residual of the affine calibration"
         }
         Verdict::Clean if usual => {
-            "noise, and biases that wander no more than usual, explain what the affine calibration leaves"
+            "noise, and biases that wander as much as usual, explain the residual of the affine calibration"
         }
-        Verdict::Clean => "noise explains what the affine calibration leaves",
+        Verdict::Clean => "noise explains the residual of the affine calibration",
         Verdict::Explained if usual => {
-            "with the effects below, noise and biases that wander no more than usual explain what remains"
+            "with the effects below, noise and biases that wander as much as usual explain what remains"
         }
         Verdict::Explained => "with the effects below, noise explains what remains",
-        Verdict::Untestable => "nothing was found, and the recording has too little to judge by",
-        Verdict::Unexplained if d.unexplained().next().is_some() => {
-            "something remains that nothing here explains"
+        Verdict::Untestable => {
+            "no effect was found, and the recording has too little data to judge"
         }
-        Verdict::Unexplained => "an unlisted alternative model does as well as what was found",
+        Verdict::Unexplained if d.unexplained().next().is_some() => {
+            "an error of unknown origin remains"
+        }
+        Verdict::Unexplained => {
+            "an unlisted alternative model fits as well as an effect that was found"
+        }
     }
 }
 
@@ -45,11 +49,12 @@ fn remarks(s: &SensorDiagnosisResult, with_share: bool) -> Vec<String> {
     let mut all = Vec::new();
     if !s.held_out_rms_after.is_finite() {
         all.push(
-            "nothing is held out: without any part of it the rest determines too little".into(),
+            "no part of the recording can be held out: the rest would determine too little".into(),
         );
     } else if s.held_out == Split::Interleaved {
         all.push(
-            "held out every fourth dwell: one block of time alone shows what is needed".into(),
+            "held out: every fourth dwell, because a single block of time contains the evidence"
+                .into(),
         );
     }
     if s.reference_rms > s.noise_floor {
@@ -60,7 +65,7 @@ fn remarks(s: &SensorDiagnosisResult, with_share: bool) -> Vec<String> {
     }
     if let (Some(share), true) = (s.explained, with_share) {
         all.push(format!(
-            "{} % of the held-out mean square beyond noise and errors of the reference is explained",
+            "the effects explain {} % of the held-out mean square beyond noise and errors of the reference",
             significant(100.0 * share)
         ));
     }

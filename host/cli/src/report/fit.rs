@@ -77,7 +77,7 @@ fn verdict(fit: &FitResult) -> String {
     let calibrated = format!("{} calibrated", names.join(" and "));
     let beyond: Vec<String> = beyond(fit)
         .iter()
-        .map(|(name, share)| format!("{} times that of noise ({name})", significant(*share)))
+        .map(|(name, share)| format!("{} times the noise ({name})", significant(*share)))
         .collect();
     let known = fit
         .sensors
@@ -86,7 +86,9 @@ fn verdict(fit: &FitResult) -> String {
     let errors = match (beyond.is_empty(), known) {
         (false, _) => format!("the error is {}", beyond.join(" and ")),
         (true, true) => "the errors are those of noise".into(),
-        (true, false) => "no dwell shows the noise to compare the errors with".into(),
+        (true, false) => {
+            "no dwell shows the noise, so the errors cannot be compared with it".into()
+        }
     };
     format!("{calibrated}; {errors}")
 }
@@ -95,7 +97,7 @@ fn verdict(fit: &FitResult) -> String {
 fn next(fit: &FitResult) -> String {
     let judge = "judge it on another recording (mimu verify OTHER --calibration FILE)";
     if !fit.recording_problems.is_empty() {
-        return format!("mend what is wrong with the recording, and record again; or {judge}");
+        return format!("correct the problems of the recording, and record again; or {judge}");
     }
     match beyond(fit).is_empty() || fit.reference == Reference::TurntableRate {
         true => format!("{judge}; --verbose prints how it was found"),
@@ -109,7 +111,7 @@ fn errors_text(out: &mut String, fit: &FitResult) {
         .sensors
         .present()
         .any(|(_, s)| s.as_they_came_rms.is_some());
-    let last = if came { "  as it came" } else { "" };
+    let last = if came { "  uncalibrated" } else { "" };
     let _ = writeln!(
         out,
         "{:<18}{:>11}{:>11}{:>11}{last}",
@@ -125,7 +127,7 @@ fn errors_text(out: &mut String, fit: &FitResult) {
             (true, came) => shown(came),
             (false, _) => String::new(),
         };
-        let width = if came { 12 } else { 0 };
+        let width = if came { 14 } else { 0 };
         let _ = writeln!(
             out,
             "{:<18}{:>11}{:>11}{:>11}{last:>width$}  {}",
@@ -182,7 +184,7 @@ fn recorded(out: &mut String, fit: &FitResult, verbose: bool) {
     let n = plural(fit.dwells.len() as u64, "dwell");
     match &fit.detection {
         None => {
-            let _ = writeln!(out, "{n} by the step column, {length}");
+            let _ = writeln!(out, "{n} numbered in the step column, {length}");
         }
         Some(d) => {
             let _ = writeln!(out, "{n} found, {length}");
@@ -229,30 +231,30 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorF
                 format!("rms over {held} of {blocks} parts, one dwell in {blocks} each")
             }
             (Split::Interleaved, _) => format!("rms, one dwell in {blocks} held out in turn"),
-            (_, 0) => "no block can be left out, see the warnings".into(),
+            (_, 0) => "no block can be held out, see the warnings".into(),
             (_, held) if held < blocks => {
                 format!("rms over {held} of {blocks} contiguous blocks")
             }
             _ if blocks < fit.holdout_blocks => format!(
-                "rms over {blocks} blocks of a dwell each; {} asked for",
+                "rms over {blocks} blocks of a dwell each; {} were requested",
                 fit.holdout_blocks
             ),
             _ => format!("rms over {blocks} contiguous blocks"),
         };
         line("held out", sensor.held_out_rms, &note);
     } else {
-        line("held out", None, "not asked for (--holdout blocks=4)");
+        line("held out", None, "not requested (--holdout blocks=4)");
     }
     line("in sample", Some(sensor.rms), "rms");
     match sensor.noise_floor.is_finite() {
         true => line("noise floor", Some(sensor.noise_floor), "noise-only rms"),
-        false => line("noise floor", None, "unknown: no dwell shows it"),
+        false => line("noise floor", None, "unknown: no dwell shows the noise"),
     }
     if let Some(came) = sensor.as_they_came_rms {
         line(
-            "as it came",
+            "uncalibrated",
             Some(came),
-            "rms of the readings without a calibration",
+            "rms of the readings in SI, without the calibration",
         );
     }
     if let Some(rms) = sensor.static_rms {
@@ -267,7 +269,7 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorF
         let of = |k: usize| plus_minus(1e3 * delay.value[k], 1e3 * INTERVAL * delay.sigma[k]);
         let _ = writeln!(
             out,
-            "  behind the reference, taken out: x {}, y {}, z {} ms",
+            "  delay behind the reference, removed: x {}, y {}, z {} ms",
             of(0),
             of(1),
             of(2)

@@ -25,7 +25,7 @@ pub fn of_fit(fit: &Fit, result: &FitResult, calibration: &Calibration) -> Strin
     fragment(&html! {
         h1 { "Calibration of " (result.device) }
         div class="scroll" { table {
-            caption { "Root mean square error; the held-out one is of dwells that the fit has not seen" }
+            caption { "Root mean square error; held out: on dwells that the fit has not used" }
             thead { tr {
                 th { "sensor" } th class="n" { "held out" } th class="n" { "in sample" } th class="n" { "noise alone" }
                 th class="n" { "dwells" } th { "error of" }

@@ -32,7 +32,7 @@ pub fn import_text(summary: &ImportSummary) -> String {
         };
         let _ = writeln!(
             out,
-            "  read by the preset {}, {whence}: {}",
+            "  read with the preset {}, {whence}: {}",
             preset.name, preset.title
         );
     }
@@ -84,8 +84,8 @@ pub fn import_text(summary: &ImportSummary) -> String {
 /// What the time stamps of a file have shown.
 fn time_text(time: &TimeSummary) -> String {
     let mut out = match (time.unit, time.recognised) {
-        (Some(unit), true) => format!("times taken for {unit}"),
-        (Some(unit), false) => format!("times in {unit}"),
+        (Some(unit), true) => format!("time stamps assumed to be in {unit}"),
+        (Some(unit), false) => format!("time stamps in {unit}"),
         (None, _) => "times scaled".into(),
     };
     if time.origin_s != 0 {
@@ -97,16 +97,16 @@ fn time_text(time: &TimeSummary) -> String {
     let _ = match (time.stamps_kept, time.jitter.max_s > 0.0) {
         (true, _) if time.polled.is_some() => write!(
             out,
-            "the stamps are kept, as those of a loop that reads once a round"
+            "the stamps are kept: a polling loop reads once a round"
         ),
         (true, false) => write!(out, "the stamps are kept"),
         (true, true) => write!(
             out,
-            "the stamps are kept, as their steps are multiples of one period to {rms} ms rms, {max} ms at most"
+            "the stamps are kept: their intervals are multiples of one period to {rms} ms rms, {max} ms at most"
         ),
         (false, _) => write!(
             out,
-            "the stamps are off by {rms} ms rms, {max} ms at most, and the time is that of the count of samples"
+            "the stamps are off by {rms} ms rms, {max} ms at most: the sample count is used as the clock"
         ),
     };
     if time.gaps > 0 {
@@ -127,7 +127,7 @@ fn time_text(time: &TimeSummary) -> String {
     if time.repeated_rows > 0 {
         let _ = write!(
             out,
-            "; {} left out as the same as the one before",
+            "; {} left out because they repeat the row before",
             plural(time.repeated_rows, "row")
         );
     }

@@ -49,7 +49,7 @@ pub(crate) fn problems(out: &mut String, problems: &[RecordingProblem], verbose:
     if problems.is_empty() {
         return;
     }
-    let _ = writeln!(out, "wrong with this recording:");
+    let _ = writeln!(out, "problems of this recording:");
     let shown = if verbose { problems.len() } else { OF_PROBLEMS };
     for problem in problems.iter().take(shown) {
         let _ = writeln!(out, "  - {problem}");

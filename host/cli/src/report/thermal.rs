@@ -16,12 +16,10 @@ use crate::report::text::{warn, warn_within, wrap};
 pub(super) const SHOWN: usize = 5;
 
 /// What the verdict `one-way` means.
-pub(super) const VERDICT_ONE_WAY: &str = "the temperature goes one way only: lag and slope cannot be told apart, and the intervals are those of \
-     any lag. A whole cycle, heating and cooling, tells them apart.";
+pub(super) const VERDICT_ONE_WAY: &str = "the temperature goes one way only: lag and slope cannot be distinguished, and the intervals allow for any lag. A whole cycle of heating and cooling distinguishes them.";
 
 /// What the verdict `misfit` means.
-pub(super) const VERDICT_MISFIT: &str = "the errors that remain are far beyond noise: something other than temperature and lag moves the readings, and the \
-     intervals do not hold it.";
+pub(super) const VERDICT_MISFIT: &str = "the remaining errors far exceed the noise: something other than temperature and lag changes the readings, and the intervals do not include it.";
 
 /// Temperatures side by side in a table of 100 columns.
 const ACROSS: usize = 3;
@@ -93,7 +91,7 @@ fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult, verbose: b
         if let Some(without) = sensor.held_out_rms_without_session_bias {
             let _ = write!(out, " ({} without its bias)", unit.write(without));
         }
-        let _ = writeln!(out, ", by noise alone {}", unit.write(floor));
+        let _ = writeln!(out, ", noise alone {}", unit.write(floor));
     }
     if !verbose {
         return;

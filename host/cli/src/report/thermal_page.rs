@@ -34,8 +34,7 @@ pub(super) fn body(result: &ThermalResult, made: &Made) -> Markup {
         figure {
             div class="figures" { (thermal_plot::panels(result)) }
             figcaption {
-                "What each parameter changes by from the middle of the range, with its 95 % interval. Below: errors of the dwells, rms while the \
-                 temperature rises and falls, each axis over temperature, and over time; a dashed line is where the next recording begins."
+                "Change of each parameter from the middle of the range, with its 95 % interval. Below: errors of the dwells, rms while the temperature rises and falls, of each axis over temperature and over time; at a dashed line the next recording begins."
             }
         }
         @for (name, sensor) in result.sensors.present() {
@@ -59,7 +58,7 @@ fn head(result: &ThermalResult, made: &Made) -> Markup {
         p class={ "verdict " @if result.verdict == FitVerdict::Fitted { "explained" } @else { "unexplained" } } {
             strong { (result.verdict.name()) } ": dies at " (written(&format!("{from:.1}"))) " to " (written(&format!("{to:.1}"))) " °C. "
             @match result.verdict {
-                FitVerdict::Fitted => { "Heating and cooling, or plateaus, tell the lag of the dies from the slopes of the curves." }
+                FitVerdict::Fitted => { "Heating and cooling, or plateaus, distinguish the lag of the dies from the slopes of the curves." }
                 FitVerdict::Misfit => { (VERDICT_MISFIT) }
                 FitVerdict::OneWay => { (VERDICT_ONE_WAY) }
             }
@@ -77,7 +76,7 @@ fn head(result: &ThermalResult, made: &Made) -> Markup {
 fn errors(result: &ThermalResult) -> Markup {
     html! {
         div class="scroll" { table {
-            caption { "Root mean square error of the dwells, or of pieces of 30 s where only biases are estimated, and the lag of the dies behind the thermometer with its 95 % interval." }
+            caption { "Root mean square error of the dwells (of segments of 30 s if only biases are estimated), and the lag of the dies behind the thermometer with its 95 % interval." }
             thead { tr {
                 th { "sensor" } th class="n" { "in sample" } th class="n" { "held out" } th class="n" { "noise alone" } th { "lag" }
             } }
@@ -123,7 +122,7 @@ fn hysteresis(sensor: &SensorResult, all: &[Hysteresis]) -> Markup {
     let unit = readable::error(&sensor.unit);
     html! {
         div class="scroll" { table {
-            caption { "Hysteresis: what heating and cooling differ by after the lag, which is reported and not fitted" }
+            caption { "Hysteresis: difference between heating and cooling that remains after the lag; it is reported, not fitted" }
             thead { tr { th { "axis" } th class="n" { "rms, " (unit.unit) } th class="n" { "as a temperature, K" } th class="n" { "largest, " (unit.unit) } th class="n" { "at, °C" } th class="n" { "heating minus cooling on average, " (unit.unit) } } }
             tbody {
                 @for h in all {

@@ -56,8 +56,7 @@ pub fn thermal_plan_text(planned: &Planned) -> String {
     wrap(
         &mut out,
         "",
-        "By the information matrix of the estimate with one curve of this kind for each parameter, dies as warm as the chamber, and a bias \
-         that wanders as flicker noise of up to 10 000 s. What a lag of the dies adds is not predicted.",
+        "From the information matrix of the estimate. Assumed: one curve of this kind for each parameter, dies at the temperature of the chamber, a bias that wanders as flicker noise of up to 10 000 s. The contribution of a lag of the dies is not predicted.",
     );
     for what in &planned.inseparable {
         wrap(&mut out, "inseparable: ", what);

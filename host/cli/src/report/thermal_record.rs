@@ -10,7 +10,7 @@ use super::record_text;
 /// One line of how it stands.
 pub fn thermal_progress(at: &Progress, has_chamber: bool) -> String {
     let chamber = match (has_chamber, at.chamber_c) {
-        (true, Some(c)) => format!("chamber set to {:.1} and at {c:.1} °C", at.planned_c),
+        (true, Some(c)) => format!("chamber set to {:.1} °C, now at {c:.1} °C", at.planned_c),
         (true, None) => format!("chamber set to {:.1} °C", at.planned_c),
         (false, _) => format!("planned {:.1} °C", at.planned_c),
     };
@@ -22,7 +22,7 @@ pub fn thermal_progress(at: &Progress, has_chamber: bool) -> String {
         return format!("on the way to the first temperature and pose: {measured}");
     }
     let lost = match at.line_lost {
-        true => "; the port has vanished, and is waited for",
+        true => "; the port has vanished: waiting for it",
         false => "",
     };
     let [round, rounds] = at.round;
@@ -45,13 +45,13 @@ pub fn thermal_record_text(made: &CarriedOut) -> String {
     if dropped > 0 {
         let _ = writeln!(
             out,
-            "not counted: {dropped}, which were not recorded as they were planned"
+            "not used: {dropped}, because they were not recorded as planned"
         );
     }
     if let Some(rest_c) = made.rest_c {
         let _ = writeln!(
             out,
-            "chamber: {} temperatures on the way; left at {rest_c} °C",
+            "chamber: {} set points; set to {rest_c} °C at the end",
             made.set_points
         );
     }

@@ -44,7 +44,7 @@ pub fn trim_text(result: &DeviceResult<Trimmed>) -> String {
     if !found.triads.accel.trimmed {
         let _ = writeln!(
             out,
-            "the accelerometer keeps its offsets, as its pose is not given: --up +z --gravity 9.81"
+            "the accelerometer's offsets are unchanged, because its pose was not given (--up +z --gravity 9.81)"
         );
     }
     warn(&mut out, found.warnings.iter());

@@ -38,7 +38,7 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
             "{name:<7}{raw:>14}{rms:>14}{max:>14}{floor:>14}{over:>12}"
         );
         let below = [
-            ("as it came", s.rms_as_they_came.map(|v| figure.write(v))),
+            ("uncalibrated", s.rms_as_they_came.map(|v| figure.write(v))),
             ("effects left in", s.rms_affine.map(|v| figure.write(v))),
             (
                 "at rest",
@@ -57,7 +57,7 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
     wrap(
         &mut out,
         "one scale: ",
-        "the means of the calibration's scale factors and of its biases on all three axes, no misalignment",
+        "on all three axes the mean of the calibration's scale factors and that of its biases, without misalignment",
     );
     match verbose {
         true => warn(&mut out, verification.warnings.iter()),
@@ -77,19 +77,19 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
 fn verdict(s: &SensorVerification) -> String {
     let figure = readable::error(s.unit);
     let (other, what) = match s.rms_as_they_came {
-        Some(came) => (came, "as it came"),
+        Some(came) => (came, "uncalibrated"),
         None => (s.rms_raw, "with one scale"),
     };
     let [rms, before] = [s.rms, other].map(|v| figure.write(v));
     let how = match s.rms < other {
-        true => format!("{rms} rms in place of {before} {what}"),
-        false => format!("{rms} rms, no better than the {before} {what}"),
+        true => format!("{rms} rms instead of {before} {what}"),
+        false => format!("{rms} rms, not better than {before} {what}"),
     };
     match s.noise_floor.is_finite() && s.noise_floor > 0.0 {
         true => format!(
             "{how}; {} times the noise",
             significant(s.rms / s.noise_floor)
         ),
-        false => format!("{how}; the noise is not known"),
+        false => format!("{how}; the noise is unknown"),
     }
 }

@@ -22,7 +22,7 @@ pub(crate) fn wizard_lines(event: &Event) -> Vec<String> {
             lines
         }
         Event::Resumed { dwells } => vec![format!(
-            "the session goes on behind {}",
+            "the session continues after {}",
             plural(*dwells as u64, "dwell")
         )],
         Event::SelfTested { words, passed, .. } => vec![match passed {
@@ -41,11 +41,10 @@ pub(crate) fn wizard_lines(event: &Event) -> Vec<String> {
             Part::Calibration => Vec::new(),
             _ => vec![format!("    dwell {number} done")],
         },
-        Event::Thrown { why, .. } => vec![format!(
-            "    thrown away, once more: {}",
-            hint::of_waiting(why)
-        )],
-        Event::Redo { number } => vec![format!("    dwell {number} is to be had again")],
+        Event::Thrown { why, .. } => {
+            vec![format!("    discarded, repeat: {}", hint::of_waiting(why))]
+        }
+        Event::Redo { number } => vec![format!("    dwell {number} will be repeated")],
         Event::Progress { progress, .. } => vec![format!("    {}", progress_line(progress))],
         Event::Interrupted { why, .. } => vec![format!("    {why}")],
         Event::Verified { judged, .. } => judged_lines(judged),
@@ -107,7 +106,7 @@ fn judged_lines(judged: &Judged) -> Vec<String> {
         judged
             .broken
             .iter()
-            .map(|b| format!("FAILED, nothing is stored: {b}")),
+            .map(|b| format!("FAILED, nothing was stored: {b}")),
     );
     lines
 }
@@ -116,7 +115,7 @@ fn judged_line(of: &SensorJudged) -> String {
     let (factor, unit) = of.figure.readable(of.sensor);
     let shown = |si: f64| significant(si * factor);
     let mut text = format!(
-        "{:5} error of {} in poses that were not used: ",
+        "{:5} error of {} in poses that the fit has not used: ",
         of.sensor.name(),
         of.figure.description()
     );
@@ -144,7 +143,7 @@ fn judged_line(of: &SensorJudged) -> String {
 pub(crate) fn wizard_text(outcome: &Outcome) -> String {
     let mut text = String::new();
     if outcome.cancelled {
-        text.push_str("\nended; the same command goes on from here\n");
+        text.push_str("\nended; the same command resumes here\n");
         return text;
     }
     for unit in &outcome.units {
@@ -156,7 +155,7 @@ pub(crate) fn wizard_text(outcome: &Outcome) -> String {
 fn unit_text(unit: &UnitOutcome, text: &mut String) {
     let _ = writeln!(
         text,
-        "\n{}: {} in {}, {} thrown away",
+        "\n{}: {} in {}, {} discarded",
         unit.unit,
         plural(unit.dwells as u64, "dwell"),
         minutes(unit.recorded_s),

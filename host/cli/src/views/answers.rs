@@ -107,7 +107,7 @@ impl Typed {
             ("r" | "redo", None) => Some(Wish::RedoLast),
             ("r" | "redo", Some(number)) => number.parse().ok().map(Wish::Redo),
             ("y" | "yes" | "n" | "no", None) if !self.asked => {
-                eprintln!("nothing is asked now: an answer counts after its question");
+                eprintln!("there is no open question: an answer counts only after its question");
                 None
             }
             ("y" | "yes", None) => {

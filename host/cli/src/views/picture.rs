@@ -45,7 +45,7 @@ pub(crate) fn draw(frame: &mut Frame, shown: &Shown) {
     let area = frame.area();
     if area.width < LEAST[0] || area.height < LEAST[1] {
         let words = format!(
-            "the terminal has {} x {} characters, and {} x {} are needed: make it larger",
+            "the terminal has {} x {} characters, but {} x {} are needed: make it larger",
             area.width, area.height, LEAST[0], LEAST[1]
         );
         let lines = wrapped(&words, area.width.into());
@@ -142,7 +142,7 @@ fn draw_head(frame: &mut Frame, area: Rect, standing: &Standing) {
     let [done, planned] = standing.dwells;
     let planned = planned.max(done);
     let right = format!(
-        "{} thrown away   {}",
+        "{} discarded   {}",
         standing.thrown,
         minutes(standing.elapsed_s.round())
     );
@@ -167,9 +167,9 @@ fn draw_step(frame: &mut Frame, area: Rect, standing: &Standing) {
     let lines = match &standing.step {
         None => {
             let words = match standing.phase {
-                Phase::WarmUp => "leave it still",
-                Phase::Store => "the calibration goes into the device",
-                Phase::Diagnosis => "nothing: what still errs is looked for",
+                Phase::WarmUp => "leave the unit at rest",
+                Phase::Store => "wait: the calibration is being stored",
+                Phase::Diagnosis => "wait: the remaining error is being diagnosed",
                 _ => "nothing now",
             };
             wrapped(words, wide)
@@ -189,7 +189,7 @@ fn draw_step(frame: &mut Frame, area: Rect, standing: &Standing) {
 }
 
 fn draw_log(frame: &mut Frame, area: Rect, log: &[String]) {
-    let inner = framed(frame, area, "what has happened", false);
+    let inner = framed(frame, area, "events", false);
     let (wide, high) = (usize::from(inner.width), usize::from(inner.height));
     let mut lines: Vec<String> = Vec::new();
     // Only what is seen is wrapped.
@@ -206,8 +206,8 @@ fn draw_log(frame: &mut Frame, area: Rect, log: &[String]) {
 
 fn draw_keys(frame: &mut Frame, area: Rect, asked: bool) {
     let keys = match asked {
-        true => " y yes   n no   q end, to go on later",
-        false => " q end, to go on later   r have the last dwell again   s another step first",
+        true => " y yes   n no   q end, resume later",
+        false => " q end, resume later   r repeat the last dwell   s another pose first",
     };
     let style = Style::new().add_modifier(Modifier::REVERSED);
     let wide = usize::from(area.width);

@@ -234,7 +234,7 @@ fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
         ("--dwell 10", 2, "--compare"),
         ("-n 8 --scheme six-face", 2, "cannot be used with"),
         ("-n 8 --model affine,quartic", 2, "quartic"),
-        ("-n 8 --model g-sensitivity,", 2, "no term"),
+        ("-n 8 --model g-sensitivity,", 2, "is not a term"),
         ("-n 0", 2, "whole number, 1 to 200"),
         ("-n 1000000000", 2, "whole number, 1 to 200"),
         ("-n=-4", 2, "invalid"),

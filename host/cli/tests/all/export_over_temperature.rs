@@ -350,6 +350,6 @@ fn what_cannot_be_exported_is_refused_with_what_to_do() {
     // Counts where the sensor gives volts.
     refused(
         "px4 -o p.param --gyro-si-per-raw 0.001",
-        "state its conversion",
+        "give its conversion",
     );
 }

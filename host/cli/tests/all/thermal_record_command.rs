@@ -220,10 +220,10 @@ fn a_procedure_that_is_interrupted_or_loses_its_power_keeps_what_it_has_and_leav
     let words = told(&out);
     assert_eq!(out.status.code(), Some(1), "{words}");
     assert!(
-        words.contains("it was interrupted, and is cut short"),
+        words.contains("it was interrupted and is incomplete"),
         "{words}"
     );
-    assert!(words.contains("no table is driven"), "{words}");
+    assert!(words.contains("no driver moves a table"), "{words}");
     assert_eq!(bench.ask("CHAMBER?"), "25", "{words}");
     let manifest = Manifest::read(&bench.path("short/recording.toml")).unwrap();
     assert!(!manifest.unfinished && manifest.reference == Reference::Gravity);
@@ -238,7 +238,7 @@ fn a_procedure_that_is_interrupted_or_loses_its_power_keeps_what_it_has_and_leav
     let out = child.wait_with_output().unwrap();
     let words = told(&out);
     assert_eq!(out.status.code(), Some(1), "{words}");
-    assert!(words.contains("a recording is of one power-on"), "{words}");
+    assert!(words.contains("a recording has one power-on"), "{words}");
     assert_eq!(bench.ask("CHAMBER?"), "25", "{words}");
     let manifest = Manifest::read(&bench.path("cut/recording.toml")).unwrap();
     let restarts = manifest.recorded.unwrap().restarts;
@@ -259,7 +259,7 @@ fn what_cannot_be_carried_out_is_refused_in_a_line_before_anything_is_opened() {
         "format = \"mimu-driver/1\"\ntcp = \"127.0.0.1:9\"\n",
     );
     for (arguments, words) in [
-        ("plan.toml -o rec", "there is no driver"),
+        ("plan.toml -o rec", "no driver is given"),
         ("cold.toml -o rec", "no temperatures (chamber_c)"),
         ("plan.toml -o there", "it exists already"),
         (

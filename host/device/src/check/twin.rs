@@ -46,7 +46,13 @@ impl HostReference {
         powered_for_ms: Option<u32>,
         place: &str,
     ) -> Result<Self> {
-        let unusable = |_| Error::device(place, "the device could not use it", "fit it again");
+        let unusable = |_| {
+            Error::device(
+                place,
+                "the device could not use it",
+                "fit the recording again",
+            )
+        };
         let stored = image.stored().map_err(unusable)?;
         let model = |sensor| {
             let missing = || Error::device(place, "a sensor is missing", "calibrate both sensors");

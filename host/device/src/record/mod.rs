@@ -143,7 +143,7 @@ fn as_words<S: Serializer>(of: &Option<Error>, to: S) -> std::result::Result<S::
 /// Records; the inputs of the dwells are those of `known`, if they are. `look` is shown how it stands, some times a second, and says what is wanted; `finishing` hears the share that is done of
 /// turning the samples into Parquet.
 ///
-/// An error means that there is no recording. One that was broken off is a [`RecordSummary`], with its reason.
+/// An error means that no recording was made. One that was broken off is a [`RecordSummary`], with its reason.
 pub fn record(
     session: &mut Session,
     options: &RecordOptions,
@@ -154,7 +154,7 @@ pub fn record(
     let who = session.who().clone();
     if who.raw_unit != "V" {
         let problem = format!(
-            "its raw readings are in {}, and a recording of V is made",
+            "its raw readings are in {}, but a recording is in V",
             who.raw_unit
         );
         return Err(Error::new(
@@ -244,7 +244,7 @@ pub fn record(
     match ended {
         Ok(()) if standing.samples == 0 => Err(Error::new(
             session.port(),
-            "no sample came, and nothing is recorded",
+            "no sample came, so nothing was recorded",
             "reset the board and run it again",
         )),
         Err(error) if standing.samples == 0 => Err(error),

@@ -44,7 +44,7 @@ impl Procedure {
         let at = |key: &str| format!("{place}, {key}");
         if self.chamber_c.is_empty() {
             let problem = "the plan has no temperatures (chamber_c)";
-            let remedy = "have `mimu thermal plan` write one; `mimu record` records a plan at one temperature";
+            let remedy = "make one with `mimu thermal plan`; `mimu record` records a plan at one temperature";
             return Err(Error::new(place, problem, remedy));
         }
         let times = || self.chamber_c.iter().map(|p| p[0]);

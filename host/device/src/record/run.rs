@@ -109,7 +109,7 @@ impl Run {
                     return Err(Error::new(
                         session.port(),
                         problem,
-                        "record each for itself",
+                        "record each device separately",
                     ));
                 }
                 self.starts = who.starts;
@@ -257,7 +257,7 @@ fn cut_short(port: &str, start: Option<Started>, at_s: f64) -> Error {
     Error::device(
         port,
         format!(
-            "the device has started anew ({why}) before {at_s:.1} s, and a recording is of one power-on"
+            "the device restarted ({why}) before {at_s:.1} s, but a recording has one power-on"
         ),
         "check the supply, and record the rest as another one: `mimu thermal fit` takes several",
     )

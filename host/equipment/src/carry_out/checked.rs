@@ -69,7 +69,8 @@ impl Checked {
         let force = by_accel.matrix * accel + by_accel.offset;
         if force.angle(&up).to_degrees() > SAME_POSE_DEG {
             let (is, planned) = (words(&force.normalize()), words(&up));
-            let problem = format!("by the accelerometer it is {is}, and {planned} was planned");
+            let problem =
+                format!("by the accelerometer the pose is {is}, but {planned} was planned");
             let remedy = "check how the unit is mounted, and the directions in the driver file";
             return Some(Error::new("", problem, remedy));
         }
@@ -86,7 +87,7 @@ impl Checked {
         }
         let is = rate.dot(&up).to_degrees();
         let problem = format!(
-            "by the gyro it turns at {is:+.1} deg/s about the vertical, and {:+} was planned",
+            "by the gyro it turns at {is:+.1} deg/s about the vertical, but {:+} was planned",
             dwell.rate_dps
         );
         let remedy = "check the sign of `rate` in the driver file, and whether the interlock stopped the table";

@@ -122,7 +122,7 @@ impl Equipment {
         match ended {
             Some(Err(_)) => vec![Error::new(
                 "equipment",
-                "the thread of table and chamber broke down",
+                "the thread of table and chamber failed",
                 "stop the table and set the chamber by hand, and report this",
             )],
             Some(Ok(errors)) => errors,
@@ -193,7 +193,7 @@ impl Hands {
             self.held = Instant::now();
             for driver in &mut self.equipped.drivers {
                 if let Some(why) = driver.held()? {
-                    let remedy = "close it, and record the rest as another recording";
+                    let remedy = "close that program, and record the rest as another recording";
                     return Err(Error::device(driver.abilities().place, why, remedy));
                 }
             }

@@ -26,12 +26,12 @@ impl Equipped {
         let table = only(&abilities, |a| a.moves, "`move`")?;
         let chamber = only(&abilities, |a| a.chamber.is_some(), "[chamber]")?;
         let given = |lacking: &str| match abilities.as_slice() {
-            [] => format!("the plan {lacking}, and there is no driver"),
-            [one] => format!("the plan {lacking}, and {} has none", one.place),
+            [] => format!("the plan {lacking}, but no driver is given"),
+            [one] => format!("the plan {lacking}, but {} has none", one.place),
             all => {
                 let names: Vec<&str> = all.iter().map(|a| a.place.as_str()).collect();
                 format!(
-                    "the plan {lacking}, and none of {} has one",
+                    "the plan {lacking}, but none of {} has one",
                     names.join(", ")
                 )
             }
@@ -40,7 +40,7 @@ impl Equipped {
             Some(table) => check_table(procedure, place, table)?,
             None if procedure.is_at_rest() => {}
             None => {
-                let problem = given("moves the unit, which takes a table (`move`)");
+                let problem = given("moves the unit, which needs a table (`move`)");
                 let remedy = "give the driver file of a table";
                 return Err(Error::new(place, problem, remedy).about(Argument::Driver));
             }
@@ -49,7 +49,7 @@ impl Equipped {
             Some(chamber) => check_chamber(procedure, place, chamber)?,
             None if drivers.is_empty() => {}
             None => {
-                let problem = given("has temperatures, which take a chamber ([chamber])");
+                let problem = given("has temperatures, which need a chamber ([chamber])");
                 let remedy = "give the driver file of a chamber";
                 return Err(Error::new(place, problem, remedy).about(Argument::Driver));
             }
@@ -109,7 +109,7 @@ fn check_table(procedure: &Procedure, place: &str, table: &Abilities) -> Result<
     for (k, dwell) in procedure.dwells.iter().enumerate() {
         let at = format!("{place}, dwell {k}");
         let lacks = |what: &str, remedy: String| {
-            let problem = format!("{what}, and {} does not say how", table.place);
+            let problem = format!("{what}, but {} lacks the command", table.place);
             Err(Error::new(&at, problem, remedy))
         };
         let beyond = |what: &str, value: f64, limit: Option<f64>, key: &str| match limit {
@@ -124,7 +124,7 @@ fn check_table(procedure: &Procedure, place: &str, table: &Abilities) -> Result<
             _ => Ok(()),
         };
         let Some(up) = dwell.up else {
-            let problem = "the plan leaves the pose open, and a table has to be told one";
+            let problem = "the plan leaves the pose open, but a table needs one";
             return Err(Error::new(&at, problem, "write up = [x, y, z]"));
         };
         let limits = table.limits;
@@ -172,7 +172,7 @@ fn check_chamber(procedure: &Procedure, place: &str, chamber: &Abilities) -> Res
     let remedy = "plan within what the chamber does, or correct [chamber]";
     if low < limits.from_c || high > limits.to_c {
         let problem = format!(
-            "{low} to {high} °C, and the chamber of {} has {} to {}",
+            "{low} to {high} °C, but the chamber of {} has {} to {}",
             chamber.place, limits.from_c, limits.to_c
         );
         return Err(Error::new(at, problem, remedy));
@@ -182,7 +182,7 @@ fn check_chamber(procedure: &Procedure, place: &str, chamber: &Abilities) -> Res
         // Times in a plan are rounded to a millisecond.
         Some(limit) if ramp > limit * (1.0 + 1e-3) => {
             let problem = format!(
-                "a ramp of {ramp:.2} K/min, and the chamber of {} has c_per_min = {limit}",
+                "a ramp of {ramp:.2} K/min, but the chamber of {} has c_per_min = {limit}",
                 chamber.place
             );
             Err(Error::new(at, problem, remedy))

@@ -134,14 +134,15 @@ impl DriverFile {
             return refuse(&problem, "write format = \"mimu-driver/1\"");
         }
         if file.to_pose.is_none() && file.chamber.is_none() {
-            let remedy = "say how a table is moved, or how a chamber is set";
+            let remedy = "give the commands that move a table or set a chamber";
             return refuse("it has neither `move` nor [chamber]", remedy);
         }
         if let Some(chamber) = &file.chamber {
             let [from, to, rest] = [chamber.from_c, chamber.to_c, chamber.rest_c];
             if !(from <= rest && rest <= to) {
                 let problem = format!("[chamber]: rest_c = {rest} is not within {from} to {to}");
-                let remedy = "give from_c and to_c, what the chamber can do, and a temperature within that is safe";
+                let remedy =
+                    "give from_c and to_c, the chamber's limits, and a safe rest_c within them";
                 return refuse(&problem, remedy);
             }
         }

@@ -56,8 +56,8 @@ impl Line {
         loop {
             match self.read.read_until(b'\n', &mut bytes) {
                 Ok(0) => {
-                    let problem = "it has closed the line";
-                    return Err(Error::device(&self.name, problem, "look at it"));
+                    let problem = "it has closed the connection";
+                    return Err(Error::device(&self.name, problem, "check it"));
                 }
                 Ok(_) if bytes.ends_with(b"\n") => {
                     return Ok(String::from_utf8_lossy(&bytes).trim().to_owned());
@@ -68,7 +68,7 @@ impl Line {
             }
             if Instant::now() > until {
                 let problem = format!("it does not answer {to:?}");
-                return Err(Error::device(&self.name, problem, "look at it"));
+                return Err(Error::device(&self.name, problem, "check it"));
             }
         }
     }

@@ -32,7 +32,7 @@ impl TextDriver {
             (None, Some(port)) => Line::serial(port, file.baud, timeout)?,
             _ => {
                 let problem = "it needs one of tcp and serial";
-                let remedy = "say where the table or the chamber is spoken to";
+                let remedy = "give the address or the port of the table or the chamber";
                 return Err(Error::new(place, problem, remedy));
             }
         };
@@ -69,10 +69,10 @@ impl TextDriver {
                 text = text.replace(&format!("{{{name}}}"), &format!("{value:.6}"));
             }
             if text.contains('{') {
-                let problem = format!("{text:?} asks for a value that there is not");
+                let problem = format!("{text:?} contains an unknown field");
                 let names: Vec<String> = values.iter().map(|v| format!("{{{}}}", v.0)).collect();
                 let remedy = match names.is_empty() {
-                    true => "no value is known here: write the line without braces".into(),
+                    true => "this line has no fields: write it without braces".into(),
                     false => format!("use {}", names.join(", ")),
                 };
                 return Err(Error::new(&self.place, problem, remedy));
@@ -81,8 +81,8 @@ impl TextDriver {
             if let Some(expected) = &command.expect {
                 let answer = self.line.answer(&text)?;
                 if !answer.starts_with(expected.as_str()) {
-                    let problem = format!("it was told {text:?} and answers {answer:?}");
-                    return Err(Error::device(&self.line.name, problem, "look at it"));
+                    let problem = format!("it answers {answer:?} to {text:?}");
+                    return Err(Error::device(&self.line.name, problem, "check it"));
                 }
             }
         }
@@ -142,7 +142,7 @@ impl Driver for TextDriver {
         let limits = self.file.limits;
         let beyond = |what: &str, value: f64, limit: f64| {
             let problem = format!("{what} of {value:.1} is beyond the table's {limit}");
-            let remedy = "leave the step out, or mend [limits]";
+            let remedy = "leave this dwell out, or correct [limits]";
             Err(Error::new(&self.place, problem, remedy))
         };
         if let Some(limit) = limits.rate_dps.filter(|l| step.rate_dps.abs() > *l) {
@@ -158,11 +158,11 @@ impl Driver for TextDriver {
         self.command(&to_pose, &values(step))?;
         if step.rate_dps != 0.0 {
             if self.file.rate.is_none() {
-                let problem = "a step turns, and there is no [rate]";
+                let problem = "a dwell turns, but the file has no [rate]";
                 return Err(Error::new(
                     &self.place,
                     problem,
-                    "say how the table is told a rate",
+                    "give the command that sets a rate",
                 ));
             }
             self.then = Some(*step);
@@ -248,7 +248,7 @@ impl Driver for TextDriver {
         match first_number(&answer) {
             Some(temp_c) => Ok(Some(temp_c)),
             None => {
-                let problem = format!("it was asked {ask:?}, and {answer:?} has no number in it");
+                let problem = format!("its answer {answer:?} to {ask:?} contains no number");
                 Err(Error::device(
                     &self.line.name,
                     problem,

@@ -57,7 +57,7 @@ impl Dwells {
             })
             .collect();
         let Some(((first, ..), (last, ..))) = all.first().zip(all.last()) else {
-            let note = "There is no scene: the recording has no dwell of the accelerometer.";
+            let note = "The scene is left out: the recording has no dwell of the accelerometer.";
             return (Vec::new(), Some(note.into()));
         };
         let largest = all.iter().map(|(_, _, off)| off.norm()).fold(0.0, f64::max);

@@ -72,7 +72,7 @@ pub fn apply(
     if let (Ok(from), Ok(to)) = (recording.directory.canonicalize(), out.canonicalize())
         && from.starts_with(&to)
     {
-        let problem = "this is the recording to compensate, and its raw readings would be lost";
+        let problem = "this is the recording to compensate; its raw readings would be lost";
         return Err(Error::new(out.display(), problem, "choose another name"));
     }
     let mut compensated = Compensated::new(recording, calibration, |share| progress(0.5 * share))?;
@@ -136,11 +136,11 @@ impl<'a> Compensated<'a> {
             accel: columns.accel,
         };
         if has == PerSensor::both(false) {
-            let problem = "it has no sensor that the calibration is for";
+            let problem = "the calibration is for none of its sensors";
             return Err(Error::new(
                 place,
                 problem,
-                "calibrate the sensor that it has",
+                "use a calibration of the sensor that it has",
             ));
         }
         let recorded = PerSensor {
@@ -259,7 +259,7 @@ impl Batches {
                 "{} cannot be removed without {lacks}",
                 effect.candidate.id()
             );
-            let remedy = "record it, or use a calibration without this effect";
+            let remedy = "record what is missing, or use a calibration without this effect";
             return Err(Error::new(place, problem, remedy));
         }
         // Before the first temperature it is that one, as for a fit.

@@ -95,7 +95,7 @@ impl BiasCubics {
             return Err(Error::new(
                 sensor,
                 format!(
-                    "{from:.1} to {to:.1} °C is less than {NARROWEST_K} K, which no cubic follows from"
+                    "{from:.1} to {to:.1} °C is less than {NARROWEST_K} K, too little for a cubic"
                 ),
                 "fit a recording over a wider range",
             ));
@@ -238,9 +238,9 @@ impl Conversion {
                 return Err(Error::new(
                     format!("{sensor}, axis {axis}"),
                     format!(
-                        "a reading changes by {along:.3} along its own axis and by {across:.3} of its sensitivity across, and has to by 1 and 0"
+                        "a reading changes by {along:.3} along its own axis and by {across:.3} of its sensitivity across it; the program needs 1 and 0"
                     ),
-                    "permute the columns as the program has its axes, or state its conversion",
+                    "order the columns as the program orders its axes, or give its conversion",
                 ));
             }
         }
@@ -345,7 +345,7 @@ fn hysteresis(
 ) -> Remainder {
     const SOURCE: &str = "hysteresis";
     let (Some([rms, largest]), Some(model)) = (found, models.first()) else {
-        return Remainder::unknown(SOURCE, "heating and cooling share no temperature");
+        return Remainder::unknown(SOURCE, "heating and cooling have no temperature in common");
     };
     // By the program's scale factors, which may be others than those of the calibration.
     let half = |sizes: &[f64; 3], k: usize| {

@@ -47,7 +47,7 @@ impl Calibration {
             if let Some((there, missing)) = table.half_uncertain() {
                 return Err(Error::new(
                     place,
-                    format!("{there} is there and {missing} is not: the file is cut or was edited"),
+                    format!("it has {there} but not {missing}: the file is cut or was edited"),
                     "copy it again, or fit the recording again",
                 ));
             }
@@ -75,14 +75,14 @@ impl Calibration {
         if let Some(id) = self.unit_id.as_ref().filter(|id| !digits(id)) {
             return Err(Error::new(
                 format!("{place}, unit_id"),
-                format!("{id:?} is no number of a unit"),
+                format!("{id:?} is not a unit's number"),
                 "write 24 hexadecimal digits, as `mimu device info` gives them, or leave the key out",
             ));
         }
         if self.gyro.is_none() && self.accel.is_none() {
             return Err(Error::new(
                 place,
-                "there is neither [gyro] nor [accel]",
+                "the file has neither [gyro] nor [accel]",
                 "fit the recording again",
             ));
         }
@@ -95,9 +95,11 @@ impl Calibration {
         let expected = if curves { FORMAT_OF_CURVES } else { FORMAT };
         let problem = match self.format.as_str() {
             format if format == expected => return Ok(()),
-            FORMAT => "there is a [temperature], and format is that of a calibration without one",
+            FORMAT => {
+                "the file has a [temperature], but its format is that of a calibration without one"
+            }
             FORMAT_OF_CURVES => {
-                "there is no [temperature], and format is that of a calibration with one"
+                "the file has no [temperature], but its format is that of a calibration with one"
             }
             other => {
                 let problem = format!(
@@ -121,7 +123,7 @@ impl Calibration {
             && !(is_temperature(from) && is_temperature(to) && from <= to)
         {
             return refuse(format!(
-                "temp_range_c is [{from}, {to}], and has to rise, within {least} and {most} °C"
+                "temp_range_c is [{from}, {to}]; it has to increase, from {least} °C at least to {most} °C at most"
             ));
         }
         if let Some(temp_c) = self.recording.temp_c.filter(|t| !is_temperature(*t)) {

@@ -74,7 +74,9 @@ pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
         if ours != theirs {
             return Err(Error::new(
                 file,
-                format!("it is for readings in {theirs}, and {first_file} for readings in {ours}"),
+                format!(
+                    "it is for readings in {theirs}, but {first_file} is for readings in {ours}"
+                ),
                 "compare calibrations of the same readings",
             ));
         }
@@ -84,7 +86,7 @@ pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
         };
         if !same {
             notes.push(format!(
-                "{file} is of {:?}, and {first_file} of {:?}",
+                "{file} belongs to {:?}, but {first_file} belongs to {:?}",
                 other.device, first.device
             ));
         }
@@ -92,7 +94,7 @@ pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
             && (a - b).abs() > 5.0
         {
             notes.push(format!(
-                "{file} holds at {b:.1} °C, and {first_file} at {a:.1} °C: part of a change may be that of the temperature"
+                "{file} is valid at {b:.1} °C, but {first_file} at {a:.1} °C: part of a change may be due to temperature"
             ));
         }
     }
@@ -104,7 +106,7 @@ pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
             Some((found.3, found.4))
         };
         let Some(found) = each.iter().map(of).collect::<Option<Vec<_>>>() else {
-            notes.push(format!("{sensor} {name} is not in all of them"));
+            notes.push(format!("{sensor} {name} is missing in some of them"));
             continue;
         };
         parameters.push(ComparedParameter::new(*sensor, name, unit, &found));
@@ -135,7 +137,7 @@ pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
 fn too_few() -> Error {
     Error::new(
         "calibrations",
-        "there is only one",
+        "only one file was given",
         "name two or more files",
     )
 }

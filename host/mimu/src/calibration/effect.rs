@@ -27,7 +27,7 @@ pub(super) fn check(calibration: &Calibration, place: &str) -> Result<()> {
             let needed = effect.sensor() == sensor || effect.candidate.needs(need);
             if needed && calibration.table(sensor).is_none() {
                 let problem =
-                    format!("it cannot be removed without [{sensor}], which is not there");
+                    format!("it cannot be removed without [{sensor}], which the file lacks");
                 return refuse(problem, "diagnose a recording of both sensors");
             }
         }

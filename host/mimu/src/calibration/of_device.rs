@@ -49,10 +49,11 @@ impl Calibration {
         let singular = || Error::new(place, "C is singular", "upload a calibration again");
         let temperatures: Vec<f64> = stored.nodes.iter().map(|n| f64::from(n.temp_c)).collect();
         let reference = reference_node(&temperatures).map(|at| stored.nodes[at]);
-        let empty = || Error::new(place, "it keeps no node", "upload a calibration again");
+        let empty = || Error::new(place, "it stores no node", "upload a calibration again");
         let node = reference.ok_or_else(empty)?;
         let unknown = |effect| {
-            let problem = format!("it keeps the effect \"{effect}\", which is not known here");
+            let problem =
+                format!("it stores the effect \"{effect}\", which this program does not know");
             Error::new(place, problem, "update mimu on this computer")
         };
         let triad = |model, sensor| triad_table(model, sensor).ok_or_else(singular);

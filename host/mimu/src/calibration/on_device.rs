@@ -43,7 +43,7 @@ pub(super) fn core_effects<T: RealField + Copy, const N: usize>(
     let place = format!("calibration of {:?}", calibration.device);
     let model = |sensor| {
         calibration.inverse(sensor).ok_or_else(|| {
-            let problem = format!("there is no [{sensor}], and the device needs both");
+            let problem = format!("the file has no [{sensor}], and the device needs both sensors");
             Error::new(&place, problem, "calibrate both sensors")
         })
     };

@@ -140,7 +140,9 @@ impl NodeTable {
         let positive = |x: &f64| x.is_finite() && *x >= 0.0;
         let sigma_c = self.sigma_C.iter().flatten().flatten();
         if !sigma_c.chain(self.sigma_o.iter().flatten()).all(positive) {
-            return Some("sigma_C or sigma_o has an entry that is no standard deviation".into());
+            return Some(
+                "sigma_C or sigma_o has an entry that cannot be a standard deviation".into(),
+            );
         }
         implausible(&self.model(), Some(&self.slope()))
     }
@@ -175,8 +177,9 @@ impl OverTemperature {
         let [from, to] = self.range_c;
         let [least, most] = TEMPERATURE_RANGE_C;
         if !(is_temperature(from) && is_temperature(to) && from <= to) {
-            let problem =
-                format!("range_c is [{from}, {to}], and has to rise, within {least} and {most} °C");
+            let problem = format!(
+                "range_c is [{from}, {to}]; it has to increase, from {least} °C at least to {most} °C at most"
+            );
             return refuse("", problem);
         }
         if let Some(problem) = self.problem_of_lags() {
@@ -185,7 +188,10 @@ impl OverTemperature {
         let all = [self.dies.gyro.hysteresis, self.dies.accel.hysteresis];
         let sizes = all.iter().flatten().flatten().flatten();
         if let Some(size) = sizes.copied().find(|h| !(*h >= 0.0 && h.is_finite())) {
-            return refuse("", format!("a hysteresis is {size}, and has to be a size"));
+            return refuse(
+                "",
+                format!("a hysteresis is {size}; write a number that is not negative"),
+            );
         }
         if self.nodes.is_empty() || self.nodes.len() > NODES {
             let problem = format!(
@@ -226,9 +232,9 @@ impl OverTemperature {
                 (Some(lag_s), _) if DieLag::new(lag_s).is_none() => format!(
                     "lag_s is {lag_s}, and has to be from {least} to {most}, and 0 or at least {LEAST_LAG_S}"
                 ),
-                (None, Some(_)) => "interval_lag_s is there and lag_s is not".into(),
+                (None, Some(_)) => "it has interval_lag_s but not lag_s".into(),
                 (_, Some([lower, upper])) if !(lower <= upper) => {
-                    format!("interval_lag_s is [{lower}, {upper}], and has to rise")
+                    format!("interval_lag_s is [{lower}, {upper}]; it has to increase")
                 }
                 _ => return None,
             };
@@ -252,16 +258,18 @@ impl OverTemperature {
         }
         if let Some(before) = before.filter(|before| temp_c <= *before) {
             return Some(format!(
-                "temp_c is {temp_c}, and that of the node before is {before}: they have to rise"
+                "temp_c is {temp_c}, and that of the node before is {before}: nodes have to be in increasing order"
             ));
         }
         for sensor in Sensor::BOTH {
             match (node.table(sensor), has[sensor]) {
                 (Some(_), false) => {
-                    return Some(format!("it has [{sensor}], and the calibration has none"));
+                    return Some(format!(
+                        "it has [{sensor}], but the calibration has no such sensor"
+                    ));
                 }
                 (None, _) if self.has(sensor) => {
-                    return Some(format!("it has no [{sensor}], and another node has"));
+                    return Some(format!("it has no [{sensor}], but another node has one"));
                 }
                 (table, _) => {
                     if let Some(problem) = table.and_then(NodeTable::problem) {

@@ -80,8 +80,8 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     if manifest.means && !calibration.effects().is_empty() {
         return Err(Error::new(
             &prepared.place,
-            "the calibration has effects, and means of poses do not show what these do to the samples",
-            "verify it by a recording of samples",
+            "the calibration has effects, and means of poses do not show how these change the samples",
+            "verify it with a recording of samples",
         ));
     }
     let cleaned = without_effects(prepared, calibration)?;
@@ -139,7 +139,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         let error = Error::new(
             &prepared.place,
             format!(
-                "the recording has nothing to judge this calibration by{}",
+                "the recording has no data that this calibration could be judged by{}",
                 reason.map_or("", String::as_str)
             ),
             "record dwells with a known input, or poses and turns by hand",
@@ -181,7 +181,7 @@ pub(crate) fn check_unit(
 ) -> Result<Option<Warning>> {
     if calibration.recording.raw_unit != manifest.raw_unit {
         let problem = format!(
-            "its raw unit is {}, the calibration is for {}",
+            "its raw unit is {}, but the calibration is for {}",
             manifest.raw_unit, calibration.recording.raw_unit
         );
         return Err(Error::new(
@@ -210,7 +210,7 @@ fn without_effects(prepared: &Prepared, calibration: &Calibration) -> Result<Opt
     cleaned.map(Some).ok_or_else(singular)
 }
 
-/// The figures of one sensor and what could not be used; `None` if the recording has nothing to judge it by.
+/// The figures of one sensor and what could not be used; `None` if the recording has no data to judge it.
 fn judge(
     prepared: &Prepared,
     calibration: &Calibration,

@@ -144,11 +144,10 @@ impl Decision {
         }
         if !ids.is_empty() {
             let found = format!(
-                "{}: the device had not been switched on but had started anew ({start}), so that the time since power-on is unknown",
+                "{}: the device had started by a reset, not by a power-on ({start}), so the time since power-on is unknown",
                 ids.join(", ")
             );
-            self.notes.push(Note::new(found, "the coefficients count from the start of the recording, are of this recording alone, and are in no calibration; switch it off \
-                 and on, and record at once"));
+            self.notes.push(Note::new(found, "the coefficients count from the start of the recording and are specific to it, so they are not stored in a calibration; switch the unit off and on, and record at once"));
         }
     }
 
@@ -441,17 +440,16 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
     let mut notes = Vec::new();
     let inputs = chosen.iter().filter(|c| !c.candidate.is_error());
     notes.extend(inputs.map(|c| {
-        let found = format!("{}: the unit is right to read it", c.candidate.id());
+        let found = format!("{}: it is a true input of the gyro", c.candidate.id());
         Note::new(
             found,
-            "the calibration is found without it, and nothing takes it out of readings",
+            "the calibration is corrected for it, and it is not removed from readings",
         )
     }));
     let sessions = chosen.iter().filter(|c| c.candidate.is_of_session());
     notes.extend(sessions.map(|c| {
         let found = format!(
-            "{}: specific to this session, as nobody knows how far it goes on: no calibration holds it, and the biases are those of the \
-             middle of the session",
+            "{}: specific to this session, because nobody knows how long it goes on: it is not stored in a calibration, and the biases are those of the middle of the session",
             c.candidate.id()
         );
         Note::new(found, "")
@@ -465,7 +463,7 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
                 .iter()
                 .map(|k| effect.coefficients[*k].name);
             let found = format!(
-                "{}: this recording does not tell {} from the bias and the other coefficients, and they are 0 in the file",
+                "{}: this recording does not distinguish {} from the bias and the other coefficients, so they are 0 in the file",
                 effect.id,
                 names.collect::<Vec<_>>().join(", ")
             );
@@ -480,8 +478,7 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
     let level: Vec<String> = level.map(|c| c.candidate.id()).collect();
     if !level.is_empty() && chosen.iter().any(|c| !c.candidate.is_error()) {
         let found = format!(
-            "{}: may be the level part of the Earth's rate, which goes by the heading and is another elsewhere: show each attitude at \
-             several headings",
+            "{}: may be the horizontal part of Earth rate, which depends on the heading and the place: record each attitude at several headings",
             level.join(", ")
         );
         notes.push(Note::new(found, ""));
@@ -489,10 +486,10 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
     let heated = chosen.iter().filter(|c| c.candidate.without_self_heating);
     notes.extend(heated.map(|c| {
         let found = format!(
-            "{}: the thermometer warms up by itself in the first minute, and the sensor is on another die",
+            "{}: the thermometer heats itself in the first minute, and the sensor is on another die",
             c.candidate.id()
         );
-        let advice = "the device has no other thermometer, and errs by that for so long after power-on";
+        let advice = "the device has no other thermometer, so it has this error for that time after power-on";
         Note::new(found, advice)
     }));
     let slow = chosen.iter().filter(|c| c.candidate.is_slow());
@@ -501,11 +498,13 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
         return notes;
     };
     let found = format!(
-        "{}: the temperature only {} while time goes on (rank correlation {order:.2}), so that what follows temperature and what \
-         follows time look alike, and a lag of the die looks like a bias",
+        "{}: the temperature only {} during the recording (rank correlation {order:.2}), so effects of temperature and of time look alike, and a lag of the die looks like a bias",
         ids.join(", "),
         if order > 0.0 { "rises" } else { "falls" },
     );
-    notes.push(Note::new(found, "let it come back within one recording"));
+    notes.push(Note::new(
+        found,
+        "let the temperature return within one recording",
+    ));
     notes
 }

@@ -90,19 +90,18 @@ impl std::fmt::Display for Untestable {
         match self {
             Self::Residuals(rows, parameters) => write!(
                 f,
-                "{rows} residuals for {parameters} affine parameters leave nothing to judge by; record more poses"
+                "{rows} residuals for {parameters} affine parameters do not suffice for a judgement; record more poses"
             ),
             Self::NothingHeldOut => f.write_str(
-                "without any part of the recording the rest does not determine the calibration; record each pose twice",
+                "whichever part of the recording is held out, the rest does not determine the calibration; record each pose twice",
             ),
             Self::Condition(condition) => write!(
                 f,
-                "the poses leave some parameters all but open (condition {condition:.0}); record poses that differ more"
+                "the poses hardly determine some parameters (condition {condition:.0}); record poses that differ more"
             ),
             Self::Reference(times) => write!(
                 f,
-                "the accelerometer's directions of gravity, by which its turns are judged, are uncertain by {} times the noise of the turns; \
-                 record more poses",
+                "its turns are judged by the accelerometer's directions of gravity, whose uncertainty is {} times the noise of the turns; record more poses",
                 significant(*times)
             ),
         }
@@ -231,7 +230,7 @@ impl Recordings<'_> {
         if let Some(turned) = all().find(|r| r.manifest.reference == Reference::TurntableRate) {
             return Err(Error::new(
                 &turned.place,
-                "only the magnitude of the rate is known, and a diagnosis needs known inputs or gravity",
+                "only the magnitude of the rate is known, but a diagnosis needs known inputs or gravity",
                 "give a recording from a rate table or by hand; a fit and a verification take this one",
             ));
         }
@@ -241,10 +240,10 @@ impl Recordings<'_> {
                 return Err(Error::new(
                     &other.place,
                     format!(
-                        "raw_unit is {}, and that of the first recording {raw_unit}",
+                        "raw_unit is {}, but that of the first recording is {raw_unit}",
                         other.manifest.raw_unit
                     ),
-                    "give recordings that the same converter wrote",
+                    "give recordings with the same raw unit",
                 ));
             }
         }
@@ -254,10 +253,10 @@ impl Recordings<'_> {
                 return Err(Error::new(
                     &self.first.place,
                     format!(
-                        "raw_unit is {raw_unit}, and [{sensor}] of the calibration is for {}",
+                        "raw_unit is {raw_unit}, but [{sensor}] of the calibration is for {}",
                         table.raw_unit
                     ),
-                    "give a calibration from recordings that the same converter wrote",
+                    "give a calibration from recordings with the same raw unit",
                 ));
             }
         }
@@ -270,7 +269,7 @@ impl Recordings<'_> {
             return Err(Error::new(
                 &self.first.place,
                 problem,
-                "effects are a unit's own: give the calibration of this unit; if it is, write the same name as device in both files",
+                "effects belong to one unit: give the calibration of this unit; if it is the same unit, write the same name as device in both files",
             ));
         }
         let mut recordings = self
@@ -279,8 +278,8 @@ impl Recordings<'_> {
         if let Some((device, place)) = recordings.find(|(d, _)| d != unit) {
             return Err(Error::new(
                 place,
-                format!("device is {device:?}, and that of the first recording {unit:?}"),
-                "effects are a unit's own: give recordings of one unit; if they are, import both with the same name of the device, or mend it in recording.toml",
+                format!("device is {device:?}, but that of the first recording is {unit:?}"),
+                "effects belong to one unit: give recordings of one unit; if they are of one unit, import both with the same device name, or correct it in recording.toml",
             ));
         }
         Ok(())
@@ -338,7 +337,7 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         Error::new(
             &place,
             "the calibration is singular",
-            "look at the columns of the recording",
+            "check the columns of the recording",
         )
     };
     let held = matrices(&recordings);

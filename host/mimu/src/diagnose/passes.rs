@@ -144,7 +144,7 @@ impl Passes<'_> {
         Error::new(
             self.place,
             "the calibration is singular",
-            "look at the columns of the recording",
+            "check the columns of the recording",
         )
     }
 

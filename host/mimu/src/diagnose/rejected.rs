@@ -87,51 +87,54 @@ const CHANCE: f64 = 0.5;
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::OneDwell(share) => write!(f, "it rests to {:.0} % on one dwell", 100.0 * share),
+            Self::OneDwell(share) => write!(
+                f,
+                "one dwell contains {:.0} % of its information",
+                100.0 * share
+            ),
             Self::HeldOut([without, with]) => write!(
                 f,
                 "the held-out error does not go down: {without} without, {with} with"
             ),
             Self::SecondRecording([a, b], [without, with]) => write!(
                 f,
-                "the error of the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {without} and {with}"
+                "the error on the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {without} and {with}"
             ),
             Self::Parts(helped, hurt) => write!(
                 f,
                 "the held-out error goes down in {helped} of the parts, and up in {hurt}"
             ),
             Self::UndeterminedWithoutBlock => {
-                f.write_str("what is left when a block is held out does not determine it")
+                f.write_str("the data without one block do not determine it")
             }
             Self::FitsNoise(times) => {
                 let [without, with] = times.map(significant);
                 write!(
                     f,
-                    "it fits the noise: the residual is {without} times the noise without it, and {with} times with it"
+                    "it fits the noise: without it the residual is {without} times the noise, with it {with} times"
                 )
             }
             Self::LostWithDwell(p) => write!(
                 f,
-                "it does not survive the loss of one dwell and of those in its pose: without them, {}",
+                "its evidence depends on one dwell and those in the same pose: without them, {}",
                 p_value(*p)
             ),
             Self::Suggestion(p) => write!(
                 f,
-                "{}, and it lowers the held-out error, but no physics asks for it: a suggestion. A second recording that shows it confirms it, \
-                 or your word",
+                "{}, and it lowers the held-out error, but no known physics explains it: a suggestion. Confirm it by a second recording that shows it, or accept it",
                 p_value(*p)
             ),
             Self::NotChosen(one) => write!(f, "{one}"),
             Self::FileErrsMore(recording, [without, with]) => write!(
                 f,
-                "the calibration file with it would err more on {recording}: {without} without effects, {with} with them"
+                "the calibration file with it has a larger error on {recording}: {without} without effects, {with} with them"
             ),
-            Self::OtherPredictsBetter => {
-                f.write_str("another effect predicts better, with the calibration that it leaves")
-            }
+            Self::OtherPredictsBetter => f.write_str(
+                "another effect predicts better, together with the calibration that then results",
+            ),
             Self::NotCalibrated(error) => write!(
                 f,
-                "readings without it cannot be calibrated: {}",
+                "after its removal the readings cannot be calibrated: {}",
                 error.refused().problem
             ),
         }
@@ -152,14 +155,14 @@ impl fmt::Display for NotChosen {
         }
         match self.why {
             Some(Passed::GivenUp) => {
-                f.write_str(", but it was found, and given up when others explained the same")?;
+                f.write_str(", but it was found first and dropped when others explained the same")?;
             }
             Some(Passed::Enough(count)) => write!(
                 f,
-                ", but {count} effects of the sensor were found before it, and no more are sought"
+                ", but {count} effects of the sensor were found before it, and the search stops there"
             )?,
             Some(Passed::NotAtFirst) => {
-                f.write_str(", but beside all that was sought at first it was not significant")?;
+                f.write_str(", but it was not significant among all that were tried first")?;
             }
             None => {}
         }
@@ -186,7 +189,7 @@ impl fmt::Display for ErrorRms {
         let (factor, unit) = self.figure.readable(self.sensor);
         match self.rms.is_finite() {
             true => write!(f, "{} {unit}", significant(self.rms * factor)),
-            false => f.write_str("nothing that can be told"),
+            false => f.write_str("nothing that can be named"),
         }
     }
 }

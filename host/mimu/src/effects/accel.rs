@@ -63,7 +63,7 @@ pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "accel_scale_quadratic",
         sensor: Sensor::Accel,
-        about: "the gap of the sense capacitor changes: error by the square of the force along the axis",
+        about: "the gap of the sense capacitor changes: error proportional to the square of the force along the axis",
         // MMA7260QT: 1 % of full scale at most, 15 mg at 1.5 g; a third of it at 1 g.
         coefficients: &each(Regressor::power(Input, 2), 5.0 * MG / (G * G)),
         parameter: None,
@@ -74,7 +74,7 @@ pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "accel_scale_cubic",
         sensor: Sensor::Accel,
-        about: "the spring stiffens: error by the cube of the force along the axis",
+        about: "the spring stiffens: error proportional to the cube of the force along the axis",
         coefficients: &each(Regressor::power(Input, 3), 5.0 * MG / (G * G * G)),
         parameter: None,
         size: "5 mg/g³ (MMA7260QT: 15 mg at 1.5 g)",
@@ -84,7 +84,7 @@ pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "accel_cross_axis_product",
         sensor: Sensor::Accel,
-        about: "force across pulls the comb aside: error by products of the forces along two axes",
+        about: "a force across the axis pulls the comb aside: error proportional to products of the forces along two axes",
         coefficients: &PRODUCT,
         parameter: None,
         size: "3 mg/g² (assumed)",
@@ -94,7 +94,7 @@ pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "accel_size_effect",
         sensor: Sensor::Accel,
-        about: "each axis senses at a point of its own: centripetal and Euler acceleration",
+        about: "each axis senses at a different point: centripetal and Euler acceleration",
         coefficients: &ARMS,
         parameter: None,
         size: "5 mm (a package; on a board centimetres)",

@@ -81,12 +81,11 @@ const fn creep(sensor: Sensor) -> Effect {
 }
 
 const fn by_turning(sensor: Sensor) -> Effect {
-    let about = "a bias and a scale factor that follow how fast the unit turns, whichever way";
+    let about = "a bias and a scale factor that follow the magnitude of the rate";
     law("by_turning", sensor, about, &TURNING, None)
 }
 
-const BY_HAND: &str =
-    "the same rates from another supply, and turned by hand: codes do not mind what turns the unit";
+const BY_HAND: &str = "the same rates from another supply, and turned by hand: errors of codes do not depend on what turns the unit";
 
 const LONGER: &str =
     "a cold start recorded for several hours: an exponential ends, a logarithm does not";
@@ -122,7 +121,7 @@ static ALTERNATIVES: [Alternative; 5] = [
         law: law(
             "vertical_field",
             Sensor::Gyro,
-            "a field along the vertical, as the Earth's magnetic one, felt along each axis",
+            "a field along the vertical, such as the Earth's magnetic field, sensed along each axis",
             &FIELD,
             None,
         ),

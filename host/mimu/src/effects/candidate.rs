@@ -97,9 +97,9 @@ impl Candidate {
         match self.kind {
             CandidateKind::Effect(e) => e.about,
             CandidateKind::Term(..) => {
-                "a product of what was recorded; no effect of this name is known"
+                "a product of recorded quantities without a physical name here"
             }
-            CandidateKind::Jump { .. } => "the bias is another from here on",
+            CandidateKind::Jump { .. } => "the bias changes here",
         }
     }
 

@@ -29,7 +29,7 @@ pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "gyro_bias_drift",
         sensor: Sensor::Gyro,
-        about: "the bias moves linearly in time",
+        about: "the bias drifts linearly in time",
         coefficients: &each(LINEAR, 0.3 * DPS / HOUR_S),
         parameter: None,
         size: "0.3 deg/s/h (assumed)",
@@ -39,7 +39,7 @@ pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "accel_bias_drift",
         sensor: Sensor::Accel,
-        about: "the bias moves linearly in time",
+        about: "the bias drifts linearly in time",
         coefficients: &each(LINEAR, 3.0 * MG / HOUR_S),
         parameter: None,
         size: "3 mg/h (assumed)",

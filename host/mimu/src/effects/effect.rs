@@ -153,7 +153,7 @@ pub enum OnDevice {
     ByCode,
     /// With every sample.
     EverySample,
-    /// Folded into a bias and a matrix, as temperature and time move.
+    /// Folded into a bias and a matrix, when temperature or time changes.
     Folded,
 }
 
@@ -196,12 +196,12 @@ impl Effect {
         for c in self.coefficients {
             // Coefficients of each axis with the same law are one formula; those of a matrix are told apart by the other axis.
             let formula = match c.regressor {
-                Regressor::Bit(_) => "bit set or not, in the mean over the noise".into(),
+                Regressor::Bit(_) => "probability, over the noise, that the bit is set".into(),
                 regressor => regressor.formula(None),
             };
             let formula = match c.scope {
                 Scope::Recording => {
-                    format!("{formula} (not of the unit: neither written nor removed)")
+                    format!("{formula} (specific to the session: neither written nor removed)")
                 }
                 _ => formula,
             };
@@ -226,10 +226,10 @@ impl Effect {
         };
         let device = match self.on_device() {
             OnDevice::Never if self.is_error() => "never: it is specific to a session",
-            OnDevice::Never => "never: it is no error",
-            OnDevice::ByCode => "with every sample, by the code",
+            OnDevice::Never => "never: it is a true input",
+            OnDevice::ByCode => "with every sample, from the code",
             OnDevice::EverySample => "with every sample",
-            OnDevice::Folded => "as temperature and time move",
+            OnDevice::Folded => "when temperature or time changes",
         };
         format!(
             "| `{}` | {} | {}{parameter} | {} in {unit} | {} | {device} | {} | {} |",

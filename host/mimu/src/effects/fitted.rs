@@ -154,7 +154,7 @@ impl FittedEffect {
         };
         if self.candidate.reads_code() {
             return Err(format!(
-                "[[effect]] {}: what is left of it is of another converter, and an axis has one",
+                "[[effect]] {}: its other coefficients belong to another converter, and an axis has only one",
                 self.id()
             ));
         }

@@ -51,8 +51,8 @@ const NAMES: [[&str; BITS]; 4] = [
 
 /// STM32H743: integral nonlinearity of 4 to 12 in 65536, which is 6 in the 32768 of the first bit.
 pub const TYPICAL: f64 = 2e-4;
-const NEEDS: &str = "raw readings as the converter gave them, at many levels over its range";
-const ABOUT: &str = "bits of the converter are worth more or less than they say, or codes never come: error by the code";
+const NEEDS: &str = "unprocessed readings of the converter, at many levels over its range";
+const ABOUT: &str = "converter nonlinearity (INL, DNL): bits weigh more or less than their nominal value, or codes are missing";
 
 const SIZE: &str = "2e-4 of the weight of bit 0 (STM32H743: 4 to 12 codes of 65536)";
 const TAKEN_FOR: &str = "scale nonlinearity, a bias beyond a limit";

@@ -45,7 +45,7 @@ pub fn removable(prepared: &Prepared, effects: &[FittedEffect]) -> Result<()> {
         let sensor = effect.candidate.sensor;
         let lacks = |problem: String| {
             let problem = format!("{} cannot be removed: {problem}", effect.candidate.id());
-            let remedy = "record it, or use a calibration without this effect";
+            let remedy = "record what is missing, or use a calibration without this effect";
             Err(Error::new(&prepared.place, problem, remedy))
         };
         if !prepared.has(sensor) {

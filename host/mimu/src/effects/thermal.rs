@@ -110,7 +110,7 @@ pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "gyro_thermal_misalignment",
         sensor: Sensor::Gyro,
-        about: "solder and board bend: the sensitive directions turn with the temperature",
+        about: "solder and board bend: the sensitive directions rotate with temperature",
         coefficients: &tilt(Rate(0), Rate(1), Rate(2)),
         parameter: None,
         size: "20 µrad/K (assumed)",
@@ -120,7 +120,7 @@ pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "accel_thermal_misalignment",
         sensor: Sensor::Accel,
-        about: "solder and board bend: the sensitive directions turn with the temperature",
+        about: "solder and board bend: the sensitive directions rotate with temperature",
         coefficients: &tilt(Force(0), Force(1), Force(2)),
         parameter: None,
         size: "20 µrad/K (assumed)",
@@ -130,7 +130,7 @@ pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "gyro_thermal_lag",
         sensor: Sensor::Gyro,
-        about: "die and package lag behind the temperature sensor: a loop on ramps",
+        about: "die and package lag behind the thermometer: a loop on ramps",
         // At the start: some kelvins of self-heating.
         coefficients: &behind(0.1 * DPS, 0.3 * DPS),
         parameter: LAG,
@@ -141,7 +141,7 @@ pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "accel_thermal_lag",
         sensor: Sensor::Accel,
-        about: "die and package lag behind the temperature sensor: a loop on ramps",
+        about: "die and package lag behind the thermometer: a loop on ramps",
         coefficients: &behind(2.0 * MG, 6.0 * MG),
         parameter: LAG,
         size: "as the thermal bias; at the start 6 mg",

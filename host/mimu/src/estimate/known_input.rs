@@ -65,11 +65,11 @@ pub(super) fn complete(found: Observability, dwells: usize) -> Result<Observabil
     let axes = inputs.join(", ");
     let add = if dwells < 4 {
         Addition::Words(format!(
-            "only {dwells} dwells can be used, and 4 parameters a sensor need at least 4 different inputs"
+            "only {dwells} dwells can be used; the 4 parameters of each axis need at least 4 different inputs"
         ))
     } else if bias {
         Addition::Words(format!(
-            "no difference between bias and a constant input along {axes}: add dwells with the opposite input, or none, along {axes}"
+            "the dwells do not distinguish the bias from the constant input along {axes}: add dwells with the opposite input, or with zero input, along {axes}"
         ))
     } else {
         Addition::Inputs(axes)
@@ -198,7 +198,7 @@ pub fn kalman(
         loop {
             let mut filter = Filter::<f64>::diffuse(floor + scatter.excess, 1.0);
             let measurements = innovations(observations, span, axis, &errors, scatter.excess)
-                .ok_or_else(|| Failure::NoSolution("the noise of the dwells is none".into()))?;
+                .ok_or_else(|| Failure::NoSolution("the noise of the dwells is zero".into()))?;
             for (m, o) in measurements.iter().zip(observations) {
                 filter
                     .update(&m.input, m.raw, m.variance)
@@ -271,7 +271,7 @@ pub(super) fn forward(axes: &[OfAxis], span: f64, condition: f64) -> Result<Esti
     let scatter: Vec<_> = axes.iter().flat_map(|a| a.scatter.clone()).collect();
     let triad = Triad::from_forward(model, parts).ok_or_else(|| {
         Failure::NoSolution(
-            "the three sensors measure one plane only (singular scale-factor matrix)".into(),
+            "the three sensors measure in one plane only (singular scale-factor matrix)".into(),
         )
     })?;
     Ok(Estimated {
@@ -327,7 +327,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
     if rest.is_empty() {
         return Err(Failure::Undetermined {
             parameters: "o (xu (10))".into(),
-            add: "the inverse form takes the offset from dwells at rest: add some, or use least squares".into(),
+            add: "the inverse form needs dwells at rest for the offset: add some, or use least squares".into(),
         });
     }
     let span = span(observations);

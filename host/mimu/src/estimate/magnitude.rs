@@ -153,7 +153,7 @@ fn refuse_too_little(observations: &[Observation], known: &KnownMagnitudes) -> R
                     PARAMETERS - n
                 ),
                 format!(
-                    "{} can be used, and without a table at least {PARAMETERS} different ones are needed: add poses, each axis up and down and between",
+                    "{} can be used; without a table at least {PARAMETERS} different poses are needed: add poses, each axis up, down and in between",
                     plural(n as u64, "still pose")
                 ),
             ),
@@ -163,7 +163,7 @@ fn refuse_too_little(observations: &[Observation], known: &KnownMagnitudes) -> R
                     PARAMETERS.saturating_sub(rows).max(needed - n.min(needed))
                 ),
                 format!(
-                    "{} at a known rate and {} can be used, and at least {needed} orientations on the turntable are needed: add dwells with each axis up and down and between",
+                    "{} at a known rate and {} can be used; at least {needed} orientations on the turntable are needed: add dwells with each axis up, down and in between",
                     plural(n as u64, "dwell"),
                     plural(known.rests.len() as u64, "rest")
                 ),
@@ -183,11 +183,11 @@ fn refuse_too_little(observations: &[Observation], known: &KnownMagnitudes) -> R
     let names = axes.join(", ");
     let add = match known.sensor {
         Sensor::Accel => format!(
-            "all poses lie in one plane across {names}: add poses with {names} up, down and slanted, and check that the column accel_{} is what it says",
+            "all poses are in one plane perpendicular to {names}: add poses with {names} up, down and slanted, and check that the column accel_{} contains this axis",
             axes[0]
         ),
         Sensor::Gyro => format!(
-            "no dwell turns about {names}: lay the unit on the turntable with {names} up, down and slanted, and check that the column gyro_{} is what it says",
+            "no dwell turns about {names}: lay the unit on the turntable with {names} up, down and slanted, and check that the column gyro_{} contains this axis",
             axes[0]
         ),
     };

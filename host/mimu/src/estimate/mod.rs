@@ -158,7 +158,7 @@ impl Failure {
             Self::NoSolution(_) => mimu_recording::error::Error::new(
                 sensor,
                 problem,
-                "look at the recording: wrong columns, wrong reference, or motion within dwells",
+                "check the recording: wrong columns, wrong reference, or motion within dwells",
             ),
         }
     }

@@ -72,7 +72,7 @@ pub fn estimate(
         return Err(Failure::Undetermined {
             parameters: "C of the gyro".into(),
             add: format!(
-                "{} turns between dwells can be used, and at least 5 about different axes are needed: turn the unit about each axis, resting between",
+                "{} turns between dwells can be used; at least 5 about different axes are needed: turn the unit about each axis, and hold it still in between",
                 turns.len()
             )
             .into(),
@@ -83,7 +83,7 @@ pub fn estimate(
         Some(start) => start.matrix,
         None => guess(motions, &at_rest, gravity).ok_or_else(|| {
             Failure::NoSolution(
-                "no scale factor of the gyro makes its turns fit those of gravity".into(),
+                "no scale factor of the gyro makes its turns agree with those of gravity".into(),
             )
         })?,
     };

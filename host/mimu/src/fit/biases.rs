@@ -110,15 +110,15 @@ pub fn fit_biases(
     if sensors.is_empty() && without_inputs {
         return Err(Error::new(
             &prepared.place,
-            "the reference is a table, and no dwell has a known input",
-            "give dwells of a second and more their inputs in the ref_ columns, or set reference = \"gravity\" where there is no table",
+            "reference is \"table\", and no dwell has a known input",
+            "give the inputs of dwells of a second or more in the ref_ columns, or set reference = \"gravity\" if there was no table",
         ));
     }
     if sensors.is_empty() {
         return Err(Error::new(
             &prepared.place,
-            "there is no triad with a known matrix and a usable dwell",
-            "give the calibration of this unit, and a recording with dwells of a second and more",
+            "no triad has both a known matrix and a usable dwell",
+            "give the calibration of this unit, and a recording with dwells of a second or more",
         ));
     }
     for sensor in &mut sensors {

@@ -26,8 +26,8 @@ pub(super) fn fit_gravity(
     if !prepared.has(Sensor::Accel) {
         return Err(Error::new(
             &prepared.place,
-            "there is no accelerometer, and gravity is the only reference",
-            "add accel_x, accel_y, accel_z, or give the gyro its rates in ref_rate_ columns (reference = \"table\")",
+            "the recording has no accelerometer, and gravity is the only reference",
+            "add the columns accel_x, accel_y, accel_z, or give the rates in ref_rate_ columns (reference = \"table\")",
         ));
     }
     let poses = prepared.observations(Sensor::Accel);
@@ -253,7 +253,7 @@ impl ByPoses<'_> {
             Failure::NoSolution(_) => Failure::Undetermined {
                 parameters: "scale factors and biases of the accelerometer".into(),
                 add: format!(
-                    "add poses with {faces} up, which no pose shows, and between; if such poses were recorded, look for wrong columns"
+                    "no pose has {faces} up: add such poses, and poses in between; if they were recorded, check the columns"
                 )
                 .into(),
             },

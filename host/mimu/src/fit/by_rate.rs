@@ -51,7 +51,7 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         let error = Error::undetermined(
             format!("{}, gyro", prepared.place),
             format!("no dwell turns at a known rate{unused}"),
-            "let the turntable run for ten seconds and more in each orientation, within the range of the gyro",
+            "let the turntable run for ten seconds or more in each orientation, within the range of the gyro",
         );
         return Err(prepared.with_steps_as_given(error, Sensor::Gyro));
     }

@@ -74,12 +74,12 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
     let add = match (fit.figure, poses) {
         (Figure::GravitySize, Some(poses)) => poses.into(),
         (Figure::GravitySize, None) => {
-            "add poses, each axis up and down and between, and hold each still".into()
+            "add poses: each axis up, down and in between; hold each still".into()
         }
-        (Figure::RateSize, _) => "lay the unit on the turntable with each axis up, down and slanted, and record rests".into(),
+        (Figure::RateSize, _) => "lay the unit on the turntable with each axis up, down and slanted, and record rests too".into(),
         // What the accelerometer errs by, whose directions the turns are judged by, is in the intervals of the gyro.
         (Figure::Direction, Some(poses)) => {
-            format!("{poses}: the accelerometer says where gravity is after each turn").into()
+            format!("{poses}: the accelerometer gives the direction of gravity after each turn").into()
         }
         (Figure::Direction, None) => "add turns about every axis, with that axis level and slanted, between dwells that are held still".into(),
         (Figure::Input, _) => Addition::Inputs("every axis".into()),
@@ -114,7 +114,7 @@ fn missing_poses(prepared: &Prepared, triad: &Triad) -> Option<String> {
     (!open.is_empty()).then(|| {
         let names: Vec<String> = open.into_iter().map(|(name, _)| name).collect();
         format!(
-            "add poses with {} up, near which there is none, and hold each still",
+            "add poses with {} up (no pose is near), and hold each still",
             names.join(", ")
         )
     })

@@ -154,7 +154,7 @@ pub(super) fn determined(
     let (factor, unit) = figure.readable(sensor);
     let [open, typical] = [open, typical].map(|v| significant(v * factor));
     let problem = format!(
-        "the rest leaves its errors open by {open} {unit}, and {typical} {unit} are left in sample"
+        "predictions for it are uncertain by {open} {unit}, and the residual in sample is {typical} {unit}"
     );
     Err(Failure::NoSolution(problem))
 }

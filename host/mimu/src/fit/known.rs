@@ -179,7 +179,7 @@ pub(super) fn fit_known(
                 .map(Warning::to_string)
                 .collect::<Vec<_>>()
                 .join(", "),
-            "give dwells of a second and more their inputs in the ref_ columns, or set reference = \"gravity\" where there is no table",
+            "give the inputs of dwells of a second or more in the ref_ columns, or set reference = \"gravity\" if there was no table",
         );
         let judged = Sensor::BOTH.into_iter().filter(wanted);
         let mut judged = judged.filter(|s| prepared.dwells.are_judged_not_still(*s));

@@ -40,10 +40,10 @@ pub fn check_readings(prepared: &Prepared) -> Result<()> {
     Err(Error::new(
         &prepared.place,
         format!(
-            "{}: readings whose low byte is 128 or more are 256 counts low, as {pairs} jumps between neighbouring samples show: the firmware takes the low byte for a signed number",
+            "{}: {pairs} jumps between neighbouring samples show that readings whose low byte is 128 or more are 256 counts too low: the firmware reads the low byte as a signed number",
             names.join(", ")
         ),
-        "mend the firmware, and for this log import it again with these readings mended",
+        "correct the firmware, and import this log again with corrected readings",
     )
     .about(Argument::SignedLowByte))
 }
@@ -64,7 +64,7 @@ pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
     match fit.estimated.triad.inverse.check(None) {
         Ok(()) => Ok(()),
         Err(_) => {
-            let seen = "the fit ends in a scale factor or a bias that no sensor has".to_string();
+            let seen = "the fit leads to a scale factor or a bias that no sensor has".to_string();
             Err(Failure::NoSolution(seen).into_error(fit.sensor))
         }
     }
@@ -82,7 +82,7 @@ pub fn check_numbers(fit: &SensorFit) -> Result<()> {
     if numbers.into_iter().all(|x| x.is_finite()) && fit.rms().is_finite() {
         return Ok(());
     }
-    let seen = "the fit ends in something that is not a number".to_string();
+    let seen = "the fit leads to a value that is not a number".to_string();
     Err(Failure::NoSolution(seen).into_error(fit.sensor))
 }
 
@@ -136,7 +136,7 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warni
         Figure::Direction => "the turns of gravity",
     };
     let how = match share < 1.0 {
-        true => format!(": {:.0} % is left over", 100.0 * share),
+        true => format!(": {:.0} % remains unexplained", 100.0 * share),
         false => " at all".to_string(),
     };
     let with = match with {
@@ -153,7 +153,7 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warni
     Err(Error::new(
         format!("{}, {}", prepared.place, fit.sensor),
         format!("the readings do not follow {against}{how}{with}{worst}"),
-        "check that no columns are swapped and that every step has its own input",
+        "check that no columns are swapped and that every dwell has its own input",
     ))
 }
 

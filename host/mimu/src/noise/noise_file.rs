@@ -108,7 +108,7 @@ impl NoiseChannel {
             Term::K => (&self.k, &self.k_reason),
             Term::R => (&self.r, &self.r_reason),
         };
-        let unknown = "the noise file does not say why";
+        let unknown = "the noise file gives no reason";
         value.as_ref().ok_or(reason.as_deref().unwrap_or(unknown))
     }
 
@@ -150,15 +150,15 @@ impl NoiseChannel {
         };
         let (remedy, argument) = match (is_si(&self.unit), &self.raw_unit) {
             (true, None) if !is_si(unit) => (
-                "run mimu allan again on the raw recording, with a calibration: the file then has the scale factor",
+                "run `mimu allan` again on the raw recording, with a calibration: the file then contains the scale factor",
                 Some(Argument::CalibrationOfNoise),
             ),
             (false, _) if is_si(unit) => (
-                "run mimu allan again with a calibration: one file then serves for raw readings and for SI",
+                "run `mimu allan` again with a calibration: the file then serves for raw readings and for SI",
                 Some(Argument::CalibrationOfNoise),
             ),
             _ => (
-                "run mimu allan on a recording of this unit with the same raw unit",
+                "run `mimu allan` on a recording of this unit with the same raw unit",
                 None,
             ),
         };
@@ -191,8 +191,8 @@ impl OtherUnit {
 const HEADER: &str = "\
 # Noise of an inertial unit at rest: sigma^2(tau) = 3 Q^2/tau^2 + N^2/tau + (2 ln 2/pi) B^2 + K^2 tau/3 + R^2 tau^2/2.
 # q quantization, n white noise, b bias instability, k rate random walk, r rate ramp, with a confidence interval each.
-# A coefficient that the record does not show is absent, and its reason is there.
-# scale_factor, where a calibration was given: raw_unit per unit. Times it, a coefficient is that of the raw readings.
+# If the record does not show a coefficient, the coefficient is absent and the reason is given.
+# scale_factor (if a calibration was given): raw_unit per unit. A coefficient times scale_factor is that of the raw readings.
 ";
 
 impl NoiseFile {
@@ -208,7 +208,7 @@ impl NoiseFile {
 
     /// Parses and checks the text of a noise file; `place` is its path.
     pub fn parse(text: &str, place: &str) -> Result<Self> {
-        let mut file: Self = parse_toml(text, place, Some("run mimu allan again"))?;
+        let mut file: Self = parse_toml(text, place, Some("run `mimu allan` again"))?;
         if file.format != NOISE_FORMAT {
             return Err(Error::new(
                 place,
@@ -223,8 +223,8 @@ impl NoiseFile {
             if !RAW_COLUMNS.contains(&channel.name.as_str()) {
                 return Err(Error::new(
                     format!("{place}, channel {:?}", channel.name),
-                    "there is no such channel",
-                    format!("it is one of {}", RAW_COLUMNS.join(", ")),
+                    "it is not a channel",
+                    format!("use one of {}", RAW_COLUMNS.join(", ")),
                 ));
             }
             let scaled = (&channel.raw_unit, channel.scale_factor);
@@ -233,8 +233,8 @@ impl NoiseFile {
             {
                 return Err(Error::new(
                     format!("{place}, channel {}, scale_factor", channel.name),
-                    "raw_unit and scale_factor stand together, and a scale factor is a number other than 0",
-                    "run mimu allan again with a calibration",
+                    "raw_unit and scale_factor need each other, and a scale factor is a number other than 0",
+                    "run `mimu allan` again with a calibration",
                 )
                 .about(Argument::CalibrationOfNoise));
             }
@@ -245,10 +245,10 @@ impl NoiseFile {
                     return Err(Error::new(
                         format!("{place}, channel {}, {}", channel.name, term.letter()),
                         format!(
-                            "value {} with the upper end {} is no noise",
+                            "value {} with the upper end {} cannot be noise",
                             c.value, c.upper
                         ),
-                        "run mimu allan again",
+                        "run `mimu allan` again",
                     ));
                 }
             }
@@ -258,8 +258,8 @@ impl NoiseFile {
             {
                 return Err(Error::new(
                     format!("{place}, channel {}, k_at_most", channel.name),
-                    "it is no upper end of a noise",
-                    "run mimu allan again",
+                    "it cannot be the upper end of a noise",
+                    "run `mimu allan` again",
                 ));
             }
             if channel.model().variance(1.0) == 0.0 {
@@ -267,7 +267,7 @@ impl NoiseFile {
                 return Err(Error::new(
                     format!("{place}, channel {}", channel.name),
                     format!("it has neither N nor B nor K: N {why}"),
-                    "run mimu allan on a longer record",
+                    "run `mimu allan` on a longer record",
                 ));
             }
         }

@@ -421,7 +421,7 @@ impl Pair<'_> {
             let words = match (&candidate.kind, &other.kind) {
                 (_, CandidateKind::Effect(effect)) => effect.needs,
                 (CandidateKind::Effect(found), CandidateKind::Term(..)) => found.needs,
-                _ => "Make the same recording again: a jump does not come back where it was.",
+                _ => "Make the same recording again: a jump does not recur at the same place.",
             };
             words.to_string()
         });

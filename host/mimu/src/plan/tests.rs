@@ -41,9 +41,9 @@ fn what_has_no_input_is_refused_by_its_step() {
         ("[[step]]\nposes = 3\ndwell_s = 1.0\n", "[[step]] 1: poses"),
         (
             "[[step]]\nup = [1.0, 0.0, 0.0]\nspin_dps = 1.0\ndwell_s = 1.0\n",
-            "no one input",
+            "not constant",
         ),
-        ("[[step]]\ndwell_s = 1.0\n", "up, or poses"),
+        ("[[step]]\ndwell_s = 1.0\n", "up or poses"),
         (
             "[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = -1.0\n",
             "dwell_s",

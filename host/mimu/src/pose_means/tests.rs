@@ -131,7 +131,7 @@ fn the_noise_of_a_mean_is_that_of_the_table_and_without_one_it_is_unknown_and_th
     assert!(
         warnings
             .iter()
-            .any(|w| w.to_string().contains("taken to be white"))
+            .any(|w| w.to_string().contains("assumed to be white"))
     );
     let (floor, excess, warnings) = noise_floor(false);
     // Not known, which is no zero.
@@ -140,7 +140,7 @@ fn the_noise_of_a_mean_is_that_of_the_table_and_without_one_it_is_unknown_and_th
     assert!(
         warnings
             .iter()
-            .any(|w| w.to_string().contains("the only noise")),
+            .any(|w| w.to_string().contains("taken as the noise")),
         "{warnings:?}"
     );
 }
@@ -184,7 +184,10 @@ fn a_gyro_is_fitted_to_steps_of_known_rate_and_of_gravity_alone_is_refused_by_na
         ..options()
     };
     let error = fit(by_gravity(), only).unwrap_err().to_string();
-    assert!(error.contains("turns, which need samples"), "{error}");
+    assert!(
+        error.contains("turns calibrate the gyro; they need samples"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -287,11 +287,8 @@ impl Condensed {
             if length != 0 && length != samples.len() {
                 return Err(Error::new(
                     format!("samples in memory, column {}", column.name()),
-                    format!(
-                        "it has {length} rows, and there are {} times",
-                        samples.len()
-                    ),
-                    "give every column a value for each time, or none",
+                    format!("it has {length} rows, and t_s has {}", samples.len()),
+                    "give every column a value for each time, or leave the column out",
                 ));
             }
         }
@@ -417,8 +414,8 @@ impl Condenser {
             self.check_rate()?;
             return Err(Error::new(
                 format!("{}, column step", self.place),
-                "the step changes in every other row or more often",
-                "give all rows of a dwell the same step, or leave the column out",
+                "the number of the dwell changes in every other row or more often",
+                "give all rows of a dwell the same number, or leave the column out",
             ));
         }
         Ok(())
@@ -449,14 +446,14 @@ impl Condenser {
             Error::new(
                 place,
                 problem,
-                "import again without the time column and with the sample rate, if the rows are in order",
+                "if the rows are in order, import again without the time column and with the sample rate",
             ).about(Argument::SampleRate)
         } else {
             let problem = format!("time goes back from {before} s to {now} s");
             Error::new(
                 place,
                 problem,
-                "sort the rows by time, or import the parts as recordings of their own",
+                "sort the rows by time, or import the parts as separate recordings",
             )
         }
     }
@@ -558,14 +555,14 @@ impl Condenser {
         let (problem, remedy) = if share > 0.9 {
             (
                 format!(
-                    "the time steps do not fit sample_rate_hz = {rate}: the first is {dt:.6} s"
+                    "the intervals between time stamps do not fit sample_rate_hz = {rate}: the first such interval is {dt:.6} s"
                 ),
                 "correct sample_rate_hz, or the unit of t_s",
             )
         } else if odd <= GAP_SHARE {
             (
                 format!(
-                    "samples are missing in {:.0} % of the time steps at {rate} Hz, or the rate is mixed: the first such step is {dt:.6} s, and hardly any motion is without one",
+                    "samples are missing in {:.0} % of the intervals at {rate} Hz, or the rate is mixed: the first such interval is {dt:.6} s, and hardly any turn is complete",
                     100.0 * share
                 ),
                 "record it without losses, or resample to one rate",
@@ -573,7 +570,7 @@ impl Condenser {
         } else {
             (
                 format!(
-                    "the rate is mixed: {:.0} % of the time steps do not fit sample_rate_hz = {rate}, the first is {dt:.6} s",
+                    "the rate is mixed: {:.0} % of the intervals between time stamps do not fit sample_rate_hz = {rate}, the first such interval is {dt:.6} s",
                     100.0 * share
                 ),
                 "correct sample_rate_hz, or resample to one rate",
@@ -590,7 +587,7 @@ impl Condenser {
         if steps.regular + steps.longer == 0 {
             return Err(Error::new(
                 &self.place,
-                "there is only one row",
+                "it has only one row",
                 "record for longer",
             ));
         }
@@ -599,7 +596,7 @@ impl Condenser {
         let off = period / self.period_s - 1.0;
         if off.abs() > 0.02 {
             let problem = format!(
-                "rows are {period:.6} s apart, sample_rate_hz = {rate} says {:.6} s",
+                "rows are {period:.6} s apart, and by sample_rate_hz = {rate} they should be {:.6} s apart",
                 self.period_s
             );
             return Err(Error::new(

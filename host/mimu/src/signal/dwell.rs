@@ -200,10 +200,9 @@ impl Dwells {
         let rails = rails::find(condensed, manifest, &mut warnings);
         let given = match finding.steps {
             Steps::Given if !condensed.has_steps => {
-                let problem = "the dwells are to be those of the column step, and there is none";
-                return Err(
-                    Error::new("dwells", problem, "have them found").about(Argument::StepsFound)
-                );
+                let problem = "the dwells were requested from the column step, and the recording has no such column";
+                return Err(Error::new("dwells", problem, "let mimu find the dwells")
+                    .about(Argument::StepsFound));
             }
             Steps::Given | Steps::AsRecorded => condensed.has_steps,
             Steps::Found | Steps::AtRest => false,
@@ -241,11 +240,11 @@ impl Dwells {
         if list.is_empty() {
             let (problem, remedy) = match given {
                 true => (
-                    "every row is in transit: its step is empty or -1",
-                    "number the dwells in the column step, or leave the column out to have them found",
+                    "every row is in transit: its number in the column step is empty or -1",
+                    "number the dwells in the column step, or leave the column out to let mimu find the dwells",
                 ),
                 false => (
-                    "no stretch of the recording is still",
+                    "the recording is nowhere still",
                     "hold the unit still for some seconds in every pose, or allow a larger variance",
                 ),
             };

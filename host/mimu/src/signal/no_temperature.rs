@@ -41,7 +41,7 @@ mod tests {
         assert_eq!([temp_c[0], temp_c[3], temp_c[5]], [20.0, -40.0, 85.0]);
         assert_eq!(
             warning(&found).unwrap().to_string(),
-            "temp_c: 2 of 5 values are no temperatures in °C, the first is -7049 at 1.0 s: left empty"
+            "temp_c: 2 of 5 values cannot be temperatures in °C, the first is -7049 at 1.0 s: left empty"
         );
         assert_eq!(warning(&NoTemperatures::default()), None);
     }

@@ -231,11 +231,12 @@ pub fn refuse_dead_channels(condensed: &Condensed, place: &str) -> Result<()> {
             let column = format!("{place}, column {}", RAW_COLUMNS[c]);
             if let Some(step) = coarse_step_at_rest(condensed, c) {
                 let problem = format!(
-                    "the channel reads {} throughout, and the unit did not move: the others of the sensor change by single steps of {}, so its noise may be below its step",
+                    "the channel reads {} throughout while the unit is at rest; the sensor's other channels change by single quantisation steps of {}, so its noise may be below one step",
                     unsigned_zero(first.min),
                     significant(step)
                 );
-                let remedy = "record turns as well, which tell a coarse channel from a stuck one";
+                let remedy =
+                    "record turns as well: they distinguish a coarse channel from a stuck one";
                 return Err(Error::new(column, problem, remedy));
             }
             return Err(Error::new(
@@ -244,7 +245,7 @@ pub fn refuse_dead_channels(condensed: &Condensed, place: &str) -> Result<()> {
                     "the channel is stuck at {} throughout",
                     unsigned_zero(first.min)
                 ),
-                "check its wiring, or that the right column was imported",
+                "check its wiring, and that the right column was imported",
             ));
         }
     }

@@ -90,7 +90,7 @@ pub(crate) fn find(
     let width = ((WINDOW_S / block_s).round() as usize).max(2);
     if blocks.len() < width {
         let problem = format!(
-            "the recording lasts {:.2} s, less than the {WINDOW_S} s in which stillness shows",
+            "the recording lasts {:.2} s, less than the window of {WINDOW_S} s in which stillness is judged",
             condensed.rows as f64 * condensed.period_s
         );
         return Err(Error::new("dwells", problem, "record for longer"));

@@ -47,19 +47,19 @@ fn said_of(
             "the ref_ columns are not in deg/s, or the readings were converted to rad/s twice"
         }
         Sensor::Gyro if figure == Figure::RateSize && rpm(200.0 / 270.0) => {
-            "is the rate that of 45 rpm where it was 33 1/3 rpm?"
+            "was the turntable at 33 1/3 rpm while the rate of 45 rpm is given?"
         }
         Sensor::Gyro if figure == Figure::RateSize && rpm(270.0 / 200.0) => {
-            "is the rate that of 33 1/3 rpm where it was 45 rpm?"
+            "was the turntable at 45 rpm while the rate of 33 1/3 rpm is given?"
         }
         // Over the turns the gyro is integrated: stamps that run twice as fast halve the scale factor.
         Sensor::Gyro if by_turns && (0.1..10.0).contains(&scale) => {
-            "time base or unit? If the stamps or the sample rate are off by this factor, so is every angle that the gyro is integrated to"
+            "check the time stamps and the unit: if the stamps or the sample rate are wrong by this factor, so is every integrated angle"
         }
         Sensor::Accel if near(1.0 / gravity_mps2) => "they are in g, and SI is m/s²",
         Sensor::Accel if near(1000.0 / gravity_mps2) => "they are in mg, and SI is m/s²",
         Sensor::Accel if near(gravity_mps2) => "they were multiplied by gravity twice",
-        _ => "unit, or range setting of the part?",
+        _ => "check the unit, and the range that the part was set to",
     };
     Some(Warning::NotSi(at_rest, scale, cause).of(sensor))
 }

@@ -42,8 +42,8 @@ pub(super) fn ahead<T: Send>(
         reader.join().map_err(|_| {
             Error::new(
                 place,
-                "the reader broke down on the contents",
-                "write the file again from its source",
+                "the reader failed on the contents",
+                "make the file again from its source",
             )
         })
     })

@@ -35,7 +35,7 @@ pub fn survey_all(
     if let (Some(unknown), 2..) = (surveys.iter().find(|s| s.temp_c.is_none()), surveys.len()) {
         return Err(Error::new(
             &unknown.recording,
-            "it has no temp_c, which tells the noise of several recordings apart",
+            "it has no temp_c, which is needed to distinguish the noise of several recordings",
             "record the temperature, or give one recording at a time",
         ));
     }
@@ -69,10 +69,7 @@ fn refuse_another_unit(first: &Recording, other: &Recording) -> Result<()> {
     };
     Err(Error::new(
         place(other),
-        format!(
-            "its {what} is {here}, and that of {} is {there}",
-            place(first)
-        ),
-        "give recordings of one unit, made alike",
+        format!("its {what} is {here}; that of {} is {there}", place(first)),
+        "give recordings of one unit with the same settings",
     ))
 }

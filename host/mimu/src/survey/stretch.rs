@@ -85,10 +85,10 @@ impl Stretch {
             return Err(Error::new(
                 place,
                 format!(
-                    "{} to compute noise from, and it takes {FEWEST}",
+                    "{}, and at least {FEWEST} are needed to compute noise",
                     plural(t.len() as u64, "sample")
                 ),
-                "record for longer, or choose a longer stretch",
+                "record for longer, or choose a longer segment",
             ));
         }
         let (mut gaps, mut first_gap, mut regular_s) = (0usize, None, 0.0);
@@ -98,11 +98,11 @@ impl Stretch {
                 return Err(Error::new(
                     at(i),
                     format!(
-                        "time does not go on, from {:.6} s to {:.6} s",
+                        "time does not increase: from {:.6} s to {:.6} s",
                         t[i - 1],
                         t[i]
                     ),
-                    "import again without the time column and with the sample rate, if the rows are in order",
+                    "if the rows are in order, import again without the time column and with the sample rate",
                 ).about(Argument::SampleRate));
             }
             if dt * rate_hz > GAP_PERIODS {
@@ -117,7 +117,7 @@ impl Stretch {
         if gaps as f64 > GAP_SHARE * steps as f64 {
             let i = first_gap.unwrap_or_default();
             let problem = format!(
-                "{gaps} of {steps} time steps do not fit sample_rate_hz = {rate_hz}: the first is {:.6} s",
+                "{gaps} of {steps} intervals between time stamps do not fit sample_rate_hz = {rate_hz}: the first such interval is {:.6} s",
                 t[i] - t[i - 1]
             );
             let remedy = "record without losing samples; if none are lost, correct sample_rate_hz, or the unit of t_s";
@@ -127,7 +127,7 @@ impl Stretch {
         let off = 1.0 / (period_s * rate_hz) - 1.0;
         if off.abs() > RATE_OFF[0] {
             let problem = format!(
-                "the time stamps run at {:.3} Hz, and sample_rate_hz is {rate_hz}",
+                "the rate of the time stamps is {:.3} Hz, but sample_rate_hz is {rate_hz}",
                 1.0 / period_s
             );
             return Err(Error::new(format!("{place}, t_s"), problem, remedy));
@@ -149,7 +149,7 @@ impl Stretch {
             if rows.len() < FEWEST {
                 return Err(Error::new(
                     at(i),
-                    format!("there are no {FEWEST} samples without a gap"),
+                    format!("it has no {FEWEST} samples without a gap"),
                     "record for longer without a pause",
                 ));
             }
@@ -185,8 +185,8 @@ fn dwell(
     if !recording.columns.step {
         return Err(Error::new(
             place,
-            "a dwell is asked for by its step, and there is no column step",
-            "choose a stretch by its times",
+            "a dwell was chosen by its number, and the recording has no column step",
+            "choose a segment by its times",
         )
         .about(Argument::Stretch));
     }
@@ -196,8 +196,8 @@ fn dwell(
         let last = steps.iter().copied().fold(-1.0, f64::max);
         return Err(Error::new(
             format!("{place}, column step"),
-            format!("there is no step {step}"),
-            format!("the last is {last}"),
+            format!("no dwell has the number {step}"),
+            format!("the last number is {last}"),
         ));
     }
     Ok(rows)
@@ -212,7 +212,7 @@ fn span(t: &[f64], from_s: Option<f64>, to_s: Option<f64>, place: &str) -> Resul
     let (first, last) = (t.first().copied(), t.last().copied());
     Err(Error::new(
         format!("{place}, t_s"),
-        "there is no sample in the stretch",
+        "the chosen segment has no sample",
         format!(
             "choose within {} to {} s",
             first.unwrap_or_default(),

@@ -62,8 +62,8 @@ pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Sui
     if raw.len() < FEWEST {
         return Err(Error::new(
             place,
-            format!("{} samples are left", raw.len()),
-            "record for longer, or choose a longer stretch",
+            format!("{} samples remain", raw.len()),
+            "record for longer, or choose a longer segment",
         ));
     }
     let window = ((WINDOW_S / period_s).round() as usize)
@@ -105,7 +105,7 @@ pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Sui
                 raw[run_end],
                 duration(run as f64 * period_s)
             ),
-            "check its wiring, or choose another stretch",
+            "check its wiring, or choose another segment",
         )
         .about(Argument::Stretch));
     }
@@ -138,7 +138,7 @@ pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Sui
 }
 
 fn seconds_in(s: f64) -> String {
-    format!("{s:.2} s into the stretch")
+    format!("{s:.2} s after the start of the segment")
 }
 
 /// Refuses a stretch in which the unit moves, and says where it does not. In a stretch that was chosen by hand it is a

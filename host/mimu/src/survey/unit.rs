@@ -72,31 +72,31 @@ impl Unit {
         let read = |value| readable::noise(&self.coefficient(term))[0].write(value);
         let at_most = match unseen.at_most {
             Some(value) => format!("at most {}", read(value)),
-            None => "the other terms leave nothing to tell it by".into(),
+            None => "the other terms leave no data that show it".into(),
         };
         match &unseen.why {
             Reason::Filtered => {
-                "at short times the curve is below white noise, as behind a low-pass filter".into()
+                "at short times the curve is below white noise, as after a low-pass filter".into()
             }
             Reason::Hidden => {
-                "at short times the curve follows none of the five terms, which would hide it"
+                "at short times the curve does not have the shape of any term, which would hide this one"
                     .into()
             }
             Reason::NotInSpectrum => {
-                format!("seen neither in the curve nor in the spectrum: {at_most}")
+                format!("not seen, nor in the spectrum: {at_most}")
             }
             Reason::Small { instead, longer_s } => {
                 let letters: Vec<&str> = instead.iter().map(|t| t.letter()).collect();
                 let mut text = match letters.is_empty() {
                     true => format!("not seen: {at_most}"),
                     false => format!(
-                        "not told apart from {} by this record: {at_most}",
+                        "this record does not distinguish it from {}: {at_most}",
                         letters.join(" or ")
                     ),
                 };
                 if let Some(longer) = longer_s {
                     text += &format!(
-                        "; to see one of half that, record at least {} longer",
+                        "; to see half of that, record at least {} more",
                         duration(*longer)
                     );
                 }

@@ -47,8 +47,8 @@ impl Values {
             if whole.len() < FEWEST {
                 return Err(Error::new(
                     format!("{place}, data row {row}"),
-                    format!("the cell is empty, and there are no {FEWEST} samples in a row"),
-                    "record again, or choose a stretch",
+                    format!("the cell is empty, and no {FEWEST} samples in a row are complete"),
+                    "record again, or choose a segment",
                 )
                 .about(Argument::Stretch));
             }

@@ -83,7 +83,7 @@ fn a_block_that_cannot_be_cut_otherwise_is_named_and_not_averaged_in() {
     assert!(
         reason
             .to_string()
-            .contains("the rest leaves its errors open by"),
+            .contains("predictions for it are uncertain by"),
         "{reason}"
     );
     assert!(accel.residuals[16..].iter().all(|r| r.held_out.is_none()));

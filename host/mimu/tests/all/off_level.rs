@@ -53,8 +53,8 @@ fn warnings(unit: &Unit, seed: u64, method: Method) -> Vec<String> {
 }
 
 const SAYS: [&str; 2] = [
-    "accel: the errors lie across the known force and not along it, as if the dwells were off level by ",
-    " deg rms: level the faces, or leave the directions out (reference = \"gravity\")",
+    "accel: the errors are perpendicular to the known force, as if the dwells were off level by ",
+    " deg rms: level the faces, or use only the magnitude of gravity (reference = \"gravity\")",
 ];
 
 /// The angle that is said, deg.

@@ -170,7 +170,7 @@ fn what_cannot_be_applied_is_refused_and_a_bad_node_is_named_by_its_number() {
         ),
         (
             good.replace("lag_s = 61.2, ", ""),
-            &["interval_lag_s is there"],
+            &["it has interval_lag_s"],
         ),
         (good.replace("temp_c = 31.0", "temp_c = nan"), &["node 3"]),
         (

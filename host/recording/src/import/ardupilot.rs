@@ -50,7 +50,7 @@ pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
         log.take(&record);
     }
     if records.formats() == 0 {
-        let problem = "this is no DataFlash log: it has no FMT record";
+        let problem = "this is not a DataFlash log: it has no FMT record";
         return Err(Error::new(
             path.display(),
             problem,
@@ -62,7 +62,7 @@ pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
         && let Some(first) = all.first_mut()
     {
         first.warnings.push(format!(
-            "{} bytes belong to no record, as of a log that is cut or damaged, and were passed over",
+            "{} bytes do not belong to a record (the log is cut or damaged) and were skipped",
             records.skipped
         ));
     }
@@ -135,7 +135,7 @@ impl Log {
             (Some(wanted), all) if all.contains(&wanted) => wanted,
             (Some(wanted), _) => {
                 let problem = format!(
-                    "there is no instance {wanted}; there are: {}",
+                    "the log has no instance {wanted}; it has: {}",
                     self.listed()
                 );
                 return refuse(problem, "choose one of these");
@@ -166,7 +166,7 @@ impl Log {
         if found.is_empty() {
             let what = choice.topic.unwrap_or("IMU");
             let problem = format!(
-                "there is no {what} of instance {instance}; there are: {}",
+                "the log has no {what} of instance {instance}; it has: {}",
                 self.listed()
             );
             return refuse(problem, "choose one of these");
@@ -182,7 +182,7 @@ impl Log {
             && let Some(first) = all.first_mut()
         {
             first.warnings.push(format!(
-                "instance {instance}: ArduPilot's calibration over temperature is on ({thermal}), and is not undone"
+                "instance {instance}: ArduPilot's calibration over temperature is on ({thermal}) and is not undone"
             ));
         }
         Ok(all)
@@ -280,12 +280,12 @@ impl Samples {
         ));
         if self.uncorrected {
             readings.warnings.push(format!(
-                "instance {instance}: the log lacks parameters of its calibration (INS_, AHRS_ORIENTATION), or the mounting is not known here: readings are as ArduPilot has calibrated them"
+                "instance {instance}: the log lacks parameters of its calibration (INS_, AHRS_ORIENTATION), or its mounting is unknown here: ArduPilot's calibration is not undone"
             ));
         }
         if self.changes > 0 {
             readings.warnings.push(format!(
-                "instance {instance}: the calibration changes {} times during the log; each reading is undone by the one of its time",
+                "instance {instance}: the calibration changes {} times during the log; each reading is corrected for the one that was in use",
                 self.changes
             ));
         }

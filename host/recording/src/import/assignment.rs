@@ -112,7 +112,10 @@ impl FromStr for ColumnList {
                     let all: Vec<&str> = Role::all().map(Role::name).collect();
                     Error::new(
                         PLACE,
-                        format!("{} is no column of a recording", shorten(known.as_bytes())),
+                        format!(
+                            "{} is not a column of a recording",
+                            shorten(known.as_bytes())
+                        ),
                         format!("write - to skip a column, or one of {}", all.join(", ")),
                     )
                 })?),
@@ -137,8 +140,8 @@ impl FromStr for ColumnList {
             // Is a plain name among named ones meant by position or by name? Nobody can tell.
             (false, false) => Err(Error::new(
                 PLACE,
-                "some columns are given by position and some by name",
-                "write all of them as name=header_name, or none",
+                "some columns are given by position, others by name",
+                "write all of them as name=header_name, or all by position",
             )),
         }
     }
@@ -226,7 +229,7 @@ impl FromStr for Scale {
         let known = Column::from_name(target).is_some_and(|column| column != Column::Step);
         if !known && target != "gyro" && target != "accel" {
             return refuse(
-                format!("{shown} names no column of numbers"),
+                format!("{shown} does not name a column of numbers"),
                 "scale gyro, accel, temp_c, t_s or a single column such as gyro_x",
             );
         }
@@ -277,7 +280,7 @@ impl FromStr for Offset {
             _ => Err(Error::new(
                 "offset",
                 format!(
-                    "{} is no column of numbers and an offset",
+                    "{} is not a column of numbers with an offset",
                     shorten(text.as_bytes())
                 ),
                 "write it like temp_c=36.53, one column at a time",
@@ -313,7 +316,7 @@ mod tests {
             ("t_s,acc_x", "acc_x"),
             ("t_s,gyro_x,t_s", "twice"),
             ("t_s=a,t_s=b", "twice"),
-            ("t_s,gyro_x=wx", "by position and some by name"),
+            ("t_s,gyro_x=wx", "by position, others by name"),
             ("", "no column"),
         ] {
             let error = text.parse::<ColumnList>().unwrap_err().to_string();

@@ -12,7 +12,7 @@ use crate::error::{Argument, Error, Result};
 const LISTED: usize = 5;
 /// After so many broken rows, and if most are, no more are read: the file is another one than was said.
 const ENOUGH: u64 = 10_000;
-/// Share beyond which what is left is no recording.
+/// Above this share the remaining rows are not a usable recording.
 const LARGEST_SHARE: f64 = 0.5;
 
 /// How many broken rows may be left out.
@@ -50,8 +50,8 @@ impl FromStr for BrokenLimit {
             (None, Ok(rows)) => Ok(Self::Rows(rows)),
             _ => Err(Error::new(
                 "broken rows",
-                format!("{} is no limit", shorten(text.as_bytes())),
-                "give a number of rows, as in 20, or a share of at most 50%",
+                format!("{} is not a limit", shorten(text.as_bytes())),
+                "give a number of rows (20), or a share of at most 50%",
             )),
         }
     }
@@ -137,9 +137,9 @@ impl Fault {
     fn words(self) -> &'static str {
         match self {
             Fault::Width => "another number of cells",
-            Fault::Reading => "a cell that is no reading",
+            Fault::Reading => "a cell that is not a reading",
             Fault::Time => "no time",
-            Fault::Step => "a step that is none",
+            Fault::Step => "an invalid number in step",
         }
     }
 }

@@ -36,7 +36,7 @@ impl FromStr for TwosComplement {
             _ => Err(Error::new(
                 "two's complement",
                 format!(
-                    "{} is no raw column and 2 to 32 bits",
+                    "{} is not a raw column with 2 to 32 bits",
                     shorten(text.as_bytes())
                 ),
                 "write it like accel=12, for gyro, accel or a single column such as gyro_x",
@@ -77,7 +77,10 @@ impl FromStr for Zero {
             (Some(channels), Some(code)) => Ok(Self { channels, code }),
             _ => Err(Error::new(
                 "zero",
-                format!("{} is no raw column and a code", shorten(text.as_bytes())),
+                format!(
+                    "{} is not a raw column with a code",
+                    shorten(text.as_bytes())
+                ),
                 "write it like gyro=2048, for gyro, accel or a single column such as gyro_x",
             )),
         }
@@ -111,7 +114,7 @@ impl Conversion {
         if self.signed_low_byte {
             if code.is_finite() && code.fract() != 0.0 {
                 return Err(Refusal {
-                    problem: format!("{code} has a fraction, and two bytes make whole counts"),
+                    problem: format!("{code} has a fraction, but two bytes are whole counts"),
                     remedy: "give the log as it was recorded, without factors or means",
                 });
             }
@@ -140,10 +143,10 @@ fn signed(code: f64, bits: u32) -> std::result::Result<f64, Refusal> {
     if code.fract() != 0.0 || !(0.0..codes).contains(&code) {
         return Err(Refusal {
             problem: format!(
-                "{code} is no code of {bits} bits, which are whole and from 0 to {}",
+                "{code} is not a code of {bits} bits (a whole number from 0 to {})",
                 codes - 1.0
             ),
-            remedy: "give another number of bits, or none if the codes have signs already",
+            remedy: "correct the number of bits, or leave it out if the codes have signs already",
         });
     }
     Ok(match code >= 0.5 * codes {

@@ -39,7 +39,7 @@ impl Face {
         let names: Vec<String> = missing.map(|face| face.to_string()).collect();
         (!names.is_empty()).then(|| {
             format!(
-                "no file is of the faces {}: bias and scale factor of an axis need both of its faces",
+                "the faces {} have no file: bias and scale factor of an axis need both of its faces",
                 names.join(", ")
             )
         })
@@ -63,7 +63,7 @@ impl FromStr for Face {
         face.ok_or_else(|| {
             Error::new(
                 "face",
-                format!("{} is no face", shorten(text.as_bytes())),
+                format!("{} is not a face", shorten(text.as_bytes())),
                 "write the axis that is up: +x, -x, +y, -y, +z or -z",
             )
         })

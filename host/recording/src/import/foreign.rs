@@ -117,14 +117,15 @@ impl ForeignFile {
             .is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
         let mut parts = 1;
         if is_log(path) && how.list.is_some() {
-            let problem = "a list of columns is given for a log, whose messages have their own";
+            let problem =
+                "a list of columns is given, but the messages of a log have fixed columns";
             return Err(
                 Error::new(path.display(), problem, "leave it out").about(Argument::Columns)
             );
         }
         if is_log(path) && !how.filters.is_empty() {
-            let problem = "rows are chosen by a column, and the messages of a log have none";
-            let remedy = "leave it out, and choose the topic or the instance";
+            let problem = "rows are chosen by a column, but the messages of a log have no columns";
+            let remedy = "leave the choice out, and choose the topic or the instance";
             return Err(Error::new(path.display(), problem, remedy).about(Argument::Where));
         }
         let table = match parquet {
@@ -146,10 +147,10 @@ impl ForeignFile {
             return Err(Error::new(
                 path.display(),
                 format!(
-                    "the column {} is of a table of means, and samples are asked for",
+                    "the column {} belongs to a table of means, but samples are to be imported",
                     role.name()
                 ),
-                "skip the column, or import the table as one of means",
+                "skip the column, or import the file as a table of means",
             )
             .about(Argument::Means));
         }
@@ -158,7 +159,7 @@ impl ForeignFile {
             how.rate_hz.ok_or_else(|| {
                 Error::new(
                     path.display(),
-                    "no column is t_s, so the time between rows is not known",
+                    "no column is t_s, so the time between rows is unknown",
                     "name the time column, or give the rate",
                 )
                 .about(Argument::SampleRate)

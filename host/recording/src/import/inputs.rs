@@ -45,7 +45,7 @@ impl Inputs {
     pub fn read(path: &Path) -> Result<Inputs> {
         let io = |error: std::io::Error| Error::io(path, &error);
         if std::fs::metadata(path).map_err(io)?.len() > LONGEST {
-            let problem = "this is too long for a table with one row a step";
+            let problem = "this is too long for a table with one row for each dwell";
             return Err(Error::new(
                 path.display(),
                 problem,
@@ -108,7 +108,7 @@ impl Inputs {
             }
             if record.len() != names.len() {
                 let problem = format!(
-                    "the row has {} cells and the header {}",
+                    "the row has {} cells, the header {}",
                     record.len(),
                     names.len()
                 );
@@ -117,8 +117,8 @@ impl Inputs {
             inputs.step(&record, &names, row)?;
         }
         if inputs.steps.is_empty() {
-            let remedy = "write a header with step and one row for each step";
-            return Err(Error::new(path.display(), "there is no step", remedy));
+            let remedy = "write a header with the column step, and one row for each dwell";
+            return Err(Error::new(path.display(), "the table has no row", remedy));
         }
         Ok(inputs)
     }
@@ -152,13 +152,13 @@ impl Inputs {
             return Err(Error::new(
                 place,
                 "column step is missing",
-                "add it: the label or number of the step",
+                "add it: the label or number of the dwell",
             ));
         }
         if self.columns == [false; 6] {
             return Err(Error::new(
                 place,
-                "there is no column with an input",
+                "the table has no column with an input",
                 "add a ref_ or turn_ column",
             ));
         }
@@ -191,7 +191,7 @@ impl Inputs {
         for ((turn, rate), name) in step.turn_deg.iter().zip(step.input).zip(TURN_COLUMNS) {
             self.has_turns |= !turn.is_nan();
             if !turn.is_nan() && !rate.is_nan() {
-                let problem = "both the rate and the angle are given";
+                let problem = "both rate and angle are given";
                 return Err(Error::new(at(name), problem, "leave one of them empty"));
             }
         }
@@ -199,13 +199,16 @@ impl Inputs {
             return Err(Error::new(
                 at("step"),
                 "the cell is empty",
-                "write the label or number of the step",
+                "write the label or number of the dwell",
             ));
         }
         let place = at("step");
         if self.steps.insert(label.clone(), step).is_some() {
-            let problem = format!("step {} appears twice", shorten(label.as_bytes()));
-            return Err(Error::new(place, problem, "leave one row for each step"));
+            let problem = format!(
+                "{} appears twice in the column step",
+                shorten(label.as_bytes())
+            );
+            return Err(Error::new(place, problem, "keep one row for each dwell"));
         }
         Ok(())
     }
@@ -273,7 +276,7 @@ impl Inputs {
         let names: Vec<&str> = unused.iter().take(10).map(|(_, label)| *label).collect();
         (!names.is_empty()).then(|| {
             format!(
-                "{}: no sample belongs to {} of its steps: {}",
+                "{}: {} of its dwells have no sample: {}",
                 self.path.display(),
                 unused.len(),
                 names.join(", ")
@@ -321,8 +324,8 @@ mod tests {
     #[test]
     fn a_bad_table_is_refused_with_row_and_column() {
         for (text, words) in [
-            ("", "no step"),
-            ("step,turn_x_deg\n", "no step"),
+            ("", "no row"),
+            ("step,turn_x_deg\n", "no row"),
             ("turn_x_deg\n1\n", "column step"),
             ("step\n1\n", "no column"),
             ("step,turn_w_deg\n", "turn_w_deg"),
@@ -330,7 +333,7 @@ mod tests {
             ("step,turn_x_deg\na,1\na,2\n", "row 3, column step"),
             ("step,turn_x_deg\na,b\n", "row 2, column turn_x_deg"),
             ("step,turn_x_deg\na\n", "row 2: the row has 1"),
-            ("step,turn_x_deg,ref_rate_x_dps\na,1,1\n", "both the rate"),
+            ("step,turn_x_deg,ref_rate_x_dps\na,1,1\n", "both rate"),
             ("step,turn_x_deg\n,1\n", "empty"),
         ] {
             let error = parse(text).unwrap_err().to_string();

@@ -112,9 +112,9 @@ pub(super) fn check_order(file: &ForeignFile, row: &Row, last_t_s: f64) -> Resul
     Err(Error::new(
         format!("{}, column t_s", file.place(row.number)),
         format!(
-            "the time {} s does not lie after {last_t_s} s of the row before",
+            "the time {} s is not later than the {last_t_s} s of the row before",
             row.t_s
         ),
-        "remove the row, or sort the file by time, before it is joined",
+        "remove the row, or sort the file by time, before you join it",
     ))
 }

@@ -28,8 +28,7 @@ fn other_rate(times: &Times, given: f64) -> Option<String> {
     let off = given / summary.rate_hz - 1.0;
     (off.abs() > 1e-3).then(|| {
         format!(
-            "{}: the rate of the time stamps is {} Hz, and not the {given} Hz that were given: the stamps are believed; to go by \
-             the rate instead, skip the time column",
+            "{}: the rate of the time stamps is {} Hz, but {given} Hz were given: the stamps are used; to use the rate instead, skip the time column",
             summary.file, summary.rate_hz
         )
     })
@@ -73,7 +72,7 @@ impl JoinedFiles {
             }
             // Opening has refused this already: without a time column the rate is needed.
             false => options.rate_hz.ok_or_else(|| {
-                Error::new("import", "the rate is not known", "give it").about(Argument::SampleRate)
+                Error::new("import", "the rate is unknown", "give it").about(Argument::SampleRate)
             })?,
         };
         let polled = first_times.as_ref().filter(|t| t.summary.polled.is_some());
@@ -98,8 +97,8 @@ impl JoinedFiles {
                     .for_each(|part| waiting.push_front((index, part)));
             }
             if file.has_step() {
-                let problem = "the column step is not in the first file";
-                let remedy = "name the file with the steps first";
+                let problem = "the first file lacks the column step";
+                let remedy = "name the file with the column step first";
                 return Err(Error::new(path.display(), problem, remedy));
             }
             let mut period_s = 1.0 / rate_hz;
@@ -126,7 +125,7 @@ impl JoinedFiles {
         names.extend(order.iter().filter(kept).map(|column| column.name()));
         let by_pauses = options.step_gap_s.is_some();
         if by_pauses && first.has_step() {
-            let problem = "it has a column step, and steps are to be parted by pauses";
+            let problem = "it has a column step, but the dwells are to be separated by pauses";
             let remedy = "skip the column, or leave out the pause";
             return Err(
                 Error::new(first.path().display(), problem, remedy).about(Argument::Columns)
@@ -143,26 +142,27 @@ impl JoinedFiles {
         // The same rules as for a recording's header: nothing twice, all axes of a sensor.
         let columns = Layout::from_names(&names, "import, all columns together")?.columns;
         if by_pauses && inputs.as_ref().is_some_and(StepInputs::has_turns) {
-            let problem = "the table of inputs has angles, and turns are not parted by pauses";
+            let problem =
+                "the table of inputs has angles of turns, but pauses do not separate turns";
             return Err(Error::new(
                 "import",
                 problem,
-                "name the column with the steps",
+                "name the column with the numbers of the dwells (step)",
             ));
         }
         if inputs.is_some() && !first.has_step() && !options.is_sequence() && !by_pauses {
-            let problem = "a table of inputs is given, and no column is step";
+            let problem = "a table of inputs is given, but no column is step";
             return Err(Error::new(
                 "import",
                 problem,
-                "name the column with the steps",
+                "name the column with the numbers of the dwells (step)",
             ));
         }
         if options.reference == Reference::Table && columns.reference == [false; 6] {
             return Err(Error::new(
                 "import, reference",
-                "the reference is to be the table, and there is no ref_ column",
-                "add the ref_ columns or a table of inputs, or say that the reference is gravity",
+                "reference is \"table\", but no column is a ref_ column",
+                "add the ref_ columns or a table of inputs, or set the reference to gravity",
             )
             .about(Argument::Reference));
         }
@@ -305,7 +305,7 @@ impl JoinedFiles {
             return Err(Error::new(
                 "import",
                 "the files have no time in common",
-                "check that their times begin at the same instant and are in the same unit",
+                "check that their times start at the same instant and have the same unit",
             )
             .about(Argument::TimeUnit));
         }

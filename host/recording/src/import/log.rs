@@ -58,13 +58,13 @@ pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     let Some(format) = format(path) else {
         return Err(Error::new(
             path.display(),
-            "this is no log",
+            "this is not a log",
             "name its columns",
         ));
     };
     let all = (format.read)(path, choice)?;
     if all.iter().all(|readings| readings.len() == 0) {
-        let problem = "there is no message of an inertial unit in what was chosen";
+        let problem = "the chosen topic or file has no message of an inertial unit";
         return Err(
             Error::new(path.display(), problem, "choose another topic or file")
                 .about(Argument::Topic)

@@ -61,7 +61,7 @@ pub fn look(path: &Path, separator: Option<Separator>) -> Result<Look> {
         lines.pop();
     }
     of_lines(&lines, separator).ok_or_else(|| {
-        let problem = "no line of it is a row of numbers";
+        let problem = "none of its lines is a row of numbers";
         let remedy =
             "give a text file with one sample a line, Parquet, or a log with its usual ending";
         Error::new(path.display(), problem, remedy)
@@ -138,7 +138,7 @@ mod tests {
         std::fs::write(&path, "Dear Sir,\nyours, faithfully\n").unwrap();
         let line = look(&path, None).unwrap_err().to_string();
         assert!(
-            line.contains("letter.txt: no line of it is a row of numbers"),
+            line.contains("letter.txt: none of its lines is a row of numbers"),
             "{line}"
         );
     }

@@ -146,13 +146,13 @@ impl ImportOptions {
         let one_for_all = self.is_sequence() && lists == 1;
         if lists != 0 && lists != files && !one_for_all {
             return refuse(
-                format!("there are {files} files and {lists} lists of columns"),
+                format!("{files} files but {lists} lists of columns are given"),
                 "give one list of columns for each file, in their order",
             );
         }
         if !self.faces.is_empty() && self.faces.len() != files {
             return refuse(
-                format!("there are {files} files and {} faces", self.faces.len()),
+                format!("{files} files but {} faces are given", self.faces.len()),
                 "give one file for each face",
             );
         }
@@ -160,12 +160,13 @@ impl ImportOptions {
             && !(gap > 0.0 && gap.is_finite())
         {
             return refuse(
-                format!("{gap} s is no pause"),
-                "write the seconds that part two steps",
+                format!("{gap} s is not a pause"),
+                "write the seconds that separate two dwells",
             );
         }
         if self.step_gap_s.is_some() && (self.is_sequence() || self.means) {
-            let problem = "steps are parted by pauses, and the files or rows are steps already";
+            let problem =
+                "dwells are to be separated by pauses, but each file or row is a dwell already";
             return refuse(problem.to_owned(), "leave out one of the two");
         }
         if let Some((_, face)) = (1..)
@@ -179,25 +180,25 @@ impl ImportOptions {
             );
         }
         if !self.faces.is_empty() && self.inputs.is_some() {
-            let problem = "the faces say what the inputs are, and a table of inputs is given";
+            let problem = "the faces give the inputs, but a table of inputs is given too";
             return refuse(problem.to_owned(), "give one of the two");
         }
         if self.means && !self.signed_low_bytes.is_empty() {
             return refuse(
-                "a low byte is mended sample by sample, and these are means".to_owned(),
-                "import the samples that they were made of",
+                "a low byte is corrected in single samples, but these are means".to_owned(),
+                "import the samples from which the means were computed",
             );
         }
         if self.means && !(self.twos_complements.is_empty() && self.zeros.is_empty()) {
             return refuse(
-                "codes are read sample by sample, and these are means".to_owned(),
+                "codes are read in single samples, but these are means".to_owned(),
                 "import the samples, or give the means as readings",
             );
         }
         if self.means && !self.filters.is_empty() {
             return refuse(
-                "rows are chosen by a column, and these are means".to_owned(),
-                "give a table with the rows that are wanted",
+                "rows are chosen by a column, but this is a table of means".to_owned(),
+                "give a table with only these rows",
             );
         }
         if let Some(rate) = self.rate_hz {
@@ -206,7 +207,7 @@ impl ImportOptions {
         }
         check_gravity(self.gravity_mps2, "import, gravity")?;
         if self.means && self.reference == Reference::TurntableRate {
-            let problem = "the rate of a turntable is a reference of samples, and these are means";
+            let problem = "the rate of a turntable is a reference for samples, but these are means";
             return refuse(problem.to_owned(), "import the samples");
         }
         // A source inside the recording that is to be replaced would be deleted with it.
@@ -215,7 +216,7 @@ impl ImportOptions {
                 continue;
             };
             if file.starts_with(&out) {
-                let problem = format!("{} lies in the recording to write", file.display());
+                let problem = format!("{} is inside the recording to be written", file.display());
                 return refuse(problem, "choose another name for the recording");
             }
         }

@@ -78,7 +78,7 @@ impl Source {
             .map_err(|_| broke_down(&path.display().to_string()))?;
         decoded.map_err(|problem| {
             let place = format!("{}, column {}", path.display(), self.name);
-            Error::new(place, problem, "write the file again from its source")
+            Error::new(place, problem, "make the file again from its source")
         })
     }
 
@@ -133,7 +133,7 @@ impl ParquetTable {
                     return Err(Error::new(
                         path.display(),
                         format!(
-                            "the file has {} columns and the list of columns {}",
+                            "the file has {} columns, the list of columns has {}",
                             names.len(),
                             items.len()
                         ),
@@ -170,7 +170,7 @@ impl ParquetTable {
             if leaf.is_text() && role != Role::Column(Column::Step) {
                 return Err(Error::new(
                     format!("{}, column {name}", path.display()),
-                    format!("it holds text, and {} is a number", role.name()),
+                    format!("it contains text, but {} is a number", role.name()),
                     "write it as DOUBLE, FLOAT, INT32 or INT64",
                 ));
             }
@@ -180,7 +180,7 @@ impl ParquetTable {
             return Err(Error::new(
                 path.display(),
                 "no column has the name of a recording's column",
-                "say what the columns are, as in gyro_x=wx,gyro_y=wy,gyro_z=wz",
+                "name the columns, like gyro_x=wx,gyro_y=wy,gyro_z=wz",
             )
             .about(Argument::Columns));
         }
@@ -188,7 +188,7 @@ impl ParquetTable {
             let at = filter.position(&names).or(filter.number());
             let name = at.and_then(|at| names.get(at)).ok_or_else(|| {
                 let name = shorten(filter.column().as_bytes());
-                let problem = format!("there is no column {name}");
+                let problem = format!("the file has no column {name}");
                 let remedy = format!("choose one of {}", names.join(", "));
                 Error::new(path.display(), problem, remedy).about(Argument::Where)
             })?;

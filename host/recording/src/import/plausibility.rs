@@ -139,7 +139,7 @@ impl Plausibility {
         if self.rows == 0 && self.padding > 0 {
             return Err(Error::new(
                 place,
-                format!("the readings are 0 in all of its {}", rows(self.padding)),
+                format!("all readings are 0, in {}", rows(self.padding)),
                 "check that the right columns were named, and that the sensor was connected",
             )
             .about(Argument::Columns));
@@ -178,7 +178,7 @@ impl Plausibility {
         }
         if self.empty_accel > 0 && self.dead()[1].is_none() {
             warnings.push(format!(
-                "{place}: in {} the accelerometer reads exactly 0 on all axes, which is no reading: its cells are left empty",
+                "{place}: in {} the accelerometer reads exactly 0 on all axes, which is impossible at rest: its cells are left empty",
                 rows(self.empty_accel)
             ));
         }
@@ -188,7 +188,7 @@ impl Plausibility {
             }
             for (_, c) in sensor.iter().filter(|(_, c)| !self.alive[*c]) {
                 warnings.push(format!(
-                    "{place}: {} is 0 in all of its {}: it looks like a channel that is not connected",
+                    "{place}: {} is 0 in all of its {}: the channel seems not to be connected",
                     RAW_COLUMNS[*c],
                     rows(self.rows)
                 ));
@@ -205,7 +205,7 @@ impl Plausibility {
                 ""
             };
             warnings.push(format!(
-                "{place}, column temp_c: {low} to {high} °C is not where sensors work: {CONVERT}{kelvin}"
+                "{place}, column temp_c: sensors do not work at {low} to {high} °C: {CONVERT}{kelvin}"
             ));
         }
         warnings

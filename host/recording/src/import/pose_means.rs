@@ -68,7 +68,7 @@ impl PoseMeans {
         if !manifest.means {
             return Err(Error::new(
                 directory.join(MANIFEST_FILE).display(),
-                format!("there is {MEANS_FILE}, and the key means is not true"),
+                format!("it contains {MEANS_FILE}, but the key means is not true"),
                 "import the table again",
             ));
         }
@@ -112,10 +112,10 @@ impl Table {
         if let Some(role) = timed.into_iter().find(|role| has(*role)) {
             return refuse(
                 format!(
-                    "there is the column {}, and means have no time",
+                    "the table has the column {}, but means have no time",
                     role.name()
                 ),
-                "skip the column, or import the rows as the samples that they are",
+                "skip the column, or import the rows as samples",
             );
         }
         for c in 0..6 {
@@ -123,10 +123,10 @@ impl Table {
             if has(Role::Deviation(c)) && !counted {
                 return refuse(
                     format!(
-                        "there is the column {}, and not of how many samples",
+                        "the table has the column {}, but not the number of samples",
                         Role::Deviation(c).name()
                     ),
-                    "add the column averaged; it is 1 where the deviations are those of the means themselves",
+                    "add the column averaged; write 1 if the deviations are those of the means themselves",
                 );
             }
         }
@@ -182,7 +182,7 @@ fn pose(
             Role::Column(Column::Temperature) => {
                 pose.temp_c = scaled(Column::Temperature);
                 if let Some(remedy) = no_temperature(pose.temp_c) {
-                    let problem = format!("{} is no temperature in °C", pose.temp_c);
+                    let problem = format!("{} is not a temperature in °C", pose.temp_c);
                     return refuse(role, problem, remedy);
                 }
             }
@@ -198,7 +198,7 @@ fn pose(
                     continue;
                 }
                 if number.fract() != 0.0 || !(1.0..=MOST_AVERAGED).contains(&number) {
-                    let problem = format!("{number} is no number of samples");
+                    let problem = format!("{number} is not a number of samples");
                     return refuse(role, problem, "write a whole number from 1");
                 }
                 // Whole and in range, by the lines above.
@@ -240,8 +240,8 @@ fn pose(
             _ => None,
         };
         if let Some(role) = missing {
-            let problem = format!("it is empty, and {} is not", Column::Raw(c).name());
-            return refuse(role, problem, "fill it in, or skip the column");
+            let problem = format!("it is empty, but {} is not", Column::Raw(c).name());
+            return refuse(role, problem, "fill the cell in, or skip the column");
         }
     }
     Ok(pose)
@@ -253,13 +253,16 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
     let refuse = |problem: &str, remedy: &str| Err(Error::new(path.display(), problem, remedy));
     if options.files.len() > 1 {
         return refuse(
-            "there are several files of means",
+            "several files of means are given",
             "put them into one table",
         );
     }
     if options.inputs.is_some() {
         let remedy = "write the known inputs into the table: ref_rate_x_dps, ref_force_x_mps2 and the others";
-        return refuse("a table of inputs is given beside a table of means", remedy);
+        return refuse(
+            "a table of inputs is given in addition to a table of means",
+            remedy,
+        );
     }
     if is_log(path)
         || path
@@ -274,8 +277,8 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
     if options.reference == Reference::Table && table.columns.reference == [false; 6] {
         return Err(Error::new(
             path.display(),
-            "the reference is to be the table, and there is no ref_ column",
-            "add the ref_ columns, or say that the reference is gravity",
+            "reference is \"table\", but no column is a ref_ column",
+            "add the ref_ columns, or set the reference to gravity",
         )
         .about(Argument::Reference));
     }

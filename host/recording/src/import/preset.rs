@@ -87,7 +87,7 @@ impl FromStr for Preset {
             let names: Vec<&str> = Preset::all().iter().map(|preset| preset.name).collect();
             Error::new(
                 "preset",
-                format!("{} is not known", shorten(name.as_bytes())),
+                format!("{} is unknown", shorten(name.as_bytes())),
                 format!("write one of {}", names.join(", ")),
             )
         })
@@ -129,7 +129,7 @@ impl Preset {
             return Err(Error::new(
                 paths[0].display(),
                 format!("it has the header of {}", names.join(" and of ")),
-                "say which of them it is",
+                "name the preset",
             )
             .about(Argument::Preset));
         }
@@ -184,7 +184,7 @@ impl Preset {
             if self.contradicted_beside(file) {
                 let metadata = self.beside.map_or("", |beside| beside.file);
                 let problem = format!(
-                    "{} beside {} says that it is not of the preset {}, but of another one with the same header",
+                    "by {} beside {}, the file does not belong to the preset {} but to another one with the same header",
                     metadata,
                     file.display(),
                     self.name
@@ -207,9 +207,12 @@ impl Preset {
             .ok_or_else(|| {
                 let sets: Vec<String> = self.in_folder.iter().map(|s| s.join(" and ")).collect();
                 let problem = match sets.is_empty() {
-                    true => format!("this is a folder, and the preset {} has none", self.name),
+                    true => format!(
+                        "this is a folder, but the preset {} is for files",
+                        self.name
+                    ),
                     false => format!(
-                        "there are no files of the preset {} in this folder: {}",
+                        "this folder has no files of the preset {}: {}",
                         self.name,
                         sets.join(", or ")
                     ),
@@ -230,7 +233,7 @@ impl Preset {
             Err(Unfit::Other(error.about(Argument::Columns)))
         };
         if is_log(path) {
-            let problem = "a preset is given for a log, whose messages have their own columns";
+            let problem = "a preset is given, but the messages of a log have fixed columns";
             return Err(Error::new(path.display(), problem, "leave it out").into());
         }
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -245,8 +248,8 @@ impl Preset {
             let outcome = match (rate_hz, layout.rate_after) {
                 (Some(None), Some(words)) => Err(Error::new(
                     path.display(),
-                    format!("no line above the data has {words:?} and the sample rate"),
-                    "export it with its header, or say what the columns are",
+                    format!("no line above the data contains {words:?} with the sample rate"),
+                    "export it with its header, or name the columns",
                 )),
                 _ => layout.read(path, list, separator),
             };
@@ -268,21 +271,18 @@ impl Preset {
         }
         match nearest {
             None => refused(
-                format!(
-                    "its name is not one of the files of the preset {}",
-                    self.name
-                ),
-                "name it as its maker does, or say what the columns are",
+                format!("the preset {} has no file of this name", self.name),
+                "rename it as its maker names it, or name the columns",
             ),
             // The names are there, and something else is wrong.
             Some((missing, error)) if missing.is_empty() => Err(error.into()),
             Some((missing, _)) => refused(
                 format!(
-                    "it is not of the preset {}: there is no column {}",
+                    "it does not fit the preset {}: the column {} is missing",
                     self.name,
                     missing.join(", ")
                 ),
-                "give the file as its maker wrote it, or say what the columns are",
+                "give the unchanged file of its maker, or name the columns",
             ),
         }
     }
@@ -345,8 +345,8 @@ impl Layout {
             row => row.map_err(Unreadable::into_error)?,
         };
         if row.is_some() && self.columns.contains("t_s") && cells.stamp.value.is_nan() {
-            let problem = "the column of the time is there, and empty";
-            let remedy = "say what the columns are without it, and the rate";
+            let problem = "the column of the time is empty";
+            let remedy = "name the columns without it, and give the rate";
             return Err(Error::new(path.display(), problem, remedy)
                 .about(Argument::Columns)
                 .about(Argument::SampleRate));

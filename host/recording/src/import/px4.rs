@@ -61,7 +61,7 @@ pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     let read = file.take(HEADER).read_to_end(&mut beginning);
     read.map_err(|error| Error::io(path, &error))?;
     let other = || {
-        let problem = "this is no ULog, or it ends before its definitions do";
+        let problem = "this is not a ULog, or it ends within its definitions";
         Error::new(path.display(), problem, "copy it from the vehicle again")
     };
     if beginning.len() < HEADER as usize || !beginning.starts_with(SIGNATURE) {
@@ -158,10 +158,7 @@ impl Log {
         };
         if !has(of_raw) {
             let what = choice.topic.unwrap_or("sensor of its own");
-            let problem = format!(
-                "there is no {what} in the log; there are: {}",
-                self.listed()
-            );
+            let problem = format!("the log has no {what}; it has: {}", self.listed());
             let remedy = "choose one of these, or log the raw sensors (SDLOG_PROFILE)";
             let error = Error::new(path.display(), problem, remedy);
             return Err(error.about(Argument::Topic).about(Argument::Instance));
@@ -203,7 +200,7 @@ impl Log {
             (wanted, _) => {
                 let problem = match wanted {
                     Some(wanted) => format!(
-                        "there is no instance {wanted}; there are: {}",
+                        "the log has no instance {wanted}; it has: {}",
                         self.listed()
                     ),
                     None => format!("the log has several sensors: {}", self.listed()),
@@ -281,7 +278,7 @@ impl Log {
     /// The readings of `sensor_combined`; `sparse`: the raw topics are there, with too few samples.
     fn combined_readings(&self, path: &Path, sparse: bool) -> Result<Vec<Readings>> {
         if self.combined.stamps_ns.is_empty() {
-            let problem = "there are no messages of inertial sensors in the log";
+            let problem = "the log has no messages of inertial sensors";
             return Err(Error::new(path.display(), problem, "choose another log"));
         }
         let ids = |sensor: Sensor| -> Vec<(usize, u32)> {
@@ -317,7 +314,9 @@ impl Log {
             );
         }
         let why = match sparse {
-            true => ", as the topics of the single sensors have too few samples (SDLOG_PROFILE)",
+            true => {
+                ", because the topics of the single sensors have too few samples (SDLOG_PROFILE)"
+            }
             false => "",
         };
         readings
@@ -337,17 +336,16 @@ impl Log {
         let mut warnings = Vec::new();
         if self.dropouts > 0 {
             warnings.push(format!(
-                "dropouts of the logger: {}, {} ms in all; what is missing of the readings is a gap",
+                "dropouts of the logger: {}, {} ms in all; missing readings are gaps",
                 self.dropouts, self.dropouts_ms
             ));
         }
         match ended {
             Completeness::Complete => {}
-            Completeness::Truncated => warnings.push(
-                "the log is cut in the middle of a record: what is before it was read".into(),
-            ),
+            Completeness::Truncated => warnings
+                .push("the log is cut within a record: everything before it was read".into()),
             Completeness::MalformedRecord(what) => warnings.push(format!(
-                "a record of the log is damaged, and what is before it was read ({what})"
+                "a record of the log is damaged: everything before it was read ({what})"
             )),
         }
         if self.broken > 0 {

@@ -91,13 +91,13 @@ impl Found {
 /// The messages of the topic that is wanted, which may be left out where there is one only.
 fn chosen(path: &Path, mut found: Found, choice: Choice<'_>) -> Result<Vec<Readings>> {
     if choice.instance.is_some() {
-        let problem = "an instance is given, and topics have none";
+        let problem = "an instance is given, but topics have no instances";
         let remedy = "leave it out, and choose the topic";
         return Err(Error::new(path.display(), problem, remedy).about(Argument::Topic));
     }
     let number = choose(path, &found.topics, choice.topic)?;
     if let Some(message) = found.broken {
-        let problem = format!("{message} is cut or is no sensor_msgs/Imu");
+        let problem = format!("{message} is cut or is not a sensor_msgs/Imu");
         return Err(Error::new(path.display(), problem, "record it again"));
     }
     let mut readings = Readings::of_unit();
@@ -123,7 +123,7 @@ fn choose(path: &Path, topics: &BTreeMap<u32, Topic>, wanted: Option<&str>) -> R
             let all = list(topics.values().collect());
             let what = wanted.map_or("no topic".into(), |name| format!("no topic {name}"));
             (
-                format!("{what} with sensor_msgs/Imu is there; there are: {all}"),
+                format!("the file has {what} with sensor_msgs/Imu; it has: {all}"),
                 "choose another file or topic",
             )
         }
@@ -155,8 +155,8 @@ pub(super) fn read_bag(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>>
 /// Without the reader of bags, which maps the file into memory.
 #[cfg(target_family = "wasm")]
 fn messages_of_bag(path: &Path) -> Result<Found> {
-    let problem = "bags of ROS 1 are not read in a browser";
-    let remedy = "import it with the command mimu, or make an MCAP file of it (mcap convert)";
+    let problem = "a browser cannot read bags of ROS 1";
+    let remedy = "import it with the command mimu, or convert it to MCAP (mcap convert)";
     Err(Error::new(path.display(), problem, remedy))
 }
 
@@ -217,7 +217,7 @@ fn messages_of_mcap(path: &Path) -> Result<Found> {
         mcap::McapError::UnsupportedCompression(codec) => Error::new(
             path.display(),
             format!("its chunks are compressed with {codec}, which this program does not read"),
-            "write it again with zstd (mcap compress --compression zstd)",
+            "compress it with zstd (mcap compress --compression zstd)",
         ),
         error => damaged(path, &error),
     };
@@ -261,9 +261,9 @@ pub(super) fn read_db3(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>>
     let mut beside = path.as_os_str().to_owned();
     beside.push("-wal");
     if std::fs::metadata(&beside).is_ok_and(|beside| beside.len() > 0) {
-        let problem =
-            "the bag was not closed: messages are in the file beside it that ends in -wal";
-        let remedy = "open it once, with ros2 bag info or sqlite3, which takes them in";
+        let problem = "the bag was not closed: some of its messages are in the file beside it that ends in -wal";
+        let remedy =
+            "open the bag once with ros2 bag info or sqlite3, which moves them into the bag";
         return Err(Error::new(path.display(), problem, remedy));
     }
     File::open(path).map_err(|error| Error::io(path, &error))?;

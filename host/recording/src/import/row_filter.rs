@@ -54,7 +54,7 @@ impl FromStr for RowFilter {
             }
             _ => Err(Error::new(
                 "choice of rows",
-                format!("{} is no column and a value", shorten(text.as_bytes())),
+                format!("{} is not a column with a value", shorten(text.as_bytes())),
                 "write it like channel=3",
             )),
         }
@@ -139,8 +139,8 @@ impl RowFilters {
         if !self.filters.is_empty() && self.kept == 0 {
             let all: Vec<String> = self.filters.iter().map(|t| t.filter.to_string()).collect();
             return refuse(
-                format!("no row has {} at once", all.join(" and ")),
-                "choose values that occur together",
+                format!("no row satisfies all of {}", all.join(" and ")),
+                "choose values that occur in one row",
             );
         }
         Ok(())

@@ -43,8 +43,8 @@ pub(super) fn import_sequence(
         };
         let mut import = JoinedFiles::open(&one, [false; 2])?;
         if import.first.has_step() {
-            let problem = "it has a column step, and in a sequence each file is a step";
-            let remedy = "skip the column, or import the file by itself";
+            let problem = "it has a column step, but in a sequence each file is a dwell";
+            let remedy = "skip the column, or import this file alone";
             return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
         }
         // What of the table is used is known when all files have been read.
@@ -75,24 +75,24 @@ pub(super) fn import_sequence(
         };
         if import.columns != *columns {
             let problem = format!(
-                "its columns are not those of {}",
+                "its columns differ from those of {}",
                 file_name(&options.files[0])
             );
             return Err(Error::new(
                 path.display(),
                 problem,
-                "give each file its list of columns",
+                "give a list of columns for each file",
             )
             .about(Argument::Columns));
         }
         if (import.rate_hz / manifest.sample_rate_hz - 1.0).abs() > ALIKE {
             let problem = format!(
-                "its rate is {} Hz, and that of {} is {} Hz",
+                "its rate is {} Hz, but that of {} is {} Hz",
                 import.rate_hz,
                 file_name(&options.files[0]),
                 manifest.sample_rate_hz
             );
-            let remedy = "import files of one rate as a sequence";
+            let remedy = "import only files with the same rate as a sequence";
             return Err(Error::new(path.display(), problem, remedy));
         }
         import.run(writer, &|share: f64| {
@@ -145,7 +145,7 @@ fn of_faces(options: &ImportOptions, gyro: bool) -> Vec<String> {
     }
     if gyro {
         warnings.push(
-            "gyro: the files show rests and not the turns between them, so no scale factor of the gyro follows from this recording"
+            "gyro: the files contain rests but not the turns between them, so this recording does not determine its scale factors"
                 .into(),
         );
     }
@@ -171,7 +171,8 @@ fn labels(options: &ImportOptions) -> Result<Vec<String>> {
     let labels: Vec<String> = options.files.iter().map(stem).collect();
     let mut seen = BTreeSet::new();
     if let Some(twice) = labels.iter().find(|label| !seen.insert(label.as_str())) {
-        let problem = format!("two files are named {twice}, and the names are those of the steps");
+        let problem =
+            format!("two files have the name {twice}, but the names are the labels of the dwells");
         return Err(Error::new("import", problem, "give them different names"));
     }
     Ok(labels)

@@ -69,7 +69,7 @@ impl Row<'_> {
             6 => 8,
             8 => return Ok(0),
             9 => return Ok(1),
-            _ => return Err("a whole number is something else".into()),
+            _ => return Err("a whole number has another type".into()),
         };
         let bytes = self.local.get(at as usize..at as usize + width);
         let bytes = bytes.ok_or("a row is cut")?;
@@ -85,7 +85,7 @@ impl Row<'_> {
         let (kind, at) = self.value(column)?;
         let length = match kind {
             12.. => (kind - 12) / 2,
-            _ => return Err("a text is something else".into()),
+            _ => return Err("a text has another type".into()),
         };
         let end = at
             .checked_add(length)
@@ -115,9 +115,9 @@ impl Database {
         let mut file = File::open(path).map_err(|error| error.to_string())?;
         let mut header = [0; HEADER];
         file.read_exact(&mut header)
-            .map_err(|_| "it is no SQLite file")?;
+            .map_err(|_| "it is not an SQLite file")?;
         if !header.starts_with(SIGNATURE) {
-            return Err("it is no SQLite file".into());
+            return Err("it is not an SQLite file".into());
         }
         let page = match u16::from_be_bytes([header[16], header[17]]) {
             1 => 1 << 16,
@@ -174,7 +174,7 @@ impl Database {
     ) -> Result<()> {
         *seen += 1;
         if depth > DEEPEST || *seen > self.pages {
-            return Err("its pages go round in a circle".into());
+            return Err("its pages form a circle".into());
         }
         let page = self.read(number)?;
         let start = if number == 1 { HEADER } else { 0 };
@@ -182,7 +182,7 @@ impl Database {
         let (interior, pointers) = match kind {
             0x05 => (true, start + 12),
             0x0d => (false, start + 8),
-            _ => return Err(format!("page {number} is of no table")),
+            _ => return Err(format!("page {number} does not belong to a table")),
         };
         for cell in 0..cells {
             let at = usize::from(u16_at(&page, pointers + 2 * cell)?);
@@ -202,7 +202,7 @@ impl Database {
         let (length, at) = varint(page, at)?;
         let (id, at) = varint(page, at)?;
         if length > LONGEST {
-            return Err("a row is longer than any".into());
+            return Err("a row is too long".into());
         }
         let (whole, least) = (
             self.usable as u64 - 35,
@@ -267,7 +267,7 @@ impl Database {
     fn read(&self, number: u64) -> Result<Vec<u8>> {
         if number == 0 || number > self.pages {
             return Err(format!(
-                "it is truncated: it has {} pages, and page {number} is meant",
+                "it is truncated: it has {} pages, but page {number} is referred to",
                 self.pages
             ));
         }

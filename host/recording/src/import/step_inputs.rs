@@ -119,9 +119,7 @@ impl StepInputs {
         };
         let names: Vec<String> = steps.iter().take(10).map(name).collect();
         let (count, names) = (steps.len(), names.join(", "));
-        Some(format!(
-            "the inputs of {count} steps are not known: {names}"
-        ))
+        Some(format!("the inputs of {count} dwells are unknown: {names}"))
     }
 
     /// A warning of inputs without a step.

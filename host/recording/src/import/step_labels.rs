@@ -42,7 +42,7 @@ impl StepLabels {
         if self.labels.len() == MOST_LABELS {
             return Err(Refusal {
                 problem: format!("{} is the 10001st different label", shorten(cell)),
-                remedy: "give another column for step: this one has a text of its own in every row",
+                remedy: "give another column for step: in this one every row has another text",
             });
         }
         // Bounded by the limit above.

@@ -78,13 +78,13 @@ impl ImportSummary {
         }
         if file.zero_bytes() > 0 {
             self.warnings.push(format!(
-                "{place}: {} bytes of 0 before and after its lines were left out, as room that was kept and not written",
+                "{place}: {} bytes of 0 before and after its lines were left out: reserved space that was never written",
                 file.zero_bytes()
             ));
         }
         if file.stamp_wraps() > 0 {
             self.warnings.push(format!(
-                "{place}: the time stamps began again at 0 {}, as counters of 16 to 32 bits do, and were counted on",
+                "{place}: the time stamps wrapped to 0 {}, like a counter of 16 to 32 bits, and were unwrapped",
                 times(file.stamp_wraps())
             ));
         }
@@ -94,7 +94,7 @@ impl ImportSummary {
         self.skipped.blank += skipped.blank;
         if file.wraps() > 0 {
             self.warnings.push(format!(
-                "{}: the column sample began again at 0 {}, as counters of 16 and 32 bits do, and was counted on",
+                "{}: the column sample wrapped to 0 {}, like a counter of 16 or 32 bits, and was unwrapped",
                 file.path().display(),
                 times(file.wraps())
             ));
@@ -110,7 +110,7 @@ impl TimeSummary {
         let [shortest, longest] =
             [rounds.shortest_s, rounds.longest_s].map(|s| format!("{:.1}", 1e3 * s));
         Some(format!(
-            "{}: a loop read the unit at irregular times, {shortest} to {longest} ms apart; the readings are interpolated between them, which lowers their white noise; let a timer of the board or the sensor's own FIFO pace them",
+            "{}: a loop read the unit at irregular times, {shortest} to {longest} ms apart; the readings are interpolated between them, which lowers their white noise. For regular times, let a timer of the board or the sensor's FIFO trigger the readings",
             self.file
         ))
     }

@@ -416,7 +416,7 @@ fn a_source_inside_the_recording_to_replace_is_not_deleted() {
     options.rate_hz = Some(1.0);
     options.replace = true;
     let error = import(&options, &out, |_| ()).unwrap_err().to_string();
-    assert!(error.contains("lies in the recording"), "{error}");
+    assert!(error.contains("is inside the recording"), "{error}");
     assert!(Path::new(&out.join("samples.csv")).exists());
 }
 

@@ -244,7 +244,7 @@ impl TextTable {
         });
         named.next().or(filter.number()).ok_or_else(|| {
             let name = shorten(filter.column().as_bytes());
-            let problem = format!("there is no header that has the column {name}");
+            let problem = format!("no header has the column {name}");
             let remedy = "check the name; without a header, give the number of the column from the left: 1=3";
             Error::new(self.path.display(), problem, remedy).about(Argument::Where)
         })
@@ -299,7 +299,7 @@ impl TextTable {
         let cells = record.len();
         if cells < self.width {
             let problem = match ended {
-                true => format!("the row has {cells} cells and {} are expected", self.width),
+                true => format!("the row has {cells} cells, but {} are expected", self.width),
                 false => format!(
                     "the file is truncated: its last row has {cells} of {} cells",
                     self.width
@@ -315,7 +315,7 @@ impl TextTable {
             return None;
         }
         Some(Refusal {
-            problem: format!("the row has {cells} cells and {} are expected", self.width),
+            problem: format!("the row has {cells} cells, but {} are expected", self.width),
             remedy: "correct the row, or list - for each column to skip",
         })
     }
@@ -371,7 +371,7 @@ impl TextTable {
                         self.first_row = number;
                         return Ok(());
                     }
-                    None => "it holds words".to_owned(),
+                    None => "it contains words".to_owned(),
                 };
                 let data = self.are_numbers(&record);
                 if misfit.as_ref().is_none_or(|first| data && !first.data) {
@@ -388,21 +388,21 @@ impl TextTable {
         if self.wanted.is_empty() {
             let (problem, remedy) = match list {
                 None => (
-                    "there is no header with the names of a recording's columns".to_owned(),
-                    "say what the columns are",
+                    "no header has the names of a recording's columns".to_owned(),
+                    "name the columns",
                 ),
                 Some(ColumnList::ByName(wanted)) => {
                     let missing = |(_, name): &&(Role, String)| !names.contains(name);
                     let name = wanted.iter().find(missing).map_or("", |(_, name)| name);
                     let name = shorten(name.as_bytes());
                     (
-                        format!("there is no header that has the column {name}"),
+                        format!("no header has the column {name}"),
                         "check the name; it must be spelt as in the file",
                     )
                 }
                 Some(ColumnList::ByPosition(_)) => (
                     "all columns are skipped".to_owned(),
-                    "name the columns that are wanted",
+                    "name the columns to be imported",
                 ),
             };
             return Err(Error::new(path, problem, remedy).about(Argument::Columns));
@@ -421,7 +421,7 @@ impl TextTable {
             .about(Argument::Columns)),
             None => Err(Error::new(
                 path,
-                "there is no row of data",
+                "the file has no row of data",
                 "record it again",
             )),
         }

@@ -78,11 +78,11 @@ impl TwoSources {
                 continue;
             };
             let problem = format!(
-                "in {:.0} % of the rows the reading leaps away and is back in the next one: rows of two devices, or readings in two units, take turns",
+                "in {:.0} % of the rows the reading jumps away and returns in the next one: rows of two devices, or readings in two units, alternate",
                 100.0 * share
             );
             let remedy =
-                "write the rows of each into a file of its own, and import them one by one";
+                "write the rows of each to a separate file, and import the files one by one";
             return Err(Error::new(
                 format!("{place}, column {}", RAW_COLUMNS[*c]),
                 problem,
@@ -99,7 +99,7 @@ impl TwoSources {
         let known = self.sizes[most].0 > 0 && !UNIT_GAIN.contains(&(usual / gravity_mps2));
         known.then(|| {
             format!(
-                "{place}: the specific force is about {usual:.3} in most rows, where gravity is {gravity_mps2} m/s²: unit or scale? Readings in g \
+                "{place}: the specific force is about {usual:.3} in most rows, but gravity is {gravity_mps2} m/s²: check unit and scale. Readings in g \
                  need the factor accel=9.80665, in mg accel=0.00980665; counts need another raw unit"
             )
         })

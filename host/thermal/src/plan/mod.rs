@@ -85,10 +85,10 @@ pub fn plan(request: &Request) -> Result<Planned> {
         return Err(Error::new(
             request.procedure.name(),
             format!(
-                "it takes {}, and a plan has two days at most",
+                "it takes {}, but a plan has two days at most",
                 duration(duration_s)
             ),
-            "take fewer set points, shorter soaks or a faster ramp",
+            "choose fewer set points, shorter soaks or a faster ramp",
         ));
     }
     let inseparable = match request.procedure {
@@ -138,9 +138,9 @@ pub fn to_toml(planned: &Planned, sample_rate_hz: f64) -> String {
 
 /// One pose, one ramp, from power-on.
 const INSEPARABLE_AT_REST: [&str; 3] = [
-    "accelerometer, along gravity: bias and 1 g times the change of the scale factor are one curve; the bias of z is predicted as if the scale factor were known",
+    "accelerometer, along gravity: only the sum of the bias and 1 g times the change of the scale factor is determined; the bias of z is predicted as if the scale factor were known",
     "all other scale factors and cross terms: nothing excites them",
-    "warm-up since power-on, lag of the dies and slope over temperature: one ramp at one rate moves all three together; come back at another rate, or soak and measure again",
+    "warm-up since power-on, lag of the dies and slope over temperature: one ramp at one rate changes all three together; return at another rate, or soak and measure again",
 ];
 
 /// Refuses a span over which no such curve is determined; else its name.
@@ -150,17 +150,17 @@ fn check_span(kelvin: f64, shape: Shape) -> Result<&'static str> {
         Err(Error::new("range of temperatures", problem, remedy).about(Argument::Range))
     };
     if !(kelvin >= SLOPE_SPAN) {
-        let what = "over less than that noise and drift pass for a slope over temperature, which";
+        let what = "below that span noise and drift look like a slope over temperature, which";
         return refuse(SLOPE_SPAN, what, "widen the range");
     }
     match shape {
         Shape::Line | Shape::Constant => Ok("line"),
         _ if kelvin < CURVATURE_SPAN => {
-            let what = "over less than that the slope passes for curvature, which";
+            let what = "below that span the slope looks like curvature, which";
             let error = refuse(
                 CURVATURE_SPAN,
                 what,
-                "widen the range, or take straight lines",
+                "widen the range, or choose straight lines",
             );
             error.map_err(|e| e.about(Argument::Curves))
         }

@@ -133,8 +133,8 @@ fn soak(request: &Request) -> Result<Schedule> {
     let needed = if request.shape == Shape::Line { 2 } else { 4 };
     let n = request.set_points;
     if n < needed {
-        let problem = format!("{n} set points, and the curves have {needed} coefficients");
-        let remedy = format!("take {needed} or more, one more to see whether the curves hold");
+        let problem = format!("{n} set points, but the curves have {needed} coefficients");
+        let remedy = format!("choose at least {needed}, and one more to test the curves");
         return Err(Error::new("set points", problem, remedy).about(Argument::SetPoints));
     }
     let round = faces_and_rates(request);
@@ -142,11 +142,11 @@ fn soak(request: &Request) -> Result<Schedule> {
         return Err(Error::new(
             "soak",
             format!(
-                "{} at a set point, and its dwells with the moves take {}",
+                "{} at a set point, but its dwells and the moves take {}",
                 duration(request.soak_s),
                 duration(round.length_s)
             ),
-            "soak for longer, or take shorter dwells",
+            "soak for longer, or choose shorter dwells",
         )
         .about(Argument::Soak));
     }

@@ -114,7 +114,7 @@ fn a_base_that_the_curves_cannot_be_added_to_is_refused() {
     };
     let cold = refused(&at_one_temperature(-30.0));
     assert!(
-        cold.contains("it holds at -30.0 °C, and the dies were at"),
+        cold.contains("it is valid at -30.0 °C, but the dies were at"),
         "{cold}"
     );
     let mut other = base.clone();
@@ -124,7 +124,7 @@ fn a_base_that_the_curves_cannot_be_added_to_is_refused() {
     let mut unknown = base.clone();
     unknown.recording.temp_c = None;
     let unknown = refused(&unknown);
-    assert!(unknown.contains("at which temperature"), "{unknown}");
+    assert!(unknown.contains("temperature at which"), "{unknown}");
     let twice = refused(&base::calibration(&found, &base, CREATED).unwrap());
     assert!(twice.contains("curves over temperature already"), "{twice}");
 

@@ -140,7 +140,7 @@ impl OpenSession<'_> {
             .collect();
         let steps = verification(asked.fixture, &used, asked.dwell_s, asked.largest_rate_dps);
         let words = format!(
-            "{} poses that were not used, for the calibration with {}",
+            "{} poses that the fit has not used, for the calibration with {}",
             steps.len(),
             names.join(", ")
         );
@@ -164,7 +164,8 @@ impl OpenSession<'_> {
             let [with, without] =
                 [&found.calibration, &plain.calibration].map(|c| judge_all(&by, c));
             if !with?.beats(&without?) {
-                let note = "the effects do not do better in new poses for all sensors: they are not stored";
+                let note =
+                    "the effects do not improve all sensors in new poses, so they are not stored";
                 self.outcomes[k].notes.push(note.into());
                 continue;
             }

@@ -133,11 +133,11 @@ impl UnitSession {
             _ => "",
         };
         let problem = format!(
-            "the accelerometer reads {} at rest{cause}, and gravity is {} m/s²",
+            "the accelerometer reads {} at rest{cause}, but gravity is {} m/s²",
             significant(size),
             asked.gravity_mps2
         );
-        let remedy = "take the readings as counts, which may be in any unit";
+        let remedy = "declare the readings as counts, which may have any unit";
         Err(Error::device(self.name(), problem, remedy).about(Argument::RawUnit))
     }
 
@@ -149,7 +149,7 @@ impl UnitSession {
             return Ok(());
         }
         let words = format!(
-            "{}: the turn to it is of no use for the gyro: {missing} samples are missing in it",
+            "{}: the turn to it lacks {missing} samples and is not used for the gyro",
             self.name()
         );
         tell.push(Event::Note { words });
@@ -163,11 +163,10 @@ impl UnitSession {
         }
         let share = self.standing.lost as f64 / (self.standing.lost + self.standing.samples) as f64;
         let problem = format!(
-            "in {lost} of {all} turns samples are missing ({} % of all), and the gyro is calibrated by turns that are whole",
+            "samples are missing in {lost} of {all} turns ({} % of all samples), and only complete turns calibrate the gyro",
             significant(100.0 * share)
         );
-        let remedy =
-            "have the board write fewer or shorter lines, or more bits a second; check the cable";
+        let remedy = "let the board write fewer or shorter lines, or use more bits per second; check the cable";
         Err(Error::device(self.name(), problem, remedy).about(Argument::Baud))
     }
 }

@@ -130,7 +130,7 @@ impl<'a> Line<'a> {
             Ok(_) => refused(format!(
                 "`{name}`: {word} is not within {low} to {high}; {usage}"
             )),
-            Err(_) => refused(format!("`{name}`: `{word}` is no number; {usage}")),
+            Err(_) => refused(format!("`{name}`: `{word}` is not a number; {usage}")),
         }
     }
 
@@ -146,7 +146,7 @@ impl<'a> Line<'a> {
         match x.fract() == 0.0 {
             true => Ok(x as u32),
             false => refused(format!(
-                "`{}`: {x} is no whole number; {}",
+                "`{}`: {x} is not a whole number; {}",
                 self.name, self.usage
             )),
         }
@@ -295,7 +295,7 @@ impl Served {
         let word = line.arguments[0].to_lowercase();
         let axes = [TableAxis::Outer, TableAxis::Middle, TableAxis::Inner];
         let Some(axis) = axes.into_iter().find(|axis| axis.name() == word) else {
-            return refused(format!("`TURN`: `{word}` is no axis; {}", line.usage));
+            return refused(format!("`TURN`: `{word}` is not an axis; {}", line.usage));
         };
         let angle = line.required(1, [-36e3, 36e3])?.to_radians();
         let rate = line.required(2, [1e-3, 36e3])?.to_radians();

@@ -67,7 +67,7 @@ fn port_and_control_are_printed_on_a_line_each_and_a_plan_gives_all_but_its_step
     drop(running);
     let mut warning = String::new();
     stderr.read_to_string(&mut warning).unwrap();
-    let wanted = "rig/plans/hands.toml: its steps are not carried out";
+    let wanted = "rig/plans/hands.toml: its entries are not carried out";
     assert!(warning.contains(wanted), "{warning}");
 }
 
@@ -79,7 +79,7 @@ fn a_control_that_cannot_be_is_refused_in_a_line() {
     let file = file.display().to_string();
     for (arguments, problem) in [
         (&["--control", "nowhere"][..], "127.0.0.1:0"),
-        (&["--link", &file], "is no symbolic link"),
+        (&["--link", &file], "is not a symbolic link"),
         (&["--carrier", "hands"], "--control"),
     ] {
         let Output { status, stderr, .. } = mimu_board().args(arguments).output().unwrap();

@@ -284,7 +284,10 @@ fn a_table_refuses_what_is_beyond_it_and_stays_as_it_was() {
     table.command(0.0, Command::Rate(dps(10.0))).unwrap();
     table.command(0.0, go(up)).unwrap();
     let refusal = table.command(0.0, Command::Rate(dps(10.0))).unwrap_err();
-    assert!(refusal.contains("no axis in this pose"), "{refusal}");
+    assert!(
+        refusal.contains("no vertical axis in this pose"),
+        "{refusal}"
+    );
     // A first pose that is out of reach is refused with its line.
     let plan = plan("[[step]]\nup = [0, 0, -1]\ndwell_s = 1");
     let refusal = Table::commanded(&plan, &truth).unwrap_err();
@@ -396,5 +399,5 @@ fn a_person_who_is_told_to_hold_on_never_rests_and_lies_still_again_when_told_to
         assert_eq!(norm(motion.rate) > 1e-3, held, "{:?}", motion.rate);
     }
     let refusal = told.command(100.0, Command::Rate(1.0)).unwrap_err();
-    assert!(refusal.contains("steady rate"), "{refusal}");
+    assert!(refusal.contains("constant rate"), "{refusal}");
 }

@@ -201,12 +201,12 @@ fn a_turn_that_the_table_cannot_make_is_refused_with_its_line() {
         (
             quarter("outer", 90.0),
             &two,
-            "PLAN.toml:9: a turn about the outer axis, and the table has none",
+            "PLAN.toml:9: a turn about the outer axis, but the table has none",
         ),
         (
             quarter("middle", 100.0),
             &two,
-            "PLAN.toml:9: the turn ends with the middle axis at 100.0 degrees, and the table has -180.0 to 95.0",
+            "PLAN.toml:9: the turn ends with the middle axis at 100.0 degrees, but its range is -180.0 to 95.0",
         ),
         (
             quarter("inner", 90.0).replace("turn_dps = 10", "turn_dps = 500"),
@@ -216,7 +216,7 @@ fn a_turn_that_the_table_cannot_make_is_refused_with_its_line() {
         (
             format!("rounds = 2\nround_s = 5\n{}", quarter("inner", 90.0)),
             &two,
-            "PLAN.toml:7: round 1 is due at 5 s, and the one before takes until",
+            "PLAN.toml:7: round 1 is due at 5 s, but the one before ends at",
         ),
     ] {
         let found = Table::new(&plan(&text), truth).unwrap_err();

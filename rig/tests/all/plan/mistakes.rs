@@ -75,7 +75,7 @@ fn mistakes_in_the_head_are_named_with_their_line() {
         ),
         (
             "HEADdevice = \"a\\nb\"",
-            ("PLAN.toml:4: `device` is no name", "in one line"),
+            ("PLAN.toml:4: `device` is not a name", "in one line"),
         ),
         (
             "HEADdevice = \" \"",
@@ -83,7 +83,7 @@ fn mistakes_in_the_head_are_named_with_their_line() {
         ),
         (
             "HEADlead_in_s = 1\n\n",
-            ("PLAN.toml:4: there is no step", "[[step]]"),
+            ("PLAN.toml:4: the plan has no entry", "[[step]]"),
         ),
     ];
     for (text, complaint) in cases {
@@ -192,7 +192,7 @@ fn mistakes_in_a_step_are_named_with_their_line() {
         (
             "poses = 4000000000\ndwell_s = 0.001",
             (
-                "PLAN.toml:5: up to this step the plan has 4000000000 dwells",
+                "PLAN.toml:5: up to this entry the plan has 4000000000 dwells",
                 "100000 dwells",
             ),
         ),
@@ -206,7 +206,7 @@ fn mistakes_in_a_step_are_named_with_their_line() {
         (
             "up = [0, 0, 1]\nrepeat = 3\ndwell_s = 90000",
             (
-                "PLAN.toml:5: up to this step the plan has 3 dwells, 75.0 h",
+                "PLAN.toml:5: up to this entry the plan has 3 dwells, 75.0 h",
                 "48 h",
             ),
         ),

@@ -100,7 +100,7 @@ fn what_the_table_cannot_do_is_refused_with_its_limit_and_the_line_of_the_plan()
         (
             &three,
             "up = [0, 0, -1]\ndwell_s = 1",
-            "PLAN.toml:5: `up` needs the middle axis at 180.0 degrees, and the table has -100.0 to 100.0",
+            "PLAN.toml:5: `up` needs the middle axis at 180.0 degrees, but its range is -100.0 to 100.0",
         ),
         (
             &three,
@@ -120,7 +120,7 @@ fn what_the_table_cannot_do_is_refused_with_its_limit_and_the_line_of_the_plan()
         (
             &two,
             "up = [0, 1, 0]\ndwell_s = 1\nrate_dps = 10",
-            "PLAN.toml:7: `rate_dps` is about the vertical, where the table has no axis",
+            "PLAN.toml:7: `rate_dps` is about the vertical, but the table has no vertical axis",
         ),
         (
             &two,
@@ -171,7 +171,7 @@ fn a_plan_that_takes_too_long_with_its_moves_or_samples_is_refused_before_it_beg
             HEAD.replace("1000.0", "20000")
         ),
         (
-            "PLAN.toml:5: up to this step the plan has 1 dwells, 48.0 h, 3.456e9 samples",
+            "PLAN.toml:5: up to this entry the plan has 1 dwells, 48.0 h, 3.456e9 samples",
             "2e8 samples",
         ),
     );
@@ -190,7 +190,7 @@ fn files_that_are_no_plans_are_refused_by_name() {
     let large = fs::File::create(at("large.toml")).unwrap();
     large.set_len(1 << 40).unwrap();
     for (path, beginning) in [
-        (at("missing.toml"), "there is no such file"),
+        (at("missing.toml"), "the file does not exist"),
         (folder.path().to_path_buf(), "is a directory"),
         (at("latin.toml"), "is not UTF-8 text"),
         (at("large.toml"), "is larger than 16 MiB"),

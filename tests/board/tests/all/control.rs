@@ -149,11 +149,11 @@ fn commands_are_answered_while_the_bench_stands_still_because_nobody_reads_the_p
             ),
             ("MOVE 0 0 0", "no length"),
             ("MOVE 1 nan 0", "not within"),
-            ("MOVE 1 x 0", "`x` is no number"),
+            ("MOVE 1 x 0", "`x` is not a number"),
             ("MOVE 1 0 0 720", "not within -360 to 360"),
-            ("RATE 10", "steady rate"),
+            ("RATE 10", "constant rate"),
             ("CHAMBER 300", "not within -100 to 200"),
-            ("FIDGET 1.5", "no whole number"),
+            ("FIDGET 1.5", "not a whole number"),
             ("LINK PERHAPS", "send `LINK ON|OFF`"),
         ] {
             let refusal = client.refusal(line);
@@ -186,7 +186,7 @@ fn a_table_goes_where_it_is_told_and_turns_as_fast_as_it_is_told() {
         client.carry_out("TURN middle -90 45");
         assert_eq!(client.ask("POSITION?"), "0 0 1 0");
         assert!(client.refusal("TURN inner 90 500").contains("400"));
-        assert!(client.refusal("TURN up 90 5").contains("no axis"));
+        assert!(client.refusal("TURN up 90 5").contains("not an axis"));
         client.carry_out("MOVE 1 0 0");
 
         client.carry_out("RATE 90");

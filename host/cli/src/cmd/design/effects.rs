@@ -49,15 +49,15 @@ fn targets(ids: &[String]) -> Result<Vec<Target>> {
             let known: Vec<&str> = effects::all().map(|e| e.id).collect();
             return Err(Error::new(
                 format!("--effects {id}"),
-                "there is no effect of this name",
-                format!("choose of {}", known.join(", ")),
+                "no effect has this name",
+                format!("choose one of {}", known.join(", ")),
             ));
         };
         let target = Target::listed(effect);
         if target.candidate.reads_code() {
             return Err(Error::new(
                 format!("--effects {id}"),
-                "which codes of a converter a dwell meets is decided by noise and bias, and no dwell can be planned for it",
+                "noise and bias decide which codes of a converter a dwell meets, so no dwell can be planned for it",
                 format!("needs {}", effect.needs),
             ));
         }
@@ -113,7 +113,7 @@ impl DesignArgs {
                 if targets.iter().any(|s| Some(s.candidate.sensor) != own) {
                     return Err(Error::new(
                         format!("--noise {n}"),
-                        "one number cannot be the noise of gyro and accelerometer",
+                        "one number cannot be the noise of both gyro and accelerometer",
                         "give the noise file of the unit, or effects of one sensor",
                     ));
                 }
@@ -190,7 +190,7 @@ pub(super) fn run(args: &DesignArgs, ids: &[String]) -> Result<()> {
         return Err(Error::new(
             format!("--effects {}", ids.join(",")),
             format!(
-                "no recipe with --table {} and these rates determines every coefficient of it",
+                "no recipe with --table {} and these rates determines all of its coefficients",
                 setup.fixture.name()
             ),
             "use another --table, --reference or --rates, or fewer effects at once",

@@ -32,16 +32,16 @@ pub struct CheckArgs {
 #[derive(Args)]
 #[command(group(clap::ArgGroup::new("input").required(true).args(["rate_dps", "force_mps2"])))]
 pub struct KalmanArgs {
-    /// Rate that is applied to the gyro, deg/s, body frame: X,Y,Z; once for each, one after the other
+    /// Rate applied to the gyro, deg/s, body frame: X,Y,Z; repeat the option for successive inputs
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = triple)]
     rate_dps: Vec<[f32; 3]>,
-    /// Specific force that is applied to the accelerometer, m/s², body frame; at rest it points up
+    /// Specific force applied to the accelerometer, m/s², body frame; at rest it points up
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = triple)]
     force_mps2: Vec<[f32; 3]>,
-    /// How long each; on a terminal it begins with Enter
+    /// Duration of each input; on a terminal each begins with Enter
     #[arg(long = "for", value_name = "TIME", default_value = "5s", value_parser = duration)]
     each: Duration,
-    /// Variances of single readings of the sensors x, y, z, V²; without them, from a second before the first input
+    /// Variances of single readings of the sensors x, y, z, V² [default: from a second before the first input]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple)]
     noise_v2: Option<[f32; 3]>,
     #[command(flatten)]
@@ -79,7 +79,7 @@ pub fn run_check(args: &CheckArgs) -> Result<()> {
         true => Ok(()),
         false => Err(Error::new(
             port,
-            "the device compensates otherwise than the PC, by more than rounding",
+            "the device's compensation differs from the PC's by more than rounding",
             "update device and program to the same version, and upload the calibration again",
         )),
     }

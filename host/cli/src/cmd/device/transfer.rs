@@ -20,7 +20,7 @@ use crate::output::{check_outputs, print, progress};
 pub struct UploadArgs {
     /// Calibration file
     calibration: PathBuf,
-    /// Also if the calibration is of another unit
+    /// Store it even if the calibration belongs to another unit
     #[arg(long)]
     other_unit: bool,
     #[command(flatten)]
@@ -32,13 +32,13 @@ pub struct UploadArgs {
 #[derive(Args)]
 #[command(group(clap::ArgGroup::new("to").required(true).multiple(true).args(["output", "bytes"])))]
 pub struct DownloadArgs {
-    /// Calibration file to write. What the device does not keep is not in it: how well the numbers are known
+    /// Calibration file to write; it lacks the uncertainties, because the device does not store them
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     /// File to write the bytes to, as the device stores them
     #[arg(long, value_name = "FILE")]
     bytes: Option<PathBuf>,
-    /// Name of the unit in the calibration file; without it, as `mimu record` names it: by its number
+    /// Name of the unit in the calibration file [default: its number, as in `mimu record`]
     #[arg(long)]
     device: Option<String>,
     #[command(flatten)]
@@ -79,10 +79,13 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
     let bytes = download(&mut session)?;
     let port = session.port();
     let mut contents = contents(&bytes).map_err(|refused| {
-        let problem = format!("this program cannot read what it stores: {}", refused);
+        let problem = format!(
+            "this program cannot read its stored calibration: {}",
+            refused
+        );
         let remedy = match refused {
             StoredError::Version { found } if found < VERSION => {
-                "upload the calibration file again: the device keeps the numbers in an older layout"
+                "upload the calibration file again: the device stores it in an older layout"
             }
             StoredError::Version { .. } => "update mimu on this computer",
             _ => "upload the calibration file again",

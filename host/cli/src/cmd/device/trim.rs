@@ -14,13 +14,13 @@ use crate::report;
 
 #[derive(Args)]
 pub struct TrimArgs {
-    /// Body axis that points up, of a unit that lies level: the accelerometer is trimmed too. Without it the gyro alone, in any pose
+    /// Body axis that points up while the unit lies level: the accelerometer is trimmed too [default: only the gyro, in any pose]
     #[arg(long, value_name = "±AXIS", requires = "gravity_mps2", allow_hyphen_values = true, value_parser = up)]
     up: Option<[f64; 3]>,
     /// Local gravity, m/s²
     #[arg(long = "gravity", value_name = "M/S²", requires = "up", value_parser = gravity)]
     gravity_mps2: Option<f64>,
-    /// How long the output is averaged, before and after
+    /// Averaging time of the output, before and after
     #[arg(long = "for", value_name = "TIME", default_value = "20s", value_parser = duration)]
     duration: Duration,
     #[command(flatten)]

@@ -33,16 +33,16 @@ pub(super) struct PlanArgs {
     /// Set points of a soak
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=100))]
     points: u16,
-    /// Time at each set point, or before and after a ramp, min; without it 60 for a soak and 30 for the others
+    /// Time at each set point, or before and after a ramp, min [default: 60 for a soak, 30 for the others]
     #[arg(long, value_name = "MIN", value_parser = |t: &str| number(t, 0.0, 2880.0))]
     soak: Option<f64>,
-    /// Length of a dwell, s; without it 9 for niu and 20 for the others
+    /// Length of a dwell, s [default: 9 for niu, 20 for the others]
     #[arg(long, value_name = "S", value_parser = |t: &str| number(t, 0.1, 3600.0))]
     dwell: Option<f64>,
-    /// Largest rate of the table, deg/s; niu's turns are at 10 or less
+    /// Largest rate of the table, deg/s; turns of niu are at 10 or less
     #[arg(long, value_name = "DPS", default_value_t = 50.0, value_parser = |t: &str| number(t, 0.1, 10_000.0))]
     table_rate: f64,
-    /// Noise file of the unit, by `mimu allan -o`; without it that of fang's sensors
+    /// Noise file of the unit (`mimu allan -o`) [default: that of fang's sensors]
     #[arg(long, value_name = "FILE")]
     noise: Option<PathBuf>,
     /// Samples a second
@@ -57,7 +57,7 @@ pub(super) struct PlanArgs {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum ProcedureArg {
-    /// Set points, at each of which the unit soaks before it is measured (fang, 3)
+    /// Set points; the unit soaks at each before it is measured (fang, 3)
     Soak,
     /// Positions and quarter turns on a ramp up and down (niu, 3.2)
     Niu,

@@ -24,9 +24,9 @@ const LINE_S: f64 = 60.0;
 
 #[derive(Args)]
 pub(super) struct RecordArgs {
-    /// Plan of the procedure, by `mimu thermal plan -o`
+    /// Plan of the procedure (`mimu thermal plan -o`)
     plan: PathBuf,
-    /// Driver file of a table, a chamber, or both; may be repeated. Without one a person warms a unit that lies still
+    /// Driver file of a table, a chamber, or both; may be repeated [default: a person warms the unit, which lies still]
     #[arg(long = "driver", value_name = "FILE")]
     drivers: Vec<PathBuf>,
     #[command(flatten)]
@@ -102,13 +102,13 @@ fn begin(procedure: &Procedure, equipped: &Equipped) {
     {
         let words = mimu_equipment::step::words(&up.into());
         eprintln!(
-            "no table is driven: the unit lies still, {words}, and gravity is all that is known"
+            "no driver moves a table: the unit lies still, {words}, and only gravity is known"
         );
     }
     if !equipped.has_chamber() {
         let [low, high] = procedure.range_c();
         eprintln!(
-            "no chamber is driven, and no temperature is set: warm the unit from {low} to {high} °C as the lines say"
+            "no driver sets a chamber: warm the unit from {low} to {high} °C as the lines below say"
         );
     }
 }

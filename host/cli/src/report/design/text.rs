@@ -65,9 +65,9 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
     line("order", order(report));
     line("sigma of a dwell mean", sigma(report));
     line(
-        "left over",
+        "residual",
         format!(
-            "{} of freedom to notice a wrong model, {} from repetitions",
+            "{} of freedom to reveal a wrong model, {} from repetitions",
             match report.dof.lack_of_fit {
                 1 => "1 degree".into(),
                 dof => format!("{dof} degrees"),
@@ -85,8 +85,7 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
             .join(", ");
         let gain = filters[0].mean_sigma / report.mean_sigma;
         let text = format!(
-            "the filters for x, y and z see four of the nine positions each, fang (26)-(28): \
-             D-efficiency {shares}, and sigmas {} times those of all nine for each",
+            "the filters for x, y and z use four of the nine positions each, fang (26)-(28): their D-efficiency is {shares}, their sigmas are {} times those of all nine",
             significant(gain)
         );
         wrapped(&mut out, "as published", &text);
@@ -95,8 +94,7 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
         wrapped(&mut out, "assumed", assumed);
     }
     if report.turned_over {
-        let text = "the unit stands the other way up than published, turned by a half turn about x: y and z \
-                    change sign, and the table reaches all poses";
+        let text = "the unit is mounted upside down compared with the publication (half a turn about x): y and z change sign, and the table reaches all poses";
         wrapped(&mut out, "mounted", text);
     }
     if let Some(budget) = &report.budget {
@@ -130,13 +128,13 @@ fn summary(out: &mut String, report: &Design) {
     line("sigma of a dwell mean", sigma(report));
     let left = plural(report.dof.lack_of_fit as u64, "degree");
     line(
-        "left over",
-        format!("{left} of freedom to notice a wrong model"),
+        "residual",
+        format!("{left} of freedom to reveal a wrong model"),
     );
     if report.turned_over {
         line(
             "mounted",
-            "the other way up than published, turned by a half turn about x".into(),
+            "upside down compared with the publication (half a turn about x)".into(),
         );
     }
     let rate = if report.rates_dps.is_some() {
@@ -195,7 +193,9 @@ fn sigma(report: &Design) -> String {
 /// Order of the dwells, and what it costs.
 fn order(report: &Design) -> String {
     let name = match report.order {
-        "shortest" => return "shortest found; neighbours share drift (see --order)".into(),
+        "shortest" => {
+            return "shortest found; neighbouring dwells share drift (see --order)".into();
+        }
         "randomised" => "in a randomised order",
         _ => "as published",
     };
@@ -302,7 +302,7 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
     for p in weak.filter(|p| p.inflation >= WEAK && p.value.is_finite()) {
         let _ = writeln!(
             out,
-            "warning: {} is all but unobservable: sigma {} times what it were with the others known",
+            "warning: {} is all but unobservable: its sigma is {} times that with the other parameters known",
             p.name,
             significant(p.inflation)
         );
@@ -402,8 +402,8 @@ pub fn comparison_text(comparison: &Comparison) -> String {
     }
     let _ = writeln!(
         out,
-        "\n  mean sigma: geometric mean over the parameters, of full scale; dof: left to notice a wrong model;\n  \
-         can notice: terms beyond the model that show in the residuals in every direction"
+        "\n  mean sigma: geometric mean over the parameters, of full scale; dof: residual degrees of freedom;\n  \
+         can notice: terms beyond the model that the residuals show in every direction"
     );
     if !comparison.out_of_reach.is_empty() {
         let names = comparison.out_of_reach.join(", ");

@@ -77,9 +77,9 @@ impl<'a> Sections<'a> {
             @if let Some(second) = &self.d.second {
                 h2 { "A second recording" }
                 p { @if second.fitted_to {
-                    code { (second.recording) } " is the recording that was fitted to, and proves nothing."
+                    code { (second.recording) } " is the fitted recording itself, so it proves nothing."
                 } @else {
-                    "Of " code { (second.recording) } " nothing was used to find or to fit the effects."
+                    "Of " code { (second.recording) } " was not used to find or fit the effects."
                 } }
                 (tables::second(second))
             }
@@ -90,8 +90,8 @@ impl<'a> Sections<'a> {
     pub fn leftover(&self) -> Markup {
         html! {
             @if !self.d.leftover.is_empty() {
-                h2 { "What is left" }
-                p { "Scatter beyond the known noise that no candidate explains:" }
+                h2 { "Residual errors" }
+                p { "Scatter beyond the known noise that no effect explains:" }
                 (tables::leftover(self.d))
                 @if self.d.leftover.iter().any(|l| l.usual) {
                     p { "*  " (USUAL) "." }
@@ -108,10 +108,10 @@ impl<'a> Sections<'a> {
     /// What was tried and not accepted, and what this recording could not show.
     pub fn tried(&self) -> Markup {
         html! {
-            h2 { "Tried and not accepted" }
+            h2 { "Tried and rejected" }
             (tables::rejected(self.d))
             h2 { "Not seen at data-sheet size" }
-            p { "These effects were tried as well. At the size that data sheets give this recording would not show them, so that their absence means nothing." }
+            p { "These effects were tried too. At their data-sheet size this recording would not show them, so their absence proves nothing." }
             (tables::not_excited(self.d))
             (confused(self.d))
         }
@@ -157,7 +157,7 @@ pub fn body(d: &DiagnosisResult, made: &Made) -> Result<Markup> {
 fn first(d: &DiagnosisResult) -> Markup {
     html! {
         @if !d.recording_problems.is_empty() {
-            h2 { "Wrong with this recording" }
+            h2 { "Problems of this recording" }
             ul { @for problem in &d.recording_problems { li data-problem=(problem.id()) { (problem) } } }
         }
         p class={ "verdict " (d.verdict.name()) } { (verdict(d)) }
@@ -240,7 +240,7 @@ fn keys() -> Markup {
     html! {
         (key("dot", "M12 6h0")) "in sample, "
         (key("sigma", "M12 0V12")) "± one standard deviation of its known noise; "
-        (key("held", "M12 2l4 4l-4 4l-4 -4z")) "held out, by a model that has not seen the dwell"
+        (key("held", "M12 2l4 4l-4 4l-4 -4z")) "held out, predicted by a model that was fitted without this dwell"
     }
 }
 
@@ -269,20 +269,20 @@ fn sensor(d: &DiagnosisResult, s: &Shown) -> Markup {
             }
             figcaption {
                 (keys()) "."
-                @if !picture.blocks_s.is_empty() { " Shading changes where the blocks do that are held out." }
-                @if after { " One scale for before and after." }
+                @if !picture.blocks_s.is_empty() { " The shading changes at the borders of the held-out blocks." }
+                @if after { " Before and after have the same scale." }
             }
         }
-        h3 { "What is left against noise" }
+        h3 { "Residuals compared with noise" }
         figure class="whole" {
             div class="figures" { (figures::quantiles(picture, after)) }
             figcaption {
-                "All residuals over their known noise, against what normal noise would give (line; the band holds 95 % of "
-                "each point). Chi-square by the known noise: "
+                "All residuals divided by their known noise, against normal quantiles (line: normal noise; band: 95 % of each "
+                "point). Chi-square with the known noise: "
                 (omnibus(if after { "before" } else { "" }, before))
                 @if after { "; " (omnibus("after", left)) }
-                ". The known noise does not hold what a bias wanders between dwells unless the noise at rest was given: "
-                "the verdict allows for that, and this test does not."
+                ". The known noise includes the wander of a bias between dwells only if the noise at rest was given. "
+                "The verdict allows for this wander; this test does not."
             }
         }
     }
@@ -317,20 +317,20 @@ fn effect(d: &DiagnosisResult, s: &Shown, one: &Accepted, panels: &[Panel]) -> M
             }
             (chance(one.chosen.p))
             " after the whole search."
-            @if !one.of_unit { " No calibration holds it." }
+            @if !one.of_unit { " It is not stored in a calibration." }
         }
         (tables::coefficients(one))
         figure {
             div class="figures" { @for panel in panels { (figures::against(s.picture.sensor, panel)) } }
             figcaption {
-                "Left, what is left plus the part of the effect named (its other parts and the other effects taken out), against "
-                "what it depends on, less what the affine calibration takes up: the mean, and the best straight line where the variable is one that "
-                "it is linear in. " (key("fit", "M0 6H24")) "effect as fitted, with its 95 % band"
+                "Left: residuals plus the named part of the effect (its other parts and the other effects removed), against the "
+                "variable that it depends on, minus the part that the affine calibration absorbs (the mean, and the best straight line if the model is "
+                "linear in the variable). " (key("fit", "M0 6H24")) "fitted effect with its 95 % band"
                 @if let Some(form) = one.effect.form() { " (for the " code { (form.name) } " found)" }
-                ". Right, what is left, on the same scale. " (keys()) "."
+                ". Right: the residuals, on the same scale. " (keys()) "."
                 @if whole {
-                    " Where a row is a whole turn or the magnitude of gravity, the abscissa is what the fit says that the effect does to "
-                    "it beside the affine calibration: points on the diagonal are explained."
+                    " If a residual is that of a whole turn or of the magnitude of gravity, the abscissa is the change that the fitted effect "
+                    "predicts beside the affine calibration: points on the diagonal are explained."
                 }
             }
         }
@@ -342,7 +342,7 @@ fn effect(d: &DiagnosisResult, s: &Shown, one: &Accepted, panels: &[Panel]) -> M
 fn confused(d: &DiagnosisResult) -> Markup {
     html! {
         @if !d.confused.is_empty() {
-            h2 { "What distinguishes the confused ones" }
+            h2 { "Experiments that distinguish the confused effects" }
             dl { @for c in &d.confused {
                 dt { code { (c.ids[0]) } " or " code { (c.ids[1]) } }
                 dd {
@@ -383,14 +383,14 @@ fn method() -> Markup {
     html! {
         h2 { "How it is decided" }
         p {
-            "Every effect of the library and every product of what was recorded up to third order is tried beside the affine "
-            "calibration and judged by the likelihood ratio, with the noise of the residuals estimated anew for each, at a "
-            "probability of chance over the whole search of " (percent(FALSE_LISTED)) " for an effect with a name and "
+            "Every effect of the library, and every product of recorded quantities up to third order, is fitted together with the "
+            "affine calibration and judged by the likelihood ratio. The noise of the residuals is estimated anew for each. Over the "
+            "whole search the probability of a false alarm is " (percent(FALSE_LISTED)) " for a named effect and "
             (percent(FALSE_FOUND)) " for a product, for each sensor. "
-            "It is accepted only if the error of dwells that the model has not seen goes down with it, and if no dwell alone "
-            "holds more than " (percent(LEVERAGE)) " of what it rests on. "
-            "What then scatters beyond the known noise, where chance would do so in " (percent(FALSE_LEFTOVER))
-            " of clean units, is reported as a residual, and the verdict is unexplained whatever was found besides."
+            "An effect is accepted only if it lowers the error of held-out dwells, and if no single dwell "
+            "contains more than " (percent(LEVERAGE)) " of the information about it. "
+            "Scatter beyond the known noise, of a size that chance causes in " (percent(FALSE_LEFTOVER))
+            " of clean units, is reported as a residual, and the verdict is then unexplained, even if effects were found."
         }
     }
 }

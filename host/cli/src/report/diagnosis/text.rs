@@ -20,11 +20,9 @@ use mimu::result::diagnosis::{DiagnosisResult, SecondResult, SensorDiagnosisResu
 use mimu::warning::Warning;
 
 /// Why its figures are not those of `mimu fit`.
-const FIGURES: &str = "The figures before are not quite those of `mimu fit`: residuals are weighted here by the variance components of \
-                       this diagnosis.";
+const FIGURES: &str = "The figures before differ slightly from those of `mimu fit`, because residuals are weighted by the variance components of this diagnosis.";
 /// What is reported of residuals that the biases of usual sensors leave.
-pub(super) const USUAL: &str = "the bias of a usual sensor wanders by up to four times the noise of a dwell; --noise, by `mimu allan` \
-                                of the unit at rest, shows whether this one does";
+pub(super) const USUAL: &str = "usual biases wander by up to four times the noise of a dwell; --noise (from `mimu allan` of the unit at rest) shows whether this one does";
 /// Residuals of a sensor that the summary lists.
 const LISTED: usize = 3;
 
@@ -149,7 +147,7 @@ fn errors(out: &mut String, d: &DiagnosisResult) {
     if d.second.as_ref().is_some_and(|s| s.fitted_to) {
         let _ = writeln!(
             out,
-            "The second recording is the one that was fitted to, and proves nothing."
+            "The second recording is the fitted one, so it proves nothing."
         );
     }
 }
@@ -161,8 +159,8 @@ fn on_second(out: &mut String, second: &SecondResult) {
         "on {}{}\n  {:<8}{:>16}{:>16}{:>16}",
         second.recording,
         match second.fitted_to {
-            true => ", which is the recording that was fitted to",
-            false => ", which nothing was fitted to",
+            true => ", the fitted recording itself",
+            false => ", which was not used for the fit",
         },
         "",
         "before",

@@ -33,7 +33,7 @@ pub fn section(calibration: &Calibration) -> Markup {
                 }
             }
             "."
-            @if over.biases_only { " Only the biases were followed over temperature; scale factors and cross terms are those of one temperature." }
+            @if over.biases_only { " Only the biases depend on temperature; scale factors and cross terms are those of one temperature." }
         }
         figure {
             div class="figures" {
@@ -54,7 +54,7 @@ pub fn section(calibration: &Calibration) -> Markup {
                     }
                 }
             }
-            figcaption { "What each scale factor and bias changes by from the middle of the range. `mimu thermal fit --page` draws them with their intervals." }
+            figcaption { "Change of each scale factor and bias from the middle of the range. `mimu thermal fit --page` draws them with their intervals." }
         }
     }
 }

@@ -29,7 +29,7 @@ pub fn section(noise: &NoiseFile) -> Markup {
                     @if !channels.is_empty() { (drawn(sensor, &channels, noise)) }
                 }
             }
-            figcaption { "Allan deviation by the coefficients in the table: N, B, K and Q; a coefficient that the record does not show is left out." }
+            figcaption { "Allan deviation computed from the coefficients in the table: N, B, K and Q. Coefficients that the record does not show are left out." }
         }
     }
 }

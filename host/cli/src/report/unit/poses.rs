@@ -67,7 +67,7 @@ pub fn figure(prepared: &Prepared, calibration: &Calibration, accel: Option<&Pic
         figure class="whole" {
             div class="figures" { (Panel::ONE.drawing(&format!("{} poses on the sphere of directions", poses.len()), &drawn)) }
             figcaption {
-                (poses.len()) " poses: the direction that is up, in the body frame. Left those with z upward, right with z downward; equal areas, "
+                (poses.len()) " poses: the direction that points up, in the body frame. Left: z upward, right: z downward; equal areas, "
                 "with circles at 45° and 90° from z."
                 @if accel.is_some() { " Orange: the residual is more than " (FAR) " times the noise (" (far) ")." }
             }

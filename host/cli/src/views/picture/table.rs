@@ -25,11 +25,11 @@ pub(super) fn draw_table(
     let sensors = progress.map_or(&[][..], |p| &p.sensors);
     if sensors.is_empty() {
         let why = progress.and_then(|p| p.not_yet.as_deref());
-        let words = why.unwrap_or("nothing is determined yet");
+        let words = why.unwrap_or("nothing determined yet");
         frame.render_widget(text(wrapped(words, inner.width.into())), inner);
         return;
     }
-    let mut lines = vec![Line::raw("      worst of    is   wanted").italic()];
+    let mut lines = vec![Line::raw("      worst of   now   target").italic()];
     for sensor in sensors {
         for aim in &sensor.aims {
             lines.push(aim_line(sensor.sensor.name(), aim));

@@ -109,13 +109,13 @@ fn standing(units: Vec<UnitStanding>) -> Standing {
 fn log() -> Vec<String> {
     [
         "mimu, firmware 0.1.0, unit 1f3a5c7e",
-        "it holds no calibration",
-        "self-test: all sensors answer as their data sheets state",
-        "warm-up: until the temperature changes by less than 0.5 °C/min; leave the unit still",
+        "it stores no calibration",
+        "self-test: all sensors respond as in their data sheets",
+        "warm-up: until the temperature changes by less than 0.5 °C/min; leave the unit at rest",
         "calibration: 12 dwells are planned",
         "waiting: it moves (accel 3.2 times the limit)",
-        "thrown away, once more: it moves (accel 1.8 times the limit)",
-        "waiting: wrong pose: +z face up, 90 degrees off what is wanted",
+        "discarded, repeat: it moves (accel 1.8 times the limit)",
+        "waiting: wrong pose: +z face up, 90 degrees from the requested one",
     ]
     .map(String::from)
     .to_vec()
@@ -194,7 +194,7 @@ fn before_the_first_sample_there_is_a_screen_already() {
 #[test]
 fn a_question_lies_above_all_else_with_its_answers() {
     let (standing, log) = (standing(vec![unit("mimu-1f3a5c7e")]), log());
-    let question = "unplug the board, plug it in again, and say yes; no leaves that out";
+    let question = "unplug the board, plug it in again, and answer yes; no skips this test";
     let shown = Shown {
         question: Some(question),
         ..shown(&standing, &log)

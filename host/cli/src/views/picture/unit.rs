@@ -40,7 +40,7 @@ pub(super) fn draw_unit(frame: &mut Frame, area: Rect, unit: &UnitStanding, stan
         }
         None => Line::raw(format!("rate   {is:+.1} deg/s")),
     });
-    lines.push(rate.unwrap_or_else(|| Line::raw("rate   not known yet")));
+    lines.push(rate.unwrap_or_else(|| Line::raw("rate   unknown yet")));
     lines.push(temperature_line(unit, standing.phase == Phase::WarmUp));
     lines.push(Line::raw(format!(
         "samples {}, {} lost",
@@ -131,7 +131,7 @@ fn capped(value: f64) -> String {
 
 fn tilt_line(unit: &UnitStanding) -> Line<'static> {
     match unit.tilt_deg {
-        None => Line::raw("tilt   no pose is wanted"),
+        None => Line::raw("tilt   no pose requested"),
         Some(tilt) => Line::from(vec![
             Span::raw(format!(
                 "tilt   {tilt:.1} of {} degrees ",

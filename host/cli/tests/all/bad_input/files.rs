@@ -34,12 +34,12 @@ fn a_damaged_text_is_refused_with_its_row() {
         (
             "a cell too many",
             text.replacen('\n', ",\n", 3).into(),
-            &["row 4", "14 cells and the header 15"],
+            &["row 4", "14 cells, the header 15"],
         ),
         (
             "a cell too few",
             lines.join("\n").replacen(",-", "", 1).into(),
-            &["row 2", "13 cells and the header 14"],
+            &["row 2", "13 cells, the header 14"],
         ),
         (
             "a word",
@@ -126,7 +126,7 @@ fn a_place_without_a_recording_is_named() {
     place.fit(&[]).json();
     let file = place.recording().join("samples.csv").display().to_string();
     mimu(["fit", &file]).refused(&["samples.csv", "a recording is a directory", "mimu import"]);
-    mimu(["fit", &place.text("nowhere")]).refused(&["nowhere", "no such directory"]);
+    mimu(["fit", &place.text("nowhere")]).refused(&["nowhere", "the directory does not exist"]);
     fs::create_dir(place.path("bare")).unwrap();
     mimu(["fit", &place.text("bare")]).refused(&["bare", "no recording.toml", "mimu import"]);
     fs::write(place.recording().join("samples.parquet"), "").unwrap();
@@ -417,7 +417,7 @@ fn a_recording_that_does_not_fit_its_calibration_is_told_apart() {
     );
     warned(
         &verify(&by_hand()).json(),
-        &["the recording that the calibration was made from"],
+        &["the calibration was made from this recording"],
     );
     let mut other = fresh.clone();
     other.set("raw_unit", "\"V\"");
@@ -433,7 +433,7 @@ fn a_recording_that_does_not_fit_its_calibration_is_told_apart() {
         let all = blank.all();
         blank.edit(name, all, |_| f64::NAN);
     }
-    verify(&blank).refused(&["nothing to judge"]);
+    verify(&blank).refused(&["no data"]);
 }
 
 #[test]

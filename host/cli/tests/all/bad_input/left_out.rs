@@ -34,7 +34,7 @@ fn what_can_be_left_out_is_named_and_the_result_is_right() {
                     s.rows.insert(i, s.rows[i].clone());
                 }
             },
-            &["3 rows are the same"],
+            &["3 rows repeat the row before"],
         ),
         (
             "a rate that is one per cent off",
@@ -222,7 +222,9 @@ fn temperatures_that_are_none_are_counted_in_the_same_words_by_every_command() {
     let place = Place::with(&samples);
     let (recording, calibration) = (place.text("rec"), place.text("cal.toml"));
     let words = |of: usize| {
-        format!("30 of {of} values are no temperatures in °C, the first is -7049 at {first:.1} s")
+        format!(
+            "30 of {of} values cannot be temperatures in °C, the first is -7049 at {first:.1} s"
+        )
     };
     let all = samples.rows.len();
     let warned = |arguments: &[&str], of: usize| {

@@ -24,19 +24,19 @@ fn what_only_its_owner_can_judge_is_a_warning() {
             "two axes of the gyro swapped",
             by_hand,
             |s| swap(s, "gyro_x", "gyro_y"),
-            &["gyro: the axes come out left-handed"],
+            &["gyro: the axes are left-handed"],
         ),
         (
             "the same on the table",
             on_table,
             |s| swap(s, "gyro_x", "gyro_y"),
-            &["gyro: the axes come out left-handed"],
+            &["gyro: the axes are left-handed"],
         ),
         (
             "two axes of the accelerometer swapped",
             by_hand,
             |s| swap(s, "accel_x", "accel_y"),
-            &["gyro: its axes are turned by 180 degrees"],
+            &["gyro: its axes are rotated by 180 degrees"],
         ),
         (
             "all axes of the gyro in another order",
@@ -45,7 +45,7 @@ fn what_only_its_owner_can_judge_is_a_warning() {
                 swap(s, "gyro_x", "gyro_y");
                 swap(s, "gyro_y", "gyro_z");
             },
-            &["gyro: its axes are turned by 121 degrees against those of the ref_ columns"],
+            &["gyro: its axes are rotated by 121 degrees relative to those of the ref_ columns"],
         ),
         (
             "degrees for radians",
@@ -67,7 +67,7 @@ fn what_only_its_owner_can_judge_is_a_warning() {
             "nothing but poses on the table",
             || on_table_at(&[0.0], &[0, 1, 2]),
             |_| {},
-            &["gyro: all dwells have the same input, so it is not calibrated"],
+            &["gyro: not calibrated: all dwells have the same input"],
         ),
     ];
     for (name, base, damage, words) in cases {
@@ -137,7 +137,7 @@ fn a_sensor_that_is_not_there_cannot_be_fitted_alone() {
     assert!(place.fit(&[]).json()["sensors"]["gyro"].is_null());
     place
         .fit(&["--only", "gyro"])
-        .refused(&["samples.csv", "no gyro", "fit the other one"]);
+        .refused(&["samples.csv", "no gyro", "fit the other sensor"]);
     let result = Place::with(&on_table()).fit(&["--only", "accel"]).json();
     assert!(result["sensors"]["gyro"].is_null() && distance(&result, "accel") < 2.0);
 }

@@ -151,7 +151,11 @@ fn what_cannot_be_right_is_refused_in_one_line_and_leaves_no_file() {
             "poses about one axis",
             || by_hand_at(20, 1, |_| [1.0, 0.0, 0.0]),
             |_| {},
-            &["accel", "one plane across x", "x up, down and slanted"],
+            &[
+                "accel",
+                "one plane perpendicular to x",
+                "x up, down and slanted",
+            ],
         ),
         (
             "no rates about z",

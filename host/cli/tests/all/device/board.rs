@@ -156,7 +156,7 @@ fn a_session_from_the_greeting_to_a_killed_recording() {
     assert!(info["stored"].is_null());
     bench
         .run(&place, &["device", "stream", "compensated"])
-        .refused(&["holds no calibration", "mimu device upload"]);
+        .refused(&["stores no calibration", "mimu device upload"]);
 
     raw_stream(&bench, &place);
     let models = forward(&truth);
@@ -316,7 +316,7 @@ fn killed(bench: &Bench, place: &Place) {
     let samples = place.path("cut/samples.csv");
     let until = Instant::now() + Duration::from_secs(120);
     while std::fs::metadata(&samples).map_or(0, |m| m.len()) < 75_000 {
-        assert!(Instant::now() < until, "nothing is recorded");
+        assert!(Instant::now() < until, "nothing was recorded");
         std::thread::sleep(Duration::from_millis(2));
     }
     // Time stands still as soon as nobody has the port open.

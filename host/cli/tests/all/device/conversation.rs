@@ -153,7 +153,7 @@ fn a_refused_upload_says_what_the_device_holds() {
         &place,
         &["device", "download", "-o", "x.toml", "--port", &empty.path],
     )
-    .refused(&["holds no calibration"]);
+    .refused(&["stores no calibration"]);
     assert!(!place.path("x.toml").exists());
 }
 
@@ -240,11 +240,11 @@ fn samples_that_carry_a_flag_are_counted_and_told() {
     let text = mimu(&place, &record);
     let all = text.stdout + &text.stderr;
     assert!(
-        all.contains("500 samples whose temperature leaves gyro y out"),
+        all.contains("500 samples whose temperature ignores gyro y"),
         "{all}"
     );
     assert!(
-        all.contains("500 samples of a device that does not know"),
+        all.contains("500 samples without a known power-on"),
         "{all}"
     );
 }
@@ -317,7 +317,7 @@ fn the_compensated_stream_is_compared_sample_by_sample() {
             &[&fixed[..], &["--port", &peer.path, "--json", "-"]].concat(),
         );
         if bent > 0.0 {
-            run.refused(&["otherwise than the PC"]);
+            run.refused(&["differs from the PC's"]);
             continue;
         }
         let result = run.json();

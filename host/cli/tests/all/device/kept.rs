@@ -56,10 +56,10 @@ fn a_calibration_of_no_known_unit_is_stored_with_a_warning() {
     let unknown = place.calibration("V", "");
     let stored = device(&place, &peer, &["upload", &unknown, "--json", "-"]).json();
     let warning = stored["warnings"][0].as_str().unwrap();
-    assert!(warning.contains("of which unit"), "{warning}");
+    assert!(warning.contains("the number of its unit"), "{warning}");
     assert!(stored["unit_id"].is_null());
     let shown = device(&place, &peer, &["info"]).stdout;
-    assert!(shown.contains("of no known unit, made 2026"), "{shown}");
+    assert!(shown.contains("of an unknown unit, made 2026"), "{shown}");
 }
 
 #[test]
@@ -105,14 +105,14 @@ fn a_file_with_half_of_its_uncertainty_is_refused() {
     let lines = whole.lines().filter(|l| !l.starts_with("sigma_o"));
     std::fs::write(&file, lines.collect::<Vec<_>>().join("\n")).unwrap();
     let refused = device(&place, &peer, &["upload", "cal.toml"]);
-    refused.refused(&["[gyro]", "sigma_C is there and sigma_o is not", "cut"]);
+    refused.refused(&["[gyro]", "it has sigma_C but not sigma_o", "cut"]);
     std::fs::write(
         &file,
         whole.replacen("device", "unit_id = \"12\"\ndevice", 1),
     )
     .unwrap();
     let refused = device(&place, &peer, &["upload", "cal.toml"]);
-    refused.refused(&["unit_id", "\"12\" is no number of a unit", "24 hexadecimal"]);
+    refused.refused(&["unit_id", "\"12\" is not a unit's number", "24 hexadecimal"]);
 }
 
 /// A calibration of an earlier layout, which no program reads any more.

@@ -78,7 +78,7 @@ fn silence_garbage_and_another_protocol_are_told_apart() {
 fn a_port_that_cannot_be_opened_is_named_with_the_reason() {
     let place = Place::new();
     mimu(&place, &["device", "info", "--port", "/nowhere/ttyACM9"])
-        .refused(&["/nowhere/ttyACM9", "no such port"]);
+        .refused(&["/nowhere/ttyACM9", "the port does not exist"]);
     let file = place.calibration("V", "");
     mimu(&place, &["device", "info", "--port", &file]).refused(&["not a serial port"]);
 

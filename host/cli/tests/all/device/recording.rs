@@ -188,7 +188,7 @@ fn a_killed_recording_is_there_up_to_the_last_second() {
     let until = Instant::now() + Duration::from_secs(60);
     let samples = place.path("rec/samples.csv");
     while std::fs::metadata(&samples).map_or(0, |m| m.len()) < 150_000 {
-        assert!(Instant::now() < until, "nothing is recorded");
+        assert!(Instant::now() < until, "nothing was recorded");
         std::thread::sleep(Duration::from_millis(5));
     }
     let sent = peer.seen.lock().unwrap().next;
@@ -202,7 +202,7 @@ fn a_killed_recording_is_there_up_to_the_last_second() {
     assert!(last + 1000.0 > f64::from(sent), "{last} of {sent}");
     assert!(recording.manifest.unfinished);
     let warning = recording.warnings[0].to_string();
-    assert!(warning.contains("not ended"), "{warning}");
+    assert!(warning.contains("unfinished"), "{warning}");
 
     // A power failure may leave half a row, whose last number reads like a whole one.
     let whole = std::fs::read(&samples).unwrap();
@@ -315,7 +315,7 @@ fn ctrl_c_ends_a_recording_and_does_not_cut_it() {
     let mut child = start(&place, &["record", "--port", &peer.path, "-o", "rec"]);
     let until = Instant::now() + Duration::from_secs(60);
     while std::fs::metadata(place.path("rec/samples.csv")).map_or(0, |m| m.len()) < 100_000 {
-        assert!(Instant::now() < until, "nothing is recorded");
+        assert!(Instant::now() < until, "nothing was recorded");
         std::thread::sleep(Duration::from_millis(5));
     }
     let pid = child.id().to_string();
@@ -421,7 +421,7 @@ fn a_plan_by_time_gives_every_sample_of_a_dwell_its_input() {
         "plan.toml",
     ];
     let nothing = mimu(&place, &record);
-    nothing.refused(&["--plan", "begins and ends", "--transit"]);
+    nothing.refused(&["--plan", "beginnings and ends", "--transit"]);
     let by_time = [&record[..], &["--transit", "250ms", "--json", "-"]].concat();
     let result = mimu(&place, &by_time).json();
     assert_eq!(

@@ -175,7 +175,7 @@ fn a_device_that_loses_its_power_ends_it_and_what_stands_is_kept() {
     );
     plan(&place, &format!("{UP}dwell_s = 600.0\n"));
     let ran = mimu(&place, &arguments(&peer, "rec"));
-    ran.refused(&["a recording is of one power-on", "0 of 1 dwells"]);
+    ran.refused(&["a recording has one power-on", "0 of 1 dwells"]);
     let told = equipment.told();
     assert_eq!(told[told.len() - 2..], ["STOP", "CHAMBER 25.000000"]);
     let manifest = Manifest::read(&place.path("rec/recording.toml")).unwrap();
@@ -235,7 +235,7 @@ fn an_interrupted_procedure_is_a_recording_that_says_it_is_cut_short() {
     let told = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(1), "{told}");
     assert!(
-        told.contains("it was interrupted, and is cut short"),
+        told.contains("it was interrupted and is incomplete"),
         "{told}"
     );
     let all = equipment.told();

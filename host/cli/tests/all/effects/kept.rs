@@ -97,7 +97,7 @@ fn the_other_commands_take_what_was_fetched_and_say_what_they_lack() {
 
     let lacks = |found: &serde_json::Value| {
         let warnings = found["warnings"].to_string();
-        warnings.contains("does not say how well it is known")
+        warnings.contains("has no uncertainty")
     };
     assert!(lacks(&run(&["diagnose", &flawed], "kept.toml")));
     assert!(!lacks(&run(&["diagnose", &flawed], "made.toml")));

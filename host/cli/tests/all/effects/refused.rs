@@ -29,7 +29,7 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
             "id = \"gyro_warm_up\"",
             "id = \"gyro_magnetic\"",
             "gyro_magnetic",
-            "knows no effect",
+            "does not know an effect",
         ),
         (
             "id = \"gyro_warm_up\"",
@@ -47,7 +47,7 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
             "{ name = \"y\", value",
             "{ name = \"w\", value",
             "gyro_warm_up",
-            "is none of its: x, y, z",
+            "those it has: x, y, z",
         ),
         (
             "{ name = \"y\", value",

@@ -127,7 +127,7 @@ fn the_terminal_is_given_back_after_the_end_by_a_key_and_by_control_c() {
         assert!(entered < left, "{seen:?}");
         let rest = &seen[left..];
         assert!(
-            rest.contains("ended; the same command goes on from here"),
+            rest.contains("ended; the same command resumes here"),
             "{rest:?}"
         );
         assert_eq!(code, Some(0), "{seen:?}");
@@ -151,7 +151,7 @@ fn the_terminal_is_given_back_before_an_error_is_told() {
     let (seen, same, code) = Sitting::begin([80, 24], &arguments).end();
     let left = seen.rfind(LEFT).unwrap();
     assert!(seen.contains(ENTERED) && same, "{seen:?}");
-    assert!(seen[left..].contains("there is no such port"), "{seen:?}");
+    assert!(seen[left..].contains("the port does not exist"), "{seen:?}");
     assert_ne!(code, Some(0));
 }
 

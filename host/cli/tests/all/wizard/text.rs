@@ -164,7 +164,7 @@ fn columns_that_are_missing_are_one_line_before_any_port_is_opened() {
     let out = command.args(arguments.split(' ')).output().unwrap();
     let said = String::from_utf8_lossy(&out.stderr);
     assert!(
-        !out.status.success() && said.contains("there is no gz"),
+        !out.status.success() && said.contains("gz is missing"),
         "{said}"
     );
 }

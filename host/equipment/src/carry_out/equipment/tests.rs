@@ -179,7 +179,7 @@ fn what_the_drivers_lack_is_said_before_anything_moves() {
     let over = "[[step]]\nup = [0.0, 0.0, -1.0]\ndwell_s = 1.0\n";
     let cases: [(&str, &[&Scripted], &str); 11] = [
         (&moves, &[&chamber], "chamber.toml has none"),
-        (&moves, &[], "there is no driver"),
+        (&moves, &[], "no driver is given"),
         (&moves, &[&table], "table.toml has none"),
         (&moves, &[&table, &all], "has `move` too"),
         (&moves, &[&chamber, &all], "has [chamber] too"),
@@ -188,7 +188,7 @@ fn what_the_drivers_lack_is_said_before_anything_moves() {
         (&fast, &[&all], "rate_dps = 100"),
         (&swift, &[&all], "turn_dps = 30"),
         (over, &[&all], "middle_deg = 120"),
-        (REST, &[&table], "take a chamber"),
+        (REST, &[&table], "need a chamber"),
     ];
     for (steps, drivers, words) in cases {
         let Err(error) = equipped(&warm(steps), drivers) else {

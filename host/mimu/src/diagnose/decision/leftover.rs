@@ -60,10 +60,10 @@ impl fmt::Display for Against {
             Self::Effect(id) => f.write_str(id),
             Self::Reading => f.write_str("reading"),
             Self::Time => f.write_str("time: the bias wanders"),
-            Self::Nothing => f.write_str("no quantity recorded: the dwells do not repeat"),
+            Self::Nothing => f.write_str("no recorded quantity: the dwells do not repeat"),
             Self::Noisier(times) => write!(
                 f,
-                "no quantity recorded: within the dwells it is {} times as noisy as the noise file says",
+                "no recorded quantity: within the dwells it is {} times as noisy as the noise file says",
                 significant(*times)
             ),
         }

@@ -45,11 +45,11 @@ pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> V
         };
         let axes: Vec<&str> = parts.iter().map(|p| AXES[p.axis]).collect();
         let found = format!(
-            "{id} ({}): {} does as well, as the input along the axis hardly changes in this recording",
+            "{id} ({}): {} fits as well, because the input along the axis hardly changes in this recording",
             axes.join(", "),
             rival.id
         );
-        let advice = "at other inputs the two differ, and the calibration holds the first";
+        let advice = "at other inputs the two differ; the calibration contains the first";
         notes.push(Note::new(found, advice));
         let others = &mut kept[i].alternatives;
         others.retain(|o| o.id != rival.id);

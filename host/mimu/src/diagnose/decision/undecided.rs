@@ -51,9 +51,9 @@ pub(super) fn undecided(search: &Search, kept: &[Chosen]) -> Vec<Undecided> {
             all.push(Undecided {
                 id,
                 sensor,
-                law: "steps at some readings of an axis, as codes that never come,",
+                law: "steps at some readings of an axis, as from missing codes,",
                 difference,
-                experiment: "inputs a few noises apart, where the error changes: a step changes it at once",
+                experiment: "inputs that differ by a few times the noise, where the error changes: a step changes it at once",
             });
         }
     }

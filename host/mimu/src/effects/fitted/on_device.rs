@@ -29,10 +29,12 @@ pub enum NotOnDevice {
 impl fmt::Display for NotOnDevice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::NoLaw => "no device removes this effect",
-            Self::NoFactor => "no device knows a factor of it",
-            Self::Jump => "a bias that has jumped once says nothing of the time after it",
-            Self::Numbers => "its numbers make no sense to the device",
+            Self::NoLaw => "devices do not remove this effect",
+            Self::NoFactor => "it has a factor that devices do not know",
+            Self::Jump => {
+                "a bias that has jumped once may jump again, so the jump cannot be removed later"
+            }
+            Self::Numbers => "its numbers are invalid for the device",
         })
     }
 }

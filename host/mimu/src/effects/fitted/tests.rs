@@ -149,7 +149,7 @@ fn an_effect_that_is_found_again_adds_to_what_is_known() {
         coded()
             .join(&mut all)
             .unwrap_err()
-            .contains("an axis has one")
+            .contains("an axis has only one")
     );
 }
 

@@ -163,7 +163,7 @@ impl WrittenConverter {
             };
             if ours.is_empty() {
                 return Err(format!(
-                    "a converter: axes is {:?}, and has to be x, y, z or xyz",
+                    "a converter: axes is {:?}; write x, y, z or xyz",
                     one.axes
                 ));
             }
@@ -178,7 +178,7 @@ impl WrittenConverter {
                 ))
             } else if !(zero.abs() <= farthest) {
                 let why = format!(
-                    "has to be from {:e} to {farthest:e}: farther, readings of single precision do not tell codes apart",
+                    "has to be from {:e} to {farthest:e}: beyond, single precision does not distinguish the codes",
                     -farthest
                 );
                 Some(("reading_of_code_0_raw", zero, why))
@@ -212,7 +212,7 @@ impl WrittenEffect {
     /// What it states, or what is wrong.
     fn read(self) -> Result<FittedEffect, String> {
         let candidate = candidate(&self.id);
-        let mut candidate = candidate.ok_or("this program knows no effect of this id")?;
+        let mut candidate = candidate.ok_or("this version does not know an effect of this id")?;
         if self.formula != FORMULA || self.direction != DIRECTION {
             return Err(format!(
                 "formula {:?}, direction {:?}: only {FORMULA:?}, {DIRECTION}, can be applied",
@@ -233,7 +233,7 @@ impl WrittenEffect {
             (Some(name), _) => return Err(format!("form has to be {name}, a positive number")),
             (None, Some(f)) => {
                 return Err(format!(
-                    "form {:?} is there, and an effect of this id has none now",
+                    "form is {:?}, and an effect of this id has none now",
                     f.name
                 ));
             }
@@ -244,7 +244,7 @@ impl WrittenEffect {
             let Some(at) = known.iter().position(|(name, _)| *name == c.name) else {
                 let names: Vec<&str> = known.iter().map(|(name, _)| name.as_str()).collect();
                 return Err(format!(
-                    "coefficient {:?} is none of its: {}",
+                    "it has no coefficient {:?}; those it has: {}",
                     c.name,
                     names.join(", ")
                 ));
@@ -261,7 +261,7 @@ impl WrittenEffect {
                 return Err(format!("value or sigma of {:?} is not a number", c.name));
             }
             if numbers[at].replace((c.value, c.sigma)).is_some() {
-                return Err(format!("coefficient {:?} is there twice", c.name));
+                return Err(format!("coefficient {:?} occurs twice", c.name));
             }
         }
         candidate.active.retain(|k| numbers[*k].is_some());
@@ -272,7 +272,9 @@ impl WrittenEffect {
         match (candidate.reads_code(), self.converters.is_empty()) {
             (true, true) => return Err("it has no converters".into()),
             (false, false) => {
-                return Err("it has converters, and is no effect of their codes".into());
+                return Err(
+                    "it has converters, although the effect does not depend on their codes".into(),
+                );
             }
             _ => {}
         }

@@ -59,13 +59,13 @@ impl DwellNoise {
         if channels.is_empty() {
             return Err(Error::new(
                 &file.place,
-                format!("there is no channel of the {sensor}"),
-                "run mimu allan on a recording that has it",
+                format!("it has no channel of the {sensor}"),
+                "run `mimu allan` on a recording that has this channel",
             ));
         }
         for channel in channels {
             let model = channel.model_in(sensor.unit()).map_err(|other| {
-                let problem = format!("it is in {} and not in {}", other.found, sensor.unit());
+                let problem = format!("its unit is {}, not {}", other.found, sensor.unit());
                 other.refused(format!("{}, channel {}", file.place, channel.name), problem)
             })?;
             let AllanModel {
@@ -207,7 +207,7 @@ impl Session {
             None => Err(Error::new(
                 format!("budget of {} min", self.time_s / 60.0),
                 format!("{least} dwells of {SHORTEST_S} s and the moves between them take longer"),
-                "allow more time, or a table that moves faster",
+                "allow more time, or use a table that moves faster",
             )),
         }
     }

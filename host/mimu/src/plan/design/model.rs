@@ -88,7 +88,7 @@ impl FromStr for Terms {
                 None if name == "affine" => {}
                 None => {
                     return Err(format!(
-                        "there is no term {name:?}: affine, quadratic, cubic, cross, g-sensitivity"
+                        "{name:?} is not a term; write affine, quadratic, cubic, cross or g-sensitivity"
                     ));
                 }
             }

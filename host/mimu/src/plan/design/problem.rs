@@ -53,7 +53,7 @@ impl Problem {
         let holds = match fixture {
             Fixture::ThreeAxis | Fixture::Faces => None,
             Fixture::TwoAxis => Some("a two-axis table holds a rate about one body axis only"),
-            Fixture::Hand => Some("by hand there is no known rate, only turns between dwells"),
+            Fixture::Hand => Some("by hand no rate is known, only turns between dwells"),
         };
         match holds {
             None => Self::new(Reach {
@@ -74,8 +74,8 @@ impl Problem {
         if reach.model.feels_force() && reach.model.sensor == Sensor::Accel {
             return Err(Error::new(
                 "accel",
-                "g-sensitivity is what a gyro makes of force",
-                "leave it out, or design for the gyro",
+                "g-sensitivity is an error of gyros",
+                "leave the term out, or design for the gyro",
             )
             .about(Argument::Sensor));
         }
@@ -197,7 +197,7 @@ fn undetermined(reach: &Reach, rows: &Rows) -> Error {
         return Error::new(
             place,
             problem,
-            "leave out terms that are hard to tell apart",
+            "leave out terms that are hard to distinguish",
         );
     }
     let of = match reach.model.reference {
@@ -207,7 +207,7 @@ fn undetermined(reach: &Reach, rows: &Rows) -> Error {
     Error::undetermined(
         place,
         format!(
-            "{of} on the table {} cannot tell apart {}",
+            "{of} on the table {} cannot distinguish {}",
             reach.fixture.name(),
             names.join(", ")
         ),

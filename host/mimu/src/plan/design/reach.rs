@@ -114,7 +114,7 @@ impl FromStr for RateList {
         let rate = |t: &str| match t.trim().parse::<f64>() {
             Ok(r) if (1e-3..=1e5).contains(&r) => Ok(r),
             _ => Err(format!(
-                "{t:?} is no rate from 0.001 to 100000 deg/s: write 10,100,300 or ..300"
+                "{t:?} is not a rate from 0.001 to 100000 deg/s: write 10,100,300 or ..300"
             )),
         };
         if let Some(largest) = text.strip_prefix("..") {

@@ -83,13 +83,10 @@ impl Scheme {
     pub fn assumed(self) -> Option<&'static str> {
         match self {
             Self::Niu8 => Some(
-                "the figure with the sequence is not in the text: of eight quarter turns, only cycles \
-                 with z down four times and x and y up and down once each reach the five poses and \
-                 turn both ways about each axis; in those x and y point the same way in all their \
-                 turns, as the appendix has it, and z does not",
+                "the text lacks the figure with the sequence. Of eight quarter turns, only cycles with z down four times and x and y up and down once each reach the five poses and turn both ways about each axis. In these cycles x and y point the same way in all their turns, as in the appendix; z does not",
             ),
             Self::XuRates => {
-                Some("rates are taken as shares of each gyro's range: 300, 300 and 3600 deg/s")
+                Some("rates are fractions of each gyro's range: 300, 300 and 3600 deg/s")
             }
             _ => None,
         }
@@ -120,7 +117,7 @@ impl Scheme {
             }
             (Self::XuRates, Sensor::Gyro) => return Ok(xu_rates()),
             (Self::Xu33 | Self::Niu8, Sensor::Gyro) => {
-                return self.refuse("of rest: it turns no gyro", "accel");
+                return self.refuse("of rests, without rates for a gyro", "accel");
             }
             (Self::XuRates, Sensor::Accel) => return self.refuse("of rates", "gyro"),
         };

@@ -15,10 +15,10 @@ impl Answer {
         // By hand a unit is left where it lies for several dwells, which are one step of the plan.
         let each = match done.hold {
             1 => format!("{dwell_s} s a dwell"),
-            n => format!("left for {n} dwells of {dwell_s} s in each before it is turned by hand"),
+            n => format!("hold each for {n} dwells of {dwell_s} s, then turn by hand to the next"),
         };
         let go = format!(
-            "for {minutes:.0} min go through {states} states again and again in a randomised order, {each}"
+            "repeat the {states} states in a randomised order for {minutes:.0} min, {each}"
         );
         let how = match done.recipe.course {
             Course::Dwells => format!(
@@ -27,11 +27,10 @@ impl Answer {
                 done.size
             ),
             Course::ColdStart => format!(
-                "Let the unit cool down switched off, switch it on and start to record at once; {go}"
+                "Switch the unit off and let it cool down. Start to record when you switch it on, and {go}"
             ),
             Course::Chamber => format!(
-                "Put the unit into a chamber, switch it on and start to record at once; {go}, while the chamber goes from {} °C \
-                 at 2 °C a minute, staying {} min at each; record temp_c as well, the temperature of the unit and not of the chamber",
+                "Put the unit into a chamber. Start to record when you switch it on, and {go}, while the chamber goes from {} °C at 2 °C a minute and stays {} min at each; record temp_c too, the temperature of the unit, not that of the chamber",
                 course_of(done),
                 shown(SOAK_S / 60.0)
             ),
@@ -39,8 +38,7 @@ impl Answer {
         let mut words = format!("{how}: {}.", inputs(setup, done.recipe.inputs));
         for p in self.predictions.iter().filter(|p| !p.done()) {
             words += &format!(
-                " Even this leaves {} with a sigma of {:.0} % of its size, where {:.0} % are wanted: make the dwells longer, or take \
-                 several such recordings.",
+                " Even then the sigma of {} is {:.0} % of its typical size, and {:.0} % are wanted: make the dwells longer, or make several such recordings.",
                 p.id,
                 100.0 * p.share,
                 100.0 * p.wanted

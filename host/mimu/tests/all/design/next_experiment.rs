@@ -61,7 +61,7 @@ fn every_error_that_is_none_of_a_converter_has_a_recipe_that_shows_it() {
         let shown = shown.unwrap_or_else(|| panic!("{}: no recipe", effect.id));
         let words = shown.words(&setup);
         println!("{}: {words}\n", effect.id);
-        assert_eq!(words.contains("Even this"), !shown.done(), "{words}");
+        assert_eq!(words.contains("Even then"), !shown.done(), "{words}");
         assert!(shown.done() || !effect.is_error(), "{}: {words}", effect.id);
     }
 }
@@ -137,7 +137,7 @@ fn what_depends_on_time_begins_cold_and_what_depends_on_temperature_goes_up_and_
     assert!(
         warm_up
             .words(&setup)
-            .starts_with("Let the unit cool down switched off")
+            .starts_with("Switch the unit off and let it cool down")
     );
     for id in ["gyro_thermal_bias", "gyro_thermal_lag"] {
         let chamber = answer(&setup, id).unwrap().experiment.chamber_c;

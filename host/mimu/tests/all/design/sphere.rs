@@ -278,7 +278,7 @@ fn approached_or_refused(list: &str, fixture: Fixture, reference: Reference) {
         }
         Err(refused) => {
             assert!(
-                refused.refused().problem.contains("tell apart"),
+                refused.refused().problem.contains("distinguish"),
                 "{what}: {refused}"
             );
             let known = fixture == Fixture::Faces

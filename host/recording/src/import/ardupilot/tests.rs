@@ -170,13 +170,13 @@ fn a_cut_or_damaged_log_is_read_as_far_as_it_is_whole_and_does_not_panic() {
         all[0]
             .warnings
             .iter()
-            .any(|w| w.contains("belong to no record")),
+            .any(|w| w.contains("do not belong to a record")),
         "{:?}",
         all[0].warnings
     );
     for other in [&b"ms,x,y\n"[..], b"", &[0; 4000]] {
         std::fs::write(&path, other).unwrap();
         let error = open(&path, None, None).unwrap_err().to_string();
-        assert!(error.contains("no DataFlash log"), "{error}");
+        assert!(error.contains("not a DataFlash log"), "{error}");
     }
 }

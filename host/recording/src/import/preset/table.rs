@@ -19,8 +19,8 @@ const LOGGED_ACCEL: &str = "t_s=time,accel_x=x,accel_y=y,accel_z=z";
 const fn without_gravity(file: &'static str) -> Layout {
     Layout {
         unfit: Some([
-            "it has the acceleration without gravity, or gravity without the acceleration: what the phone makes of its sensors, and no reading",
-            "record and give AccelerometerUncalibrated.csv, or TotalAcceleration.csv",
+            "it contains the acceleration without gravity, or gravity alone: estimates of the phone, not readings of a sensor",
+            "record AccelerometerUncalibrated.csv or TotalAcceleration.csv, and import that file",
         ]),
         ..sensor_logger(file, LOGGED_ACCEL)
     }
@@ -91,7 +91,7 @@ pub(super) const PRESETS: [Preset; 7] = [
     // back a phone reads -1 on z, where its specific force is +g. Rates of rotation have the same sign on both.
     Preset {
         name: "sensor-logger-ios",
-        title: "Sensor Logger on iOS, as it is without standardised units and frames",
+        title: "Sensor Logger on iOS, without standardised units and frames",
         raw_unit: Some(RawUnit::Si),
         layouts: &[
             sensor_logger("GyroscopeUncalibrated.csv", LOGGED_GYRO),
@@ -134,7 +134,7 @@ pub(super) const PRESETS: [Preset; 7] = [
             ),
             Layout {
                 unfit: Some([
-                    "it has the acceleration without gravity, which is no reading of a sensor",
+                    "it contains the acceleration without gravity, which is not a reading of a sensor",
                     "record the experiment \"Acceleration (with g)\"",
                 ]),
                 ..Layout::of(
@@ -212,8 +212,8 @@ pub(super) const PRESETS: [Preset; 7] = [
         ],
         in_folder: &[],
         apart: Some([
-            "the gyro of rs-imu-calibration.py was recorded in the last of the six directions only, and joined to it the accelerometer has no other either",
-            "import each file by itself",
+            "rs-imu-calibration.py keeps the gyro's readings of the last of the six directions only, so a joined file has only that direction",
+            "import each file separately",
         ]),
         beside: None,
     },

@@ -98,12 +98,12 @@ impl Parameters {
         let as_they_are = |why: String| Undone {
             values: readings.to_vec(),
             said: "after PX4's calibration".into(),
-            warnings: vec![format!(
-                "{why}: the readings are as PX4 has calibrated them"
-            )],
+            warnings: vec![format!("{why}: PX4's calibration is not undone")],
         };
         if devices.is_empty() {
-            return as_they_are("the log does not say which device its calibration is of".into());
+            return as_they_are(
+                "the log does not name the device that its calibration belongs to".into(),
+            );
         }
         if self.epochs.is_empty() {
             return as_they_are("the log has no parameters".into());
@@ -154,7 +154,7 @@ impl Parameters {
             .any(|(_, values)| values.get(sensor.thermal()) == Some(&1.0))
         {
             warnings.push(format!(
-                "PX4's compensation over temperature is on ({}), and is not undone",
+                "PX4's compensation over temperature is on ({}) and is not undone",
                 sensor.thermal()
             ));
         }
@@ -207,7 +207,7 @@ fn correction(
     };
     let Some(rotation) = rotation else {
         return Err(
-            "the mounting of the board (SENS_BOARD_ROT, CAL_..._ROT) is not known here".into(),
+            "the mounting of the board (SENS_BOARD_ROT, CAL_..._ROT) is unknown here".into(),
         );
     };
     let name = match own {
@@ -216,7 +216,7 @@ fn correction(
             listed(offset),
             listed(scale)
         ),
-        None => format!("device {device}, which PX4 has no calibration of"),
+        None => format!("device {device}, for which PX4 has no calibration"),
     };
     Ok((
         Correction {

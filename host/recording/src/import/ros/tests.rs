@@ -98,7 +98,7 @@ fn a_bag_that_was_not_closed_is_refused() {
     let other = folder.path().join("other.db3");
     std::fs::write(&other, "a,b\n1,2\n").unwrap();
     let error = open(&other, None).unwrap_err().to_string();
-    assert!(error.contains("no SQLite file"), "{error}");
+    assert!(error.contains("not an SQLite file"), "{error}");
     let several = open(&fixture("imu.db3"), None).unwrap_err().to_string();
     assert!(
         several.contains("/imu/raw") && !several.contains("/chatter"),

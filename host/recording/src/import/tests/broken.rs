@@ -35,7 +35,7 @@ fn all_kinds_of_broken_rows_are_named_at_once_and_the_option_that_leaves_them_ou
     assert!(text.contains("a.txt, row 12, column gyro_y"), "{text}");
     assert!(text.contains("5 of 200 rows are broken"), "{text}");
     for kind in [
-        "2 with a cell that is no reading (rows 12, 52)",
+        "2 with a cell that is not a reading (rows 12, 52)",
         "2 with another number of cells (rows 13, 152)",
         "1 with no time (row 92)",
     ] {
@@ -109,7 +109,7 @@ fn where_no_row_fits_the_first_line_of_data_is_named_with_what_is_wrong_with_it(
     let error = one("a,b,c,d\nx,y,z,w,v\n", NAMES).unwrap_err();
     let text = error.to_string();
     assert!(
-        text.contains("a.txt, row 1: ") && text.contains("it holds words"),
+        text.contains("a.txt, row 1: ") && text.contains("it contains words"),
         "{text}"
     );
 }

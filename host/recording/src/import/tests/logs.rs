@@ -53,7 +53,7 @@ fn what_does_not_go_with_a_log_is_refused() {
     assert!(
         bench
             .refused(&options)
-            .contains("messages of a log have none")
+            .contains("messages of a log have no columns")
     );
     options.filters.clear();
     options.columns = vec!["t_s,accel_x,accel_y,accel_z".parse().unwrap()];
@@ -63,7 +63,7 @@ fn what_does_not_go_with_a_log_is_refused() {
             .contains("list of columns is given for a log")
     );
     let (bench, options) = log("flight.ulg", ARDUPILOT);
-    assert!(bench.refused(&options).contains("no ULog"));
+    assert!(bench.refused(&options).contains("not a ULog"));
 }
 
 #[test]

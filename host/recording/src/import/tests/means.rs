@@ -61,7 +61,7 @@ fn what_is_missing_or_wrong_in_a_table_of_means_is_named() {
         (
             TABLE.into(),
             LIST.replace("averaged=n,", ""),
-            "accel_x_sd, and not of how many samples",
+            "accel_x_sd, but not the number of samples",
         ),
         (
             TABLE.into(),
@@ -76,12 +76,12 @@ fn what_is_missing_or_wrong_in_a_table_of_means_is_named() {
         (
             with("250", "2.5"),
             LIST.into(),
-            "row 3, column averaged: 2.5 is no number of samples",
+            "row 3, column averaged: 2.5 is not a number of samples",
         ),
         (
             with("250", ""),
             LIST.into(),
-            "row 3, column averaged: it is empty, and accel_x is not",
+            "row 3, column averaged: it is empty, but accel_x is not",
         ),
         (
             with("1,5", ""),
@@ -96,7 +96,7 @@ fn what_is_missing_or_wrong_in_a_table_of_means_is_named() {
     // A table of means is not taken for samples.
     let error = one_refused("1,2,3,4\n", "accel_x,accel_y,accel_z,averaged");
     assert!(
-        error.contains("column averaged is of a table of means"),
+        error.contains("column averaged belongs to a table of means"),
         "{error}"
     );
     // And samples are not without their rate.

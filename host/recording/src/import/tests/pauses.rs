@@ -100,14 +100,14 @@ fn pauses_that_contradict_other_steps_are_refused() {
     assert!(
         bench
             .refused(&options)
-            .contains("turns are not parted by pauses")
+            .contains("pauses do not separate turns")
     );
     options.inputs = None;
     options.sequence = true;
-    assert!(bench.refused(&options).contains("steps already"));
+    assert!(bench.refused(&options).contains("a dwell already"));
     options.sequence = false;
     options.step_gap_s = Some(-1.0);
-    assert!(bench.refused(&options).contains("-1 s is no pause"));
+    assert!(bench.refused(&options).contains("-1 s is not a pause"));
 }
 
 #[test]

@@ -145,7 +145,7 @@ fn a_few_impossible_temperatures_are_left_empty_and_kelvins_are_warned_of() {
     let (summary, batch, _) = one(&text, list).unwrap();
     assert_eq!(batch.temp_c.iter().filter(|c| c.is_nan()).count(), 3);
     assert!(
-        warned(&summary, "3 of 100 values are no temperatures"),
+        warned(&summary, "3 of 100 values cannot be temperatures"),
         "{summary:?}"
     );
     let (summary, _, _) = one(&log(&|_| 294.0), list).unwrap();

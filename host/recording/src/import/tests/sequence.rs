@@ -72,7 +72,11 @@ fn files_that_are_no_sequence_are_refused() {
     options.files = ["z_up.csv", "z_up.csv"]
         .map(|name| bench.path(name))
         .to_vec();
-    assert!(bench.refused(&options).contains("two files are named z_up"));
+    assert!(
+        bench
+            .refused(&options)
+            .contains("two files have the name z_up")
+    );
 }
 
 fn faces(names: &[&str]) -> Vec<Face> {

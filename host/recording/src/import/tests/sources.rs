@@ -43,7 +43,7 @@ fn a_sensor_that_is_logged_faster_than_it_updates_is_said_with_its_rate() {
         "{summary:?}"
     );
     assert!(
-        warned(&summary, "at 25.0 Hz where the log has 100.0 Hz"),
+        warned(&summary, "at 25.0 Hz, but the log has 100.0 Hz"),
         "{summary:?}"
     );
     assert!(!warned(&summary, "the gyro repeats"), "{summary:?}");
@@ -64,7 +64,7 @@ fn rows_of_two_devices_or_units_that_take_turns_are_refused() {
     };
     for mixed in [log(1000, units), log(1000, devices)] {
         let error = one_refused(&mixed, BOTH);
-        assert!(error.contains("take turns"), "{error}");
+        assert!(error.contains("alternate"), "{error}");
     }
     let (summary, ..) = one(&log(1000, at_rest), BOTH).unwrap();
     assert!(summary.warnings.is_empty(), "{summary:?}");
@@ -98,7 +98,7 @@ fn forces_in_si_that_are_not_of_the_size_of_gravity_are_said() {
         options.raw_unit = RawUnit::Si;
         let (summary, ..) = bench.import(&options).unwrap();
         assert_eq!(
-            warned(&summary, "unit or scale?"),
+            warned(&summary, "check unit and scale"),
             wrong,
             "{factor} {summary:?}"
         );

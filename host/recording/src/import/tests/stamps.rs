@@ -156,7 +156,7 @@ fn counters_of_16_and_32_bits_that_begin_again_are_counted_on_and_reported() {
             summary
                 .warnings
                 .iter()
-                .any(|w| w.contains("began again at 0 once"))
+                .any(|w| w.contains("wrapped to 0 once"))
         );
         let steps = batch.t_s.windows(2).map(|w| w[1] - w[0]);
         assert!(steps.into_iter().all(|dt| (dt * rate - 1.0).abs() < 1e-6));
@@ -208,7 +208,7 @@ fn stamps_that_neither_their_steps_nor_the_count_explain_are_refused_and_not_sme
         (0..3000).flat_map(|i| vec![10_000 * i; if i < 1500 && i % 7 == 0 { 2 } else { 1 }]);
     let bench = Bench::new(&[("a", &stamped(stamps))]);
     let error = bench.refused(&bench.options(&["a"], &[GYR]));
-    assert!(error.contains("off the count of samples"), "{error}");
+    assert!(error.contains("off the sample count"), "{error}");
 }
 
 #[test]

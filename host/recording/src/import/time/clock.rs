@@ -189,21 +189,21 @@ fn refused(path: &Path, irregular: Irregular) -> Error {
     match irregular {
         Irregular::Short => Error::new(
             path.display(),
-            "the rate cannot be found from the times of fewer than two rows",
-            "give it, and skip the time column",
+            "the times of fewer than two rows do not give the rate",
+            "give the rate, and skip the time column",
         )
         .about(Argument::SampleRate),
         Irregular::SetBack(row) => Error::new(
             format!("{}, data row {}, column t_s", path.display(), row + 1),
-            "the time goes back, and stays behind",
-            "import the parts before and from that row as recordings of their own, or sort the rows by time",
+            "the time goes back and stays back",
+            "import the rows before that row, and those from it on, as separate recordings; or sort the rows by time",
         ),
         Irregular::OffTheCount(off_s) => Error::new(
             format!("{}, column t_s", path.display()),
             format!(
-                "the times are up to {off_s:.3} s off the count of samples, which no late hand-over explains, and their steps are no multiples of one period"
+                "the times are up to {off_s:.3} s off the sample count, which late hand-overs do not explain, and their intervals are not multiples of one period"
             ),
-            "remove rows that are there twice and stamps that are wrong; if every sample is there, skip the time column and give the rate",
+            "remove repeated rows and wrong stamps; if no sample is missing, skip the time column and give the rate",
         )
         .about(Argument::SampleRate),
     }
@@ -227,7 +227,7 @@ fn either(path: &Path, seen: &Seen<'_>, both: [Decimal; 2]) -> Error {
             reading(coarse),
             reading(fine)
         ),
-        format!("say which: {} or {}", coarse.symbol(), fine.symbol()),
+        format!("give the unit: {} or {}", coarse.symbol(), fine.symbol()),
     )
     .about(Argument::TimeUnit)
 }

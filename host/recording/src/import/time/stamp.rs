@@ -179,7 +179,7 @@ impl FromStr for Decimal {
         let text = if text == "µs" { "us" } else { text };
         let known = Decimal::ALL.into_iter().find(|unit| unit.symbol() == text);
         known.ok_or_else(|| {
-            let problem = format!("{} is no unit of time stamps", shorten(text.as_bytes()));
+            let problem = format!("{} is not a unit of time stamps", shorten(text.as_bytes()));
             Error::new("unit of the times", problem, "give s, ms, us or ns")
         })
     }

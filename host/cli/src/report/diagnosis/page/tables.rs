@@ -33,7 +33,7 @@ pub fn chance(p: f64) -> Markup {
 pub(super) fn errors(sensors: &[Shown]) -> Markup {
     html! {
         div class="scroll" { table {
-            caption { "Root mean square error. Noise floor: what would be left if the model were complete." }
+            caption { "Root mean square error. Noise floor: the error that would remain if the model were complete." }
             thead { tr {
                 th { "sensor" } th { "model" } th class="n" { "in sample" } th class="n" { "held out" } th class="n" { "noise floor" }
             } }
@@ -106,7 +106,7 @@ pub(super) fn alternatives(d: &DiagnosisResult, s: &Shown, one: &Accepted) -> Ma
         }
         @if one.chosen.alternatives.is_empty() {
             @if undecided().next().is_none() && s.figures.notes.is_empty() {
-                p { "Nothing else that was tried would do nearly as well." }
+                p { "Nothing else that was tried fits nearly as well." }
             }
         } @else {
             p { "In this recording it can be confused with:" }
@@ -193,7 +193,7 @@ pub fn second(both: &SecondResult) -> Markup {
 pub fn rejected(d: &DiagnosisResult) -> Markup {
     html! {
         @if d.rejected.is_empty() {
-            p { "Nothing came near." }
+            p { "No other effect came near." }
         } @else {
             div class="scroll" { table class="long told" {
                 thead { tr { th { "effect" } th { "why not" } } }
@@ -210,7 +210,7 @@ pub fn not_excited(d: &DiagnosisResult) -> Markup {
     let by_experiment = by_experiment(d);
     html! {
         @if by_experiment.is_empty() {
-            p { "Every effect of the library would have been seen at the size that data sheets give." }
+            p { "This recording would show every effect of the library at its data-sheet size." }
         } @else {
             div class="scroll" { table class="told" {
                 thead { tr { th { "effect" } th { "what would show it" } } }
