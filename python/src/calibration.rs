@@ -117,7 +117,7 @@ impl Calibration {
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let from = Sources {
             calibration: Some((&self.model, &self.name)),
-            noise: None,
+            ..Sources::default()
         };
         let made = as_json::export(&from).map_err(|error| raised(py, &error))?;
         loaded(py, &String::from_utf8_lossy(&made.content))

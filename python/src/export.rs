@@ -47,6 +47,7 @@ pub(crate) fn export(
             calibration: calibration
                 .as_ref()
                 .map(|(model, name)| (model.as_ref(), name.as_str())),
+            biases: None,
             noise: noise.as_deref(),
         };
         called::export(arguments, &from)

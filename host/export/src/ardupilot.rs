@@ -11,6 +11,7 @@
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
+use mimu::calibration::thermal_biases::ThermalBiases;
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Argument, Result};
 
@@ -35,8 +36,11 @@ pub type Options = parameters::Options;
 /// Biases over temperature, or offsets and scale factors at one.
 ///
 /// # Errors
-/// The calibration is missing; those of [`BiasCubics::of`] or of `Conversion::of`; an offset or a scale factor beyond what ArduPilot takes.
+/// The calibration is missing; those of [`BiasCubics::of`], [`BiasCubics::of_rest`] or of `Conversion::of`; an offset or a scale factor beyond what ArduPilot takes.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
+    if let Some(biases) = from.biases {
+        return at_rest(biases, options);
+    }
     let (calibration, _) = from.calibration()?;
     let mut export = Export::new("ardupilot");
     export.notes.push("ArduPilot measures gyro offsets again at every start (INS_GYR_CAL), at the temperature of that start.".into());
@@ -49,18 +53,42 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     }
     match &calibration.temperature {
         Some(over) => {
-            let [from_c, to_c] = over.range_c;
-            let range_c = [from_c.max(RANGE_C[0]), to_c.min(RANGE_C[1])];
-            if range_c != [from_c, to_c] {
-                let note = "The range is limited to ArduPilot's -70 to 80 °C.";
-                export.notes.push(note.into());
-            }
+            let range_c = cut(over.range_c, &mut export);
             px4::cubics(calibration, options, range_c, REFERENCE_C, &mut export)?;
             parameters_of(&export.cubics, options.imu, &mut export.parameters)?;
         }
         None => at_one_temperature(calibration, options, &mut export)?,
     }
     let comments = heading::comments("#", &heading::of_calibration(calibration, &export));
+    export.content = options.text(&comments, &export.parameters).into_bytes();
+    Ok(export)
+}
+
+/// The range that ArduPilot has of `range_c`.
+fn cut([from_c, to_c]: [f64; 2], export: &mut Export) -> [f64; 2] {
+    let range_c = [from_c.max(RANGE_C[0]), to_c.min(RANGE_C[1])];
+    if range_c != [from_c, to_c] {
+        let note = "The range is limited to ArduPilot's -70 to 80 °C.";
+        export.notes.push(note.into());
+    }
+    range_c
+}
+
+/// Coefficients alone: ArduPilot's own calibration over temperature, which is made at rest too, writes no others and leaves the offsets to
+/// the calibrations at one temperature, with their CALTEMP. Source: libraries/AP_InertialSensor/AP_InertialSensor_tempcal.cpp,
+/// `save_calibration`.
+fn at_rest(biases: &ThermalBiases, options: &Options) -> Result<Export> {
+    let (imu, n) = (options.imu, number(options.imu));
+    let mut export = Export::new("ardupilot");
+    let range_c = cut(biases.range_c, &mut export);
+    px4::cubics_at_rest(biases, options, range_c, REFERENCE_C, &mut export)?;
+    export.notes.push(format!("Scale factors and offsets stay the flight controller's own (INS_ACC{n}SCAL, INS_ACC{n}OFFS): a recording at rest does not show them."));
+    if biases.has(Sensor::Accel) {
+        export.notes.push(format!("accel: ArduPilot subtracts what the bias has changed by since the temperature INS_ACC{imu}_CALTEMP of its accelerometer calibration. Repeat that calibration after loading this file if the temperature is missing there (-300)."));
+    }
+    export.notes.push("gyro: its offsets are measured again at every start (INS_GYR_CAL), at the temperature of that start.".into());
+    coefficients(&export.cubics, imu, &mut export.parameters);
+    let comments = heading::comments("#", &heading::of_biases(biases, &export));
     export.content = options.text(&comments, &export.parameters).into_bytes();
     Ok(export)
 }
@@ -123,9 +151,10 @@ fn offset_parameter(sensor: Sensor, axis: usize, imu: u8, offset: f64) -> Result
     Ok(Parameter::real(name, offset))
 }
 
-fn parameters_of(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) -> Result<()> {
+/// Range and coefficients.
+fn coefficients(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) {
     let Some(first) = sensors.first() else {
-        return Ok(());
+        return;
     };
     let prefix = format!("INS_TCAL{imu}");
     out.push(Parameter::int8(format!("{prefix}_ENABLE"), 1));
@@ -140,10 +169,20 @@ fn parameters_of(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) -> R
                 out.push(Parameter::real(name, scaled));
             }
         }
+    }
+}
+
+fn parameters_of(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) -> Result<()> {
+    coefficients(sensors, imu, out);
+    for cubics in sensors {
+        let Some(settled_c) = cubics.settled_c else {
+            continue;
+        };
+        let short = short(cubics.sensor);
         // CALTEMP has a number always, and offsets have none of the first unit.
         let name = format!("INS_{short}{imu}_CALTEMP");
-        out.push(Parameter::real(name, cubics.settled_c));
-        let settled = cubics.at(cubics.settled_c);
+        out.push(Parameter::real(name, settled_c));
+        let settled = cubics.at(settled_c);
         for axis in 0..3 {
             out.push(offset_parameter(cubics.sensor, axis, imu, settled[axis])?);
         }

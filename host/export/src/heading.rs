@@ -1,6 +1,7 @@
 //! The comments at the head of every file: whose calibration it is, what to compute with it, and what it leaves.
 
 use mimu::calibration::Calibration;
+use mimu::calibration::thermal_biases::ThermalBiases;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::quantity::Sensor;
 
@@ -28,6 +29,28 @@ pub fn of_calibration(calibration: &Calibration, export: &Export) -> Vec<String>
             ));
         }
     }
+    lines.extend(said(export));
+    lines
+}
+
+/// Lines of a file that is made from biases over temperature alone, without comment signs.
+pub fn of_biases(biases: &ThermalBiases, export: &Export) -> Vec<String> {
+    let unit = match &biases.unit_id {
+        Some(id) => format!("unit {id}, "),
+        None => String::new(),
+    };
+    let mut lines = vec![
+        format!(
+            "{}: {}, by mimu {}",
+            biases.device,
+            what(export.to),
+            env!("CARGO_PKG_VERSION")
+        ),
+        format!(
+            "{unit}biases over temperature from a recording at rest, evaluated {}; readings in {}",
+            biases.created, biases.recording.raw_unit
+        ),
+    ];
     lines.extend(said(export));
     lines
 }

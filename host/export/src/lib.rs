@@ -47,6 +47,7 @@ use std::path::PathBuf;
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
+use mimu::calibration::thermal_biases::ThermalBiases;
 use mimu::noise::noise_file::NoiseFile;
 use mimu_recording::error::{Argument, Error, Result};
 use serde::Serialize;
@@ -105,6 +106,8 @@ pub enum Format {
 pub struct Sources<'a> {
     /// The calibration, and the file that it is from.
     pub calibration: Option<(&'a Calibration, &'a str)>,
+    /// In its place, biases over temperature of a unit that only lay still: for [formats that take them](Format::takes_biases).
+    pub biases: Option<&'a ThermalBiases>,
     /// Noise of the unit.
     pub noise: Option<&'a NoiseFile>,
 }
@@ -193,6 +196,11 @@ impl Format {
                 | Self::LioSam(_)
                 | Self::FastLio(_)
         )
+    }
+
+    /// Whether biases over temperature alone are enough for it.
+    pub fn takes_biases(&self) -> bool {
+        matches!(self, Self::Px4(_) | Self::ArduPilot(_))
     }
 
     /// Files that it reads beside its [`Sources`]: no result may take their place.

@@ -10,15 +10,20 @@
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
+use mimu::calibration::thermal_biases::ThermalBiases;
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Argument, Result};
 
 use crate::one_temperature::{self, LETTERS, Offsets, within};
 use crate::parameters::Parameter;
+use crate::remaining::Remaining;
 use crate::{Export, Sources, heading, parameters, remaining};
 
 /// What a person knows of the autopilot.
 pub type Options = parameters::Options;
+
+const AXES_OF_THE_RECORDING: &str =
+    "Axes are those of the recording; they have to be those of the sensor in the autopilot.";
 
 /// Scale that PX4 takes of an accelerometer.
 const SCALES: [f64; 2] = [0.1, 3.0];
@@ -26,30 +31,113 @@ const SCALES: [f64; 2] = [0.1, 3.0];
 /// Biases over temperature, or offsets and scale factors at one.
 ///
 /// # Errors
-/// The calibration is missing; those of [`BiasCubics::of`] or of `Conversion::of`; a scale factor beyond what PX4 takes.
+/// The calibration is missing; those of [`BiasCubics::of`], [`BiasCubics::of_rest`] or of `Conversion::of`; a scale factor beyond what PX4 takes.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, _) = from.calibration()?;
     let mut export = Export::new("px4");
+    let head = if let Some(biases) = from.biases {
+        needs_ids(options, ["TC_G", "TC_A"], &mut export);
+        at_rest(biases, options, &mut export)?;
+        loaded_by(options, &mut export);
+        heading::of_biases(biases, &export)
+    } else {
+        let (calibration, _) = from.calibration()?;
+        match &calibration.temperature {
+            Some(over) => {
+                needs_ids(options, ["TC_G", "TC_A"], &mut export);
+                over_temperature(calibration, options, over.range_c, &mut export)?;
+            }
+            None => {
+                needs_ids(options, ["CAL_GYRO", "CAL_ACC"], &mut export);
+                at_one_temperature(calibration, options, &mut export)?;
+            }
+        }
+        loaded_by(options, &mut export);
+        heading::of_calibration(calibration, &export)
+    };
+    let comments = heading::comments("#", &head);
+    export.content = options.text(&comments, &export.parameters).into_bytes();
+    Ok(export)
+}
+
+fn needs_ids(options: &Options, [gyro, accel]: [&str; 2], export: &mut Export) {
     if options.gyro_id.is_none() || options.accel_id.is_none() {
         let n = options.imu - 1;
-        let [gyro, accel] = match calibration.temperature {
-            Some(_) => ["TC_G", "TC_A"],
-            None => ["CAL_GYRO", "CAL_ACC"],
-        };
         export.notes.push(format!(
             "Set {gyro}{n}_ID and {accel}{n}_ID to the sensors' device ids if they are missing here: PX4 finds a table by its id only."
         ));
     }
-    match &calibration.temperature {
-        Some(over) => over_temperature(calibration, options, over.range_c, &mut export)?,
-        None => at_one_temperature(calibration, options, &mut export)?,
-    }
+}
+
+fn loaded_by(options: &Options, export: &mut Export) {
     if !options.qgc {
         export.notes.push("MAVProxy's `param load` skips changes of less than 1e-6, such as X2 and X3: load this file with another program, or write it for QGroundControl.".into());
     }
-    let comments = heading::comments("#", &heading::of_calibration(calibration, &export));
-    export.content = options.text(&comments, &export.parameters).into_bytes();
-    Ok(export)
+}
+
+/// As PX4's own calibration over temperature, which is made at rest too: X0 of a gyro is its bias, that of an accelerometer is 0 at TREF.
+/// Source: src/modules/temperature_compensation/temperature_calibration/gyro.cpp and accel.cpp, `finish_sensor_instance`.
+fn at_rest(biases: &ThermalBiases, options: &Options, export: &mut Export) -> Result<()> {
+    let n = options.imu - 1;
+    let [from_c, to_c] = biases.range_c;
+    cubics_at_rest(
+        biases,
+        options,
+        [from_c, to_c],
+        0.5 * (from_c + to_c),
+        export,
+    )?;
+    export.notes.push(format!("Scale factors stay the flight controller's own (CAL_ACC{n}_XSCALE, _YSCALE, _ZSCALE; a gyro has none): a recording at rest does not show them."));
+    if biases.has(Sensor::Gyro) {
+        export.notes.push(format!("gyro: X0 is the whole reading at rest. PX4 also subtracts CAL_GYRO{n}_XOFF, _YOFF, _ZOFF: set these to 0, or calibrate the gyro there again."));
+        export.remaining.push(Remaining::of_earth_rate());
+    }
+    if biases.has(Sensor::Accel) {
+        export.notes.push("accel: X0 is 0 at TREF, as gravity hides the bias. Calibrate the accelerometer in PX4 after loading this file.".into());
+    }
+    let ids = options.ids();
+    for cubics in &export.cubics {
+        let id = ids[cubics.sensor];
+        parameters_of(cubics, options.imu, id, &mut export.parameters);
+    }
+    Ok(())
+}
+
+/// The changes of each sensor's readings at rest as cubics; what they leave goes to `export`.
+pub(crate) fn cubics_at_rest(
+    biases: &ThermalBiases,
+    options: &parameters::Options,
+    range_c: [f64; 2],
+    reference_c: f64,
+    export: &mut Export,
+) -> Result<()> {
+    let mut conversions = options.conversions();
+    export.notes.push(AXES_OF_THE_RECORDING.into());
+    for sensor in Sensor::BOTH {
+        let known = std::mem::take(&mut conversions[sensor]);
+        match BiasCubics::of_rest(biases, sensor, &known, range_c, reference_c)? {
+            Some(cubics) => add(cubics, export),
+            None => export.notes.push(format!(
+                "The recording has no readings of the {sensor}: none are written."
+            )),
+        }
+    }
+    Ok(())
+}
+
+/// `cubics` with their formula and what they leave.
+fn add(cubics: BiasCubics, export: &mut Export) {
+    let list = |values: [f64; 3]| values.map(|v| format!("{v:.6}")).join(", ");
+    let [from, to] = cubics.range_c;
+    export.formulas.push(format!(
+        "{}: reading = [{}] (raw - [{}]) {}, raw to SI; minus the cubic of {from:.1} to {to:.1} °C about {:.1} °C",
+        cubics.sensor,
+        list(cubics.conversion.si_per_raw),
+        list(cubics.conversion.zero_raw),
+        cubics.unit,
+        cubics.reference_c,
+    ));
+    export.remaining.extend(remaining::of_cubics(&cubics));
+    export.cubics.push(cubics);
 }
 
 fn over_temperature(
@@ -122,10 +210,7 @@ pub(crate) fn cubics(
     export: &mut Export,
 ) -> Result<()> {
     let mut conversions = options.conversions();
-    export.notes.push(
-        "Axes are those of the recording; they have to be those of the sensor in the autopilot."
-            .into(),
-    );
+    export.notes.push(AXES_OF_THE_RECORDING.into());
     for sensor in Sensor::BOTH {
         let known = std::mem::take(&mut conversions[sensor]);
         let Some(cubics) = BiasCubics::of(calibration, sensor, &known, range_c, reference_c)?
@@ -135,21 +220,12 @@ pub(crate) fn cubics(
             export.notes.push(note);
             continue;
         };
-        let list = |values: [f64; 3]| values.map(|v| format!("{v:.6}")).join(", ");
-        let [from, to] = cubics.range_c;
-        export.formulas.push(format!(
-            "{sensor}: reading = [{}] (raw - [{}]) {}, raw to SI; minus the cubic of {from:.1} to {to:.1} °C about {:.1} °C",
-            list(cubics.conversion.si_per_raw),
-            list(cubics.conversion.zero_raw),
-            cubics.unit,
-            cubics.reference_c,
-        ));
-        export.notes.push(format!(
-            "{sensor}: the errors below are those with the scale factors of {:.1} °C.",
-            cubics.settled_c
-        ));
-        export.remaining.extend(remaining::of_cubics(&cubics));
-        export.cubics.push(cubics);
+        if let Some(settled_c) = cubics.settled_c {
+            export.notes.push(format!(
+                "{sensor}: the errors below are those with the scale factors of {settled_c:.1} °C."
+            ));
+        }
+        add(cubics, export);
     }
     let places = remaining::Places {
         cross_terms: true,

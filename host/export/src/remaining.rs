@@ -87,6 +87,20 @@ impl Remaining {
         )
     }
 
+    /// The Earth's rate in the bias of a gyro that was found at rest, in an attitude that nobody knows.
+    pub fn of_earth_rate() -> Self {
+        let rate = mimu::estimate::earth::RATE;
+        Self {
+            sensor: Sensor::Gyro,
+            source: "Earth's rate in the bias".into(),
+            condition: "in other attitudes than that of the recording".into(),
+            unit: Sensor::Gyro.unit(),
+            // Counted as bias, it is off by what the unit has turned: by twice the rate where it points the other way.
+            rms: Some(rate * f64::sqrt(2.0 / 3.0)),
+            max: Some(2.0 * rate),
+        }
+    }
+
     /// In one line, in the units that people read.
     pub fn line(&self) -> String {
         let readable = readable::parameter(self.unit);

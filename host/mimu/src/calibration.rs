@@ -11,6 +11,7 @@ mod of_device;
 mod of_fit;
 mod on_device;
 mod over_temperature;
+pub mod thermal_biases;
 pub mod verify;
 
 pub use of_curves::{CurvesOfUnit, TriadOfCurves};
@@ -107,7 +108,7 @@ pub struct Calibration {
 }
 
 /// The recording that a calibration was made from.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
@@ -258,8 +259,12 @@ impl Calibration {
         Self::parse(&text, &path.display().to_string())
     }
 
-    /// Parses and checks the text of a calibration file; `place` is its path.
+    /// Parses and checks the text of a calibration file; `place` is its path. Refused, by its name, is a file of
+    /// [biases alone](thermal_biases).
     pub fn parse(text: &str, place: &str) -> Result<Self> {
+        if thermal_biases::is_one(text) {
+            return Err(thermal_biases::refusal(place));
+        }
         let calibration: Self = parse_toml(text, place, Some("fit the recording again"))?;
         calibration.checked(place)
     }

@@ -10,6 +10,7 @@ use serde::{Serialize, Serializer};
 
 use crate::fault::Fault;
 use crate::fit::{Fit, SensorFit, faces_not_up};
+use crate::prepared::Prepared;
 use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::warning::Warning;
 use mimu_recording::RawUnit;
@@ -102,26 +103,41 @@ impl Seen {
     }
 }
 
+/// What is wrong with one of the recordings that a command was given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OfRecording {
+    /// Its file of samples, as in other messages.
+    pub recording: String,
+    /// What is wrong.
+    pub problem: RecordingProblem,
+}
+
+impl OfRecording {
+    /// All of a recording that was fitted.
+    pub fn fitted(fit: &Fit) -> Vec<Self> {
+        Self::named(&fit.prepared, RecordingProblem::of(fit))
+    }
+
+    /// What is seen without a fit: of a recording that was refused, or that nothing is fitted to.
+    pub fn prepared(prepared: &Prepared) -> Vec<Self> {
+        Self::named(prepared, RecordingProblem::without_fit(prepared))
+    }
+
+    fn named(prepared: &Prepared, problems: Vec<RecordingProblem>) -> Vec<Self> {
+        let named = problems.into_iter().map(|problem| Self {
+            recording: prepared.place.clone(),
+            problem,
+        });
+        named.collect()
+    }
+}
+
 impl RecordingProblem {
     /// All of a recording that was fitted, those first that may spoil the whole of it.
     pub fn of(fit: &Fit) -> Vec<Self> {
         let prepared = &fit.prepared;
         let of_sensors = fit.sensors.iter().flat_map(|s| &s.warnings);
-        let mut seen: Vec<(Seen, Vec<Warning>)> = Vec::new();
-        for warning in fit.warnings.iter().chain(of_sensors) {
-            let Some(kind) = Seen::of(warning) else {
-                continue;
-            };
-            match seen.iter_mut().find(|(k, _)| *k == kind) {
-                Some((_, all)) => all.push(warning.clone()),
-                None => seen.push((kind, vec![warning.clone()])),
-            }
-        }
-        seen.sort_by_key(|(kind, _)| *kind as usize);
-        let mut all: Vec<Self> = seen
-            .into_iter()
-            .map(|(kind, w)| Self::Seen(kind, w))
-            .collect();
+        let mut all = Self::seen(fit.warnings.iter().chain(of_sensors));
         let accel = fit.sensor(Sensor::Accel);
         all.extend(accel.into_iter().flat_map(|accel| offsets(fit, accel)));
         let rate_hz = prepared.condensed.period_s.recip();
@@ -139,6 +155,39 @@ impl RecordingProblem {
                 faces_not_up(&accel.estimated.triad.inverse, &raw)
             });
         all.extend(missing.map(Self::MissingPoses));
+        all.extend(Self::of_board(prepared));
+        all
+    }
+
+    /// Those that are seen without a fit.
+    pub fn without_fit(prepared: &Prepared) -> Vec<Self> {
+        let warnings = prepared.condensed.warnings.iter();
+        let mut all = Self::seen(warnings.chain(&prepared.dwells.warnings));
+        all.extend(Self::of_board(prepared));
+        all
+    }
+
+    /// What of `warnings` is of a recording, kind by kind.
+    fn seen<'a>(warnings: impl Iterator<Item = &'a Warning>) -> Vec<Self> {
+        let mut seen: Vec<(Seen, Vec<Warning>)> = Vec::new();
+        for warning in warnings {
+            let Some(kind) = Seen::of(warning) else {
+                continue;
+            };
+            match seen.iter_mut().find(|(k, _)| *k == kind) {
+                Some((_, all)) => all.push(warning.clone()),
+                None => seen.push((kind, vec![warning.clone()])),
+            }
+        }
+        seen.sort_by_key(|(kind, _)| *kind as usize);
+        seen.into_iter()
+            .map(|(kind, warnings)| Self::Seen(kind, warnings))
+            .collect()
+    }
+
+    /// What the board's thermometer and its line to the PC show.
+    fn of_board(prepared: &Prepared) -> Vec<Self> {
+        let mut all = Vec::new();
         let blocks = prepared.condensed.blocks.iter().map(|b| b.temp_c.mean);
         let known = blocks.filter(|t| t.is_finite());
         let [low, high] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| {
@@ -235,11 +284,12 @@ impl fmt::Display for RecordingProblem {
     }
 }
 
-impl Serialize for RecordingProblem {
+impl Serialize for OfRecording {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut out = serializer.serialize_struct("RecordingProblem", 2)?;
-        out.serialize_field("id", self.id())?;
-        out.serialize_field("text", &self.to_string())?;
+        let mut out = serializer.serialize_struct("RecordingProblem", 3)?;
+        out.serialize_field("id", self.problem.id())?;
+        out.serialize_field("text", &self.problem.to_string())?;
+        out.serialize_field("recording", &self.recording)?;
         out.end()
     }
 }

@@ -14,7 +14,7 @@ use nalgebra::Matrix3;
 
 use crate::curves::TriadCurves;
 use crate::fit::{ThermalFit, range};
-use crate::nodes::{Inverse, fewest, with_lags};
+use crate::nodes::{Inverse, fewest, physical, with_lags};
 
 /// The dies have to have been this near to the temperature of the calibration, K.
 const NEAR_C: f64 = 1.0;
@@ -48,6 +48,7 @@ impl Based<'_> {
                 offset: -(matrix * slope.bias),
             },
             sigma,
+            physical: None,
         }
     }
 
@@ -88,7 +89,13 @@ pub fn calibration(fit: &ThermalFit, base: &Calibration, created: &str) -> Resul
             at_c: at_c.clamp(range_c[0], range_c[1]),
         })
     });
-    let of = |sensor: Sensor, temp_c: f64| Some(based[sensor].as_ref()?.inverse(temp_c));
+    let of = |sensor: Sensor, temp_c: f64| {
+        let based = based[sensor].as_ref()?;
+        Some(Inverse {
+            physical: based.triad(temp_c).as_ref().map(physical),
+            ..based.inverse(temp_c)
+        })
+    };
     let nodes = fewest(of, based.as_ref().map(Option::is_some), range_c)?;
     let mut temperature = with_lags(&fit.joint, range_c, nodes);
     // The errors are raw: across the axes C is a hundredth.

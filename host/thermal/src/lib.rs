@@ -13,7 +13,7 @@
 //! | [`suitability`] | recordings that are refused |
 //! | `evaluator`, [`joint`] | one triad at any lag; both, and their lags: the estimate |
 //! | [`curves`], [`nodes`] | its result at any temperature, and in a calibration file |
-//! | [`base`] | curves of the biases upon a calibration at one temperature |
+//! | [`base`], [`biases`] | curves of the biases upon a calibration at one temperature, and alone |
 //! | [`path`] | whether a recording comes back to temperatures that it has been at |
 //! | [`judge`] | errors of dwells, by temperature, heating and cooling apart |
 //! | [`classic`], [`points`] | estimators of the literature, for comparison |
@@ -26,6 +26,7 @@
 pub mod base;
 pub mod basis;
 pub mod bias_jumps;
+pub mod biases;
 pub mod classic;
 pub mod compare;
 pub mod coverage;

@@ -3,7 +3,7 @@
 
 use mimu::calibration::{DieTable, NodeTable, OverTemperature, TemperatureNode};
 use mimu::quantity::{PerSensor, Sensor};
-use mimu::triad::Forward;
+use mimu::triad::{Angles, Forward, Triad};
 use mimu_core::compensation::Affine;
 use mimu_core::die::LEAST_LAG_S;
 use mimu_recording::error::{Argument, Error, Result};
@@ -29,6 +29,14 @@ pub struct Inverse {
     pub slope: Affine<f64>,
     /// Standard deviations of C by rows, then of o.
     pub sigma: [f64; 12],
+    /// Those of the scale factors and of the biases, raw.
+    pub physical: Option<[[f64; 3]; 2]>,
+}
+
+/// Standard deviations of scale factors and biases.
+pub fn physical(triad: &Triad) -> [[f64; 3]; 2] {
+    let physical = triad.physical(Angles::Exact);
+    [physical.scale, physical.bias].map(|of| of.map(|e| e.sigma))
 }
 
 /// `[temperature]` of a calibration file by `joint`.
@@ -141,11 +149,13 @@ pub fn inverse(curves: &TriadCurves, temp_c: f64) -> Option<[Affine<f64>; 2]> {
 
 fn with_sigma(curves: &TriadCurves, temp_c: f64) -> Option<Inverse> {
     let [model, slope] = inverse(curves, temp_c)?;
-    let estimates = curves.triad(temp_c)?.inverse_estimates();
+    let triad = curves.triad(temp_c)?;
+    let estimates = triad.inverse_estimates();
     Some(Inverse {
         model,
         slope,
         sigma: estimates.map(|e| e.sigma),
+        physical: Some(physical(&triad)),
     })
 }
 
@@ -158,6 +168,8 @@ fn table(at: Inverse) -> NodeTable {
         slope_o: at.slope.offset.into(),
         sigma_C: Some([0, 1, 2].map(|i| [0, 1, 2].map(|j| at.sigma[3 * i + j]))),
         sigma_o: Some([0, 1, 2].map(|i| at.sigma[9 + i])),
+        sigma_scale_factor: at.physical.map(|[scale, _]| scale),
+        sigma_bias: at.physical.map(|[_, bias]| bias),
     }
 }
 

@@ -9,11 +9,12 @@ use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
 use mimu::plan::next_experiment;
 use mimu::prepared::Prepared;
+use mimu::recording_problem::OfRecording;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, StillArgs, VerboseArgs};
-use crate::output::{now, print};
+use crate::output::{now, print, refused};
 use crate::reading::read;
 
 #[derive(Args)]
@@ -84,7 +85,12 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<()> {
     let names = [shown(&args.verify), shown(&args.calibration)];
     let now = now();
     let by = names.each_ref().map(Option::as_deref);
-    let done = diagnosed(recordings, args.still.factor, by, &now)?;
+    let all = std::iter::once(&recordings.first).chain(&recordings.more);
+    let all = all.chain(&recordings.second);
+    let problems: Vec<_> = all.flat_map(OfRecording::prepared).collect();
+    let several = args.recordings.len() > 1 || args.verify.is_some();
+    let done = diagnosed(recordings, args.still.factor, by, &now)
+        .inspect_err(|error| refused(error, &problems, several, Some(&args.json)))?;
     let Diagnosed {
         diagnosis,
         next,

@@ -4,9 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::Calibration;
+use mimu::calibration::thermal_biases::{self, ThermalBiases};
 use mimu::noise::noise_file::NoiseFile;
 use mimu_export::{Export, Format, Sources, heading};
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::read_text;
 use mimu_recording::result_file::stage;
 use serde::Serialize;
 
@@ -18,7 +20,7 @@ use crate::output::{check_outputs, print};
 pub struct ExportArgs {
     #[command(subcommand)]
     format: Format,
-    /// Calibration file of `mimu fit -o`, `mimu diagnose -o` or `mimu thermal fit -o`
+    /// Calibration file of `mimu fit -o`, `mimu diagnose -o` or `mimu thermal fit -o`; px4 and ardupilot also take the biases of a unit at rest
     #[arg(long, value_name = "FILE", global = true)]
     calibration: Option<PathBuf>,
     /// Noise file of the unit (`mimu allan -o`)
@@ -56,11 +58,18 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let inputs: Vec<_> = sources.into_iter().flatten().chain(own).collect();
     check_outputs(&[Some(path), args.json.file()], &inputs)?;
     let named = args.calibration.as_deref().map(|p| p.display().to_string());
-    let calibration = args.calibration.as_deref().map(Calibration::read);
-    let calibration = calibration.transpose()?;
+    let (mut calibration, mut biases) = (None, None);
+    if let (Some(path), Some(place)) = (&args.calibration, &named) {
+        let text = read_text(path)?;
+        match args.format.takes_biases() && thermal_biases::is_one(&text) {
+            true => biases = Some(ThermalBiases::parse(&text, place)?),
+            false => calibration = Some(Calibration::parse(&text, place)?),
+        }
+    }
     let noise = args.noise.as_deref().map(NoiseFile::read).transpose()?;
     let from = Sources {
         calibration: calibration.as_ref().zip(named.as_deref()),
+        biases: biases.as_ref(),
         noise: noise.as_ref(),
     };
     let export = args.format.export(&from)?;

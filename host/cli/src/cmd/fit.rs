@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::fit::{Method, Options, fit};
+use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, VerboseArgs};
-use crate::output::{now, print};
+use crate::output::{now, print, refused};
 use crate::reading::read_samples_or_means;
 use crate::report;
 
@@ -98,8 +99,11 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     }
     let found = DwellResult::list(&prepared);
     // Which dwells there are is the first that a person asks for then. The line with the error is the last.
-    let fitted =
-        fit(prepared, options).inspect_err(|_| eprint!("{}", report::dwell_table(&found)))?;
+    let problems = OfRecording::prepared(&prepared);
+    let fitted = fit(prepared, options).inspect_err(|error| {
+        refused(error, &problems, false, Some(&args.json));
+        eprint!("{}", report::dwell_table(&found));
+    })?;
     let result = FitResult::of(&fitted);
     let mut text = report::fit_text(&result, args.verbose.verbose);
     if args.dwells {

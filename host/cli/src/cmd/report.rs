@@ -9,11 +9,12 @@ use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
+use mimu::recording_problem::OfRecording;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{KeepArgs, NoiseArgs, StillArgs};
-use crate::output::{now, show};
+use crate::output::{now, refused, show};
 use crate::reading::read;
 use crate::report::text::problems;
 use crate::report::{Made, UnitReport, unit_page};
@@ -98,7 +99,15 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         .transpose()?;
     let found = match recordings.is_empty() {
         true => None,
-        false => Some(found(&recordings, &others, args.still.factor, &now)?),
+        false => {
+            let all = || recordings.iter().chain(&others);
+            let done = found(&recordings, &others, args.still.factor, &now);
+            let refused = |error: &Error| {
+                let problems: Vec<_> = all().flat_map(|r| OfRecording::prepared(&r.1)).collect();
+                refused(error, &problems, all().count() > 1, None);
+            };
+            Some(done.inspect_err(refused)?)
+        }
     };
     let calibration = match (&inputs.calibration, &found) {
         (Some(path), _) => Calibration::read(path)?,
@@ -135,7 +144,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let verdict = match unit.diagnosis {
         Some(d) => {
             let mut out = String::new();
-            problems(&mut out, &d.recording_problems, false);
+            problems(&mut out, &d.recording_problems, d.has_several(), false);
             out + &format!("{}: {}\n", d.device, d.verdict.name())
         }
         None => format!("{}\n", calibration.device),

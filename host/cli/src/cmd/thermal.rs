@@ -59,7 +59,8 @@ struct FitArgs {
     /// Temperatures of the dies that the curves have to cover; otherwise nothing is written
     #[arg(long, value_name = "FROM..TO", allow_hyphen_values = true, value_parser = range)]
     range: Option<[f64; 2]>,
-    /// Calibration of the unit at one temperature; recordings at rest add the biases over temperature to it
+    /// Calibration of the unit at one temperature; recordings at rest add the biases over temperature to it. Without it they give a file of biases
+    /// for `mimu export px4` and `ardupilot`
     #[arg(long, value_name = "FILE")]
     base: Option<PathBuf>,
     #[command(flatten)]
@@ -69,7 +70,7 @@ struct FitArgs {
     /// Declare that the unit lay still throughout: mimu does not search for turns, and leaves out no sample because of them
     #[arg(long, conflicts_with_all = ["steps", "factor"])]
     at_rest: bool,
-    /// Calibration file to write
+    /// Calibration file to write; of recordings at rest without --base, a file of biases over temperature
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     /// SVG file to write: all curves with their bands, and the errors during heating and cooling
@@ -122,6 +123,10 @@ impl EstimatorArg {
         }
     }
 }
+
+/// What `-o` wrote of recordings at rest without a base.
+const BIASES: &str =
+    "biases over temperature, no calibration (for mimu export px4 and ardupilot; --base makes one)";
 
 fn lag(text: &str) -> std::result::Result<f64, String> {
     match text.parse() {
@@ -182,12 +187,16 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<()> {
     let mut staged = Vec::new();
     let now = now();
     if let Some(path) = &args.output {
-        let made = match &base {
-            None => fitted.calibration(&now)?,
-            Some(base) => base::calibration(&fitted, base, &now)?,
+        let (what, made) = match &base {
+            None if fitted.is_biases_only() => (BIASES, fitted.biases(&now)?.to_toml()),
+            None => ("calibration", fitted.calibration(&now)?.to_toml()),
+            Some(base) => {
+                let made = base::calibration(&fitted, base, &now)?;
+                ("calibration", made.to_toml())
+            }
         };
-        staged.push(stage(path, made.to_toml())?);
-        text.push_str(&format!("\ncalibration: {}\n", path.display()));
+        staged.push(stage(path, made)?);
+        text.push_str(&format!("\n{what}: {}\n", path.display()));
     }
     if let Some(path) = &args.plot {
         staged.push(stage(path, thermal_plot::svg(&result))?);

@@ -27,7 +27,7 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
     } else {
         recorded(&mut out, fit, verbose);
     }
-    problems(&mut out, &fit.recording_problems, verbose);
+    problems(&mut out, &fit.recording_problems, false, verbose);
     if verbose {
         for (name, sensor) in fit.sensors.present() {
             let _ = writeln!(out);

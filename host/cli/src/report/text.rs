@@ -3,7 +3,7 @@
 use std::fmt::{Display, Write as _};
 
 use mimu::quantity::plural;
-use mimu::recording_problem::RecordingProblem;
+use mimu::recording_problem::OfRecording;
 
 /// Width that text keeps to, characters.
 pub(crate) const COLUMNS: usize = 98;
@@ -44,15 +44,24 @@ pub(crate) const SUMMARY: usize = 25;
 /// Lines of a summary that what is wrong with the recording takes at most.
 const OF_PROBLEMS: usize = 7;
 
-/// What is wrong with a recording, a line each, which is not wrapped so that programs find it; without `verbose` only so many.
-pub(crate) fn problems(out: &mut String, problems: &[RecordingProblem], verbose: bool) {
+/// What is wrong with a recording, or with `several`, a line each, which is not wrapped so that programs find it; without `verbose` only so
+/// many.
+pub(crate) fn problems(out: &mut String, problems: &[OfRecording], several: bool, verbose: bool) {
     if problems.is_empty() {
         return;
     }
-    let _ = writeln!(out, "problems of this recording:");
+    let which = if several {
+        "these recordings"
+    } else {
+        "this recording"
+    };
+    let _ = writeln!(out, "problems of {which}:");
     let shown = if verbose { problems.len() } else { OF_PROBLEMS };
-    for problem in problems.iter().take(shown) {
-        let _ = writeln!(out, "  - {problem}");
+    for OfRecording { recording, problem } in problems.iter().take(shown) {
+        let _ = match several {
+            true => writeln!(out, "  - {recording}: {problem}"),
+            false => writeln!(out, "  - {problem}"),
+        };
     }
     if problems.len() > shown {
         let _ = writeln!(out, "  - and {} more (--verbose)", problems.len() - shown);

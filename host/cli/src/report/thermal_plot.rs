@@ -88,24 +88,72 @@ pub fn svg(result: &ThermalResult) -> String {
 /// The same panels one by one, in the colours of the page.
 pub fn panels(result: &ThermalResult) -> Markup {
     html! {
-        @for Drawn(label, drawn) in rows(result).iter().flatten() {
-            svg class="curves" role="img" aria-label=(label) viewBox={ "0 0 " (PANEL.0) " " (PANEL.1) }
-                xmlns="http://www.w3.org/2000/svg" { (drawn) }
-        }
+        @for Drawn(label, drawn) in rows(result).iter().flatten() { (panel(label, drawn)) }
     }
 }
 
-fn frame(result: &ThermalResult, y: Range<f64>) -> Frame {
+/// One panel in the colours of the page; `label` is what it shows, for people who do not see it.
+pub(super) fn panel(label: &str, drawn: &Markup) -> Markup {
+    html! {
+        svg class="curves" role="img" aria-label=(label) viewBox={ "0 0 " (PANEL.0) " " (PANEL.1) }
+            xmlns="http://www.w3.org/2000/svg" { (drawn) }
+    }
+}
+
+fn frame([from, to]: [f64; 2], y: Range<f64>) -> Frame {
     Frame {
         across: 78.0..PANEL.0 - 12.0,
         down: 34.0..PANEL.1 - 46.0,
-        x: result.range_c[0]..result.range_c[1],
+        x: from..to,
         y,
     }
 }
 
-/// Temperature, value, lower and upper end of one curve, as changes from its middle.
-type Points = Vec<(f64, f64, f64, f64)>;
+/// A curve at one temperature, as a change from its middle.
+pub(super) struct Point {
+    /// °C.
+    pub temp_c: f64,
+    /// Change.
+    pub value: f64,
+    /// Ends of its 95 % interval, where they are known.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// The curves of one kind of parameter of a sensor, axis by axis, with their bands.
+pub(super) struct Changes {
+    /// Sensor and kind.
+    pub heading: String,
+    /// Unit of the changes.
+    pub unit: String,
+    /// Ends of the abscissa, °C.
+    pub range_c: [f64; 2],
+    /// Name of each axis and its curve.
+    pub curves: Vec<(String, Vec<Point>)>,
+}
+
+impl Changes {
+    pub(super) fn draw(&self) -> Markup {
+        let ends = |p: &Point| p.interval.unwrap_or([p.value; 2]);
+        let all = self.curves.iter().flat_map(|(_, points)| points);
+        let frame = frame(self.range_c, range(all.flat_map(ends)));
+        let key: Vec<(&str, &str)> = CLASSES
+            .iter()
+            .zip(&self.curves)
+            .map(|(class, (axis, _))| (*class, axis.as_str()))
+            .collect();
+        html! {
+            (frame.axes(&self.heading, true))
+            @for (class, (_, points)) in CLASSES.iter().zip(&self.curves) {
+                @let band: Vec<_> = points.iter().filter_map(|p| p.interval.map(|[low, high]| (p.temp_c, low, high))).collect();
+                @if !band.is_empty() { (frame.band(&format!("{class} band"), &band)) }
+                (frame.line(class, points.iter().map(|p| (p.temp_c, p.value))))
+            }
+            (frame.x_name("die, °C", &frame))
+            (frame.y_name(&format!("change from the middle, {}", self.unit)))
+            (frame.legend(&key))
+        }
+    }
+}
 
 /// One kind of numbers of a sensor, if it has them.
 fn curves(result: &ThermalResult, sensor: Sensor, kind: ParameterKind) -> Option<Markup> {
@@ -119,7 +167,7 @@ fn curves(result: &ThermalResult, sensor: Sensor, kind: ParameterKind) -> Option
     // Scale factors are shown relative to themselves.
     let relative = kind == ParameterKind::Scale;
     let unit = readable::parameter(&first.unit);
-    let all: Vec<(String, Points)> = found
+    let curves = found
         .iter()
         .map(|curve| {
             let middle = curve.value[curve.value.len() / 2];
@@ -128,37 +176,24 @@ fn curves(result: &ThermalResult, sensor: Sensor, kind: ParameterKind) -> Option
                 false => unit.factor,
             };
             let change = |v: f64| (v - middle) * by;
-            let points = (0..curve.temp_c.len()).map(|k| {
-                let [low, high] = [curve.lower[k], curve.upper[k]].map(change);
-                (curve.temp_c[k], change(curve.value[k]), low, high)
+            let points = (0..curve.temp_c.len()).map(|k| Point {
+                temp_c: curve.temp_c[k],
+                value: change(curve.value[k]),
+                interval: Some([curve.lower[k], curve.upper[k]].map(change)),
             });
             (curve.of.axis(), points.collect())
         })
         .collect();
-    let frame = frame(
-        result,
-        range(all.iter().flat_map(|a| a.1.iter().flat_map(|p| [p.2, p.3]))),
-    );
-    let of_unit = match relative {
-        true => "ppm",
-        false => &unit.unit,
+    let changes = Changes {
+        heading: format!("{sensor} {}", first.of.0.words()),
+        unit: match relative {
+            true => "ppm".into(),
+            false => unit.unit.to_string(),
+        },
+        range_c: result.range_c,
+        curves,
     };
-    let key: Vec<(&str, &str)> = CLASSES
-        .iter()
-        .zip(&all)
-        .map(|(c, a)| (*c, a.0.as_str()))
-        .collect();
-    Some(html! {
-        (frame.axes(&format!("{sensor} {}", first.of.0.words()), true))
-        @for (class, (_, points)) in CLASSES.iter().zip(&all) {
-            @let band: Vec<_> = points.iter().map(|p| (p.0, p.2, p.3)).collect();
-            (frame.band(&format!("{class} band"), &band))
-            (frame.line(class, points.iter().map(|p| (p.0, p.1))))
-        }
-        (frame.x_name("die, °C", &frame))
-        (frame.y_name(&format!("change from the middle, {of_unit}")))
-        (frame.legend(&key))
-    })
+    Some(changes.draw())
 }
 
 /// Errors of dwells by temperature, heating and cooling apart.
@@ -180,7 +215,7 @@ fn errors(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Marku
         ("noise", points(|b| Some(b.noise_floor))),
     ];
     let highest = lines.iter().flat_map(|l| l.1.iter().map(|p| p.1));
-    let frame = frame(result, range(highest.chain([0.0])));
+    let frame = frame(result.range_c, range(highest.chain([0.0])));
     let key = ["heating", "cooling", "noise"].map(|name| (name, name));
     html! {
         (frame.axes(&format!("{} error", sensor.name()), true))
@@ -257,7 +292,7 @@ impl Marks {
 
 fn by_temperature(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Markup {
     let marks = Marks::of(found);
-    let frame = frame(result, marks.errors());
+    let frame = frame(result.range_c, marks.errors());
     html! {
         (frame.axes(&format!("{} error", sensor.name()), true))
         (marks.draw(&frame, |m| m.die_c))

@@ -24,7 +24,7 @@ fn main() {
 fn crate_of(calibration: &Calibration) -> PathBuf {
     let from = Sources {
         calibration: Some((calibration, "test")),
-        noise: None,
+        ..Sources::default()
     };
     let source = rust::export(&from).unwrap().content;
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("exported");

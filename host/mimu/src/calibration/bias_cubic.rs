@@ -1,6 +1,8 @@
 //! The biases of a calibration over temperature as cubics, for programs that compensate nothing else over temperature, and the error
 //! that is left because scale factors, cross terms and the lag of the dies have no place there.
 
+mod at_rest;
+
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
 
@@ -68,8 +70,8 @@ pub struct BiasCubics {
     pub conversion: Conversion,
     /// Errors that are left once the cubic is subtracted and the program is calibrated at `settled_c`.
     pub remains: Vec<Remainder>,
-    /// Temperature at which the program's own scale factors hold, °C.
-    pub settled_c: f64,
+    /// Temperature at which the program's own scale factors hold, °C; `None` where the calibration says nothing about them.
+    pub settled_c: Option<f64>,
 }
 
 impl BiasCubics {
@@ -90,32 +92,47 @@ impl BiasCubics {
         if !over.has(sensor) {
             return Ok(None);
         }
+        wide_enough(sensor, range_c)?;
         let [from, to] = range_c;
-        if !(to - from >= NARROWEST_K) {
-            return Err(Error::new(
-                sensor,
-                format!(
-                    "{from:.1} to {to:.1} °C is less than {NARROWEST_K} K, too little for a cubic"
-                ),
-                "fit a recording over a wider range",
-            ));
-        }
         let settled_c = match calibration.recording.temp_c {
             Some(temp_c) if (from..=to).contains(&temp_c) => temp_c,
             _ => 0.5 * (from + to),
         };
         let at = |temp_c: f64| forward(&curves, sensor, temp_c);
         let conversion = Conversion::of(calibration, sensor, known, &at(settled_c)?)?;
-        let temperatures =
-            || (0..POINTS).map(|k| from + (to - from) * k as f64 / (POINTS - 1) as f64);
-        let models: Vec<Forward> = temperatures().map(at).collect::<Result<_>>()?;
+        let models: Vec<Forward> = temperatures(range_c).map(at).collect::<Result<_>>()?;
         let bias = |model: &Forward| conversion.bias(model);
         let biases: Vec<Vector3<f64>> = models.iter().map(bias).collect();
+        let mut cubics = Self::nearest(sensor, range_c, reference_c, conversion, &biases);
+        cubics.settled_c = Some(settled_c);
+        cubics.remains.push(cubics.misses(&biases));
+        cubics
+            .remains
+            .extend(linear(&models, &at(settled_c)?, sensor, over.biases_only));
+        let lag_s = over.lags_s().map(|lags_s| lags_s[sensor]);
+        let late = cubics.late(&biases, lag_s, |t| Ok(bias(&at(t)?)))?;
+        cubics.remains.push(late);
+        let own = models.first().map(|m| m.matrix.diagonal());
+        cubics.remains.push(hysteresis(
+            over.dies[sensor].hysteresis.as_ref().zip(own),
+            &conversion,
+        ));
+        Ok(Some(cubics))
+    }
+
+    /// The cubics nearest to `biases` at [`temperatures`], without remainders.
+    fn nearest(
+        sensor: Sensor,
+        range_c: [f64; 2],
+        reference_c: f64,
+        conversion: Conversion,
+        biases: &[Vector3<f64>],
+    ) -> Self {
         let coefficients = [0, 1, 2].map(|axis| {
             let values = biases.iter().map(|b| b[axis]);
             cubic(values.collect(), range_c, reference_c)
         });
-        let mut cubics = Self {
+        Self {
             sensor,
             unit: sensor.unit(),
             reference_c,
@@ -123,35 +140,34 @@ impl BiasCubics {
             coefficients,
             conversion,
             remains: Vec::new(),
-            settled_c,
+            settled_c: None,
+        }
+    }
+
+    /// What the cubics leave of `biases`.
+    fn misses(&self, biases: &[Vector3<f64>]) -> Remainder {
+        let misses = temperatures(self.range_c).zip(biases);
+        let misses: Vec<_> = misses.map(|(t, b)| b - self.at(t)).collect();
+        Remainder::of("bias, which is no cubic", "without input", &misses)
+    }
+
+    /// What dies that follow the thermometer by `lag_s` change the biases by; `bias` is that at a temperature of the dies.
+    fn late(
+        &self,
+        biases: &[Vector3<f64>],
+        lag_s: Option<f64>,
+        bias: impl Fn(f64) -> Result<Vector3<f64>>,
+    ) -> Result<Remainder> {
+        let Some(lag_s) = lag_s else {
+            return Ok(Remainder::unknown(LAG, "lag not determined"));
         };
-        let misses = temperatures().zip(&biases);
-        let misses: Vec<_> = misses.map(|(t, b)| b - cubics.at(t)).collect();
-        cubics.remains.push(Remainder::of(
-            "bias, which is no cubic",
-            "without input",
-            &misses,
-        ));
-        cubics
-            .remains
-            .extend(linear(&models, &at(settled_c)?, sensor, over.biases_only));
-        let lag_s = over.lags_s().map(|lags_s| lags_s[sensor]);
-        cubics.remains.push(match lag_s {
-            None => Remainder::unknown(LAG, "lag not determined"),
-            Some(lag_s) => {
-                let late = temperatures().zip(&biases).map(|(t, b)| {
-                    let die_c = (t - lag_s * RAMP_K_PER_S).clamp(from, to);
-                    Ok(b - bias(&at(die_c)?))
-                });
-                Remainder::of(LAG, "at 2 K/min", &late.collect::<Result<Vec<_>>>()?)
-            }
+        let [from, to] = self.range_c;
+        let late = temperatures(self.range_c).zip(biases).map(|(t, b)| {
+            let die_c = (t - lag_s * RAMP_K_PER_S).clamp(from, to);
+            Ok(b - bias(die_c)?)
         });
-        cubics.remains.push(hysteresis(
-            over.dies[sensor].hysteresis.as_ref(),
-            &models,
-            &conversion,
-        ));
-        Ok(Some(cubics))
+        let late = late.collect::<Result<Vec<_>>>()?;
+        Ok(Remainder::of(LAG, "at 2 K/min", &late))
     }
 
     /// The biases at `temp_c`, held outside the range, SI.
@@ -260,6 +276,25 @@ impl Conversion {
     }
 }
 
+/// Refuses a range that no cubic follows from.
+fn wide_enough(sensor: Sensor, [from, to]: [f64; 2]) -> Result<()> {
+    if to - from >= NARROWEST_K {
+        return Ok(());
+    }
+    let problem =
+        format!("{from:.1} to {to:.1} °C is less than {NARROWEST_K} K, too little for a cubic");
+    Err(Error::new(
+        sensor,
+        problem,
+        "fit a recording over a wider range",
+    ))
+}
+
+/// Temperatures at which a cubic is fitted and judged, °C.
+fn temperatures([from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
+    (0..POINTS).map(move |k| from + (to - from) * k as f64 / (POINTS - 1) as f64)
+}
+
 /// Model of the sensor at a temperature of the die, SI to raw.
 fn forward(curves: &Curves, sensor: Sensor, temp_c: f64) -> Result<Forward> {
     let inverse = curves.inverse(sensor, temp_c);
@@ -337,20 +372,16 @@ fn linear(
     ]
 }
 
-/// What the biases are off by while it heats or cools: half of what both differ by, `found` with rms and largest of the axes.
-fn hysteresis(
-    found: Option<&[[f64; 3]; 2]>,
-    models: &[Forward],
-    conversion: &Conversion,
-) -> Remainder {
+/// What the biases are off by while it heats or cools: half of what both differ by, `found` with rms and largest of the axes, and raw per
+/// unit of these.
+fn hysteresis(found: Option<(&[[f64; 3]; 2], Vector3<f64>)>, conversion: &Conversion) -> Remainder {
     const SOURCE: &str = "hysteresis";
-    let (Some([rms, largest]), Some(model)) = (found, models.first()) else {
+    let Some(([rms, largest], raw)) = found else {
         return Remainder::unknown(SOURCE, "heating and cooling have no temperature in common");
     };
     // By the program's scale factors, which may be others than those of the calibration.
-    let half = |sizes: &[f64; 3], k: usize| {
-        0.5 * sizes[k] * (model.matrix[(k, k)] * conversion.si_per_raw[k]).abs()
-    };
+    let half =
+        |sizes: &[f64; 3], k: usize| 0.5 * sizes[k] * (raw[k] * conversion.si_per_raw[k]).abs();
     let squares: f64 = (0..3).map(|k| half(rms, k).powi(2)).sum();
     let max = (0..3).map(|k| half(largest, k)).fold(0.0, f64::max);
     Remainder {

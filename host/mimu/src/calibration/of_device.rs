@@ -99,6 +99,8 @@ fn over_temperature(stored: &DeviceCalibration) -> Option<OverTemperature> {
         slope_o: exact(&slope.offset.map(f64::from)),
         sigma_C: None,
         sigma_o: None,
+        sigma_scale_factor: None,
+        sigma_bias: None,
     };
     let nodes = stored.nodes.iter().map(|node| TemperatureNode {
         temp_c: f64::from(node.temp_c),

@@ -100,6 +100,12 @@ pub struct NodeTable {
     /// Standard deviations of o.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_o: Option<[f64; 3]>,
+    /// Standard deviations of the scale factors, raw per SI. They do not follow from those of C and o, whose errors go together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_scale_factor: Option<[f64; 3]>,
+    /// Standard deviations of the biases, raw.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_bias: Option<[f64; 3]>,
 }
 
 /// Inverse models of a calibration over temperature, ready to be evaluated as the device does, in double precision.
@@ -139,10 +145,10 @@ impl NodeTable {
     fn problem(&self) -> Option<String> {
         let positive = |x: &f64| x.is_finite() && *x >= 0.0;
         let sigma_c = self.sigma_C.iter().flatten().flatten();
-        if !sigma_c.chain(self.sigma_o.iter().flatten()).all(positive) {
-            return Some(
-                "sigma_C or sigma_o has an entry that cannot be a standard deviation".into(),
-            );
+        let all = sigma_c.chain(self.sigma_o.iter().flatten());
+        let all = all.chain(self.sigma_scale_factor.iter().flatten());
+        if !all.chain(self.sigma_bias.iter().flatten()).all(positive) {
+            return Some("a sigma has an entry that cannot be a standard deviation".into());
         }
         implausible(&self.model(), Some(&self.slope()))
     }

@@ -41,6 +41,7 @@ use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::prepared::Prepared;
 use crate::quantity::{Sensor, significant};
+use crate::recording_problem::OfRecording;
 use crate::triad::{Part, Triad};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
@@ -164,6 +165,8 @@ pub struct Diagnosis {
     pub untestable: Vec<(Sensor, Untestable)>,
     /// The recordings that effects were found in, the first first.
     pub sources: Vec<Source>,
+    /// What is wrong with these and with the one that effects are judged by; of the later ones without a fit.
+    pub problems: Vec<OfRecording>,
 }
 
 /// A recording, told apart from others.
@@ -362,6 +365,9 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         _ => Some(prepared.clone()),
     };
     let before = calibrate(without(&recordings.first).ok_or_else(singular)?)?;
+    let of_later = recordings.later().flat_map(OfRecording::prepared);
+    let problems = OfRecording::fitted(&before).into_iter().chain(of_later);
+    let problems = problems.collect();
     let mut later: Vec<Prepared> = Vec::new();
     for prepared in recordings.later() {
         later.push(without(prepared).ok_or_else(singular)?);
@@ -452,5 +458,6 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         verdict,
         untestable,
         sources,
+        problems,
     })
 }

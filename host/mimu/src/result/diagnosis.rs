@@ -14,7 +14,7 @@ use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::fit::Split;
 use crate::plan::next_experiment::{Confused, Next, NotExcited, NotInPlan};
 use crate::quantity::{Figure, PerSensor, Sensor, present};
-use crate::recording_problem::RecordingProblem;
+use crate::recording_problem::OfRecording;
 use crate::warning::Warning;
 
 /// Result of a diagnosis.
@@ -55,8 +55,8 @@ pub struct DiagnosisResult {
     pub leftover: Vec<Leftover>,
     /// What of the samples was left out.
     pub left_out: LeftOutResult,
-    /// What is wrong with the first recording, one for each kind; most are among the warnings too.
-    pub recording_problems: Vec<RecordingProblem>,
+    /// What is wrong with the recordings, one for each kind; most are among the warnings too.
+    pub recording_problems: Vec<OfRecording>,
     /// What a person should know.
     pub warnings: Vec<Warning>,
     /// The calibration before and after on a recording that nothing was fitted to.
@@ -204,7 +204,7 @@ impl DiagnosisResult {
                 empty_samples: condensed.missing.iter().sum(),
                 clipped_samples: clipped.map(|m| m.clipped).sum(),
             },
-            recording_problems: RecordingProblem::of(&d.before),
+            recording_problems: d.problems.clone(),
             warnings,
             second: second.map(|(name, [before, after])| SecondResult {
                 recording: name.into(),
@@ -224,6 +224,15 @@ impl DiagnosisResult {
         self.rejected.extend(decision.rejected.iter().cloned());
         self.undecided.extend(decision.undecided.iter().cloned());
         self.leftover.extend(decision.leftover.iter().cloned());
+    }
+
+    /// Whether the command was given more than one recording, so that a problem has to say which has it.
+    pub fn has_several(&self) -> bool {
+        let first = self.recordings.first().map(|r| r.place.as_str());
+        let other = |p: &OfRecording| Some(p.recording.as_str()) != first;
+        self.recordings.len() > 1
+            || self.second.is_some()
+            || self.recording_problems.iter().any(other)
     }
 
     /// Left over beyond what usual sensors do by themselves.

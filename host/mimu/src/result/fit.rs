@@ -12,7 +12,7 @@ use crate::observable::Observable;
 use crate::parameter::{ParameterKind, TriadParameter, parameters};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, PerSensor, Sensor, present, raw_unit};
-use crate::recording_problem::RecordingProblem;
+use crate::recording_problem::OfRecording;
 use crate::signal::dwell::Dwell;
 use crate::signal::stillness::Detection;
 use crate::triad::{Angles, Estimate};
@@ -61,7 +61,7 @@ pub struct FitResult {
     /// What that changes: every parameter fitted with everything, and as fitted.
     pub left_out_changes: Vec<Change>,
     /// What is wrong with the recording, one for each kind; most are among the warnings too.
-    pub recording_problems: Vec<RecordingProblem>,
+    pub recording_problems: Vec<OfRecording>,
     /// What a person should know.
     pub warnings: Vec<Warning>,
 }
@@ -272,7 +272,7 @@ impl FitResult {
             dwells: DwellResult::list(&fit.prepared),
             left_out: LeftOutResult::list(&fit.prepared),
             left_out_changes: fit.changes.clone(),
-            recording_problems: RecordingProblem::of(fit),
+            recording_problems: OfRecording::fitted(fit),
             warnings: fit.warnings.iter().chain(of_sensors).cloned().collect(),
         }
     }

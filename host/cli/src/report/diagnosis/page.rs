@@ -13,6 +13,7 @@ use mimu::diagnose::picture::{Against, Omnibus, Panel, Picture};
 use mimu::diagnose::search::{FALSE_FOUND, FALSE_LISTED};
 use mimu::quantity::{Figure, Sensor};
 use mimu::readable;
+use mimu::recording_problem::OfRecording;
 use mimu::result::diagnosis::{DiagnosisResult, SensorDiagnosisResult};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
@@ -157,8 +158,10 @@ pub fn body(d: &DiagnosisResult, made: &Made) -> Result<Markup> {
 fn first(d: &DiagnosisResult) -> Markup {
     html! {
         @if !d.recording_problems.is_empty() {
-            h2 { "Problems of this recording" }
-            ul { @for problem in &d.recording_problems { li data-problem=(problem.id()) { (problem) } } }
+            h2 { "Problems of " (if d.has_several() { "these recordings" } else { "this recording" }) }
+            ul { @for OfRecording { recording, problem } in &d.recording_problems {
+                li data-problem=(problem.id()) { @if d.has_several() { (recording) ": " } (problem) }
+            } }
         }
         p class={ "verdict " (d.verdict.name()) } { (verdict(d)) }
     }

@@ -39,7 +39,7 @@ pub struct Detail {
 pub fn diagnosis_text(d: &DiagnosisResult, detail: Detail) -> String {
     let Detail { all, next } = detail;
     let mut out = String::new();
-    problems(&mut out, &d.recording_problems, all);
+    problems(&mut out, &d.recording_problems, d.has_several(), all);
     let _ = writeln!(out, "{}: {}: {}", d.device, d.verdict.name(), meaning(d));
     for u in &d.untestable {
         wrap(&mut out, &format!("  {}: ", u.sensor), &u.reason);

@@ -1,16 +1,18 @@
 //! The curves of a calibration over temperature.
 
 use maud::{Markup, html};
-use mimu::calibration::Calibration;
+use mimu::calibration::{Calibration, Curves, OverTemperature, TemperatureNode};
+use mimu::parameter::ParameterKind;
 use mimu::quantity::{AXES, Sensor};
 use mimu::readable;
 use mimu::triad::Forward;
 
 use crate::report::page::{number, spoken};
-use crate::report::svg::{Panel, range};
+use crate::report::thermal_plot::{Changes, Point, panel};
 
 const POINTS: usize = 81;
-const CLASSES: [&str; 3] = ["axis-x", "axis-y", "axis-z"];
+/// Half of a 95 % interval over the standard deviation: curves are estimated from so many rows that their errors are Gaussian.
+const NORMAL_95: f64 = 1.959_964;
 
 /// Scale factors and biases over temperature, and what is known of the dies.
 pub fn section(calibration: &Calibration) -> Markup {
@@ -18,9 +20,6 @@ pub fn section(calibration: &Calibration) -> Markup {
         return html! {};
     };
     let [from, to] = over.range_c;
-    let temperatures: Vec<f64> = (0..POINTS)
-        .map(|k| from + (to - from) * k as f64 / (POINTS - 1) as f64)
-        .collect();
     html! {
         p {
             "From " (number(from, 1.0, "")) " to " (number(to, 1.0, "°C")) " of the dies"
@@ -39,53 +38,103 @@ pub fn section(calibration: &Calibration) -> Markup {
             div class="figures" {
                 @for sensor in Sensor::BOTH {
                     @if over.has(sensor) {
-                        @let models: Vec<Forward> = temperatures.iter().filter_map(|t| Forward::of(&curves.inverse(sensor, *t)?)).collect();
-                        @if models.len() == POINTS {
-                            @if !over.biases_only {
-                                (changes(sensor, "scale factor, ppm", &temperatures, &models, |m, i, middle| {
-                                    1e6 * (m.matrix[(i, i)] / middle.matrix[(i, i)] - 1.0)
-                                }))
-                            }
-                            @let unit = readable::parameter(sensor.unit());
-                            (changes(sensor, &format!("bias, {}", unit.unit), &temperatures, &models, |m, i, middle| {
-                                (m.bias[i] - middle.bias[i]) / middle.matrix[(i, i)] * unit.factor
-                            }))
-                        }
+                        @if !over.biases_only { (drawn(calibration, &curves, sensor, ParameterKind::Scale)) }
+                        (drawn(calibration, &curves, sensor, ParameterKind::Bias))
                     }
                 }
             }
-            figcaption { "Change of each scale factor and bias from the middle of the range. `mimu thermal fit --page` draws them with their intervals." }
+            figcaption {
+                "Change of each scale factor and bias from the middle of the range"
+                @if over.nodes.iter().all(|n| [&n.gyro, &n.accel].into_iter().flatten().all(|t| t.sigma_bias.is_some())) {
+                    ", with its 95 % interval: those of the calibration's " (over.nodes.len()) " nodes, and straight lines between them."
+                } @else {
+                    ". The calibration has no intervals at its nodes."
+                }
+            }
         }
     }
 }
 
-fn changes(
+/// Scale factors, relative to themselves, or biases, in SI by the scale factors of the middle.
+fn drawn(
+    calibration: &Calibration,
+    curves: &Curves,
     sensor: Sensor,
-    what: &str,
-    temperatures: &[f64],
-    models: &[Forward],
-    of: impl Fn(&Forward, usize, &Forward) -> f64,
+    kind: ParameterKind,
 ) -> Markup {
-    let middle = &models[models.len() / 2];
-    let curve = |axis: usize| -> Vec<(f64, f64)> {
-        let each = temperatures.iter().zip(models);
-        each.map(|(t, m)| (*t, of(m, axis, middle))).collect()
+    let Some(over) = &calibration.temperature else {
+        return html! {};
     };
-    let curves: Vec<_> = (0..3).map(curve).collect();
-    let panel = Panel::ONE;
-    let frame = panel.frame(
-        range(temperatures.iter().copied()),
-        range(curves.iter().flatten().map(|p| p.1)),
-    );
-    let entries: Vec<(&str, &str)> = CLASSES.into_iter().zip(AXES).collect();
-    panel.drawing(
-        &format!("{sensor}: {what} over temperature"),
-        &html! {
-            (frame.axes(spoken(sensor), true))
-            (frame.y_name(what))
-            (frame.x_name("temperature of the dies, °C", &frame))
-            @for (class, curve) in CLASSES.iter().zip(&curves) { (frame.line(class, curve.iter().copied())) }
-            (frame.legend(&entries))
+    let [from, to] = over.range_c;
+    let temperature = |k: usize| from + (to - from) * k as f64 / (POINTS - 1) as f64;
+    let at = |temp_c: f64| Forward::of(&curves.inverse(sensor, temp_c)?);
+    let models: Option<Vec<Forward>> = (0..POINTS).map(|k| at(temperature(k))).collect();
+    let Some(models) = models else {
+        return html! {};
+    };
+    let middle = &models[POINTS / 2];
+    let unit = readable::parameter(sensor.unit());
+    let curve = |axis: usize| {
+        let gain = |m: &Forward| m.matrix.row(axis).norm();
+        // Value and what a raw unit of it counts.
+        let (of, factor): (&dyn Fn(&Forward) -> f64, f64) = match kind {
+            ParameterKind::Scale => (&gain, 1e6 / gain(middle)),
+            _ => (&|m: &Forward| m.bias[axis], unit.factor / gain(middle)),
+        };
+        let points = models.iter().enumerate().map(|(k, model)| {
+            let temp_c = temperature(k);
+            let value = (of(model) - of(middle)) * factor;
+            let half = sigma(over, sensor, kind, axis, temp_c).map(|s| NORMAL_95 * s * factor);
+            Point {
+                temp_c,
+                value,
+                interval: half.map(|half| [value - half, value + half]),
+            }
+        });
+        (AXES[axis].to_string(), points.collect())
+    };
+    let changes = Changes {
+        heading: format!("{sensor} {}", kind.words()),
+        unit: match kind {
+            ParameterKind::Scale => "ppm".into(),
+            _ => unit.unit.to_string(),
         },
+        range_c: over.range_c,
+        curves: (0..3).map(curve).collect(),
+    };
+    panel(
+        &format!("{sensor}: {} over temperature", kind.words()),
+        &changes.draw(),
     )
+}
+
+/// Standard deviation, raw, on a straight line between the nodes beside `temp_c`.
+fn sigma(
+    over: &OverTemperature,
+    sensor: Sensor,
+    kind: ParameterKind,
+    axis: usize,
+    temp_c: f64,
+) -> Option<f64> {
+    let of = |node: &TemperatureNode| {
+        let table = node.table(sensor)?;
+        let sigma = match kind {
+            ParameterKind::Scale => table.sigma_scale_factor?,
+            _ => table.sigma_bias?,
+        };
+        Some((node.temp_c, sigma[axis]))
+    };
+    let after = over.nodes.partition_point(|node| node.temp_c < temp_c);
+    let last = over.nodes.len().checked_sub(1)?;
+    let (cold, warm) = (
+        of(&over.nodes[after.saturating_sub(1)])?,
+        of(&over.nodes[after.min(last)])?,
+    );
+    let span = warm.0 - cold.0;
+    let share = if span > 0.0 {
+        (temp_c - cold.0) / span
+    } else {
+        0.0
+    };
+    Some(cold.1 + share.clamp(0.0, 1.0) * (warm.1 - cold.1))
 }

@@ -1,0 +1,87 @@
+//! Cubics of a unit that only lay still, whose scale factors the program that takes them has to know itself.
+
+use nalgebra::Vector3;
+
+use super::{
+    BiasCubics, Conversion, KnownConversion, Remainder, hysteresis, temperatures, wide_enough,
+};
+use crate::calibration::thermal_biases::ThermalBiases;
+use crate::quantity::Sensor;
+use mimu_recording::RawUnit;
+use mimu_recording::error::{Argument, Error, Result};
+
+impl BiasCubics {
+    /// Of `sensor` over `range_c`, about `reference_c`; `None` if `biases` has no readings of it.
+    ///
+    /// The cubic of an accelerometer is 0 at `reference_c`: its readings at rest contain gravity in a pose that nobody knows, and only their
+    /// change is one of the bias. That of a gyro is the whole of the bias, with the Earth's rate.
+    ///
+    /// # Errors
+    /// A range of less than 10 K; readings that are not SI, with no factor to convert them.
+    pub fn of_rest(
+        biases: &ThermalBiases,
+        sensor: Sensor,
+        known: &KnownConversion,
+        range_c: [f64; 2],
+        reference_c: f64,
+    ) -> Result<Option<Self>> {
+        if !biases.has(sensor) {
+            return Ok(None);
+        }
+        wide_enough(sensor, range_c)?;
+        let si = match (known.si_per_raw, biases.recording.raw_unit) {
+            (Some(factor), _) => factor,
+            (None, RawUnit::Si) => 1.0,
+            (None, raw_unit) => {
+                let problem = format!(
+                    "the readings are in {raw_unit}, and a recording at rest does not show how many {} that is",
+                    sensor.unit()
+                );
+                let remedy = "give the factor by which the autopilot's driver converts";
+                let argument = match sensor {
+                    Sensor::Gyro => Argument::GyroConversion,
+                    Sensor::Accel => Argument::AccelConversion,
+                };
+                return Err(Error::new(sensor, problem, remedy).about(argument));
+            }
+        };
+        let conversion = Conversion {
+            si_per_raw: [si; 3],
+            zero_raw: [known.zero_raw.unwrap_or(0.0); 3],
+        };
+        let curves = biases.curves()?;
+        let bias = |temp_c: f64| {
+            let off = curves.reading(sensor, temp_c) - Vector3::from(conversion.zero_raw);
+            off * si
+        };
+        let mut values: Vec<_> = temperatures(range_c).map(bias).collect();
+        let mut cubics = Self::nearest(sensor, range_c, reference_c, conversion, &values);
+        let level = match sensor {
+            Sensor::Gyro => Vector3::zeros(),
+            Sensor::Accel => Vector3::from(cubics.coefficients.map(|c| c[0])),
+        };
+        values.iter_mut().for_each(|v| *v -= level);
+        for (of_axis, level) in cubics.coefficients.iter_mut().zip(&level) {
+            of_axis[0] -= level;
+        }
+        cubics.remains.push(cubics.misses(&values));
+        let lag_s = biases.dies[sensor].lag_s;
+        let late = cubics.late(&values, lag_s, |t| Ok(bias(t) - level))?;
+        cubics.remains.push(late);
+        let of_gravity = match sensor {
+            Sensor::Gyro => "the unit only lay still",
+            Sensor::Accel => "and what they do to gravity at rest counts as bias",
+        };
+        let never = "the unit only lay still";
+        let gains = [
+            ("scale factors and cross terms", never),
+            ("scale factors and cross terms over temperature", of_gravity),
+        ];
+        let gains = gains.map(|(source, why)| Remainder::unknown(source, why));
+        cubics.remains.extend(gains);
+        let own = biases.dies[sensor].hysteresis.as_ref();
+        let own = own.zip(Some(Vector3::repeat(1.0)));
+        cubics.remains.push(hysteresis(own, &conversion));
+        Ok(Some(cubics))
+    }
+}

@@ -1,0 +1,263 @@
+//! Biases over temperature of a unit that only lay still: what its readings change by, without the scale factors that would make a
+//! calibration of it.
+//!
+//! It is a file of its own, with its own `format`, and not a calibration with a mark: without C nothing can be applied, and a C of ones would
+//! be applied by whoever overlooks the mark. Every command that reads a calibration refuses the file by its name ([`refusal`]); the formats of
+//! autopilots, which compensate the bias alone over temperature, take it.
+
+use mimu_core::compensation::{Affine, Compensation};
+use mimu_core::stored::NODES;
+use mimu_core::table::{Node, TEMPERATURE_RANGE_C, Table, is_temperature};
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::{DieTable, Origin};
+use crate::quantity::{PerSensor, Sensor};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::parse_toml;
+
+/// Version of the layout.
+const FORMAT: &str = "mimu-thermal-biases/1";
+
+const HEADER: &str = "\
+# Biases over temperature of a unit at rest, and nothing else: scale factors and misalignments were not estimated, so this is no calibration.
+# `mimu export px4` and `mimu export ardupilot` take it; with the unit's calibration at one temperature, `mimu thermal fit --base` makes one.
+# u is the raw reading at rest, by the temperature of the dies: the bias, with the Earth's rate or with gravity in the pose of the recording.
+# Between two nodes, h apart, with w from 0 to 1, a reading and its slope s (per kelvin) are
+#   (1+2w)(1-w)^2 u0 + w^2(3-2w) u1 + h w(1-w)^2 s0 - h w^2(1-w) s1.
+# sigma_u is a standard deviation. hysteresis: rms and largest of what heating and cooling differ by, raw.
+";
+
+/// A file of biases over temperature.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThermalBiases {
+    /// `mimu-thermal-biases/1`.
+    format: String,
+    /// Unit that it is for.
+    pub device: String,
+    /// The unit's own number, if it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_id: Option<String>,
+    /// When it was made, RFC 3339.
+    pub created: String,
+    /// Program and version that made it.
+    pub tool: String,
+    /// Dies' temperatures in the recordings that it was fitted to, °C.
+    pub range_c: [f64; 2],
+    /// What it was made from.
+    pub recording: Origin,
+    /// What is known of the dies of each triad. Its hysteresis is raw.
+    #[serde(default)]
+    pub dies: PerSensor<DieTable>,
+    /// One to sixteen, the coldest first.
+    #[serde(rename = "node", default)]
+    nodes: Vec<BiasNode>,
+}
+
+/// Readings at rest at one temperature of the dies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BiasNode {
+    /// °C.
+    pub temp_c: f64,
+    /// Of the gyro.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gyro: Option<RestReading>,
+    /// Of the accelerometer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accel: Option<RestReading>,
+}
+
+/// Reading of a triad at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RestReading {
+    /// Raw.
+    pub u: [f64; 3],
+    /// Derivatives by the temperature, raw per kelvin.
+    pub slope_u: [f64; 3],
+    /// Standard deviations of u.
+    pub sigma_u: [f64; 3],
+}
+
+/// The readings at all temperatures, to be evaluated many times.
+#[derive(Debug, Clone)]
+pub struct RestCurves(Table<f64, NODES>);
+
+impl RestCurves {
+    /// Reading of `sensor` at this temperature of the dies, °C: raw.
+    pub fn reading(&self, sensor: Sensor, die_c: f64) -> Vector3<f64> {
+        let mut state = self.0.state();
+        self.0.follow(&mut state, PerSensor::both(die_c));
+        state.model[sensor].offset
+    }
+}
+
+/// The error of who wants a calibration and is given such a file at `place`.
+pub fn refusal(place: &str) -> Error {
+    Error::new(
+        place,
+        format!(
+            "it contains biases over temperature alone ({FORMAT}), without scale factors and misalignments"
+        ),
+        "export it to px4 or ardupilot, or make a calibration of the recording: mimu thermal fit REC --base FILE",
+    )
+}
+
+/// Whether `text` is such a file, of any version.
+pub fn is_one(text: &str) -> bool {
+    #[derive(Deserialize)]
+    struct Format {
+        format: String,
+    }
+    let read: std::result::Result<Format, _> = toml::from_str(text);
+    let name = FORMAT.split('/').next().unwrap_or(FORMAT);
+    read.is_ok_and(|r| r.format.split('/').next() == Some(name))
+}
+
+impl BiasNode {
+    /// The reading of `sensor`.
+    pub fn reading(&self, sensor: Sensor) -> Option<&RestReading> {
+        match sensor {
+            Sensor::Gyro => self.gyro.as_ref(),
+            Sensor::Accel => self.accel.as_ref(),
+        }
+    }
+}
+
+/// What such a file is made of.
+#[derive(Debug, Clone)]
+pub struct RestOfUnit {
+    /// Name of the unit.
+    pub device: String,
+    /// Its own number, if it is known.
+    pub unit_id: Option<String>,
+    /// What it was made from.
+    pub recording: Origin,
+    /// Dies' temperatures, °C.
+    pub range_c: [f64; 2],
+    /// What is known of the dies; hysteresis raw.
+    pub dies: PerSensor<DieTable>,
+    /// Readings, the coldest first.
+    pub nodes: Vec<BiasNode>,
+}
+
+impl ThermalBiases {
+    /// Of `unit`, made at `created` (RFC 3339).
+    ///
+    /// # Errors
+    /// Nodes that cannot be evaluated.
+    pub fn of(unit: RestOfUnit, created: &str) -> Result<Self> {
+        let place = format!("biases of {:?}", unit.device);
+        let made = Self {
+            format: FORMAT.into(),
+            device: unit.device,
+            unit_id: unit.unit_id,
+            created: created.into(),
+            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            range_c: unit.range_c,
+            recording: unit.recording,
+            dies: unit.dies,
+            nodes: unit.nodes,
+        };
+        made.checked(&place)
+    }
+
+    /// Parses and checks the text of a file; `place` is its path.
+    ///
+    /// # Errors
+    /// Another version; what is no file of biases; numbers that cannot be evaluated.
+    pub fn parse(text: &str, place: &str) -> Result<Self> {
+        let read: Self = parse_toml(text, place, Some("fit the recordings again"))?;
+        read.checked(place)
+    }
+
+    /// Text of the file, for programs and for people.
+    pub fn to_toml(&self) -> String {
+        crate::toml_layout::to_toml(HEADER, self)
+    }
+
+    /// Whether it has readings of `sensor`.
+    pub fn has(&self, sensor: Sensor) -> bool {
+        self.nodes.iter().any(|node| node.reading(sensor).is_some())
+    }
+
+    /// The readings over temperature. A sensor without any reads zero.
+    ///
+    /// # Errors
+    /// Nodes that cannot be evaluated: none that was [parsed](Self::parse).
+    pub fn curves(&self) -> Result<RestCurves> {
+        self.table().map_err(|problem| wrong("nodes", problem))
+    }
+
+    fn table(&self) -> std::result::Result<RestCurves, String> {
+        let offset = |offset: [f64; 3]| Affine {
+            matrix: Matrix3::zeros(),
+            offset: Vector3::from(offset),
+        };
+        let both = |node: &BiasNode, of: fn(&RestReading) -> [f64; 3]| {
+            Compensation::from_fn(|sensor| offset(node.reading(sensor).map_or([0.0; 3], of)))
+        };
+        let nodes = self.nodes.iter().map(|node| Node {
+            temp_c: node.temp_c,
+            model: both(node, |r| r.u),
+            slope: both(node, |r| r.slope_u),
+        });
+        let table = Table::new(nodes).and_then(|table| table.with_range(self.range_c));
+        table.map(RestCurves).map_err(|refused| refused.to_string())
+    }
+
+    fn checked(self, place: &str) -> Result<Self> {
+        let refuse = |problem: String| Err(wrong(place, problem));
+        if self.format != FORMAT {
+            let problem = format!(
+                "format is {:?}, and this program reads {FORMAT:?}",
+                self.format
+            );
+            let remedy = "use the version of mimu that wrote it";
+            return Err(Error::new(place, problem, remedy));
+        }
+        let [least, most] = TEMPERATURE_RANGE_C;
+        let [from, to] = self.range_c;
+        if !(is_temperature(from) && is_temperature(to) && from <= to) {
+            return refuse(format!(
+                "range_c is [{from}, {to}], and has to rise, within {least} and {most} °C"
+            ));
+        }
+        if !(self.has(Sensor::Gyro) || self.has(Sensor::Accel)) {
+            return refuse("no node has a reading of gyro or accel".into());
+        }
+        for (k, node) in self.nodes.iter().enumerate() {
+            let number = k + 1;
+            if !is_temperature(node.temp_c) {
+                let temp_c = node.temp_c;
+                return refuse(format!(
+                    "temp_c of node {number} is {temp_c}, and has to be from {least} to {most} °C"
+                ));
+            }
+            for sensor in Sensor::BOTH {
+                let reading = node.reading(sensor);
+                if self.has(sensor) && reading.is_none() {
+                    return refuse(format!(
+                        "node {number} has no [{sensor}], and another node has"
+                    ));
+                }
+                let mut sigmas = reading.iter().flat_map(|r| r.sigma_u);
+                if !sigmas.all(|s| s.is_finite() && s >= 0.0) {
+                    return refuse(format!(
+                        "sigma_u of {sensor} in node {number} has an entry that is no standard deviation"
+                    ));
+                }
+            }
+        }
+        match self.table() {
+            Ok(_) => Ok(self),
+            Err(problem) => refuse(problem),
+        }
+    }
+}
+
+fn wrong(place: &str, problem: String) -> Error {
+    Error::new(place, problem, "fit the recordings again")
+}
