@@ -85,10 +85,9 @@ dist: toolchain ## an archive for any Linux since glibc 2.28: command, manual, c
 python: toolchain ## the Python package: builds the wheel and runs its tests
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/tests/run.sh
 
-wheel: toolchain ## the wheel to hand out: target/wheels, with the command
-	@python3 -m venv target/python-build && target/python-build/bin/pip install -q --disable-pip-version-check maturin==1.16.0
-	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) target/python-build/bin/maturin build --locked --manifest-path python/Cargo.toml --out target/wheels
-	@ls -l target/wheels
+wheel: toolchain ## the wheel to hand out, target/wheels, for any Linux since glibc 2.28, with the command; DIST_TARGET as of dist
+	@rustup target add --toolchain $(TOOLCHAIN) $(DIST_TARGET)
+	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./packaging/wheel.sh $(DIST_TARGET)
 
 book: toolchain ## the documentation as a site, target/book, with search; its links are checked
 	@test "$$(target/tools/bin/mdbook --version 2>/dev/null)" = "mdbook v$(MDBOOK)" \

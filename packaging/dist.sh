@@ -14,12 +14,7 @@ version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -1)
 name=mimu-$version-$target
 
 tools=$out/dist-tools
-if ! cmp -s packaging/requirements.txt "$tools/requirements.txt"; then
-    rm -rf "$tools"
-    python3 -m venv "$tools"
-    "$tools/bin/pip" install --quiet --disable-pip-version-check -r packaging/requirements.txt
-    cp packaging/requirements.txt "$tools/requirements.txt"
-fi
+packaging/environment.sh packaging/requirements.txt "$tools"
 PATH=$(realpath "$tools")/bin:$PATH $cargo zigbuild --locked --profile dist --target "$target.$glibc" -p mimu-cli --bin mimu
 
 folder=$out/$name

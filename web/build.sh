@@ -8,12 +8,7 @@ target=$(cd "$target" && pwd)
 out=$target/web
 
 venv=$target/web-cc
-if ! cmp -s "$here/requirements.txt" "$venv/requirements.txt"; then
-    rm -rf "$venv"
-    python3 -m venv "$venv"
-    "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$here/requirements.txt"
-    cp "$here/requirements.txt" "$venv/requirements.txt"
-fi
+"$here/../packaging/environment.sh" "$here/requirements.txt" "$venv"
 export MIMU_WEB_PYTHON=$venv/bin/python ZIG_GLOBAL_CACHE_DIR=$venv/cache ZIG_LOCAL_CACHE_DIR=$venv/cache
 export CC_wasm32_wasip1=$here/cc.sh AR_wasm32_wasip1=$here/ar.sh
 "$@" build --locked -p mimu-web --profile page --target wasm32-wasip1

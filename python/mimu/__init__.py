@@ -15,7 +15,9 @@ from importlib.metadata import version as _version
 
 from mimu import thermal
 from mimu._allan import Allan, Channel, NoiseCoefficient, allan
-from mimu._design import Design, ParameterSigma, design
+from mimu._design import (
+    CoefficientSigma, Design, NextExperiment, ParameterSigma, SchemeComparison, Shown, compare_schemes, design, next_experiment,
+)
 from mimu._diagnosis import Coefficient, Diagnosis, Effect, Leftover, NotExcited, Rejected, SensorDiagnosis, diagnose
 from mimu._error import Error
 from mimu._files import Export, SensorVerification, Verification, export, load, load_noise, verify
@@ -26,8 +28,8 @@ from mimu._recording import read
 __version__ = _version("mimu")
 
 __all__ = [
-    "Allan", "Calibration", "Channel", "Coefficient", "Design", "Diagnosis", "Dwell", "Effect", "Error", "Export", "Figures", "Fit",
-    "Leftover", "Noise", "NoiseCoefficient", "NotExcited", "Parameter", "ParameterSigma", "Recording", "Rejected", "SensorDiagnosis",
-    "SensorFit", "SensorVerification", "Verification", "allan", "design", "diagnose", "export", "fit", "load",
-    "load_noise", "read", "thermal", "verify",
+    "Allan", "Calibration", "Channel", "Coefficient", "CoefficientSigma", "Design", "Diagnosis", "Dwell", "Effect", "Error", "Export",
+    "Figures", "Fit", "Leftover", "NextExperiment", "Noise", "NoiseCoefficient", "NotExcited", "Parameter", "ParameterSigma", "Recording",
+    "Rejected", "SchemeComparison", "SensorDiagnosis", "SensorFit", "SensorVerification", "Shown", "Verification", "allan", "compare_schemes",
+    "design", "diagnose", "export", "fit", "load", "load_noise", "next_experiment", "read", "thermal", "verify",
 ]

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import os
+import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from mimu import _mimu
 from mimu._arguments import arguments
+from mimu._mimu import Recording
 from mimu._result import Array, Result, typed
+
+Reference = Literal["table", "gravity"]
+Table = Literal["three-axis", "two-axis", "faces", "hand"]
+Order = Literal["shortest", "randomised"]
 
 
 @dataclass(frozen=True)
@@ -56,7 +63,7 @@ class Design(Result):
 
     def to_toml(self) -> str:
         """The plan that ``mimu design -o`` writes, for a table or a person to carry out."""
-        return self._native.plan()
+        return _plan(self._native)
 
     def __str__(self) -> str:
         return self._native.text()
@@ -65,17 +72,116 @@ class Design(Result):
         return f"<mimu.Design: {self.title}, D-efficiency {self.d_efficiency:.3f}>"
 
 
+@dataclass(frozen=True)
+class Shown:
+    """What an experiment shows of an effect."""
+
+    id: str
+    #: Typical size over the sigma of the coefficient that is determined worst, or of the whole effect beside its rivals.
+    sigmas: float
+    #: What is enough of that, and whether it is reached.
+    wanted: float
+    settled: bool
+
+
+@dataclass(frozen=True)
+class CoefficientSigma:
+    """How well a coefficient of an effect is determined."""
+
+    name: str
+    value: float
+    #: SI.
+    unit: str
+
+
+class NextExperiment(Result):
+    """The smallest experiment that shows given effects."""
+
+    _native: _mimu.Design
+
+    title: str
+    #: What to do, in order.
+    experiment: str
+    effects: list[Shown]
+    #: Direction in the body frame that points up, a row for each dwell, in order.
+    positions: Array
+    #: Rate about the vertical in each dwell, deg/s, and when it begins.
+    rates_dps: Array
+    begin_s: Array
+    #: Chamber, times in s and degrees Celsius in rows; empty where it does not matter.
+    chamber_c: Array
+    #: Whether the unit is switched on as the recording begins.
+    cold_start: bool
+    sigma_per_parameter: list[CoefficientSigma]
+    dwell_s: float
+    time_s: float
+
+    def __init__(self, native: _mimu.Design) -> None:
+        super().__init__(native)
+        data = self.to_dict()
+        self.title = data["title"]
+        self.experiment = data["experiment"]
+        self.effects = [typed(Shown, effect) for effect in data["effects"]]
+        self.positions = typed(Array, data["positions"]).reshape(-1, 3)
+        self.rates_dps = typed(Array, data["rates_dps"])
+        self.begin_s = typed(Array, data["begin_s"])
+        self.chamber_c = typed(Array, data["chamber_c"]).reshape(-1, 2)
+        self.cold_start = data["cold_start"]
+        self.sigma_per_parameter = [typed(CoefficientSigma, sigma) for sigma in data["sigma_per_parameter"]]
+        self.dwell_s = data["dwell_s"]
+        self.time_s = data["time_s"]
+
+    def to_toml(self) -> str:
+        """The plan that ``mimu design --effects -o`` writes, for a table or a person to carry out."""
+        return _plan(self._native)
+
+    def __str__(self) -> str:
+        return self._native.text()
+
+    def __repr__(self) -> str:
+        return f"<mimu.NextExperiment {self.title}: {len(self.positions)} dwells>"
+
+
+class SchemeComparison(Result):
+    """Published schemes beside the best designs of as many dwells."""
+
+    _native: _mimu.Design
+
+    #: Schemes, each followed by the best design.
+    designs: list[dict[str, Any]]
+    #: Names of the schemes that the table cannot hold.
+    out_of_reach: list[str]
+
+    def __init__(self, native: _mimu.Design) -> None:
+        super().__init__(native)
+        data = self.to_dict()
+        self.designs = data["designs"]
+        self.out_of_reach = data["out_of_reach"]
+
+    def __str__(self) -> str:
+        return self._native.text()
+
+    def __repr__(self) -> str:
+        return "<mimu.SchemeComparison: " + ", ".join(f"{d['title']} {d['d_efficiency']:.3f}" for d in self.designs) + ">"
+
+
+def _plan(native: _mimu.Design) -> str:
+    plan = native.plan()
+    assert plan is not None, "only a comparison has no plan"
+    return plan
+
+
 def design(
     *,
     n: int | None = None,
     budget: float | None = None,
     scheme: Literal["six-face", "fang-nine", "xu-33", "xu-rates", "niu-8"] | None = None,
     sensor: Literal["gyro", "accel"] = "accel",
-    reference: Literal["table", "gravity"] = "table",
+    reference: Reference = "table",
     model: str | None = None,
-    table: Literal["three-axis", "two-axis", "faces", "hand"] | None = None,
+    table: Table | None = None,
     dwell: float | None = None,
-    order: Literal["shortest", "randomised"] | None = None,
+    order: Order | None = None,
     rates: str | None = None,
     slew: float | None = None,
     settle: float | None = None,
@@ -95,3 +201,57 @@ def design(
         rates=rates, slew=slew, settle=settle, sigma=sigma, noise=noise, instability=instability, walk=walk, seed=seed,
     )
     return Design(_mimu.design(arguments(options)))
+
+
+def next_experiment(
+    effects: str | Sequence[str],
+    *,
+    after: Recording | str | os.PathLike[str] | None = None,
+    chamber: tuple[float, float, float] | None = None,
+    reference: Reference = "table",
+    table: Table | None = None,
+    dwell: float | None = None,
+    rates: str | None = None,
+    slew: float | None = None,
+    settle: float | None = None,
+    noise: float | str | os.PathLike[str] | None = None,
+    seed: int | None = None,
+) -> NextExperiment:
+    """The smallest experiment that shows ``effects``, by their ids, as ``mimu design --effects`` finds it.
+
+    ``after`` is a recording of the unit, for its noise, sensors, rates and fixture. ``chamber`` has three temperatures in degrees Celsius:
+    where it begins and ends, and the two farthest from it. The others are those of :func:`mimu.design`.
+    """
+    options = dict(
+        effects=[effects] if isinstance(effects, str) else list(effects), chamber=chamber and ",".join(map(str, chamber)), reference=reference,
+        table=table, dwell=dwell, rates=rates, slew=slew, settle=settle, noise=noise, seed=seed,
+    )
+    with tempfile.TemporaryDirectory(prefix="mimu-") as folder:
+        # The command reads a recording from disk, and arrays are on none.
+        if isinstance(after, Recording):
+            after = after.directory or after.save(os.path.join(folder, "after"))
+        return NextExperiment(_mimu.design(arguments({**options, "after": after})))
+
+
+def compare_schemes(
+    *,
+    sensor: Literal["gyro", "accel"] = "accel",
+    reference: Reference = "table",
+    model: str | None = None,
+    table: Table | None = None,
+    dwell: float | None = None,
+    order: Order | None = None,
+    slew: float | None = None,
+    settle: float | None = None,
+    sigma: float | None = None,
+    noise: float | str | os.PathLike[str] | None = None,
+    instability: float | None = None,
+    walk: float | None = None,
+    seed: int | None = None,
+) -> SchemeComparison:
+    """All published schemes beside the best designs of as many dwells, as ``mimu design --compare``. Options as of :func:`mimu.design`."""
+    options = dict(
+        compare=True, sensor=sensor, reference=reference, model=model, table=table, dwell=dwell, order=order, slew=slew, settle=settle,
+        sigma=sigma, noise=noise, instability=instability, walk=walk, seed=seed,
+    )
+    return SchemeComparison(_mimu.design(arguments(options)))

@@ -19,6 +19,7 @@ use crate::work::{computed, json};
 #[pyclass(frozen, module = "mimu._mimu")]
 pub(crate) struct Allan {
     result: AllanResult,
+    created: String,
 }
 
 #[pymethods]
@@ -45,7 +46,7 @@ impl Allan {
 
     /// What the other functions take as noise.
     fn noise(&self) -> PyResult<Noise> {
-        let file = self.result.noise_file();
+        let file = self.result.noise_file(&self.created);
         let file = file.ok_or_else(|| PyValueError::new_err("no recording is given"))?;
         Ok(Noise {
             file: Arc::new(file),
@@ -113,6 +114,7 @@ pub(crate) fn allan(
         let surveys = survey_all(&samples, model.as_deref(), options, |_| {})?;
         Ok(Allan {
             result: AllanResult::of(&surveys),
+            created: mimu_cli::now(),
         })
     })
 }

@@ -2,40 +2,40 @@
 
 use std::ffi::OsString;
 
-use mimu_cli::called;
-use mimu_cli::report::{self, fragment};
+use mimu_cli::called::{self, Designed};
+use mimu_cli::report::fragment;
 use pyo3::prelude::*;
 
 use crate::error::refused;
 use crate::work::{done, json};
 
-/// A designed experiment.
+/// A designed experiment, or several.
 #[pyclass(frozen, module = "mimu._mimu")]
 pub(crate) struct Design {
-    design: mimu::result::design::Design,
-    plan: String,
+    made: Designed,
+    plan: Option<String>,
 }
 
 #[pymethods]
 impl Design {
     /// JSON of the result, as `mimu design --json` writes it.
     fn json(&self) -> PyResult<String> {
-        json(&self.design)
+        json(&self.made)
     }
 
     /// The text that `mimu design` prints.
     fn text(&self) -> String {
-        report::design_text(&self.design, false)
+        self.made.text(false)
     }
 
     /// The text within a page.
     fn html(&self) -> String {
-        fragment::of_design(&self.design)
+        fragment::of_text(&self.made.text(true))
     }
 
     /// The plan for a table or a person, as `mimu design -o` writes it.
-    fn plan(&self) -> &str {
-        &self.plan
+    fn plan(&self) -> Option<&str> {
+        self.plan.as_deref()
     }
 }
 
@@ -43,6 +43,6 @@ impl Design {
 #[pyfunction]
 pub(crate) fn design(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<Design> {
     let work = move || called::design(arguments);
-    let (design, plan) = done(py, work, refused)?;
-    Ok(Design { design, plan })
+    let (made, plan) = done(py, work, refused)?;
+    Ok(Design { made, plan })
 }

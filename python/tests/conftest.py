@@ -24,6 +24,11 @@ EXAMPLES = ROOT / "python" / "examples"
 Command = Callable[..., subprocess.CompletedProcess[str]]
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Marks of the tests."""
+    config.addinivalue_line("markers", "nightly: what takes minutes; run by `make nightly`")
+
+
 def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """The command ``mimu`` that the wheel has brought."""
     program = Path(sys.executable).with_name("mimu")

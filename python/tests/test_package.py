@@ -33,6 +33,11 @@ def test_the_command_is_there_with_its_help_and_status() -> None:
         (mimu.read, "import", {"json", "o", "x", "y", "z"}),
         # Other results than a design, and what only these take.
         (mimu.design, "design", {"json", "o", "compare", "effects", "after", "chamber", "verbose"}),
+        (mimu.compare_schemes, "design", {"json", "o", "compare", "effects", "after", "chamber", "verbose", "n", "budget", "scheme", "rates"}),
+        (
+            mimu.next_experiment, "design",
+            {"json", "o", "compare", "verbose", "n", "budget", "scheme", "model", "sigma", "instability", "walk", "order", "sensor"},
+        ),
     ],
 )
 def test_every_option_of_the_command_is_a_keyword(function: object, subcommand: str, elsewhere: set[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,6 +15,13 @@ from conftest import EXAMPLE, json_of, run
 def without(data: dict[str, Any], *keys: str) -> dict[str, Any]:
     """``data`` but for what names the place of a recording."""
     return {key: value for key, value in data.items() if key not in keys}
+
+
+def undated(text: str) -> str:
+    """``text`` of a file but for when it was made, which it has to say."""
+    rest, found = re.subn(r"^created = \"20\d\d-\S+Z\"$", "created", text, flags=re.MULTILINE)
+    assert found == 1, text[:300]
+    return rest
 
 
 def test_an_import_reports_and_reads_what_the_command_does(folder: Path) -> None:
@@ -46,9 +54,7 @@ def test_text_and_calibration_are_those_of_the_command(folder: Path, by_hand: mi
     fit = mimu.fit(by_hand)
     printed = run("fit", folder, "-o", tmp_path / "cal.toml").stdout
     assert printed.startswith(str(fit))
-    dated = ("created = ",)
-    lines = [line for line in fit.to_toml().splitlines() if not line.startswith(dated)]
-    assert lines == [line for line in (tmp_path / "cal.toml").read_text().splitlines() if not line.startswith(dated)]
+    assert undated(fit.to_toml()) == undated((tmp_path / "cal.toml").read_text())
 
 
 def test_attributes_are_the_numbers_of_the_json(by_hand: mimu.Recording) -> None:
@@ -82,9 +88,7 @@ def test_noise_is_that_of_the_command(at_rest: mimu.Recording, tmp_path: Path) -
     noise = mimu.allan(mimu.read(path))
     command = json_of("allan", path, "-o", tmp_path / "noise.toml")
     assert noise.to_dict() == command
-    # The command dates its file.
-    lines = (tmp_path / "noise.toml").read_text().splitlines(keepends=True)
-    assert noise.to_toml() == "".join(line for line in lines if not line.startswith("created = "))
+    assert undated(noise.to_toml()) == undated((tmp_path / "noise.toml").read_text())
     assert np.array_equal(noise["gyro_x"].adev, command["channels"][0]["adev"])
     # Of arrays without a file, but for the name of the recording.
     memory = mimu.allan(at_rest).to_dict()
@@ -108,6 +112,25 @@ def test_a_design_is_that_of_the_command() -> None:
     gyro = mimu.design(scheme="xu-rates", sensor="gyro", dwell=12.5)
     assert gyro.to_dict() == json_of("design", "--scheme", "xu-rates", "--sensor", "gyro", "--dwell", 12.5)
     assert gyro.rates_dps is not None and len(gyro.rates_dps) == len(gyro.positions)
+
+
+def test_the_next_experiment_is_that_of_the_command(folder: Path, arrays: mimu.Recording, tmp_path: Path) -> None:
+    ids = ["gyro_g_sensitivity", "accel_scale_cubic"]
+    found = mimu.next_experiment(ids, reference="gravity", table="hand", seed=3)
+    asked = ("design", "--effects", ",".join(ids), "--reference", "gravity", "--table", "hand", "--seed", 3)
+    assert found.to_dict() == json_of(*asked, "-o", tmp_path / "plan.toml")
+    assert found.to_toml() == (tmp_path / "plan.toml").read_text()
+    assert [e.id for e in found.effects] == ids and len(found.positions) == len(found.begin_s)
+    # Of a recording on disk, and of arrays.
+    command = json_of("design", "--effects", "accel_scale_cubic", "--after", folder, "--chamber", "25,45,5")
+    for after in (folder, arrays):
+        assert mimu.next_experiment("accel_scale_cubic", after=after, chamber=(25, 45, 5)).to_dict() == command
+
+
+def test_schemes_are_compared_as_by_the_command() -> None:
+    compared = mimu.compare_schemes(reference="gravity", seed=2)
+    assert compared.to_dict() == json_of("design", "--compare", "--reference", "gravity", "--seed", 2)
+    assert compared.designs[0]["title"] in repr(compared)
 
 
 def test_a_verification_is_that_of_the_command(folder: Path, by_hand: mimu.Recording, tmp_path: Path) -> None:

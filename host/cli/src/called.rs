@@ -4,13 +4,13 @@
 use std::ffi::OsString;
 
 use clap::{Args, CommandFactory, Parser};
-use mimu::result::design::Design;
 use mimu_export::{Export, Format, Sources};
 use mimu_recording::ImportSummary;
 use mimu_recording::error::Error;
 
 use crate::Cli;
 use crate::cmd::design::DesignArgs;
+pub use crate::cmd::design::Designed;
 use crate::cmd::import::{ImportArgs, imported};
 
 /// Why a call did nothing.
@@ -36,15 +36,12 @@ pub fn import(arguments: Vec<OsString>) -> Result<ImportSummary, Refusal> {
     Ok(imported(parsed::<ImportArgs>("import", arguments)?)?)
 }
 
-/// The design by the arguments of `mimu design`, and its plan as TOML.
+/// What `mimu design` makes by its arguments, and the plan as TOML, which a comparison does not have.
 ///
 /// # Errors
 /// See [`Refusal`].
-pub fn design(arguments: Vec<OsString>) -> Result<(Design, String), Refusal> {
-    let args = parsed::<DesignArgs>("design", arguments)?;
-    let designed = args.designed()?;
-    let plan = designed.plan(args.motion().slew);
-    Ok((designed, plan))
+pub fn design(arguments: Vec<OsString>) -> Result<(Designed, Option<String>), Refusal> {
+    Ok(parsed::<DesignArgs>("design", arguments)?.made()?)
 }
 
 /// What `mimu export` writes, by its arguments from the name of the format on.

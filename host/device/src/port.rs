@@ -1,6 +1,7 @@
 //! The serial port that the device is at.
 
 use std::io::{ErrorKind as Io, Read as _, Write as _};
+use std::path::Path;
 use std::time::Duration;
 
 use serialport::{ClearBuffer, ErrorKind, SerialPort, SerialPortInfo, SerialPortType};
@@ -130,12 +131,33 @@ pub struct Ports {
     pub of_boards: Vec<String>,
     /// The others, each with what it is: nothing is sent to one that nobody names, since what listens there is not ours to disturb.
     pub others: Vec<String>,
+    /// The system does not list its ports, as in a container without `/sys`. One that is named still opens.
+    pub unlisted: bool,
 }
+
+/// Where Linux lists its serial ports.
+const LISTED: &str = "/sys/class/tty";
 
 /// The serial ports of this computer.
 pub fn ports() -> Ports {
-    // A system that cannot list its ports has none to offer; one that is named still opens.
-    sorted(serialport::available_ports().unwrap_or_default())
+    listed_in(Path::new(LISTED))
+}
+
+fn listed_in(folder: &Path) -> Ports {
+    // `serialport` 4.10 panics where the folder is missing.
+    if cfg!(target_os = "linux") && !folder.is_dir() {
+        return Ports {
+            unlisted: true,
+            ..Ports::default()
+        };
+    }
+    serialport::available_ports().map_or_else(
+        |_| Ports {
+            unlisted: true,
+            ..Ports::default()
+        },
+        sorted,
+    )
 }
 
 fn sorted(mut all: Vec<SerialPortInfo>) -> Ports {
@@ -173,6 +195,9 @@ impl Ports {
     /// What there is to choose from, as a remedy.
     pub(super) fn listed(&self) -> String {
         match [&self.of_boards[..], &self.others].concat().as_slice() {
+            [] if self.unlisted => format!(
+                "this system does not list its ports ({LISTED} is missing): name the board's port, such as /dev/ttyACM0"
+            ),
             [] => "this computer has no serial port: plug the board in".into(),
             names => format!("name one of {}", names.join(", ")),
         }
@@ -253,6 +278,16 @@ mod tests {
         ];
         assert_eq!(ports.others, others);
         assert!(ports.left_alone().contains("ttyACM2 (2341:0043, Uno)"));
+    }
+
+    #[test]
+    fn a_system_that_does_not_list_its_ports_is_reported() {
+        let ports = listed_in(Path::new("/nowhere/class/tty"));
+        assert_eq!(ports.unlisted, cfg!(target_os = "linux"));
+        if ports.unlisted {
+            assert!(ports.listed().contains("/sys/class/tty is missing"));
+        }
+        assert!(!sorted(Vec::new()).listed().contains("missing"));
     }
 
     #[test]

@@ -48,6 +48,9 @@ impl Session {
             (Some(_), _) => refuse("more than one device greets".into(), ports.listed()),
             (None, _) => {
                 let problem = match reasons.is_empty() {
+                    true if ports.unlisted => {
+                        return refuse("no port is named".into(), ports.listed());
+                    }
                     true => "this computer has no serial port of a board (ST-LINK, or the board's own USB)"
                         .to_string(),
                     false => format!(

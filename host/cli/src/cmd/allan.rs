@@ -14,7 +14,7 @@ use mimu_recording::result_file::stage;
 use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, VerboseArgs};
-use crate::output::{check_outputs, print, progress};
+use crate::output::{check_outputs, now, print, progress};
 
 #[derive(Args)]
 pub struct AllanArgs {
@@ -147,9 +147,7 @@ pub fn run(args: &AllanArgs) -> Result<()> {
     let result = AllanResult::of(&surveys);
     let mut text = report::allan_text(&result, args.verbose.verbose);
     let mut staged = Vec::new();
-    if let (Some(path), Some(mut noise)) = (&args.output, result.noise_file()) {
-        let now = jiff::Timestamp::now().round(jiff::Unit::Second);
-        noise.created = now.ok().map(|now| now.to_string());
+    if let (Some(path), Some(noise)) = (&args.output, result.noise_file(&now())) {
         staged.push(stage(path, noise.to_toml())?);
         text.push_str(&format!("\nnoise: {}\n", path.display()));
     }

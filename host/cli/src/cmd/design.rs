@@ -5,7 +5,6 @@ mod effects;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::report;
 use clap::{ArgGroup, Args, ValueEnum};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::Problem;
@@ -16,13 +15,16 @@ use mimu::plan::design::schemes::Scheme;
 use mimu::plan::design::tour::{Motion, Order, randomised};
 use mimu::quantity::Sensor;
 use mimu::result::design::{Comparison, Conditions, Design};
+use mimu::result::next_experiment::NextExperiment;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use crate::arguments::{JsonArgs, SensorArg, VerboseArgs};
 use crate::output::{check_outputs, print};
+use crate::report;
 
 #[derive(Args)]
 #[command(group(ArgGroup::new("design").required(true).args(["n", "budget", "scheme", "compare", "effects"])))]
@@ -199,7 +201,7 @@ impl DesignArgs {
         }
     }
 
-    pub(crate) fn motion(&self) -> Motion {
+    fn motion(&self) -> Motion {
         let usual = Motion::of(self.fixture());
         Motion {
             slew: self.slew.map_or(usual.slew, f64::to_radians),
@@ -367,7 +369,7 @@ impl DesignArgs {
     }
 
     /// The design that is asked for, of one.
-    pub(crate) fn designed(&self) -> Result<Design> {
+    fn designed(&self) -> Result<Design> {
         match (self.scheme, self.budget, self.n) {
             (Some(scheme), ..) => {
                 let scheme = match scheme {
@@ -418,26 +420,57 @@ impl DesignArgs {
 /// Largest rate without `--rates`, deg/s: the range of fang's gyros.
 const RATE_DPS: f64 = 300.0;
 
-pub fn run(args: &DesignArgs) -> Result<()> {
-    if let Some(ids) = &args.effects {
-        return effects::run(args, ids);
+/// What `mimu design` makes.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Designed {
+    /// One design (`-n`, `--budget`, `--scheme`).
+    Design(Box<Design>),
+    /// The smallest experiment that shows effects (`--effects`).
+    NextExperiment(Box<NextExperiment>),
+    /// All published schemes (`--compare`).
+    Comparison(Comparison),
+}
+
+impl Designed {
+    /// The text that the command prints, in full or not.
+    pub fn text(&self, verbose: bool) -> String {
+        match self {
+            Self::Design(design) => report::design_text(design, verbose),
+            Self::NextExperiment(next) => report::next_text(next),
+            Self::Comparison(comparison) => report::comparison_text(comparison),
+        }
     }
+}
+
+impl DesignArgs {
+    /// What these arguments ask for, and its plan as TOML.
+    pub(crate) fn made(&self) -> Result<(Designed, Option<String>)> {
+        if let Some(ids) = &self.effects {
+            let (next, plan) = effects::smallest_experiment(self, ids)?;
+            return Ok((Designed::NextExperiment(Box::new(next)), Some(plan)));
+        }
+        if self.compare {
+            return Ok((Designed::Comparison(self.compare()?), None));
+        }
+        let design = self.designed()?;
+        let plan = design.plan(self.motion().slew);
+        Ok((Designed::Design(Box::new(design)), Some(plan)))
+    }
+}
+
+pub fn run(args: &DesignArgs) -> Result<()> {
     let stated: Vec<&Path> = match &args.noise {
         Some(NoiseArg::File(path)) => vec![path],
         _ => Vec::new(),
     };
     check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
-    if args.compare {
-        let comparison = args.compare()?;
-        let text = report::comparison_text(&comparison);
-        return print(&args.json, &text, &comparison, None);
-    }
-    let designed = args.designed()?;
-    let mut text = report::design_text(&designed, args.verbose.verbose);
-    let mut plan = None;
-    if let Some(path) = &args.output {
-        plan = Some(stage(path, designed.plan(args.motion().slew))?);
+    let (made, plan) = args.made()?;
+    let mut text = made.text(args.verbose.verbose);
+    let mut staged = None;
+    if let (Some(path), Some(plan)) = (&args.output, plan) {
+        staged = Some(stage(path, plan)?);
         text.push_str(&format!("\nplan: {}\n", path.display()));
     }
-    print(&args.json, &text, &designed, plan)
+    print(&args.json, &text, &made, staged)
 }

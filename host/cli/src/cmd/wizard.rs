@@ -287,7 +287,9 @@ impl WizardArgs {
             ([], None) => vec![None],
             // Who writes lines of text cannot be asked who it is.
             ([], Some(_)) => {
-                let mimu_device::Ports { of_boards, others } = mimu_device::ports();
+                let mimu_device::Ports {
+                    of_boards, others, ..
+                } = mimu_device::ports();
                 let there = [of_boards, others].concat().join(", ");
                 let problem =
                     format!("the port that writes the lines is not given; there are: {there}");

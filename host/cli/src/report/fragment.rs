@@ -9,15 +9,15 @@ use mimu::calibration::verify::Verification;
 use mimu::fit::Fit;
 use mimu::readable;
 use mimu::result::allan::AllanResult;
-use mimu::result::design::Design;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::result::fit::FitResult;
 use mimu_recording::error::Result;
 use mimu_thermal::result::ThermalResult;
 
 use super::page::{Made, STYLE, number, spoken};
-use super::{allan_plot, design_text, diagnosis, thermal_page, unit};
+use super::{allan_plot, diagnosis, thermal_page, unit};
 use crate::hint;
+use crate::output::now;
 
 /// A fit: errors, parameters, poses and readings.
 pub fn of_fit(fit: &Fit, result: &FitResult, calibration: &Calibration) -> String {
@@ -64,7 +64,7 @@ pub fn of_diagnosis(result: &DiagnosisResult, made: &Made) -> Result<String> {
 pub fn of_allan(result: &AllanResult) -> String {
     fragment(&html! {
         h1 { "Noise of " (result.device.as_deref().unwrap_or("a unit")) }
-        @if let Some(noise) = result.noise_file() { (unit::noise::section(&noise)) }
+        @if let Some(noise) = result.noise_file(&now()) { (unit::noise::section(&noise)) }
         // A drawing of its own, with a style of its own, which would hold for the whole page in another place than an image.
         @if result.recordings.len() == 1 {
             img alt="Allan deviation with its fitted model" style="max-width:100%" src=(data_url(&allan_plot::svg(result))) {}
@@ -78,9 +78,9 @@ pub fn of_thermal(result: &ThermalResult, made: &Made) -> String {
     fragment(&thermal_page::body(result, made))
 }
 
-/// A design, as the command prints it.
-pub fn of_design(design: &Design) -> String {
-    fragment(&html! { pre { (design_text(design, true)) } })
+/// A result as the command prints it.
+pub fn of_text(text: &str) -> String {
+    fragment(&html! { pre { (text) } })
 }
 
 /// A verification by the recording `name`.

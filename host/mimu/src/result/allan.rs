@@ -218,13 +218,13 @@ impl AllanResult {
     }
 
     /// The noise file for the commands that rest on it; `None` without a recording.
-    pub fn noise_file(&self) -> Option<NoiseFile> {
+    pub fn noise_file(&self, created: &str) -> Option<NoiseFile> {
         // What has no noise is not told apart from a channel that nothing was recorded of.
         let alive = self.channels.iter().filter(|c| c.samples > 0);
         let lengths = self.recordings.iter().map(|r| r.span_s[1] - r.span_s[0]);
         Some(NoiseFile {
             format: NOISE_FORMAT.into(),
-            created: None,
+            created: Some(created.to_owned()),
             device: self.device.clone()?,
             sample_rate_hz: self.recordings.first()?.sample_rate_hz,
             duration_s: lengths.fold(f64::INFINITY, f64::min),

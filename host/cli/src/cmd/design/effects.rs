@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use crate::report;
 use mimu::effects;
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::noise::noise_file::NoiseFile;
@@ -16,10 +15,8 @@ use mimu::result::next_experiment::NextExperiment;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::result_file::stage;
 
 use super::{DesignArgs, NoiseArg};
-use crate::output::{check_outputs, print};
 use crate::reading::read;
 
 /// Sample rate where no recording says another, Hz.
@@ -147,12 +144,11 @@ fn after(path: &Path, args: &DesignArgs) -> Result<Fit> {
     fit(prepared, options)
 }
 
-pub(super) fn run(args: &DesignArgs, ids: &[String]) -> Result<()> {
-    let stated: Vec<&Path> = match &args.noise {
-        Some(NoiseArg::File(path)) => vec![path],
-        _ => Vec::new(),
-    };
-    check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
+/// The smallest experiment that shows the effects `ids`, and its plan as TOML.
+pub(super) fn smallest_experiment(
+    args: &DesignArgs,
+    ids: &[String],
+) -> Result<(NextExperiment, String)> {
     let targets = targets(ids)?;
     let recording = args
         .after
@@ -198,13 +194,7 @@ pub(super) fn run(args: &DesignArgs, ids: &[String]) -> Result<()> {
     };
     let manifest = recording.as_ref().map(|f| &f.prepared.manifest);
     let result = NextExperiment::new(&setup, &answer);
-    let mut text = report::next_text(&result);
-    let mut plan = None;
-    if let Some(path) = &args.output {
-        let device = manifest.map(|m| m.device.as_str());
-        let sample_rate_hz = manifest.map_or(SAMPLE_RATE_HZ, |m| m.sample_rate_hz);
-        plan = Some(stage(path, answer.plan(&setup, device, sample_rate_hz))?);
-        text.push_str(&format!("\nplan: {}\n", path.display()));
-    }
-    print(&args.json, &text, &result, plan)
+    let device = manifest.map(|m| m.device.as_str());
+    let sample_rate_hz = manifest.map_or(SAMPLE_RATE_HZ, |m| m.sample_rate_hz);
+    Ok((result, answer.plan(&setup, device, sample_rate_hz)))
 }
