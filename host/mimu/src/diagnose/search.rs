@@ -55,6 +55,19 @@ pub struct Chosen {
     pub alternatives: Vec<Alternative>,
 }
 
+impl Chosen {
+    /// The true input, such as Earth rate, that would do nearly as well in its place.
+    pub fn or_true_input(&self) -> Option<&'static Effect> {
+        let alternatives = self.alternatives.iter();
+        let effects = alternatives.filter_map(|a| match a.kind {
+            CandidateKind::Effect(effect) => Some(effect),
+            _ => None,
+        });
+        let mut inputs = effects.filter(|e| !e.is_error());
+        inputs.next().filter(|_| self.candidate.is_error())
+    }
+}
+
 /// A candidate that would do nearly as well in the place of another.
 #[derive(Debug, Clone, Serialize)]
 pub struct Alternative {
