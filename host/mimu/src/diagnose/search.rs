@@ -4,12 +4,14 @@
 //! fitted with noise of their own, and judged by the likelihood ratio, as a probability after the whole search. The noise of
 //! a model that lacks an effect is too large, and a test that keeps it would miss what makes it so.
 
+mod chosen;
+mod columns;
+mod forward;
 mod refine;
 mod screen;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::rows::Rows;
@@ -17,6 +19,9 @@ use super::variance::{Fitted, LikelihoodKind, VarianceModel};
 use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
+pub use chosen::{Alternative, COEFFICIENT, Chosen};
+use chosen::{price, score};
+pub use columns::{basis, beside, independent_of, unit_columns};
 use refine::{Beside, With};
 use screen::Screened;
 
@@ -29,77 +34,6 @@ const FINALISTS: usize = 8;
 /// Most effects of one sensor, and most terms and jumps found from the data. Counted apart: over a wide range of temperatures the cubes of three
 /// axes took three of five places, were not accepted, and kept out a lag that halved what was left.
 pub const MOST: usize = 5;
-
-/// A candidate as part of a model.
-#[derive(Debug, Clone, Serialize)]
-pub struct Chosen {
-    /// Which.
-    #[serde(skip)]
-    pub candidate: Candidate,
-    /// Value of its nonlinear constant, 0 if it has none.
-    #[serde(skip)]
-    pub parameter: f64,
-    /// Its columns.
-    #[serde(skip)]
-    pub columns: DMatrix<f64>,
-    /// Probability of chance, after the whole search.
-    #[serde(rename = "chance")]
-    pub p: f64,
-    /// By how much the deviance grows without it.
-    #[serde(skip)]
-    pub drop: f64,
-    /// By how much the sizes of its coefficients speak against it, in units of the deviance.
-    #[serde(skip)]
-    pub unlikely: f64,
-    /// Others that would do nearly as well in its place.
-    pub alternatives: Vec<Alternative>,
-}
-
-impl Chosen {
-    /// The true input, such as Earth rate, that would do nearly as well in its place.
-    pub fn or_true_input(&self) -> Option<&'static Effect> {
-        let alternatives = self.alternatives.iter();
-        let effects = alternatives.filter_map(|a| match a.kind {
-            CandidateKind::Effect(effect) => Some(effect),
-            _ => None,
-        });
-        let mut inputs = effects.filter(|e| !e.is_error());
-        inputs.next().filter(|_| self.candidate.is_error())
-    }
-}
-
-/// A candidate that would do nearly as well in the place of another.
-#[derive(Debug, Clone, Serialize)]
-pub struct Alternative {
-    /// Public id.
-    pub id: String,
-    /// What it is.
-    #[serde(skip)]
-    pub kind: CandidateKind,
-    /// By how much its score is worse.
-    pub score_worse_by: f64,
-}
-
-impl Alternative {
-    /// A candidate whose score is worse by `score_worse_by`.
-    pub fn of(candidate: &Candidate, score_worse_by: f64) -> Self {
-        Self {
-            id: candidate.id(),
-            kind: candidate.kind.clone(),
-            score_worse_by,
-        }
-    }
-}
-
-impl From<(&'static Effect, f64)> for Alternative {
-    fn from((effect, score_worse_by): (&'static Effect, f64)) -> Self {
-        Self {
-            id: effect.id.into(),
-            kind: CandidateKind::Effect(effect),
-            score_worse_by,
-        }
-    }
-}
 
 /// What a search led to.
 pub struct Found {
@@ -135,49 +69,6 @@ pub struct Search<'a> {
     /// Codes with all of their bits, and their columns by slot in the rows by dwells.
     codes: Vec<(Candidate, DMatrix<f64>)>,
     tests: [f64; 2],
-}
-
-/// Columns that span what `columns` do.
-pub fn basis(columns: &DMatrix<f64>) -> DMatrix<f64> {
-    let svd = columns.clone().svd(true, false);
-    let largest = svd.singular_values.max();
-    let kept: Vec<usize> = (0..svd.singular_values.len())
-        .filter(|k| svd.singular_values[*k] > 1e-9 * largest)
-        .collect();
-    svd.u
-        .map_or_else(|| columns.clone(), |u| u.select_columns(&kept))
-}
-
-/// `matrix` with more columns behind.
-pub fn beside(matrix: &DMatrix<f64>, more: &DMatrix<f64>) -> DMatrix<f64> {
-    let (p, q) = (matrix.ncols(), more.ncols());
-    let mut all = matrix.clone().resize_horizontally(p + q, 0.0);
-    all.columns_mut(p, q).copy_from(more);
-    all
-}
-
-/// Part of a column beyond which it is no sum of others, rounding aside.
-const OF_ITS_OWN: f64 = 1e-6;
-
-/// Those of `columns`, at size 1, that are no sums of `model` and of those before them.
-pub(super) fn independent_of(columns: &DMatrix<f64>, model: &DMatrix<f64>) -> DMatrix<f64> {
-    let columns = unit_columns(columns);
-    let mut spanned = basis(&unit_columns(model));
-    let mut kept = Vec::new();
-    for (k, column) in columns.column_iter().enumerate() {
-        // Twice, as once leaves rounding in the direction of what was taken away.
-        let once = column - &spanned * spanned.tr_mul(&column);
-        let left = &once - &spanned * spanned.tr_mul(&once);
-        if left.norm() > OF_ITS_OWN {
-            let left = left.normalize();
-            spanned = beside(
-                &spanned,
-                &DMatrix::from_column_slice(left.len(), 1, left.as_slice()),
-            );
-            kept.push(k);
-        }
-    }
-    columns.select_columns(&kept)
 }
 
 /// Probability that chance makes F with these degrees of freedom as large.
@@ -485,180 +376,6 @@ impl<'a> Search<'a> {
         };
         Some(score(one) - score(&shadow))
     }
-
-    /// The effects that the rows ask for.
-    ///
-    /// A named effect goes before a term found from the data unless the term is better by 12 in score: with two thousand terms
-    /// some product is always near an effect.
-    pub fn run(&self) -> Option<Found> {
-        self.beside(Vec::new(), |_| true)
-    }
-
-    /// The same beside what is chosen already, of the candidates that `may` be tried.
-    pub fn beside(
-        &self,
-        mut chosen: Vec<Chosen>,
-        may: impl Fn(&Candidate) -> bool,
-    ) -> Option<Found> {
-        let mut now = self.fit(&chosen)?;
-        let given = chosen.len();
-        let mut exchanges = 0;
-        // What others have made superfluous does not come back: two that make each other superfluous would take turns for ever.
-        let mut gone: Vec<String> = Vec::new();
-        loop {
-            let full = [true, false].map(|listed| {
-                let alike = chosen.iter().filter(|c| c.candidate.is_listed() == listed);
-                alike.count() >= MOST
-            });
-            if full == [true; 2] {
-                break;
-            }
-            let mut finalists = self.finalists(&chosen, &now);
-            finalists.retain(|c| {
-                let room = !full[usize::from(!c.candidate.is_listed())];
-                room && may(&c.candidate) && !gone.contains(&c.candidate.id())
-            });
-            let significant = |c: &&Chosen| {
-                c.p < if c.candidate.is_listed() {
-                    FALSE_LISTED
-                } else {
-                    FALSE_FOUND
-                }
-            };
-            let best_of = |listed: bool| {
-                finalists
-                    .iter()
-                    .filter(significant)
-                    .filter(|c| c.candidate.is_listed() == listed)
-                    .max_by(|a, b| score(a).total_cmp(&score(b)))
-            };
-            let best = match (best_of(true), best_of(false)) {
-                (Some(a), Some(b)) if score(b) > score(a) + PREFERENCE => b,
-                (Some(a), _) => a,
-                (None, Some(b)) => b,
-                (None, None) => {
-                    let more = exchanges < EXCHANGES;
-                    if more && self.exchange(&mut chosen, &mut now, given, &may)? {
-                        exchanges += 1;
-                        continue;
-                    }
-                    break;
-                }
-            };
-            let mut best = best.clone();
-            best.alternatives = finalists
-                .iter()
-                .filter(|c| c.candidate.id() != best.candidate.id())
-                .filter(|c| score(&best) - score(c) < CONFUSED && significant(c))
-                .map(|c| Alternative::of(&c.candidate, score(&best) - score(c)))
-                .collect();
-            chosen.push(best);
-            let before: Vec<String> = chosen.iter().map(|c| c.candidate.id()).collect();
-            let Some(fit) = self.fit(&chosen) else {
-                // Beside the others it is determined by some noise and not by other.
-                gone.extend(chosen.pop().map(|c| c.candidate.id()));
-                continue;
-            };
-            now = fit;
-            self.read_again(&mut chosen, &mut now);
-            self.again(&mut chosen, &mut now)?;
-            let stays = |id: &String| chosen.iter().any(|c| c.candidate.id() == *id);
-            gone.extend(before.into_iter().filter(|id| !stays(id)));
-        }
-        Some(Found {
-            chosen,
-            fit: now,
-            superfluous: gone,
-        })
-    }
-
-    /// Puts a named effect in the place of one of the chosen, from the `first` on, where that makes the score of the whole better; says
-    /// whether it did.
-    ///
-    /// One after the other, the first effect takes what belongs to others: a bias over temperature that lags was a bias, a warm-up and a
-    /// drift, and the lag was not significant beside them.
-    fn exchange(
-        &self,
-        chosen: &mut Vec<Chosen>,
-        now: &mut Fitted,
-        first: usize,
-        may: &impl Fn(&Candidate) -> bool,
-    ) -> Option<bool> {
-        let mut best: Option<(f64, usize, Chosen)> = None;
-        for k in first..chosen.len() {
-            let mut rest = chosen.clone();
-            let mut one = rest.remove(k);
-            let null = self.fit(&rest)?;
-            one.drop = (null.deviance - now.deviance).max(0.0);
-            let rivals = self.others(&rest, &null).into_iter();
-            let rivals = rivals.filter(|r| r.p < FALSE_LISTED && may(&r.candidate));
-            let rival = rivals
-                .filter(|r| !r.candidate.is_variant_of(&one.candidate))
-                .max_by(|a, b| score(a).total_cmp(&score(b)));
-            let Some(mut rival) = rival else { continue };
-            let gain = score(&rival) - score(&one);
-            if gain > EXCHANGED && best.as_ref().is_none_or(|b| gain > b.0) {
-                rival.alternatives = vec![Alternative::of(&one.candidate, gain)];
-                best = Some((gain, k, rival));
-            }
-        }
-        let Some((_, k, rival)) = best else {
-            return Some(false);
-        };
-        let mut there = chosen.clone();
-        there[k] = rival;
-        let Some(fit) = self.fit(&there) else {
-            return Some(false);
-        };
-        (*chosen, *now) = (there, fit);
-        self.read_again(chosen, now);
-        self.again(chosen, now)?;
-        Some(true)
-    }
-
-    /// Tests each of the chosen again beside the others: what they have made superfluous goes.
-    fn again(&self, chosen: &mut Vec<Chosen>, now: &mut Fitted) -> Option<()> {
-        let mut i = 0;
-        while i < chosen.len() && chosen.len() > 1 {
-            let (drop, p, without) = self.without(chosen, i, now)?;
-            let listed = chosen[i].candidate.is_listed();
-            if p > if listed { FALSE_LISTED } else { FALSE_FOUND } {
-                chosen.remove(i);
-                *now = without;
-                i = 0;
-            } else {
-                (chosen[i].drop, chosen[i].p) = (drop, p);
-                i += 1;
-            }
-        }
-        Some(())
-    }
-
-    /// Of chosen effect `k` beside the others: the drop in deviance, its chance after the whole search, and the fit without it.
-    fn without(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Option<(f64, f64, Fitted)> {
-        let mut rest = chosen.to_vec();
-        let one = rest.remove(k);
-        let without = self.fit(&rest)?;
-        let columns = self.model(&rest).ncols();
-        let drop = (without.deviance - now.deviance).max(0.0);
-        let p = self.chance(drop, one.columns.ncols(), columns, &one.candidate);
-        Some((drop, p, without))
-    }
-}
-
-/// How good a candidate is among others with more or fewer coefficients: the drop of the deviance less what each coefficient
-/// costs (Akaike's two, doubled, as for each there are several candidates), and what speaks against their sizes. Of products that are the
-/// same in this recording the shortest is told.
-///
-/// A nonlinear parameter costs two coefficients. It has a limit, as a time constant that is infinite is a straight line, and should be
-/// told from it by two sigmas.
-fn score(c: &Chosen) -> f64 {
-    let coefficients = c.columns.ncols() as f64 + if c.parameter > 0.0 { 2.0 } else { 0.0 };
-    let order = match &c.candidate.kind {
-        CandidateKind::Term(_, product) => f64::from(product.order()),
-        _ => 0.0,
-    };
-    c.drop - price(&c.candidate) * coefficients - order - c.unlikely
 }
 
 /// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
@@ -673,38 +390,8 @@ pub(super) const LARGEST: f64 = 1e4;
 /// of temperatures would be one.
 pub(super) const SEPARATE: f64 = 1e-3;
 
-/// What a coefficient costs.
-pub(super) const COEFFICIENT: f64 = 4.0;
-
-/// The same of a candidate. Where no bit of a code would be seen at the size of data sheets, the search is among up to 36, and the best of
-/// so many nothings is worth 7.
-fn price(candidate: &Candidate) -> f64 {
-    match candidate.reads_code() && candidate.excited.is_empty() {
-        true => COEFFICIENT + 2.0 * (candidate.offered.len().max(1) as f64).ln(),
-        false => COEFFICIENT,
-    }
-}
-
-/// Score by which an effect has to be better to take the place of one that was chosen before it, and how often at most.
-const EXCHANGED: f64 = 1.0;
-const EXCHANGES: usize = 4;
-
-/// Score by which a term found from the data has to be better than an effect with a name.
-const PREFERENCE: f64 = 12.0;
 /// Score within which two candidates are told to be confused: odds of one to four hundred.
 pub(super) const CONFUSED: f64 = 12.0;
-
-/// Columns of size 1.
-pub fn unit_columns(columns: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut columns = columns.clone();
-    for mut column in columns.column_iter_mut() {
-        let norm = column.norm();
-        if norm > 0.0 {
-            column /= norm;
-        }
-    }
-    columns
-}
 
 impl Candidate {
     /// Whether both are the same but for the choice of coefficients.
