@@ -64,7 +64,7 @@ impl Integrated {
                     since_start += rate - reference;
                 }
             });
-        // One more than there are rates, and no more: a vector that grows by itself doubles.
+        // Exactly one more than the rates; a vector that grows automatically would double.
         rates.reserve_exact(1);
         rates.push(last);
         integrated.x = rates;
@@ -134,7 +134,7 @@ impl Integrated {
         self.dt_s
     }
 
-    /// What the integral's samples stand for.
+    /// Meaning of the integral's samples.
     pub(in crate::allan) fn sampling(&self) -> Sampling {
         self.sampling
     }
