@@ -4,14 +4,14 @@ use nalgebra::{Matrix3, RealField, Vector3, convert};
 
 use crate::PerSensor;
 
-/// Lengths that a column of C may have, SI per raw unit: what one raw unit of a sensor is worth. A converter of 32 bits over 250 deg/s has
-/// 2e-9 rad/s; a gyro of 30 000 deg/s read in volts has 200 rad/s.
+/// Allowed length of a column of C, SI per raw unit. A 32-bit converter over 250 deg/s has 2e-9 rad/s per code; a gyro of 30 000 deg/s read
+/// in volts has 200 rad/s per volt.
 pub const SCALE_RANGE: [f64; 2] = [1e-12, 1e4];
 
 /// Largest entry of o, SI: full scale of the most insensitive sensors is below 1e4 rad/s and 1e6 m/s².
 pub const MOST_OFFSET: f64 = 1e6;
 
-/// Smallest volume of the three columns of C at unit length; 1 at right angles. Two sensors 0.06° apart make this.
+/// Smallest volume spanned by the three columns of C at unit length; 1 if they are orthogonal. Two sensors 0.06° apart have this volume.
 pub const LEAST_VOLUME: f64 = 1e-3;
 
 /// Inverse model of one triad, raw to SI.
@@ -23,8 +23,8 @@ pub const LEAST_VOLUME: f64 = 1e-3;
 ///   accelerometer (at rest it points up),
 /// * `C` is in SI per raw unit, `o` in SI.
 ///
-/// The inverse model and not the forward one, `u = P x + b`, because nothing is inverted on the
-/// device then: nine multiplications and nine additions a sample.
+/// The device uses the inverse model instead of the forward one, `u = P x + b`, because it then needs no matrix inverse: nine
+/// multiplications and nine additions per sample.
 ///
 /// ```
 /// # use mimu_core::compensation::Affine;
@@ -45,18 +45,18 @@ pub struct Affine<T: RealField> {
     pub offset: Vector3<T>,
 }
 
-/// What is wrong with an inverse model, whatever unit it is of.
+/// Why an inverse model is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Implausible {
     /// An entry is not a finite number.
     NotFinite,
     /// A column of C has a length outside [`SCALE_RANGE`], SI per raw unit.
     Scale,
-    /// C is singular: its columns make less than [`LEAST_VOLUME`].
+    /// C is singular: its columns span less than [`LEAST_VOLUME`].
     Singular,
     /// An entry of o is beyond [`MOST_OFFSET`], SI.
     Offset,
-    /// Within a kelvin the largest entry of a column of C changes by more than itself, or o by more than [`MOST_OFFSET`].
+    /// Within a kelvin the largest entry of a column of C changes by more than its own size, or o by more than [`MOST_OFFSET`].
     Slope,
 }
 
@@ -83,7 +83,7 @@ impl core::fmt::Display for Implausible {
 impl core::error::Error for Implausible {}
 
 impl<T: RealField + Copy> Affine<T> {
-    /// Refuses what no sensor is. `slope`: derivative of the model by the temperature, per kelvin.
+    /// Refuses a model that no sensor can have. `slope`: derivative of the model by the temperature, per kelvin.
     pub fn check(&self, slope: Option<&Self>) -> Result<(), Implausible> {
         let finite = |of: &Self| of.matrix.iter().chain(&of.offset).all(T::is_finite);
         if !finite(self) || !slope.is_none_or(finite) {
@@ -93,7 +93,7 @@ impl<T: RealField + Copy> Affine<T> {
         let mut unit = [Vector3::zeros(); 3];
         for (unit, column) in unit.iter_mut().zip(self.matrix.data.0) {
             let column = Vector3::from(column);
-            // By its largest entry first, whose square may be no number of single precision.
+            // Divided by the largest entry first, because its square may overflow single precision.
             let largest = column.amax();
             if !(largest >= least * convert(0.5) && largest <= most) {
                 return Err(Implausible::Scale);
@@ -123,7 +123,7 @@ impl<T: RealField + Copy> Affine<T> {
         }
     }
 
-    /// SI input in the body frame from the raw reading `u`. Not a number in, not a number out.
+    /// SI input in the body frame from the raw reading `u`. NaN in, NaN out.
     #[inline]
     pub fn apply(&self, raw: &Vector3<T>) -> Vector3<T> {
         self.matrix * raw + self.offset
@@ -133,7 +133,7 @@ impl<T: RealField + Copy> Affine<T> {
 /// Inverse models of both triads of an inertial unit: gyro, raw to rad/s, accelerometer, raw to m/s².
 pub type Compensation<T> = PerSensor<Affine<T>>;
 
-/// One sample of an inertial unit, gyro x, y, z and accelerometer x, y, z: raw or SI as the context says.
+/// One sample of an inertial unit, gyro x, y, z and accelerometer x, y, z: raw or SI, depending on the context.
 pub type Sample<T> = PerSensor<Vector3<T>>;
 
 impl<T: RealField + Copy> Compensation<T> {

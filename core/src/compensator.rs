@@ -1,11 +1,12 @@
-//! Everything that makes SI of raw readings, in its one order: lags of the dies, curves over temperature, effects.
+//! The whole path from raw readings to SI: lags of the dies, curves over temperature, effects.
 //!
-//! Firmware, the comparison with it and the compensation of recordings on the PC all run this, so that none of them has an order of its
-//! own. The calibration is immutable; what is remembered of a stream is in [`State`].
+//! The firmware, `mimu device check` and the compensation of recordings on the PC all run this code, so the order of the operations is the
+//! same everywhere. The calibration is immutable; the memory of a stream is in [`State`].
 //!
-//! [`Compensator::follow`] runs some times a second, with the temperature and the time that passed; [`Compensator::apply`] with every sample:
+//! [`Compensator::follow`] runs several times per second, with the temperature and the elapsed time; [`Compensator::apply`] runs with every
+//! sample:
 //!
-//! 1. errors of the converter's code are taken out of the raw reading ([`Effects::without_code_errors`]);
+//! 1. errors of the converter's code are removed from the raw reading ([`Effects::without_code_errors`]);
 //! 2. `x = C u + o`, C and o at the temperature of the dies ([`Table`], [`DieLag`]);
 //! 3. the other effects are removed from x ([`Effects::remove`]).
 
@@ -24,11 +25,11 @@ pub struct Compensator<T: RealField, const NODES: usize, const ROOM: usize> {
     pub table: Table<T, NODES>,
     /// Lags of the dies behind the thermometer.
     pub lags: PerSensor<DieLag<T>>,
-    /// What the affine model lacks; `None` if there is nothing, so that no sample pays for it.
+    /// The effects; `None` if there are none, so that samples do not pay for them.
     pub effects: Option<Effects<T, ROOM>>,
 }
 
-/// What a [`Compensator`] remembers of one stream.
+/// Memory of a [`Compensator`] for one stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State<T: RealField, const ROOM: usize> {
     dies: PerSensor<die::State<T>>,
@@ -63,7 +64,7 @@ impl<T: RealField + Copy, const ROOM: usize> State<T, ROOM> {
 }
 
 impl<T: RealField + Copy, const NODES: usize, const ROOM: usize> Compensator<T, NODES, ROOM> {
-    /// The state of a stream which begins at power-on, of so many samples a second.
+    /// State of a stream that begins at power-on, at this sample rate, Hz.
     pub fn state(&self, sample_rate_hz: T) -> State<T, ROOM> {
         State {
             dies: PerSensor::both(die::State::new()),
@@ -73,35 +74,36 @@ impl<T: RealField + Copy, const NODES: usize, const ROOM: usize> Compensator<T, 
         }
     }
 
-    /// Takes over the state of a stream that another calibration has compensated until now. Time since power-on goes on, and so do the lags of
-    /// the dies and of the effects that both calibrations have: the unit does not know that it has another calibration. To be followed by
-    /// [`Self::follow`] before the next sample, which brings the models of the new one.
+    /// Takes over the state of a stream that another calibration has compensated so far. Time since power-on continues, and so do the lags
+    /// of the dies and of the effects that are in both calibrations. Call [`Self::follow`] before the next sample: it evaluates the models
+    /// of the new calibration.
     pub fn take_over(&self, before: &Self, state: &mut State<T, ROOM>) {
         let known = before.lags.zip(state.dies);
         state.dies = self.lags.map(|lag| {
             let mut same = known.into_iter().filter(|(_, (other, _))| *other == lag);
             same.next().map_or(die::State::new(), |(_, (_, die))| die)
         });
-        // Without effects nothing is remembered but time and temperature.
+        // Without effects only time and temperature are remembered.
         state.effects.gap();
         if let Some(all) = &self.effects {
             all.take_over(before.effects.as_ref(), &mut state.effects);
         }
     }
 
-    /// Follows time, s since the call before or since power-on, and the thermometer, °C: `None` where it has no reading. Before the first
-    /// reading the models are those of [`REFERENCE_C`], neither lags nor effects have a temperature, and the first one is not a step.
+    /// Follows time (s since the previous call, or since power-on) and the thermometer (°C; `None` if it has no reading). Before the first
+    /// reading the models are those of [`REFERENCE_C`], and lags and effects have no temperature; the first reading does not count as a
+    /// step.
     ///
-    /// Where the dies are in the table.
+    /// Returns where the temperatures of the dies are in the table.
     pub fn follow(&self, state: &mut State<T, ROOM>, dt_s: T, thermometer_c: Option<T>) -> Place {
-        // No number is no reading.
+        // NaN counts as no reading.
         let read_c = thermometer_c.unwrap_or(T::zero() / T::zero());
         let dies = self.lags.as_ref().zip(state.dies.as_mut());
         let dies_c = dies.map(|(lag, die)| lag.follow(die, dt_s, read_c));
         self.follow_at(state, dt_s, thermometer_c, dies_c.transpose())
     }
 
-    /// The same where somebody else knows the temperatures of the dies, °C: the device reports them.
+    /// The same with known temperatures of the dies, °C, such as those that the device reports.
     pub fn follow_at(
         &self,
         state: &mut State<T, ROOM>,
@@ -120,7 +122,7 @@ impl<T: RealField + Copy, const NODES: usize, const ROOM: usize> Compensator<T, 
         state.model.place
     }
 
-    /// A raw sample in SI. To be called with every sample in turn, and [`State::gap`] where some are missing.
+    /// Converts a raw sample to SI. Call it with every sample in order, and [`State::gap`] if samples are missing.
     #[inline]
     pub fn apply(&self, state: &mut State<T, ROOM>, raw: &Sample<T>) -> Sample<T> {
         match &self.effects {
@@ -129,8 +131,8 @@ impl<T: RealField + Copy, const NODES: usize, const ROOM: usize> Compensator<T, 
         }
     }
 
-    /// The same of a reading that is free of the errors of the converters' codes: for somebody who takes them out with more care than a device
-    /// has the time for.
+    /// The same for a reading without errors of the converters' codes: the PC can remove these more accurately than the device has time
+    /// for.
     #[inline]
     pub fn apply_clean(&self, state: &mut State<T, ROOM>, clean: &Sample<T>) -> Sample<T> {
         let input = state.model.model.apply(clean);

@@ -1,31 +1,33 @@
 //! Temperature of the dies from that of the thermometer.
 //!
-//! What drifts is the die; what is measured is a thermometer beside it. Between the two is a first-order lag (niu, thermal ramp): the heat
-//! reaches one of them later than the other.
+//! The die drifts, but a thermometer beside it is measured. Between the two is a first-order lag (niu, thermal ramp), because heat reaches
+//! one of them later than the other.
 //!
 //! * Lag positive: the die follows, `lag dD/dt + D = T`.
-//! * Lag negative: the die leads, `D = T + |lag| dT/dt`, the rate of change taken behind a filter of [`RATE_SHARE`] of the lag. On a
-//!   steady ramp it is exact. It multiplies the noise of the thermometer by `1 + 1 / RATE_SHARE`, whatever the lag, which is why the
-//!   thermometer has to be filtered before.
+//! * Lag negative: the die leads, `D = T + |lag| dT/dt`, with the rate of change filtered by [`RATE_SHARE`] of the lag. This is exact on a
+//!   steady ramp. It multiplies the noise of the thermometer by `1 + 1 / RATE_SHARE` for any lag, so the thermometer has to be filtered
+//!   before.
 //!
-//! Both are one state: the lagged temperature minus the temperature, which is exact over a ramp within a step however long the step is,
-//! so that a gap is one long step and a device of fifty steps a second and a recording of some agree.
+//! Both have one state: the lagged temperature minus the temperature. Its update is exact for a ramp over a time step of any length. A gap
+//! is therefore one long step, and a device with fifty steps per second agrees with a recording with a few.
 
 use nalgebra::{RealField, convert};
 
 use crate::PerSensor;
 
-/// So far outside the temperatures that a calibration is for its curves go on along their slope, K; farther out they are held.
+/// Up to this distance beyond the temperature range of a calibration its curves continue along their slope, K; farther out they are
+/// constant.
 pub const BEYOND_C: f64 = 5.0;
 
-/// Time constant of the filter of the rate of change, as a share of a lead. At the beginning of a ramp the lead is missing for so long; a
-/// quarter leaves three quarters of the hysteresis removed within it, and makes five times the thermometer's noise.
+/// Time constant of the filter of the rate of change, as a fraction of the lead. At the beginning of a ramp the lead is missing for this
+/// time. A quarter removes three quarters of the hysteresis within it, and multiplies the thermometer's noise by five.
 pub const RATE_SHARE: f64 = 0.25;
 
 /// Lags that a calibration may have, s.
 pub const LAG_RANGE_S: [f64; 2] = [-120.0, 600.0];
 
-/// Shortest lag or lead that is not none, s: a sample at 1 kHz. The thermometer is read by the batch, 20 ms, and nothing shorter is followed.
+/// Shortest lag or lead other than 0, s: one sample at 1 kHz. The thermometer is read once per batch (20 ms), so shorter lags have no
+/// effect.
 pub const LEAST_LAG_S: f64 = 1e-3;
 
 /// The lag between thermometer and dies: immutable, for any number of streams.
@@ -34,7 +36,7 @@ pub struct DieLag<T> {
     lag_s: T,
 }
 
-/// What it remembers of one stream.
+/// Its memory of one stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State<T> {
     /// The last reading that was a number, °C.
@@ -50,7 +52,8 @@ impl<T: RealField + Copy> Default for State<T> {
 }
 
 impl<T: RealField + Copy> State<T> {
-    /// Of a stream of which there is no reading yet. The first is taken for the temperature of the dies too: what was before is not known.
+    /// State of a stream without a reading yet. The first reading is taken as the temperature of the dies too, because the history is
+    /// unknown.
     pub fn new() -> Self {
         Self {
             thermometer_c: None,
@@ -65,7 +68,7 @@ impl<T: RealField + Copy> DieLag<T> {
         Self { lag_s: T::zero() }
     }
 
-    /// Of so many seconds; `None` outside [`LAG_RANGE_S`], and below [`LEAST_LAG_S`] unless it is 0.
+    /// Lag of this many seconds; `None` outside [`LAG_RANGE_S`], and below [`LEAST_LAG_S`] unless it is 0.
     pub fn new(lag_s: T) -> Option<Self> {
         let [least, most] = LAG_RANGE_S.map(convert::<f64, T>);
         let shortest: T = convert(LEAST_LAG_S);
@@ -73,7 +76,7 @@ impl<T: RealField + Copy> DieLag<T> {
         (followed && lag_s >= least && lag_s <= most).then_some(Self { lag_s })
     }
 
-    /// Of both triads by their lags, s; none where these are not known or [`Self::new`] refuses them.
+    /// Lags of both triads, s; zero if they are unknown or [`Self::new`] refuses them.
     pub fn of_triads(lags_s: Option<PerSensor<T>>) -> PerSensor<Self> {
         let known = |lag_s| Self::new(lag_s).unwrap_or_else(Self::none);
         lags_s.map_or_else(|| PerSensor::both(Self::none()), |lags_s| lags_s.map(known))
@@ -84,9 +87,10 @@ impl<T: RealField + Copy> DieLag<T> {
         self.lag_s
     }
 
-    /// Temperature of the dies, °C, `dt_s` after the call before, where the thermometer reads this, °C. `None` until there was a reading.
+    /// Temperature of the dies, °C, `dt_s` after the previous call, with this reading of the thermometer, °C. `None` before the first
+    /// reading.
     ///
-    /// A reading that is not a number is that of before. A step of time that is not positive is none.
+    /// NaN repeats the previous reading. A time step that is not positive counts as zero.
     pub fn follow(&self, state: &mut State<T>, dt_s: T, thermometer_c: T) -> Option<T> {
         let known = state.thermometer_c;
         let now = match thermometer_c.is_finite() {
@@ -105,8 +109,7 @@ impl<T: RealField + Copy> DieLag<T> {
         Some(self.of(now, state))
     }
 
-    /// The state of a stream in which the thermometer reads this and the dies have that temperature, °C: for one who hears both, and has not
-    /// heard what was before.
+    /// State of a stream with these temperatures of thermometer and dies, °C: for a receiver that gets both but missed the history.
     pub fn state_of(&self, thermometer_c: T, die_c: T) -> State<T> {
         let apart = die_c - thermometer_c;
         let share: T = convert(RATE_SHARE);
@@ -126,7 +129,7 @@ impl<T: RealField + Copy> DieLag<T> {
     fn of(&self, now: T, state: &State<T>) -> T {
         match self.lag_s > T::zero() {
             true => now + state.behind,
-            // The rate of change is that of the filter, `-behind / filter`.
+            // The filtered rate of change is `-behind / filter`.
             false => now - state.behind / convert(RATE_SHARE),
         }
     }
@@ -139,12 +142,12 @@ impl<T: RealField + Copy> DieLag<T> {
     }
 }
 
-/// A step of the lagged temperature minus the temperature over `dt` behind a first-order lag, `step` being that of the temperature: exact if
-/// it is a ramp. Kept as the difference: the lagged temperature itself would stand still in single precision once its step is below the
-/// last digit of some 10 °C.
+/// Updates the lagged temperature minus the temperature over `dt` for a first-order lag; `step` is the change of the temperature. Exact for
+/// a ramp. The difference is stored because the lagged temperature itself would stop changing in single precision once its step is below
+/// the last digit of a few 10 °C.
 pub(crate) fn lagged<T: RealField + Copy>(difference: T, dt: T, step: T, lag: T) -> T {
     let z = dt / lag;
-    // No time passed: all of the step is yet to come.
+    // No time passed: the lagged temperature has not moved, so the difference changes by the whole step.
     if !(z > T::zero()) {
         return difference - step;
     }

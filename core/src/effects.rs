@@ -6,19 +6,18 @@
 //!
 //! `x_clean = x - R e(x_clean)`, `R = C diag(|P_x|, |P_y|, |P_z|) = D⁻¹`.
 //!
-//! The input that e is a function of is read by the sensor that errs, and e of the reading itself would leave the share k of the error
-//! in, k being the slope of e. To evaluate every law twice, the second time without the first, leaves k² and costs as much again. Here
-//! each is evaluated once, without the error of the sample before: what is left is k² times the change of the input within a
-//! sample, and nothing while it stands still. With the nonlinearities that datasheets state (gyro 0.1 %, accelerometer 1 %) and
-//! the whole range swept at 40 Hz, that is 1.8e-5 rad/s and 4.4e-4 m/s², a thousandth and a hundredth of the noise of a
-//! sample (`cargo test -p mimu-core --test effects one_evaluation -- --nocapture`). Only a sample that none goes before is evaluated twice.
+//! The error e is a function of the true input, but only the erroneous reading is known. Evaluating e at the reading leaves a fraction k of
+//! the error, with k the slope of e. Evaluating every law twice, the second time at the corrected reading, leaves k² and doubles the cost.
+//! Here each law is evaluated once, at the reading corrected by the error of the previous sample. The remaining error is k² times the
+//! change of the input within a sample, and zero for a constant input. With the nonlinearities of data sheets (gyro 0.1 %, accelerometer 1
+//! %) and the whole range swept at 40 Hz, it is 1.8e-5 rad/s and 4.4e-4 m/s², a thousandth and a hundredth of the noise of a sample (`cargo
+//! test -p mimu-core --test effects one_evaluation -- --nocapture`). Only the first sample, and the first after a gap, is evaluated twice.
 //!
-//! What moves with temperature and time only is folded into a matrix and a bias by [`Effects::slow`], which cost the same however
-//! many there are.
+//! Effects that depend on temperature and time only are folded into one matrix and one bias by [`Effects::slow`], so the cost per sample
+//! does not depend on their number.
 //!
-//! Errors of the converter are another matter: they are functions of the raw reading, whatever that stands for, and are taken out of it
-//! before it is compensated, by [`Effects::without_code_errors`]. They are those of an axis, which may have a converter to itself, and are
-//! made by [`DeviceEffect::code`].
+//! Errors of the converter are functions of the raw reading. [`Effects::without_code_errors`] removes them before compensation. Each
+//! belongs to an axis, because an axis may have a separate converter; [`DeviceEffect::code`] makes them.
 
 mod code;
 mod directions;
@@ -41,11 +40,11 @@ pub use effect::{Converter, DeviceEffect, EffectError, TIME_CONSTANT_RANGE_S, Va
 
 /// Temperature that temperature offsets count from, °C.
 pub const REFERENCE_C: f64 = 25.0;
-/// Lag of the filter by which the rate of change of the temperature is taken, s: unfiltered it would be noise.
+/// Time constant of the filter for the rate of change of the temperature, s; unfiltered it would be noise.
 pub const RATE_LAG_S: f64 = 30.0;
 
-/// Effects of a unit: immutable, for any number of streams. Up to N of each triad that run with every sample, and N that do
-/// not.
+/// Effects of a unit: immutable, for any number of streams. Each triad has room for N effects that run with every sample, and for N slow
+/// ones.
 ///
 /// ```
 /// # use mimu_core::PerSensor;
@@ -72,20 +71,20 @@ pub struct Effects<T: RealField, const N: usize> {
     seen_c: Option<[T; 2]>,
 }
 
-/// What the effects remember of one stream of samples.
+/// Memory of the effects for one stream of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State<T: RealField, const N: usize> {
     sample_rate_hz: T,
     /// Rate in the sample before, rad/s.
     previous: Option<Vector3<T>>,
-    /// As they were last; the slow ones, at the last call of [`Effects::slow`].
+    /// Latest variables; the slow ones are those of the last call of [`Effects::slow`].
     at: Conditions<T>,
-    /// Time since power-on, s, and what rounding has added to it.
+    /// Time since power-on, s, and its accumulated rounding error.
     time: T,
     lost: T,
-    /// What decays after power-on is gone.
+    /// Whether decays after power-on count as over.
     settled: bool,
-    /// The last temperature that was a number, °C: as it was read, since what effects see of it is theirs.
+    /// The last valid temperature, °C, as it was read; effects clamp it themselves.
     read_c: Option<T>,
     /// The temperature lagged by [`RATE_LAG_S`], minus itself, °C.
     rate_lag: T,
@@ -93,9 +92,9 @@ pub struct State<T: RealField, const N: usize> {
 }
 
 impl<T: RealField + Copy, const N: usize> State<T, N> {
-    /// That of a stream which begins at power-on, of so many samples a second.
+    /// State of a stream that begins at power-on, at this sample rate, Hz.
     ///
-    /// [`Effects::slow`] before the first sample, or the slow effects stay in until its first call.
+    /// Call [`Effects::slow`] before the first sample; until then the slow effects are not removed.
     pub fn new(sample_rate_hz: T) -> Self {
         let (none, one) = (T::zero(), T::one());
         Self {
@@ -115,8 +114,8 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
         }
     }
 
-    /// Of a stream whose power-on is not known: what decays after it is taken for long past, and what grows with time counts from the
-    /// beginning of the stream. To count a warm-up from there instead would put an error of its whole size in.
+    /// For a stream whose power-on is unknown: decays count as over, and effects that grow with time count from the beginning of the
+    /// stream. If a warm-up were counted from there, a wrong correction of its full size would be added.
     pub fn long_after_power_on(self) -> Self {
         Self {
             settled: true,
@@ -124,19 +123,20 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
         }
     }
 
-    /// Follows time and temperature as [`Effects::slow`] does, where there are no effects: so that both are known to the effects of a later
+    /// Follows time and temperature like [`Effects::slow`], but without effects, so that both are known to the effects of a later
     /// calibration.
     pub fn pass(&mut self, dt_s: T, temp_c: T) {
         self.follow(dt_s, temp_c, None);
     }
 
-    /// Time and temperature, of which effects see what is within `seen_c`; the step of time that was one, and that of what is seen.
+    /// Updates time and temperature; effects see the temperature clamped to `seen_c`. Returns the time step and the step of the clamped
+    /// temperature.
     fn follow(&mut self, dt_s: T, temp_c: T, seen_c: Option<[T; 2]>) -> [T; 2] {
         let dt = match dt_s > T::zero() && dt_s.is_finite() {
             true => dt_s,
             false => T::zero(),
         };
-        // Compensated (Kahan): of steps of 0.1 s each single precision loses seconds within hours.
+        // Compensated summation (Kahan): with steps of 0.1 s single precision loses seconds within hours.
         let step = dt - self.lost;
         let time = self.time + step;
         self.lost = (time - self.time) - step;
@@ -164,8 +164,8 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
         [dt, risen]
     }
 
-    /// The next sample does not follow the one before: samples are missing. Time and temperature go on; the angular acceleration of
-    /// that sample is not known, and taken for none.
+    /// Samples are missing before the next one. Time and temperature continue; the angular acceleration of that sample is unknown and taken
+    /// as zero.
     pub fn gap(&mut self) {
         self.previous = None;
         self.triads.gyro.gap();
@@ -174,14 +174,14 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
 }
 
 impl<T: RealField + Copy, const N: usize> Effects<T, N> {
-    /// No effects yet, of a unit with these inverse models, raw to SI. `None` if one of them is singular. For the PC, as
+    /// No effects yet, for a unit with these inverse models, raw to SI. `None` if one of them is singular. For the PC, like
     /// [`Directions::of`].
     pub fn new(models: &Compensation<f64>) -> Option<Self> {
         let directions = models.map(|model| Directions::of(&model.matrix));
         Some(Self::of(directions.transpose()?))
     }
 
-    /// No effects yet, of a unit whose sensors look there.
+    /// No effects yet, for a unit with these sensitive directions.
     pub fn of(directions: PerSensor<Directions<T>>) -> Self {
         Self {
             triads: directions.map(Triad::new),
@@ -189,8 +189,8 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         }
     }
 
-    /// The same of a calibration for these temperatures, °C: beyond them the effects see the temperature go on for [`BEYOND_C`] and then
-    /// stand still, as the curves of the calibration do. A square of the temperature would leave every size behind.
+    /// The same for a calibration with this temperature range, °C. Beyond it the temperature that effects see is clamped at [`BEYOND_C`],
+    /// like the curves of the calibration; otherwise a square of the temperature would grow without bound.
     pub fn within(mut self, limits: Option<[T; 2]>) -> Self {
         let most: T = convert(BEYOND_C);
         self.seen_c = limits.map(|[from, to]| [from - most, to + most]);
@@ -202,10 +202,10 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         self.triads[effect.sensor].push(&effect.kind())
     }
 
-    /// Takes over the state of a stream that other effects, or none, were removed from until now. Time, temperature and its rate go on, and so does each
-    /// lagged temperature that one of the new effects needs too: it is a function of the temperature alone, whatever the coefficients.
-    /// One of another time constant begins at the temperature of the next call of [`Self::slow`]. The errors of the sample before are those of the
-    /// old effects, and forgotten.
+    /// Takes over the state of a stream from which other effects, or none, were removed so far. Time, temperature and its rate continue,
+    /// and so does each lagged temperature that one of the new effects needs too, because it depends on the temperature alone. One with
+    /// another time constant starts at the temperature of the next call of [`Self::slow`]. The errors of the previous sample belong to the
+    /// old effects and are discarded.
     pub fn take_over(&self, before: Option<&Self>, state: &mut State<T, N>) {
         let PerSensor { gyro, accel } = state.triads;
         let known = |lag_s: T| {
@@ -218,10 +218,10 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         state.previous = None;
     }
 
-    /// Follows temperature, °C, and time, s since the call before or since power-on: some times a second is enough.
+    /// Follows temperature (°C) and time (s since the previous call, or since power-on). A few calls per second are enough.
     ///
-    /// The temperature is that of the thermometer, as effects are found by it: one of them is the lag of the dies behind it. One that is
-    /// not a number is that of before; as long as there was none, the reference. A step of time that is not positive is none.
+    /// The temperature is that of the thermometer, because effects are found with it: one of them is the lag of the dies. NaN repeats the
+    /// previous temperature, or before the first one the reference. A time step that is not positive counts as zero.
     pub fn slow(&self, state: &mut State<T, N>, dt_s: T, temp_c: T) {
         let [dt, risen] = state.follow(dt_s, temp_c, self.seen_c);
         let (at, settled) = (&state.at, state.settled);
@@ -230,7 +230,7 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         (self.triads.accel).slow(&mut triads.accel, dt, risen, settled, at);
     }
 
-    /// Raw readings without the errors of the converters' codes: to be compensated in place of those that were read.
+    /// Raw readings without the errors of the converters' codes, to be compensated instead of the original ones.
     #[inline]
     pub fn without_code_errors(&self, raw: &Sample<T>) -> Sample<T> {
         Sample {
@@ -239,8 +239,8 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         }
     }
 
-    /// A compensated sample, SI in the body frame, without the effects. To be called with every sample in turn, and
-    /// [`State::gap`] where some are missing: the angular acceleration is the difference to the one before.
+    /// Removes the effects from a compensated sample, SI in the body frame. Call it with every sample in order, and [`State::gap`] if
+    /// samples are missing, because the angular acceleration is the difference from the previous sample.
     #[inline]
     pub fn remove(&self, state: &mut State<T, N>, compensated: &Sample<T>) -> Sample<T> {
         let (rate, force) = (&compensated.gyro, &compensated.accel);

@@ -6,18 +6,17 @@
 //!
 //! # The form of the covariance
 //!
-//! fang (25) as printed, `P = (I - K H) P`, subtracts nearly equal numbers and in `f32` leaves
-//! symmetry and positiveness to luck. Here the covariance is kept as `U W⁻¹ Uᵀ`, Bierman's (1977) `U D Uᵀ`
-//! with U unit upper triangular and the diagonal inverted. It is symmetric because nothing else can be
-//! represented, and positive because W only ever has positive numbers added. Not Joseph's form, which
-//! costs twice the multiplications and stays symmetric only if it is symmetrized; not a square-root
-//! information filter, whose state hides behind a back substitution. W and not D, because Bierman's
-//! `D ← D a₀/a₁` multiplies by 1 - 1/n: after 10⁷ updates in `f32` that is at the unit of rounding and
-//! the claimed sigma was found 5 % too large; `W ← W + f²/a` can be summed with compensation.
+//! fang (25) as printed, `P = (I - K H) P`, subtracts nearly equal numbers, so in `f32` P may lose symmetry and positiveness. Here the
+//! covariance is kept as `U W⁻¹ Uᵀ`, Bierman's (1977) `U D Uᵀ`
+//! with U unit upper triangular and the diagonal inverted. It is symmetric by construction, and positive because only positive numbers are
+//! added to W. Joseph's form costs twice the multiplications and needs symmetrization; a square-root information filter needs a back
+//! substitution to give its state. W is stored instead of D, because Bierman's
+//! `D ← D a₀/a₁` multiplies by 1 - 1/n: after 10⁷ updates in `f32` this factor is at the unit of rounding, and sigma came out 5 % too
+//! large. `W ← W + f²/a` can be summed with compensation.
 //!
-//! The state is summed with compensation as well (Kahan): with 1/n as gain and 10⁵ samples an increment is
-//! below half a unit in the last place of a 2.5 V bias in `f32`, and would be lost, so that a filter
-//! would stop learning at about 25 000 samples while its covariance goes on shrinking.
+//! The state is summed with compensation too (Kahan). With a gain of 1/n and 10⁵ samples an increment is below half a unit in the last
+//! place of a 2.5 V bias in `f32` and would be lost: the filter would stop learning after about 25 000 samples while its covariance
+//! continues to shrink.
 
 use core::cmp::Ordering;
 
@@ -52,13 +51,13 @@ impl core::error::Error for Rejected {}
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Filter<T: RealField> {
     mean: [Sum<T>; STATES],
-    /// Columns of U, of which only what stands above the diagonal is used.
+    /// Columns of U; only the entries above the diagonal are used.
     upper: [[T; STATES]; STATES],
     /// W, the inverse of the diagonal of `U W⁻¹ Uᵀ`.
     information: [Sum<T>; STATES],
 }
 
-/// Running sum with what it has lost to rounding so far (Kahan).
+/// Running sum with its accumulated rounding error (Kahan).
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Sum<T> {
     value: T,
@@ -83,8 +82,8 @@ impl<T: RealField + Copy> Sum<T> {
 }
 
 impl<T: RealField + Copy> Filter<T> {
-    /// Filter with prior mean `mean` and independent prior `variance`s. These must be positive: a filter with any other
-    /// is not one, and refuses what it is given.
+    /// Filter with prior mean `mean` and independent prior `variance`s. These must be positive; otherwise the filter refuses every
+    /// measurement.
     pub fn with_prior(mean: [T; STATES], variance: [T; STATES]) -> Self {
         Self {
             mean: mean.map(Sum::new),
@@ -93,22 +92,20 @@ impl<T: RealField + Copy> Filter<T> {
         }
     }
 
-    /// Filter that knows nothing yet: zero mean, and a variance that is infinite to rounding.
+    /// Filter with a diffuse prior: zero mean, and a variance that is infinite to rounding.
     ///
-    /// `noise` is the variance R of the measurements to come and `span` the size of the inputs
-    /// to come (SI). The prior variance is `R/ε` for the bias and `R/(ε span²)` for the rest,
-    /// ε being the unit of rounding. A smaller one pulls the result towards zero by `R/D`; a
-    /// larger one `D` does harm as well, because a direction that a repeated measurement should
-    /// find known is known to ε only, and seems to have the variance `ε² D` left. At `R/ε` both
-    /// are at rounding.
+    /// `noise` is the variance R of the measurements to come and `span` the magnitude of the inputs to come (SI). The prior variance D is
+    /// `R/ε` for the bias and `R/(ε span²)` for the rest, with ε the unit of rounding. A smaller D pulls the result towards zero by `R/D`.
+    /// A larger D harms too: a direction that is already measured is known to ε only, and seems to keep the variance `ε² D`. At `R/ε` both
+    /// errors are at rounding.
     pub fn diffuse(noise: T, span: T) -> Self {
         let bias = noise / T::default_epsilon();
         let row = bias / (span * span);
         Self::with_prior([T::zero(); STATES], [bias, row, row, row])
     }
 
-    /// Takes in the reading `raw` under the known `input` (SI), whose noise has the variance
-    /// `noise` (raw units squared): fang (25) for one scalar, in Bierman's form.
+    /// Updates the filter with the reading `raw` at the known `input` (SI); `noise` is the variance of the reading (raw units squared).
+    /// This is fang (25) for one scalar, in Bierman's form.
     ///
     /// Returns the innovation, `raw` minus its prediction, with its predicted variance.
     #[inline]
@@ -122,7 +119,7 @@ impl<T: RealField + Copy> Filter<T> {
             return Err(Rejected::NoiseNotPositive);
         }
         let h = [T::one(), input.x, input.y, input.z];
-        // Column by column: b is the unscaled gain, a the variance of what is predicted by the states so far.
+        // Column by column: b is the unscaled gain, a the predicted variance from the states so far.
         let (mut a, mut predicted) = (noise, T::zero());
         let mut upper = self.upper;
         let (mut b, mut growth) = ([T::zero(); STATES], [T::zero(); STATES]);
@@ -132,7 +129,7 @@ impl<T: RealField + Copy> Filter<T> {
                 f += upper[j][i] * h[i];
             }
             let v = f / self.information[j].value;
-            // The factor by which the column of U moves.
+            // Factor of the change of the column of U.
             let l = -f / a;
             a += v * f;
             growth[j] = -f * l;
@@ -146,7 +143,7 @@ impl<T: RealField + Copy> Filter<T> {
         }
         let innovation = raw - predicted;
         let step = innovation / a;
-        // One test finds every not-a-number and infinity among raw, input, noise and state, and every overflow on the way.
+        // This one test finds every NaN and infinity in raw, input, noise and state, and every overflow on the way.
         let sum = growth.iter().fold(T::zero(), |sum, growth| sum + *growth);
         if !(step + sum).is_finite() {
             return Err(Rejected::NotFinite);
@@ -188,7 +185,7 @@ impl<T: RealField + Copy> Filter<T> {
     }
 }
 
-/// What a measurement said beyond what was already known.
+/// Innovation of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation<T> {
     /// Measurement minus prediction, raw units.
@@ -220,18 +217,17 @@ pub struct Bank<T: RealField> {
 }
 
 impl<T: RealField + Copy> Bank<T> {
-    /// Bank that knows nothing yet; see [`Filter::diffuse`]. `noise`: variances (raw units
-    /// squared) of the three sensors; `span`: size of the inputs to come (SI).
+    /// Bank with a diffuse prior; see [`Filter::diffuse`]. `noise`: variances (raw units
+    /// squared) of the three sensors; `span`: magnitude of the inputs to come (SI).
     pub fn diffuse(noise: &Vector3<T>, span: T) -> Self {
         Self {
             axes: [noise.x, noise.y, noise.z].map(|noise| Filter::diffuse(noise, span)),
         }
     }
 
-    /// Takes in one reading of the triad under a known `input` (SI), one scalar at a time.
+    /// Updates the filters with one reading of the triad at a known `input` (SI), one scalar at a time.
     ///
-    /// All three sensors are offered the reading; the first refusal is returned, and only the
-    /// filter that it came from is unchanged.
+    /// All three filters get the reading. The first refusal is returned; only filters that refuse are unchanged.
     #[inline]
     pub fn update(
         &mut self,

@@ -1,5 +1,5 @@
-//! What the device computes, on the device and on the PC alike: compensation of raw readings, removal
-//! of what an affine model lacks, and the recursive estimation of a calibration.
+//! The device's computations, shared with the PC: compensation of raw readings, removal of effects, and recursive estimation of a
+//! calibration.
 //!
 //! | module           | what it is                                                        |
 //! |------------------|-------------------------------------------------------------------|

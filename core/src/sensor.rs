@@ -1,4 +1,4 @@
-//! The two triads of an inertial unit, and what there is of each.
+//! The two triads of an inertial unit, and values for each.
 
 use core::fmt;
 use core::ops::{Index, IndexMut, Range};
@@ -82,7 +82,7 @@ impl FromStr for Sensor {
     }
 }
 
-/// What there is of each triad.
+/// One value for each triad.
 ///
 /// ```
 /// # use mimu_core::{PerSensor, Sensor};
@@ -100,7 +100,7 @@ pub struct PerSensor<T> {
 }
 
 impl<T> PerSensor<T> {
-    /// By a function of the sensor, the gyro first.
+    /// Values of a function of the sensor, the gyro first.
     #[inline]
     pub fn from_fn(mut of: impl FnMut(Sensor) -> T) -> Self {
         Self {
@@ -109,7 +109,7 @@ impl<T> PerSensor<T> {
         }
     }
 
-    /// The same of both.
+    /// The same value for both.
     #[inline]
     pub fn both(of: T) -> Self
     where
@@ -121,7 +121,7 @@ impl<T> PerSensor<T> {
         }
     }
 
-    /// A function of each, the gyro first.
+    /// Applies a function to each, the gyro first.
     #[inline]
     pub fn map<U>(self, mut f: impl FnMut(T) -> U) -> PerSensor<U> {
         PerSensor {
@@ -139,7 +139,7 @@ impl<T> PerSensor<T> {
         }
     }
 
-    /// References to both, to change them.
+    /// Mutable references to both.
     #[inline]
     pub const fn as_mut(&mut self) -> PerSensor<&mut T> {
         PerSensor {
@@ -148,7 +148,7 @@ impl<T> PerSensor<T> {
         }
     }
 
-    /// Each with that of `other`.
+    /// Pairs each value with that of `other`.
     #[inline]
     pub fn zip<U>(self, other: PerSensor<U>) -> PerSensor<(T, U)> {
         PerSensor {
@@ -157,14 +157,14 @@ impl<T> PerSensor<T> {
         }
     }
 
-    /// Each with its sensor, the gyro first.
+    /// Each value with its sensor, the gyro first.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = (Sensor, &T)> {
         self.as_ref().into_iter()
     }
 }
 
 impl<T> PerSensor<Option<T>> {
-    /// Both, if there are both.
+    /// Both values, if both exist.
     #[inline]
     pub fn transpose(self) -> Option<PerSensor<T>> {
         Some(PerSensor {
@@ -173,7 +173,7 @@ impl<T> PerSensor<Option<T>> {
         })
     }
 
-    /// Those that there are, the gyro first.
+    /// The existing ones, the gyro first.
     pub fn present(&self) -> impl DoubleEndedIterator<Item = (Sensor, &T)> {
         self.iter().filter_map(|(s, of)| Some((s, of.as_ref()?)))
     }

@@ -1,7 +1,7 @@
-//! What runs with every sample, in single precision and compiled here.
+//! The functions that run with every sample, compiled here in single precision.
 //!
-//! Generic code is compiled, and inlined, where it is used. These have names of their own in every image, by which their instructions
-//! can be counted: [`apply`] is what the firmware calls, the others are its parts by themselves.
+//! Generic code is compiled and inlined where it is used. These functions keep their names in every image, so their instructions can be
+//! counted. The firmware calls [`apply`]; the others are its parts.
 
 use nalgebra::Vector3;
 

@@ -1,4 +1,4 @@
-//! A calibration as bytes: what is sent to the device, kept in its flash, and used.
+//! A calibration as bytes: sent to the device, stored in its flash, and used there.
 //!
 //! Little end first, `f32` as IEEE 754, matrices by rows:
 //!
@@ -25,16 +25,16 @@
 //!
 //! [`Variable`]: crate::effects::Variable
 //!
-//! Another version is not read: the calibration has to be uploaded again from its file.
+//! Other versions are not read: upload the calibration again from its file.
 //!
-//! What no unit can have is refused, wherever the bytes come from: C and o beyond [`Affine::check`], temperatures beyond
+//! Impossible values are refused, wherever the bytes come from: C and o beyond [`Affine::check`], temperatures beyond
 //! [`TEMPERATURE_RANGE_C`](crate::table::TEMPERATURE_RANGE_C), lags and time constants beyond those of [`DieLag`] and of
-//! [`DeviceEffect`], bits that say something of a later version.
+//! [`DeviceEffect`], bits of a later version.
 //!
 //! [`Affine::check`]: crate::compensation::Affine::check
 //!
-//! Raw is volts at the sensor, as in [`RawBatch`](crate::wire::RawBatch). The noise of biases and the sigmas of the parameters are not
-//! here: the device has no use for them.
+//! Raw is volts at the sensor, as in [`RawBatch`](crate::wire::RawBatch). The noise of biases and the sigmas of the parameters are left
+//! out, because the device does not use them.
 
 mod bytes;
 mod curves;
@@ -70,15 +70,15 @@ pub const MAX_LENGTH: usize = 5888;
 const MAGIC: [u8; 4] = *b"mimc";
 const HEADER: usize = 12;
 const CHECK: usize = 4;
-/// Where the length stands.
+/// Position of the length.
 const LENGTH_AT: usize = 6;
 
-// Bit by bit: computed once in a while over some kB, which is not worth tables of 3 KiB.
+// Bit by bit: it is computed rarely, over a few kB, which does not justify tables of 3 KiB.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 const HASH: Crc<u64, NoTable> = Crc::<u64, NoTable>::new(&CRC_64_XZ);
 
-/// What a calibration is identified by: CRC-64/XZ over all of its bytes. Not the CRC-32 once more, which over anything that ends in its
-/// own CRC-32 is always the same.
+/// Hash that identifies a calibration: CRC-64/XZ over all of its bytes. A CRC-32 would be the same for every input that ends with its own
+/// CRC-32.
 pub fn hash(bytes: &[u8]) -> u64 {
     HASH.checksum(bytes)
 }
@@ -90,16 +90,16 @@ pub struct Stored {
     pub origin: Origin,
     /// What it does to a sample.
     pub compensator: Compensator<f32, NODES, ROOM>,
-    /// Lags of the dies behind the thermometer, s, if they are known; otherwise none is applied.
+    /// Lags of the dies behind the thermometer, s, if known; otherwise no lag is applied.
     pub lags_s: Option<PerSensor<f32>>,
-    /// How many effects: errors by the code are one for each converter.
+    /// Number of effects; the code errors of a converter count as one.
     pub effect_count: u8,
 }
 
 /// Why bytes are not a calibration that this build can use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum StoredError {
-    /// They do not begin as a calibration does.
+    /// They do not begin like a calibration.
     NotACalibration,
     /// They end too early, or go on after the end.
     Length,
@@ -108,31 +108,31 @@ pub enum StoredError {
         /// Theirs.
         found: u16,
     },
-    /// The CRC does not hold.
+    /// The CRC is wrong.
     Check,
-    /// A node has numbers that no sensor has, or is not warmer than the one before, or there are none or too many.
+    /// A node has impossible numbers or is not warmer than the one before, or the number of nodes is zero or too large.
     Node {
         /// Which, from 0.
         at: u8,
     },
-    /// C of the gyro or of the accelerometer that the effects were found with is singular.
+    /// C of the gyro or of the accelerometer with which the effects were found is singular.
     Singular,
     /// An effect that this build does not know.
     EffectUnknown {
-        /// Which, from 0, in the order that they were given in.
+        /// Its index, from 0, in the given order.
         at: u8,
     },
-    /// An effect with numbers that make no sense.
+    /// An effect with impossible numbers.
     EffectValue {
         /// Which, from 0.
         at: u8,
     },
     /// More effects than there is room for.
     EffectsFull {
-        /// The first that has none.
+        /// Index of the first effect without room.
         at: u8,
     },
-    /// The range is not one of temperatures, a lag is none that dies have, or the thermometer is one that this build does not know.
+    /// The temperature range or a lag is impossible, or this build does not know the thermometer.
     Temperature,
     /// Bits of the header are set that this build does not know.
     Header,
@@ -166,8 +166,8 @@ impl core::fmt::Display for StoredError {
 
 impl core::error::Error for StoredError {}
 
-/// Writes a calibration to the beginning of `out`; returns its length. `found_with`: C that the effects were found with. [`decode`] judges what
-/// is written, not this.
+/// Writes a calibration to the beginning of `out`; returns its length. `found_with`: C with which the effects were found. This function
+/// does not validate; [`decode`] does.
 pub fn encode(
     origin: &Origin,
     found_with: PerSensor<&Matrix3<f32>>,
@@ -184,7 +184,7 @@ pub fn encode(
     to.bytes(&[curves::TEMP_PINS, curves.known()])?;
     origin.write(&mut to)?;
     for (_, matrix) in found_with {
-        // The device inverts nothing, so a singular matrix is marked by what is no number.
+        // The device computes no inverse, so NaN marks a singular matrix.
         let nothing = Matrix3::repeat(f32::NAN);
         let none = Directions {
             sensed: nothing,
@@ -214,8 +214,8 @@ pub fn decode(bytes: &[u8]) -> Result<Stored, StoredError> {
     read(bytes, |_| {}, |_| {})
 }
 
-/// The same, and shows each node and each effect as it is stored, which what the device computes with does not give back. Of what is
-/// refused the beginning may have been shown.
+/// The same, and passes each node and each effect as it is stored to a callback; the device's tables do not give them back. If the bytes
+/// are refused, the callback may have received the first ones.
 pub fn read(
     bytes: &[u8],
     node: impl FnMut(&Node<f32>),

@@ -1,19 +1,20 @@
 //! Compensation over temperature: inverse models at several temperatures, and curves between them.
 //!
-//! A node holds the whole of C and o of both triads. Not a scale factor K(T) in front of a fixed M: what drifts is the sensor, a row of
-//! the forward matrix and so a column of C; row factors would be wrong by drift times misalignment, of which 1 % each make 100 ppm.
+//! A node contains C and o of both triads completely, instead of a scale factor K(T) times a fixed M. The sensor drifts: a row of the
+//! forward matrix, and therefore a column of C. Row factors would be wrong by drift times misalignment: 1 % of each make 100 ppm.
 //!
-//! Between nodes each number is a cubic Hermite piece: it has the values and the derivatives of both nodes. Drifts of MEMS sensors are
-//! cubics of the temperature (niu), which 16 nodes with straight lines between them miss by 18 deg/h; Hermite pieces hold a cubic exactly,
-//! and joined at the nodes they have no kink there.
+//! Between nodes each number is a cubic Hermite segment with the values and derivatives of both nodes. Drifts of MEMS sensors are cubics of
+//! the temperature (niu). Straight lines between 16 nodes miss these by 18 deg/h; Hermite segments represent a cubic exactly, and have no
+//! kink at the nodes.
 //!
-//! Outside the nodes a cubic leaves the data at its third power. There each number goes on along the slope of the end node for
-//! [`BEYOND_C`], and is held from there on: the error grows linearly at first, and then no more.
+//! Outside the nodes a cubic diverges with the third power. There each number continues along the slope of the end node for [`BEYOND_C`]
+//! and is constant beyond.
 //!
-//! Each triad has the model of its own dies: gyro and accelerometer are other packages, in other places on the board.
+//! Each triad is evaluated at the temperature of its own dies: gyro and accelerometer are separate packages in different places on the
+//! board.
 //!
-//! Temperature moves slowly, so this runs some times a second ([`Table::follow`]), and what runs with every sample is
-//! [`Compensation::apply`] of the model that it leaves behind.
+//! Temperature changes slowly, so [`Table::follow`] runs several times per second. With every sample only [`Compensation::apply`] runs,
+//! with the latest model.
 
 use heapless::Vec;
 use nalgebra::{RealField, convert};
@@ -24,10 +25,10 @@ use crate::effects::REFERENCE_C;
 
 pub use crate::die::BEYOND_C;
 
-/// Temperatures that a calibration may be for, °C: wider than any part that is sold works in.
+/// Temperatures that a calibration may have, °C: wider than the range of any part on the market.
 pub const TEMPERATURE_RANGE_C: [f64; 2] = [-100.0, 250.0];
 
-/// Whether a calibration may be for this temperature, °C.
+/// Whether a calibration may have this temperature, °C.
 pub fn is_temperature<T: RealField + Copy>(temp_c: T) -> bool {
     let [least, most] = TEMPERATURE_RANGE_C.map(convert::<f64, T>);
     temp_c >= least && temp_c <= most
@@ -107,17 +108,17 @@ impl core::error::Error for TableError {}
 /// Nodes in the order of their temperatures: immutable, for any number of streams.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table<T: RealField, const N: usize> {
-    /// Apart, because there always is one.
+    /// Stored separately, because there is always one.
     first: Node<T>,
     others: Vec<Node<T>, N>,
-    /// Dies' temperatures that the nodes were found from, °C.
+    /// Temperature range of the dies from which the nodes were found, °C.
     range_c: Option<[T; 2]>,
 }
 
 /// Where a temperature is in a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// Within the range that the calibration is for.
+    /// Within the range of the calibration.
     Inside,
     /// Below it, by however little.
     Below,
@@ -184,13 +185,13 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         Ok(self)
     }
 
-    /// Dies' temperatures that the nodes were found from, °C.
+    /// Temperature range of the dies from which the nodes were found, °C.
     pub fn range_c(&self) -> Option<[T; 2]> {
         self.range_c
     }
 
-    /// The temperatures that the calibration is for, °C: those that it was found from, and of several nodes none outside them. `None`: a
-    /// single node of no known range, which is for all temperatures, as nothing else is known.
+    /// Temperature range of the calibration, °C: that of the dies from which it was found, limited to the nodes if there are several.
+    /// `None`: a single node of unknown range, which is used at all temperatures.
     pub fn limits(&self) -> Option<[T; 2]> {
         let nodes = self.others.last();
         let nodes = nodes.map(|last| [self.first.temp_c, last.temp_c]);
@@ -200,12 +201,12 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         }
     }
 
-    /// The state of a stream whose temperature is not known yet: that of [`REFERENCE_C`].
+    /// State of a stream whose temperature is unknown so far: the model at [`REFERENCE_C`].
     pub fn state(&self) -> State<T> {
         self.at(PerSensor::both(convert(REFERENCE_C)))
     }
 
-    /// Follows the temperatures of the dies, °C. If one is not a number, nothing changes.
+    /// Follows the temperatures of the dies, °C. If one is NaN, nothing changes.
     pub fn follow(&self, state: &mut State<T>, dies_c: PerSensor<T>) {
         if dies_c.gyro.is_finite() && dies_c.accel.is_finite() {
             *state = self.at(dies_c);
@@ -217,7 +218,7 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         1 + self.others.len()
     }
 
-    /// Never: there is a first.
+    /// Always false: there is at least one node.
     pub const fn is_empty(&self) -> bool {
         false
     }
@@ -259,7 +260,7 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         }
     }
 
-    /// The four weights of a piece are 1 and three zeros at either end, so that a node has its own numbers to the last bit.
+    /// At either end of a segment one weight is 1 and the other three are 0, so a node reproduces its numbers to the last bit.
     fn between(
         low: &Node<T>,
         high: &Node<T>,

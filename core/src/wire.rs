@@ -8,14 +8,14 @@
 //!   [postcard](https://postcard.jamesmunns.com/wire-format): a variant is its number, integers are varints of 7 bits a byte, `f32`
 //!   and fixed arrays of bytes are as they are in memory, little end first, text and byte strings begin with their length.
 //! * CRC-32 is that of Ethernet and zip (CRC-32/ISO-HDLC), over the message, little end first.
-//! * COBS takes every zero out, so that a zero is the end of a frame and nothing else: whatever was lost or garbled, reading
-//!   resumes at the next zero. The zero in front costs a byte and saves the first frame after noise. Empty frames mean nothing.
+//! * COBS removes every zero, so a zero always marks the end of a frame: after lost or garbled bytes, reading resumes at the next zero. The
+//!   leading zero costs a byte and saves the first frame after noise. Empty frames are ignored.
 //!
 //! The order of variants and fields is the protocol. A minor version appends variants of requests, messages and refusals, and fields
-//! behind the last of [`Greeting`], [`Counters`], [`SelfTest`] and [`CompensatedBatch`], which are read whatever their length: what the sender lacks is zero, and
-//! what the reader does not know is passed over. [`Start`] and [`Slot`] have their length in front, so that one that the reader does not
-//! know hides nothing behind it. A major version may do anything but change the beginning of [`Message::Greeting`], up to
-//! [`Greeting::protocol`], and [`Request::Hello`], by which both sides find out whom they talk to.
+//! behind the last of [`Greeting`], [`Counters`], [`SelfTest`] and [`CompensatedBatch`], which may have any length: missing fields are
+//! zero, unknown ones are skipped. [`Start`] and [`Slot`] begin with their length, so a reader can skip a variant that it does not know. A
+//! major version may change everything except [`Request::Hello`] and the beginning of [`Message::Greeting`] up to [`Greeting::protocol`],
+//! by which both sides identify each other.
 //!
 //! | longest, by a test                | bytes a frame | frames a second | kB/s |
 //! |-----------------------------------|---------------|-----------------|------|

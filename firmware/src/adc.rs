@@ -1,26 +1,22 @@
 //! The converter: ADC1 scanning freely into a ring in memory, averaged to one sample a millisecond.
 //!
-//! embassy-stm32 0.6 starts every read of this family's converter by software and has no ring
-//! buffer for it, which leaves both the rate and the gaps to the scheduler. So its driver powers up
-//! and calibrates, and the rest is done here on the registers: the sequence repeats by itself
-//! (CONT), and circular DMA carries every word away.
+//! embassy-stm32 0.6 starts every read of this family's converter by software and has no ring buffer for it, so the scheduler would
+//! determine rate and gaps. Its driver is therefore used for power-up and calibration only. The rest is done here on the registers: the
+//! sequence repeats automatically (CONT), and circular DMA transfers every word.
 //!
 //! # Why a scan is never rotated by a channel
 //!
-//! A word lost between converter and memory would shift every later word into its neighbour's
-//! place, silently. Two things rule that out.
+//! A word lost between converter and memory would silently shift every later word to its neighbour's place. Two mechanisms prevent this.
 //!
 //! - Within a stream no word can be lost unnoticed. When its FIFO overflows, the converter raises
 //!   OVR and makes no further DMA request until the flag is cleared (RM0433 25.4.27), and it is
-//!   cleared only between streams. What is in memory until then is in order; after that nothing
-//!   comes, which the deadline in [`Stream::next`] turns into an error.
+//!   cleared only between streams. The words in memory up to then are in order. No further word arrives, and the deadline in
+//! [`Stream::next`] turns this into an error.
 //! - After an error the stream is over: it repeats the error until it is dropped. A new one begins
 //!   with the converter stopped, which resets the sequence to its first channel, the FIFO emptied,
-//!   and the DMA controller set up anew at the first word of the ring. It is aligned by
-//!   construction and not by skipping words. Every part is needed: with the eight words of an
-//!   overflow left in the FIFO, all later scans are rotated by eight places. Pausing and resuming
-//!   the controller would not do either: it resumes with what was left of the count, but at the
-//!   ring's first word.
+//!   and the DMA controller set up anew at the first word of the ring. It is aligned by construction, without skipping words. Every part is
+//! needed: with the eight words of an overflow left in the FIFO, all later scans would be rotated by eight places. Pausing and resuming the
+//! controller does not help: it resumes with the remaining count, but at the ring's first word.
 
 use embassy_stm32::Peri;
 use embassy_stm32::adc::Adc;
@@ -38,13 +34,12 @@ use crate::front_end::{Factors, LINEARITY_WORDS};
 /// Conversions in one sample.
 const BLOCK: usize = SCANS * CHANNELS;
 
-/// The `REV_ID` of the last silicon that does not halve the kernel clock before the converter sees it, revision Y: everything would run
-/// twice as fast (RM0433 25.4.3).
+/// `REV_ID` of revision Y, the last silicon that does not halve the converter's kernel clock: everything would run twice as fast (RM0433
+/// 25.4.3).
 const LAST_REVISION_WITHOUT_DIVIDER: u16 = 0x1003;
 
-/// Words in the ring: two samples. The controller interrupts at the half and at the end, so once a
-/// sample, and the reader has the time of the other half to take it. A longer ring would give it
-/// longer, and hand out samples in bunches.
+/// Words in the ring: two samples. The controller interrupts at the half and at the end, once per sample, and the reader has one sample
+/// period to take it. A longer ring would give more time, but deliver samples in bunches.
 pub const RING: usize = 2 * BLOCK;
 
 /// The request multiplexer's input for ADC1 (RM0433 17.3.2).
@@ -56,8 +51,7 @@ const FIFO_WORDS: usize = 8;
 const PERIOD: Duration = Duration::from_hz(SAMPLE_HZ as u64);
 const _: () = assert!(PERIOD.as_ticks() * SAMPLE_HZ as u64 == embassy_time::TICK_HZ);
 
-/// The register's code for [`SAMPLING_HALF_CYCLES`], so that the time that is set and the time that
-/// is calculated with cannot differ.
+/// The register's code for [`SAMPLING_HALF_CYCLES`]: derived from it, so the set and the calculated time cannot differ.
 const SAMPLE_TIME: SampleTime = match SAMPLING_HALF_CYCLES {
     3 => SampleTime::CYCLES1_5,
     5 => SampleTime::CYCLES2_5,
@@ -83,8 +77,8 @@ const BOOST: Boost = match ADC_HZ {
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
     /// Milliseconds from the first start to the beginning of this sample, for 49 days. Consecutive
-    /// within a stream. Across a fault it advances by the time that passed, rounded up: a gap in
-    /// the numbers is the gap in time, to within one sample.
+    /// within a stream. Across a fault it advances by the elapsed time, rounded up: a gap in the numbers equals the gap in time to within
+    /// one sample.
     pub number: u32,
     /// Sums of the conversions of each channel.
     pub sums: Channels<u32>,
@@ -93,18 +87,17 @@ pub struct Sample {
 /// Why a stream ended. Samples were lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub enum Fault {
-    /// The reader came after the controller had begun to overwrite the sample, by the clock or by
-    /// the ring's own count.
+    /// The reader was late: by the clock or by the ring's count, the controller had begun to overwrite the sample.
     Late,
     /// The converter's FIFO overflowed: the controller did not fetch for 400 µs.
     ConverterOverrun,
-    /// No data, and no flag that says why.
+    /// No data, and no flag that gives the reason.
     Stalled,
 }
 
 /// ADC1 with its DMA channel and ring, powered up, calibrated and set to the scan, not yet running.
 pub struct Converter {
-    // Keeps the peripheral from anybody else.
+    // Reserves the peripheral.
     _adc: Adc<'static, ADC1>,
     dma: Peri<'static, DMA1_CH0>,
     ring: &'static mut [u16; RING],
@@ -114,11 +107,11 @@ pub struct Converter {
 }
 
 impl Converter {
-    /// Powers up, calibrates and configures. Takes 42 ms, nearly all of it calibration; half of that with factors that were `kept`, which
-    /// then stand in place of its own.
+    /// Powers up, calibrates and configures. Takes 42 ms, nearly all of it for calibration. With `kept` factors, which then replace its
+    /// own, it takes half of that.
     ///
-    /// `ring` must be where DMA1 reaches it, which is all RAM of `memory.x`; the data cache stays off, as after reset, so what the
-    /// controller writes there is what is read.
+    /// `ring` must be in memory that DMA1 reaches, which is all RAM of `memory.x`. The data cache stays off, as after reset, so reads see
+    /// what the controller writes.
     ///
     /// # Panics
     ///
@@ -144,7 +137,7 @@ impl Converter {
         }
     }
 
-    /// Its calibration factors, to be kept with what is calibrated by it; `None` if it does not let them be read.
+    /// Its calibration factors, to be stored with the unit's calibration; `None` if they cannot be read.
     pub fn factors(&self) -> Option<Factors> {
         self.factors
     }
@@ -153,9 +146,8 @@ impl Converter {
     pub fn start(&mut self) -> Stream<'_> {
         stop();
         let channel = Channel::new(self.dma.reborrow(), Irqs);
-        // SAFETY: the address is that of ADC1's data register, which stays valid, and reads of half
-        // a word are what it allows. The ring is borrowed by the stream for as long as the
-        // controller runs: dropping the stream stops it and waits until it has.
+        // SAFETY: the address is that of ADC1's data register, which is always valid and allows half-word reads. The stream borrows the
+        // ring for as long as the controller runs: dropping the stream stops the controller and waits for it.
         #[allow(unsafe_code)]
         let mut ring = unsafe {
             ReadableRingBuffer::new(
@@ -166,22 +158,22 @@ impl Converter {
                 TransferOptions::default(),
             )
         };
-        // A sample, that is whole scans: the buffer then never hands out part of one.
+        // One sample, a whole number of scans: the buffer then never returns part of a scan.
         ring.set_alignment(BLOCK);
         ring.start();
 
-        // Everything else is ready, so that this instant is that of the first conversion. If an
-        // interrupt comes in between, the deadlines are early by its length, not late.
+        // Everything else is ready, so this is the instant of the first conversion. If an interrupt comes in between, the deadlines are
+        // early by its duration, not late.
         let started = Instant::now();
         pac::ADC1
             .cfgr()
             .modify(|w| w.set_dmngt(Dmngt::DMA_CIRCULAR));
         pac::ADC1.cr().modify(|w| w.set_adstart(true));
 
-        // Saturating, and never back: when its 16-bit counter turns over, the HAL's clock can read
-        // 65.5 ms early for an instant. (It counts half turns by a compare interrupt; seen on the
-        // emulator, where its initialisation seems to raise the flag of the first.) A stream that starts on
-        // such a reading ends at once for being late, and the next is right.
+        // Saturating, so it never goes back: when its 16-bit counter overflows, the HAL's clock can read 65.5 ms early for an instant. (It
+        // counts half turns by a compare interrupt; seen on the
+        // emulator, where its initialisation seems to raise the flag of the first.) A stream that starts on such a reading ends at once as
+        // late, and the next one is right.
         let elapsed = started.saturating_duration_since(*self.first_start.get_or_insert(started));
         let number = elapsed.as_ticks().div_ceil(PERIOD.as_ticks()) as u32;
         self.next_number = self.next_number.max(number);
@@ -229,18 +221,15 @@ impl Stream<'_> {
     }
 
     async fn read(&mut self) -> Result<Channels<u32>, Fault> {
-        // Sample k is complete at k + 1 periods, and at k + 2 the controller is back at its first
-        // word.
+        // Sample k is complete after k + 1 periods; after k + 2 the controller overwrites its first word.
         let overwritten =
             self.started + Duration::from_ticks(PERIOD.as_ticks() * (self.samples + 2));
         let mut scans = [[0; CHANNELS]; SCANS];
         match with_deadline(overwritten, self.ring.read_exact(scans.as_flattened_mut())).await {
-            // The clock decides, not the ring. The ring counts rounds by interrupts, and two that
-            // come while interrupts are off are one: a reader held up for a whole number of rounds
-            // would be given the right channels of the wrong time. Clock and converter share a
-            // crystal, so the comparison holds for any length of run; if a sample took longer than
-            // a millisecond after all, it would fail within the run. (The clock itself slips once
-            // interrupts are off for 32 ms.)
+            // The clock decides, not the ring. The ring counts rounds by interrupts, and two interrupts while interrupts are off count as
+            // one: a reader that is late by a whole number of rounds would get the right channels of the wrong time. Clock and converter
+            // share a crystal, so the comparison is valid for any duration; a sample longer than a millisecond would fail during the run.
+            // (The clock itself slips if interrupts are off for 32 ms.)
             Ok(Ok(_)) if Instant::now() < overwritten => {}
             Ok(_) => return Err(Fault::Late),
             Err(_) if pac::ADC1.isr().read().ovr() => return Err(Fault::ConverterOverrun),
@@ -259,15 +248,15 @@ impl Stream<'_> {
 
 impl Drop for Stream<'_> {
     fn drop(&mut self) {
-        // Before the ring's own drop stops the controller: nothing is left to fetch then.
+        // Before the ring's drop stops the controller, so that nothing remains to be fetched.
         stop();
     }
 }
 
-/// Calibrates once more, with the bias current that the converter will run at, or has it use the factors that were kept; the factors.
+/// Calibrates again, with the bias current that the converter will use, or loads the kept factors; returns the factors.
 ///
-/// [`Adc::new`] chooses the current by the kernel clock (which it logs as the converter's) and does
-/// not know of the fixed divider behind it. It took the next higher one and calibrated with that.
+/// [`Adc::new`] chooses the current for the kernel clock (which it logs as the converter's), without the fixed divider after it. It
+/// therefore calibrated with the next higher current.
 fn calibrate_at_boost(kept: Option<Factors>) -> Option<Factors> {
     disable();
     pac::ADC1.cr().modify(|w| w.set_boost(BOOST));
@@ -280,10 +269,10 @@ fn calibrate_at_boost(kept: Option<Factors>) -> Option<Factors> {
     }
     measure();
     enable();
-    // Written back at once: whether a word that was read is still in use, the manual does not say.
+    // Written back at once, because the manual does not say whether a word is still in use after it was read.
     let found = read().filter(|factors| write(factors).is_some());
     if found.is_none() {
-        // Some words may have been read and not written back: once more, and left alone.
+        // Some words may have been read but not written back: calibrate again, and do not read.
         disable();
         measure();
         enable();
@@ -311,11 +300,11 @@ fn measure() {
     while adc.cr().read().adcal() {}
 }
 
-/// Looks at the flag of a linearity word before it is taken for stuck. The word moves within some cycles of the converter's clock, 0.13 µs each; a
-/// look takes some 0.1 µs.
+/// Number of polls of a linearity word's flag before it counts as stuck. The word moves within some cycles of the converter's clock, 0.13
+/// µs each; a poll takes about 0.1 µs.
 const LOOKS: u32 = 10_000;
 
-/// Sets or clears LINCALRDYW of a word, 0 to 5 (RM0433 25.6.3, bits 22 to 27), which has the word written or read; `None` if the flag does not
+/// Sets or clears LINCALRDYW of a word, 0 to 5 (RM0433 25.6.3, bits 22 to 27), which writes or reads the word; `None` if the flag does not
 /// follow.
 fn hand_over(word: usize, ready: bool) -> Option<()> {
     let (adc, bit) = (pac::ADC1, 1 << (22 + word));
@@ -328,14 +317,14 @@ fn hand_over(word: usize, ready: bool) -> Option<()> {
     looks.find(|_| is(adc.cr().read().0) == ready).map(|_| ())
 }
 
-/// The factors in use (RM0433 25.4.8): the converter is on and does not convert.
+/// The factors in use (RM0433 25.4.8). The converter has to be on and idle.
 fn read() -> Option<Factors> {
     let adc = pac::ADC1;
     let mut factors = Factors {
         offset: adc.calfact().read().calfact_s(),
         linearity: [0; LINEARITY_WORDS],
     };
-    // From the last word, as the maker's own library does.
+    // From the last word, as in the manufacturer's library.
     for (word, factor) in factors.linearity.iter_mut().enumerate().rev() {
         hand_over(word, false)?;
         *factor = adc.calfact2().read().lincalfact();
@@ -343,7 +332,7 @@ fn read() -> Option<Factors> {
     Some(factors)
 }
 
-/// Has the converter use these.
+/// Loads these factors into the converter.
 fn write(factors: &Factors) -> Option<()> {
     let adc = pac::ADC1;
     adc.calfact().modify(|w| w.set_calfact_s(factors.offset));
@@ -356,7 +345,7 @@ fn write(factors: &Factors) -> Option<()> {
     Some(())
 }
 
-/// Sequence, sampling times, input switches and repetition, by the number that the converter's input of each channel has.
+/// Configures sequence, sampling times, input switches and repetition, from the converter's input number of each channel.
 fn configure_scan(inputs: Channels<u8>) {
     let adc = pac::ADC1;
     adc.cfgr().modify(|w| {
@@ -378,20 +367,20 @@ fn configure_scan(inputs: Channels<u8>) {
         // The sampling time registers have ten channels each.
         adc.smpr(usize::from(channel / 10))
             .modify(|w| w.set_smp(usize::from(channel % 10), SAMPLE_TIME));
-        // Without preselection the pin stays off the analog bus and its conversions read anything.
+        // Without preselection the pin is not connected to the analog bus, and its conversions are arbitrary.
         adc.pcsel()
             .modify(|w| w.set_pcsel(usize::from(channel), Pcsel::PRESELECTED));
     }
 }
 
-/// Ends conversion, and leaves neither word nor flag behind for the next stream to find.
+/// Ends conversion and removes all words and flags before the next stream.
 fn stop() {
     let adc = pac::ADC1;
     if adc.cr().read().adstart() {
         adc.cr().modify(|w| w.set_adstp(Adstp::STOP));
         while adc.cr().read().adstart() {}
     }
-    // No request while the FIFO is emptied by hand.
+    // Disable DMA requests while the FIFO is emptied by hand.
     adc.cfgr().modify(|w| w.set_dmngt(Dmngt::DR));
     for _ in 0..FIFO_WORDS {
         adc.dr().read();

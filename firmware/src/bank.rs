@@ -1,4 +1,4 @@
-//! A Kalman bank of `core` that is given its input and fed from the stream.
+//! A Kalman bank of `core` with its known input, fed from the stream.
 
 use mimu_core::Sensor;
 use mimu_core::kalman::{self, Filter};
@@ -9,13 +9,13 @@ use nalgebra::Vector3;
 /// Samples between two reports of a state: five a second.
 const REPORT: u32 = 200;
 
-/// A bank that runs.
+/// A running bank.
 #[derive(Clone, Copy, Debug)]
 pub struct Bank {
     sensor: Sensor,
     noise: Vector3<f32>,
     filters: kalman::Bank<f32>,
-    /// Filters and updates to go back to.
+    /// Saved filters and number of updates.
     kept: (kalman::Bank<f32>, u32),
     input: Option<Vector3<f32>>,
     last: u32,
@@ -26,7 +26,7 @@ pub struct Bank {
 }
 
 impl Bank {
-    /// A bank as the host wants it; `None` if a number is not finite or a variance not positive.
+    /// A bank with the host's settings; `None` if a number is not finite or a variance not positive.
     pub fn new(sensor: Sensor, noise: [f32; 3], prior: Prior) -> Option<Self> {
         let positive = |v: &f32| *v > 0.0 && v.is_finite();
         let noise_is = noise.iter().all(positive);
@@ -59,7 +59,7 @@ impl Bank {
         })
     }
 
-    /// What the triad senses from the next sample on; `false` if it is not finite, and nothing changes.
+    /// Sets the triad's input from the next sample on. If it is not finite, returns `false` and changes nothing.
     pub fn set_input(&mut self, input: Option<[f32; 3]>) -> bool {
         let finite = input.iter().flatten().all(|v| v.is_finite());
         if finite {
@@ -68,23 +68,23 @@ impl Bank {
         finite
     }
 
-    /// Keeps what it knows.
+    /// Saves the state.
     pub fn keep(&mut self) {
         self.kept = (self.filters, self.updates);
     }
 
-    /// Knows again what was kept; takes no sample in until it is told the input.
+    /// Restores the saved state; uses no sample before the input is set.
     pub fn back(&mut self) {
         (self.filters, self.updates) = self.kept;
         self.input = None;
     }
 
-    /// Samples that were lost.
+    /// Counts lost samples.
     pub fn skip(&mut self, samples: u32) {
         self.skipped = self.skipped.wrapping_add(samples);
     }
 
-    /// Offers a sample, V; whether a report is due.
+    /// Processes a sample, V; returns whether a report is due.
     pub fn offer(&mut self, number: u32, raw: &Vector3<f32>) -> bool {
         self.last = number;
         match &self.input {
@@ -102,7 +102,7 @@ impl Bank {
         due
     }
 
-    /// As it is now.
+    /// Its present state.
     pub fn state(&self) -> KalmanState {
         KalmanState {
             sensor: self.sensor,

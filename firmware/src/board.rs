@@ -1,9 +1,9 @@
-//! The board: everything that another one would have different, and nothing else.
+//! The board: everything that differs on another board, and only that.
 //!
 //! # Another board
 //!
-//! A board with an STM32H743 is one file more, `board/<name>.rs`, written after [`nucleo_h743zi2`](self), and the two lines at the end
-//! of this file that name it. It says
+//! A board with an STM32H743 needs one more file, `board/<name>.rs`, modelled on [`nucleo_h743zi2`](self), and the two lines at the end of
+//! this file that name it. The file defines
 //!
 //! | item                                        | what it is                                             |
 //! |---------------------------------------------|--------------------------------------------------------|
@@ -14,9 +14,9 @@
 //! | `Irqs`                                      | interrupts of the peripherals that it hands out        |
 //! | `Board`, `Board::start`                     | starts the clocks, and hands out pins and parts by name |
 //!
-//! Every other file is written against these names. `memory.x` says where the flash and RAM of the part are, and agrees with
-//! `CALIBRATION_SECTORS`, which the firmware checks at its start. A board with another microcontroller also needs drivers in place of
-//! `adc` and `flash`, which are written on the registers of this one.
+//! All other files use these names. `memory.x` gives the addresses of flash and RAM, and has to agree with `CALIBRATION_SECTORS`; the
+//! firmware checks this at its start. A board with another microcontroller also needs drivers instead of `adc` and `flash`, which use the
+//! registers of this one.
 
 mod nucleo_h743zi2;
 pub use nucleo_h743zi2::*;

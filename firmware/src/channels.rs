@@ -1,4 +1,4 @@
-//! The channels of a sample, by name, and the one order in which they are converted.
+//! The channels of a sample, by name, and the order of their conversion.
 
 /// Number of channels.
 pub const CHANNELS: usize = 10;
@@ -17,7 +17,7 @@ pub struct Channels<T> {
 }
 
 impl<T> Channels<T> {
-    /// What `f` makes of every channel.
+    /// Applies `f` to every channel.
     pub fn map<U>(self, mut f: impl FnMut(T) -> U) -> Channels<U> {
         Channels {
             gyro: self.gyro.map(&mut f),
@@ -28,8 +28,8 @@ impl<T> Channels<T> {
     }
 }
 
-// The order of conversion, both ways. The three axes of a triad stand together: neighbours are 50 µs apart, which at the gyro's 40 Hz
-// is 0.7 degrees of phase.
+// The order of conversion, in both directions. The three axes of a triad are adjacent: neighbours are 50 µs apart, which at the gyro's 40
+// Hz is 0.7 degrees of phase.
 impl<T: Copy> Channels<T> {
     /// The channels of a scan.
     pub const fn from_scan_order(scan: [T; CHANNELS]) -> Self {

@@ -1,4 +1,4 @@
-//! What the host asks, and what it is answered.
+//! Requests of the host, and the answers.
 
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -26,23 +26,23 @@ use crate::slots::Slots;
 use crate::supply::Supply;
 use crate::upload::Upload;
 
-/// Everything that a call can concern.
+/// Everything that a request may need.
 pub struct Commands<'a> {
     /// The path of the samples.
     pub pipeline: &'a Shared,
-    /// What sampling counts.
+    /// Counters of sampling.
     pub tally: &'a Tally,
-    /// Where calibrations are kept.
+    /// Stored calibrations.
     pub slots: Slots<Flash>,
-    /// What the next one is tied to.
+    /// Front end to be stored with the next calibration.
     pub front_end: FrontEnd,
-    /// One on its way.
+    /// Upload in progress.
     pub upload: Upload<'a>,
-    /// Of the calibration in use.
+    /// Summary of the calibration in use.
     pub stored: Option<StoredInfo>,
     /// Inputs of the sensors.
     pub self_test: SelfTestPins,
-    /// What the self-test measures the supply with.
+    /// Supply measurement for the self-test.
     pub supply: Supply,
     /// Why the device started.
     pub before: &'a Before,
@@ -52,7 +52,7 @@ pub struct Commands<'a> {
     pub replies: FrameSender,
 }
 
-/// What the greeting says of a calibration.
+/// Summary of a calibration for the greeting.
 pub fn info(length: u32, hash: u64, stored: &Stored) -> StoredInfo {
     StoredInfo {
         length,
@@ -64,7 +64,7 @@ pub fn info(length: u32, hash: u64, stored: &Stored) -> StoredInfo {
     }
 }
 
-/// Calls that were refused, and times that bytes were lost on the way to the decoder.
+/// Number of refused calls, and number of times that bytes were lost before the decoder.
 #[derive(Default)]
 struct Heard {
     refused: u32,
@@ -73,7 +73,7 @@ struct Heard {
 }
 
 impl Commands<'_> {
-    /// Greets, and then answers for ever.
+    /// Sends the greeting, then answers requests forever.
     pub async fn serve(mut self, mut input: Input) -> ! {
         self.greet(0).await;
         let mut decoder = Decoder::new();
@@ -140,7 +140,7 @@ impl Commands<'_> {
         }
     }
 
-    /// What takes no time.
+    /// Requests that need no waiting.
     fn at_once(&mut self, request: Request<'_>) -> Result<Reply<'static>, Refusal> {
         let pipeline = self.pipeline;
         match request {
@@ -176,7 +176,7 @@ impl Commands<'_> {
                 let bank = bank.ok_or(Refusal::NoBank)?;
                 return Ok(Reply::Kalman(bank.state()));
             }
-            // The others are the caller's.
+            // The caller handles the others.
             _ => return Err(Refusal::Unknown),
         }
         Ok(Reply::Done)
@@ -218,7 +218,7 @@ impl Commands<'_> {
         Ok(())
     }
 
-    /// Not in `commit`, whose future would keep room for what is decoded.
+    /// A separate function, because the future of `commit` would otherwise keep room for the decoded calibration.
     #[inline(never)]
     fn use_stored(&mut self) -> Result<(), Refusal> {
         let bytes = self.upload.bytes();

@@ -1,13 +1,12 @@
-//! Sums of converter codes, and what they stand for.
+//! Sums of converter codes, and their conversion to volts and °C.
 //!
-//! A sample is the sum of [`SCANS`] conversions of every channel: integers until the moment they become volts, so that no order of
-//! adding changes them and nothing is lost by averaging.
+//! A sample is the sum of [`SCANS`] conversions of every channel. It stays an integer until it is converted to volts, so the order of
+//! additions does not matter and averaging loses nothing.
+//! # What is removed
 //!
-//! # What is taken out
-//!
-//! The gyros' outputs are absolute and the converter measures in units of its own reference, the 3.3 V supply of the board, whose
-//! drift of 1 % would look like 5 deg/s. The 2.5 V reference of gyro x is converted along with the rest through an equal divider:
-//! a ratio to it is free of the supply and of the dividers. The accelerometer follows that supply itself, as its codes do.
+//! The gyros' outputs are absolute, but the converter measures in units of its reference, the board's 3.3 V supply: a drift of 1 % would
+//! look like 5 deg/s. The 2.5 V reference of gyro x is therefore converted too, through an equal divider. A ratio to it does not depend on
+//! the supply or on the dividers. The accelerometer's output is proportional to that supply, so its codes do not depend on it.
 
 use mimu_core::wire::flags;
 
@@ -18,25 +17,25 @@ use crate::design_parameters::{
 };
 use crate::temperature::Thermometer;
 
-/// The code at the converter's reference voltage. A full scale of 2^16 - 1 and not 2^16 (RM0433 25.4.35).
+/// The code at the converter's reference voltage: full scale is 2^16 - 1 (RM0433 25.4.35).
 pub const FULL_SCALE: u32 = u16::MAX as u32;
 
 /// A sum at the end of the range.
 pub const SUM_FULL_SCALE: u32 = SCANS as u32 * FULL_SCALE;
 
-/// Volts at the accelerometer for a step of its sum, 25.2 µV. By the nominal reference: it is ratiometric.
+/// Volts at the accelerometer per unit of its sum, 25.2 µV. With the nominal reference, because it is ratiometric.
 pub const ACCEL_VOLTS: f32 = REFERENCE_V / SUM_FULL_SCALE as f32;
 
-/// The sum that the reference of the gyros has at nominal voltages: 2.5 V behind the divider.
+/// The sum of the gyros' reference at nominal voltages: 2.5 V after the divider.
 pub const NOMINAL_REFERENCE: f32 =
     GYRO_REFERENCE_V * DIVIDER_RATIO / REFERENCE_V * SUM_FULL_SCALE as f32;
 
-/// A mean over the first [`SLOW_S`], and from then on a first-order lag of that length: with the lag alone the first reading would
-/// weigh on the first seconds with all of its noise.
+/// A mean over the first [`SLOW_S`], then a first-order lag with that time constant: with the lag alone the noise of the first reading
+/// would dominate the first seconds.
 #[derive(Clone, Copy, Debug)]
 struct Lag {
     value: f32,
-    /// Samples so far, as far as the mean goes.
+    /// Number of samples in the mean so far.
     samples: f32,
 }
 
@@ -53,20 +52,19 @@ impl Lag {
     }
 }
 
-/// What moves slowly and is filtered: the gyros' reference and their temperatures.
+/// Slow quantities, filtered: the gyros' reference and temperatures.
 ///
-/// Whether a pin can be believed is asked of each batch by itself: the filter would hide one that has just come off, and let it bend
-/// what it filters for as long.
+/// Each batch is checked before filtering: the filter would hide a pin that has just come off, and would be distorted by it for seconds.
 #[derive(Clone, Copy, Debug)]
 pub struct Slow {
-    /// Sum of the reference minus [`NOMINAL_REFERENCE`]: as a difference, so that a step of the filter is not lost in the last digit of
-    /// a large number.
+    /// Sum of the reference minus [`NOMINAL_REFERENCE`]. As a difference, so that a step of the filter is not lost to rounding of a large
+    /// number.
     reference: Lag,
     /// The last one, unfiltered.
     reference_sum: f32,
     /// By the TEMP pins of gyro x, y, z, °C.
     pins_c: [Lag; 3],
-    /// Which of them count, and their common temperature.
+    /// Which pins are used, and their common temperature.
     thermometer: Thermometer,
     /// The same filtered, °C.
     temp_c: Lag,
@@ -82,7 +80,7 @@ impl Slow {
         temp_c: Lag::NEW,
     };
 
-    /// Before the first sample of TEMP pins that stood there beside each other, °C, when the calibration was stored.
+    /// Before the first sample, with the offsets that the TEMP pins had when the calibration was stored, °C.
     pub const fn of_pins(pins_c: [f32; 3]) -> Self {
         Self {
             thermometer: Thermometer::of_pins(pins_c),
@@ -90,12 +88,12 @@ impl Slow {
         }
     }
 
-    /// Where the TEMP pins stand beside each other, °C, to be kept with a calibration; `before`: as it was kept until now.
+    /// Offsets between the TEMP pins, °C, to be stored with a calibration; `before`: those stored so far.
     pub fn pins_to_keep(&self, before: Option<[f32; 3]>) -> Option<[f32; 3]> {
         self.thermometer.to_keep(before)
     }
 
-    /// Takes in `count` samples: totals of the sums of the reference and of the three temperatures.
+    /// Processes `count` samples: totals of the sums of the reference and of the three temperatures.
     pub fn update(&mut self, reference: u32, temperatures: [u32; 3], count: u32) {
         if count == 0 {
             return;
@@ -106,7 +104,8 @@ impl Slow {
             let off = self.reference_sum - NOMINAL_REFERENCE;
             self.reference.take(off, count);
         }
-        // By the reference of the same samples: a supply that steps would otherwise be a temperature that does, until the filter has followed.
+        // With the reference of the same samples: otherwise a step of the supply would look like a step of temperature until the filter has
+        // settled.
         let volts = GYRO_REFERENCE_V
             / match self.has_reference() {
                 true => self.reference_sum,
@@ -122,17 +121,17 @@ impl Slow {
         }
     }
 
-    /// Whether the reference is where it can be; otherwise its pin is open, and the nominal one counts.
+    /// Whether the reference is in its range; otherwise its pin is open, and the nominal value is used.
     pub fn has_reference(&self) -> bool {
         (self.reference_sum - NOMINAL_REFERENCE).abs() <= REFERENCE_TOLERANCE * NOMINAL_REFERENCE
     }
 
-    /// Whether any sample was taken in.
+    /// Whether any sample was processed.
     pub fn begun(&self) -> bool {
         self.pins_c[0].samples > 0.0
     }
 
-    /// Volts at a gyro for a step of its sum, about 42 µV.
+    /// Volts at a gyro per unit of its sum, about 42 µV.
     pub fn gyro_volts(&self) -> f32 {
         let reference = match self.has_reference() {
             true => NOMINAL_REFERENCE + self.reference.value,
@@ -141,12 +140,12 @@ impl Slow {
         GYRO_REFERENCE_V / reference
     }
 
-    /// The gyros' reference as it was read last, as a share of the converter's.
+    /// Last reading of the gyros' reference, as a fraction of the converter's.
     pub fn reference_share(&self) -> f32 {
         self.reference_sum / SUM_FULL_SCALE as f32 / DIVIDER_RATIO
     }
 
-    /// Temperature of the gyros by the pins that count, °C; while none does the last one, and before there was one 25 °C.
+    /// Temperature of the gyros from the pins that are used, °C. Without any, the last one; before the first one, 25 °C.
     pub fn temp_c(&self) -> f32 {
         match self.has_known_temperature() {
             true => self.temp_c.value,
@@ -154,22 +153,22 @@ impl Slow {
         }
     }
 
-    /// Whether there was a good temperature yet.
+    /// Whether there has been a good temperature.
     pub fn has_known_temperature(&self) -> bool {
         self.temp_c.samples > 0.0
     }
 
-    /// Temperatures by the TEMP pins of gyro x, y, z, °C, also of those that do not count.
+    /// Temperatures of the TEMP pins of gyro x, y, z, °C, including pins that are not used.
     pub fn gyro_temps_c(&self) -> [f32; 3] {
         self.pins_c.map(|pin| pin.value)
     }
 
-    /// Which of them count.
+    /// Which of them are used.
     pub fn temperatures_that_count(&self) -> [bool; 3] {
         self.thermometer.that_count()
     }
 
-    /// What of it cannot be believed, as [`flags`].
+    /// Faults, as [`flags`].
     pub fn flags(&self) -> u16 {
         let count = self.temperatures_that_count();
         let left_out = flags::TEMPERATURE_LEFT_OUT.iter().zip(count);
@@ -185,7 +184,7 @@ impl Slow {
     }
 }
 
-/// Temperature of a gyro, °C, by the voltage of its TEMP pin, which is made from the gyro's reference and so is a ratio as well.
+/// Temperature of a gyro, °C, from the voltage of its TEMP pin. The pin is proportional to the gyro's reference, so this is a ratio too.
 fn celsius(temp_v: f32) -> f32 {
     GYRO_TEMPERATURE_NULL_C + (temp_v - GYRO_TEMPERATURE_NULL_V) / GYRO_TEMPERATURE_V_PER_C
 }

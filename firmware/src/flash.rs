@@ -1,15 +1,15 @@
-//! The two calibration sectors of bank 2 as a flash memory that can be waited for.
+//! Asynchronous driver of the two calibration sectors of flash bank 2.
 //!
 //! embassy-stm32 0.6 erases this family's flash by waiting in a loop, a second in which no other task runs; its asynchronous half
-//! clears error flags by writing to the status register, which does not clear them. So this is on the registers, and it polls with
-//! pauses: nothing is in a hurry, and an interrupt would only add a vector.
+//! clears error flags by writing to the status register, which does not clear them. So this driver uses the registers, and polls with
+//! pauses: speed does not matter, and an interrupt would only add a vector.
 //!
-//! # Reading a word that is not whole
+//! # Reading a torn word
 //!
-//! A word whose programming was cut off has an error code that does not match. Reading it raises a bus error (RM0433 4.7.7), which is a
-//! hard fault, at every start again. Such a read is therefore done where the processor ignores bus errors of data accesses: at the
-//! priority of a hard fault (FAULTMASK) with CCR.BFHFNMIGN set (ARMv7-M B3.2.8), for the eight loads of one word; then the memory's
-//! own flags tell whether to believe them.
+//! A word whose programming was interrupted has a wrong error code. Reading it raises a bus error (RM0433 4.7.7), which becomes a hard
+//! fault, at every start. A word is therefore read in a mode in which the processor ignores bus errors of data accesses: at the priority of
+//! a hard fault (FAULTMASK) with CCR.BFHFNMIGN set (ARMv7-M B3.2.8), for the eight loads of one word. The memory's flags then show whether
+//! the data are valid.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -23,21 +23,21 @@ use embedded_storage_async::nor_flash::{
 use crate::board::CALIBRATION_SECTORS;
 use crate::design_parameters::FLASH_WORD as WORD;
 
-/// Size of a sector, bytes: what is erased.
+/// Size of a sector, the unit of erasing, bytes.
 const SECTOR: usize = 128 * 1024;
 /// Bank 2 (RM0433 4.3.4).
 const BANK_START: usize = 0x0810_0000;
-/// Where the first sector is.
+/// Address of the first sector.
 const START: usize = BANK_START + CALIBRATION_SECTORS[0] as usize * SECTOR;
-/// Bytes in all of them.
+/// Total size of the sectors, bytes.
 const LENGTH: usize = CALIBRATION_SECTORS.len() * SECTOR;
 
 /// Keys that unlock the control register (RM0433 4.5.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 
-/// Words whose single wrong bit was corrected when they were read.
+/// Words with one wrong bit, which was corrected on reading.
 pub static CORRECTED: AtomicU32 = AtomicU32::new(0);
-/// Words with more than one.
+/// Words with more than one wrong bit.
 pub static UNCORRECTABLE: AtomicU32 = AtomicU32::new(0);
 
 // SAFETY: symbols of `memory.x`, of which only the addresses are used.
@@ -50,13 +50,13 @@ unsafe extern "C" {
 /// What went wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub enum Error {
-    /// Not within the sectors, or not by whole words.
+    /// Outside the sectors, or not a multiple of a word.
     Range,
-    /// The memory refused; its status register.
+    /// The memory reported an error; its status register.
     Refused(u32),
     /// A word has more than one wrong bit.
     Uncorrectable,
-    /// An operation does not end, or one from before has not.
+    /// An operation does not end, or an earlier one has not ended.
     Stalled,
 }
 
@@ -73,11 +73,11 @@ impl NorFlashError for Error {
 pub struct Flash(());
 
 impl Flash {
-    /// To be called once: nobody else may use the controller of bank 2.
+    /// Call it once: this driver needs exclusive use of the controller of bank 2.
     ///
     /// # Panics
     ///
-    /// If `memory.x` has the sectors elsewhere.
+    /// If `memory.x` has other addresses for the sectors.
     pub fn new() -> Self {
         let start = (&raw const __calibration_start).addr();
         let end = (&raw const __calibration_end).addr();
@@ -104,7 +104,7 @@ impl ReadNorFlash for Flash {
         if at.checked_add(bytes.len()).is_none_or(|end| end > LENGTH) {
             return Err(Error::Range);
         }
-        // A load from a bank that is busy would hold the processor until it is not (RM0433 4.3.8).
+        // A load from a busy bank would stall the processor (RM0433 4.3.8).
         idle()?;
         let mut rest = bytes;
         while !rest.is_empty() {
@@ -143,7 +143,7 @@ impl NorFlash for Flash {
                 w.set_snb(*sector);
             });
             bank.cr().modify(|w| w.set_start(true));
-            // About a second; looked at a hundred times.
+            // About a second; polled a hundred times.
             let done = finished(10_000, ERASE_US).await;
             bank.cr().modify(|w| w.set_ser(false));
             done?;
@@ -169,8 +169,8 @@ impl NorFlash for Flash {
             let start = START + offset + k * WORD;
             for (k, part) in word.as_chunks::<4>().0.iter().enumerate() {
                 let value = u32::from_le_bytes(*part);
-                // SAFETY: a word of the calibration sectors, by the test above; nothing has a reference to them. With PG set a
-                // store goes to the controller's buffer, and programming begins with the eighth.
+                // SAFETY: the test above ensures that this is a word of the calibration sectors, to which no reference exists. With PG set,
+                // stores go to the controller's buffer, and programming begins with the eighth.
                 #[allow(unsafe_code)]
                 unsafe {
                     core::ptr::with_exposed_provenance_mut::<u32>(start + 4 * k)
@@ -187,7 +187,7 @@ impl NorFlash for Flash {
     }
 }
 
-/// The control register of bank 2 is unlocked as long as this lives.
+/// Keeps the control register of bank 2 unlocked until it is dropped.
 struct Unlocked;
 
 impl Unlocked {
@@ -209,7 +209,7 @@ impl Drop for Unlocked {
     }
 }
 
-/// Flags of errors stand until they are cleared, and some forbid the next operation.
+/// Error flags stay set until they are cleared, and some block the next operation.
 fn clear_flags() {
     pac::FLASH.bank(1).ccr().write(|w| {
         w.set_clr_eop(true);
@@ -223,13 +223,13 @@ fn clear_flags() {
     });
 }
 
-/// Most that erasing a sector takes, µs: 4 s whatever the parallelism (DS12110, table 140), and a quarter more. The host waits for 15 s.
+/// Longest time to erase a sector, µs: 4 s for any parallelism (DS12110, table 140), plus a quarter. The host waits 15 s.
 const ERASE_US: u64 = 5_000_000;
 
-/// Most that programming a word takes, µs: 0.6 ms in that table; nothing else waits for it.
+/// Longest time to program a word, µs: 0.6 ms in that table; a large reserve is harmless, because nothing else waits.
 const WRITE_US: u64 = 10_000;
 
-/// Refuses to begin while an operation runs that did not end in its time: its outcome is not known, and another behind it would wait as well.
+/// Refuses to start while an earlier operation has not ended in its time: its outcome is unknown, and a new operation would wait too.
 fn idle() -> Result<(), Error> {
     match pac::FLASH.bank(1).sr().read().qw() {
         true => Err(Error::Stalled),
@@ -237,8 +237,8 @@ fn idle() -> Result<(), Error> {
     }
 }
 
-/// Waits until the queue is empty, looking every `pause_us`, for `most_us` at most: samples go on meanwhile and feed the watchdog, so that
-/// nothing else would end it.
+/// Waits until the queue is empty, polling every `pause_us`, for at most `most_us`. The limit is needed because sampling continues and
+/// feeds the watchdog, so nothing else would end the wait.
 async fn finished(pause_us: u64, most_us: u64) -> Result<(), Error> {
     let bank = pac::FLASH.bank(1);
     let until = Instant::now() + Duration::from_micros(most_us);
@@ -257,18 +257,18 @@ async fn finished(pause_us: u64, most_us: u64) -> Result<(), Error> {
     }
 }
 
-/// Bit of CCR by which the highest priorities ignore bus errors of data.
+/// Bit of CCR that makes the highest priorities ignore data bus errors.
 const BFHFNMIGN: u32 = 1 << 8;
-/// Bits of CFSR by which a data bus error is reported, precise or not, and its address is valid.
+/// Bits of CFSR for a data bus error (precise or imprecise) and a valid address.
 const DATA_BUS_ERRORS: u32 = 1 << 9 | 1 << 10 | 1 << 15;
 
-/// Reads a word of the calibration sectors, by its number.
+/// Reads the word with this number in the calibration sectors.
 fn read_word(number: usize) -> Result<[u8; WORD], Error> {
     let from = core::ptr::with_exposed_provenance::<u32>(START + number * WORD);
     let mut bytes = [0; WORD];
     clear_flags();
-    // SAFETY: the address is within the sectors, since the callers check their ranges. With FAULTMASK set nothing interrupts, so that
-    // the two registers are this function's; both are as before when it returns. CFSR's bits are cleared by writing ones.
+    // SAFETY: the callers check that the address is within the sectors. With FAULTMASK set nothing interrupts, so this function has
+    // exclusive use of the two registers; both are restored when it returns. CFSR's bits are cleared by writing ones.
     #[allow(unsafe_code)]
     let bus_error = unsafe {
         let scb = &*SCB::PTR;

@@ -1,15 +1,15 @@
-//! What a calibration is tied to besides the sensors: how the front end read them when it was stored.
+//! State of the front end that a calibration depends on, stored with it.
 //!
-//! - **The converter's calibration.** At each power-on the converter measures its own offset, 11 bits, and linearity. Two
-//!   such measurements differ by their noise, and by the temperature and the supply of the moment. The reference manual does not say what a step of the
-//!   offset is worth; one code is 50 µV at a pin, 0.017 deg/s of a gyro and 0.06 mg. That would be another bias at each power-on. To repeat the calibration at some temperature would also
-//!   make a step in the stream, and stop it for 21 ms. With its factors kept the converter is one function of code and temperature, whatever
-//!   it drifts by, and the curves of the calibration have that drift in them. RM0433 (25.4.8) has factors written back for this purpose.
-//! - **Where the TEMP pins stand beside each other.** Temperatures are the mean of three pins; without their offsets, a pin that is open at
-//!   power-on would move the mean by a third of what the references differ by, some degrees.
+//! - **The converter's calibration.** At each power-on the converter measures its own offset, 11 bits, and linearity. Two such measurements
+//!   differ by noise, temperature and supply. The reference manual does not give the weight of a step of the offset; one code is 50 µV at a
+//!   pin, 0.017 deg/s or 0.06 mg, so each power-on would have another bias. Repeating the calibration at some temperature would make a step
+//!   in the stream and stop it for 21 ms. With stored factors the converter is a fixed function of code and temperature, and the curves of
+//!   the calibration include its drift. RM0433 (25.4.8) provides for writing factors back.
+//! - **The offsets between the TEMP pins.** The temperature is the mean of three pins. Without their offsets, a pin that is open at
+//!   power-on would change the mean by a third of the difference between the references, some degrees.
 //!
-//! Both are kept in the slot of the calibration, and used from the next start on. They are those of the time when it was stored: the recording that it
-//! was made from should be of the same power-on, or of a later one of a device that kept an earlier calibration.
+//! Both are stored in the slot of the calibration and used from the next start on. They are those at the time of storing. The recording
+//! behind the calibration should therefore be of the same power-on, or of a device that already used stored values.
 
 use mimu_core::stored::hash;
 
@@ -18,31 +18,31 @@ use crate::design_parameters::FLASH_WORD as WORD;
 /// Words of the converter's linearity factor (RM0433 25.4.8).
 pub const LINEARITY_WORDS: usize = 6;
 
-/// Words of flash that it takes.
+/// Number of flash words that it needs.
 pub const FRONT_END_WORDS: usize = 2;
 
 /// Calibration factors of the converter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Factors {
-    /// Of the offset, single-ended: 11 bits.
+    /// Offset, single-ended: 11 bits.
     pub offset: u16,
-    /// Of the linearity: 30 bits each.
+    /// Linearity: 30 bits each.
     pub linearity: [u32; LINEARITY_WORDS],
 }
 
 impl Factors {
-    /// Whether the registers can hold it.
+    /// Whether the values fit the registers.
     fn is_possible(&self) -> bool {
         self.offset < 1 << 11 && self.linearity.iter().all(|word| *word < 1 << 30)
     }
 }
 
-/// How the front end reads the sensors.
+/// State of the front end.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct FrontEnd {
-    /// The converter's, if they are known.
+    /// The converter's factors, if known.
     pub converter: Option<Factors>,
-    /// Where the TEMP pins of gyro x, y, z stand beside each other, °C, if that is known.
+    /// Offsets between the TEMP pins of gyro x, y, z, °C, if known.
     pub pins_c: Option<[f32; 3]>,
 }
 
@@ -50,7 +50,7 @@ const CONVERTER: u32 = 1;
 const PINS: u32 = 1 << 1;
 
 impl FrontEnd {
-    /// As it is kept.
+    /// As flash words.
     pub fn to_words(&self) -> [[u8; WORD]; FRONT_END_WORDS] {
         let factors = self.converter.unwrap_or(Factors {
             offset: 0,
@@ -79,7 +79,7 @@ impl FrontEnd {
         words
     }
 
-    /// What is kept; `None` if the words are not whole, or no converter and no pins are like that.
+    /// From flash words; `None` if the words are torn or their values are impossible.
     pub fn from_words(words: &[[u8; WORD]; FRONT_END_WORDS]) -> Option<Self> {
         let [first, second] = words;
         if second.last_chunk::<8>() != Some(&check(first, second)) {
@@ -102,7 +102,7 @@ impl FrontEnd {
     }
 }
 
-/// Over all but the end of the second word.
+/// CRC over everything except the end of the second word.
 fn check(first: &[u8; WORD], second: &[u8; WORD]) -> [u8; 8] {
     let mut body = [0; 2 * WORD - 8];
     let (head, tail) = body.split_at_mut(WORD);
@@ -144,7 +144,7 @@ mod tests {
             words[bit / 8 / WORD][bit / 8 % WORD] ^= 1 << (bit % 8);
             assert_eq!(FrontEnd::from_words(&words), None, "bit {bit}");
         }
-        // Erased, and never written.
+        // Erased and never written.
         assert_eq!(FrontEnd::from_words(&[[0xff; WORD]; 2]), None);
         assert_eq!(FrontEnd::from_words(&[[0; WORD]; 2]), None);
     }

@@ -5,21 +5,21 @@
 //! | [`board`]             | pins, clocks, converter's timing, line, flash sectors: one file a board |
 //! | [`design_parameters`] | sensors, front end and timing, each constant with its reason     |
 //! | [`channels`]          | the channels of a sample, and their order in a scan              |
-//! | [`convert`]           | sums of converter codes, and what they stand for                 |
-//! | [`temperature`]       | which of the gyros' TEMP pins count                              |
-//! | [`front_end`]         | what a calibration is tied to: the converter's factors, the TEMP pins' offsets |
-//! | [`pipeline`]          | what happens to a sample: compensation, batches, Kalman banks    |
-//! | [`bank`]              | a Kalman bank that is given its input and fed from the stream     |
-//! | [`upload`]            | a calibration on its way to the device                           |
-//! | [`slots`]             | where calibrations are kept, safe against a failing supply       |
+//! | [`convert`]           | sums of converter codes, and their conversion                    |
+//! | [`temperature`]       | which of the gyros' TEMP pins are used                           |
+//! | [`front_end`]         | state stored with a calibration: the converter's factors, the TEMP pins' offsets |
+//! | [`pipeline`]          | from samples to the streams: compensation, batches, Kalman banks |
+//! | [`bank`]              | a Kalman bank with its known input, fed from the stream           |
+//! | [`upload`]            | an upload in progress                                            |
+//! | [`slots`]             | stored calibrations, safe against a failing supply               |
 //! | `adc`                 | the converter's driver, the only place with its registers        |
 //! | `flash`               | the same of the flash memory                                     |
-//! | `sampling`            | the task that takes samples, above all others                    |
+//! | `sampling`            | the task that takes samples, with the highest priority           |
 //! | `link`                | the line to the host: serial, or USB                             |
-//! | `commands`            | what the host asks, and what it is answered                      |
-//! | [`self_test`]         | what the sensors make of their test inputs, against their data sheets |
+//! | `commands`            | requests of the host, and the answers                            |
+//! | [`self_test`]         | responses of the sensors to their test inputs, compared with their data sheets |
 //! | `supply`              | the supply, by the part's internal reference                     |
-//! | `restart`             | why the device started, and the record that a panic leaves       |
+//! | `restart`             | reset cause, and the record that a panic leaves                  |
 //!
 //! Those with links compile for the PC as well and are tested there.
 #![no_std]

@@ -15,7 +15,7 @@ pub use serial::{Input, Output, split};
 #[cfg(feature = "usb")]
 pub use usb::{Input, Memory, Output, Usb, split};
 
-/// A frame on its way out.
+/// A frame to be sent.
 #[derive(Clone, Copy)]
 pub struct Outgoing {
     length: usize,
@@ -30,7 +30,7 @@ impl Outgoing {
     };
 
     fn fill(&mut self, message: &Message<'_>) {
-        // Too long is none; the types leave no such message.
+        // A frame that is too long is dropped; the types exclude such messages.
         self.length = encode(message, &mut self.bytes).unwrap_or_default();
     }
 
@@ -39,18 +39,18 @@ impl Outgoing {
     }
 }
 
-/// Where frames go in.
+/// Input of the queue of frames.
 pub type FrameSender = Sender<'static, NoopRawMutex, Outgoing>;
-/// Where they come out.
+/// Output of the queue of frames.
 pub type FrameReceiver = Receiver<'static, NoopRawMutex, Outgoing>;
 
-/// Sends a message when there is room.
+/// Sends a message, and waits for room.
 pub async fn send(frames: &mut FrameSender, message: &Message<'_>) {
     frames.send().await.fill(message);
     frames.send_done();
 }
 
-/// Sends a message if there is room; says whether.
+/// Sends a message if there is room; returns whether it did.
 pub fn try_send(frames: &mut FrameSender, message: &Message<'_>) -> bool {
     let Some(frame) = frames.try_send() else {
         return false;
@@ -60,7 +60,7 @@ pub fn try_send(frames: &mut FrameSender, message: &Message<'_>) -> bool {
     true
 }
 
-/// Transmits what comes, answers before events: the host waits for those.
+/// Transmits queued frames; answers go before events, because the host waits for them.
 pub async fn transmit(mut output: Output, mut replies: FrameReceiver, mut events: FrameReceiver) {
     loop {
         let from_replies = match select(replies.receive(), events.receive()).await {

@@ -1,12 +1,12 @@
-//! Firmware of the inertial unit: the tasks, and what each of them is given.
+//! Firmware of the inertial unit: the tasks and their resources.
 //!
 //! - Samples three gyros, three accelerometer axes, the gyros' temperatures and their reference at
-//!   exactly 1 kHz, by the crystal alone.
-//! - Samples in an executor of its own, above everything else in priority: no other task, however
-//!   long it computes, can make a sample late. It hands each sample to a queue and computes nothing.
+//!   exactly 1 kHz, timed by the crystal alone.
+//! - Samples in a separate executor with the highest priority: however long another task computes, no sample is late. The task puts each
+//!   sample into a queue and computes nothing.
 //! - Compensates, streams and answers in the other executor, see [`mimu_firmware`].
-//! - Counts what it loses, by cause, and starts again aligned.
-//! - Starts again after a panic, a fault, or when it stands still, and says so in its greeting.
+//! - Counts losses by cause, and restarts aligned.
+//! - Restarts after a panic, a fault, or if it hangs, and reports this in its greeting.
 #![no_std]
 #![no_main]
 
@@ -46,7 +46,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 async fn main(spawner: Spawner) {
     static BEFORE: StaticCell<Before> = StaticCell::new();
     static STORED: ConstStaticCell<Vec<u8, MAX_LENGTH>> = ConstStaticCell::new(Vec::new());
-    /// Where the controller writes samples.
+    /// Ring into which the controller writes samples.
     static SCANS: ConstStaticCell<[u16; RING]> = ConstStaticCell::new([0; RING]);
 
     let before = &*BEFORE.init(restart::take());
@@ -98,7 +98,7 @@ async fn main(spawner: Spawner) {
     watch(board.watchdog, pipeline, before).await
 }
 
-/// Takes samples from the queue through the pipeline.
+/// Processes the samples of the queue.
 #[embassy_executor::task]
 async fn process(pipeline: &'static Shared, mut events: FrameSender) {
     loop {
@@ -112,7 +112,7 @@ async fn process(pipeline: &'static Shared, mut events: FrameSender) {
     }
 }
 
-/// Sends what waits.
+/// Sends queued frames.
 #[embassy_executor::task]
 async fn output(output: Output, replies: FrameReceiver, events: FrameReceiver) {
     transmit(output, replies, events).await;
@@ -131,7 +131,7 @@ async fn usb(mut usb: link::Usb) {
     usb.run().await
 }
 
-/// Time since power-on now, ms, if it is known.
+/// Present time since power-on, ms, if known.
 fn powered_for_ms(before: &Before) -> Option<u32> {
     let uptime_ms = u32::try_from(Instant::now().as_millis()).unwrap_or(u32::MAX);
     let so_far = before.powered_for_ms()?;
@@ -148,8 +148,8 @@ async fn watch(
     let (mut last, mut rounds) = (0, 0);
     loop {
         due.next().await;
-        // Nothing but samples: a converter that gives none is started anew again and again, which is no progress. A queue that is full
-        // is one that nobody empties.
+        // Only samples count: a converter without samples is restarted again and again, which is not progress. A full queue means that
+        // nobody empties it.
         let samples = TALLY.samples.load(Ordering::Relaxed);
         if samples != last && !QUEUE.is_full() {
             watchdog.pet();
@@ -173,7 +173,7 @@ async fn watch(
     }
 }
 
-/// The path of the samples, with the calibration in use. Not in `main`, whose future would keep room for both.
+/// The pipeline with the calibration in use. Not in `main`, because its future would keep room for both.
 #[inline(never)]
 fn pipeline(
     in_use: Option<(u32, u64)>,
@@ -201,7 +201,7 @@ fn pipeline(
 
 type Frames = Channel<'static, NoopRawMutex, Outgoing>;
 
-/// Frames that nobody asked for one by one.
+/// Queue of events.
 fn queue_of_events() -> (FrameSender, FrameReceiver) {
     static MEMORY: ConstStaticCell<[Outgoing; design::FRAMES]> =
         ConstStaticCell::new([Outgoing::EMPTY; design::FRAMES]);
@@ -209,14 +209,14 @@ fn queue_of_events() -> (FrameSender, FrameReceiver) {
     FRAMES.init(Frames::new(MEMORY.take())).split()
 }
 
-/// Answers: one that is sent, and one that is written.
+/// Queue of answers: one being sent, one being written.
 fn queue_of_replies() -> (FrameSender, FrameReceiver) {
     static MEMORY: ConstStaticCell<[Outgoing; 2]> = ConstStaticCell::new([Outgoing::EMPTY; 2]);
     static FRAMES: StaticCell<Frames> = StaticCell::new();
     FRAMES.init(Frames::new(MEMORY.take())).split()
 }
 
-/// A panic leaves its place and starts the device anew: a unit in the field that stands still helps nobody.
+/// A panic records its place and restarts the device: a unit in the field that stands still is of no use.
 #[panic_handler]
 fn panic(panic: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
@@ -227,7 +227,7 @@ fn panic(panic: &PanicInfo<'_>) -> ! {
     })
 }
 
-// SAFETY: it never returns, and all that it uses is the record of `restart`.
+// SAFETY: it never returns, and uses only the record of `restart`.
 #[allow(unsafe_code)]
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {

@@ -1,7 +1,8 @@
-//! What happens to a sample: from sums of codes to batches of the streams and to the Kalman banks.
+//! Processing of samples: from sums of codes to the batches of the streams and to the Kalman banks.
 //!
 //! Once for every sample: volts, compensation, effects, banks. Once for every batch: reference and temperature, the model at that
-//! temperature, and what else moves slowly. All samples of a batch are therefore compensated by the same numbers, which the batch states.
+//! temperature, and other slow quantities. All samples of a batch are therefore compensated with the same numbers, which the batch
+//! contains.
 
 mod calibrated;
 
@@ -29,7 +30,7 @@ use crate::design_parameters::{
     ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, GYRO_STOP_MARGIN_V, GYRO_STOPS_V,
 };
 
-/// The path of the samples, between tasks of one executor: none of them holds it while it waits.
+/// The pipeline, shared between tasks of one executor; none of them borrows it while waiting.
 pub type Shared = Mutex<NoopRawMutex, RefCell<Pipeline>>;
 
 /// Which streams are sent.
@@ -41,16 +42,16 @@ pub struct Streams {
     pub compensated: bool,
 }
 
-/// What has been lost on the way.
+/// Counters of losses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Losses {
-    /// Samples that are missing in the numbers.
+    /// Missing samples.
     pub samples: u32,
-    /// Batches that the line had no room for.
+    /// Batches without room in the queue of the line.
     pub batches: u32,
 }
 
-/// Mean of some samples for the self-test.
+/// Running mean of samples for the self-test.
 #[derive(Clone, Copy, Debug)]
 struct Measurement {
     wanted: u32,
@@ -59,13 +60,13 @@ struct Measurement {
     total: Sample<f32>,
 }
 
-/// The batch that is being filled.
+/// The batch being filled.
 struct Batch {
     streams: Streams,
     head: BatchHead,
-    /// Whether it ends before the next sample: a new calibration begins a new batch.
+    /// Whether it ends before the next sample, because a new calibration starts a new batch.
     closed: bool,
-    /// Temperatures of the dies that it is compensated at, see [`Calibrated::dies_c`].
+    /// Temperatures of the dies at which it is compensated, see [`Calibrated::dies_c`].
     dies_c: (f32, Option<f32>),
     gyro_volts: f32,
     gyro_temps_c: [f32; 3],
@@ -85,9 +86,9 @@ pub struct Pipeline {
     expected: Option<u32>,
     /// Streams from the next batch on.
     streams: Streams,
-    /// Flags that others set, see [`flags`].
+    /// Flags set by other parts, see [`flags`].
     held_flags: u16,
-    /// Time since power-on at sample 0, ms, if it is known.
+    /// Time since power-on at sample 0, ms, if known.
     powered_for_ms: Option<u32>,
     losses: Losses,
     measurement: Option<Measurement>,
@@ -102,7 +103,7 @@ impl Default for Pipeline {
 }
 
 impl Pipeline {
-    /// Without a calibration, and sending nothing.
+    /// Without a calibration and without streams.
     pub const fn new() -> Self {
         Self {
             calibrated: None,
@@ -147,15 +148,15 @@ impl Pipeline {
         }
     }
 
-    /// How long the device had its power at sample 0, ms: 0 unless it is told, `None` if nobody knows. To be called before
-    /// [`Self::calibrate`].
+    /// Sets the time since power-on at sample 0, ms (default 0; `None`: unknown). Call it before [`Self::calibrate`].
     pub fn powered_for(&mut self, ms: Option<u32>) {
         self.powered_for_ms = ms;
         self.flag(flags::POWER_ON_UNKNOWN, ms.is_none());
     }
 
-    /// Compensates by this from the next batch on, which begins with the next sample: none is compensated before the calibration has followed
-    /// the present temperature. The state of the one before goes on, see [`Compensator::take_over`](mimu_core::compensator::Compensator::take_over).
+    /// Uses this calibration from the next batch on, which begins with the next sample: no sample is compensated before the calibration has
+    /// followed the present temperature. The state of the previous calibration continues, see
+    /// [`Compensator::take_over`](mimu_core::compensator::Compensator::take_over).
     pub fn calibrate(&mut self, stored: Stored) {
         match &mut self.calibrated {
             Some(calibrated) => calibrated.replace(stored),
@@ -164,12 +165,12 @@ impl Pipeline {
         self.batch.closed = true;
     }
 
-    /// Where the TEMP pins stand beside each other, °C, as it is kept. To be called before the first sample.
+    /// Sets the stored offsets between the TEMP pins, °C. Call it before the first sample.
     pub fn pins_stand(&mut self, pins_c: [f32; 3]) {
         self.slow = Slow::of_pins(pins_c);
     }
 
-    /// What moves slowly.
+    /// The slow quantities.
     pub fn slow(&self) -> &Slow {
         &self.slow
     }
@@ -179,7 +180,7 @@ impl Pipeline {
         self.calibrated.is_some()
     }
 
-    /// Sends these streams from the next batch on.
+    /// Selects the streams from the next batch on.
     pub fn stream(&mut self, streams: Streams) {
         self.streams = streams;
     }
@@ -192,17 +193,17 @@ impl Pipeline {
         }
     }
 
-    /// What has been lost.
+    /// The counters of losses.
     pub fn losses(&self) -> Losses {
         self.losses
     }
 
-    /// Begins counting losses anew.
+    /// Resets the counters of losses.
     pub fn reset_losses(&mut self) {
         self.losses = Losses::default();
     }
 
-    /// Begins to average the next samples.
+    /// Starts to average the next samples.
     pub fn measure(&mut self, samples: u32) {
         let zero = Vector3::zeros();
         self.measurement = Some(Measurement {
@@ -215,7 +216,7 @@ impl Pipeline {
         });
     }
 
-    /// The mean, V at the sensors, once all of the samples are in it.
+    /// The mean, V at the sensors, once it is complete.
     pub fn measured(&self) -> Option<Sample<f32>> {
         let done = self.measurement.filter(|m| m.count == m.wanted)?;
         let count = done.count as f32;
@@ -225,7 +226,7 @@ impl Pipeline {
         })
     }
 
-    /// Takes the next sample. `send` is given what is to be sent and says whether there was room for it.
+    /// Processes the next sample. `send` gets each event and returns whether there was room for it.
     pub fn take(
         &mut self,
         number: u32,
@@ -266,9 +267,9 @@ impl Pipeline {
             batch.head.flags |= flags::SATURATED;
         }
         batch.head.flags |= self.held_flags;
-        // There is room: a full batch ends below.
+        // There is always room, because a full batch ends below.
         let _ = batch.raw.push(RawBatch::pack(&sums));
-        // Also while nobody listens: the effects have to see every sample, and the load is then the same at all times.
+        // Even without a stream, because the effects need every sample; the load is then always the same.
         if let Some(calibrated) = &mut self.calibrated {
             let sample = calibrated.apply(&raw);
             let _ = batch.compensated.push(CompensatedBatch::pack(&sample));
@@ -280,7 +281,7 @@ impl Pipeline {
         }
     }
 
-    /// To the banks and the self-test.
+    /// Passes a sample to the banks and the self-test.
     fn offer(
         &mut self,
         number: u32,
@@ -297,7 +298,7 @@ impl Pipeline {
         for (_, (bank, reading)) in self.banks.as_mut().zip(raw.as_ref()) {
             let Some(bank) = bank else { continue };
             if bank.offer(number, reading) {
-                // One that finds no room is followed by the next, which says more.
+                // A report without room is dropped; the next one contains more.
                 send(&Message::Event(Event::Kalman(bank.state())));
             }
         }
@@ -372,7 +373,7 @@ impl Pipeline {
     }
 }
 
-/// Whether a sensor's output is at one of its stops.
+/// Whether a sensor's output is at an end of its range.
 fn is_saturated(raw: &Sample<f32>) -> bool {
     let at_a_stop = |volts: &Vector3<f32>, [low, high]: [f32; 2], margin: f32| {
         volts.min() <= low + margin || volts.max() >= high - margin

@@ -1,4 +1,4 @@
-//! Why the device started, and for how long it has had its power: the reset flags, and records in memory that outlive a reset.
+//! Reset cause and time since power-on: reset flags, and records in memory that survives a reset.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -11,22 +11,22 @@ use mimu_core::wire::Start;
 
 use crate::design_parameters::WATCHDOG_US;
 
-/// Most bytes of a path: its end says which file it is.
+/// Largest number of bytes of a path; its end identifies the file.
 const PATH: usize = 40;
 
-/// That the record is one, and of this layout.
+/// Marks a record of this layout.
 const MAGIC: u32 = 0x6d69_6d32;
 
 const NOTHING: u32 = 0;
 const PANIC: u32 = 1;
 const FAULT: u32 = 2;
 
-/// What is left for the next start. Whole words: the memory's error code is over 64 bits, and part of one may be lost in a reset.
+/// Record for the next start, in whole 64-bit words: the memory's error code covers 64 bits, and part of a word may be lost in a reset.
 #[derive(Clone, Copy)]
 #[repr(C, align(8))]
 struct Record {
     magic: u32,
-    /// Starts since the power came.
+    /// Starts since power-on.
     starts: u32,
     kind: u32,
     /// Line of a panic, or address of a fault.
@@ -37,7 +37,7 @@ struct Record {
     path: [u8; PATH],
     /// Sum of all words before.
     check: u32,
-    /// A store behind the last one that counts pushes that out of the memory's write buffer.
+    /// A store after the last relevant one pushes that one out of the memory's write buffer.
     push: u32,
 }
 
@@ -59,27 +59,27 @@ impl Record {
     }
 }
 
-/// How long the power had been there. A word of the memory's error code by itself, so that a reset while it is written leaves the one
-/// before, the new one, or one whose check does not hold.
+/// Time since power-on. It fills one 64-bit word of the memory's error code, so that a reset during writing leaves the old value, the new
+/// one, or one with a wrong check.
 #[derive(Clone, Copy)]
 #[repr(C, align(8))]
 struct Powered {
     ms: u32,
-    /// `ms`, all bits turned, and [`MAGIC`].
+    /// Check value, from the inverted bits of `ms` and [`MAGIC`].
     check: u32,
     /// As in [`Record`].
     push: [u32; 2],
 }
 
-/// What is kept over a reset: integers, of which any bits are some.
+/// Memory that survives a reset: integers, for which any bits are valid.
 struct Kept<T: Copy>(UnsafeCell<MaybeUninit<T>>);
 
-// SAFETY: `KEPT` is used by `take`, before anything runs beside it, and by handlers that nothing interrupts and that never return; `POWERED`
-// by `take`, and then by the one task that keeps the time.
+// SAFETY: `KEPT` is used by `take`, before other tasks run, and by handlers that are never interrupted and never return; `POWERED` by
+// `take`, and then by the single task that stores the time.
 #[allow(unsafe_code)]
 unsafe impl<T: Copy> Sync for Kept<T> {}
 
-// SAFETY: the section is one that is neither loaded nor cleared at a start.
+// SAFETY: the section is neither loaded nor cleared at a start.
 #[allow(unsafe_code)]
 #[unsafe(link_section = ".uninit.restart")]
 static KEPT: Kept<Record> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
@@ -90,9 +90,9 @@ static KEPT: Kept<Record> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 static POWERED: Kept<Powered> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
 impl<T: Copy> Kept<T> {
-    /// Whatever the memory holds.
+    /// The contents of the memory.
     fn read(&self) -> T {
-        // SAFETY: whatever the memory holds is a `T`, see there; volatile, because it was written in another life.
+        // SAFETY: any bits are a valid `T`, see above; volatile, because they were written before the reset.
         #[allow(unsafe_code)]
         unsafe {
             self.0.get().cast::<T>().read_volatile()
@@ -100,7 +100,7 @@ impl<T: Copy> Kept<T> {
     }
 
     fn write(&self, value: T) {
-        // SAFETY: nothing else uses it at the time; see `Sync`.
+        // SAFETY: nothing else uses it at this time; see `Sync`.
         #[allow(unsafe_code)]
         unsafe {
             self.0.get().cast::<T>().write_volatile(value);
@@ -119,11 +119,11 @@ fn save(mut record: Record) {
     KEPT.write(record);
 }
 
-/// Keeps for how long the power has been there, ms, for the next start; `None`: that it is not known.
+/// Stores the time since power-on, ms, for the next start; `None`: unknown.
 pub fn keep_powered(ms: Option<u32>) {
     let check = match ms {
         Some(ms) => !ms ^ MAGIC,
-        // Holds for no number beside it.
+        // A check value that fits no time.
         None => MAGIC,
     };
     let ms = ms.unwrap_or_default();
@@ -148,14 +148,14 @@ const EMPTY: Record = Record {
     push: 0,
 };
 
-/// What the life before left.
+/// The record of the previous run.
 pub struct Before {
     record: Record,
     flags: pac::rcc::regs::Rsr,
     powered_for_ms: Option<u32>,
 }
 
-/// To be called once, at the start: reads and clears the record and the reset flags.
+/// Reads and clears the record and the reset flags. Call it once, at the start.
 pub fn take() -> Before {
     let flags = pac::RCC.rsr().read();
     pac::RCC.rsr().modify(|w| w.set_rmvf(true));
@@ -168,7 +168,7 @@ pub fn take() -> Before {
     });
     let powered_for_ms = match power_on {
         true => Some(0),
-        // The watchdog bites so long after it was fed, which is when the time was kept. How long the reset itself took nobody knows.
+        // The watchdog resets this long after it was fed, and the time was stored then. The duration of the reset itself is unknown.
         false if flags.iwdg1rstf() => powered().map(|ms| ms.saturating_add(WATCHDOG_US / 1000)),
         false => powered(),
     };
@@ -181,12 +181,12 @@ pub fn take() -> Before {
 }
 
 impl Before {
-    /// Starts since the power came, this one counted.
+    /// Starts since power-on, including this one.
     pub fn starts(&self) -> u32 {
         self.record.starts
     }
 
-    /// For how long the power had been there when the clock of this start began, ms; `None` if the record does not hold.
+    /// Time since power-on when the clock of this start began, ms; `None` if the record is invalid.
     pub fn powered_for_ms(&self) -> Option<u32> {
         self.powered_for_ms
     }
@@ -214,7 +214,7 @@ impl Before {
                 pc: *place,
                 cfsr: *cfsr,
             },
-            // Every reset from within also pulls the pin low and sets its flag, so the order is from the particular to the general.
+            // Every internal reset also pulls the pin low and sets its flag, so specific causes are tested first.
             _ if flags.porrstf() || flags.borrstf() => Start::PowerOn,
             _ if flags.iwdg1rstf() || flags.wwdg1rstf() => Start::Watchdog,
             _ if flags.sftrstf() => Start::Software,
@@ -224,7 +224,7 @@ impl Before {
     }
 }
 
-/// Leaves a record of a panic, then logs it by `log`, and starts anew.
+/// Records a panic, logs it with `log`, and restarts.
 pub fn after_panic(info: &PanicInfo<'_>, log: impl FnOnce()) -> ! {
     let mut record = Record {
         starts: load().map_or(0, |before| before.starts),
@@ -241,9 +241,9 @@ pub fn after_panic(info: &PanicInfo<'_>, log: impl FnOnce()) -> ! {
     leave(record, log)
 }
 
-/// Leaves a record of a fault at the instruction `pc`, then logs it by `log`, and starts anew.
+/// Records a fault at the instruction `pc`, logs it with `log`, and restarts.
 pub fn after_fault(pc: u32, log: impl FnOnce()) -> ! {
-    // SAFETY: reading a register that is always there.
+    // SAFETY: reads a register that always exists.
     #[allow(unsafe_code)]
     let cfsr = unsafe { (*SCB::PTR).cfsr.read() };
     let record = Record {
@@ -256,8 +256,8 @@ pub fn after_fault(pc: u32, log: impl FnOnce()) -> ! {
     leave(record, log)
 }
 
-/// The record first: the log may be what the program has stopped in, and then stops it again. What comes second tells of the first
-/// only, and is not kept.
+/// Writes the record before logging, because the program may have stopped in the log, which would stop it again. A second fault follows
+/// from the first and is not recorded.
 fn leave(record: Record, log: impl FnOnce()) -> ! {
     static LEFT: AtomicBool = AtomicBool::new(false);
     if !LEFT.swap(true, Ordering::Relaxed) {

@@ -1,5 +1,5 @@
-//! Sampling: a task in an executor of its own, above everything else in priority. No other task, however long it computes, can make a
-//! sample late. It hands each sample to a queue and computes nothing.
+//! Sampling: a task in a separate executor with the highest priority. However long another task computes, no sample is late. The task puts
+//! each sample into a queue and computes nothing.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -14,23 +14,23 @@ use crate::adc::{Converter, Fault};
 use crate::channels::Channels;
 use crate::design_parameters as design;
 
-/// A sample on its way to be processed.
+/// A sample to be processed.
 pub struct Taken {
     /// See [`Sample`](crate::adc::Sample).
     pub number: u32,
-    /// When it was read, µs, by the clock's low word.
+    /// Time of reading, µs, low word of the clock.
     pub at_us: u32,
     /// Sums of the conversions of each channel.
     pub sums: Channels<u32>,
 }
 
-/// Samples that wait to be processed.
+/// Queue of samples for processing.
 pub static QUEUE: Channel<CriticalSectionRawMutex, Taken, { design::QUEUE }> = Channel::new();
 
-/// What sampling counts.
+/// Counters of sampling.
 pub static TALLY: Tally = Tally::new();
 
-/// What sampling and processing count.
+/// Counters of sampling and processing.
 #[derive(Debug, Default)]
 pub struct Tally {
     /// Samples taken.
@@ -43,7 +43,7 @@ pub struct Tally {
     pub converter_overruns: AtomicU32,
     /// See [`Fault`].
     pub stalls: AtomicU32,
-    /// Samples that found no room in the queue.
+    /// Samples without room in the queue.
     pub queue_overruns: AtomicU32,
     /// Longest time between a sample and the end of its processing, µs.
     pub longest_us: AtomicU32,
@@ -67,17 +67,17 @@ impl Tally {
 /// Runs the task, from an interrupt.
 static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
-// The vector of a peripheral that nothing here uses, pended by the executor when a task is due.
+// Interrupt of an unused peripheral; the executor pends it when a task is due.
 #[interrupt]
 fn SWPMI1() {
-    // SAFETY: this is the interrupt that the executor was started with, and nothing else polls it.
+    // SAFETY: the executor was started with this interrupt, and only this handler polls it.
     #[allow(unsafe_code)]
     unsafe {
         EXECUTOR.on_interrupt();
     }
 }
 
-/// Starts sampling. To be called once.
+/// Starts sampling. Call it once.
 pub fn start(converter: Converter) {
     // Below the controller's and the timer's interrupts (level 0): the ring's reader relies on
     // their counts being up to date.

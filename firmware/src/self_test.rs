@@ -1,11 +1,11 @@
-//! The self-test: what the sensors make of their test inputs, and what they are supplied with, against their data sheets.
+//! The self-test: responses of the sensors to their test inputs, and their supplies, compared with their data sheets.
 //!
 //! # What one pose cannot show
 //!
-//! The accelerometer has no input that moves its mass, so that gravity is all there is to sense. An axis that lies across it reads its null
-//! in every range, and so does one that is stuck there: only in a pose that turns it up does it show which. An axis that is stuck anywhere
-//! else fails in all poses, because what it reads above its null does not shrink with the range. Of the gyros it shows that they
-//! answer, and not their scale factor within better than half. Their 5 V supply is at no pin.
+//! The accelerometer has no input that deflects its mass, so the test relies on gravity. An axis perpendicular to gravity reads its null in
+//! every range, and so does an axis that is stuck at its null; only a pose with this axis up distinguishes them. An axis that is stuck
+//! elsewhere fails in all poses, because its reading above the null does not shrink with the range. The test shows that the gyros respond,
+//! but their scale factors only to about a half. Their 5 V supply is not connected to any pin.
 
 use nalgebra::Vector3;
 
@@ -23,7 +23,7 @@ mod deflect;
 #[cfg(target_os = "none")]
 pub use deflect::run;
 
-/// What a self-test has measured.
+/// Measurements of a self-test.
 #[derive(Clone, Copy, Debug)]
 pub struct Measured {
     /// Change of the gyros' outputs by ST1, V.
@@ -34,7 +34,7 @@ pub struct Measured {
     pub accel_fine_v: [f32; 3],
     /// The same at its coarsest.
     pub accel_coarse_v: [f32; 3],
-    /// Whether the TEMP pins count ([`that_count`](crate::temperature::that_count)).
+    /// Whether the TEMP pins are used ([`that_count`](crate::temperature::that_count)).
     pub temperatures_count: [bool; 3],
     /// Reference of the gyros, V.
     pub reference_v: f32,
@@ -61,7 +61,7 @@ pub fn judge(of: &Measured) -> u16 {
         );
         pass(checks::TEMPERATURE[axis], of.temperatures_count[axis]);
     }
-    // The length of the change and not the change of the length: nulls are not in it.
+    // The length of the change, not the change of the length, so that nulls cancel.
     let change = Vector3::from(of.accel_fine_v) - Vector3::from(of.accel_coarse_v);
     let gravity = within(
         change.norm(),

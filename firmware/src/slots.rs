@@ -1,19 +1,18 @@
-//! Where calibrations are kept: two sectors of flash memory, so that a write either happened or did not.
+//! Stored calibrations: two flash sectors, so that a write is either complete or has not happened.
 //!
-//! # Why it cannot be half done
+//! # Why a write is never half done
 //!
-//! Each sector is a slot: a word that says what follows, two of what the calibration is tied to ([`FrontEnd`]), and the calibration. A new one goes to the slot that is not in use:
-//! it is erased, all but the first word is written and read back, and last the word in front is written, in a single programming operation, with
-//! the next generation and a CRC of itself. Before that word is whole the slot does not count; from then on it is the younger one.
-//! The slot in use is not touched until the next calibration.
+//! Each sector is a slot: a header word, two words of [`FrontEnd`], and the calibration. A new calibration goes to the slot that is not in
+//! use. The slot is erased, everything except the header is written and read back, and last the header is written, in a single programming
+//! operation, with the next generation and a CRC of itself. Until the header is complete the slot is invalid; from then on it is the
+//! younger one. The slot in use is not touched before the next calibration.
 //!
 //! # Why not a key-value store
 //!
-//! `sequential-storage` appends within a sector behind whatever is there, and finds the end by what reads as erased. A word of this
-//! memory whose programming was cut off may read as erased and yet not be: to program it again leaves an error code that does not
-//! match (RM0433 4.3.9), and the item is lost after it was reported as stored. Here nothing is ever written to a sector that was not
-//! erased to the end in the same operation. It also costs erasing when a calibration is stored, about a second, and a life of 10 000
-//! of them, neither of which matters.
+//! `sequential-storage` appends within a sector, and finds the end by words that read as erased. A word of this memory whose programming
+//! was interrupted may read as erased without being so: programming it again leaves a wrong error code (RM0433 4.3.9), and the item is lost
+//! after it was reported as stored. Here a sector is always erased completely in the same operation before it is written. The cost is about
+//! a second of erasing for each calibration, and a life of 10 000 calibrations; neither matters.
 
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
@@ -25,10 +24,10 @@ use crate::front_end::{FRONT_END_WORDS, FrontEnd};
 
 const MAGIC: [u8; 4] = *b"slt2";
 
-/// Where the calibration stands in a slot, bytes.
+/// Position of the calibration in a slot, bytes.
 const BODY: usize = WORD * (1 + FRONT_END_WORDS);
 
-/// What the word in front of a calibration says.
+/// Header word of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Front {
     generation: u32,
@@ -62,7 +61,7 @@ impl Front {
     }
 }
 
-/// The flash memory refused, or did not keep what was written.
+/// The flash memory reported an error, or did not keep the written data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Failed;
 
@@ -78,14 +77,14 @@ pub struct Slots<F> {
     flash: F,
     state: [Slot; 2],
     in_use: Option<InUse>,
-    /// The highest that was found.
+    /// Highest generation found.
     generation: u32,
 }
 
 impl<F: NorFlash> Slots<F> {
     const SECTOR: usize = F::ERASE_SIZE;
 
-    /// Looks for calibrations. `buffer` holds the one in use afterwards.
+    /// Searches the slots for calibrations. Afterwards `buffer` contains the one in use.
     pub async fn open(flash: F, buffer: &mut Vec<u8, MAX_LENGTH>) -> Self {
         const { assert!(F::WRITE_SIZE == WORD && MAX_LENGTH + BODY <= F::ERASE_SIZE) };
         let mut slots = Self {
@@ -113,7 +112,7 @@ impl<F: NorFlash> Slots<F> {
         slots
     }
 
-    /// What is in the slots.
+    /// Contents of the slots.
     pub fn state(&self) -> [Slot; 2] {
         self.state
     }
@@ -128,7 +127,7 @@ impl<F: NorFlash> Slots<F> {
         &self.flash
     }
 
-    /// Reads a part of the calibration in use; `None` if there is none, or the part is not within it, or cannot be read.
+    /// Reads a part of the calibration in use; `None` if there is no calibration, or the part is outside it or unreadable.
     pub async fn part(&mut self, offset: usize, bytes: &mut [u8]) -> Option<()> {
         let InUse { slot, front } = self.in_use?;
         let end = offset.checked_add(bytes.len())?;
@@ -136,8 +135,8 @@ impl<F: NorFlash> Slots<F> {
         (within && self.read(slot, BODY + offset, bytes).await).then_some(())
     }
 
-    /// What the calibration in use is tied to; `None` if there is none, or it cannot be read: the calibration is then used as it is, with a
-    /// front end that calibrates itself.
+    /// Front end of the calibration in use; `None` if there is none or it is unreadable. The calibration is then used with a front end that
+    /// calibrates itself.
     pub async fn front_end(&mut self) -> Option<FrontEnd> {
         let InUse { slot, .. } = self.in_use?;
         let mut words = [[0; WORD]; FRONT_END_WORDS];
@@ -145,8 +144,8 @@ impl<F: NorFlash> Slots<F> {
         read.then(|| FrontEnd::from_words(&words)).flatten()
     }
 
-    /// Stores a calibration and what it is tied to. When this returns, or the supply fails on the way, either it is the one in use, whole, or the one before
-    /// is. The one in use is not written again: a sector lives for 10 000 erases.
+    /// Stores a calibration and its front end. When this returns, or if the supply fails meanwhile, either the new calibration is in use,
+    /// complete, or the previous one. If it is in use already, it is not written again: a sector lasts for 10 000 erases.
     pub async fn store(&mut self, bytes: &[u8], front_end: &FrontEnd) -> Result<(), Failed> {
         if self.holds(bytes).await {
             return Ok(());
@@ -183,7 +182,7 @@ impl<F: NorFlash> Slots<F> {
         Ok(())
     }
 
-    /// Whether the calibration in use is this one, byte by byte in the flash.
+    /// Whether the calibration in use equals this one, byte by byte in the flash.
     async fn holds(&mut self, bytes: &[u8]) -> bool {
         let Some(InUse { slot, front }) = self.in_use else {
             return false;
@@ -215,7 +214,7 @@ impl<F: NorFlash> Slots<F> {
         self.flash.read(offset, bytes).await.is_ok()
     }
 
-    /// Reads the calibration of a slot, so many bytes.
+    /// Reads the calibration of a slot, with this number of bytes.
     async fn read_all(
         &mut self,
         slot: usize,

@@ -1,9 +1,8 @@
-//! The supply of converter and accelerometer, by the part's internal reference.
+//! Supply of converter and accelerometer, measured with the part's internal reference.
 //!
-//! Only ADC3 is connected to that reference (RM0433 25.4.11), so that the scan of ADC1 cannot have it among its channels. The self-test
-//! can: ADC3 does nothing else, and is switched on for this and off again. On the registers, since the HAL's driver calibrates
-//! linearity as well, which keeps the processor polling for 21 ms, and enables the reference while the converter is on, which the reference
-//! manual forbids (25.4.10).
+//! Only ADC3 is connected to that reference (RM0433 25.4.11), so it cannot be a channel in the scan of ADC1. The self-test switches ADC3 on
+//! for this measurement and off again. This code uses the registers, because the HAL's driver also calibrates linearity (21 ms of polling),
+//! and enables the reference while the converter is on, which the reference manual forbids (25.4.10).
 
 use embassy_stm32::pac::adc::vals::{Boost, Pcsel, Res, SampleTime};
 use embassy_stm32::peripherals::ADC3;
@@ -16,19 +15,19 @@ use crate::convert::FULL_SCALE;
 /// The internal reference, V: least, typical, most (DS12110, embedded reference voltage).
 const INTERNAL_V: [f32; 3] = [1.180, 1.216, 1.255];
 
-/// Where the part keeps what its maker has measured: the code of the internal reference, 16 bits, at a supply of 3.3 V (DS12110).
+/// Address of the factory measurement: the code of the internal reference, 16 bits, at a supply of 3.3 V (DS12110).
 const MEASURED_AT: *const u16 = 0x1FF1_E860 as *const u16;
 
-/// The input of ADC3 that it is at.
+/// Its input of ADC3.
 const INPUT: u8 = 19;
 
-/// Conversions that are averaged. Each takes 50 µs, with a sampling time of 49 where 4.3 are asked for.
+/// Number of conversions averaged. Each takes 50 µs, with a sampling time of 49 µs; 4.3 µs are required.
 const CONVERSIONS: u32 = 16;
 
 /// Calibration of the offset takes 2 ms, the rest one.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// ADC3 at the internal reference; off but while it measures.
+/// ADC3 at the internal reference; on only while it measures.
 pub struct Supply(Peri<'static, ADC3>);
 
 impl Supply {
@@ -60,7 +59,7 @@ impl Supply {
         common.ccr().modify(|w| w.set_vrefen(true));
         // The regulator, 10 µs, and the reference's buffer.
         Timer::after_millis(1).await;
-        // The offset alone: what linearity is worth, some hundred of 65535 codes, decides nothing here.
+        // Offset only: linearity matters by about a hundred of 65535 codes, which is irrelevant here.
         adc.cr().modify(|w| w.set_adcal(true));
         while adc.cr().read().adcal() {
             Timer::after_millis(1).await;
@@ -96,9 +95,9 @@ impl Supply {
     }
 }
 
-/// The internal reference's code at the nominal supply: as it was measured, or the typical one where that word makes no sense.
+/// Code of the internal reference at the nominal supply: the factory value, or the typical one if that word is implausible.
 fn code_at_nominal() -> f32 {
-    // SAFETY: it is flash of the system's, which is always there to be read and which nothing writes.
+    // SAFETY: it is system flash, which is always readable and never written.
     #[allow(unsafe_code)]
     let measured = f32::from(unsafe { MEASURED_AT.read_volatile() });
     let [least, typical, most] = INTERNAL_V.map(|v| v / REFERENCE_V * FULL_SCALE as f32);

@@ -1,12 +1,12 @@
-//! The thermometer: the gyros' TEMP pins, of which some may be wrong.
+//! The thermometer: the gyros' TEMP pins, some of which may be faulty.
 //!
-//! Where each pin stands beside the others is learnt while it counts: their references differ by as much as 12 °C. Their common temperature is
-//! the mean of the pins minus these offsets, so that a pin that is lost takes nothing but itself out of it: the temperature makes no step. The
-//! offsets are kept with a calibration, so that a pin that is open when the power comes takes nothing else with it either.
+//! The offset of each pin to the others is learnt while it is used, because their references differ by up to 12 °C. The common temperature
+//! is the mean of the pins minus these offsets, so losing a pin makes no step. The offsets are stored with a calibration, so a pin that is
+//! open at power-on makes no error either.
 //!
-//! A pin counts as long as it is in the range of a working gyro, agrees with another one, makes no step that no die can make, and stays where
-//! it stands beside the others. One that left comes back when it is there again. When all have left at once, the last good temperature
-//! holds, and one is believed again that the dies may have reached since.
+//! A pin is used while it is in the range of a working gyro, agrees with another pin, does not jump faster than a die can, and keeps its
+//! offset to the others. A pin that was left out is used again when it has returned to its offset. If all pins are left out at once, the
+//! last good temperature is used, until a reading is one that the dies may have reached since.
 
 use crate::design_parameters::{
     GYRO_TEMPERATURE_BEGINNING_S, GYRO_TEMPERATURE_DEPARTURE_C, GYRO_TEMPERATURE_OFFSET_S,
@@ -17,13 +17,13 @@ use crate::design_parameters::{
 /// A TEMP pin.
 #[derive(Clone, Copy, Debug)]
 struct Pin {
-    /// What it read last, °C.
+    /// Last reading, °C.
     read_c: f32,
-    /// Where it stands beside the others, °C, once it has counted.
+    /// Offset to the others, °C, once it has been used.
     offset_c: Option<f32>,
-    /// For how long that was learnt, s.
+    /// Time over which the offset was learnt, s.
     learnt_s: f32,
-    /// Whether it counts.
+    /// Whether it is used.
     counts: bool,
 }
 
@@ -31,7 +31,7 @@ struct Pin {
 #[derive(Clone, Copy, Debug)]
 pub struct Thermometer {
     pins: [Pin; 3],
-    /// Common temperature of those that counted last, °C, if any has, and how long ago that was, s.
+    /// Last common temperature, °C, if any, and its age, s.
     together_c: Option<f32>,
     since_s: f32,
 }
@@ -49,11 +49,11 @@ impl Thermometer {
         since_s: 0.0,
     };
 
-    /// Before the first reading of pins that stood there beside each other, °C.
+    /// Before the first reading, with stored offsets between the pins, °C.
     pub const fn of_pins(pins_c: [f32; 3]) -> Self {
         let mut new = Self::NEW;
         let mut i = 0;
-        // A constant function has no other loop.
+        // `while`, because a constant function has no other loop.
         while i < 3 {
             new.pins[i].offset_c = Some(pins_c[i]);
             new.pins[i].learnt_s = GYRO_TEMPERATURE_BEGINNING_S;
@@ -62,8 +62,8 @@ impl Thermometer {
         new
     }
 
-    /// Where the pins stand beside each other, °C, once all three have counted for their beginning. While one is open or shorted it is as it was
-    /// `before`. Where one is in the range of a gyro and does not count, the pins are others than before, and nothing is known.
+    /// Offsets between the pins, °C, once all three have been used long enough. If one is open or shorted, its offset is the one from
+    /// `before`. If one is in the range of a gyro but not used, the pins have changed, and the offsets are unknown.
     pub fn to_keep(&self, before: Option<[f32; 3]>) -> Option<[f32; 3]> {
         let learnt = |pin: &Pin| pin.learnt_s >= GYRO_TEMPERATURE_BEGINNING_S;
         if self.pins.iter().all(|pin| pin.counts && learnt(pin)) {
@@ -73,12 +73,12 @@ impl Thermometer {
         before.filter(|_| !self.pins.iter().any(disagrees))
     }
 
-    /// Which pins count.
+    /// Which pins are used.
     pub fn that_count(&self) -> [bool; 3] {
         self.pins.map(|pin| pin.counts)
     }
 
-    /// Takes in what the pins read on the average of the next `seconds`, °C; the temperature of those that count, or `None` if none does.
+    /// Processes the mean readings of the pins over the next `seconds`, °C; returns the temperature of those that are used, or `None`.
     pub fn take(&mut self, pins_c: [f32; 3], seconds: f32) -> Option<f32> {
         self.since_s += seconds;
         let plausible = plausible(pins_c);
@@ -89,7 +89,7 @@ impl Thermometer {
         });
         let counts: [bool; 3] =
             core::array::from_fn(|i| plausible[i] && self.may_be(i, pins_c, plausible, steady));
-        // A pin that has never counted has no offset yet, and takes its own from the others.
+        // A pin that has never been used has no offset yet; it is computed from the others.
         let known = core::array::from_fn(|i| counts[i] && self.pins[i].offset_c.is_some());
         let together_c = self
             .mean(known, pins_c)
@@ -106,7 +106,7 @@ impl Thermometer {
         together_c
     }
 
-    /// Whether a pin may be right, by what was before and by the others that are steady.
+    /// Whether a pin may be right, judged by its history and by the other steady pins.
     fn may_be(&self, i: usize, pins_c: [f32; 3], plausible: [bool; 3], steady: [bool; 3]) -> bool {
         let pin = &self.pins[i];
         let Some(offset_c) = pin.offset_c else {
@@ -119,12 +119,12 @@ impl Thermometer {
             (true, Some(others_c)) => steady[i] && away(others_c) <= GYRO_TEMPERATURE_DEPARTURE_C,
             (false, Some(others_c)) => away(others_c) <= GYRO_TEMPERATURE_STEP_C,
             (false, None) => match self.together_c {
-                // The dies may have gone so far since.
+                // Distance that the dies may have changed since.
                 Some(together_c) => {
                     let gone_c = GYRO_TEMPERATURE_RATE_C_PER_S * self.since_s;
                     away(together_c) <= GYRO_TEMPERATURE_STEP_C + gone_c
                 }
-                // The first reading of pins whose offsets were kept: one that stands where it did beside another, or is the only one.
+                // First reading with stored offsets: a pin is right if it has its offset to another pin, or is the only one.
                 None => {
                     let mut others = (0..3).filter(|&j| j != i && plausible[j]).peekable();
                     others.peek().is_none()
@@ -137,7 +137,7 @@ impl Thermometer {
         }
     }
 
-    /// Mean of what some pins read without their offsets, °C.
+    /// Mean of the readings of some pins minus their offsets, °C.
     fn mean(&self, which: [bool; 3], pins_c: [f32; 3]) -> Option<f32> {
         let all = (0..3).filter(|i| which[*i]);
         let (sum, count) = all.fold((0.0, 0.0), |(sum, count), i| {
@@ -149,8 +149,8 @@ impl Thermometer {
 }
 
 impl Pin {
-    /// Takes in where it stands: the mean of the beginning, and then a lag. A mean of all so far would follow, after a minute, whatever
-    /// departs within the next.
+    /// Updates the offset: at first the mean, then a lag. A mean of everything so far would, after a minute, follow a pin that departs
+    /// within the next minute.
     fn learn(&mut self, beside_c: f32, seconds: f32) {
         let before = self.offset_c.unwrap_or(beside_c);
         self.learnt_s = (self.learnt_s + seconds).min(GYRO_TEMPERATURE_BEGINNING_S);
@@ -162,10 +162,10 @@ impl Pin {
     }
 }
 
-/// Whether each pin may be right by what the three read at the same time, °C.
+/// Whether each pin may be right, judged by the three simultaneous readings, °C.
 ///
-/// One may if it is in the range of a working gyro, and agrees with another such pin or is the only one. Of two that disagree neither
-/// may: which of them is wrong cannot be known, and a mean of both is wrong for certain.
+/// A pin may be right if it is in the range of a working gyro and agrees with another such pin, or is the only one. If only two are left
+/// and they disagree, neither is used: it is unknown which is wrong, and their mean would certainly be wrong.
 fn plausible(pins_c: [f32; 3]) -> [bool; 3] {
     let in_range = pins_c.map(in_range);
     core::array::from_fn(|i| {
@@ -176,7 +176,7 @@ fn plausible(pins_c: [f32; 3]) -> [bool; 3] {
     })
 }
 
-/// Whether a working gyro can be at it, °C.
+/// Whether a working gyro can have this reading, °C.
 fn in_range(temp_c: f32) -> bool {
     let [least, most] = GYRO_TEMPERATURE_RANGE_C;
     (least..=most).contains(&temp_c)

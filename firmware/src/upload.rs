@@ -1,10 +1,10 @@
-//! A calibration on its way to the device.
+//! An upload in progress.
 
 use heapless::Vec;
 use mimu_core::stored::{self, MAX_LENGTH, hash};
 use mimu_core::wire::{CHUNK, Refusal};
 
-/// What has been announced.
+/// The announced upload.
 #[derive(Clone, Copy, Debug)]
 struct Announced {
     length: usize,
@@ -12,14 +12,14 @@ struct Announced {
     other_unit: bool,
 }
 
-/// A calibration as far as it has been received.
+/// The received part of a calibration.
 pub struct Upload<'a> {
     received: &'a mut Vec<u8, MAX_LENGTH>,
     announced: Option<Announced>,
 }
 
 impl<'a> Upload<'a> {
-    /// Nothing has been announced.
+    /// No upload was announced.
     pub fn new(received: &'a mut Vec<u8, MAX_LENGTH>) -> Self {
         Self {
             received,
@@ -27,7 +27,7 @@ impl<'a> Upload<'a> {
         }
     }
 
-    /// Announces one, and whether it may be of another unit; another before it is forgotten.
+    /// Starts an upload, and sets whether it may belong to another unit; an earlier upload is discarded.
     pub fn begin(&mut self, length: u32, hash: u64, other_unit: bool) -> Result<(), Refusal> {
         let room = MAX_LENGTH as u32;
         if length > room {
@@ -42,7 +42,7 @@ impl<'a> Upload<'a> {
         Ok(())
     }
 
-    /// Takes a part.
+    /// Adds a part.
     pub fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
         let announced = self.announced.ok_or(Refusal::NoUpload)?;
         if bytes.is_empty() || bytes.len() > CHUNK {
@@ -65,8 +65,8 @@ impl<'a> Upload<'a> {
         self.received.extend_from_slice(new).map_err(|_| too_long)
     }
 
-    /// Whether all of it is there, has the hash that was announced, can be used, and is of the unit of this number: wrong by up to a
-    /// tenth in scale, a calibration of another one looks like one to everything else.
+    /// Checks that the upload is complete, has the announced hash, can be used, and belongs to this unit. The unit is checked because
+    /// another unit's calibration, wrong by up to a tenth in scale, passes every other test.
     #[inline(never)]
     pub fn check(&self, unit_id: &[u8; 12]) -> Result<(), Refusal> {
         let announced = self.announced.ok_or(Refusal::NoUpload)?;
@@ -89,12 +89,12 @@ impl<'a> Upload<'a> {
         }
     }
 
-    /// What has been received.
+    /// The received bytes.
     pub fn bytes(&self) -> &[u8] {
         self.received
     }
 
-    /// Forgets it.
+    /// Discards the upload.
     pub fn end(&mut self) {
         self.announced = None;
     }

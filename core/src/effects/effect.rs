@@ -1,4 +1,4 @@
-//! One effect with its numbers: what a device stores, lists and removes.
+//! One effect with its coefficients, as a device stores, lists and removes it.
 
 use nalgebra::{RealField, convert};
 
@@ -24,7 +24,7 @@ pub enum Variable {
     ForceZ,
     /// Temperature above [`REFERENCE_C`](super::REFERENCE_C), °C.
     Temperature,
-    /// Its rate of change behind a lag of [`RATE_LAG_S`](super::RATE_LAG_S), °C/s.
+    /// Its rate of change, filtered with [`RATE_LAG_S`](super::RATE_LAG_S), °C/s.
     TemperatureRate,
     /// Time since power-on, s.
     Time,
@@ -44,7 +44,7 @@ impl Variable {
         Self::Time,
     ];
 
-    /// As in the id of a term.
+    /// Its name in the id of a term.
     pub const fn name(self) -> &'static str {
         match self {
             Self::RateX => "rate_x",
@@ -60,8 +60,8 @@ impl Variable {
     }
 }
 
-/// Time constants that an effect may have, s: from a sample at 1 kHz to four months. Outside, its decay or its lag is a constant within
-/// any session.
+/// Allowed time constants of an effect, s: from one sample at 1 kHz to four months. Beyond, a decay or a lag is constant within any
+/// session.
 pub const TIME_CONSTANT_RANGE_S: [f64; 2] = [1e-3, 1e7];
 
 /// Why an effect is refused.
@@ -69,15 +69,15 @@ pub const TIME_CONSTANT_RANGE_S: [f64; 2] = [1e-3, 1e7];
 pub enum EffectError {
     /// No effect of this name can be removed here.
     Unknown,
-    /// It takes another number of coefficients, or a term another number of variables.
+    /// It needs another number of coefficients, or a term another number of variables.
     Count {
-        /// How many (a term: at most).
+        /// The required number (for a term: the largest).
         needed: usize,
     },
-    /// A coefficient is not a finite number, a nonlinear constant is missing, not wanted or outside
-    /// [`TIME_CONSTANT_RANGE_S`], a weight is not positive, or there is no such axis.
+    /// A coefficient is not finite; a nonlinear constant is missing, superfluous or outside
+    /// [`TIME_CONSTANT_RANGE_S`], a weight is not positive; or the axis does not exist.
     Value,
-    /// There is no room for one more, or an axis has a code already.
+    /// The room is full, or an axis has a code already.
     Full,
 }
 
@@ -96,19 +96,19 @@ impl core::fmt::Display for EffectError {
 
 impl core::error::Error for EffectError {}
 
-/// An effect with its numbers, as a device takes it: there is none of numbers that it would refuse.
+/// An effect with valid coefficients: a device accepts every value of this type.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceEffect<T: RealField> {
     pub(super) sensor: Sensor,
     pub(super) numbers: Numbers<T>,
 }
 
-/// The numbers of an effect by its kind.
+/// The coefficients of an effect, by its kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Numbers<T: RealField> {
     Named {
         law: &'static Law<T>,
-        /// Those that the law has not are 0.
+        /// Unused ones are 0.
         coefficients: [T; COEFFICIENTS],
         nonlinear: Option<T>,
     },
@@ -118,7 +118,7 @@ pub(super) enum Numbers<T: RealField> {
         variables: [Option<Variable>; FACTORS],
     },
     Code {
-        /// Whose readings err; `None`: all three alike.
+        /// Axis whose readings err; `None`: all three in the same way.
         axis: Option<u8>,
         /// In units of the weight of bit 0.
         errors: [T; BITS],
@@ -135,7 +135,7 @@ pub(super) enum Kind<'a, T: RealField> {
     Fast(Fast<T>),
     Slow(Slowly<T>),
     Code {
-        /// Whose readings err.
+        /// Axis whose readings err.
         axes: [bool; 3],
         errors: &'a [T; BITS],
         weight: T,
@@ -146,10 +146,10 @@ pub(super) enum Kind<'a, T: RealField> {
 /// Names of the axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// The converter that a code is of.
+/// The converter whose codes err.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Converter<T> {
-    /// Axis that it reads; `None`: all three.
+    /// Axis that it converts; `None`: all three.
     pub axis: Option<usize>,
     /// Weight of bit 0, raw.
     pub weight: T,
@@ -158,15 +158,15 @@ pub struct Converter<T> {
 }
 
 impl<T> Converter<T> {
-    /// Names of the axes that it reads.
+    /// Names of the axes that it converts.
     pub fn axes(&self) -> &'static str {
         self.axis.map_or("xyz", axis_name)
     }
 }
 
 impl<T: RealField + Copy> DeviceEffect<T> {
-    /// The effect of a public id like `gyro_scale_cubic`, with all of its coefficients (SI, those of a matrix by rows) and the
-    /// nonlinear constant of one that has any: a time constant, s.
+    /// The effect with a public id like `gyro_scale_cubic`. Coefficients are in SI, those of a matrix by rows; the nonlinear constant, if
+    /// the effect has one, is a time constant in s.
     pub fn named(id: &str, coefficients: &[T], nonlinear: Option<T>) -> Result<Self, EffectError> {
         let (sensor, name) = match (id.strip_prefix("gyro_"), id.strip_prefix("accel_")) {
             (Some(name), _) => (Sensor::Gyro, name),
@@ -233,20 +233,20 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         })
     }
 
-    /// Errors of a converter by the bits of its code, of one axis (0 to 2), or of all three alike.
+    /// Errors of a converter as a function of the bits of its code, for one axis (0 to 2) or for all three.
     ///
-    /// `weight`: of bit 0, the highest, raw; each of the nine bits has half the weight of the one before. `errors`: what a reading has too
-    /// much where the bit is set, in units of `weight`. `zero`: the reading of code 0, raw; not 0 where something was subtracted from the
-    /// readings. A reading of less than 1/65536 of `weight` below the turn of a bit counts as one of the turn, whichever way it was
-    /// rounded. The code of all nine bits set, and one more, is again 0: what lies beyond is not distinguished. EffectError where a number is not
-    /// finite, the weight not positive, or `zero` farther from a reading of 0 than [`FARTHEST_ZERO`] weights.
+    /// `weight`: that of bit 0, the highest, raw; each of the nine bits has half the weight of the one before. `errors`: excess of a
+    /// reading if the bit is set, in units of `weight`. `zero`: the reading of code 0, raw; it differs from 0 if a number was subtracted
+    /// from the readings. A reading that is less than 1/65536 of `weight` below the transition of a bit counts as at the transition,
+    /// whichever way it was rounded. Codes repeat beyond the range of nine bits. Refused if a number is not finite, the weight is not
+    /// positive, or `zero` is farther from a reading of 0 than [`FARTHEST_ZERO`] weights.
     ///
     /// ```
     /// # use mimu_core::compensation::Sample;
     /// # use mimu_core::effects::{DeviceEffect, Directions, Effects};
     /// # use mimu_core::{PerSensor, Sensor};
     /// # use nalgebra::{Matrix3, Vector3};
-    /// // Bit 0 of a converter of ±2.5 V is worth 2.5 V, and 1 mV more than that.
+    /// // Bit 0 of a converter of ±2.5 V weighs 2.5 V plus an error of 1 mV.
     /// let code = DeviceEffect::code(Sensor::Gyro, Some(2), &[4e-4, 0., 0., 0., 0., 0., 0., 0., 0.], 2.5, -2.5).unwrap();
     /// let directions = Directions { sensed: Matrix3::identity(), to_body: Matrix3::identity() };
     /// let mut effects = Effects::<f64, 8>::of(PerSensor::both(directions));
@@ -263,7 +263,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         weight: T,
         zero: T,
     ) -> Result<Self, EffectError> {
-        // What is not finite in single precision is not in this one, or becomes it in the tables.
+        // Checked in single precision: a number that overflows there would become infinite in the tables.
         let codes = convert::<_, T>(256.0) / weight;
         let most = errors.iter().fold(T::zero(), |sum, e| sum + e.abs()) * weight;
         let finite = [weight, codes, most].iter().all(T::is_finite);
@@ -288,7 +288,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         self.sensor
     }
 
-    /// Name of the law of a named effect, which behind that of the sensor is its id.
+    /// Name of the law of a named effect; the id is the sensor's name, `_`, and this.
     pub(crate) fn law(&self) -> Option<&'static str> {
         match self.numbers {
             Numbers::Named { law, .. } => Some(law.name),
@@ -296,7 +296,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         }
     }
 
-    /// Its coefficients: all of a named effect, the one of a term, the errors of the nine bits of a code.
+    /// Its coefficients: all of a named effect, the single one of a term, the errors of the nine bits of a code.
     pub fn coefficients(&self) -> &[T] {
         match &self.numbers {
             Numbers::Named {
@@ -315,7 +315,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         }
     }
 
-    /// Of a code: its converter.
+    /// Converter of a code.
     pub fn converter(&self) -> Option<Converter<T>> {
         match self.numbers {
             Numbers::Code {
@@ -329,7 +329,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         }
     }
 
-    /// Of a term: its axis and its variables.
+    /// Axis and variables of a term.
     pub fn product(&self) -> Option<(usize, impl Iterator<Item = Variable> + Clone)> {
         match self.numbers {
             Numbers::Term {
@@ -339,7 +339,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         }
     }
 
-    /// Whether it moves with temperature and time only, so that no sample pays for it.
+    /// Whether it depends on temperature and time only, so that it costs nothing per sample.
     pub fn is_slow(&self) -> bool {
         matches!(self.kind(), Kind::Slow(_))
     }

@@ -1,4 +1,4 @@
-//! The effects that the device removes by name, each in one row of one table.
+//! The effects that the device removes by name: a table with one row for each.
 
 use nalgebra::{Matrix3, RealField, Vector3};
 
@@ -8,10 +8,10 @@ pub(super) const COEFFICIENTS: usize = 9;
 /// Most variables of a term.
 pub(super) const FACTORS: usize = 3;
 
-/// Values of the variables by their numbers; the first is 1, for products of fewer than three.
+/// Values of the variables, indexed by their numbers; the first is 1, for products of fewer than three.
 pub(super) type Values<T> = [T; 10];
 
-/// What the error of a sample is computed from, SI, body frame.
+/// Quantities from which the error of a sample is computed, SI, body frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Conditions<T: RealField> {
     /// Rate, rad/s, force, m/s², and the slow ones.
@@ -27,14 +27,14 @@ pub(super) struct Conditions<T: RealField> {
 pub(super) struct Fast<T: RealField> {
     pub law: FastLaw<T>,
     pub coefficients: [T; COEFFICIENTS],
-    /// Of a term: the numbers of its variables.
+    /// For a term: the numbers of its variables.
     pub factors: [u8; FACTORS],
 }
 
 /// Adds an effect to the error of the three sensors, SI.
 pub(super) type FastLaw<T> = fn(&Fast<T>, &Conditions<T>, &mut Vector3<T>);
 
-/// An effect that moves with temperature and time only.
+/// An effect that depends on temperature and time only.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Slowly<T: RealField> {
     Law {
@@ -47,12 +47,12 @@ pub(super) enum Slowly<T: RealField> {
     Term(Fast<T>),
 }
 
-/// What the errors are computed from that move with temperature and time.
+/// Quantities from which slow errors are computed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ambient<T> {
     /// Time since power-on, s.
     pub time: T,
-    /// What decays after power-on is gone, whatever the time.
+    /// Decays after power-on count as over, whatever the time.
     pub settled: bool,
     /// Temperature above the reference, °C.
     pub temperature_offset: T,
@@ -60,7 +60,7 @@ pub(super) struct Ambient<T> {
     pub lag: T,
 }
 
-/// An error that moves with temperature and time: of sensor i, `bias_i + along_i s_i + (across x)_i`, with s the input along
+/// A slow error. For sensor i it is `bias_i + along_i s_i + (across x)_i`, with s the input along
 /// the sensitive directions and x in the body frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slow<T: RealField> {
@@ -69,15 +69,15 @@ pub(super) struct Slow<T: RealField> {
     pub across: Matrix3<T>,
 }
 
-/// Adds an effect by coefficients, nonlinear constant and ambient.
+/// Adds an effect from its coefficients, its nonlinear constant and the ambient quantities.
 pub(super) type SlowLaw<T> = fn(&[T; COEFFICIENTS], T, &Ambient<T>, &mut Slow<T>);
 
-/// How an effect is evaluated: what it adds to the error of the three sensors, SI.
+/// How an effect is evaluated: its contribution to the errors of the three sensors, SI.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Evaluation<T: RealField> {
     /// With every sample.
     Fast(FastLaw<T>),
-    /// Now and then.
+    /// Several times per second.
     Slow(SlowLaw<T>),
 }
 
@@ -97,7 +97,7 @@ pub(super) enum Nonlinear {
 pub(super) struct Law<T: RealField> {
     /// Id of the effect without the `gyro_` or `accel_` before it.
     pub name: &'static str,
-    /// How many coefficients it takes. A matrix is by rows; rows are sensors.
+    /// Number of coefficients. A matrix is by rows; rows are sensors.
     pub coefficients: usize,
     pub nonlinear: Nonlinear,
     pub evaluation: Evaluation<T>,
@@ -116,8 +116,8 @@ impl<T: RealField + Copy> Law<T> {
         Self::TABLE.iter().find(|law| law.name == name)
     }
 
-    /// Everything that the device can remove by name. The laws hold for either triad; that some are of no use to one of them costs
-    /// nothing. An effect is added here and nowhere else.
+    /// All effects that the device can remove by name. Each law applies to both triads; a law that one of them never uses costs nothing. A
+    /// new effect is added only here.
     const TABLE: &'static [Self] = &[
         Self::fast("g_sensitivity", 9, g_sensitivity),
         Self::fast("g_squared", 9, g_squared),
@@ -131,7 +131,7 @@ impl<T: RealField + Copy> Law<T> {
             3,
             Nonlinear::TimeConstant,
             |c, time_constant, at, e| {
-                // Not `exp`, which nothing else here uses and which would be in the image for this.
+                // Not `exp`: it is used nowhere else and would be linked into the image for this line.
                 let left = (-at.time / time_constant).exp_m1() + T::one();
                 if !at.settled {
                     e.bias += each(c) * left;
@@ -225,9 +225,9 @@ fn cross_axis_product<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e:
     product(&law.coefficients, &s.component_mul(&s.yzx()), e);
 }
 
-/// `e_i = (α × r_i + ω × (ω × r_i))_i`, with r_i the place, m, where sensor i senses.
+/// `e_i = (α × r_i + ω × (ω × r_i))_i`, with r_i the sensing point of sensor i, m.
 ///
-/// As rows of `[α]× + [ω]×²` times the places: the matrix is shared by the three sensors.
+/// Rows of `[α]× + [ω]×²` times the positions: the three sensors share the matrix.
 fn size_effect<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
     let (c, a) = (&law.coefficients, &at.angular_acceleration);
     let [_, x, y, z, ..] = at.values;
@@ -238,7 +238,7 @@ fn size_effect<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut V
     e.z = e.z + (yz + a.x) * c[7] + (zx - a.y) * c[6] - (xx + yy) * c[8];
 }
 
-/// `e_i = c_i v_1 v_2 v_3`, where one c_i is not zero: an axis without an index, and without a branch.
+/// `e_i = c_i v_1 v_2 v_3`, where exactly one c_i is not zero: this selects the axis without an index and without a branch.
 pub(super) fn term<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
     let value = |factor: u8| {
         let value = at.values.get(usize::from(factor));

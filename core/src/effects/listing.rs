@@ -1,4 +1,4 @@
-//! An effect for people and programs: its public id, and what is stored of it.
+//! An effect for people and programs: its public id and its stored numbers.
 
 use core::fmt;
 
@@ -7,7 +7,7 @@ use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::effect::{Converter, DeviceEffect, Numbers, axis_name};
 
-/// The public id: of a term in the form `term:accel_y~rate_x*force_y^2`.
+/// The public id; that of a term has the form `term:accel_y~rate_x*force_y^2`.
 impl<T: RealField + Copy> fmt::Display for DeviceEffect<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sensor = self.sensor;
@@ -33,7 +33,7 @@ impl<T: RealField + Copy> fmt::Display for DeviceEffect<T> {
     }
 }
 
-/// For people and programs: what is stored of it, each number as it is.
+/// For people and programs: the stored numbers, unrounded.
 impl<T: RealField + Copy + Serialize> Serialize for DeviceEffect<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut all = serializer.serialize_struct("DeviceEffect", 4)?;
@@ -45,7 +45,7 @@ impl<T: RealField + Copy + Serialize> Serialize for DeviceEffect<T> {
     }
 }
 
-/// Raw in V, as on a device.
+/// Raw unit V, as on a device.
 impl<T: Serialize> Serialize for Converter<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut all = serializer.serialize_struct("Converter", 3)?;

@@ -10,7 +10,7 @@ use super::law::{Ambient, Conditions, Fast, Slow, Slowly, Values};
 use crate::Sensor;
 use crate::die::lagged;
 
-/// Evaluations of a sample that none goes before.
+/// Evaluations for a first sample.
 const COLD: usize = 2;
 
 /// Effects of one triad, and how their errors become errors in the body frame.
@@ -19,11 +19,11 @@ pub(super) struct Triad<T: RealField, const N: usize> {
     directions: Directions<T>,
     fast: Vec<Fast<T>, N>,
     slow: Vec<Slowly<T>, N>,
-    /// By axis, which may each have a converter of its own.
+    /// By axis, because each may have a separate converter.
     code: [Option<Code<T>>; 3],
 }
 
-/// What the effects of one triad remember.
+/// Memory of the effects of one triad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Memory<T: RealField, const N: usize> {
     /// The slow effects: errors of the sensors `A x + b`.
@@ -31,12 +31,12 @@ pub(super) struct Memory<T: RealField, const N: usize> {
     bias: Vector3<T>,
     /// Error of the sample before, body frame; `None` if there was none.
     before: Option<Vector3<T>>,
-    /// Of each slow effect: its lagged temperature, minus itself, °C.
+    /// For each slow effect: the lagged temperature minus the temperature, °C.
     lags: [T; N],
 }
 
 impl<T: RealField + Copy, const N: usize> Memory<T, N> {
-    /// Of nothing.
+    /// Empty memory.
     pub fn none() -> Self {
         Self {
             slope: Matrix3::zeros(),
@@ -46,7 +46,7 @@ impl<T: RealField + Copy, const N: usize> Memory<T, N> {
         }
     }
 
-    /// The next sample does not follow the one before.
+    /// Samples are missing before the next one.
     pub fn gap(&mut self) {
         self.before = None;
     }
@@ -71,7 +71,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
                 weight,
                 zero,
             } => {
-                // All are looked at before any is set: what is refused changes nothing.
+                // All are checked before any is set, so a refusal changes nothing.
                 let mut both = self.code.iter().zip(axes);
                 if both.any(|(code, meant)| *meant && code.is_some()) {
                     return Err(EffectError::Full);
@@ -89,7 +89,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         Ok(())
     }
 
-    /// The lagged temperatures in a memory, minus the temperature, °C, each behind its time constant, s.
+    /// Lagged temperatures of a memory minus the temperature, °C, each with its time constant, s.
     pub fn lags<'a>(&'a self, memory: &'a Memory<T, N>) -> impl Iterator<Item = (T, T)> + 'a {
         let all = self.slow.iter().zip(&memory.lags);
         all.filter_map(|(effect, lag)| match effect {
@@ -102,7 +102,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         })
     }
 
-    /// A memory of nothing but the lagged temperatures that are known, by their time constants, s.
+    /// A memory with only the known lagged temperatures, by their time constants, s.
     pub fn memory(&self, known: impl Fn(T) -> Option<T>) -> Memory<T, N> {
         let mut memory = Memory::none();
         for (effect, lag) in self.slow.iter().zip(&mut memory.lags) {
@@ -118,7 +118,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         memory
     }
 
-    /// Folds the slow effects; the slow variables of the conditions are set.
+    /// Folds the slow effects; expects the slow variables of the conditions to be set.
     pub fn slow(
         &self,
         memory: &mut Memory<T, N>,
@@ -176,7 +176,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         clean
     }
 
-    /// The input of the triad without its errors; `own` says which of the conditions that is. They are left as they were.
+    /// The input of the triad without its errors; `own` selects it among the conditions, which stay unchanged.
     #[inline]
     pub fn remove(
         &self,
@@ -205,8 +205,8 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         };
         for _ in 0..rounds {
             let before = memory.before.unwrap_or(Vector3::zeros());
-            // Where the error is steeper than the input, far beyond any sensor, this would lead away, and out of all numbers. The
-            // one is 1 rad/s or 1 m/s²: by much less may a resting sensor be off.
+            // If the slope of the error exceeds that of the input (far beyond any sensor), the iteration would diverge. The 1 is 1 rad/s or
+            // 1 m/s²: a sensor at rest errs by much less.
             let clean = match before.norm_squared() < input.norm_squared() + T::one() {
                 true => input - before,
                 false => *input,

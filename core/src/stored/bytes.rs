@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-/// The calibration would be longer than there is room for, or an effect is longer than any is.
+/// The calibration exceeds the room for it, or an effect exceeds the largest one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooLong;
 
@@ -14,7 +14,7 @@ impl core::fmt::Display for TooLong {
 
 impl core::error::Error for TooLong {}
 
-/// The bytes that are still to be read. Everything is `None` once they end.
+/// The remaining bytes. All reads return `None` after the end.
 pub(super) struct Reader<'a>(pub &'a [u8]);
 
 impl<'a> Reader<'a> {
@@ -52,7 +52,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Bytes that are written from the beginning.
+/// Buffer that is written from its beginning.
 pub(super) struct Writer<'a> {
     out: &'a mut [u8],
     length: usize,

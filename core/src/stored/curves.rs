@@ -11,24 +11,24 @@ use crate::table::{self, Node, Table};
 
 /// The thermometer is the mean of the gyros' TEMP pins.
 pub(super) const TEMP_PINS: u8 = 0;
-/// Bytes in front of the first node: range and lags.
+/// Number of bytes before the first node: range and lags.
 pub(super) const BEFORE_NODES: usize = 8 + 8;
 const RANGE_KNOWN: u8 = 1;
 const LAGS_KNOWN: u8 = 1 << 1;
 
-/// Compensation over temperature as it is written.
+/// Compensation over temperature, to be written.
 #[derive(Debug, Clone, Copy)]
 pub struct Curves<'a> {
     /// In the order of their temperatures.
     pub nodes: &'a [Node<f32>],
-    /// Dies' temperatures that they were found from, °C.
+    /// Temperature range of the dies from which they were found, °C.
     pub range_c: Option<[f32; 2]>,
     /// Lags of the dies behind the thermometer, s; negative: they lead.
     pub lags_s: Option<PerSensor<f32>>,
 }
 
 impl<'a> Curves<'a> {
-    /// These nodes, of no known range and no known lags.
+    /// These nodes, with unknown range and unknown lags.
     pub const fn of(nodes: &'a [Node<f32>]) -> Self {
         Self {
             nodes,
@@ -37,7 +37,7 @@ impl<'a> Curves<'a> {
         }
     }
 
-    /// Bits of what is known.
+    /// Bits that say which fields are known.
     pub(super) fn known(&self) -> u8 {
         let bit = |known: bool, bit: u8| if known { bit } else { 0 };
         bit(self.range_c.is_some(), RANGE_KNOWN) | bit(self.lags_s.is_some(), LAGS_KNOWN)
@@ -65,18 +65,18 @@ impl<'a> Curves<'a> {
     }
 }
 
-/// What stands in front of the nodes, and how much of it.
+/// Fields before the nodes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Head {
     /// Number of nodes.
     pub nodes: u8,
     /// As in the layout.
     pub thermometer: u8,
-    /// Bits of what is known.
+    /// Bits that say which fields are known.
     pub known: u8,
 }
 
-/// Range and lags as a table and what [`Curves::lags_s`] was, and the nodes.
+/// Reads range, lags and nodes; returns the table and the lags.
 pub(super) fn read(
     from: &mut Reader<'_>,
     head: Head,

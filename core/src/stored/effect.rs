@@ -9,7 +9,7 @@ use crate::effects::{DeviceEffect, EffectError, Variable};
 const NAMED: u8 = 0;
 const TERM: u8 = 1;
 const CODE: u8 = 2;
-/// The axis of a code that is that of all three.
+/// Axis number of a code that applies to all three axes.
 const ALL: u8 = 3;
 /// Most coefficients of an effect.
 const COEFFICIENTS: usize = 9;
@@ -76,7 +76,7 @@ pub(super) fn read(from: &mut Reader<'_>) -> Option<Result<DeviceEffect<f32>, Ef
             let of = |sensor| DeviceEffect::code(sensor, axis, &errors, weight, zero);
             Some(sensor(triad).and_then(of))
         }
-        // Of a kind that a later version has.
+        // A kind of a later version.
         _ => Some(Err(EffectError::Unknown)),
     }
 }

@@ -1,8 +1,8 @@
-//! Which unit a calibration is of, when it was made, and from what.
+//! The unit that a calibration belongs to, its date, and the samples that it was made from.
 
 use super::bytes::{Reader, TooLong, Writer};
 
-/// Where a calibration comes from. In bytes what is unknown is zero.
+/// Origin of a calibration. In bytes an unknown field is zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Origin {
     /// The unit: its microcontroller's own 96-bit number, as it is in memory.
@@ -11,7 +11,7 @@ pub struct Origin {
     pub created_s: Option<u64>,
     /// SHA-256 of the samples that it was made from.
     pub samples_sha256: Option<[u8; 32]>,
-    /// When its offsets were set anew on the device, with everything else kept, seconds of UTC since 1970.
+    /// Date of the last trim of its offsets on the device, seconds of UTC since 1970.
     pub trimmed_s: Option<u64>,
 }
 

@@ -1,25 +1,25 @@
-//! Offsets of a stored calibration set anew, everything else kept.
+//! Trim: new offsets for a stored calibration; everything else is kept.
 
 use super::bytes::Reader;
 use super::{CHECK, CRC, HEADER, StoredError, curves, decode};
 use crate::PerSensor;
 
-/// Where the time of the trim stands.
+/// Position of the time of the trim.
 const TRIMMED_AT: usize = HEADER + 52;
-/// Where the first node stands: behind the origin, the directions, and what stands in front of the nodes.
+/// Position of the first node: after the origin, the directions and the fields before the nodes.
 const NODES_AT: usize = HEADER + 60 + 144 + curves::BEFORE_NODES;
 const NODE: usize = 196;
-/// Where o of the gyro and o of the accelerometer stand in a node.
+/// Positions of o of the gyro and o of the accelerometer in a node.
 const OFFSETS_AT: PerSensor<usize> = PerSensor {
     gyro: 4 + 36,
     accel: 4 + 48 + 36,
 };
 
-/// Adds to o of the gyro (rad/s) and of the accelerometer (m/s²) of every node, so that the curves move as they are, and writes when that was, UTC
-/// seconds since 1970. Origin, effects and all else stay as they are, bit by bit.
+/// Adds to o of the gyro (rad/s) and of the accelerometer (m/s²) of every node, which shifts the curves unchanged, and writes the time (UTC
+/// seconds since 1970). All other bytes are unchanged.
 ///
 /// # Errors
-/// Why the bytes are no calibration, before or after.
+/// The reason why the bytes are not a calibration, before or after the trim.
 pub fn trim(bytes: &mut [u8], add: PerSensor<[f32; 3]>, trimmed_s: u64) -> Result<(), StoredError> {
     decode(bytes)?;
     let nodes = usize::from(*bytes.get(HEADER - 4).ok_or(StoredError::Length)?);

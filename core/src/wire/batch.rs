@@ -8,10 +8,10 @@ use crate::PerSensor;
 use crate::compensation::Sample;
 use crate::effects::REFERENCE_C;
 
-/// Most samples of a batch. Fewer come where a sample is missing, since those of a batch are consecutive, and before the first sample of a new
-/// calibration.
+/// Largest number of samples in a batch. A batch is shorter before a missing sample, because its samples are consecutive, and before the
+/// first sample of a new calibration.
 ///
-/// Twenty: 20 ms of delay, and 46 bytes of everything else are 11 % of a raw frame.
+/// Twenty samples mean 20 ms of delay; the 46 bytes of overhead are then 11 % of a raw frame.
 pub const BATCH: usize = 20;
 
 /// Bytes of a raw sample: six sums of three bytes.
@@ -22,48 +22,48 @@ pub const COMPENSATED_BYTES: usize = 24;
 
 /// Bits of [`BatchHead::flags`].
 pub mod flags {
-    /// The temperature of the dies is outside what the calibration is for, by however little: its curves go on along their slope for 5 K, and are
-    /// held farther out.
+    /// The temperature of the dies is outside the range of the calibration, by any amount. The curves continue along their slope for 5 K
+    /// and are constant beyond.
     pub const OUTSIDE_NODES: u16 = 1;
     /// The self-test deflects the sensors.
     pub const SELF_TEST: u16 = 1 << 1;
     /// A calibration is being written.
     pub const STORING: u16 = 1 << 2;
-    /// A sample of the batch stands where a sensor's output can go no further: its input is larger than it tells.
+    /// A sample of the batch is at the end of a sensor's output range: the input is larger than the reading.
     pub const SATURATED: u16 = 1 << 3;
-    /// The gyros' reference is not where it can be: its pin is open, and its nominal voltage is used.
+    /// The gyros' reference is out of its range (its pin is open), so its nominal voltage is used.
     pub const NO_REFERENCE: u16 = 1 << 4;
-    /// The TEMP pins of gyro x, y, z: one that reads what no working gyro has, that disagrees with the others, that has made a step that no die
-    /// makes, or that stands still while the others move is left out of [`BatchHead::temp_c`](super::BatchHead::temp_c).
+    /// TEMP pins of gyro x, y, z. A pin that is out of range, disagrees with the others, has jumped faster than a die can, or is stuck
+    /// while the others change is left out of [`BatchHead::temp_c`](super::BatchHead::temp_c).
     pub const TEMPERATURE_LEFT_OUT: [u16; 3] = [1 << 5, 1 << 6, 1 << 7];
-    /// No TEMP pin is left, and the last good temperature is used; before there was one, 25 °C.
+    /// No TEMP pin is usable, so the last good temperature is used; before there was one, 25 °C.
     pub const NO_TEMPERATURE: u16 = 1 << 8;
-    /// When the power came is not known: what passes after it is taken for long past.
+    /// The time since power-on is unknown: decays after power-on count as over.
     pub const POWER_ON_UNKNOWN: u16 = 1 << 9;
 }
 
-/// Sums of the converter's codes of x, y, z over the scans of a sample, so that averaging loses nothing.
+/// Sums of the converter's codes of x, y, z over the scans of a sample; a mean would lose resolution.
 pub type Sums = PerSensor<[u32; 3]>;
 
-/// What holds for all samples of a batch.
+/// Fields that apply to all samples of a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BatchHead {
     /// Number of the first sample: milliseconds since sampling began. The others follow one by one; a gap between batches is a gap
     /// in time.
     pub first: u32,
-    /// Samples that the device lost so far, of all causes: sampling began anew, or processing was behind.
+    /// Samples that the device has lost so far, for any reason: sampling restarted, or processing was late.
     pub samples_lost: u32,
-    /// Batches that were lost so far because the line was behind.
+    /// Batches lost so far because the line was too slow.
     pub batches_dropped: u32,
-    /// Temperature, °C. In a raw batch that of the thermometer, filtered: the gyros' TEMP pins that are not left out. In a compensated batch that of
-    /// the gyros' dies, which is what compensation goes by: the same behind the lag of the calibration.
+    /// Temperature, °C. In a raw batch it is that of the thermometer: the filtered mean of the gyros' usable TEMP pins. In a compensated
+    /// batch it is that of the gyros' dies, which compensation uses: the same after the calibration's lag.
     pub temp_c: f32,
     /// [`flags`].
     pub flags: u16,
 }
 
 impl BatchHead {
-    /// The thermometer of a raw batch, °C; `None` where it has had no reading yet: 25 °C stands in for it, beside the flag.
+    /// Thermometer of a raw batch, °C; `None` if it has had no reading yet (the batch then has 25 °C and the flag).
     pub fn thermometer_c(&self) -> Option<f32> {
         let none = self.flags & flags::NO_TEMPERATURE != 0 && self.temp_c == REFERENCE_C as f32;
         (!none).then_some(self.temp_c)
@@ -75,12 +75,12 @@ impl BatchHead {
 pub struct RawBatch<'a> {
     /// What holds for all of them.
     pub head: BatchHead,
-    /// Volts at a gyro for one step of its sum. It moves with the filtered reading of the gyros' own reference, so that drift of the
-    /// converter's is taken out. Reading in V = sum * this, in `f32`, which is what the device compensates.
+    /// Volts at a gyro per unit of its sum. It follows the filtered reading of the gyros' reference, which removes the drift of the
+    /// converter's reference. Reading in V = sum * this, in `f32`, as the device compensates it.
     pub gyro_volts: f32,
-    /// Volts at the accelerometer for one step of its sum.
+    /// Volts at the accelerometer per unit of its sum.
     pub accel_volts: f32,
-    /// Temperatures by the TEMP pins of gyro x, y, z, filtered, °C, also of a pin that is left out.
+    /// Filtered temperatures of the TEMP pins of gyro x, y, z, °C, including pins that are left out.
     pub gyro_temps_c: [f32; 3],
     /// [`Sums`]: gyro x, y, z, accel x, y, z, each three bytes, little end first; sample after sample.
     pub samples: &'a [u8],
@@ -93,8 +93,8 @@ pub struct CompensatedBatch<'a> {
     pub head: BatchHead,
     /// Gyro x, y, z, rad/s, accel x, y, z, m/s², each an `f32`, little end first; sample after sample.
     pub samples: &'a [u8],
-    /// Temperature of the accelerometer's die, °C, where the calibration has a lag of its own for it; `None` where it is that of the
-    /// gyros. Since protocol 2.2.
+    /// Temperature of the accelerometer's die, °C, if the calibration has a separate lag for it; `None` if it is that of the gyros. Since
+    /// protocol 2.2.
     #[serde(with = "extensible::last")]
     pub accel_die_c: Option<f32>,
 }
@@ -136,7 +136,7 @@ impl<'a> RawBatch<'a> {
         }))
     }
 
-    /// Numbers and readings of the samples, V, in order: to the last bit what the device compensates.
+    /// Numbers and readings of the samples, V, in order; identical to the readings that the device compensates, to the last bit.
     pub fn volts(&self) -> impl Iterator<Item = (u32, Sample<f32>)> + 'a {
         let (gyro, accel) = (self.gyro_volts, self.accel_volts);
         self.sums()
@@ -144,7 +144,7 @@ impl<'a> RawBatch<'a> {
     }
 }
 
-/// Reading of a sample, V, from its sums and the volts for a step of them; see [`RawBatch`].
+/// Reading of a sample, V, from its sums and the volts per unit; see [`RawBatch`].
 #[inline]
 pub fn volts(sums: &Sums, gyro_volts: f32, accel_volts: f32) -> Sample<f32> {
     let volts = |sums: [u32; 3], step: f32| Vector3::from(sums).map(|sum| sum as f32) * step;
@@ -203,7 +203,7 @@ impl<'a> CompensatedBatch<'a> {
     }
 }
 
-/// Sample numbers from the first on; after 49 days they begin again at 0.
+/// Sample numbers from the first on; after 49 days they wrap to 0.
 fn numbers(first: u32) -> impl Iterator<Item = u32> {
     (0..).map(move |k| first.wrapping_add(k))
 }

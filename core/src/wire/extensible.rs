@@ -1,7 +1,7 @@
-//! What two versions read of each other: a record that has become longer, and a choice that has got another variant.
+//! Compatibility of two versions: longer records, and additional variants.
 //!
-//! Used as `#[serde(with = "extensible")]`, a field is its own bytes in postcard behind their length. A reader that does not know the
-//! variant reads the default of the type, and goes on behind it.
+//! Used as `#[serde(with = "extensible")]`, a field is written as its length followed by its bytes in postcard. A reader that does not know
+//! the variant gets the default of the type, and continues after the field.
 
 use postcard::Error;
 use postcard::de_flavors::Flavor;
@@ -28,7 +28,7 @@ where
     Ok(read.map_or_else(|_| T::default(), |(value, _)| value))
 }
 
-/// The same of two in a row, each behind its own length.
+/// The same for two fields in a row, each after its own length.
 pub(super) mod pair {
     use serde::de::{Deserialize, Deserializer};
     use serde::ser::{Serialize, Serializer};
@@ -64,7 +64,7 @@ pub(super) mod pair {
     }
 }
 
-/// A last field that is not always there: none is no bytes at all, as a version sends it that does not know the field.
+/// An optional last field: `None` is written as no bytes, like a version that does not know the field.
 pub(super) mod last {
     use serde::de::{Deserialize, Deserializer};
     use serde::ser::{Serialize, Serializer};
@@ -88,13 +88,13 @@ pub(super) mod last {
     }
 }
 
-/// Bytes that go on with zeros behind their end. In postcard a zero is 0, false, none, the first variant, and text of no length.
+/// Bytes followed by zeros without end. In postcard a zero is 0, false, `None`, the first variant, or an empty text.
 pub(super) struct Tolerant<'de> {
     rest: &'de [u8],
     cut: bool,
 }
 
-/// What is taken behind the end at once; nothing that is read takes more.
+/// Zeros that one read can get after the end; no read needs more.
 static ZEROS: [u8; 16] = [0; 16];
 
 impl<'de> Tolerant<'de> {
@@ -109,12 +109,12 @@ impl<'de> Tolerant<'de> {
         Ok((value, from.finalize()?))
     }
 
-    /// Whether the bytes have ended before what was read has.
+    /// Whether the bytes ended before the value did.
     pub fn is_cut(&self) -> bool {
         self.cut
     }
 
-    /// Whether both have ended together.
+    /// Whether bytes and value ended together.
     pub fn is_exact(&self) -> bool {
         !self.cut && self.rest.is_empty()
     }
@@ -142,7 +142,7 @@ impl<'de> Flavor<'de> for Tolerant<'de> {
             self.rest = rest;
             return Ok(taken);
         }
-        // What has begun is cut in the middle, which no version sends.
+        // The value is cut in the middle, which no version sends.
         let behind = self.rest.is_empty();
         self.cut = true;
         let zeros = ZEROS.get(..count).filter(|_| behind);

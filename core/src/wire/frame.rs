@@ -1,4 +1,4 @@
-//! Frames: where a message begins and ends, and whether it arrived whole.
+//! Frames: limits of a message, and whether it arrived complete.
 
 use cobs::{DecodeResult, DecoderState};
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -17,8 +17,8 @@ const CHECK: usize = 4;
 /// Most bytes of a frame: message and CRC, one byte of COBS for every 254 begun, and the zeros.
 pub const MAX_FRAME: usize = cobs::max_encoding_length(MAX_PAYLOAD + CHECK) + 2;
 
-/// With the table of 1 KiB: bit by bit it would be some fifty instructions a byte, at 45 kB/s.
-// A static: the table of a constant is in the image once for each use.
+/// With a table of 1 KiB: bit by bit it would need about fifty instructions per byte, at 45 kB/s.
+// A static, because the table of a constant would be in the image once for each use.
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// The message is longer than [`MAX_PAYLOAD`].
@@ -54,13 +54,14 @@ pub fn encode<T: Serialize>(message: &T, out: &mut [u8; MAX_FRAME]) -> Result<us
     Ok(length + 2)
 }
 
-/// Payload of a frame that arrived whole.
+/// Payload of a frame that arrived complete.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Frame<'a>(pub &'a [u8]);
 
 impl<'a> Frame<'a> {
     /// The message in it: all of it, or `None`. A [greeting](Message::Greeting), [counters](Reply::Counters), the results of a
-    /// [self-test](Reply::SelfTest) and a [compensated batch](Event::Compensated) may be followed by what later versions have appended, and may lack what this one has; then it is zero.
+    /// [self-test](Reply::SelfTest) and a [compensated batch](Event::Compensated) may be followed by fields of later versions, and may lack
+    /// fields of this one, which are then zero.
     /// A refusal for a reason that this build does not know is [`Refusal::NotKnown`].
     pub fn message(&self) -> Option<Message<'a>> {
         let Ok((message, tolerant)) = Tolerant::read::<Message<'a>>(self.0) else {
@@ -71,7 +72,7 @@ impl<'a> Frame<'a> {
             return Some(Message::Refused { id, refusal });
         };
         let any_length = match &message {
-            // What begins otherwise is somebody else's, and only what is whole is one of those.
+            // A message that begins differently is not one of these; and only a complete one counts.
             Message::Greeting { greeting, .. } => !tolerant.is_cut() || greeting.magic == MAGIC,
             Message::Reply { reply, .. } => {
                 matches!(reply, Reply::Counters(_) | Reply::SelfTest(_))
@@ -99,7 +100,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// As much of a [`Message`] as tells a refusal.
+/// The part of a [`Message`] that shows a refusal.
 #[derive(Deserialize)]
 enum Beginning {
     Greeting,
@@ -112,7 +113,7 @@ enum Beginning {
 pub struct Decoder {
     cobs: DecoderState,
     decoded: Vec<u8, { MAX_PAYLOAD + CHECK }>,
-    /// The rest until the next zero is not looked at.
+    /// The rest until the next zero is skipped.
     discarding: bool,
     garbled: u32,
 }
@@ -156,12 +157,12 @@ impl Decoder {
         None
     }
 
-    /// Frames so far that did not arrive whole: too short, too long, not COBS, wrong CRC.
+    /// Number of frames so far that did not arrive complete: too short, too long, not COBS, wrong CRC.
     pub const fn garbled(&self) -> u32 {
         self.garbled
     }
 
-    /// Begins counting anew.
+    /// Resets the counter.
     pub const fn reset_garbled(&mut self) {
         self.garbled = 0;
     }

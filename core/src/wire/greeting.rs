@@ -1,5 +1,5 @@
-//! Who the device is. The layout of this is that of version 2 for ever. Later versions append fields: one that a device does not send
-//! yet is read as zero, which is none or unknown, and one that this build does not know yet is not looked at.
+//! Identity of the device. The layout of version 2 never changes; later versions append fields. A field that the device does not send is
+//! read as zero (none or unknown); one that this build does not know is ignored.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,20 +16,20 @@ pub const PROTOCOL: Version = Version { major: 2, minor: 2 };
 /// Version of a protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 pub struct Version {
-    /// Another one cannot be talked to.
+    /// Another major version is incompatible.
     pub major: u8,
-    /// A higher one knows more messages.
+    /// A higher minor version knows more messages.
     pub minor: u8,
 }
 
-/// Who the device is, what it can do, and what it holds.
+/// Identity, abilities and stored calibration of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Greeting<'a> {
     /// [`MAGIC`].
     pub magic: [u8; 4],
-    /// What it speaks.
+    /// Its protocol.
     pub protocol: Version,
-    /// Version of the firmware, and the commit that it was built from: `0.1.0-1a2b3c4`, with `-dirty` behind it if it was changed.
+    /// Version of the firmware, and the commit that it was built from: `0.1.0-1a2b3c4`, followed by `-dirty` if the sources were changed.
     pub firmware: &'a str,
     /// Name of the board.
     pub board: &'a str,
@@ -37,7 +37,7 @@ pub struct Greeting<'a> {
     pub unit_id: [u8; 12],
     /// What it can do.
     pub capabilities: Capabilities,
-    /// The effects that it can remove: bit k stands for [`EFFECTS`]`[k]`.
+    /// The effects that it can remove: bit k means [`EFFECTS`]`[k]`.
     pub effects: u32,
     /// Most effects of each triad that run with every sample, and as many that do not.
     pub effects_room: u8,
@@ -51,17 +51,17 @@ pub struct Greeting<'a> {
     pub channels: &'a str,
     /// Unit of a raw reading.
     pub raw_unit: &'a str,
-    /// Why it started.
+    /// Reset cause.
     #[serde(borrow, with = "extensible")]
     pub start: Start<'a>,
-    /// Starts without a power failure in between, this one counted.
+    /// Number of starts since the last power failure, including this one.
     pub starts: u32,
     /// The calibration in use.
     pub stored: Option<StoredInfo>,
-    /// What is in the two places for a calibration.
+    /// Contents of the two places for a calibration.
     #[serde(with = "extensible::pair")]
     pub slots: [Slot; 2],
-    /// Time since power-on at the start of sampling, ms; `None` if it is not known.
+    /// Time since power-on at the start of sampling, ms; `None` if unknown.
     pub powered_for_ms: Option<u32>,
 }
 
@@ -121,12 +121,12 @@ pub const EFFECTS: &[&str] = &[
     "gyro_g_squared",
 ];
 
-/// Bits of those that are no effects by name, but [`DeviceEffect::code`].
+/// Bits of the effects that are [`DeviceEffect::code`] instead of named laws.
 const CODES: u32 = 0b11 << 18;
 
-/// The bits of the effects that this build removes: those by name are found by asking for each, so that they cannot be out of date.
+/// Bits of the effects that this build removes. Each named one is tried, so the bits cannot be out of date.
 pub fn effects_of_this_build() -> u32 {
-    // None takes no numbers at all, so that a known one is refused for their count.
+    // Every effect needs coefficients, so a known one is refused for their number.
     let known = |id| {
         !matches!(
             DeviceEffect::<f32>::named(id, &[], None),
@@ -137,16 +137,16 @@ pub fn effects_of_this_build() -> u32 {
     bits.fold(CODES, |bits, (bit, id)| bits | u32::from(known(id)) << bit)
 }
 
-/// Why the device started.
+/// Reset cause of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Start<'a> {
-    /// Power came, or was too low in between.
+    /// Power-on, or the supply was too low.
     PowerOn,
     /// The reset pin: the button, or the debugger.
     ResetPin,
     /// The watchdog: the program stopped sampling for too long.
     Watchdog,
-    /// The program asked for it.
+    /// The program requested it.
     Software,
     /// The program stopped at a panic.
     Panic {
@@ -164,7 +164,7 @@ pub enum Start<'a> {
     },
     /// None of these.
     Other,
-    /// A reason that this build does not know, or none was given; never sent.
+    /// A cause that this build does not know, or none was given; never sent.
     #[default]
     #[serde(skip)]
     NotKnown,
@@ -181,27 +181,27 @@ pub struct StoredInfo {
     pub nodes: u8,
     /// Effects.
     pub effects: u8,
-    /// Number of the unit that it is of; zero if that is not known.
+    /// Number of the unit that it belongs to; zero if unknown.
     pub unit_id: [u8; 12],
-    /// When it was made, UTC seconds since 1970; zero if that is not known.
+    /// When it was made, UTC seconds since 1970; zero if unknown.
     pub created_s: u64,
 }
 
-/// What is in one of the two places for a calibration.
+/// Contents of one of the two places for a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Slot {
     /// Nothing.
     Empty,
-    /// A whole calibration.
+    /// A complete calibration.
     Whole {
         /// Counts the calibrations; the higher one is in use.
         generation: u32,
     },
     /// A calibration whose writing did not end, or the remains of one being erased.
     Unfinished,
-    /// A calibration that was whole once and is not any more.
+    /// A calibration that was complete before and is damaged now.
     Damaged,
-    /// A whole calibration that this version of the firmware cannot use.
+    /// A complete calibration that this version of the firmware cannot use.
     NotUsable(stored::StoredError),
     /// Something that this build does not know; never sent.
     #[default]
@@ -212,19 +212,19 @@ pub enum Slot {
 /// How a device compares with this build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Compatibility {
-    /// It speaks the same.
+    /// It has the same protocol.
     Same,
-    /// It speaks less: update the device.
+    /// It has an older protocol: update the device.
     DeviceOlder {
-        /// Whether what both know is the same; otherwise only the greeting can be relied on.
+        /// Whether the common part is compatible; otherwise only the greeting can be relied on.
         usable: bool,
     },
-    /// It speaks more: update the host.
+    /// It has a newer protocol: update the host.
     DeviceNewer {
         /// As above.
         usable: bool,
     },
-    /// Something else answers.
+    /// It is not a mimu device.
     NotMimu,
 }
 

@@ -12,19 +12,19 @@ pub const CHUNK: usize = 256;
 /// What the host sends: a request and a number of its choice, which the answer repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Call<'a> {
-    /// Repeated in the answer. 0 is for messages that nobody asked for.
+    /// Number of the call; the answer repeats it. 0 is for messages without a call.
     pub id: u16,
-    /// What is wanted.
+    /// The request.
     #[serde(borrow)]
     pub request: Request<'a>,
 }
 
-/// What the host can ask. Each is answered by one [`Message`] with its id: the reply that is named here, or [`Message::Refused`].
+/// Requests of the host. Each gets one [`Message`] with its id: the reply named here, or [`Message::Refused`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Request<'a> {
-    /// Who are you? → [`Message::Greeting`]. Number and answer stay as they are in all versions.
+    /// Ask for the identity. → [`Message::Greeting`]. Number and answer are the same in all versions.
     Hello,
-    /// Send samples from the next batch on, as [`Event::Raw`], [`Event::Compensated`] or both; neither is [`Request::Stop`].
+    /// Send samples from the next batch on, as [`Event::Raw`], [`Event::Compensated`] or both; neither means [`Request::Stop`].
     /// Both start with the same sample. → [`Reply::Done`]
     Stream {
         /// Raw readings.
@@ -36,21 +36,21 @@ pub enum Request<'a> {
     Stop,
     /// → [`Reply::Counters`]
     Counters,
-    /// Set the counters to zero, but for what describes the present. → [`Reply::Done`]
+    /// Set the counters to zero, except those that describe the present. → [`Reply::Done`]
     ResetCounters,
     /// Deflect the sensors electrically and measure it; the unit has to stand still for a second. Samples meanwhile carry
     /// [`flags::SELF_TEST`](super::flags::SELF_TEST). → [`Reply::SelfTest`], after about a second.
     SelfTest,
-    /// Begin sending a calibration. One that was begun before and not committed is forgotten. → [`Reply::Done`]
+    /// Start an upload. An earlier one that was not committed is discarded. → [`Reply::Done`]
     UploadBegin {
         /// Bytes, at most [`stored::MAX_LENGTH`](crate::stored::MAX_LENGTH).
         length: u32,
         /// [`stored::hash`](crate::stored::hash) over all of them.
         hash: u64,
-        /// Whether it is also stored if it is of another unit. One of an unknown unit always is.
+        /// Whether it is stored even if it belongs to another unit. One of an unknown unit is always stored.
         other_unit: bool,
     },
-    /// Part of it, in order of the offset and without gaps; a part that was received already may be repeated. → [`Reply::Done`]
+    /// Send a part, in order of the offset and without gaps; a part that was received already may be repeated. → [`Reply::Done`]
     UploadChunk {
         /// Of the first byte.
         offset: u32,
@@ -58,7 +58,7 @@ pub enum Request<'a> {
         bytes: &'a [u8],
     },
     /// Check the hash and the contents, then store and use it. → [`Reply::Done`], once it is in flash and has been read back; the old
-    /// one holds until then. Takes some seconds.
+    /// calibration is used until then. Takes some seconds.
     UploadCommit,
     /// Part of the calibration in use. → [`Reply::Stored`]
     Download {
@@ -67,21 +67,21 @@ pub enum Request<'a> {
         /// At most [`CHUNK`]; fewer come at the end.
         length: u16,
     },
-    /// Start the Kalman bank of a triad anew; it takes in no sample before its input is known. → [`Reply::Done`]
+    /// Restart the Kalman bank of a triad; it uses no sample before its input is known. → [`Reply::Done`]
     KalmanStart {
         /// Of the sensors.
         sensor: Sensor,
         /// Variances of single readings of the sensors x, y, z, V².
         noise: [f32; 3],
-        /// What is known before.
+        /// The prior.
         prior: Prior,
     },
-    /// From the next sample on this is what the triad senses, until the next such request. → [`Reply::Done`]
+    /// Set the known input of the triad, from the next sample until the next such request. → [`Reply::Done`]
     KalmanInput {
         /// Of the sensors.
         sensor: Sensor,
-        /// True input in the body frame: rate, rad/s, or specific force (at rest it points up), m/s². `None`: unknown, as while the
-        /// table moves; no sample is taken in.
+        /// True input in the body frame: rate, rad/s, or specific force (at rest it points up), m/s². `None`: unknown, as while the table
+        /// moves; samples are not used.
         input: Option<[f32; 3]>,
     },
     /// Stop the bank. → [`Reply::Kalman`], the last state.
@@ -89,13 +89,13 @@ pub enum Request<'a> {
         /// Of the sensors.
         sensor: Sensor,
     },
-    /// Keep what the bank knows now, for [`Request::KalmanBack`]. → [`Reply::Done`]
+    /// Save the state of the bank, for [`Request::KalmanBack`]. → [`Reply::Done`]
     KalmanKeep {
         /// Of the sensors.
         sensor: Sensor,
     },
-    /// Know again what was kept, or what the bank began with; the input is unknown from now on. What came in between is forgotten, as of a
-    /// dwell in which the unit moved. → [`Reply::Done`]
+    /// Restore the saved state, or the prior; the input is unknown from now on. Samples in between are discarded, as after a dwell in which
+    /// the unit moved. → [`Reply::Done`]
     KalmanBack {
         /// Of the sensors.
         sensor: Sensor,
@@ -105,7 +105,7 @@ pub enum Request<'a> {
 /// What the device sends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Message<'a> {
-    /// Who it is: answer to [`Request::Hello`], and sent once after every start with the id 0.
+    /// Greeting: answer to [`Request::Hello`], and sent once after every start with the id 0.
     Greeting {
         /// That of the call.
         id: u16,
@@ -117,44 +117,44 @@ pub enum Message<'a> {
     Reply {
         /// That of the call.
         id: u16,
-        /// What it asked for.
+        /// The reply.
         #[serde(borrow)]
         reply: Reply<'a>,
     },
     /// The call was not done, and nothing has changed.
     Refused {
-        /// That of the call; 0 if the frame was whole but its contents could not be read.
+        /// That of the call; 0 if the frame was complete but its contents could not be read.
         id: u16,
         /// Why.
         refusal: Refusal,
     },
-    /// What is sent without being asked each time.
+    /// Sent without a request for each message.
     Event(#[serde(borrow)] Event<'a>),
 }
 
 /// Answers to calls.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Reply<'a> {
-    /// Done, and there is nothing to tell.
+    /// Done, without further data.
     Done,
-    /// What has been counted.
+    /// The counters.
     Counters(Counters),
-    /// How the sensors answered.
+    /// Results of the self-test.
     SelfTest(SelfTest),
     /// Part of the stored calibration.
     Stored {
         /// Of the first byte.
         offset: u32,
-        /// Length of the whole, bytes.
+        /// Total length, bytes.
         length: u32,
-        /// The part; shorter than asked for at the end.
+        /// The part; shorter than requested at the end.
         bytes: &'a [u8],
     },
-    /// A bank as it ended.
+    /// Last state of a bank.
     Kalman(KalmanState),
 }
 
-/// What comes without being asked each time.
+/// Messages without a request for each.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Event<'a> {
     /// Raw readings.
@@ -168,13 +168,13 @@ pub enum Event<'a> {
 /// Why a call was not done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
-    /// This version knows no such request, or its contents make no sense.
+    /// This version does not know the request, or its contents are invalid.
     Unknown,
-    /// Compensation and download need a stored calibration, and there is none.
+    /// Compensation and download need a stored calibration, but none is stored.
     NoCalibration,
-    /// No upload was begun.
+    /// No upload is in progress.
     NoUpload,
-    /// The calibration is longer than there is room for.
+    /// The calibration is longer than the room for it.
     TooLong {
         /// Room, bytes.
         room: u32,
@@ -189,22 +189,22 @@ pub enum Refusal {
         /// Bytes received.
         received: u32,
     },
-    /// What was received does not have the hash that was announced.
+    /// The received bytes do not have the announced hash.
     WrongHash {
-        /// What it has.
+        /// Their hash.
         found: u64,
     },
-    /// What was received is not a calibration that this device can use.
+    /// The received bytes are not a calibration that this device can use.
     NotUsable(crate::stored::StoredError),
-    /// The flash did not take it; the calibration before is still there.
+    /// Writing the flash failed; the previous calibration is still stored.
     FlashFailed,
-    /// No bank of this triad runs.
+    /// No bank of this triad is running.
     NoBank,
     /// A number is not finite, or a variance is not positive.
     BadNumber,
-    /// The device does something that does not go together with it; try again later.
+    /// The device is busy with something incompatible; try again later.
     Busy,
-    /// What was received is of another unit, and the upload does not insist.
+    /// The calibration belongs to another unit, and the upload does not allow this.
     OtherUnit {
         /// Which.
         unit_id: [u8; 12],
@@ -214,7 +214,7 @@ pub enum Refusal {
     NotKnown,
 }
 
-/// What a Kalman bank knows before the first sample.
+/// Prior of a Kalman bank.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Prior {
     /// Nothing.
@@ -236,13 +236,13 @@ pub enum Prior {
 pub struct KalmanState {
     /// Of the sensors.
     pub sensor: Sensor,
-    /// Number of the last sample that was offered to it, by [`BatchHead::first`](super::BatchHead::first).
+    /// Number of the last sample that it was given, as in [`BatchHead::first`](super::BatchHead::first).
     pub last: u32,
-    /// Samples taken in.
+    /// Number of samples used.
     pub updates: u32,
     /// Samples that at least one of its filters rejected.
     pub rejected: u32,
-    /// Samples that the device lost, or that an unknown input let pass.
+    /// Samples that the device lost, or that were not used because the input was unknown.
     pub skipped: u32,
     /// Sensors x, y, z.
     pub axes: [KalmanAxis; 3],
@@ -257,7 +257,7 @@ pub struct KalmanAxis {
     pub covariance: [f32; 10],
 }
 
-/// How the sensors answered to their self-test inputs, and what they are supplied with. Later versions append fields, as to [`Greeting`].
+/// Responses of the sensors to their self-test inputs, and their supplies. Later versions append fields, as to [`Greeting`].
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct SelfTest {
     /// Change of the gyros' outputs by ST1, V at the gyro.
@@ -280,23 +280,23 @@ pub struct SelfTest {
 
 /// Bits of [`SelfTest::passed`].
 pub mod checks {
-    /// Gyro x, y, z answered to both inputs as its data sheet states.
+    /// Gyro x, y, z responded to both inputs as in its data sheet.
     pub const GYRO: [u16; 3] = [1, 1 << 1, 1 << 2];
     /// Accelerometer x, y, z followed its range about a null that its data sheet allows.
     pub const ACCEL: [u16; 3] = [1 << 3, 1 << 4, 1 << 5];
-    /// The three axes of the accelerometer together see gravity.
+    /// The three axes of the accelerometer together sense gravity.
     pub const GRAVITY: u16 = 1 << 6;
     /// The TEMP pin of gyro x, y, z is in its range and agrees with the others.
     pub const TEMPERATURE: [u16; 3] = [1 << 7, 1 << 8, 1 << 9];
-    /// The gyros' reference is where its data sheet allows.
+    /// The gyros' reference is within its data sheet's range.
     pub const REFERENCE: u16 = 1 << 10;
-    /// The supply of the converter is where its regulator holds it.
+    /// The supply of the converter is within its regulator's range.
     pub const SUPPLY: u16 = 1 << 11;
     /// All of them.
     pub const ALL: u16 = (1 << 12) - 1;
 }
 
-/// What the device has counted since its start, or since [`Request::ResetCounters`]. Later versions append fields, as to [`Greeting`].
+/// Counters of the device since its start, or since [`Request::ResetCounters`]. Later versions append fields, as to [`Greeting`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counters {
     /// Since the start, ms. Not reset.
@@ -305,25 +305,25 @@ pub struct Counters {
     pub samples: u32,
     /// Number of the last one. Not reset.
     pub last: u32,
-    /// Times that sampling began anew because a sample was read too late.
+    /// Restarts of sampling because a sample was read too late.
     pub late: u32,
     /// The same because the converter's buffer overran.
     pub converter_overruns: u32,
     /// The same because the converter stood still.
     pub stalls: u32,
-    /// Samples that were taken, and lost because processing was behind.
+    /// Samples lost because processing was late.
     pub queue_overruns: u32,
-    /// Batches that were lost because the line was behind.
+    /// Batches lost because the line was too slow.
     pub batches_dropped: u32,
     /// Frames from the host that were garbled.
     pub frames_garbled: u32,
-    /// Bytes from the host that were lost before they were looked at, in times that this happened.
+    /// Number of times that bytes from the host were lost before they were read.
     pub receiver_overruns: u32,
     /// Calls refused.
     pub refused: u32,
-    /// Words of the calibration flash whose error was corrected when they were read.
+    /// Words of the calibration flash with an error that was corrected when they were read.
     pub flash_corrected: u32,
-    /// The same, of those that could not be.
+    /// The same, with an error that could not be corrected.
     pub flash_uncorrectable: u32,
     /// Longest time between a sample and the end of its processing, µs.
     pub longest_us: u32,

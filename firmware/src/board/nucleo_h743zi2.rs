@@ -14,8 +14,8 @@ pub const REFERENCE_V: f32 = 3.3;
 
 // ---- The line ----------------------------------------------------------------------------------
 
-/// Baud rate: 100 kB/s, twice what raw and compensated streams take together. Not 921 600, of which a kernel clock of 100 MHz
-/// makes 0.45 % more; this divides it evenly, and the debugger's bridge takes any rate.
+/// Baud rate: 100 kB/s, twice the rate of raw and compensated streams together. It divides the kernel clock of 100 MHz evenly (921 600
+/// would be 0.45 % off), and the debugger's bridge accepts any rate.
 pub const BAUD: u32 = 1_000_000;
 
 // ---- Flash -------------------------------------------------------------------------------------
@@ -25,22 +25,20 @@ pub const CALIBRATION_SECTORS: [u8; 2] = [6, 7];
 
 // ---- Clocks ------------------------------------------------------------------------------------
 
-/// The debugger's clock output, Hz, which drives the oscillator input: a clock, not a crystal,
-/// hence the bypass. It is a crystal's all the same, and everything below, sampling included, is a
-/// ratio of integers to it.
+/// The debugger's clock output, Hz, which drives the oscillator input: a clock, not a crystal, hence the bypass. It comes from a crystal,
+/// and all clocks below, including sampling, are integer ratios of it.
 const HSE_HZ: u32 = 8_000_000;
 
-/// Divider in front of both PLLs: none, for a reference of 8 MHz. The other common choice, 2 MHz,
-/// belongs to the medium VCO (RM0433 8.5.5: 2 MHz or less), which ends at 420 MHz, below what the
-/// core needs. 8 MHz belongs to the wide one without doubt, and the phase is compared four times
-/// as often.
+/// Divider before both PLLs: none, for a reference of 8 MHz. The other common choice, 2 MHz, is for the medium VCO (RM0433 8.5.5: 2 MHz or
+/// less), which ends at 420 MHz, below what the core needs. 8 MHz is clearly for the wide VCO, and the phase is compared four times as
+/// often.
 const PLL_PREDIVIDER: u32 = 1;
 
 /// PLL1: VCO at 800 MHz.
 const PLL1_MULTIPLIER: u32 = 100;
 
-/// PLL1 output P, the core: 400 MHz, the most that voltage scale 1 allows. The part can do 480 MHz
-/// at scale 0, which takes more current for speed that nothing here needs.
+/// PLL1 output P, the core: 400 MHz, the maximum at voltage scale 1. The part allows 480 MHz at scale 0, with more current and for speed
+/// that is not needed.
 const PLL1_P: u32 = 2;
 
 /// PLL2: VCO at 792 MHz. Its reason is [`PLL2_P`].
@@ -52,26 +50,25 @@ const PLL2_P: u32 = 50;
 /// PLL3: VCO at 480 MHz, for the part's own USB.
 const PLL3_MULTIPLIER: u32 = 60;
 
-/// PLL3 output Q: 48 MHz exactly, by the same crystal as all else.
+/// PLL3 output Q: 48 MHz exactly, from the same crystal.
 ///
-/// Not the part's 48 MHz oscillator, which is off by up to some percent of its own where USB takes 0.25 % (USB 2.0, 7.1.11). It would have to be
-/// trimmed by the frames of the bus, which takes CRS with the right source: SYNCSRC 0, USB2, for the pins that the connector is on. The HAL's
-/// switch for it selects USB1, and its default trims by nothing. PLL1 has no 48 MHz in its 800 MHz, nor has PLL2 in 792.
+/// The part's 48 MHz oscillator is off by up to some percent; USB allows 0.25 % (USB 2.0, 7.1.11). It would have to be trimmed to the
+/// frames of the bus by CRS with the right source: SYNCSRC 0, USB2, for the connector's pins. The HAL's switch selects USB1, and its
+/// default does not trim. 48 MHz cannot be derived from the 800 MHz of PLL1 or the 792 MHz of PLL2.
 const PLL3_Q: u32 = 10;
 
-/// Clock of the converter, Hz: 7.92 MHz. Silicon from revision V on halves the kernel clock before the converter sees it (RM0433
-/// 25.4.3, figure 136).
+/// Clock of the converter, Hz: 7.92 MHz. Silicon from revision V on halves the kernel clock before the converter (RM0433 25.4.3, figure
+/// 136).
 pub const ADC_HZ: u32 = HSE_HZ / PLL_PREDIVIDER * PLL2_MULTIPLIER / PLL2_P / 2;
 
-// The division above loses nothing.
+// The division above is exact.
 const _: () = {
     assert!(HSE_HZ.is_multiple_of(PLL_PREDIVIDER));
     assert!((HSE_HZ / PLL_PREDIVIDER * PLL2_MULTIPLIER).is_multiple_of(PLL2_P * 2));
 };
 
-// The HAL picks the VCO by its output, the medium one wherever that ends (420 MHz), although a
-// reference above 2 MHz asks for the wide one. A multiplier that lands in the overlap would be set
-// wrongly.
+// The HAL chooses the VCO by its output: the medium one up to 420 MHz, although a reference above 2 MHz needs the wide one. A multiplier in
+// the overlap would be set wrongly.
 const _: () = {
     let reference = HSE_HZ / PLL_PREDIVIDER;
     assert!(reference > 2_000_000 && reference <= 16_000_000);
@@ -90,9 +87,8 @@ const _: () = {
 
 // ---- Sampling ----------------------------------------------------------------------------------
 
-/// Sampling time of every channel in half cycles of [`ADC_HZ`]: 387.5 cycles, 49 µs. The longest
-/// that fits the number of conversions, since the channel is on the capacitor for all of it and
-/// settles through 14 kΩ.
+/// Sampling time of every channel in half cycles of [`ADC_HZ`]: 387.5 cycles, 49 µs. It is the longest that fits the number of conversions,
+/// because the channel settles on the capacitor through 14 kΩ during this time.
 pub const SAMPLING_HALF_CYCLES: u32 = 775;
 
 /// Conversion proper at 16 bits in half cycles: 8.5 cycles (RM0433 25.4.23, table 214).
@@ -101,13 +97,13 @@ const CONVERSION_HALF_CYCLES: u32 = 17;
 /// Scans averaged into one sample.
 ///
 /// Two, for 20 000 conversions a second. A gyro's noise is 0.1 (deg/s)/√Hz, over 40 Hz about 2.4 mV
-/// at the pin, an accelerometer's 4.7 mV; the converter's own is of the order of 0.1 mV, so
-/// averaging more of it would show nowhere. It would show in the emulator that the image is tested
-/// on, which spends about 12 µs on a conversion and falls behind real time near 80 000 a second.
+/// at the pin, an accelerometer's 4.7 mV; the converter's own is of the order of 0.1 mV, so more averaging has no effect. It would slow
+/// down the emulator on which the image is tested, which needs about 12 µs per conversion and falls behind real time near 80 000 per
+/// second.
 pub const SCANS: usize = 2;
 
-// The converter runs freely, one scan after the other, without a trigger: its clock alone makes the
-// sample rate, and this is the proof that it is 1 kHz and not nearly so.
+// The converter runs freely, one scan after the other, without a trigger. Its clock alone determines the sample rate; this proves that it
+// is exactly 1 kHz.
 //   2 scans x 10 channels x 396 cycles = 7920 cycles; 7.92 MHz / 1000 = 7920 cycles.
 const _: () = {
     use crate::design_parameters::SAMPLE_HZ;
@@ -144,7 +140,7 @@ mod parts {
     use crate::design_parameters::WATCHDOG_US;
 
     bind_interrupts!(
-        /// Who answers which interrupt.
+        /// Handlers of the interrupts.
         pub struct Irqs {
             DMA1_STREAM0 => dma::InterruptHandler<peripherals::DMA1_CH0>;
             #[cfg(not(feature = "usb"))]
@@ -160,29 +156,28 @@ mod parts {
 
     /// The converter, and the sensors at its inputs.
     ///
-    /// Only ADC1: one converter has one clock, one reference and one order. Of its inputs on this
-    /// package, PA1, PA2, PA7, PC1, PC4 and PC5 go to the Ethernet PHY and PB0 to an LED, which leaves
-    /// nine. PC2_C and PC3_C (A4 and A2 on the header) belong to ADC3. The tenth is PA7, which a jumper
-    /// parts from the PHY; it has the reference, the one signal whose loss does not cost an axis. The
+    /// Only ADC1: one converter has one clock, one reference and one order. Of its inputs on this package, PA1, PA2, PA7, PC1, PC4 and PC5
+    /// are connected to the Ethernet PHY and PB0 to an LED; nine remain. PC2_C and PC3_C (A4 and A2 on the header) belong to ADC3. The
+    /// tenth is PA7, which a jumper separates from the PHY; it has the reference, because losing the reference does not cost an axis. The
     /// debugger's serial line (PD8, PD9), USB and the other LEDs have no input of ADC1.
     ///
-    /// Which input of ADC1 a pin is, is looked up in the HAL's tables; on an emulated board they were seen to match. A0 to A3 and D3
-    /// to D13 are those of Zephyr's description of this board, CN12 that of published drawings of the Nucleo-144 family; D24, D32 and
-    /// the jumper are to be checked against the board's manual (UM2407) before anything is wired.
+    /// The HAL's tables give the input of ADC1 of each pin; on the emulated board they matched. A0 to A3 and D3
+    /// to D13 are those of Zephyr's description of this board, CN12 that of published drawings of the Nucleo-144 family; check D24, D32 and
+    /// the jumper against the board's manual (UM2407) before wiring.
     pub struct Sensors {
         /// ADC1.
         pub adc: Peri<'static, ADC1>,
-        /// The stream that carries its words away.
+        /// DMA stream of its words.
         pub dma: Peri<'static, DMA1_CH0>,
-        /// Where every channel is connected.
+        /// Pin of each channel.
         pub pins: Channels<AnyAdcChannel<'static, ADC1>>,
     }
 
-    /// Inputs of the sensors by which they test themselves. Low, as after reset, is no test and the finest range.
+    /// Self-test and range inputs of the sensors. Low, as after reset: no test, and the finest range.
     ///
-    /// Four outputs of the Zio header that no input of ADC1 and no other part of the board is on. A self-test input of the
-    /// ADXRS300 takes 3.3 V and more for high, which a pin of a 3.3 V part just does not reach: both go through a 74AHCT buffer at
-    /// 5 V. The accelerometer is a 3.3 V part.
+    /// Four outputs of the Zio header that are not shared with ADC1 or other parts of the board. A self-test input of the ADXRS300 needs at
+    /// least 3.3 V for high, which a pin of a 3.3 V part just misses: both go through a 74AHCT buffer at 5 V. The accelerometer is a 3.3 V
+    /// part.
     pub struct SelfTestPins {
         /// ST1 of the three gyros: PE13 (D3).
         pub st1: Output<'static>,
@@ -203,7 +198,7 @@ mod parts {
         pub dm: Peri<'static, peripherals::PA11>,
     }
 
-    /// All that the program uses of the board.
+    /// All parts of the board that the program uses.
     pub struct Board {
         /// The sensors' outputs.
         pub sensors: Sensors,
@@ -211,33 +206,33 @@ mod parts {
         pub self_test: SelfTestPins,
         /// The converter that can read the internal reference.
         pub supply: Peri<'static, ADC3>,
-        /// To the host: USART3, which the debugger's bridge is on, at [`BAUD`], 8 data bits, no parity, 1 stop bit.
+        /// To the host: USART3, at the debugger's bridge, with [`BAUD`], 8 data bits, no parity, 1 stop bit.
         #[cfg(not(feature = "usb"))]
         pub line: usart::Uart<'static, Async>,
         /// To the host.
         #[cfg(feature = "usb")]
         pub line: UsbPins,
-        /// Restarts the program when it stands still; runs already.
+        /// Watchdog; already running.
         pub watchdog: IndependentWatchdog<'static, IWDG1>,
     }
 
     impl Board {
-        /// Starts the watchdog and the clocks, and takes the board. To be called once, first.
+        /// Starts the watchdog and the clocks, and takes the board. Call it once, first.
         pub fn start() -> Self {
-            // By itself, with its reset value of 512 ms: `init` waits for the oscillator for ever, and one that does not start is given
-            // the next chance by a reset. The watchdog's own clock comes with it.
+            // Directly, with its reset value of 512 ms: `init` waits for the oscillator forever, and if it does not start, a reset tries
+            // again. This also starts the watchdog's clock.
             pac::IWDG1.kr().write(|w| w.set_key(Key::START));
             if let Some(mut core) = cortex_m::Peripherals::take() {
-                // Without it each instruction that is not in the prefetch buffer waits for the flash. The data cache stays off: all
-                // memory here is AXI RAM, which DMA reads and writes behind it, and every buffer would have to be invalidated.
+                // Without it, each instruction that is not in the prefetch buffer waits for the flash. The data cache stays off: all memory
+                // here is AXI RAM, which DMA accesses without the cache, so every buffer would have to be invalidated.
                 core.SCB.enable_icache();
             }
             let p = embassy_stm32::init(clocks());
             let mut watchdog = IndependentWatchdog::new(p.IWDG1, WATCHDOG_US);
             watchdog.unleash();
-            // Its counter still holds what is left of the 512 ms.
+            // Its counter still has the rest of the 512 ms.
             watchdog.pet();
-            // Was on for `clocks` only.
+            // It was on for `clocks` only.
             #[cfg(not(feature = "usb"))]
             pac::RCC.cr().modify(|w| w.set_pllon(2, false));
             let low = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::Low, Speed::Low);
@@ -275,7 +270,7 @@ mod parts {
                     config.baudrate = BAUD;
                     let (rx, tx) = (p.PD9, p.PD8);
                     let (tx_dma, rx_dma) = (p.DMA1_CH1, p.DMA1_CH2);
-                    // Refused is a baud rate that the clock cannot make; this one it can.
+                    // `new` refuses only baud rates that the clock cannot make.
                     usart::Uart::new(p.USART3, rx, tx, tx_dma, rx_dma, Irqs, config).unwrap()
                 },
                 #[cfg(feature = "usb")]
@@ -309,28 +304,28 @@ mod parts {
         });
         config.rcc.pll1 = Some(pll(PLL1_MULTIPLIER, PLL1_P));
         config.rcc.pll2 = Some(pll(PLL2_MULTIPLIER, PLL2_P));
-        // Also without USB. A PLL that is left out is switched off by a write of zeros to the register that it shares
-        // with the running ones, whose fields must not be written then (RM0433 8.7.11). The hardware
-        // ignores them, but nothing should rely on it: so the third is started as USB needs it, and stopped after if there is none.
+        // Even without USB. The HAL switches off an unused PLL by writing zeros to a register that it shares with the running ones, whose
+        // fields must not be written then (RM0433 8.7.11). The hardware ignores this, but the program should not rely on it: the third PLL
+        // is started as USB needs it, and stopped afterwards if USB is not used.
         config.rcc.pll3 = Some(Pll {
             divp: None,
             divq: Some(PllDiv::from_bits(PLL3_Q as u8 - 1)),
             ..pll(PLL3_MULTIPLIER, PLL2_P)
         });
         config.rcc.mux.usbsel = mux::Usbsel::PLL3_Q;
-        // Nothing is clocked by it; the default starts it.
+        // Unused; the default would start it.
         config.rcc.hsi48 = None;
-        // Nothing needs a calendar; the default resets the backup domain to choose a clock for one.
+        // No calendar is needed; the default would reset the backup domain to choose a clock for it.
         config.rcc.ls = LsConfig::off();
         config.rcc.sys = Sysclk::PLL1_P;
         config.rcc.voltage_scale = VoltageScale::Scale1;
-        // At voltage scale 1 the buses end at 200 MHz, the peripherals behind them at 100 MHz.
+        // At voltage scale 1 the buses allow 200 MHz, their peripherals 100 MHz.
         config.rcc.ahb_pre = AHBPrescaler::DIV2;
         config.rcc.apb1_pre = APBPrescaler::DIV2;
         config.rcc.apb2_pre = APBPrescaler::DIV2;
         config.rcc.apb3_pre = APBPrescaler::DIV2;
         config.rcc.apb4_pre = APBPrescaler::DIV2;
-        // The default source as well, but the sample rate hangs on it.
+        // This is the default too; it is explicit because the sample rate depends on it.
         config.rcc.mux.adcsel = mux::Adcsel::PLL2_P;
         config
     }

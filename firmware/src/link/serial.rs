@@ -5,18 +5,18 @@ use embassy_stm32::usart::{RingBufferedUartRx, Uart, UartTx};
 
 use crate::design_parameters::RECEIVED;
 
-/// Towards the host.
+/// To the host.
 pub struct Output(UartTx<'static, Async>);
 
 impl Output {
-    /// Sends all of it.
+    /// Sends all bytes.
     pub async fn send(&mut self, bytes: &[u8]) {
-        // The transmitter knows no error but that of an empty buffer.
+        // The only error of the transmitter is an empty buffer.
         let _ = self.0.write(bytes).await;
     }
 }
 
-/// From the host: a ring that the controller fills by itself, so that nothing is lost while a call is being answered.
+/// From the host: a ring that DMA fills, so that nothing is lost while a call is being answered.
 pub struct Input(RingBufferedUartRx<'static>);
 
 impl Input {

@@ -10,10 +10,10 @@ use crate::design_parameters::{USB_PACKET, USB_PRODUCT, USB_VENDOR};
 
 type Bus = Driver<'static, USB_OTG_FS>;
 
-/// The device, to be run by a task of its own.
+/// The device, run by a separate task.
 pub type Usb = UsbDevice<'static, Bus>;
 
-/// What the device needs as long as it lives.
+/// Buffers of the device, for its whole life.
 pub struct Memory {
     output: [u8; 256],
     configuration: [u8; 128],
@@ -39,20 +39,20 @@ impl Default for Memory {
     }
 }
 
-/// Towards the host.
+/// To the host.
 pub struct Output(Sender<'static, Bus>);
 
 impl Output {
-    /// Sends all of it; while nobody has opened the port it waits.
+    /// Sends all bytes; waits while the port is not open.
     pub async fn send(&mut self, bytes: &[u8]) {
         for packet in bytes.chunks(usize::from(USB_PACKET)) {
             self.0.wait_connection().await;
             if self.0.write_packet(packet).await.is_err() {
-                // Unplugged: the host finds the frame garbled, and the next begins with a zero.
+                // Unplugged: the host discards the garbled frame, and the next one begins with a zero.
                 return;
             }
         }
-        // A full packet at the end says that more is to come, unless an empty one follows.
+        // A full last packet means that more follows, unless an empty packet comes after it.
         if bytes.len().is_multiple_of(usize::from(USB_PACKET)) {
             let _ = self.0.write_packet(&[]).await;
         }
@@ -77,7 +77,7 @@ pub fn split(
     memory: &'static mut Memory,
 ) -> (Output, Input, Usb) {
     let mut driver = DriverConfig::default();
-    // The board powers the part by the debugger's connector; what this one has is not asked.
+    // The debugger's connector powers the part, so the voltage at this one is not checked.
     driver.vbus_detection = false;
     let UsbPins { controller, dp, dm } = pins;
     let bus = Driver::new_fs(controller, Irqs, dp, dm, &mut memory.output, driver);

@@ -1,4 +1,4 @@
-//! The calibration in use: at a temperature once for every batch, and on a sample a thousand times a second.
+//! The calibration in use: evaluated for the temperature once per batch, and applied to each sample.
 
 use mimu_core::PerSensor;
 use mimu_core::compensation::Sample;
@@ -9,16 +9,16 @@ use mimu_core::table::Place;
 
 use crate::design_parameters::SAMPLE_HZ;
 
-/// A calibration with what it remembers of the stream.
+/// A calibration with its state for the stream.
 pub(super) struct Calibrated {
     compensator: Compensator<f32, NODES, ROOM>,
     state: State<f32, ROOM>,
-    /// Number of the sample at which it was followed last; time since power-on is counted by it.
+    /// Number of the sample of the last `follow`; it counts the time since power-on.
     followed: u32,
 }
 
 impl Calibrated {
-    /// The first of a device that had its power for so long at sample 0, if that is known.
+    /// The first calibration of a device; the argument is the time since power-on at sample 0, if known.
     pub fn new(stored: Stored, powered_for_ms: Option<u32>) -> Self {
         let compensator = stored.compensator;
         let state = compensator.state(SAMPLE_HZ as f32);
@@ -29,12 +29,12 @@ impl Calibrated {
         Self {
             compensator,
             state,
-            // A number is a millisecond. Time since power-on goes on, whenever the calibration comes.
+            // One number is one millisecond. Time since power-on counts from sample 0, whenever the calibration arrives.
             followed: 0_u32.wrapping_sub(powered_for_ms),
         }
     }
 
-    /// Goes on with another one. [`Self::follow`] has to come before the next sample.
+    /// Switches to another calibration. Call [`Self::follow`] before the next sample.
     pub fn replace(&mut self, stored: Stored) {
         let compensator = stored.compensator;
         compensator.take_over(&self.compensator, &mut self.state);
@@ -46,8 +46,8 @@ impl Calibrated {
         self.state.gap();
     }
 
-    /// Temperature of the gyros' dies at the beginning of the batch, °C, and that of the accelerometer's, if it has a lag of its own; `temp_c`
-    /// stands in for both before there was one.
+    /// Temperature of the gyros' dies at the beginning of the batch, °C, and that of the accelerometer's, if it has a separate lag. Before
+    /// the first temperature, both are `temp_c`.
     pub fn dies_c(&self, temp_c: f32) -> (f32, Option<f32>) {
         let dies_c = self.state.dies_c().unwrap_or(PerSensor::both(temp_c));
         let lags = &self.compensator.lags;

@@ -1,4 +1,4 @@
-//! Deflects the sensors by their inputs, and measures what comes of it.
+//! Deflects the sensors with their test inputs, and measures the response.
 
 use embassy_stm32::gpio::Output;
 use embassy_time::Timer;
@@ -11,7 +11,7 @@ use crate::design_parameters::{SELF_TEST_SAMPLES, SELF_TEST_SETTLE_MS};
 use crate::pipeline::Shared;
 use crate::supply::Supply;
 
-/// Takes about a second. The inputs are as before afterwards.
+/// Takes about a second, and restores the inputs.
 pub async fn run(
     pins: &mut SelfTestPins,
     supply: &mut Supply,
@@ -28,7 +28,7 @@ pub async fn run(
     pins.range.iter_mut().for_each(Output::set_high);
     let coarse = mean(pipeline).await.accel;
     pins.range.iter_mut().for_each(Output::set_low);
-    // The sensors have to be back before the flag goes.
+    // The sensors have to settle before the flag is cleared.
     Timer::after_millis(SELF_TEST_SETTLE_MS).await;
     pipeline.lock(|p| p.borrow_mut().flag(flags::SELF_TEST, false));
 

@@ -62,7 +62,7 @@ pub struct Checked {
 /// Most that the two may differ by, K: both add up steps of some microkelvin of rounding, and forget them within the lag.
 const DIE_K: f64 = 1e-3;
 
-/// Compares for `duration` of samples. Refused if the device holds another calibration than that of the file.
+/// Compares for `duration` of samples. Refused if the device stores a calibration other than that of the file.
 pub fn check(
     session: &mut Session,
     calibration: &Calibration,

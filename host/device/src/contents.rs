@@ -1,4 +1,4 @@
-//! What stands in a stored calibration: nodes and effects as [`mimu_core::stored`] reads them, for people, and as a calibration file.
+//! Contents of a stored calibration: nodes and effects as [`mimu_core::stored`] reads them, for people and as a calibration file.
 
 use mimu_core::compensation::Affine;
 use mimu_core::effects::DeviceEffect;
@@ -23,11 +23,11 @@ pub struct Contents {
     pub bytes: usize,
     /// What the calibration is told apart by.
     pub hash: Hash,
-    /// Number of the unit that it is of, if it says so.
+    /// Number of the unit that it belongs to, if given.
     pub unit_id: Option<String>,
-    /// When it was made, RFC 3339, if it says so.
+    /// When it was made, RFC 3339, if given.
     pub created: Option<String>,
-    /// SHA-256 of the samples that it was made from, if it says so.
+    /// SHA-256 of the samples that it was made from, if given.
     pub samples_sha256: Option<String>,
     /// When its offsets were set anew on the device, RFC 3339, if they were.
     pub trimmed: Option<String>,
@@ -41,11 +41,11 @@ pub struct Contents {
     pub frame: &'static str,
     /// Dies' temperatures that it is for, °C, if they are known.
     pub range_c: Option<[f32; 2]>,
-    /// Lag of the dies behind the thermometer, s, if it is known; of the gyros' where the accelerometer has one of its own.
+    /// Lag of the dies behind the thermometer, s, if known; that of the gyros if the accelerometer has a separate one.
     pub lag_s: Option<f32>,
-    /// Lag of the accelerometer's die, s, if it has one of its own.
+    /// Lag of the accelerometer's die, s, if it is separate.
     pub accel_lag_s: Option<f32>,
-    /// What stands between the nodes: `cubic`, or `straight` in the layouts of earlier versions.
+    /// Interpolation between the nodes: `cubic`, or `straight` in the layouts of earlier versions.
     pub between_nodes: &'static str,
     /// Temperature nodes, the coldest first.
     pub nodes: Vec<NodeContents>,
@@ -80,7 +80,7 @@ pub struct Inverse {
     pub unit: &'static str,
 }
 
-/// What stands in `bytes`. Refused where the device would refuse it.
+/// Contents of `bytes`; refused if the device would refuse them.
 pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::StoredError> {
     let (mut nodes, mut effects) = (Vec::new(), Vec::new());
     let stored = stored::read(
@@ -142,7 +142,7 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
     Calibration::of_device(&stored, place)
 }
 
-/// The lag of the gyros' dies, and that of the accelerometer's if it is another, s.
+/// The lag of the gyros' dies, and that of the accelerometer's if it differs, s.
 fn lags(stored: Option<PerSensor<f32>>) -> (Option<f32>, Option<f32>) {
     let apart = stored.filter(|lags_s| lags_s.gyro != lags_s.accel);
     (stored.map(|s| s.gyro), apart.map(|s| s.accel))

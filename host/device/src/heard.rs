@@ -29,7 +29,7 @@ pub enum Answer {
         /// The part.
         bytes: Vec<u8>,
     },
-    /// A bank as it ended.
+    /// Last state of a bank.
     Kalman(Box<KalmanState>),
     /// Not done.
     Refused(Refusal),
@@ -68,7 +68,7 @@ pub enum Heard {
     Answer(u16, Answer),
     /// Nobody asked.
     Event(Event),
-    /// A greeting of somebody who cannot be talked to, or not be understood further: number of the call, its first bytes, its version.
+    /// A greeting of an incompatible device: number of the call, its first bytes, its version.
     Stranger(u16, [u8; 4], Version),
 }
 

@@ -61,7 +61,7 @@ pub struct Room {
     pub bytes: u32,
 }
 
-/// The calibration that a device uses, as it greets with it.
+/// The calibration that a device uses, from its greeting.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Held {
     /// What it is told apart by.
@@ -72,13 +72,13 @@ pub struct Held {
     pub nodes: u8,
     /// Effects.
     pub effects: u8,
-    /// Number of the unit that it is of, if it says so.
+    /// Number of the unit that it belongs to, if given.
     pub unit_id: Option<String>,
-    /// When it was made, RFC 3339, if it says so.
+    /// When it was made, RFC 3339, if given.
     pub created: Option<String>,
 }
 
-/// What a calibration is told apart by. In JSON 16 hexadecimal digits: many programs read numbers of 53 bits.
+/// Hash that identifies a calibration. In JSON it has 16 hexadecimal digits, because many programs read numbers with 53 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hash(pub u64);
 
@@ -239,10 +239,10 @@ fn version_warning(device: Version) -> Option<String> {
     }
 }
 
-/// The beginning of a greeting, which is that of version 1 for ever: number of the call, first bytes, version.
+/// The beginning of a greeting, the same since version 1: number of the call, first bytes, version.
 ///
-/// Read by itself, because a device of another major version may put things behind it that this program cannot read, and
-/// is to be told apart all the same.
+/// Read separately, because a device with another major version may send more after it that this program cannot read, and still has to be
+/// identified.
 pub(super) fn beginning(payload: &[u8]) -> Option<(u16, [u8; 4], Version)> {
     // The first variant of `Message`.
     let mut rest = payload.strip_prefix(&[0])?;

@@ -1,4 +1,4 @@
-//! A calibration file as the bytes that the device stores, and what stands in the way of it.
+//! A calibration file as the bytes that the device stores, and the reasons why it cannot store them.
 
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{DeviceEffect, REFERENCE_C};
@@ -28,7 +28,7 @@ pub struct Image {
     pub node_temp_c: Vec<f32>,
     /// Ids of its effects.
     pub effects: Vec<String>,
-    /// One sentence for each thing that had to be assumed.
+    /// One sentence for each assumption.
     pub warnings: Vec<String>,
 }
 
@@ -105,7 +105,7 @@ impl Image {
         })
     }
 
-    /// Refuses a calibration of another unit than that of this greeting.
+    /// Refuses a calibration of a unit other than that of this greeting.
     pub fn check_unit(&self, who: &Identity, place: &str) -> Result<()> {
         let of = self.origin.unit_id.as_ref().map(origin::digits);
         match of.filter(|of| *of != who.unit_id) {

@@ -18,7 +18,7 @@ use mimu_recording::error::{Error, Result};
 pub const SHORTEST: Duration = Duration::from_secs(1);
 /// Samples that the noise is taken from, if it is not given: a second.
 const NOISE_SAMPLES: usize = 1000;
-/// Variance that a reading has at least, V²: that of rounding to a step of 25 µV, which the converter's sums have.
+/// Smallest variance of a reading, V²: that of rounding to 25 µV, the quantisation step of the converter's sums.
 const LEAST_VARIANCE: f64 = 25e-6 * 25e-6 / 12.0;
 /// Longest silence of the stream or of the bank.
 const SILENCE: Duration = Duration::from_secs(3);
@@ -167,7 +167,7 @@ pub fn kalman(
                 .as_flattened()
                 .iter()
                 .fold(0.0, |s: f32, v| s.max(v.abs()));
-            // At rest the span means nothing, as long as it is positive.
+            // At rest the span does not matter, but it has to be positive.
             let span = if span > 0.0 { span } else { 1.0 };
             let prior = Prior::Diffuse { span };
             let start = Request::KalmanStart {
@@ -330,7 +330,7 @@ fn replay(
                 continue;
             };
             let reading = sample[plan.sensor].map(f64::from);
-            // What the device rejects, a number that is none, is rejected here as well.
+            // The device rejects NaN, and so does this bank.
             let _ = bank.update(&input, &reading, &noise);
         }
     }

@@ -8,9 +8,9 @@
 //! | `who`        | the greeting: what is there, and whether it can be talked to                           |
 //! | `nominal`    | the sensors by their data sheets                                                       |
 //! | `image`      | a calibration file as the bytes that the device stores                                 |
-//! | `origin`     | of which unit, from when and of what recording a calibration is                        |
+//! | `origin`     | the unit, the date and the recording of a calibration                                  |
 //! | `upload`     | sending them and fetching them back                                                    |
-//! | `contents`   | what stands in them                                                                    |
+//! | `contents`   | contents of stored calibrations                                                        |
 //! | `trim`       | offsets of the stored calibration set anew while the unit lies still                   |
 //! | `self_test`  | the self-test, and whether the unit stood still for it                                 |
 //! | `flagged`    | samples that carry a flag, counted                                                     |

@@ -15,7 +15,7 @@ pub(super) const ATTEMPTS: u32 = 4;
 /// Wait for an answer behind a frame that was garbled: longer than the 1 to 4 s that a sector takes to be erased, of the 15 that a commit is
 /// waited for otherwise.
 const GARBLED: Duration = Duration::from_millis(4500);
-/// Most that is waiting to be looked at: a minute of both streams. Beyond, somebody has forgotten to look.
+/// Largest queue of unread events: a minute of both streams. Beyond, the caller has stopped reading.
 const WAITING: usize = 6000;
 
 /// A port, and what has been heard on it.
@@ -27,7 +27,7 @@ pub(super) struct Line {
     pub overflowed: u64,
     /// How many of those that wait came before the last answer.
     pub before_answer: usize,
-    /// Calls that had to be made again.
+    /// Calls that had to be repeated.
     pub repeated: u32,
     last_id: u16,
 }
@@ -41,7 +41,7 @@ impl Line {
             overflowed: 0,
             before_answer: 0,
             repeated: 0,
-            // Not always 1, so that answers to a program before this one are nobody's.
+            // Not always 1, so that answers to an earlier program are ignored.
             last_id: std::process::id() as u16,
         }
     }
@@ -53,7 +53,7 @@ impl Line {
             if attempt > 0 {
                 self.repeated += 1;
             }
-            // 0 is for what nobody has asked.
+            // 0 is for messages without a call.
             self.last_id = self.last_id.checked_add(1).unwrap_or(1);
             let id = self.last_id;
             let call = Call { id, request };
@@ -88,7 +88,7 @@ impl Line {
         self.ear.take(&bytes[..count], |heard| match heard {
             Heard::Event(event) if waiting.len() < WAITING => waiting.push_back(event),
             Heard::Event(_) => *overflowed += 1,
-            // Answers to calls that were given up are late, and nobody's.
+            // Late answers to abandoned calls are ignored.
             Heard::Answer(id, of) if Some(id) == wanted => {
                 *before_answer = waiting.len();
                 answer = Some(of);

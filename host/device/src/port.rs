@@ -28,7 +28,7 @@ impl Port {
             .timeout(POLL)
             .open()
             .map_err(|error| not_opened(name, &error))?;
-        // What a program before this one has not read is nobody's answer.
+        // Bytes that an earlier program has not read are not answers to this one.
         let _ = serial.clear(ClearBuffer::Input);
         Ok(Self {
             name: name.to_owned(),
@@ -129,7 +129,7 @@ const OWN: (u16, &[u16]) = (0x1209, &[0x0001]);
 pub struct Ports {
     /// Those that a board can be at: a debugger of ST, or the firmware's own USB.
     pub of_boards: Vec<String>,
-    /// The others, each with what it is: nothing is sent to one that nobody names, since what listens there is not ours to disturb.
+    /// The other ports with their descriptions. Nothing is sent to them unless the user names one, because other devices may be there.
     pub others: Vec<String>,
     /// The system does not list its ports, as in a container without `/sys`. One that is named still opens.
     pub unlisted: bool,
@@ -216,7 +216,7 @@ impl Ports {
 }
 
 fn not_opened(name: &str, error: &serialport::Error) -> Error {
-    // A pseudo-terminal or a board that was just pulled out can fail in ways of its own: the system's words then.
+    // A pseudo-terminal or a board that was just unplugged may fail differently; the message is then the system's.
     let (problem, remedy) = match error.kind() {
         ErrorKind::Io(Io::NotFound) => ("the port does not exist".into(), ports().listed()),
         ErrorKind::Io(Io::PermissionDenied) => (
@@ -266,7 +266,7 @@ mod tests {
             port("ttyS0", None),
             port("ttyACM2", Some((0x2341, 0x0043, "Uno"))),
             port("ttyACM0", Some((0x1209, 0x0001, "mimu"))),
-            // Of the same maker, and no debugger: somebody's own device.
+            // Of the same maker but not a debugger: another device.
             port("ttyACM3", Some((0x0483, 0x5740, "VCP"))),
         ]);
         assert_eq!(ports.of_boards, ["ttyACM0", "ttyACM1"]);

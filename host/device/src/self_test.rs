@@ -18,7 +18,7 @@ use mimu_recording::error::Result;
 const PATIENCE: Duration = Duration::from_secs(5);
 /// What is looked at before and after.
 const LOOK: Duration = Duration::from_millis(250);
-/// Most that a gyro moves while it stands still, V, as a standard deviation and as a change of the mean: 4 deg/s. Its noise is
+/// Largest scatter of a gyro at rest, V, as a standard deviation and as a change of the mean: 4 deg/s. Its noise is
 /// 3.5 mV, and what decides the test is 120 mV.
 const STILL_GYRO_V: f64 = 0.02;
 /// The same of the accelerometer, V: 50 mg, or a tilt by 3 degrees. Its noise is 5 mV, and what decides is 150 mV.
@@ -49,7 +49,7 @@ pub struct SelfTested {
     pub supply_v: f32,
     /// Axes of the accelerometer that lie across gravity: one that is stuck at its null would read the same in this pose.
     pub accel_not_shown: Vec<&'static str>,
-    /// The sensor that moved most of all, in a few words, if the unit did not stand still.
+    /// The sensor with the largest motion, in words, if the unit did not stand still.
     pub moved: Option<String>,
 }
 

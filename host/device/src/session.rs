@@ -98,7 +98,7 @@ impl Session {
         self.line.ear.count()
     }
 
-    /// Calls that had to be made again because no answer came.
+    /// Calls that had to be repeated because no answer came.
     pub fn repeated(&self) -> u32 {
         self.line.repeated
     }

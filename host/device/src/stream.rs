@@ -1,4 +1,4 @@
-//! One of the streams, sample by sample, and what can be said of it in a line.
+//! One of the streams, sample by sample, with a summary.
 
 use std::time::{Duration, Instant};
 
@@ -39,7 +39,7 @@ pub struct Streamed {
     pub temp_c: f64,
     /// By the TEMP pins of gyro x, y, z, °C, the last; of the raw stream only.
     pub gyro_temps_c: Option<[f32; 3]>,
-    /// What the device says is wrong with them.
+    /// Faults that the device flags.
     #[serde(flatten)]
     pub flagged: Flagged,
     /// Gyro.
@@ -87,7 +87,7 @@ impl Streamed {
     }
 }
 
-/// Receives samples for `duration` of the device's time, or until `stop` says so. `take` is given each with its number.
+/// Receives samples for `duration` of the device's time, or until `stop` is set. `take` gets each sample with its number.
 pub fn stream(
     session: &mut Session,
     which: Stream,

@@ -15,9 +15,9 @@ use super::upload::{download, upload};
 use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
-/// Length of the stretches whose means are compared, s: their scatter is what is left of the noise, whatever its spectrum is within them.
+/// Length of the segments whose means are compared, s: their scatter shows the remaining noise, whatever its spectrum within a segment.
 const STRETCH_S: f64 = 0.5;
-/// Shortest average, s: eight stretches, of which a deviation is known within a quarter.
+/// Shortest average, s: eight segments, which determine a standard deviation to a quarter.
 pub const SHORTEST_TRIM_S: f64 = 8.0 * STRETCH_S;
 /// Most that the means of stretches scatter by, and differ between the halves, while the unit lies still: 0.5 deg/s, where a gyro's noise makes
 /// 0.1, and 0.1 m/s², a tilt by 0.6 degrees, where the accelerometer's makes 0.004.
@@ -100,7 +100,7 @@ pub fn trim(
 ) -> Result<Trimmed> {
     let mut bytes = download(session)?;
     let held = Hash(stored::hash(&bytes));
-    // StoredError before the time is spent: the numbers do not matter.
+    // Refused before the time is spent: the numbers do not matter.
     stored::trim(&mut bytes.clone(), PerSensor::default(), trimmed_s)
         .map_err(|refused| refuse(session, &refused))?;
     let before = average(session, duration, |share| progress(0.45 * share))?;

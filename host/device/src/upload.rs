@@ -34,26 +34,26 @@ pub struct Uploaded {
     pub before: Option<Hash>,
     /// The device held it already, byte by byte, and nothing was written.
     pub was_there: bool,
-    /// Messages that had to be sent again.
+    /// Messages that had to be repeated.
     pub repeated: u32,
     /// Times that the device restarted and the upload began anew.
     pub restarts: u32,
-    /// Number of the unit that the calibration is of, if it says so.
+    /// Number of the unit that the calibration belongs to, if given.
     pub unit_id: Option<String>,
     /// Temperatures of its nodes, °C.
     pub node_temp_c: Vec<f32>,
     /// Ids of its effects.
     pub effects: Vec<String>,
-    /// One sentence for each thing that had to be assumed.
+    /// One sentence for each assumption.
     pub warnings: Vec<String>,
 }
 
-/// Sends a calibration, has it stored, and reads it back byte by byte. `progress` hears the share that is done, up to 1.
+/// Sends a calibration, stores it, and reads it back byte by byte. `progress` gets the fraction done, up to 1.
 ///
 /// `other_unit`: also if it is of another unit; refused by the device else.
 ///
-/// Whatever fails, and whenever: the device holds the old calibration or the new one, whole. The error says which, if the device still
-/// says it.
+/// Whatever fails, the device stores either the old calibration or the new one, complete. The error says which, if the device still
+/// answers.
 pub fn upload(
     session: &mut Session,
     image: &Image,

@@ -26,11 +26,11 @@ pub use progress::Progress;
 pub struct CarriedOut {
     /// `mimu-thermal-record/1`.
     pub format: &'static str,
-    /// Dwells and turns that were had to their ends.
+    /// Completed dwells and turns.
     pub dwells_done: usize,
     /// As planned.
     pub dwells_planned: usize,
-    /// Whole rounds that were had.
+    /// Completed rounds.
     pub rounds_done: usize,
     /// As planned.
     pub rounds_planned: usize,

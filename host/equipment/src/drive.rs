@@ -1,4 +1,4 @@
-//! What turns the unit and warms it: a person who is told, or a table and a chamber that take text commands.
+//! Moves and warms the unit: a person with instructions, or a table and a chamber with text commands.
 
 mod file;
 mod line;
@@ -26,7 +26,7 @@ pub trait Driver: Send {
     /// Ends all motion.
     fn stop(&mut self) -> Result<()>;
 
-    /// Turns the supply off and on; `false`: somebody has to be asked.
+    /// Turns the supply off and on; `false`: a person has to do it.
     fn power_cycle(&mut self) -> Result<bool>;
 
     /// Whether a person has to be told what to do.

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// A dwell that is wanted, or was had.
+/// A requested or completed dwell.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// Direction in the body frame that points up, of length 1.

@@ -87,7 +87,7 @@ impl ChannelNoise {
 pub struct Noise {
     /// Gyro x, y, z, accelerometer x, y, z: within the dwells.
     pub channels: [ChannelNoise; 6],
-    /// What a record at rest said of them, where it is used.
+    /// Their noise from a record at rest, if it is used.
     stated: [Option<Stated>; 6],
     /// Variances of a mean over a second, raw units squared, within the dwells and as a record at rest said, where it did not hold.
     other: [Option<[f64; 2]>; 6],
@@ -371,7 +371,7 @@ impl Noise {
         Some(std::array::from_fn(|i| match &self.stated[from + i] {
             None => DMatrix::zeros(dwells.len(), dwells.len()),
             Some(stated) => {
-                // A noise whose size follows the temperature: each mean has the amplitude of its own.
+                // A noise whose size depends on temperature: each mean has a separate amplitude.
                 let of = |part: fn(&mut AllanModel) -> &mut f64| {
                     let amplitude: Vec<f64> = dwells
                         .iter()

@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 use crate::quantity::{AXES, Sensor, inverse_names, raw_unit, scale_unit};
 use crate::triad::{Angles, Estimate, Triad};
 
-/// ParameterKind of a parameter of a triad.
+/// Kind of a parameter of a triad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterKind {
     /// Element of the inverse model: of C by rows, then of o.

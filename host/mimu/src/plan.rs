@@ -1,6 +1,6 @@
 //! The plan of an experiment, `mimu-plan/1`: what a table or a person carries out, step by step.
 //!
-//! One type writes and reads it. The bench reads it by itself: it is the check from outside.
+//! One type writes and reads it. The bench has a separate reader, as a check from outside.
 
 pub mod chamber;
 pub mod design;
@@ -291,7 +291,7 @@ impl Plan {
     }
 }
 
-/// A dwell whose input nobody knows.
+/// A dwell with an unknown input.
 fn unknown(up: Option<[f64; 3]>, title: String, length: Duration) -> Planned {
     Planned {
         input: [f64::NAN; 6],

@@ -1,6 +1,7 @@
 //! What is wrong with a recording: one line for each kind, for every command that judges one.
 //!
-//! Most of it is seen while the recording is read or its dwells are judged, and stands in a [`Warning`] with its figures. What only a fit shows,
+//! Most problems are seen while the recording is read or its dwells are judged, and are in a [`Warning`] with their figures. What only a
+//! fit shows,
 //! an offset that no accelerometer has or a pose that was never held, is looked for here.
 
 use std::fmt;
@@ -42,7 +43,7 @@ pub enum RecordingProblem {
 /// Kinds of what is seen without a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seen {
-    /// Readings are not in the unit that they are said to be in.
+    /// Readings are not in their declared unit.
     Unit,
     /// A channel has no noise.
     DeadChannel,

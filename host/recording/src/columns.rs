@@ -209,7 +209,7 @@ mod tests {
         for (names, word) in [
             (vec!["t_s", "gyro_x", "gyro_y"], "gyro_z"),
             (vec!["gyro_x", "gyro_y", "gyro_z"], "t_s"),
-            (vec!["t_s", "step"], "neither"),
+            (vec!["t_s", "step"], "both the gyro_ and"),
             (vec!["t_s", "t_s", "gyro_x", "gyro_y", "gyro_z"], "twice"),
         ] {
             let error = Layout::from_names(&names, "samples.csv").unwrap_err();

@@ -1,4 +1,5 @@
-//! The device's own Kalman filters beside the session: told each dwell's input while it lasts, taken back where a dwell is thrown away.
+//! The device's Kalman filters during the session: they get the input of each dwell while it lasts, and are restored if a dwell is
+//! discarded.
 
 use mimu::fit::Fit;
 use mimu::quantity::{AXES, PerSensor, Sensor};
@@ -31,7 +32,7 @@ pub struct ByDevice(PerSensor<Rows>);
 #[derive(Debug, Clone, Default)]
 pub struct DeviceBanks {
     runs: bool,
-    /// Whether they have taken in what they should not have, and go back before they go on.
+    /// Whether they have used samples of a discarded dwell, and have to be restored first.
     spoiled: bool,
     /// Why they lack a dwell.
     lack: Option<String>,
@@ -133,7 +134,7 @@ impl DeviceBanks {
         }
     }
 
-    /// Ends them. The error says why they are not a calibration.
+    /// Ends them. The error gives the reason why they are not a calibration.
     pub fn end(&mut self, station: &Station) -> std::result::Result<ByDevice, String> {
         if let Some(why) = &self.lack {
             return Err(why.clone());

@@ -25,7 +25,7 @@ pub struct DeviceSource {
     next: u64,
     /// Whether what comes next begins a new count.
     anew: bool,
-    /// For how long it had its power when it began to sample, s.
+    /// Time since power-on when it began to sample, s.
     powered_for_s: Option<f64>,
 }
 
@@ -79,7 +79,7 @@ impl DeviceSource {
     fn take(&mut self, samples: &Samples) -> Result<Heard> {
         self.heard = Instant::now();
         let number = i64::from(samples.head.first);
-        // A count that begins anew says nothing of the time that has passed: that it was more than nothing is all that is claimed.
+        // A restarted count does not give the elapsed time; only that it was positive is assumed.
         let back = self.zero + number < self.next as i64;
         if self.anew || back {
             self.zero = self.next as i64 + 1 - number;

@@ -23,7 +23,7 @@ pub enum Event {
         /// What it says of itself.
         told: Vec<String>,
     },
-    /// A session goes on where it was.
+    /// A session is resumed.
     Resumed {
         /// Dwells that there are already.
         dwells: usize,
@@ -64,7 +64,7 @@ pub enum Event {
         /// Why.
         why: Waiting,
     },
-    /// A dwell was had.
+    /// A dwell was completed.
     Dwell {
         /// Which unit.
         unit: String,
@@ -77,19 +77,19 @@ pub enum Event {
         /// In words.
         words: String,
     },
-    /// A dwell was thrown away.
+    /// A dwell was discarded.
     Thrown {
         /// Which unit.
         unit: String,
         /// Why.
         why: Waiting,
     },
-    /// A dwell is to be had again.
+    /// A dwell is to be repeated.
     Redo {
         /// Its number.
         number: i32,
     },
-    /// How the calibration stands after a dwell.
+    /// State of the calibration after a dwell.
     Progress {
         /// Which unit.
         unit: String,
@@ -135,7 +135,7 @@ pub enum Event {
         /// What.
         words: String,
     },
-    /// Something is asked, to be answered by yes or no.
+    /// A question, to be answered by yes or no.
     Question {
         /// `power-cycled`, `store-effects`, `store-rough`, `go-on`.
         question: &'static str,
@@ -267,33 +267,33 @@ pub struct Standing {
     pub elapsed_s: f64,
     /// Each unit.
     pub units: Vec<UnitStanding>,
-    /// The calibration of each, as far as it is known.
+    /// The calibration of each, as far as it is determined.
     pub progress: Vec<Progress>,
 }
 
-/// What a person wants, since the last time that was asked.
+/// Request of a person since the last call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wish {
-    /// End it; what there is stays, and the session can go on.
+    /// End the session; its data stay, and it can be resumed.
     Cancel,
-    /// Have the last dwell again.
+    /// Repeat the last dwell.
     RedoLast,
-    /// Have the dwell of this number again.
+    /// Repeat the dwell with this number.
     Redo(i32),
-    /// Another step first: this one comes later.
+    /// Another pose first; this one follows later.
     Skip,
 }
 
 /// A question that has to be answered by yes or no.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Question {
-    /// Turn the supply off and on, then yes.
+    /// Whether the supply was turned off and on.
     PowerCycled,
-    /// Store the calibration with the effects that were found.
+    /// Whether to store the calibration with the effects that were found.
     StoreEffects(String),
-    /// Store a calibration that errs by many times the noise, as this says.
+    /// Whether to store a calibration whose error is many times the noise, as described.
     StoreRough(String),
-    /// Something is wrong, as this says: go on all the same.
+    /// Whether to continue despite this problem.
     GoOn(String),
 }
 
@@ -323,17 +323,17 @@ impl Question {
     }
 }
 
-/// Shows a session to somebody, and hears what they want.
+/// Shows a session to a person, and receives their requests.
 pub trait View {
     /// Something has happened.
     fn tell(&mut self, event: &Event);
 
-    /// How it stands; called many times a second.
+    /// Shows the present state; called many times per second.
     fn show(&mut self, standing: &Standing);
 
     /// What is wanted.
     fn wish(&mut self) -> Option<Wish>;
 
-    /// Asks; `None` while there is no answer yet.
+    /// Asks a question; `None` until it is answered.
     fn ask(&mut self, question: &Question) -> Option<bool>;
 }

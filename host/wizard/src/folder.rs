@@ -1,12 +1,12 @@
-//! The folder of a session: what was asked, a journal, and the recordings. Killed at any instant, a session goes on from its last dwell.
+//! The folder of a session: settings, journal and recordings. A session that was killed at any instant resumes after its last dwell.
 //!
 //! | file | what |
 //! |---|---|
-//! | `session.json` | what was asked, and of which unit |
+//! | `session.json` | settings and unit |
 //! | `journal.jsonl` | a line for everything that was done and counts |
 //! | `calibration/`, `verification/`, `confirmation/` | the recordings, which the other commands read |
 //! | `calibration.toml` | the calibration |
-//! | `held-before.bin` | the calibration that the device held before, as it stores it |
+//! | `held-before.bin` | the calibration that the device stored before, as bytes |
 //! | `diagnosis.html`, `with-effects.toml` | what still errs, and the calibration with it |
 //!
 //! The samples of a dwell are handed to the disk before its line in the journal is written. A line that is cut, and samples behind the
@@ -55,7 +55,7 @@ impl Part {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "entry", rename_all = "kebab-case")]
 pub enum Entry {
-    /// A dwell was had.
+    /// A dwell was completed.
     Dwell {
         /// Of which recording.
         part: Part,
@@ -75,14 +75,14 @@ pub enum Entry {
         /// Mean temperature, °C, if known.
         temp_c: Option<f64>,
     },
-    /// A dwell was thrown away while it lasted.
+    /// A dwell was discarded while it lasted.
     Thrown {
         /// What it was to be.
         step: Step,
         /// Why.
         why: String,
     },
-    /// A dwell is to be had again: the old one does not count.
+    /// A dwell is to be repeated: the old one does not count.
     Redo {
         /// Of which recording.
         part: Part,

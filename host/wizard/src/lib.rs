@@ -8,19 +8,19 @@
 //! | [`procedure`] | what is asked of a session; the steps to begin with, the next best one, those that verify |
 //! | [`source`], [`device`] | where samples come from |
 //! | [`text`], [`text_line`], [`regular`] | a board of another maker: its port, its lines, and their times as a regular rate |
-//! | [`station`] | a port with a thread of its own, opened again when it was gone |
+//! | [`station`] | a port with a separate thread, reopened when it has vanished |
 //! | [`waiting`] | why no dwell runs |
 //! | [`watch`] | is the unit still, which way is up, how fast does it turn |
 //! | [`refit`] | the calibration so far, every parameter beside its target |
-//! | [`folder`] | the journal and the recordings, from which a killed session goes on |
+//! | [`folder`] | the journal and the recordings, from which a killed session resumes |
 //! | [`unit_session`] | one of the units: its dwells, accepted or discarded |
 //! | [`axes`] | whether the axes are those that their names say |
 //! | [`bank`] | the device's own Kalman filters beside it |
-//! | [`event`] | what a session says and asks; views show it |
-//! | [`wizard`] | which step comes next, and who has had it |
+//! | [`event`] | events and questions of a session; views show them |
+//! | [`wizard`] | the next dwell, and the units that have completed it |
 //! | [`store`] | into the device, back, and over a loss of the supply |
 //! | [`verdict`] | whether a calibration keeps what it promises |
-//! | [`resumed`] | what a session that goes on keeps |
+//! | [`resumed`] | settings that a resumed session keeps |
 //! | [`session`] | all of it, in order |
 
 pub mod axes;

@@ -53,7 +53,7 @@ impl Fixture {
     }
 }
 
-/// What is asked of a session; kept with it, so that it goes on as it was begun.
+/// Settings of a session; stored in its folder, so that it resumes with the same ones.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SessionConfig {
     /// Columns and unit of a board that writes lines of text.
@@ -71,7 +71,7 @@ pub struct SessionConfig {
     pub largest_rate_dps: f64,
     /// Steps to begin with.
     pub steps: Vec<Step>,
-    /// Whether to go on beyond these while targets are not met, and to end before their end once they are.
+    /// Whether the dwells continue until the targets are met, and end early once they are.
     pub by_targets: bool,
     /// Most dwells.
     pub most_dwells: usize,
@@ -323,7 +323,7 @@ pub fn next_step(asked: &SessionConfig, done: &[Step], missed: Missed) -> Step {
 
 /// Rate below which a dwell on a table tells of the accelerometer, rad/s: see [`mimu::signal::dwell::Dwell::spins`].
 const AT_REST: f64 = 0.175;
-/// What a pose that was not had yet is worth beside its information, in logarithms of a determinant: as much as one more of ten dwells.
+/// Bonus of a pose that was not recorded yet, in logarithms of the determinant: as much as one more dwell after ten.
 const NEW_POSE: f64 = 1.0;
 
 /// Nearer than this two poses by hand are one, degrees.
@@ -336,7 +336,7 @@ pub fn verification(
     dwell_s: f64,
     largest_rate_dps: f64,
 ) -> Vec<Step> {
-    // A spiral over the sphere: directions that nobody plans.
+    // A spiral over the sphere: directions that no plan contains.
     let count = 200;
     let spiral = (0..count).map(|k| {
         let z = 1.0 - (2 * k + 1) as f64 / count as f64;

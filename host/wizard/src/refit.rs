@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::procedure::{Missed, Targets};
 
-/// Parameters of which the worst of three counts.
+/// Parameters for which the worst of three counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Parameter {
@@ -66,7 +66,7 @@ impl Aims {
     }
 }
 
-/// How the calibration stands after a dwell.
+/// State of the calibration after a dwell.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Progress {
     /// By sensor, as far as they are determined.

@@ -22,7 +22,7 @@ const SMOOTHED_S: f64 = 2.0;
 const LATE: f64 = 0.75;
 /// Least time that this is by the computer's clock, s: what its system may be late by for half a second.
 const JITTER_S: f64 = 2e-3;
-/// A clock that goes on by more than this, s, or back, has to do so for three lines in a row to be believed.
+/// If the clock advances by more than this, s, or goes back, three lines in a row have to agree before it is believed.
 const LEAP_S: f64 = 1.0;
 /// See [`LEAP_S`].
 const BELIEVED: usize = 3;
@@ -79,7 +79,7 @@ impl Regular {
     }
 
     /// Takes a line. Whether the board's clock has begun anew: then all before is to be taken out with [`Regular::rest`], and
-    /// [`Regular::begin_anew`] goes on with what is behind.
+    /// [`Regular::begin_anew`] continues with the rest.
     pub fn take(&mut self, line: Timed) -> bool {
         let leaps = |last: f64, t: f64| self.own_clock && !(t > last && t <= last + LEAP_S);
         if self.last_s.is_some_and(|last| leaps(last, line.t_s)) {
@@ -107,7 +107,7 @@ impl Regular {
         false
     }
 
-    /// Goes on behind a restart of the board. How long that took nobody knows: more than nothing is all that is claimed.
+    /// Continues after a restart of the board. Its duration is unknown; only that it was positive is assumed.
     pub fn begin_anew(&mut self) {
         self.waiting = self.odd.drain(..).collect();
         self.last_s = self.waiting.back().map(|l| l.t_s);

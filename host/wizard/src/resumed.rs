@@ -1,4 +1,4 @@
-//! What a session that goes on keeps of what it was begun with, and what may be given otherwise.
+//! Settings that a resumed session keeps, and those that may change.
 
 use std::path::Path;
 

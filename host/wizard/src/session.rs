@@ -24,7 +24,7 @@ use crate::verdict::{Judged, judge, prepared};
 use crate::wizard::{Ended, Wizard};
 use mimu_equipment::drive::Driver;
 
-/// A unit to calibrate: how it is opened, and where its folder is.
+/// A unit to calibrate: how to open it, and its folder.
 pub struct UnitSpec {
     /// Opens it.
     pub opener: Opener,
@@ -42,7 +42,7 @@ pub struct Outcome {
     pub format: &'static str,
     /// This program and its version.
     pub tool: &'static str,
-    /// Whether it was ended before its end; the session can go on.
+    /// Whether it was ended early; the session can be resumed.
     pub cancelled: bool,
     /// The units.
     pub units: Vec<UnitOutcome>,
@@ -127,7 +127,7 @@ pub fn run(
         page,
     };
     let ended = session.carry_out();
-    // Whatever happens, nothing goes on turning.
+    // Whatever happens, stop the table.
     let stopped = session.wizard.driver.stop();
     let ended = ended?;
     stopped?;
@@ -335,7 +335,7 @@ impl OpenSession<'_> {
         Ok(ended)
     }
 
-    /// Puts the estimate of the device's own filters in the place of the fit, if they have had all dwells.
+    /// Replaces the fit by the estimate of the device's filters, if these have received all dwells.
     fn take_from_device(&mut self, k: usize, fitted: &mut Fit) -> Result<()> {
         let unit = &mut self.wizard.units[k];
         let name = unit.name();

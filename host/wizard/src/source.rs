@@ -16,9 +16,9 @@ pub struct Unit {
     pub raw_unit: RawUnit,
     /// Samples a second.
     pub rate_hz: f64,
-    /// What the data sheet says of gyro and accelerometer, raw to SI: enough to tell which way is up. `None`: to be guessed from gravity.
+    /// Data-sheet model of gyro and accelerometer, raw to SI: good enough to find which side is up. `None`: estimated from gravity.
     pub nominal: Option<[Affine<f64>; 2]>,
-    /// What it says of itself: why it started, what it holds.
+    /// Lines about itself: reset cause and stored calibration.
     pub told: Vec<String>,
     /// Whether it stores calibrations, tests itself and runs Kalman banks.
     pub is_device: bool,
@@ -35,11 +35,11 @@ pub struct Chunk {
     pub values: Vec<[f64; 6]>,
     /// °C, not a number where unknown.
     pub temp_c: f64,
-    /// Whether a reading among them may stand at the end of its range.
+    /// Whether one of the readings may be at the end of its range.
     pub saturated: bool,
     /// Whether a self-test deflected the sensors.
     pub self_test: bool,
-    /// When the power came, on the clock of the ticks, s; `None` where nobody knows.
+    /// Time of the power-on on the clock of the ticks, s; `None` if unknown.
     pub power_on_s: Option<f64>,
 }
 
@@ -67,7 +67,7 @@ pub trait Source: Send {
     /// The session, where there is a mimu device. Whatever is asked of it, the stream begins again with the next [`Source::next`].
     fn device(&mut self) -> Option<&mut Session>;
 
-    /// The same for short calls that leave the stream as it is: no sample is lost by them.
+    /// The same for short calls that do not disturb the stream: no sample is lost.
     fn aside(&mut self) -> Option<&mut Session>;
 }
 

@@ -1,4 +1,4 @@
-//! A unit at its port: a thread of its own takes what comes, and opens the port again when it was gone.
+//! A unit at its port: a separate thread receives its data, and reopens the port when it has vanished.
 
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;

@@ -14,7 +14,7 @@ use crate::wizard::{Ended, Wizard};
 const BACK: Duration = Duration::from_secs(60);
 /// Length of the comparison of the device's compensation with the PC's.
 const COMPARED: Duration = Duration::from_secs(1);
-/// Length of the raw stream that says how many samples there were since the start.
+/// Length of the raw stream that shows the number of samples since the start.
 const GLANCE: Duration = Duration::from_millis(50);
 
 /// For how long the device has had its supply, s; `None` if it started by anything but power-on since, or does not know.
@@ -52,7 +52,7 @@ impl Wizard<'_> {
                     mimu_recording::result_file::stage(&copy, bytes.as_slice())?.publish()?;
                 }
             }
-            // A session that goes on has had it.
+            // A resumed session has done this already.
             if unit
                 .folder
                 .entries()

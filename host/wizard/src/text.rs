@@ -18,7 +18,7 @@ use crate::text_line::{Columns, Lines, Reading};
 
 /// Longest wait for the port: what comes together within it has one time of arrival.
 const POLL: Duration = Duration::from_millis(5);
-/// Longest wait for a line of numbers. A board that is reset by the opening of its port has said its first words by then.
+/// Longest wait for a line of numbers. A board that resets when its port is opened has started by then.
 const NOTHING: Duration = Duration::from_secs(5);
 /// Silence after which the port is opened again: one that was unplugged need not say so.
 const SILENCE: Duration = Duration::from_secs(5);
@@ -39,7 +39,7 @@ pub struct Text {
     pub port: String,
     /// Bits a second; a line over USB or TCP takes no notice of it.
     pub baud: u32,
-    /// What stands in which place.
+    /// Meaning of each place in a line.
     pub columns: Columns,
     /// Unit of the readings.
     pub raw_unit: RawUnit,
@@ -56,7 +56,7 @@ pub struct TextOpener {
 }
 
 impl TextOpener {
-    /// Of a board. `rate_hz`: that of the session that goes on, if one does.
+    /// Opens a board. `rate_hz`: that of the session, if one is resumed.
     pub fn new(text: Text, rate_hz: Option<f64>) -> Self {
         Self {
             text,
@@ -274,7 +274,7 @@ impl TextSource {
         }
         self.lines.refuse(self.regular.garbled() - self.garbled);
         self.garbled = self.regular.garbled();
-        // On the computer's clock time goes on without lines as well.
+        // On the computer's clock time advances without lines too.
         let now = (!self.lines.has_clock()).then_some(arrived_s);
         while let Some((tick, sample)) = self.regular.certain(now) {
             self.emit(tick, &sample);

@@ -1,4 +1,4 @@
-//! Lines of text as readings: which numbers are what, and which lines are none.
+//! Lines of text as readings: the meaning of their numbers, and lines that are not data.
 //!
 //! Sketches write numbers with commas, semicolons, tabs or blanks between them, often a label in front (`a/g:`, `Accel: 1, 2, 3 Gyro: …`)
 //! or one for each number (`ax:1,ay:2`, the Arduino plotter's way), and words of greeting before. MotionCal's boards write `Raw:` with
@@ -20,7 +20,7 @@ pub struct Columns {
     names: String,
     /// `None` is not needed.
     columns: Vec<Option<Column>>,
-    /// Unit of the board's clock, where it has one.
+    /// Unit of the board's clock, if it has one.
     clock: Option<Decimal>,
 }
 
@@ -99,7 +99,7 @@ impl Columns {
         }
     }
 
-    /// Whether the board has a clock of its own.
+    /// Whether the lines contain the board's clock.
     pub fn has_clock(&self) -> bool {
         self.clock.is_some()
     }
@@ -110,7 +110,7 @@ impl Columns {
 pub struct Reading {
     /// Gyro x, y, z, accelerometer x, y, z, raw.
     pub raw: [f64; 6],
-    /// °C, not a number where there is none.
+    /// °C, NaN if there is none.
     pub temp_c: f64,
     /// The board's clock, s, where there is one.
     pub t_s: Option<f64>,
@@ -123,7 +123,7 @@ pub struct Lines {
     open: Vec<u8>,
     /// What is before the first end of a line may be its second half.
     whole: bool,
-    /// What stands before the first number of the lines that are data.
+    /// Label before the first number of the lines that are data.
     label: Option<String>,
     count: u64,
     refused: u64,
@@ -274,7 +274,7 @@ impl Lines {
         ))
     }
 
-    /// How many lines of numbers had another label; `None` if none had.
+    /// Number of lines of numbers with another label; `None` if zero.
     pub fn others_in_words(&self) -> Option<String> {
         let label = self.label.as_deref().unwrap_or_default();
         let others = self.others;
@@ -284,7 +284,7 @@ impl Lines {
         })
     }
 
-    /// Whether the board has a clock of its own.
+    /// Whether the lines contain the board's clock.
     pub fn has_clock(&self) -> bool {
         self.columns.has_clock()
     }

@@ -70,7 +70,7 @@ pub struct Round<'a> {
     pub others: &'a [Step],
     /// Whether the table still moves.
     pub busy: bool,
-    /// Whether another step may be had first, as a person may.
+    /// Whether another pose may be recorded first, which only a person can do.
     pub any_order: bool,
 }
 
@@ -86,7 +86,7 @@ pub struct UnitSession {
     pub progress: Progress,
     /// How it stands.
     pub standing: UnitStanding,
-    /// Whether it has had the step.
+    /// Whether it has completed the step.
     pub done: bool,
     watch: Watch,
     /// Raw to SI: of the data sheet, or guessed, or of the calibration so far.
@@ -108,7 +108,7 @@ pub struct UnitSession {
     seen: Option<Seen>,
     part: Part,
     number: i32,
-    /// The device's own filters, where its estimate is to be the calibration.
+    /// The device's filters, if its estimate is to be the calibration.
     pub banks: Option<DeviceBanks>,
 }
 
@@ -145,7 +145,7 @@ impl UnitSession {
         }
     }
 
-    /// Begins a recording, or goes on with it.
+    /// Begins or resumes a recording.
     pub fn begin(&mut self, part: Part, asked: &SessionConfig) -> Result<()> {
         let unit = &self.station.unit;
         let table = asked.fixture == Fixture::Table;
@@ -202,7 +202,7 @@ impl UnitSession {
         self.station.unit.name.clone()
     }
 
-    /// First tick that a source may use, so that time goes on behind what was recorded.
+    /// First tick that a source may use, so that time continues after the recorded samples.
     pub fn first_tick(folder: &Folder, rate_hz: f64) -> u64 {
         let last = folder.entries().iter().filter_map(|e| match e {
             Entry::Dwell { from_s, step, .. } => Some(from_s + step.dwell_s),
@@ -295,7 +295,7 @@ impl UnitSession {
                 rows.reference[c].push(f64::NAN);
             }
         }
-        // Nobody turns a unit for minutes: whoever is at lunch leaves a gap.
+        // A turn does not last minutes: a longer pause of the person leaves a gap.
         if self.dwell.is_none() && rows.len() as f64 > 2.0 * KEPT_S * rate_hz {
             cut(rows, rows.len() - (KEPT_S * rate_hz) as usize);
         }
@@ -512,7 +512,7 @@ impl UnitSession {
         Ok(())
     }
 
-    /// Refuses to go on where more dwells do not help.
+    /// Ends the session if more dwells cannot help.
     fn check_hope(&self) -> Result<()> {
         match &self.hopeless {
             Some(error) => Err(error.clone()),

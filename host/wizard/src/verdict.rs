@@ -138,7 +138,7 @@ impl Judged {
             && both().any(|(a, b)| a.after < b.after)
     }
 
-    /// Whether noise explains what is left.
+    /// Whether noise explains the remaining error.
     pub fn clean(&self) -> bool {
         self.sensors.iter().all(|s| s.after <= CLEAN * s.floor)
     }

@@ -45,7 +45,7 @@ pub enum Waiting {
 }
 
 impl Waiting {
-    /// Whether `other` is the same reason, though its numbers may differ: then it is told once.
+    /// Whether `other` is the same reason with other numbers; it is then reported only once.
     pub fn is_like(&self, other: &Self) -> bool {
         // In a person's hands a unit does both by turns, several times a second.
         let in_hands = |why: &Self| matches!(why, Self::Moves(..) | Self::Turns(_));

@@ -62,7 +62,7 @@ struct Codes {
     step: Option<f64>,
     /// Whether the first second had one value: a step larger than the noise, or a broken wire.
     constant: Option<bool>,
-    /// Variance of the quietest second that had more than one value.
+    /// Variance of the quietest second with more than one value.
     quietest: Option<f64>,
 }
 
@@ -119,7 +119,7 @@ pub struct Seen {
     pub mean: [f64; 6],
     /// Standard deviation of gyro and accelerometer over the most that counts as still; the worst axis.
     pub motion: [f64; 2],
-    /// Whether a reading may stand at the end of its range.
+    /// Whether a reading may be at the end of its range.
     pub saturated: bool,
     /// Samples that are missing in it.
     pub missing: u64,
@@ -236,7 +236,7 @@ impl Watch {
     }
 
     /// Looks whether a second of the gyro (mean and variance of each axis) is rest: as that before it, which a table that slows down is not.
-    /// A table may say that it stands while samples of its turning are still on their way.
+    /// A table may report that it is at rest while samples of its motion still arrive.
     fn find_rest(&mut self, means: [f64; 6], variances: [f64; 6]) {
         let first = |of: [f64; 6]| [of[0], of[1], of[2]];
         let (mean, variance) = (first(means), first(variances));

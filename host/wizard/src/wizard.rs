@@ -1,4 +1,4 @@
-//! A session from the greeting to the last dwell: which step comes next, and who has had it.
+//! A session from the greeting to the last dwell: chooses the next dwell, and records which units have completed it.
 
 use std::time::{Duration, Instant};
 
@@ -20,7 +20,7 @@ const IDLE: Duration = Duration::from_millis(4);
 /// Longest wait for a unit to say anything, or for a table's interlock.
 const SILENT: Duration = Duration::from_secs(30);
 
-/// So long a pose that is another may stand where no person turns the unit: it will not become that which was asked for.
+/// Longest time with a wrong pose if no person turns the unit: it will not become the requested one.
 const WRONG: Duration = Duration::from_secs(10);
 
 /// How a phase ended.
@@ -28,7 +28,7 @@ const WRONG: Duration = Duration::from_secs(10);
 pub enum Ended {
     /// As it was to.
     Done,
-    /// By the person: the session can go on later.
+    /// By the person: the session can be resumed later.
     Cancelled,
 }
 
@@ -46,7 +46,7 @@ pub struct Wizard<'a> {
     pub phase: Phase,
     shown: Instant,
     queue: Vec<Step>,
-    /// Those in whose place a person had another pose: they come after the others.
+    /// Dwells in whose place a person held another pose: they follow after the others.
     later: Vec<Step>,
     planned: usize,
     current: Option<Step>,
@@ -299,7 +299,7 @@ impl<'a> Wizard<'a> {
         left
     }
 
-    /// The next step; `None` if there is none left to do.
+    /// The next step; `None` if all are done.
     fn choose(&mut self, part: Part) -> Option<Step> {
         let going_by_targets = part == Part::Calibration && self.asked.by_targets;
         if !going_by_targets {

@@ -131,7 +131,7 @@ fn one_rate_without_rests_is_enough_in_many_orientations_and_names_what_lacks_in
     );
     let error = refused(&only(|i| i % 3 == 1 && i < 24), turntable("200", 0.001));
     assert!(
-        error.contains("add dwells with each axis up and down"),
+        error.contains("add dwells with each axis up, down"),
         "{error}"
     );
 }

@@ -137,7 +137,7 @@ fn a_sweep_that_moves_the_bias_by_more_than_the_rates_is_fitted_and_its_effect_i
     let gyro = fitted.sensor(Sensor::Gyro).expect("recorded");
     // More than the share of the inputs from which on readings follow nothing.
     let warned = gyro.warnings.iter().map(Warning::to_string);
-    let mut warned = warned.filter(|w| w.contains("by a model without temperature"));
+    let mut warned = warned.filter(|w| w.contains("a model without temperature"));
     assert!(warned.next().is_some(), "{:?}", gyro.warnings);
     let found = diagnosed(prepared, None);
     assert!(

@@ -6,7 +6,7 @@ use super::super::Deviation;
 /// Largest sum that the combined algorithm of GR evaluates term by term.
 const J_MAX: usize = 100;
 
-/// What a sample of the integral stands for.
+/// Meaning of a sample of the integral.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sampling {
     /// The integral at an instant, as the sum of rates is.

@@ -64,7 +64,7 @@ impl Integrated {
                     since_start += rate - reference;
                 }
             });
-        // One more than there are rates, and no more: a vector that grows by itself doubles.
+        // Exactly one more than the rates; a vector that grows automatically would double.
         rates.reserve_exact(1);
         rates.push(last);
         integrated.x = rates;

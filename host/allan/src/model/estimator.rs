@@ -11,7 +11,7 @@ use super::selection::{FEWEST, SEEN, Selection};
 use super::terms::{Coefficient, NoiseModel, Reason, Term, Unseen};
 use crate::Point;
 
-/// Third differences over second ones that are no more than rounding errors.
+/// Ratio of third to second differences that are only rounding errors.
 const ROUNDING: f64 = 1e-6;
 
 /// Fits models to the curves of one record: several channels have the same times, and so the same covariances.

@@ -126,7 +126,7 @@ pub struct NoiseModel {
 }
 
 impl NoiseModel {
-    /// The coefficient of `term`, or why there is none.
+    /// The coefficient of `term`, or the reason why it is absent.
     pub fn get(&self, term: Term) -> Result<&Coefficient, &Unseen> {
         self.coefficients[term as usize].as_ref()
     }

@@ -14,7 +14,7 @@ use super::white::{White, of_spectrum};
 const ROUNDS: usize = 4;
 /// Part of a band's power that a sinusoid has to hold to be taken off as one.
 const STEADY: f64 = 0.3;
-/// A sinusoid of more power than this part of the band's is none that was seen there.
+/// A sinusoid with more than this fraction of the band's power was not seen there.
 const MUCH: f64 = 2.0;
 /// Part of its power that a line may have beside a sinusoid and still is steady, or twice what the noise makes of the power.
 const BESIDE_IT: f64 = 0.1;
@@ -30,7 +30,7 @@ pub struct SetAside {
     pub searched_hz: Option<[f64; 2]>,
     /// Whether something still stands out, which could not be brought down.
     pub remains: bool,
-    /// Spectrum of what is left, at the finest resolution.
+    /// Spectrum of the residual, at the finest resolution.
     finest: Option<Welch>,
 }
 

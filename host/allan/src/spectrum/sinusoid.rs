@@ -85,7 +85,7 @@ impl Sinusoid {
         0.5 * (self.cos * self.cos + self.sin * self.sin)
     }
 
-    /// One step of Gauss–Newton on what is left of the bins without the line.
+    /// One Gauss–Newton iteration on the residual bins without the line.
     fn refine(
         &self,
         whole: &Transform,

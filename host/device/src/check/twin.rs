@@ -113,7 +113,8 @@ impl HostReference {
         self.next = Some(head.first.wrapping_add(raw.values.len() as u32));
     }
 
-    /// Compares the temperatures of the dies that the device says it has used with that of the thermometer behind their lags. What was before the comparison is in the temperatures of its first batch.
+    /// Compares the temperatures of the dies that the device reports with those computed from its thermometer and lags. The first batch
+    /// gives the initial state.
     fn follow_dies(
         &mut self,
         head: &BatchHead,

@@ -12,7 +12,7 @@ pub(super) struct Clock {
     /// Tick and number of the sample that comes next if none is lost.
     next: Option<(u64, u32)>,
     restarted: Option<Option<Started>>,
-    /// The line was lost and is there again; why the device had started, as it says.
+    /// The line was lost and is back; the reset cause that the device reports.
     reconnected: Option<Started>,
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Arrival {
     pub tick: u64,
     /// Samples that are missing before it.
     pub missing: u64,
-    /// It is the first after a restart; why that was, if the device has said so.
+    /// It is the first after a restart; the reset cause, if the device reported it.
     pub restart: Option<Option<Started>>,
 }
 
@@ -50,13 +50,13 @@ impl Clock {
         }
     }
 
-    /// The line is there again, and the device has not said whether it went on meanwhile: its next number tells.
+    /// The line is back. Whether the device continued meanwhile follows from its next sample number.
     pub fn reconnected(&mut self, start: Started) {
         self.reconnected = Some(start);
     }
 
-    /// Whether a device that begins a batch with this number has begun to count while the line was away, and did not go on. One that
-    /// goes on is ahead by the time that has passed here; one that began anew has no larger number than that time.
+    /// Whether a device that begins a batch with this number has restarted while the line was lost. If it continued, its number is ahead by
+    /// the elapsed time; if it restarted, its number is at most the elapsed time.
     fn began_anew(&self, number: u32, ahead: u32, silence: Duration) -> bool {
         let away = silence.as_secs_f64() * self.rate_hz;
         let room = DRIFT * away + DELAY_S * self.rate_hz;
@@ -167,10 +167,10 @@ mod tests {
         };
         // It went on for 20 s, by its clock 20.1.
         assert_eq!(arrival(5_000, 25_100), (25_100, 20_100, false));
-        // It was without power, and is on for 15 s: ahead of where it was, and yet another count.
+        // It was without power and has been on for 15 s: its number is ahead of the old one, but from a new count.
         assert_eq!(arrival(5_000, 15_000), (25_000, 0, true));
         assert_eq!(arrival(60_000, 300), (80_000, 0, true));
-        // Time stood still for the device, as for an emulated one that nobody listens to.
+        // Time stood still for the device, as for an emulated one without a reader.
         assert_eq!(arrival(60_000, 60_040), (60_040, 40, false));
     }
 

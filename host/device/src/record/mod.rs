@@ -91,7 +91,7 @@ pub struct Standing {
     pub step: Option<i32>,
     /// Restarts of the device.
     pub restarts: Vec<Restart>,
-    /// Times that a device which was still there had to be told to stream again.
+    /// Number of times that a connected device had to be asked to stream again.
     pub resumed: u32,
     /// Times that the port vanished and came back.
     pub reconnected: u32,
@@ -100,7 +100,7 @@ pub struct Standing {
     pub waiting: bool,
     /// Dwells that do not count: turns that were not recorded as a whole, and what is found to be another input.
     pub dropped: Vec<i32>,
-    /// It is over, and what was received is about to be ended as a recording: whoever moves the unit may rest.
+    /// The recording is over and is about to be written; the unit may be at rest.
     #[serde(skip)]
     pub ended: bool,
     /// Mean of the last readings: gyro, accelerometer.
@@ -108,7 +108,7 @@ pub struct Standing {
     pub raw: [f64; 6],
     /// °C, the last.
     pub temp_c: f64,
-    /// What the device says is wrong with them.
+    /// Faults that the device flags.
     #[serde(flatten)]
     pub flagged: Flagged,
     /// What was heard on the line.

@@ -20,7 +20,7 @@ pub struct Procedure {
     pub chamber_c: Vec<[f64; 2]>,
     /// Time before the first round, s.
     pub lead_in_s: f64,
-    /// From the beginning of a round to that of the next, s; without it they follow each other.
+    /// From the beginning of a round to that of the next, s; if `None`, each round follows at once.
     pub round_s: Option<f64>,
 }
 

@@ -129,7 +129,7 @@ impl Run {
         Ok(false)
     }
 
-    /// Waits until the unit is there again; whether it is, or the person has had enough.
+    /// Waits until the unit is back; returns `false` if the person stops.
     fn reconnect(
         &mut self,
         session: &mut Session,

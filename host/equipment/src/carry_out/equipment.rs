@@ -14,7 +14,7 @@ use crate::step::Step;
 
 /// Time between two questions whether the table still moves.
 const BUSY: Duration = Duration::from_millis(100);
-/// Time between two questions whether an interlock is open: a table that it has stopped must not be taken for one that turns.
+/// Time between two checks of the interlock: a table that it has stopped must not count as turning.
 const HELD: Duration = Duration::from_millis(500);
 /// Time between two looks at the temperature in the chamber.
 const READ: Duration = Duration::from_secs(2);
@@ -26,7 +26,7 @@ pub(super) enum Order {
     Go(Step),
     /// A turn by an angle.
     Turn(Turn),
-    /// To rest where it is.
+    /// Stops it where it is.
     Halt,
     /// A temperature of the chamber, °C.
     Set(f64),
@@ -85,11 +85,11 @@ impl Equipment {
 
     pub fn order(&mut self, order: Order) {
         self.motions[0] += usize::from(!matches!(order, Order::Set(_)));
-        // A thread that has ended has said why.
+        // A thread that has ended has reported why.
         let _ = self.orders.as_ref().map(|orders| orders.send(order));
     }
 
-    /// Takes in what has happened; an error after which nothing goes on.
+    /// Processes the thread's events; an error ends the procedure.
     pub fn take_news(&mut self) -> Option<Error> {
         for news in self.news.try_iter() {
             match news {
@@ -140,7 +140,7 @@ impl Drop for Equipment {
 struct Hands {
     equipped: Equipped,
     tell: Sender<EquipmentEvent>,
-    /// Whether anything was told: what nobody has touched is left as it was found.
+    /// Whether any command was sent: equipment that was not touched is left unchanged.
     ordered: bool,
     motions: usize,
     moves: bool,
@@ -207,7 +207,7 @@ impl Hands {
         Ok(())
     }
 
-    /// Each by itself: a table that does not answer must not leave the chamber hot.
+    /// Each separately: a table that does not answer must not leave the chamber hot.
     fn rest(&mut self) -> Vec<Error> {
         let (table, chamber) = (self.equipped.table, self.equipped.chamber);
         let rest_c = self.equipped.rest_c();

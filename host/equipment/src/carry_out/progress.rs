@@ -12,13 +12,13 @@ pub struct Progress {
     pub since_s: Option<f64>,
     /// Round that runs, from 1, and rounds.
     pub round: [usize; 2],
-    /// Dwells and turns that were had, and as planned.
+    /// Dwells and turns completed as planned.
     pub dwells: [usize; 2],
     /// Time that is left, at the pace so far, s.
     pub left_s: f64,
     /// What the chamber is to be at, °C.
     pub planned_c: f64,
-    /// What it is at, °C, where it can be asked.
+    /// Its present temperature, °C, if it can be read.
     pub chamber_c: Option<f64>,
     /// The unit's thermometer, °C.
     pub temp_c: f64,

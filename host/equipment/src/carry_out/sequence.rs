@@ -17,7 +17,7 @@ const SET_EVERY_S: f64 = 5.0;
 const SET_LEAST_C: f64 = 0.005;
 /// How near to the first temperature of the plan the chamber has to be at the beginning, K.
 const NEAR_C: f64 = 1.0;
-/// Time after the table says that it is done, s, in which samples arrive that were taken before: a batch, the line and a busy PC.
+/// Time, s, during which older samples still arrive after the table reports that it is done: a batch, the line and a busy PC.
 const ON_THE_WAY_S: f64 = 0.5;
 
 /// How it stands.
@@ -25,7 +25,7 @@ const ON_THE_WAY_S: f64 = 0.5;
 pub(super) struct Seen {
     /// By [`Sequence::clock`], s.
     pub now_s: f64,
-    /// No samples come: nothing begins or ends, and the chamber goes on.
+    /// No samples come: no dwell begins or ends, and the chamber continues.
     pub line_lost: bool,
     /// The table is done with all that was ordered.
     pub arrived: bool,

@@ -17,7 +17,7 @@ pub struct TextDriver {
     place: String,
     file: DriverFile,
     line: Line,
-    /// Turns as soon as it no longer tilts: a table that is told a rate before would turn about another axis.
+    /// Turns only after the tilt has ended: a table that gets a rate earlier would turn about another axis.
     then: Option<Step>,
 }
 

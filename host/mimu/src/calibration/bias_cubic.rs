@@ -357,7 +357,7 @@ fn linear(
     let scales: Vec<_> = models.iter().map(scale).collect();
     let crosses: Vec<_> = models.iter().map(cross).collect();
     let over = |source, errors: &[Vector3<f64>]| match biases_only {
-        // C is the same at all temperatures because nobody measured it at another: its error there is unknown, not zero.
+        // C is the same at all temperatures because it was measured at one only: its error elsewhere is unknown, not zero.
         true => Remainder::unknown(source, "calibrated at one temperature"),
         false => Remainder::of(source, condition, errors),
     };

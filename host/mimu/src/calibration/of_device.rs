@@ -16,7 +16,7 @@ use crate::triad::{Angles, Triad};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
 
-/// What a device keeps of a calibration, raw in V: numbers of single precision, each as it is.
+/// The part of a calibration that a device stores, raw in V: unrounded numbers of single precision.
 #[derive(Debug, Clone)]
 pub struct DeviceCalibration {
     /// Name of the unit.

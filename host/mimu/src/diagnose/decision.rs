@@ -1,4 +1,4 @@
-//! From the rows of one sensor to a verdict: what is tried, what is accepted, what is left.
+//! From the rows of one sensor to a verdict: effects tried, effects accepted, residual errors.
 
 mod acceptance;
 mod hold_out;

@@ -9,7 +9,7 @@
 //! | [`variance`]    | how that scatters: known noise, more of it, a bias that walks                    |
 //! | [`search`]    | which effects the rows ask for                                                   |
 //! | [`note`]      | what a person should know of the accepted ones                                   |
-//! | [`decision`]  | which of them are accepted, and what is left                                     |
+//! | [`decision`]  | accepted effects, and residual errors                                            |
 //! | `passes`      | all of this again with the affine model that strong effects leave                |
 //! | [`uncertainty`] | what the coefficients of effects leave open of what stands on them               |
 //! | [`picture`]   | what of it can be drawn                                                          |
@@ -169,7 +169,7 @@ pub struct Diagnosis {
     pub problems: Vec<OfRecording>,
 }
 
-/// A recording, told apart from others.
+/// A recording, with its index.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Source {
     /// Its file of samples.
@@ -200,7 +200,7 @@ impl From<&Prepared> for Source {
 pub struct Recordings<'a> {
     /// The recording that the calibration is made from.
     pub first: Prepared,
-    /// More of the same unit: effects are found in all of them together; each has biases of its own.
+    /// More recordings of the same unit: effects are found in all of them together; each has separate biases.
     pub more: Vec<Prepared>,
     /// One that nothing is found in, and that effects are judged by.
     pub second: Option<Prepared>,
@@ -344,7 +344,7 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         )
     };
     let held = matrices(&recordings);
-    // Of readings in SI that were never turned nobody knows how well their matrix is known.
+    // For readings in SI of a unit that is never turned, the uncertainty of the matrix is unknown.
     let covariances = Sensor::BOTH.map(|s| recordings.given.and_then(|c| c.covariance(s)));
     let free = |sensor: Sensor| match (held, &covariances) {
         (Some(_), [gyro, accel]) => FreeParameters::Bias(match sensor {

@@ -49,7 +49,7 @@ pub(super) fn session(prepared: &Prepared, [gyro, accel]: [Option<Affine<f64>>; 
     }
 }
 
-/// A later recording beside the calibration of the first: its matrices, and biases of its own.
+/// A later recording with the calibration of the first: its matrices, and separate biases.
 fn later_session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) -> Session<'a> {
     let own = [0, 1].map(|i| {
         let known = models[i]?;

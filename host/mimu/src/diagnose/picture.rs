@@ -74,7 +74,7 @@ pub struct Step {
 pub struct Quantile {
     /// What noise alone would be expected to give here.
     pub normal: f64,
-    /// The middle 95 % of that, each by itself.
+    /// The middle 95 % of that, for each separately.
     pub band: [f64; 2],
     /// What it is before and after.
     pub found: [f64; 2],
@@ -194,7 +194,7 @@ fn middle(rows: &Rows, row: usize) -> f64 {
     rows.mean(row, &rows.conditions(None), |at| at.t_s)
 }
 
-/// The rows stratum by stratum; of turns each direction by itself.
+/// The rows by stratum; those of turns by direction.
 fn tracks(rows: &Rows, sample: impl Fn(usize, f64) -> Sample) -> Vec<Track> {
     let mut all = Vec::new();
     for stratum in &rows.strata {

@@ -81,7 +81,7 @@ pub struct ErrorRms {
     pub rms: f64,
 }
 
-/// Probability of chance from which on an effect is none.
+/// Probability by chance above which an effect is rejected.
 const CHANCE: f64 = 0.5;
 
 impl fmt::Display for Reason {

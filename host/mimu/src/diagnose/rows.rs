@@ -130,7 +130,7 @@ struct Row {
     weights: Vec<Vector3<f64>>,
     /// Index of the dwell, or of the dwells that a turn begins and ends in; counted through all recordings.
     dwells: [usize; 2],
-    /// Whether the input moves from one of its conditions to the next, so that none stands for all.
+    /// Whether the input changes between its conditions, so that no single one represents all.
     moving: bool,
 }
 
@@ -161,7 +161,7 @@ pub struct Rows {
     block: Vec<(usize, usize)>,
     /// Of each recording: time of each block, s, and its temperature, °C above the reference.
     temperature: Vec<Vec<(f64, f64)>>,
-    /// The same without what the thermometer warms up by itself, where it does.
+    /// The same without the thermometer's self-heating, if there is any.
     without_self_heating: Vec<Option<Vec<(f64, f64)>>>,
     /// Number of the first dwell of each recording, and that of all dwells.
     first: Vec<usize>,
@@ -388,7 +388,7 @@ impl Rows {
         Cow::Owned(conditions)
     }
 
-    /// Whether the thermometer of a recording warms up by itself.
+    /// Whether the thermometer of a recording has self-heating.
     pub fn thermometer_heats_itself(&self) -> bool {
         self.without_self_heating.iter().any(Option::is_some)
     }

@@ -247,7 +247,7 @@ impl<'a> Search<'a> {
             .fold(self.basis.clone(), |m, c| beside(&m, &c.columns))
     }
 
-    /// The model with the chosen effects, with noise of its own.
+    /// The model with the chosen effects and separately estimated noise.
     pub fn fit(&self, chosen: &[Chosen]) -> Option<Fitted> {
         self.variance.fit(
             &self.model(chosen),
@@ -281,7 +281,8 @@ impl<'a> Search<'a> {
         exceeds(f, p as f64, dof)
     }
 
-    /// A candidate beside the chosen, its parameter refined, with noise of its own: the drop of the deviance and its chance.
+    /// A candidate beside the chosen effects, with refined parameter and separately estimated noise: the drop in deviance and its
+    /// probability by chance.
     fn judge(&self, chosen: &[Chosen], null: &Fitted, screened: &Screened) -> Option<Chosen> {
         let candidate = &self.candidates[screened.index];
         let beside_these = Beside {
@@ -326,7 +327,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// The best candidates beside the chosen, each with noise of its own, the least by chance first.
+    /// The best candidates beside the chosen effects, each with separately estimated noise, the least probable by chance first.
     fn finalists(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Chosen> {
         let screened = self.screen(chosen, null);
         // Every named effect is a rival of every other.
@@ -344,7 +345,7 @@ impl<'a> Search<'a> {
         judged
     }
 
-    /// The named effects that are not among the chosen, each beside them with noise of its own.
+    /// The named effects that were not chosen, each beside the chosen ones with separately estimated noise.
     pub fn others(&self, chosen: &[Chosen], now: &Fitted) -> Vec<Chosen> {
         let screened = self.screen(chosen, now);
         let listed = screened

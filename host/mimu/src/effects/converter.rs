@@ -1,16 +1,16 @@
-//! How the codes of a converter stand behind readings, and how often a bit is set.
+//! Relation between a converter's codes and readings, and how often a bit is set.
 
 use statrs::function::erf::erfc;
 
 use super::quantity::{Conditions, Reading};
 
-/// Bits that are told apart, from the first down.
+/// Bits that are distinguished, from the first down.
 pub const BITS: usize = 9;
 
 /// Converters of the axes.
 pub type Codes = [Option<Converter>; 3];
 
-/// How the codes of a converter stand behind readings.
+/// Relation between a converter's codes and readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Converter {
     /// Of bit 0, raw.

@@ -70,7 +70,7 @@ pub struct Effect {
     pub size: &'static str,
     /// What an experiment has to have for it to be seen.
     pub needs: &'static str,
-    /// What it may be taken for.
+    /// What it may be mistaken for.
     pub taken_for: &'static str,
 }
 

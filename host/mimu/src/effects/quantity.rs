@@ -19,7 +19,7 @@ pub struct Conditions {
     pub session: usize,
     /// Middle of the stretch, s since the recording began.
     pub t_s: f64,
-    /// The same since power-on, as the device counts it; since the recording began where nobody knows.
+    /// The same since power-on, as the device counts it; if unknown, since the start of the recording.
     pub on_s: f64,
     /// The same since the middle of the dwells of the recording.
     pub from_middle_s: f64,
@@ -111,7 +111,7 @@ pub enum Quantity {
     Temperature,
     /// Its rate of change behind a lag of [`RATE_LAG_S`], K/s.
     TemperatureRate,
-    /// Time since power-on, or since the recording began where nobody knows, s.
+    /// Time since power-on or, if unknown, since the start of the recording, s.
     Time,
     /// Time since the middle of the dwells of a recording, s: a coefficient of it is specific to the session.
     SessionTime,
@@ -239,8 +239,7 @@ impl Quantity {
         }
     }
 
-    /// Whether it cannot be known without `need`, in an error of `sensor`. The angular acceleration of a recording is taken for zero
-    /// where nobody knows it.
+    /// Whether it is unknown without `need`, in an error of `sensor`. An unknown angular acceleration of a recording is taken as zero.
     pub(crate) fn needs(self, need: Need, sensor: Sensor) -> bool {
         match (self, need) {
             (Self::Input | Self::InputAlong(_), Need::Rate) => sensor == Sensor::Gyro,

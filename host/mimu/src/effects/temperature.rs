@@ -50,7 +50,7 @@ pub fn lagged(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
     out
 }
 
-/// Time after the beginning in which a thermometer warms up by itself, s: dies of such parts take 3 to 10 s.
+/// Time after the beginning in which a thermometer heats itself, s: dies of such parts need 3 to 10 s.
 const START_S: f64 = 60.0;
 /// Time constants of it that are tried first: the least, s, the ratio of each to that before, and how many.
 const OWN_S: (f64, f64, i32) = (2.0, 1.33, 9);

@@ -1,6 +1,6 @@
 //! The readings as they came, judged like a calibration.
 //!
-//! Where a unit gives SI, somebody has calibrated it already, and the figure to beat is that of its readings. Ten poses by hand once
+//! A unit with readings in SI is calibrated already, and a new calibration has to improve its readings. Ten poses by hand once
 //! ended in a calibration that turned gravity 1.65 degrees off, in sample, where the readings themselves were 0.44 degrees off.
 
 use mimu_core::compensation::Affine;
@@ -74,7 +74,7 @@ pub(super) fn compare(fit: &mut SensorFit) {
     fit.warnings.push(warning.of(fit.sensor));
 }
 
-/// Probability that what is said to be larger is so by chance.
+/// Probability that a reported difference is chance.
 const BY_CHANCE: f64 = 0.025;
 
 /// Numbers that `count` errors of a figure are.

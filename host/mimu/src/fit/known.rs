@@ -192,7 +192,7 @@ pub(super) fn fit_known(
     Ok(sensors)
 }
 
-/// Dwells that `observations` are of, which stand in order.
+/// Dwells of `observations`, in order.
 fn count_dwells(observations: &[Observation]) -> u64 {
     let mut dwells: Vec<usize> = observations.iter().map(|o| o.dwell).collect();
     dwells.dedup();

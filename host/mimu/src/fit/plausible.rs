@@ -205,7 +205,7 @@ fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     )
 }
 
-/// Rests of a gyro that are none.
+/// Gyro rests that are not rests.
 fn rests(fit: &SensorFit) -> Option<Warning> {
     fit.static_rms.and_then(|(rms, _)| restless(rms))
 }
@@ -218,7 +218,7 @@ fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let svd = fit.estimated.triad.inverse.matrix.svd(true, true);
     let rotation = svd.u? * svd.v_t?;
     let angle = (0.5 * (rotation.trace() - 1.0)).clamp(-1.0, 1.0).acos();
-    // What is left-handed has a warning of its own.
+    // Left-handed axes have a separate warning.
     if rotation.determinant() < 0.0 || angle.to_degrees() < TURNED_DEG {
         return None;
     }

@@ -99,7 +99,7 @@ pub struct FileCoefficient {
 }
 
 impl NoiseChannel {
-    /// The coefficient of `term`, or why there is none.
+    /// The coefficient of `term`, or the reason why it is absent.
     pub fn get(&self, term: Term) -> std::result::Result<&FileCoefficient, &str> {
         let (value, reason) = match term {
             Term::Q => (&self.q, &self.q_reason),

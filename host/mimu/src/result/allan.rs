@@ -219,7 +219,7 @@ impl AllanResult {
 
     /// The noise file for the commands that rest on it; `None` without a recording.
     pub fn noise_file(&self, created: &str) -> Option<NoiseFile> {
-        // What has no noise is not told apart from a channel that nothing was recorded of.
+        // A channel without noise is not distinguished from one that was not recorded.
         let alive = self.channels.iter().filter(|c| c.samples > 0);
         let lengths = self.recordings.iter().map(|r| r.span_s[1] - r.span_s[0]);
         Some(NoiseFile {
@@ -301,7 +301,7 @@ impl ChannelResult {
         }
     }
 
-    /// The coefficient of `term`, or why there is none.
+    /// The coefficient of `term`, or the reason why it is absent.
     pub fn get(&self, term: Term) -> Result<&FileCoefficient, &str> {
         let value = match term {
             Term::Q => &self.q,

@@ -1,4 +1,4 @@
-//! A design as it is reported: each result is one type, and JSON is that type.
+//! A design, as reported: each result is one type, and JSON is that type.
 
 use std::borrow::Cow;
 
@@ -77,7 +77,7 @@ pub struct Design {
     pub mean_sigma_of_full_scale: f64,
     /// Names of the parameters that it does not determine.
     pub undetermined: Vec<String>,
-    /// What is left over.
+    /// Residual degrees of freedom.
     pub dof: Freedom,
     /// What it would notice of the terms that the model lacks.
     pub notices: Vec<Noticed>,

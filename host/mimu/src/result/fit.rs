@@ -237,7 +237,7 @@ pub struct ResidualResult {
     pub within: bool,
     /// Residual, SI; of a magnitude the first.
     pub value: [f64; 3],
-    /// The same by a fit that has not seen it; null where there is none.
+    /// The same by a fit that has not used it; null if there is none.
     pub held_out: Option<[f64; 3]>,
     /// Standard deviation that noise alone gives it, SI.
     pub floor: f64,
@@ -333,7 +333,7 @@ impl SensorFitResult {
                 dof: s.dof,
                 excess_sigma: s.excess.sqrt(),
                 unit: excess_unit(fit, found, *group),
-                // What nobody knows explains nothing, and leaves nothing unexplained.
+                // An unknown noise neither explains an error nor leaves one unexplained.
                 significant: s.is_significant() && fit.prepared.noise.is_known(found.sensor),
             };
             (group.to_string(), result)

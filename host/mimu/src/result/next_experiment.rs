@@ -1,4 +1,4 @@
-//! The next experiment as it is reported: JSON is this type.
+//! The next experiment, as reported: JSON is this type.
 
 use serde::Serialize;
 

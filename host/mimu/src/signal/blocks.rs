@@ -234,7 +234,7 @@ pub struct Condensed {
     pub rows: u64,
     /// Step that the readings of each raw channel are multiples of, raw; `None` where they are not in steps.
     pub reading_step: [Option<f64>; 6],
-    /// Of each raw channel: pairs of samples that show a [low byte taken for a signed number](crate::signal::signed_low_byte).
+    /// For each raw channel: pairs of samples that show a [low byte read as a signed number](crate::signal::signed_low_byte).
     pub signed_low_byte: [Option<u64>; 6],
     /// Which of the six raw channels the recording has.
     pub has_raw: [bool; 6],

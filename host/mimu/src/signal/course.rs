@@ -25,7 +25,7 @@ const GAP_BLOCKS: f64 = 3.0;
 /// What the known input of a sensor does within a dwell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Motion {
-    /// It stands, or nobody knows it.
+    /// It is constant, or unknown.
     Stands,
     /// It moves, and blocks follow it.
     Moves,

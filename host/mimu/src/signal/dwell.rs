@@ -402,7 +402,7 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
     }
 }
 
-/// A dwell that turns evenly is none for both sensors.
+/// A dwell that turns evenly is used for neither sensor.
 fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
     let usable = |d: &&Dwell| Sensor::BOTH.iter().all(|s| d.fault(*s).is_none());
     let judged: Vec<&Dwell> = list.iter().filter(usable).collect();

@@ -1,4 +1,4 @@
-//! Samples of the thermometer that are no temperatures in °C are taken for empty cells, and counted.
+//! Samples of the thermometer that cannot be temperatures in °C are treated as empty cells, and counted.
 
 use mimu_recording::NoTemperatures;
 

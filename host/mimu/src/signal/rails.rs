@@ -40,7 +40,7 @@ const NEAR: f64 = 0.1;
 /// Where a channel comes to a calm end: a sensor at its own rail, of whose noise only the converter's is left. `sign` is
 /// 1 for the high end and -1 for the low one; the answer is the innermost value there.
 ///
-/// Repeated values, which tell a converter's rail, do not occur: behind a rail of the sensor the converter goes on making noise.
+/// Repeated values, the sign of a converter's rail, do not occur: at a rail of the sensor the converter still makes noise.
 fn calm_end(condensed: &Condensed, c: usize, sign: f64, range: [f64; 2]) -> Option<f64> {
     let [low, high] = range;
     let near = NEAR * (high - low);
@@ -101,7 +101,7 @@ fn full_scale_log_odds(value: f64, step: Option<f64>) -> f64 {
 
 /// How often the extreme `value` comes: in all, and in a row.
 fn count(moments: impl Iterator<Item = Moments>, value: f64) -> (u64, f64) {
-    // Blocks are short: a run goes on through those that hold nothing else.
+    // Blocks are short: a run continues through blocks that contain only its value.
     let (mut all, mut longest, mut run) = (0, 0.0_f64, 0.0);
     for m in moments {
         if m.max == value {

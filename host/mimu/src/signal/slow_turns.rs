@@ -14,9 +14,9 @@ use crate::signal::rest::expected;
 const PARAMETERS: usize = 4;
 /// Fewer dwells do not show what is usual beside so many parameters.
 const FEWEST: usize = 12;
-/// Share of the dwells that may be slow turns: of more, nobody knows which are the rests.
+/// Largest share of dwells that may be slow turns; beyond it, it is unknown which dwells are rests.
 const MOST: f64 = 0.25;
-/// Probability that any dwell of a recording at rest is taken for a turn, where noise is all there is.
+/// Probability that any dwell of a recording at rest is mistaken for a turn because of noise.
 const FALSE_ALARM: f64 = 1e-3;
 /// And the least factor between a deviation and the scatter: biases wander from dwell to dwell, and their tails are longer than those of noise.
 const SIGMAS: f64 = 6.0;

@@ -1,4 +1,4 @@
-//! Finding dwells where nobody says where they are: stretches in which no channel varies.
+//! Finds dwells that are not numbered: segments in which no channel varies.
 
 use serde::Serialize;
 
@@ -33,11 +33,11 @@ pub enum Steps {
     /// The `step` column where there is one, and judged; found elsewhere.
     #[default]
     AsRecorded,
-    /// The `step` column, as it is: no dwell is judged not to be still.
+    /// The `step` column, without a test for stillness.
     Given,
     /// Found by stillness, whatever the column says.
     Found,
-    /// None are looked for: somebody knows that the unit lies still throughout, and all of the recording is one dwell.
+    /// Dwells are not searched: the caller declares that the unit lay still throughout, and the whole recording is one dwell.
     AtRest,
 }
 

@@ -42,7 +42,7 @@ pub fn survey_all(
     Ok(surveys)
 }
 
-/// Refuses a recording whose channels cannot stand in one file with those of the first.
+/// Refuses a recording whose channels cannot be in one file with those of the first.
 fn refuse_another_unit(first: &Recording, other: &Recording) -> Result<()> {
     let (one, two) = (&first.manifest, &other.manifest);
     let place = |recording: &Recording| recording.samples.display().to_string();

@@ -42,7 +42,7 @@ impl Suitability {
 
 /// Samples that a variance needs to be told from the quietest.
 const FEWEST_IN_WINDOW: usize = 16;
-/// A step between the means of two windows that is none of noise: ten of their sigmas.
+/// A jump between the means of two windows that is not noise: ten of their sigmas.
 const STEP_SIGMAS: f64 = 10.0;
 /// Natural logarithm of the odds against a run of equal samples by chance in the whole recording.
 const RUN_LOG_ODDS: f64 = 14.0;

@@ -16,7 +16,7 @@ pub(super) enum Read {
     Dead(String),
 }
 
-/// One channel as it is computed with.
+/// One channel, prepared for the computation.
 pub(super) struct Values {
     pub rates: Vec<f64>,
     pub suitability: Suitability,

@@ -317,7 +317,7 @@ mod tests {
             ("t_s,gyro_x,t_s", "twice"),
             ("t_s=a,t_s=b", "twice"),
             ("t_s,gyro_x=wx", "by position, others by name"),
-            ("", "no column"),
+            ("", "not a column"),
         ] {
             let error = text.parse::<ColumnList>().unwrap_err().to_string();
             assert!(error.contains(word), "{error}");

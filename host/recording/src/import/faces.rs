@@ -92,7 +92,7 @@ mod tests {
             .map(|text| text.parse().unwrap())
             .collect();
         let warning = Face::missing(&faces).unwrap();
-        assert!(warning.contains("-y, +z:"), "{warning}");
+        assert!(warning.contains("-y, +z have"), "{warning}");
         assert_eq!(Face::missing(&Face::all()), None);
     }
 }

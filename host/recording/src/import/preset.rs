@@ -278,7 +278,7 @@ impl Preset {
             Some((missing, error)) if missing.is_empty() => Err(error.into()),
             Some((missing, _)) => refused(
                 format!(
-                    "it does not fit the preset {}: the column {} is missing",
+                    "it does not fit the preset {}: its header lacks {}",
                     self.name,
                     missing.join(", ")
                 ),

@@ -236,12 +236,16 @@ fn a_list_that_does_not_fit_the_file_is_refused() {
         (
             "1,2,3,4\n",
             "gyro_x,gyro_y,gyro_z",
-            "has 4 cells and 3 are expected",
+            "has 4 cells, but 3 are expected",
         ),
         ("1,2\n", "gyro_x,gyro_y,gyro_z", "has 2 cells"),
         ("words\nonly\n", "gyro_x,gyro_y,gyro_z", "row 1"),
         ("", "gyro_x,gyro_y,gyro_z", "no row"),
-        ("a,b,c\n1,2,3\n", "gyro_x=a,gyro_y=b,gyro_z=d", "\"d\""),
+        (
+            "a,b,c\n1,2,3\n",
+            "gyro_x=a,gyro_y=b,gyro_z=d",
+            "column \"d\"",
+        ),
         ("a,a,c\n1,2,3\n", "gyro_x=a,gyro_y=a,gyro_z=c", "twice"),
         ("1,2\n", "gyro_x,gyro_y", "gyro_z"),
         ("1,2\n", "-,-", "skipped"),
@@ -424,7 +428,7 @@ fn a_source_inside_the_recording_to_replace_is_not_deleted() {
 fn options_that_contradict_each_other_are_refused() {
     let bench = Bench::new(&[("a", "0 1 2 3\n0.1 1 2 3\n"), ("b", "0 1 2 3\n0.1 1 2 3\n")]);
     let error = bench.refused(&bench.options(&["a", "b"], &[ACC]));
-    assert!(error.contains("2 files and 1 lists"), "{error}");
+    assert!(error.contains("2 files but 1 lists"), "{error}");
     let error = bench.refused(&bench.options(&["a", "b"], &[ACC, ACC]));
     assert!(error.contains("twice"), "{error}");
     let error = bench.refused(&bench.options(&[], &[]));

@@ -55,7 +55,7 @@ impl OpenSession<'_> {
         let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
         let of_unit = accepted.filter(|a| a.of_unit);
         let found: Vec<FittedEffect> = of_unit.map(|a| a.effect.clone()).collect();
-        // On a table a sensor without effects stays as it is: the fit before knows of the force of a board beside the axis.
+        // On a table a sensor without effects is unchanged: only the earlier fit includes the lever arm of a board beside the axis.
         let mut fitted = diagnosis.after.clone();
         if other.manifest.reference == Reference::Table {
             mounted(&mut fitted, self.wizard.asked.mounting_deg);

@@ -1,4 +1,4 @@
-//! What has to hold for a dwell to run: samples come, the unit is as still or as steady as it can be, and its pose and rate are those of
+//! Conditions of a dwell: samples come, the unit is as still or as steady as it can be, and its pose and rate are those of
 //! a step.
 
 use mimu::quantity::{Sensor, significant};
@@ -64,7 +64,7 @@ impl UnitSession {
         None
     }
 
-    /// Why its rate is not that of the step.
+    /// Why its rate differs from the requested one.
     pub(super) fn turns_otherwise(&self, seen: &Seen, step: &Step) -> Option<Waiting> {
         let nominal = self.nominal.as_ref()?;
         let rate = self.watch.rate(seen, &nominal[0]);
@@ -121,7 +121,7 @@ impl UnitSession {
 }
 
 impl UnitSession {
-    /// Refuses readings in SI that are none.
+    /// Refuses readings that are declared as SI but are not.
     pub(super) fn check_unit(&self, seen: &Seen, asked: &SessionConfig) -> Result<()> {
         let size = Vector3::from_fn(|k, _| seen.mean[3 + k]).norm();
         let share = size / asked.gravity_mps2;
@@ -141,7 +141,8 @@ impl UnitSession {
         Err(Error::device(self.name(), problem, remedy).about(Argument::RawUnit))
     }
 
-    /// Counts turns whose samples are not whole, which do nothing for the gyro; `missing`: of the one before the dwell that was had.
+    /// Counts turns with missing samples, which do not calibrate the gyro; `missing`: number of missing samples in the turn before the
+    /// completed dwell.
     pub(super) fn count_turn(&mut self, missing: u64, tell: &mut Vec<Event>) -> Result<()> {
         let lost = missing > 0;
         self.turns = self.turns.with(lost);

@@ -210,7 +210,7 @@ fn when_the_power_came_is_told_or_that_it_is_not_known() {
     let known = told(Some(90_500));
     assert!(known.contains("90.5 s before sampling began"), "{known}");
     let lost = told(None);
-    assert!(lost.contains("power-on      not known"), "{lost}");
+    assert!(lost.contains("power-on      unknown"), "{lost}");
 }
 
 #[test]

@@ -212,7 +212,7 @@ impl<'a> Acceptance<'a> {
         (p > SURVIVES).then_some(Reason::LostWithDwell(p))
     }
 
-    /// Takes out of the `kept` what no physics asks for, the second recording does not show and nobody accepts: suggestions.
+    /// Removes suggestions from `kept`: products without known physics that neither the second recording nor the user confirms.
     pub fn suggestions(
         &self,
         kept: &mut Vec<Chosen>,

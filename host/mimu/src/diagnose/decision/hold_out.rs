@@ -74,7 +74,7 @@ pub(in crate::diagnose) fn held_out(
     Some(out)
 }
 
-/// Root mean square of the rows at rest, SI, where the judged rows are turns; `None` where there are none.
+/// Root mean square of the rows at rest, SI, if the judged rows are turns; `None` if there are none.
 pub(super) fn rms_at_rest(rows: &Rows, residuals: &DVector<f64>) -> Option<f64> {
     let count = rows.y.len() - rows.judged.0;
     (rows.figure == RowFigure::Direction && count > 0)

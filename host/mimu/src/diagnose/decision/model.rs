@@ -16,7 +16,7 @@ pub struct Model {
     pub fitted: Fitted,
     /// In-sample residuals, SI.
     pub residuals: DVector<f64>,
-    /// Residuals of rows that the coefficients had not seen; `None` where what is left does not determine them.
+    /// Residuals of rows that were not used for the coefficients; `None` if the remaining rows do not determine them.
     pub held_out: Option<DVector<f64>>,
 }
 

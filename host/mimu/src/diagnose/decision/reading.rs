@@ -1,4 +1,4 @@
-//! Whether what is left of an axis is a function of what the axis itself reads.
+//! Whether the residual of an axis is a function of the axis's own reading.
 //!
 //! A converter that is not linear, codes that never come, an amplifier that rests or no longer follows: each leaves a function of the
 //! reading that no smooth law makes. Which of them it is, dwell means do not say, so that the answer is a line of what is left and no
@@ -26,7 +26,7 @@ const TRIED: f64 = (3 * PIECES.len()) as f64;
 
 /// A function of its reading that is left of an axis.
 pub(super) struct OfReading {
-    /// What is said of it.
+    /// The report about it.
     pub left: Leftover,
     /// Columns that take it up, the smooth ones included.
     pub columns: DMatrix<f64>,

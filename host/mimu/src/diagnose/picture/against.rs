@@ -1,6 +1,6 @@
 //! An effect against what it depends on.
 //!
-//! Component plus residual, and not the added-variable plot: of two residuals against each other nobody reads a rate or a
+//! Component plus residual instead of an added-variable plot: two residuals against each other do not show a rate or a
 //! temperature. What the affine calibration takes up of the component is taken out of it all the same, as the added-variable
 //! plot does: its mean, and its best straight line where the variable is one that the calibration is linear in. Otherwise a
 //! cubic would be drawn with the scale factor that it was never seen to have.
@@ -39,7 +39,7 @@ pub struct At {
     pub x: f64,
     /// Standard deviation by the known noise.
     pub sigma: f64,
-    /// Residual with the effect left in: what is left, plus the effect as fitted.
+    /// Residual plus the fitted effect.
     pub partial: f64,
     /// What the model that has not seen the row says that this is; not a number where there is none.
     pub predicted: f64,

@@ -57,7 +57,7 @@ pub(super) struct Builder<'a> {
     pub scale: Vector3<f64>,
 }
 
-/// The rows of `sensor` in a recording. `None` if there are none, or the calibration is singular.
+/// The rows of `sensor` in a recording; `None` if it has none, or if the calibration is singular.
 pub(super) fn part(session: &Session, sensor: Sensor, free: FreeParameters) -> Option<Part> {
     let inverse = session.model(sensor)?;
     let accel = session.accel.as_ref();
@@ -229,7 +229,7 @@ impl Builder<'_> {
         })
     }
 
-    /// Force on dwell `index` by the accelerometer, not a number where there is none.
+    /// Force in dwell `index` by the accelerometer; NaN if there is none.
     pub(super) fn force(&self, index: usize, accel: Option<&Affine<f64>>) -> Vector3<f64> {
         let raw = self.prepared.dwells.list[index].raw_mean(Sensor::Accel);
         accel.map_or(Vector3::repeat(f64::NAN), |a| a.apply(&raw))

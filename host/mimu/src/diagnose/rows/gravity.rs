@@ -147,7 +147,7 @@ impl Builder<'_> {
         )
     }
 
-    /// Two rows for each turn, which `accel` is needed for, and one for each dwell and axis, where the rate is none.
+    /// Two rows for each turn, which need `accel`, and one for each dwell and axis at rest.
     pub(super) fn turns(
         mut self,
         inverse: &Affine<f64>,

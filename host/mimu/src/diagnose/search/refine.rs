@@ -7,7 +7,7 @@ use crate::diagnose::variance::{Components, Fitted, LikelihoodKind};
 use crate::effects::candidate::Candidate;
 use crate::effects::effect::NonlinearParameter;
 
-/// A model with noise of its own that a candidate is put beside.
+/// A model with separately estimated noise, to which a candidate is added.
 pub(super) struct Beside<'a> {
     pub search: &'a Search<'a>,
     pub model: DMatrix<f64>,

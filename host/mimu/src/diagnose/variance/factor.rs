@@ -143,7 +143,7 @@ pub(super) enum Factor {
 }
 
 impl Factor {
-    /// That of a covariance of `open` times its transpose beside this. `None` if a number in it is none.
+    /// The factor of this covariance plus `open` times its transpose; `None` if it contains NaN.
     ///
     /// Without correlated noise the sum is 1 + w wᵀ, whose inverse root differs from 1 along the directions of w only: an n by n factor of
     /// each size of the noise that is tried took minutes of 500 dwells.

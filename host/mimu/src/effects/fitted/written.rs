@@ -14,7 +14,7 @@ use crate::quantity::{AXES, Sensor, significant};
 const FORMULA: &str = "x = C (u - S e) + o, e_i = sum of coefficient * regressor";
 const DIRECTION: &str = "raw to SI";
 
-/// An effect as it is written.
+/// An effect in a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -40,7 +40,7 @@ pub(super) struct WrittenEffect {
     coefficients: Vec<WrittenCoefficient>,
 }
 
-/// A nonlinear parameter as it is written.
+/// A nonlinear parameter in a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -63,7 +63,7 @@ pub struct WrittenParameter {
     pub to: f64,
 }
 
-/// How the codes of a converter stand behind readings, as it is written.
+/// Relation between a converter's codes and readings, as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -78,7 +78,7 @@ pub struct WrittenConverter {
     pub reading_of_code_0_within_raw: f64,
 }
 
-/// A coefficient as it is written.
+/// A coefficient in a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]

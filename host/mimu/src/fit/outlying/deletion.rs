@@ -185,7 +185,7 @@ impl Others {
         Some(found)
     }
 
-    /// What they say of a row that is none of them.
+    /// Their prediction for a row outside them.
     fn judge(&self, k: usize, row: &Row) -> Judged {
         let error = row.error - &row.by * &self.step;
         let error = Vector3::new(error[0], error[1], error[2]);

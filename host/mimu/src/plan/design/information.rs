@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 /// Regressor rows of points at which one could measure.
 ///
-/// A row consists of one or more blocks with parameters of their own: a sensor's square of its own input is
+/// A row consists of one or more blocks with separate parameters: a sensor's square of its own input is
 /// no other sensor's regressor, and one dwell serves all three. The information matrix is then block
 /// diagonal, and its determinant the product over the blocks.
 #[derive(Debug, Clone, PartialEq)]

@@ -30,7 +30,7 @@ pub struct Target {
     pub sizes: Vec<f64>,
     /// Whether each coefficient is to be seen; or the effect, as found, to be told from `rivals`.
     pub each: bool,
-    /// What it must not be taken for. One at a time.
+    /// Effects that it must not be mistaken for, one at a time.
     pub rivals: Vec<Candidate>,
 }
 
@@ -191,7 +191,7 @@ fn apart_from_bias(mut candidate: Candidate) -> Candidate {
     candidate
 }
 
-/// States that coefficients are told apart at: more than any axis has coefficients.
+/// States at which coefficients are distinguished: more than any axis has coefficients.
 const STATES: usize = 64;
 
 /// Values of its nonlinear parameter that an experiment has to be good for: the quarters of its range, in the logarithm.
@@ -250,7 +250,7 @@ fn problems(setup: &Setup, sensor: Sensor, states: &[Conditions]) -> Vec<Problem
     each.collect()
 }
 
-/// Whether an experiment determines the calibration of every sensor by itself.
+/// Whether an experiment alone determines the calibration of every sensor.
 pub fn calibrates(setup: &Setup, experiment: &Experiment) -> bool {
     setup.sensors.iter().all(|sensor| {
         let states = experiment.states(*sensor, None);

@@ -95,7 +95,7 @@ fn where_no_row_fits_the_first_line_of_data_is_named_with_what_is_wrong_with_it(
         let text = error.to_string();
         assert!(text.contains(&format!("a.txt, row {row}: ")), "{text}");
         assert!(
-            text.contains("the row has 5 cells and 6 are expected"),
+            text.contains("the row has 5 cells, but 6 are expected"),
             "{text}"
         );
     }

@@ -60,7 +60,7 @@ fn what_does_not_go_with_a_log_is_refused() {
     assert!(
         bench
             .refused(&options)
-            .contains("list of columns is given for a log")
+            .contains("list of columns is given, but the messages of a log")
     );
     let (bench, options) = log("flight.ulg", ARDUPILOT);
     assert!(bench.refused(&options).contains("not a ULog"));

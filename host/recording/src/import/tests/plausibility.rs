@@ -47,7 +47,7 @@ fn rows_of_zeros_are_padding_and_left_out_counted_wherever_they_are() {
     let text = text + &"0 0 0 0 0 0 0\n".repeat(50);
     assert_eq!(one(&text, BOTH).unwrap().0.padding, 79);
     let error = one_refused(&log(50, |_| [0; 6]), BOTH);
-    assert!(error.contains("0 in all of its 50 rows"), "{error}");
+    assert!(error.contains("all readings are 0, in 50 rows"), "{error}");
 }
 
 #[test]

@@ -188,7 +188,7 @@ fn phyphox_is_read_with_every_separator_that_it_exports() {
         let error = bench.preset(Some("phyphox"), &["other.csv"]);
         let error = error.unwrap_err().to_string();
         assert!(
-            error.contains("the column Acceleration x (m/s^2) is missing"),
+            error.contains("its header lacks Acceleration x (m/s^2)"),
             "{error}"
         );
         assert!(bench.preset(None, &["other.csv"]).unwrap().is_none());

@@ -89,7 +89,7 @@ fn a_value_that_never_occurs_is_refused_with_those_that_do() {
     let error = chosen(&early, LIST, &["channel=1", "range=odd"])
         .unwrap_err()
         .to_string();
-    assert!(error.contains("channel=1 and range=odd at once"), "{error}");
+    assert!(error.contains("all of channel=1 and range=odd"), "{error}");
 }
 
 #[test]
