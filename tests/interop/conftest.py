@@ -110,6 +110,9 @@ def thermal_unit(tmp_path_factory):
             (ca, oa), (cb, ob) = inverse(temp_c - h)[sensor], inverse(temp_c + h)[sensor]
             text += f"[temperature.node.{sensor}]\nC = {rows(c)}\no = {rows(o)}\n"
             text += f"slope_C = {rows((cb - ca) / (2 * h))}\nslope_o = {rows((ob - oa) / (2 * h))}\n"
+            # Intervals that are seen beside the curves: wider where it is cold.
+            gain, share = numpy.diag(curves(temp_c)[sensor][0]), 3e-4 * (2 - temp_c / 60)
+            text += f"sigma_scale_factor = {rows(share * gain)}\nsigma_bias = {rows(share * gain * G)}\n"
     (folder / "cal.toml").write_text(text)
     # Ten minutes at 10 Hz, in which it warms from -15 to 55 °C and turns about everything.
     random = numpy.random.default_rng(1)

@@ -164,3 +164,70 @@ def test_ardupilot_over_temperature(thermal_unit: Unit, temp_c):
         settled_c = p[f"INS_{short}1_CALTEMP"]
         offset = [polynomial(temp_c, a) - polynomial(settled_c, a) + p[f"INS_{short}OFFS_{a}"] for a in "XYZ"]
         assert numpy.allclose(offset, reading(sensor, temp_c), atol=2e-5)
+
+
+def rest_bias(sensor, temp_c):
+    """Biases of a unit in SI that lies still while its temperature changes."""
+    x = (numpy.asarray(temp_c)[..., None] - 20.0) / 30.0
+    size = {"gyro": 0.01, "accel": 0.1}[sensor]
+    return size * (numpy.array([0.5, -0.3, 0.2]) + numpy.array([1.0, -0.7, 0.4]) * x + numpy.array([0.2, 0.1, -0.3]) * x**2 + numpy.array([0.1, 0.0, 0.2]) * x**3)
+
+
+@pytest.fixture(scope="session")
+def at_rest(tmp_path_factory):
+    """Biases of a recording at rest, from -10 to 50 °C and back in two hours, in a pose that nobody knows; without a calibration."""
+    folder = tmp_path_factory.mktemp("at-rest")
+    t_s = numpy.arange(0, 7200, 0.1)
+    temp_c = 50.0 - numpy.abs(t_s - 3600.0) / 60.0
+    random = numpy.random.default_rng(5)
+    up = numpy.array([0.1, -0.2, 0.97])
+    gyro = rest_bias("gyro", temp_c) + 5e-4 * random.standard_normal((len(t_s), 3))
+    accel = rest_bias("accel", temp_c) + G * up / numpy.linalg.norm(up) + 0.01 * random.standard_normal((len(t_s), 3))
+    thermometer = temp_c + 0.02 * random.standard_normal(len(t_s))
+    (folder / "rest").mkdir()
+    header = "t_s,temp_c," + ",".join(f"{sensor}_{axis}" for sensor in ["gyro", "accel"] for axis in "xyz")
+    numpy.savetxt(folder / "rest" / "samples.csv", numpy.column_stack([t_s, thermometer, gyro, accel]), "%.9g", ",", header=header, comments="")
+    (folder / "rest" / "recording.toml").write_text(
+        f'format = "mimu-recording/1"\ndevice = "unit"\nsample_rate_hz = 10.0\ngravity_mps2 = {G}\nraw_unit = "SI"\nreference = "gravity"\n'
+    )
+    run("thermal", "fit", "rest", "-o", "cal.toml", cwd=folder)
+    return folder
+
+
+# White noise over 10 of 60 K, and what the fit makes of the ends of the range.
+LEFT = {"gyro": 2e-5, "accel": 4e-4}
+
+
+def test_px4_from_a_recording_at_rest_alone(at_rest):
+    p, head = export(at_rest, "px4", "--gyro-id", 7, "--accel-id", 8)
+    # TemperatureCompensation.cpp: calc_thermal_offsets_3D(), with the temperature held within TMIN to TMAX.
+    temperatures = numpy.linspace(-9.0, 49.0, 30)
+    for sensor, letter in [("gyro", "G"), ("accel", "A")]:
+        of = lambda name, letter=letter: p[f"TC_{letter}0_{name}"]  # noqa: E731
+        assert of("TMIN") == pytest.approx(-10, abs=0.5) and of("TMAX") == pytest.approx(50, abs=0.5)
+        d = temperatures - of("TREF")
+        offset = numpy.stack([sum(of(f"X{k}_{axis}") * d**k for k in range(4)) for axis in range(3)], axis=1)
+        truth = rest_bias(sensor, temperatures)
+        if sensor == "accel":
+            # As accel.cpp of PX4's own calibration: zero at the reference temperature.
+            assert all(of(f"X0_{axis}") == 0 for axis in range(3))
+            truth = truth - rest_bias(sensor, of("TREF"))
+        assert numpy.abs(offset - truth).max() < LEFT[sensor], numpy.abs(offset - truth).max(axis=0)
+    assert "Scale factors stay the flight controller's own" in head and "scale factors and cross terms: unknown" in head
+
+
+def test_ardupilot_from_a_recording_at_rest_alone(at_rest):
+    p, head = export(at_rest, "ardupilot", "--imu", 3)
+    # Nothing but what its own calibration over temperature writes.
+    assert len(p) == 3 + 2 * 9 and all(name.startswith("INS_TCAL3_") for name in p)
+    temperatures, calibrated_c = numpy.linspace(-9.0, 49.0, 30), 22.0
+    for sensor, short in [("gyro", "GYR"), ("accel", "ACC")]:
+        # AP_InertialSensor_tempcal.cpp: correct_sensor() from CALTEMP, with polynomial_eval() about 35 °C in millionths.
+        def polynomial(temp_c, short=short):
+            d = numpy.asarray(temp_c)[..., None] - 35.0
+            return 1e-6 * sum(numpy.array([p[f"INS_TCAL3_{short}{k}_{a}"] for a in "XYZ"]) * d**k for k in (1, 2, 3))
+
+        change = polynomial(temperatures) - polynomial(calibrated_c)
+        truth = rest_bias(sensor, temperatures) - rest_bias(sensor, calibrated_c)
+        assert numpy.abs(change - truth).max() < 2 * LEFT[sensor], numpy.abs(change - truth).max(axis=0)
+    assert "Scale factors and offsets stay the flight controller's own (INS_ACC3SCAL, INS_ACC3OFFS)" in head

@@ -180,6 +180,18 @@ fn faces(args: &ImportArgs) -> Result<(Vec<PathBuf>, Vec<Face>)> {
         }
     }
     both.sort_by_key(|(face, _)| *face);
+    for (k, (face, path)) in both.iter().enumerate() {
+        if path.as_os_str().is_empty() {
+            let remedy = format!("write it like {face}=FILE");
+            return Err(Error::new(face, "no file is given for this face", remedy));
+        }
+        // One recording for two faces is a slip of the keyboard, which a fit cannot tell from an axis without sensitivity.
+        if let Some((other, _)) = both[..k].iter().find(|(f, p)| p == path && f != face) {
+            let problem = format!("it is given for the faces {other} and {face}");
+            let remedy = "give the recording of each face";
+            return Err(Error::new(path.display(), problem, remedy));
+        }
+    }
     Ok(both.into_iter().map(|(face, path)| (path, face)).unzip())
 }
 

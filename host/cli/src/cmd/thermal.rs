@@ -92,6 +92,8 @@ struct CompareArgs {
     /// The second calibration file; differences are second minus first
     second: PathBuf,
     #[command(flatten)]
+    verbose: VerboseArgs,
+    #[command(flatten)]
     json: JsonArgs,
 }
 
@@ -196,7 +198,7 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<()> {
             }
         };
         staged.push(stage(path, made)?);
-        text.push_str(&format!("\n{what}: {}\n", path.display()));
+        text.push_str(&format!("{what}: {}\n", path.display()));
     }
     if let Some(path) = &args.plot {
         staged.push(stage(path, thermal_plot::svg(&result))?);
@@ -222,7 +224,7 @@ fn run_compare(args: &CompareArgs) -> Result<()> {
     let result = compare(&first?, &second?)?;
     print(
         &args.json,
-        &report::thermal_comparison_text(&result),
+        &report::thermal_comparison_text(&result, args.verbose.verbose),
         &result,
         None,
     )

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use mimu::parameter::ParameterKind;
-use mimu::quantity::{Sensor, plus_minus, significant};
+use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable;
-use mimu_thermal::compare::Comparison;
+use mimu_thermal::compare::{Comparison, Difference};
 use mimu_thermal::fit::FitVerdict;
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
@@ -26,21 +26,100 @@ const ACROSS: usize = 3;
 
 /// Result of `mimu thermal fit`: a summary, or with `verbose` everything.
 pub fn thermal_text(result: &ThermalResult, verbose: bool) -> String {
-    let mut out = String::new();
+    match verbose {
+        true => everything(result),
+        false => summary(result),
+    }
+}
+
+fn recorded(result: &ThermalResult) -> String {
     let [from, to] = result.range_c;
+    format!(
+        "{}: {}, dies at {from:.1} to {to:.1} °C, estimator {}",
+        result.device,
+        plural(result.recordings.len() as u64, "recording"),
+        result.estimator,
+    )
+}
+
+fn summary(result: &ThermalResult) -> String {
+    let mut out = recorded(result) + "\n";
+    let meaning = match result.verdict {
+        FitVerdict::Fitted => over_noise(result),
+        FitVerdict::OneWay => VERDICT_ONE_WAY.into(),
+        FitVerdict::Misfit => VERDICT_MISFIT.into(),
+    };
+    let _ = writeln!(out, "verdict: {}: {meaning}\n", result.verdict.name());
+    errors_text(&mut out, result);
+    for (name, sensor) in result.sensors.present() {
+        if let Some(what) = sensor.inseparable {
+            wrap(&mut out, &format!("{name}, inseparable: "), what);
+        }
+    }
+    for (name, _) in result.sensors.present() {
+        let _ = writeln!(out);
+        curves_text(&mut out, name, result, false);
+    }
+    // Below it one more line, and one with the file of the calibration.
+    warn_within(&mut out, result.warnings.iter().map(hint::of_thermal), 2);
+    out += "next: --page shows all curves, --verify judges them on another recording; --verbose prints more\n";
+    out
+}
+
+/// Errors of the sensors over those of noise.
+fn over_noise(result: &ThermalResult) -> String {
+    let ratio = |s: &SensorResult| Some(s.held_out_rms.or(s.rms)? / s.noise_floor?);
+    let each = result.sensors.present();
+    let known: Vec<String> = each
+        .filter_map(|(name, s)| Some(format!("{} times ({name})", significant(ratio(s)?))))
+        .collect();
+    match known.is_empty() {
+        true => "no dwell shows the noise to compare the errors with".into(),
+        false => format!("the errors are those of noise {}", known.join(", ")),
+    }
+}
+
+/// Errors and lags of both sensors in one table.
+fn errors_text(out: &mut String, result: &ThermalResult) {
     let _ = writeln!(
         out,
-        "{}: {} recording{}, dies at {from:.1} to {to:.1} °C, estimator {}: {}",
-        result.device,
-        result.recordings.len(),
-        if result.recordings.len() == 1 {
-            ""
-        } else {
-            "s"
-        },
-        result.estimator,
-        result.verdict.name()
+        "{:<18}{:>11}{:>11}{:>11}   lag of the dies, s",
+        "rms error", "held out", "in sample", "noise"
     );
+    let mut reasons: Vec<&str> = Vec::new();
+    for (name, s) in result.sensors.present() {
+        let unit = readable::error(&s.unit);
+        let shown = |v: Option<f64>| v.map_or("-".into(), |v| significant(v * unit.factor));
+        let lag = match &s.lag_s {
+            Some(lag) => {
+                let [value, lower, upper] = [lag.value, lag.lower, lag.upper].map(significant);
+                format!("{value} ({lower} to {upper})")
+            }
+            None => "-".into(),
+        };
+        let _ = writeln!(
+            out,
+            "{:<18}{:>11}{:>11}{:>11}   {lag}",
+            format!("{name}, {}", unit.unit),
+            shown(s.held_out_rms),
+            shown(s.rms),
+            shown(s.noise_floor),
+        );
+        let why = s.lag_reason.as_deref().filter(|_| s.lag_s.is_none());
+        reasons.extend(why.filter(|why| !reasons.contains(why)));
+        if let Some(without) = s.held_out_rms_without_session_bias {
+            let name = "  without its bias";
+            let _ = writeln!(out, "{name:<18}{:>11}", shown(Some(without)));
+        }
+    }
+    for why in reasons {
+        wrap(out, "lag: ", why);
+    }
+}
+
+fn everything(result: &ThermalResult) -> String {
+    let mut out = String::new();
+    let _ = writeln!(out, "{}: {}", recorded(result), result.verdict.name());
     match result.verdict {
         FitVerdict::Fitted => {}
         FitVerdict::OneWay => wrap(&mut out, "", VERDICT_ONE_WAY),
@@ -48,24 +127,20 @@ pub fn thermal_text(result: &ThermalResult, verbose: bool) -> String {
     }
     for (name, sensor) in result.sensors.present() {
         let _ = writeln!(out);
-        sensor_text(&mut out, name, sensor, verbose);
-        curves_text(&mut out, name, result, verbose);
+        sensor_text(&mut out, name, sensor);
+        curves_text(&mut out, name, result, true);
     }
-    if verbose && !result.warnings.is_empty() {
+    if !result.warnings.is_empty() {
         let _ = writeln!(out);
         warn(&mut out, result.warnings.iter().map(hint::of_thermal));
-    }
-    if !verbose {
-        warn_within(&mut out, result.warnings.iter().map(hint::of_thermal), 1);
-        out += "next: --page shows all curves, --verify judges them on another recording; --verbose prints more\n";
     }
     out
 }
 
-fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult, verbose: bool) {
+fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult) {
     let unit = readable::error(&sensor.unit);
     let _ = writeln!(out, "{name}");
-    if let Some(used) = sensor.used.as_ref().filter(|_| verbose) {
+    if let Some(used) = &sensor.used {
         let _ = writeln!(out, "  used: {}", used.words());
     }
     match (&sensor.lag_s, &sensor.lag_reason) {
@@ -92,9 +167,6 @@ fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult, verbose: b
             let _ = write!(out, " ({} without its bias)", unit.write(without));
         }
         let _ = writeln!(out, ", noise alone {}", unit.write(floor));
-    }
-    if !verbose {
-        return;
     }
     bins_text(out, sensor);
     for h in sensor.hysteresis.iter().flatten() {
@@ -166,7 +238,11 @@ fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult, verbose: 
     let count = if verbose { SHOWN } else { ACROSS };
     let shown: Vec<usize> = (0..count).map(|k| k * last / (count - 1)).collect();
     for shown in shown.chunks(ACROSS) {
-        let _ = write!(out, "  {:<32}", "95 % intervals at");
+        let head = match verbose {
+            true => "  95 % intervals at".into(),
+            false => format!("{name}, ± of 95 %"),
+        };
+        let _ = write!(out, "{head:<34}");
         for &k in shown {
             let _ = write!(out, "{:>22}", format!("{:.1} °C", first.temp_c[k]));
         }
@@ -188,8 +264,24 @@ fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult, verbose: 
     }
 }
 
-/// Result of `mimu thermal compare`.
-pub fn thermal_comparison_text(result: &Comparison) -> String {
+/// Rows of a comparison that a summary has: scale factors and biases, and of C and o the one that differs by the most sigmas.
+fn compared(result: &Comparison, verbose: bool) -> Vec<&Difference> {
+    let inverse = |c: &Difference| c.name.contains("_C_") || c.name.contains("_o_");
+    let most = |sensor: &str| {
+        let own = result.curves.iter().filter(|c| c.name.starts_with(sensor));
+        own.filter(|c| inverse(c) && c.sigmas.is_some())
+            .max_by(|a, b| a.sigmas.unwrap_or(0.0).total_cmp(&b.sigmas.unwrap_or(0.0)))
+            .map(|c| c.name.clone())
+    };
+    let most = Sensor::BOTH.map(|sensor| most(sensor.name()));
+    let shown = |c: &&Difference| {
+        verbose || !inverse(c) || most.iter().flatten().any(|name| *name == c.name)
+    };
+    result.curves.iter().filter(shown).collect()
+}
+
+/// Result of `mimu thermal compare`: a summary, or with `verbose` everything.
+pub fn thermal_comparison_text(result: &Comparison, verbose: bool) -> String {
     let mut out = String::new();
     let [from, to] = result.range_c;
     let lag = |k: usize| match result.lags_s[k] {
@@ -201,18 +293,19 @@ pub fn thermal_comparison_text(result: &Comparison) -> String {
             significant(accel)
         ),
     };
-    let _ = writeln!(
-        out,
-        "second minus first, dies at {from:.1} to {to:.1} °C; lags {} and {}",
+    let lags = format!(
+        "dies at {from:.1} to {to:.1} °C; lags {} and {}",
         lag(0),
         lag(1)
     );
+    wrap(&mut out, "second minus first, ", &lags);
     let _ = writeln!(
         out,
         "{:<16}{:>12}{:>14}{:>12}{:>10}  unit",
         "", "rms", "largest", "at °C", "sigmas"
     );
-    for c in &result.curves {
+    let shown = compared(result, verbose);
+    for c in &shown {
         let sigmas = c.sigmas.map_or("-".into(), significant);
         let _ = writeln!(
             out,
@@ -224,6 +317,15 @@ pub fn thermal_comparison_text(result: &Comparison) -> String {
             c.unit
         );
     }
-    warn(&mut out, result.warnings.iter());
+    if verbose {
+        warn(&mut out, result.warnings.iter());
+        return out;
+    }
+    let warnings = result.warnings.iter().map(ToString::to_string);
+    warn_within(&mut out, warnings, 1);
+    let more = (result.curves.len() - shown.len()) as u64;
+    if more > 0 {
+        let _ = writeln!(out, "next: --verbose prints {more} more numbers of C and o");
+    }
     out
 }

@@ -326,6 +326,24 @@ fn a_file_for_each_face_calibrates_the_accelerometer_and_says_why_there_is_no_gy
         &format!("import --faces +w=x_up.csv {columns} --reference table -o bad"),
     );
     assert!(error.contains("is not a face"), "{error}");
+    // Slips of the keyboard.
+    for (faces, says) in [
+        (
+            "+x= -x=x_down.csv",
+            "+x: no file is given for this face; write it like +x=FILE",
+        ),
+        (
+            "+y=y_up.csv -y=y_up.csv",
+            "y_up.csv: it is given for the faces +y and -y; give the recording of each face",
+        ),
+    ] {
+        let error = refused(
+            folder,
+            &format!("import --faces {faces} {columns} --reference table -o bad"),
+        );
+        assert!(error.contains(says), "{error}");
+        assert!(!folder.join("bad").exists());
+    }
 }
 
 #[test]

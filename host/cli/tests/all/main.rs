@@ -2,6 +2,7 @@
 
 mod allan_command;
 mod bad_input;
+mod biases_at_rest;
 mod design_command;
 mod device;
 mod diagnosis_page;

@@ -97,6 +97,78 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
         .as_f64()
         .unwrap();
     assert!(values.contains(&lag), "the lag is on the page as in JSON");
+    // A report draws the same curves, scale factors and biases, with the intervals that the file holds.
+    let nodes = calibration["temperature"]["node"].as_array().unwrap();
+    let curve = |name: &str| {
+        let mut all = result["curves"].as_array().unwrap().iter();
+        all.find(|c| c["name"] == name).unwrap()
+    };
+    for (node, of) in [(&nodes[0], 0), (&nodes[nodes.len() - 1], usize::MAX)] {
+        for (sensor, name, key) in [
+            ("gyro", "scale", "sigma_scale_factor"),
+            ("accel", "bias", "sigma_bias"),
+        ] {
+            let curve = curve(&format!("{sensor}_{name}_y"));
+            let at = of.min(curve["temp_c"].as_array().unwrap().len() - 1);
+            let [low, high] = ["lower", "upper"].map(|end| curve[end][at].as_f64().unwrap());
+            let sigma = node[sensor][key][1].as_float().unwrap();
+            let ratio = 0.5 * (high - low) / (1.96 * sigma);
+            assert!((ratio - 1.0).abs() < 0.02, "{sensor} {name}: {ratio}");
+        }
+    }
+    let report = |calibration: &str| {
+        done(
+            folder,
+            &format!("report --calibration {calibration} -o unit.html"),
+        );
+        std::fs::read_to_string(folder.join("unit.html")).unwrap()
+    };
+    let page = report("cal.toml");
+    assert_eq!(page.matches(" band\"").count(), 12);
+    assert!(page.contains("with its 95 % interval: those of the calibration's"));
+    let text = std::fs::read_to_string(folder.join("cal.toml")).unwrap();
+    let without: Vec<&str> = text
+        .lines()
+        .filter(|l| !(l.starts_with("sigma_scale_factor") || l.starts_with("sigma_bias")))
+        .collect();
+    std::fs::write(folder.join("without.toml"), without.join("\n")).unwrap();
+    let page = report("without.toml");
+    assert_eq!(page.matches(" band\"").count(), 0);
+    assert!(page.contains("has no intervals at its nodes"));
+
+    // Summaries fit a terminal, sentences aside.
+    let fit = "thermal fit niu --verify again -o again.toml";
+    for (short, verbose) in [
+        (fit, "thermal fit niu --verify again --verbose"),
+        (
+            "thermal compare cal.toml again.toml",
+            "thermal compare cal.toml again.toml --verbose",
+        ),
+    ] {
+        let [short, all] = [short, verbose].map(|arguments| done(folder, arguments));
+        println!("{short}");
+        assert!(short.lines().count() <= 25, "{short}");
+        assert!(all.lines().count() > short.lines().count(), "{all}");
+        let sentences = ["verdict:", "warning:", "next:"];
+        for line in short
+            .lines()
+            .filter(|l| !sentences.iter().any(|s| l.starts_with(s)))
+        {
+            assert!(line.chars().count() <= 100, "{line}");
+        }
+    }
+    let short = done(folder, fit);
+    for says in [
+        "verdict: fitted: the errors are those of noise ",
+        "gyro, ± of 95 %",
+        "calibration: again.toml",
+    ] {
+        assert!(
+            short.lines().any(|l| l.starts_with(says)),
+            "{says}: {short}"
+        );
+    }
+
     let same = done(folder, "thermal compare cal.toml cal.toml --json -");
     let same: Value = serde_json::from_str(&same).unwrap();
     assert_eq!(same["format"], "mimu-thermal-comparison/1");

@@ -1,7 +1,9 @@
 //! Recordings at rest without a table: biases of the gyro, and what one pose shows of the accelerometer.
 
+use mimu::calibration::thermal_biases::ThermalBiases;
+use mimu::quantity::Sensor;
 use mimu::{Manifest, RawUnit, Reference, Samples};
-use mimu_thermal::fit::{Estimator, FitVerdict, Options, fit};
+use mimu_thermal::fit::{Estimator, FitVerdict, Options, ThermalFit, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::warning::Warning;
 use nalgebra::Vector3;
@@ -97,6 +99,41 @@ fn there_and_back_shows_the_biases_of_the_gyro_and_names_what_is_inseparable() {
         .unwrap_err()
         .to_string();
     assert!(refused.contains("only biases"), "{refused}");
+    a_file_keeps_the_biases(&found);
+}
+
+/// The accelerometer's readings have gravity along z in them, by its scale factor at that temperature.
+fn a_file_keeps_the_biases(found: &ThermalFit) {
+    assert!(found.is_biases_only());
+    let written = found.biases("2026-01-01T00:00:00Z").unwrap();
+    let biases = ThermalBiases::parse(&written.to_toml(), "again").unwrap();
+    assert_eq!(biases, written);
+    let lag = biases.dies.gyro.lag_s.unwrap();
+    assert!((lag - 60.0).abs() < 6.0, "{lag} s");
+    let curves = biases.curves().unwrap();
+    let result = ThermalResult::of(found);
+    for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
+        let hysteresis = biases.dies[sensor].hysteresis.unwrap();
+        assert!(hysteresis[0].iter().all(|h| *h > 0.0), "{hysteresis:?}");
+        for t in [-8.0, 11.0, 40.0, 66.0] {
+            let (matrix, bias) = truth(k, t);
+            let truth = bias + matrix * Vector3::z() * [0.0, GRAVITY][k];
+            let off = curves.reading(sensor, t) - truth;
+            // White noise of a session of 80 minutes at an end of a cubic.
+            let sigma = GAIN[k] * WHITE[k] / f64::sqrt(4800.0) * 4.0;
+            assert!(off.amax() < 3.5 * sigma, "{sensor} {t} °C: {off}, {sigma}");
+        }
+        // Pieces between the nodes keep the curves that the fit reports.
+        for (axis, letter) in ["x", "y", "z"].iter().enumerate() {
+            let all = result.curves.iter().filter(|c| c.sensor == sensor);
+            let curve = all.rev().find(|c| c.of.axis() == *letter).unwrap();
+            for (k, t) in curve.temp_c.iter().enumerate() {
+                let half = curve.upper[k] - curve.value[k];
+                let off = curves.reading(sensor, *t)[axis] - curve.value[k];
+                assert!(off.abs() < 0.05 * half, "{} {t} °C: {off}", curve.name);
+            }
+        }
+    }
 }
 
 #[test]

@@ -29,12 +29,19 @@ pub fn mimu<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -
 }
 
 impl Run {
-    /// The line of a refusal, after checking that it is one and has its three parts. A fit lists the dwells before it.
+    /// The line of a refusal, after checking that it is one and has its three parts. A command that has read the recording lists what is wrong
+    /// with it before, and a fit the dwells.
     pub fn refusal(&self) -> &str {
         let text = self.stderr.strip_suffix('\n').unwrap_or(&self.stderr);
-        let (table, line) = text.rsplit_once('\n').unwrap_or(("", text));
+        let (before, line) = text.rsplit_once('\n').unwrap_or(("", text));
+        let mut lines = before.lines().peekable();
+        if lines.next_if(|l| l.starts_with("wrong with th")).is_some() {
+            let listed = std::iter::from_fn(|| lines.next_if(|l| l.starts_with("  - ")));
+            assert!(listed.count() > 0, "{text}");
+        }
+        let table = lines.next();
         assert!(
-            table.is_empty() || table.trim_start().starts_with("step first row"),
+            table.is_none_or(|head| head.trim_start().starts_with("step first row")),
             "{text}"
         );
         assert_eq!(
@@ -56,11 +63,20 @@ impl Run {
                 .all(|p| !p.trim().is_empty()),
             "{line}"
         );
-        assert!(
-            self.stdout.is_empty(),
-            "a refusal prints no result: {}",
-            self.stdout
-        );
+        // A refusal prints no result: with `--json -` it prints itself.
+        if !self.stdout.is_empty() {
+            let told: Value = serde_json::from_str(&self.stdout).expect(&self.stdout);
+            assert_eq!(told["format"], "mimu-refusal/1", "{told}");
+            let part = |key: &str| told["error"][key].as_str().unwrap().replace('\n', " ");
+            for part in ["place", "problem", "remedy"].map(part) {
+                assert!(line.contains(&part), "{part:?} is not in: {line}");
+            }
+            let keys = told.as_object().unwrap().keys();
+            assert_eq!(
+                keys.collect::<Vec<_>>(),
+                ["error", "format", "recording_problems"]
+            );
+        }
         line
     }
 

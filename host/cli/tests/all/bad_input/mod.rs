@@ -11,6 +11,7 @@ mod damage;
 mod files;
 mod generator;
 mod left_out;
+mod listed;
 mod refused;
 
 use answer::*;
