@@ -8,7 +8,7 @@ use rigless::time::VirtualNanos;
 
 use crate::part::Machine;
 
-/// State of a board's time.
+/// Present state of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Standing {
     /// The virtual clock, ns since the board was switched on first.
