@@ -36,7 +36,7 @@ pub struct Sensor {
     pub kind: MeasuredQuantity,
     /// Unit of the output.
     pub output: RawUnit,
-    /// Packages that three axes take: each is turned on the board by itself.
+    /// Number of packages for three axes: each is rotated on the board separately.
     pub packages: u32,
     /// Output in proportion to the supply.
     pub ratiometric: bool,

@@ -1,10 +1,10 @@
-//! A carrier that is told where to go while it goes, in place of a plan.
+//! A table or a person under command, instead of a plan.
 
 use crate::motion::Carrier;
 use crate::plan::Turn;
 use crate::rotation::Vector;
 
-/// What a carrier can be told.
+/// Commands of a carrier.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
     /// To a pose at rest.
@@ -14,7 +14,7 @@ pub enum Command {
         /// Turn about the vertical from the body's nominal heading, rad. Left out, a table takes 0 and a person any.
         heading: Option<f64>,
     },
-    /// Rate about the vertical by the outer axis, rad/s, kept until it is told another one or to move.
+    /// Rate about the vertical by the outer axis, rad/s, kept until the next rate or move.
     Rate(f64),
     /// Rate about the body's z axis by the inner axis, rad/s, kept likewise.
     Spin(f64),
@@ -28,23 +28,23 @@ pub enum Command {
     Hold(bool),
 }
 
-/// Where a carrier was told to go, and nothing of how well it got there.
+/// Commanded target of a carrier, without its errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
     /// Body direction that points up, unit vector.
     pub up: Vector,
-    /// Turn about the vertical, rad, from -π to π. `None`: a person was not told any.
+    /// Turn about the vertical, rad, from -π to π. `None`: none was given to a person.
     pub heading: Option<f64>,
 }
 
-/// A carrier under command. It stands at the first pose of a plan and has no end.
+/// A carrier under command. It starts in the first pose of a plan and has no end.
 pub trait Commanded: Carrier {
     /// Does as it is told from `t_s` on, which must not be before the last instant that it was asked for: attitude
     /// and rate go on from there without a jump.
     ///
-    /// Errors: it cannot do that, in one line that says what instead.
+    /// Errors: the carrier cannot do that; one line gives the remedy.
     fn command(&mut self, t_s: f64, command: Command) -> Result<(), String>;
-    /// Whether it still moves, runs up or settles as it was told, at an instant.
+    /// Whether it still moves, ramps or settles at an instant.
     fn busy(&self, t_s: f64) -> bool;
     /// Where it was told to be: the pose that it is on its way to or, once it is there, where its axes have been
     /// turned to at the instant.

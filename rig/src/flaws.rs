@@ -1,6 +1,6 @@
 //! What goes wrong in recordings that people really make, and no tolerance of a data sheet covers.
 //!
-//! Each flaw has a stream of its own and is off by default: switching one on leaves the rest of a recording as it was.
+//! Each flaw has a separate random stream and is off by default: switching one on does not change the rest of a recording.
 
 use std::f64::consts::TAU;
 
@@ -17,7 +17,7 @@ use crate::rotation::{Vector, add, scale};
 pub struct FlawsTruth {
     /// Jitter of the time stamps, standard deviation, s. The samples themselves stay steady.
     pub stamp_jitter_s: f64,
-    /// So many samples are fetched at once, and stamped at once; 1 is none.
+    /// Number of samples that are fetched and stamped at once; 1: no bursts.
     pub stamp_burst: u32,
     /// Share of the samples that the recording has lost, drawn one at a time; the time stamps of the others are right.
     pub lost_share: f64,

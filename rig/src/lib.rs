@@ -11,7 +11,7 @@
 //! | [`table`], [`axis`]            | a turntable with its flaws                                        |
 //! | [`hands`]                      | a person                                                          |
 //! | [`flaws`]                      | what goes wrong in real recordings                                |
-//! | [`command`]                    | what a table and a person are told in place of a plan             |
+//! | [`command`]                    | commands to a table and a person, instead of a plan               |
 //! | [`motion`], [`chain`], [`rotation`] | what passes from a carrier to the sensors                    |
 //! | [`record`]                     | recordings of it, in memory or as files                           |
 //!

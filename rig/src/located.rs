@@ -79,7 +79,8 @@ impl Source {
     /// Reads the text as `T`, which should refuse unknown fields and mark with [`toml::Spanned`] what is checked later; `serde(flatten)`
     /// would lose the lines. What is wrong is in the words of serde and of the parser, which name the keys and values that are possible.
     ///
-    /// The bench reads its files by itself: a plan that the host reads wrongly would else be read as wrongly here, and no test would show it.
+    /// The bench has its own reader: with a shared one, a plan that the host reads wrongly would be read as wrongly here, and no test would
+    /// show it.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, String> {
         toml::from_str(&self.text).map_err(|e| {
             // Without a span it is about the file as a whole.

@@ -161,7 +161,7 @@ mod tests {
         let mut worst = 0.0_f64;
         let mut tau = 10.0 * dt;
         while tau <= 1e5 {
-            // Beyond ten steps the fastest is white, as strong as `FASTEST` says.
+            // Beyond ten steps the fastest is white, with the strength `FASTEST`.
             let fastest = (1.0 + 1.0 / (RATIO - 1.0)) * allan_of_markov(dt, tau);
             let others =
                 (1..noise.markov.len()).map(|k| allan_of_markov(dt * RATIO.powi(k as i32), tau));

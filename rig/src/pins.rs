@@ -15,6 +15,6 @@ pub struct Pins {
     pub supply_v: f64,
     /// Reference of the converter, V.
     pub converter_reference_v: f64,
-    /// What the unit's temperature sensor says, °C.
+    /// Reading of the unit's thermometer, °C.
     pub temp_c: f64,
 }

@@ -5,7 +5,7 @@ use crate::rotation::Vector;
 /// Rate of the Earth against inertial space, rad/s (WGS 84).
 pub const EARTH_RATE: f64 = 7.292_115e-5;
 
-/// Where the bench stands.
+/// Place of the bench.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// Geodetic latitude, north positive, degrees.

@@ -31,7 +31,7 @@ pub struct Plan {
     pub carrier: CarriedBy,
     /// Whether the recording numbers the dwells.
     pub numbered: bool,
-    /// Where the bench stands.
+    /// Place of the bench.
     pub place: Place,
     /// Chamber temperature: time (s, increasing) and °C at each breakpoint. Read it with [`Plan::chamber_c`].
     pub chamber: Vec<[f64; 2]>,
@@ -87,7 +87,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// One that stands in no file: a pose, at rest.
+    /// An entry that is not from a file: a pose, at rest.
     pub(crate) fn commanded(up: Vector, heading: Option<f64>, dwell_s: f64) -> Self {
         Self {
             pose: Pose::Up(up),
@@ -122,7 +122,7 @@ pub enum Pose {
     Here,
 }
 
-/// Where in the file the values of a step stand.
+/// Positions of an entry's values in the file.
 #[derive(Debug, Clone, Default)]
 struct Places {
     pose: Range<usize>,

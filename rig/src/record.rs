@@ -59,7 +59,7 @@ pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a
     plan.check_length(carrier.duration_s())?;
     let period_s = 1.0 / plan.sample_rate_hz;
     let dwells = plan.dwells();
-    // All before the end. The ends of dwells are sums: a rounding error beyond a sample is none.
+    // All before the end. The ends of dwells are sums: a sample that is late by a rounding error still counts.
     let count = (carrier.duration_s() * plan.sample_rate_hz - 1e-6).ceil() as usize;
     let lost = Lost::new(&truth.flaws, period_s, seed);
     Ok(Run {
@@ -123,7 +123,7 @@ impl ExactSizeIterator for Run<'_> {}
 pub struct Output {
     /// Folder of the recording.
     pub folder: PathBuf,
-    /// File of the truth. Nothing but the judge of a test reads it, and so it does not stand in the folder.
+    /// File of the truth. Only the judge of a test reads it, so it is not in the folder of the recording.
     pub truth: PathBuf,
     /// How the samples are stored.
     pub samples: Samples,

@@ -1,6 +1,6 @@
 //! The inertial unit: three gyros and an accelerometer on a board, from motion to the voltages at their pins.
 //!
-//! It stands on its own in front of any converter: one in a recording, or one of an emulated microcontroller.
+//! It does not depend on the converter: that of a recording, or of an emulated microcontroller.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +32,7 @@ pub struct VoltageTruth {
 pub enum TemperatureSensor {
     /// Mean of the gyros' own TEMP pins.
     Dies,
-    /// A part of its own on the board.
+    /// A separate part on the board.
     Board,
     /// TEMP pin of the x gyro.
     GyroX,
@@ -68,7 +68,7 @@ impl TemperatureSensor {
 pub struct TemperatureTruth {
     /// Where it is.
     pub at: TemperatureSensor,
-    /// Lag of the sensor behind the place where it is, s: its own package. 0 is none.
+    /// Lag of the sensor behind its place, s, from its package; 0: no lag.
     pub lag_s: f64,
     /// Constant error, K.
     pub offset_c: f64,

@@ -38,7 +38,7 @@ def test_permuted_axes_are_refused(tmp_path):
     # T has ones on its diagonal, so C may have no zeros there.
     permuted = 0.344 * numpy.roll(numpy.eye(3), 1, axis=1)
     (tmp_path / "cal.toml").write_text(text_of({"gyro": (permuted, [2.5, 2.5, 2.5], "rad/s")}))
-    with pytest.raises(AssertionError, match="gyro, axis x: only 0 % of its sensitivity is along x of the body; permute"):
+    with pytest.raises(AssertionError, match="gyro, axis x: only 0 % of its sensitivity is along x of the body; order"):
         run("export", "imu-tk", "--sensor", "gyro", "--calibration", "cal.toml", "-o", "gyro.calib", cwd=tmp_path)
     assert not (tmp_path / "gyro.calib").exists()
     with pytest.raises(AssertionError, match="the accel is not calibrated"):

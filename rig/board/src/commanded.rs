@@ -1,4 +1,4 @@
-//! A board that takes commands, served in a thread of its own: for programs and tests that calibrate it with the real command beside them.
+//! A board under command, served in a separate thread: for programs and tests that calibrate it with the real command.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -17,7 +17,7 @@ use crate::image::Image;
 use crate::running::Board;
 use crate::serve::{Pace, Served};
 
-/// Gravity where it stands, m/s².
+/// Gravity at its place, m/s².
 pub const GRAVITY: f64 = 9.793;
 /// Latitude, degrees.
 pub const LATITUDE_DEG: f64 = 30.5;

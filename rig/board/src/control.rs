@@ -62,7 +62,7 @@ impl Control {
         &mut self,
         answer: &mut dyn FnMut(&str) -> Result<String, String>,
     ) -> Result<(), String> {
-        // Whoever gives up before being accepted is no matter.
+        // A client that gives up before it is accepted does not matter.
         while let Ok((stream, _)) = self.listener.accept() {
             // A client beyond the most finds its connection closed.
             if self.clients.len() < MOST && stream.set_nonblocking(true).is_ok() {

@@ -1,4 +1,4 @@
-//! What stands between the emulator's thread and the owner of a board.
+//! Interface between the emulator's thread and the owner of a board.
 
 use std::sync::mpsc::{Receiver, Sender};
 
@@ -8,7 +8,7 @@ use rigless::time::VirtualNanos;
 
 use crate::part::Machine;
 
-/// Where a board stands.
+/// Present state of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Standing {
     /// The virtual clock, ns since the board was switched on first.
@@ -31,11 +31,11 @@ pub struct Arrival {
 /// What a stopped board can be asked for.
 pub(crate) type Errand = Box<dyn FnOnce(&mut Stopped<'_>) + Send>;
 
-/// What the board is told.
+/// Commands to the board.
 pub(crate) enum Order {
     /// Run to an instant, ns.
     To(u64),
-    /// Do an errand where the board stands.
+    /// Run a function at the board's present instant.
     Do(Errand),
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct Stopped<'a> {
     pub(crate) stop: Stop,
 }
 
-/// The driver that the emulator calls: it does as it is told.
+/// The driver that the emulator calls: it carries out the commands.
 pub(crate) struct Puppet {
     pub(crate) orders: Receiver<Order>,
     pub(crate) reports: Sender<Standing>,

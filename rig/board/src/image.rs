@@ -23,7 +23,7 @@ pub struct Image {
 pub struct Sizes {
     /// Code, constants, and the initial values of variables.
     pub flash: u64,
-    /// Variables. The stack has what is left.
+    /// Variables. The stack gets the rest.
     pub ram: u64,
 }
 
@@ -53,7 +53,7 @@ impl Image {
         let symbols = file
             .symbols()
             .filter(|symbol| symbol.is_definition())
-            // The lowest bit of a function's symbol says Thumb and is no part of its address.
+            // The lowest bit of a function's symbol means Thumb and is not part of its address.
             .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() & !1)))
             .collect();
         let sizes = sizes(&file);

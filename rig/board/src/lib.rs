@@ -12,11 +12,11 @@
 //! | `watchdog`    | a model that the emulator lacks                                               |
 //! | `line`        | the serial line                                                               |
 //! | [`image`]     | the ELF file                                                                  |
-//! | [`fault`]     | an instruction that is not what the image says                                |
+//! | [`fault`]     | an instruction that differs from the image                                    |
 //! | [`findings`]  | what the emulator found out about the firmware                                |
 //! | [`running`]   | a board that runs: time, bytes, supply, reset, counters                       |
 //! | [`serve`], [`terminal`], `port` | the same behind a pseudo-terminal                            |
-//! | [`commanded`] | the same in a thread, with somebody who commands it                         |
+//! | [`commanded`] | the same in a thread, under command                                         |
 //! | `control`, `interference` | commands over TCP; garbled bytes                                  |
 
 pub mod commanded;

@@ -163,7 +163,7 @@ impl Serve {
             None => None,
         };
         served.start()?;
-        // A host that calibrates by another gravity finds scale factors that are wrong by the ratio, and nothing that says so.
+        // A host that calibrates with another gravity finds scale factors that are wrong by the ratio, and no reading shows it.
         eprintln!(
             "mimu-board: gravity here is {:.5} m/s², at latitude {}°: give the same to the host (--gravity, --latitude)",
             plan.place.gravity, plan.place.latitude_deg

@@ -47,7 +47,7 @@ impl Port {
         self.point()
     }
 
-    /// Makes the link point to the terminal, in one move: whoever opens it meanwhile finds the old one or the new one.
+    /// Points the link to the terminal atomically: a program that opens it meanwhile gets the old or the new terminal.
     fn point(&self) -> Result<(), String> {
         let Some(link) = &self.link else {
             return Ok(());
@@ -69,7 +69,7 @@ impl Port {
         self.terminal.is_some()
     }
 
-    /// Hangs up: whoever has it open gets an error or the end of the file, and nobody can open it.
+    /// Hangs up: a program that has it open gets an error or the end of the file, and no program can open it.
     pub(crate) fn unplug(&mut self) {
         self.terminal = None;
         self.remove_link();

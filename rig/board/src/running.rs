@@ -252,7 +252,7 @@ impl Board {
         })?
     }
 
-    /// The stored part of flash memory, bank 2, as it is.
+    /// The stored part of flash memory, bank 2.
     pub fn store(&mut self) -> Result<Vec<u8>, String> {
         self.memory(STORE, BANK as usize)
     }
@@ -283,7 +283,7 @@ impl Board {
         self.with(|s| s.session.board_mut().part.flash.in_flight(s.stop.at.0))
     }
 
-    /// What bank 2 would hold if the supply were cut now: as it is, but for what is in flight.
+    /// Contents of bank 2 if the supply were cut now: the present ones, except for the operation in flight.
     pub fn store_if_cut(&mut self, seed: u64) -> Result<Vec<u8>, String> {
         let mut bytes = self.store()?;
         let at = self.standing.ns;

@@ -45,7 +45,7 @@ impl Conversions {
     }
 }
 
-/// The converter and what stands in front of it.
+/// The converter and its front end.
 #[derive(Debug)]
 pub(crate) struct Sampler {
     adc: Adc,

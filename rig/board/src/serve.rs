@@ -23,12 +23,12 @@ use orders::Desk;
 pub enum Pace {
     /// With the clock on the wall, or as near as the machine can.
     Wall,
-    /// As fast as the machine can, but never ahead of whoever reads: it stands still while nobody has the terminal
+    /// As fast as the machine allows, but never ahead of the reader: it stands still while no program has the terminal
     /// open, and while bytes wait to be read.
     Fast,
 }
 
-/// Longest virtual time that a firmware may take until it says something, ms.
+/// Longest virtual time until a firmware sends its first byte, ms.
 const START_MS: u32 = 2000;
 
 /// Virtual time between two looks at the terminal, ns. A request waits so long at most.
@@ -47,9 +47,9 @@ const WAITING: usize = 256;
 /// What became of the bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Traffic {
-    /// From the device, read by somebody or waiting in the terminal.
+    /// From the device: read, or waiting in the terminal.
     pub delivered: u64,
-    /// From the device while nobody had the terminal open.
+    /// From the device while the terminal was not open.
     pub unheard: u64,
     /// From the device while the terminal was full. Only at the wall's pace: a serial line cannot wait.
     pub lost: u64,
@@ -196,7 +196,7 @@ impl Served {
         }
         if self.pace == Pace::Fast && !(self.port.is_open() && self.waiting.is_empty()) {
             if !self.port.is_open() {
-                // Poll returns at once for a terminal that nobody has open.
+                // Poll returns at once for a terminal that is not open.
                 std::thread::sleep(Duration::from_millis(1));
             }
             self.port.wait_for_room(10);

@@ -79,7 +79,7 @@ pub enum Shape {
     Cross,
 }
 
-/// How a parameter that nobody stated is drawn.
+/// How a parameter that was not given is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Draw {
     /// The amplitude of the effect: each number of either sign, between a half and three halves of this size.
@@ -96,7 +96,7 @@ pub struct Parameter {
     pub key: &'static str,
     /// Numbers that it holds.
     pub shape: Shape,
-    /// What it is when nobody states it.
+    /// Value if it is not given.
     pub draw: Draw,
 }
 
@@ -177,7 +177,7 @@ impl Build<'_> {
         std::array::from_fn(|i| std::array::from_fn(|j| self.effect.values[key][3 * i + j]))
     }
 
-    /// A stream of its own: no other draws change with it.
+    /// A separate random stream, so that other draws do not change with it.
     fn random(&self) -> Random {
         Random::new(self.seed, self.effect.id)
     }

@@ -1,4 +1,4 @@
-//! Accelerometer errors that stand on no list.
+//! Accelerometer errors that estimators do not know.
 
 use super::{DPS, G, Spec, axes, form, input};
 
@@ -52,7 +52,7 @@ pub(super) const SPECS: &[Spec] = &[
             let size = b.list::<3>("mg_per_decade");
             let onset_s = b.number("onset_s");
             input(move |at, add| {
-                // A unit that was always on has crept for ever: what is left of it is constant.
+                // A unit that was always on has crept forever: the creep is constant.
                 let decades = if at.on_s.is_finite() {
                     (at.on_s / onset_s).ln_1p() / 10_f64.ln()
                 } else {

@@ -1,4 +1,4 @@
-//! Gyro errors that stand on no list.
+//! Gyro errors that estimators do not know.
 
 use super::{DPS, G, Spec, axes, form, input, matrix};
 use crate::filter::LowPass;

@@ -32,7 +32,7 @@ pub(super) struct Turn {
     pub(super) shaken: bool,
     /// Angle from its pose at which it arrives, rad, and the time in which it gets there, s.
     pub(super) settling: Option<(Vector, f64)>,
-    /// A rest that is none.
+    /// A slow turn instead of a rest.
     pub(super) even: Option<Even>,
 }
 

@@ -1,4 +1,4 @@
-//! A person who is told what to do next, pose by pose.
+//! A person who gets commands, pose by pose.
 
 use super::choice::{Turn, between, chosen};
 use super::{Hands, HandsTruth};

@@ -1,4 +1,4 @@
-//! A rest that is none: the unit turns slowly and evenly.
+//! A slow turn instead of a rest: the unit turns slowly and evenly.
 
 use crate::chain::Jet;
 use crate::rotation::{Rotation, Vector, norm, scale};

@@ -1,4 +1,4 @@
-//! Flaws of the person: a violent shake, a hand that settles slowly, a rest that is none.
+//! Flaws of the person: a violent shake, a hand that settles slowly, a slow turn instead of a rest.
 
 use super::choice::Turn;
 use super::even::Even;

@@ -215,7 +215,7 @@ impl Reader<'_> {
                     "give [time in s, °C] pairs in order of time",
                 ));
             }
-            // Beyond what chambers and silicon stand; 298 is a temperature in kelvins.
+            // Beyond the limits of chambers and silicon; 298 is a temperature in kelvins.
             if !(-100.0..=200.0).contains(&c) {
                 let problem = format!("`chamber_c`: {} °C at {t} s", written(c));
                 return Err(self.source.error(

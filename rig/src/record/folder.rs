@@ -17,7 +17,7 @@ const FORMAT: &str = "mimu-recording/1";
 /// All that a recording may have in it.
 const FILES: [&str; 3] = ["recording.toml", "samples.csv", "samples.parquet"];
 
-/// How the file of a truth begins, and a rig file that somebody wrote does not.
+/// Beginning of a truth file, which a rig file by hand does not have.
 const TRUTH: &str = "# The truth of the recording ";
 
 /// `recording.toml`.
@@ -38,7 +38,7 @@ fn said(path: &Path, problem: impl Display, remedy: &str) -> String {
     format!("{}: {problem}; {remedy}", path.display())
 }
 
-/// The folder in which `path` stands.
+/// The folder of `path`.
 fn parent(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -101,7 +101,7 @@ pub(super) fn check(output: &Output) -> Result<(), String> {
     Ok(())
 }
 
-/// Whether a TOML file says that it is of a format.
+/// Whether a TOML file has this format.
 fn has_format(path: &Path, format: &str) -> bool {
     #[derive(Deserialize)]
     struct Head {
@@ -113,7 +113,7 @@ fn has_format(path: &Path, format: &str) -> bool {
     head.is_some_and(|head| head.format == format)
 }
 
-/// Whether a folder is a recording and nothing else, so that nobody misses anything of it.
+/// Whether a folder contains only a recording, so that replacing it loses nothing else.
 fn is_recording(folder: &Path) -> bool {
     let Ok(entries) = fs::read_dir(folder) else {
         return false;

@@ -14,7 +14,7 @@ use parquet::schema::types::{Type, TypePtr};
 use super::{Row, Run};
 use crate::plan::{CarriedBy, Plan};
 
-/// Columns before those of the table; `step` stands after the first where the dwells are numbered.
+/// Columns before those of the table; if the dwells are numbered, `step` is after the first.
 const READINGS: [&str; 8] = [
     "t_s", "temp_c", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z",
 ];

@@ -1,4 +1,4 @@
-//! Where each key of a TOML text stands.
+//! Position of each key in a TOML text.
 
 use std::collections::BTreeMap;
 use std::fmt;

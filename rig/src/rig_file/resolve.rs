@@ -216,7 +216,7 @@ fn triad(
 ) -> TriadTruth {
     let si = parts[0].kind.si();
     let random = |cause: &str| Random::new(seed, &format!("{name} {cause}"));
-    // Noise differs from part to part; how much, no data sheet says.
+    // Noise differs from part to part; no data sheet gives by how much.
     let noise = |slot: &mut Option<[f64; 3]>, cause: &str, typical: [f64; 3]| {
         *slot.get_or_insert_with(|| {
             let mut r = random(cause);
@@ -279,7 +279,7 @@ fn triad(
     }
 }
 
-/// A length of 1 already is left as it is, bit by bit.
+/// A length that is 1 already is left unchanged, bit by bit.
 fn unit(v: Vector) -> Vector {
     let length = norm(v);
     if length == 0.0 || (length - 1.0).abs() < 1e-15 {

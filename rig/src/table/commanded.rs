@@ -1,4 +1,4 @@
-//! A table that is told what to do next, move by move.
+//! A table that gets commands, move by move.
 
 use super::controller::Controller;
 use super::{Table, TableTruth};

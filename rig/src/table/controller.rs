@@ -30,12 +30,12 @@ pub(super) struct Controller {
     pub(super) dwells: Vec<Dwell>,
     /// Whether it has turned by an angle, and the load has had no time to come to rest.
     unsettled: bool,
-    /// Under command: rates about the vertical and about the inner axis that it was told last, rad/s.
+    /// Under command: last commanded rates about the vertical and about the inner axis, rad/s.
     pub(super) rates: [f64; 2],
-    /// When the move that it was told last is over, s, and when the load has come to rest behind it.
+    /// End of the last commanded move, s, and the time at which the load has come to rest.
     pose_s: f64,
     settled_s: f64,
-    /// When it is done with all that it was told, s.
+    /// End of all commanded motion, s.
     pub(super) busy_s: f64,
 }
 
@@ -63,13 +63,13 @@ impl Controller {
         Ok(controller)
     }
 
-    /// Stands where it is until a round is due.
+    /// Waits in its pose until a round is due.
     fn await_round(&mut self, plan: &Plan, round: u32, round_s: f64) -> Result<(), Beyond> {
         let due_s = self.lead_in_s + f64::from(round) * round_s;
         if round == 0 {
             return Ok(());
         }
-        // The ends of dwells are sums: a rounding error beyond the time is none.
+        // The ends of dwells are sums: a rounding error beyond the time does not count.
         if self.now() > due_s + 1e-6 {
             let problem = format!(
                 "round {round} is due at {due_s} s, but the one before ends at {:.1} s",
@@ -81,7 +81,7 @@ impl Controller {
         Ok(())
     }
 
-    /// At rest in the first pose of a plan, within the table's limits, about to be told what to do.
+    /// At rest in the first pose of a plan, within the table's limits, waiting for commands.
     pub(super) fn standing(plan: &Plan, truth: &TableTruth) -> Result<Self, Beyond> {
         let mut controller = Self::new(plan, truth);
         if let Some(first) = plan.steps.first() {
@@ -115,7 +115,7 @@ impl Controller {
         }
     }
 
-    /// Stands at a pose from the beginning.
+    /// Is in a pose from the beginning.
     fn stand(&mut self, up: Vector, heading: Option<f64>) {
         let target = self.angles(up, heading.unwrap_or(0.0));
         self.axes = target.map(|angle| Axis::new(angle, self.truth.settling));
@@ -126,7 +126,7 @@ impl Controller {
         let first = self.dwells.is_empty();
         let before = if first { self.lead_in_s } else { self.now() };
         match up {
-            // The table stands at the first pose when the recording begins.
+            // The table is in the first pose when the recording begins.
             Some(up) if first => {
                 self.stand(up, heading);
                 self.hold(self.lead_in_s);
@@ -266,9 +266,9 @@ impl Controller {
         self.posed(t_s);
     }
 
-    /// One axis by an angle from where all of them stand.
+    /// Turns one axis by an angle from the present angles.
     pub(super) fn turn_from(&mut self, t_s: f64, turn: Turn) -> Result<(), (String, &'static str)> {
-        // On the way to a pose nobody could say where the turn begins.
+        // During a move the start of the turn would be undefined.
         if t_s < self.busy_s || self.rates != [0.0; 2] {
             let problem = "a turn by an angle starts from rest, but the table is moving".to_owned();
             return Err((problem, "send `STOP`, and wait until `BUSY?` is 0"));
@@ -285,7 +285,7 @@ impl Controller {
         Ok(())
     }
 
-    /// Takes note of when it is done with what it was told at `from_s`.
+    /// Records the end of the motion commanded at `from_s`.
     fn posed(&mut self, from_s: f64) {
         self.pose_s = self.now();
         self.settled_s = self.settled_s(from_s);

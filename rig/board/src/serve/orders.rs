@@ -1,4 +1,4 @@
-//! What the bench of a served board does as it is told: one command a line, SCPI style, and one line back.
+//! Commands to the bench of a served board: one command per line, SCPI style, and one line as the answer.
 
 use mimu_rig::command::Command;
 use mimu_rig::motion::Motion;
@@ -47,7 +47,7 @@ pub(super) struct Desk {
     interlock: bool,
     /// Since when the supply is off, ns.
     off_ns: Option<u64>,
-    /// Cuts and resets so far: each tears what is in flight in a way of its own.
+    /// Number of cuts and resets so far: each tears the word in flight differently.
     torn: u64,
 }
 
@@ -69,7 +69,7 @@ impl Desk {
 
 /// Why there is no answer.
 enum Problem {
-    /// The bench does not do that, and goes on.
+    /// The bench refuses the command and continues.
     Refused(String),
     /// The bench cannot go on.
     Broken(String),
@@ -164,7 +164,7 @@ impl<'a> Line<'a> {
 }
 
 impl Served {
-    /// Does what a line says, and returns the line to give back.
+    /// Carries out a line, and returns the answer.
     ///
     /// Errors: the emulator, the terminal or the file gave up.
     pub(super) fn answer(&mut self, line: &str) -> Result<String, String> {
@@ -210,7 +210,7 @@ impl Served {
             "INTERLOCK" => {
                 self.desk.interlock = line.switch()?;
                 if !self.desk.interlock {
-                    // As a door that is opened stops a table. A plan goes on.
+                    // Like an opened door, it stops a table; a plan continues.
                     let stop = |front: &mut Front, ns| front.command(ns, Command::Stop);
                     let _ = self.board.front(stop)?;
                 }
@@ -260,7 +260,7 @@ impl Served {
                     self.waiting.clear();
                 }
             },
-            // The list of commands says what comes here.
+            // The list of commands determines what arrives here.
             name => return refused(format!("`{name}`: not done")),
         }
         done
@@ -369,7 +369,7 @@ fn written(motion: &Motion) -> String {
 }
 
 impl Board {
-    /// Does something with what is in front of the pins, at the instant where the board stands, ns.
+    /// Runs a function on the front end of the pins, at the board's present instant, ns.
     ///
     /// Errors: the emulator gave up.
     pub fn front<T: Send + 'static>(

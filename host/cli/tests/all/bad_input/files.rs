@@ -18,7 +18,7 @@ fn a_damaged_text_is_refused_with_its_row() {
         (
             "a header",
             format!("{}\n", lines[0]).into(),
-            &["row 2", "a header and no row"],
+            &["row 2", "a header but no row"],
         ),
         (
             "a header and empty lines",
