@@ -1,5 +1,6 @@
 // The page: from dropped files to a calibration, one step after the other.
 
+import { loadJournal, offerBoards } from "./board.js";
 import { FORMATS } from "./exports.js";
 import { FIELD_OF, cut, importArguments, show } from "./fields.js";
 import { Cancelled, Program, Refused, load } from "./program.js";
@@ -7,8 +8,11 @@ import { sphere } from "./sphere.js";
 
 const $ = (id) => document.getElementById(id);
 
-/** The files that were dropped last, what was found in them, and what was computed of these and of those before: the text of each file. */
-const state = { files: [], looked: null, program: null, calibration: null, noise: null, from: {}, example: false };
+/**
+ * The files that were dropped last, what was found in them, or the session with a board that came after them; and what was computed of these
+ * and of those before: the text of each file.
+ */
+const state = { files: [], looked: null, session: null, recording: "rec", program: null, calibration: null, noise: null, from: {}, example: false };
 
 function made(name, properties, ...children) {
   const element = Object.assign(document.createElement(name), properties);
@@ -17,24 +21,25 @@ function made(name, properties, ...children) {
 }
 
 /** Text in which the arguments of the command lead to the field that sets them. */
-function withFields(text) {
+function withFields(text, fields = FIELD_OF) {
   return text.split(/(--[a-z-]+)/).map((part) => {
-    const id = FIELD_OF[part];
+    const id = fields[part];
     if (!id) return part;
     const button = made("button", { type: "button", className: "field-link", textContent: part });
     button.addEventListener("click", () => {
       const target = id === "files" ? $("files").querySelector("select") : $(id);
       target?.closest("details")?.setAttribute("open", "");
-      (target ?? $("columns-title")).focus();
+      if (target && !target.matches("input, select, button")) target.querySelector("select, input")?.focus();
+      else (target ?? $("columns-title")).focus();
     });
     return button;
   });
 }
 
 /** Shows the line of a refusal where the person is looking, below `place`; an empty one takes it away. */
-function refuse(line, place = $("drop").parentElement) {
+function refuse(line, place = $("drop").parentElement, fields = FIELD_OF) {
   place.after($("error"));
-  $("error").replaceChildren(...withFields(line));
+  $("error").replaceChildren(...withFields(line, fields));
   $("error").hidden = !line;
   if (line) $("error").focus();
 }
@@ -45,10 +50,11 @@ function status(text, share) {
   else $("bar").value = share;
 }
 
-/** The program, with the dropped files in its folder. */
+/** The program, with the dropped files in its folder, or those of the session. */
 async function program() {
   state.program ??= new Program(({ file, share }) => status(`reading ${file}: ${Math.round(100 * share)} %`, share));
   await state.program.files(state.files);
+  if (state.session) await state.program.ask("unpack", { name: "session", files: state.session.files });
   return state.program;
 }
 
@@ -64,21 +70,22 @@ function named(files) {
 }
 
 /** What may fail runs in here: its line is shown, and the page goes on. */
-async function guarded(work, place) {
-  refuse("", place);
+async function guarded(work, place, fields) {
+  refuse("", place, fields);
   try {
     await work();
   } catch (error) {
     if (error instanceof Cancelled) return;
-    refuse(error instanceof Refused ? error.message : `this page has a fault (${error?.message ?? error}); load it again, and report it if it comes back`, place);
+    refuse(error instanceof Refused ? error.message : `this page has a fault (${error?.message ?? error}); load it again, and report it if it comes back`, place, fields);
     if (!(error instanceof Refused)) console.error(error);
   }
 }
 
 async function open(files) {
   if (files.length === 0) return;
+  if (files.length === 1 && /\.zip$/i.test(files[0].name)) return loadJournal(files[0]);
   cancel();
-  state.files = named(files);
+  Object.assign(state, { files: named(files), session: null, recording: "rec" });
   // Where the example was recorded says nothing of where this was.
   if (state.example) $("gravity").value = "";
   state.example = false;
@@ -144,23 +151,28 @@ async function imported(mimu) {
 
 async function calibrate(mimu) {
   await imported(mimu);
-  const more = cut($("more-fit").value);
+  await fitted(mimu, state.files[0].name, cut($("more-fit").value));
+}
+
+/** Fits the recording, and diagnoses it: `verify`, a later recording of the unit. `name`: what the recording is called. */
+async function fitted(mimu, name, more, verify = []) {
+  const rec = state.recording;
   // The readings are shown even if they cannot be fitted: there one sees why.
-  const fitted = await step("Calibration", () => mimu.run("fit", "rec", "-o", "cal.toml", "--json", "fit.json", ...more)).catch(refusal);
-  const shown = fitted instanceof Refused ? [] : ["cal.toml"];
-  const view = await step("Readings and poses", () => mimu.run("view", "rec", ...shown)).catch((why) => {
-    throw fitted instanceof Refused ? fitted : why;
+  const fit = await step("Calibration", () => mimu.run("fit", rec, "-o", "cal.toml", "--json", "fit.json", ...more)).catch(refusal);
+  const shown = fit instanceof Refused ? [] : ["cal.toml"];
+  const view = await step("Readings and poses", () => mimu.run("view", rec, ...shown)).catch((why) => {
+    throw fit instanceof Refused ? fit : why;
   });
   picture(JSON.parse(view.stdout));
   $("result").hidden = false;
-  if (fitted instanceof Refused) throw fitted;
+  if (fit instanceof Refused) throw fit;
   state.calibration = await mimu.text("cal.toml");
-  state.from["calibration.toml"] = state.files[0].name;
+  state.from["calibration.toml"] = name;
   warn((await mimu.json("fit.json")).warnings);
-  $("errors").replaceChildren(printed("mimu fit", fitted));
+  $("errors").replaceChildren(printed("mimu fit", fit));
   const shared = more.filter((_, k) => more[k] !== "--only" && more[k - 1] !== "--only");
   const page = ["-o", "calibration.toml", "--json", "diagnosis.json", "--page", "report.html"];
-  const found = await step("Diagnosis", () => mimu.run("diagnose", "rec", ...page, ...shared)).catch(refusal);
+  const found = await step("Diagnosis", () => mimu.run("diagnose", rec, ...page, ...shared, ...verify)).catch(refusal);
   if (!(found instanceof Refused)) {
     state.calibration = await mimu.text("calibration.toml");
     warn((await mimu.json("diagnosis.json")).warnings);
@@ -168,6 +180,15 @@ async function calibrate(mimu) {
   }
   await keep(mimu, ["fit.json", "diagnosis.json", "report.html"]);
   if (found instanceof Refused) throw found;
+}
+
+/** Calibrates from the recordings of a session with the board called `name`. */
+async function finished(files, name) {
+  cancel();
+  Object.assign(state, { files: [], session: { files }, recording: "session/calibration" });
+  $("columns").hidden = true;
+  const verify = files.has("verification/samples.csv") ? ["--verify", "session/verification"] : [];
+  await compute((mimu) => fitted(mimu, `the session with ${name}`, [], verify));
 }
 
 async function noise(mimu) {
@@ -248,11 +269,11 @@ function save(name, bytes) {
 
 /** Offers the files that were made of this recording, and the formats that can be made of what is known of the unit. */
 async function keep(mimu, files) {
-  const recording = await mimu.read("rec");
+  const recording = await mimu.read(state.recording);
   const ours = { "calibration.toml": state.calibration, "noise.toml": state.noise };
   for (const [name, text] of Object.entries(ours)) if (text) await mimu.write(name, text);
   const all = [...Object.keys(ours), ...files].map((name) => [name, name]);
-  all.push(...[...recording.keys()].map((name) => [`rec/${name}`, name]));
+  all.push(...[...recording.keys()].map((name) => [`${state.recording}/${name}`, name]));
   for (const [from, name] of all) {
     const bytes = await mimu.read(from);
     if (!bytes) continue;
@@ -276,7 +297,8 @@ async function takeAway() {
   await guarded(async () => {
     const mimu = state.program;
     const from = ["calibration", "noise"].filter((of) => state[of]).flatMap((of) => [`--${of}`, `${of}.toml`]);
-    const done = await mimu.run("export", ...args, ...from, "-o", file);
+    const of = args.map((argument) => (argument === "rec" ? state.recording : argument));
+    const done = await mimu.run("export", ...of, ...from, "-o", file);
     save(file, await mimu.read(file));
     $("exported").replaceChildren(made("span", { className: "said", textContent: done.stdout.trim() }));
   }, $("exported"));
@@ -321,5 +343,6 @@ addEventListener("drop", (event) => {
   $("drop").classList.remove("over");
   open(event.dataTransfer.files);
 });
+offerBoards({ guarded, refuse, save, done: finished });
 load().catch((error) => refuse(error.message));
 if ("serviceWorker" in navigator && isSecureContext) navigator.serviceWorker.register("sw.js").catch(() => {});

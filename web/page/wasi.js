@@ -90,6 +90,14 @@ export class Folder {
     return [folder, names.at(-1)];
   }
 
+  /** Paths and contents of all files that the program wrote. */
+  *files(before = "") {
+    for (const [name, entry] of this.entries) {
+      if (entry instanceof Folder) yield* entry.files(`${before}${name}/`);
+      else if (entry instanceof MemoryFile) yield [before + name, entry.content().slice()];
+    }
+  }
+
   find(path) {
     const found = this.parent(path);
     if (!found) return undefined;
@@ -108,18 +116,50 @@ class Exit extends Error {
 
 const encoder = new TextEncoder(), decoder = new TextDecoder();
 
+/** Bytes that the program reads from its standard input; at their end it goes on without. */
+export class Input {
+  constructor() {
+    this.waiting = [];
+  }
+
+  push(text) {
+    this.waiting.push(encoder.encode(text));
+  }
+
+  read(_, into) {
+    let sum = 0;
+    while (this.waiting.length && sum < into.length) {
+      const [first] = this.waiting;
+      const part = first.subarray(0, into.length - sum);
+      into.set(part, sum);
+      sum += part.length;
+      if (part.length === first.length) this.waiting.shift();
+      else this.waiting[0] = first.subarray(part.length);
+    }
+    return sum;
+  }
+}
+
 /**
  * Runs the program with these arguments on the files in `root`.
  * Returns its exit status and what it wrote to its standard streams. A trap of the program is thrown on.
  */
 export function run(module, root, args) {
+  return start(module, root, args)("_start");
+}
+
+/**
+ * Makes an instance of the program: what it exports is called by the function that this returns, which answers as `run`. Lines of the
+ * standard output go to `said` at once, if that is given.
+ */
+export function start(module, root, args, input, said) {
   let memory;
   const view = () => new DataView(memory.buffer);
   const bytes = (at, length) => new Uint8Array(memory.buffer, at, length);
   const text = (at, length) => decoder.decode(bytes(at, length).slice());
   const streams = ["", ""];
   const utf8 = [new TextDecoder(), new TextDecoder()];
-  const open = new Map([[0, {}], [1, { stream: 0 }], [2, { stream: 1 }], [3, { node: root }]]);
+  const open = new Map([[0, { input }], [1, { stream: 0 }], [2, { stream: 1 }], [3, { node: root }]]);
   let next = 4;
 
   const vectors = (at, count) => {
@@ -167,7 +207,8 @@ export function run(module, root, args) {
     if (handle.node instanceof Folder) return ISDIR;
     let sum = 0;
     for (const into of vectors(iovs, count)) {
-      const got = handle.node ? handle.node.read(at + sum, into) : 0;
+      const from = handle.node ?? handle.input;
+      const got = from ? from.read(at + sum, into) : 0;
       sum += got;
       if (got < into.length) break;
     }
@@ -179,13 +220,20 @@ export function run(module, root, args) {
     if (!handle) return BADF;
     let sum = 0;
     for (const from of vectors(iovs, count)) {
-      if (handle.stream !== undefined) streams[handle.stream] += utf8[handle.stream].decode(from.slice(), { stream: true });
-      else if (handle.node instanceof MemoryFile) handle.node.write(at + sum, from);
+      if (handle.stream !== undefined) {
+        streams[handle.stream] += utf8[handle.stream].decode(from.slice(), { stream: true });
+        if (said && handle.stream === 0) hand();
+      } else if (handle.node instanceof MemoryFile) handle.node.write(at + sum, from);
       else return ROFS;
       sum += from.length;
     }
     view().setUint32(result, sum, true);
     return sum;
+  };
+  const hand = () => {
+    const lines = streams[0].split("\n");
+    streams[0] = lines.pop();
+    lines.forEach(said);
   };
   const remove = (wantsFolder) => (fd, at, length) =>
     below(fd, at, length, (folder, name, node) => {
@@ -377,15 +425,17 @@ export function run(module, root, args) {
   const unknown = { get: (target, name) => target[name] ?? (() => NOSYS), has: () => true };
   const instance = new WebAssembly.Instance(module, { wasi_snapshot_preview1: new Proxy(calls, unknown) });
   memory = instance.exports.memory;
-  let status = 0;
-  try {
-    instance.exports._start();
-  } catch (stopped) {
-    if (!(stopped instanceof Exit)) {
-      stopped.stderr = streams[1];
-      throw stopped;
+  return (name) => {
+    let status = 0;
+    try {
+      status = instance.exports[name]() ?? 0;
+    } catch (stopped) {
+      if (!(stopped instanceof Exit)) {
+        stopped.stderr = streams[1];
+        throw stopped;
+      }
+      status = stopped.code;
     }
-    status = stopped.code;
-  }
-  return { status, stdout: streams[0], stderr: streams[1], memory: memory.buffer.byteLength };
+    return { status, stdout: streams[0], stderr: streams[1], memory: memory.buffer.byteLength };
+  };
 }

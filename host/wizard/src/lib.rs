@@ -6,8 +6,10 @@
 //! | [`step`] | a dwell that is wanted: which way is up, how fast it turns, how long |
 //! | [`procedure`] | what is asked of a session; the steps to begin with, the next best one, those that verify |
 //! | [`source`], [`device`] | where samples come from |
-//! | [`text`], [`text_line`], [`regular`] | a board of another maker: its port, its lines, and their times as a regular rate |
-//! | [`station`] | a port with a thread of its own, opened again when it was gone |
+//! | [`text`], [`text_line`], [`regular`] | a board of another maker: what comes from it, its lines, and their times as a regular rate |
+//! | [`text_port`], [`relay`] | its port: read by a thread, or held by somebody who relays what comes |
+//! | [`station`] | a unit at the end of its line; a port with a thread of its own, opened again when it was gone |
+//! | [`turn`] | a session pauses where it has to wait, and is gone on with from outside |
 //! | [`waiting`] | why no dwell runs |
 //! | [`watch`] | is the unit still, which way is up, how fast does it turn |
 //! | [`refit`] | the calibration so far, every parameter beside its target |
@@ -34,6 +36,7 @@ pub mod folder;
 pub mod procedure;
 pub mod refit;
 pub mod regular;
+pub mod relay;
 pub mod resumed;
 pub mod session;
 pub mod source;
@@ -42,6 +45,8 @@ pub mod step;
 pub mod store;
 pub mod text;
 pub mod text_line;
+pub mod text_port;
+pub mod turn;
 pub mod unit_session;
 pub mod verdict;
 pub mod waiting;
