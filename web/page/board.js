@@ -3,10 +3,9 @@
 
 import { unzip, zip } from "./archive.js";
 import { cut } from "./fields.js";
-import { pose } from "./pose.js";
 import { Program, Refused } from "./program.js";
 import { NO_SERIAL, Port, now } from "./serial.js";
-import { sphere } from "./sphere.js";
+import * as session from "./session.js";
 
 const $ = (id) => document.getElementById(id);
 
@@ -154,17 +153,15 @@ async function begin() {
   // A session that has no dwell yet, or is finished, is not gone on with.
   if (!board.goesOn) await program().ask("unpack", { name: FOLDER, files: new Map() });
   await program().begin(...wizardArguments());
-  Object.assign(board, { stage: "session", queue: [], part: "calibration", step: null, planned: 0 });
+  Object.assign(board, { stage: "session", queue: [] });
+  session.begin(async () => (await program().text(`${FOLDER}/journal.jsonl`)) ?? "");
   $("line").hidden = true;
   $("session").hidden = false;
-  for (const id of ["log", "heard", "aims", "session-sphere", "pose", "state", "phase", "prompt"]) $(id).replaceChildren();
   for (const id of ["go-on", "reconnect", "question", "forget"]) $(id).hidden = true;
   for (const id of ["stop", "redo", "skip"]) $(id).hidden = false;
   $("stop").disabled = false;
   $("session-title").focus();
   tell({ opened: now() });
-  $("prompt").textContent = "Leave the board still.";
-  $("state").textContent = "Its rate is being found …";
 }
 
 /** Tells the program something. What comes while it computes waits, with its time. */
@@ -187,109 +184,15 @@ setInterval(() => board.stage === "session" && tell({ time: now() }), TICK);
 
 /** What the program says. */
 function said(message) {
-  if (message.standing) return stand(message.standing);
+  if (message.standing) return session.stand(message.standing);
   if (message.question) return ask(message.question);
   if (message.ended) return ended(message.ended);
   const { event, lines } = message;
-  const log = $("log");
-  const below = log.scrollHeight - log.scrollTop - log.clientHeight < 8;
-  log.append(...lines.filter((line) => line.trim()).map((line) => made("li", { textContent: line.trim() })));
-  if (below) log.scrollTop = log.scrollHeight;
-  (events[event.event] ?? (() => {}))(event);
-}
-
-const events = {
-  greeted({ told }) {
-    board.told = told;
-  },
-  phase({ phase, words }) {
-    if (["verification", "confirmation", "calibration"].includes(phase)) board.part = phase;
-    $("phase").textContent = `${phase[0].toUpperCase()}${phase.slice(1)}: ${words}`;
-    $("pose").replaceChildren();
-    board.step = null;
-    $("prompt").textContent = { "warm-up": "Leave the board still.", diagnosis: "The dwells are evaluated …", store: "The dwells are evaluated …" }[phase] ?? "";
-    $("state").textContent = "";
-    poses();
-  },
-  step({ step, words, done, planned }) {
-    board.step = { ...step, words };
-    $("prompt").textContent = words[0].toUpperCase() + words.slice(1);
-    $("pose").replaceChildren(pose(step.up, words));
-    $("session-bar").value = done / planned;
-    $("count").textContent = `pose ${done + 1} of ${planned}`;
-    poses();
-  },
-  dwell() {
-    Object.assign(board, { goesOn: true, saved: false });
-    poses();
-  },
-  redo: () => poses(),
-  progress: ({ progress }) => aims(progress),
-  interrupted({ why }) {
-    $("reconnect").hidden = port.isOpen;
-    $("state").textContent = why;
-  },
-  resumed: () => (board.goesOn = true),
-};
-
-/** The poses of this part by the journal, and the one that comes next. */
-async function poses() {
-  const text = (await program().text(`${FOLDER}/journal.jsonl`)) ?? "";
-  const had = new Map();
-  for (const line of text.split("\n").filter(Boolean)) {
-    const entry = JSON.parse(line);
-    if (entry.part !== board.part) continue;
-    if (entry.entry === "dwell") had.set(entry.number, entry.step.up);
-    if (entry.entry === "redo") had.delete(entry.number);
-  }
-  const next = board.step && { up: board.step.up, words: board.step.words };
-  $("session-sphere").replaceChildren(sphere({ poses: [...had.values()], map: [], cell: 0, next }));
-}
-
-const digits = (value) => Number(value.toPrecision(3)).toString();
-
-function aims({ sensors, not_yet: why }) {
-  const rows = sensors.flatMap(({ sensor, aims }) =>
-    aims.map(({ parameter, axis, half_width: half, target, unit }) => {
-      const met = half <= target;
-      const bar = made("progress", { max: 1, value: Math.min(1, target / half) });
-      bar.setAttribute("aria-label", `${sensor} ${parameter}: target over interval`);
-      return made("tr", { className: met ? "met" : "" }, made("td", { textContent: `${sensor} ${parameter}` }), made("td", { className: "n", textContent: `±${digits(half)}` }),
-        made("td", { textContent: `of ±${digits(target)} ${unit} (${axis})` }), made("td", {}, bar, met ? " ✓" : ""));
-    }),
-  );
-  const caption = sensors.length ? "95 % intervals of the worst axis, beside what is wanted" : `Not determined yet: ${why ?? "more poses are needed"}`;
-  $("aims").replaceChildren(made("caption", { textContent: caption }), made("tbody", {}, ...rows));
-}
-
-/** How the unit stands: what it waits for, and what has been heard of it. */
-function stand({ units: [unit], phase, step }) {
-  if (!unit) return;
-  const running = unit.left_s !== null && step;
-  $("dwell-bar").value = running ? Math.min(1, Math.max(0, 1 - unit.left_s / step.dwell_s)) : 0;
-  if (running) $("state").textContent = `Keep it still: ${unit.left_s.toFixed(1)} s`;
-  else if (unit.waiting) $("state").textContent = `Waiting: ${unit.waiting}`;
-  else if (step) $("state").textContent = `Turn it so, and let it rest for ${digits(step.dwell_s)} s.`;
-  else if (phase === "warm-up") $("state").textContent = "It is being listened to at rest.";
-  const at = now();
-  const before = board.counted;
-  if (!before || at - before.at > 1 || unit.samples < before.samples) {
-    if (before && unit.samples > before.samples) board.rate = (unit.samples - before.samples) / (at - before.at);
-    board.counted = { at, samples: unit.samples };
-  }
-  const times = (motion) => (motion === null ? "–" : `${motion < 10 ? motion.toFixed(1) : Math.round(motion)}`);
-  const rows = {
-    Line: (board.told ?? []).join("; "),
-    "Now": board.rate ? `${digits(board.rate)} samples a second` : "",
-    Samples: `${unit.samples}; ${unit.lost} missing; ${unit.clipped} at the end of a range`,
-    Motion: unit.motion ? `gyro ${times(unit.motion[0])}, accelerometer ${times(unit.motion[1])} times what counts as rest` : "",
-    Temperature: unit.temp_c === null ? "" : `${unit.temp_c.toFixed(1)} °C${unit.trend_c_per_min === null ? "" : `, ${unit.trend_c_per_min.toFixed(2)} °C/min`}`,
-  };
-  const shown = Object.entries(rows).filter(([, text]) => text);
-  const terms = [...$("heard").querySelectorAll("dd")];
-  // Elements that stay can be selected and read aloud.
-  if (terms.length === shown.length) shown.forEach(([, text], k) => terms[k].textContent !== text && (terms[k].textContent = text));
-  else $("heard").replaceChildren(...shown.flatMap(([name, text]) => [made("dt", { textContent: name }), made("dd", { textContent: text })]));
+  session.log(lines);
+  session.tell(event);
+  if (event.event === "dwell") Object.assign(board, { goesOn: true, saved: false });
+  if (event.event === "resumed") board.goesOn = true;
+  if (event.event === "interrupted") $("reconnect").hidden = port.isOpen;
 }
 
 function ask(words) {
@@ -310,14 +213,10 @@ async function ended({ outcome, text, refused }) {
   for (const id of ["stop", "redo", "skip", "reconnect", "question"]) $(id).hidden = true;
   $("go-on").hidden = Boolean(done);
   $("forget").hidden = !board.goesOn || Boolean(done);
-  $("pose").replaceChildren();
-  $("state").textContent = "";
-  $("dwell-bar").value = 0;
-  $("prompt").textContent = done ? "The session is finished." : "The session is stopped. It goes on from the last dwell, here or by the command with the journal.";
+  session.end(done);
   if (done) {
     board.goesOn = false;
-    $("session-bar").value = 1;
-    $("log").append(...text.trim().split("\n").filter(Boolean).map((line) => made("li", { textContent: line })));
+    session.log(text.split("\n"));
   }
   if (refused) page.refuse(refused, $("session"), FIELDS);
   if (done) await result();
@@ -353,9 +252,9 @@ export async function loadJournal(file) {
     if (board.stage === "session") throw new Refused("a session runs; stop it before another journal is loaded");
     const files = await unzip(new Uint8Array(await file.arrayBuffer()));
     if (!files) throw new Refused(`${file.name}: this is no ZIP archive that can be read, or it is cut; choose what “Download the journal” has made, or a ZIP of the folder of mimu wizard -o`);
-    const session = [...files.keys()].find((path) => path === "session.json" || path.endsWith("/session.json"));
-    if (!session) throw new Refused(`${file.name}: there is no session.json in it; choose what “Download the journal” has made, or a ZIP of the folder of mimu wizard -o`);
-    const before = session.slice(0, -"session.json".length);
+    const inside = [...files.keys()].find((path) => path === "session.json" || path.endsWith("/session.json"));
+    if (!inside) throw new Refused(`${file.name}: there is no session.json in it; choose what “Download the journal” has made, or a ZIP of the folder of mimu wizard -o`);
+    const before = inside.slice(0, -"session.json".length);
     const own = new Map([...files].filter(([path]) => path.startsWith(before)).map(([path, bytes]) => [path.slice(before.length), bytes]));
     const text = (name) => new TextDecoder().decode(own.get(name) ?? new Uint8Array(0));
     let begun, entries;

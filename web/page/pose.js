@@ -4,8 +4,8 @@ import { element } from "./sphere.js";
 
 // Half of the edges along x, y and z: flat, as a board is.
 const HALF = [1, 1, 0.55];
-// From where it is seen, degrees: to the right of the front, and above.
-const ASIDE = 32, ABOVE = 24;
+// From where it is seen, degrees to the right of the front and above: by how many faces are upwards, so that all of those are seen.
+const ASIDE = [32, 45, 8], ABOVE = [24, 50, 50];
 const SCALE = 46, MIDDLE = [110, 112];
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -28,7 +28,9 @@ function frame(up) {
 /** The drawing of the pose with `up` upwards, called `words`. */
 export function pose(up, words) {
   const [top, front, right] = frame(unit(up));
-  const [a, e] = [ASIDE, ABOVE].map((angle) => (angle * Math.PI) / 180);
+  const largest = Math.max(...up.map(Math.abs));
+  const upwards = up.filter((part) => Math.abs(part) > largest / 3).length - 1;
+  const [a, e] = [ASIDE, ABOVE].map((angles) => (angles[upwards] * Math.PI) / 180);
   const across = sum(scaled(right, Math.cos(a)), scaled(front, -Math.sin(a)));
   const towards = sum(scaled(right, Math.sin(a)), scaled(front, Math.cos(a)));
   const seen = sum(scaled(towards, Math.cos(e)), scaled(top, Math.sin(e)));
@@ -42,8 +44,8 @@ export function pose(up, words) {
       const middle = scaled(normal, HALF[k]);
       const [p, q] = [(k + 1) % 3, (k + 2) % 3].map((i) => axis(i, HALF[i]));
       const corners = [[1, 1], [1, -1], [-1, -1], [-1, 1]].map(([i, j]) => place(sum(middle, sum(scaled(p, i), scaled(q, j)))));
-      const upwards = dot(normal, top) > 0.3 ? "face up" : "face";
-      svg.append(element("polygon", { class: upwards, points: corners.map((c) => c.map((v) => v.toFixed(1)).join(",")).join(" ") }));
+      const lies = dot(normal, top) > 0.3 ? "face up" : "face";
+      svg.append(element("polygon", { class: lies, points: corners.map((c) => c.map((v) => v.toFixed(1)).join(",")).join(" ") }));
       const [x, y] = place(middle);
       if (facing > 0.12) svg.append(element("text", { class: "heading", x, y: y + 5, "text-anchor": "middle" }, `${sign < 0 ? "−" : "+"}${"xyz"[k]}`));
     }

@@ -1,6 +1,7 @@
 // Runs the program on the person's files, away from the page, so that the page answers while it computes.
 
-import { DroppedFile, Folder, Input, MemoryFile, run, start } from "./wasi.js";
+import { DroppedFile, Folder, Input, MemoryFile } from "./files.js";
+import { run, start } from "./wasi.js";
 
 // Of what is told while a file is read, ms.
 const EVERY = 100;
