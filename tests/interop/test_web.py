@@ -100,6 +100,29 @@ def test_a_parquet_file_is_read(page, tmp_path):
     same(ours, theirs, "fit of Parquet")
 
 
+@pytest.mark.parametrize("several", ["verify", "joint"])
+def test_several_recordings_of_a_unit_are_diagnosed_as_by_the_command(page, tmp_path, several):
+    for k in [1, 2]:
+        web_logs.write_csv(tmp_path / f"day-{k}.csv", web_logs.by_hand(seed=k))
+        columns = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z"
+        given = ["--columns", columns, "--raw-unit", "SI", "--reference", "gravity", "--gravity", 9.80665, "--device", "day-1"]
+        run("import", f"day-{k}.csv", *given, "-o", {1: "rec", 2: "rec-2"}[k], cwd=tmp_path)
+    page.set_input_files("#file", [tmp_path / "day-1.csv", tmp_path / "day-2.csv"])
+    page.wait_for_selector("#columns:not([hidden])")
+    page.select_option("#several", several)
+    page.select_option("#gyro-unit", "rad/s")
+    page.fill("#gravity", "9.80665")
+    calibrate(page)
+    assert page.inner_text("#error") == ""
+    assert taken_away(page, "rec-2-samples.parquet") == (tmp_path / "rec-2" / "samples.parquet").read_bytes()
+    second = ["--verify", "rec-2"] if several == "verify" else ["rec-2"]
+    ours = json.loads(taken_away(page, "diagnosis.json"))
+    theirs = json.loads(run("diagnose", "rec", *second, "--json", "-", cwd=tmp_path))
+    same(ours, theirs, f"diagnosis, {several}")
+    inside = page.frame_locator("#report").locator("h1")
+    assert inside.inner_text() == "Inertial unit day-1"
+
+
 def test_a_file_can_be_dropped_anywhere_on_the_page(page):
     drop = """text => {
         const data = new DataTransfer();
