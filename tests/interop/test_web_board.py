@@ -131,6 +131,15 @@ def test_a_whole_session_gives_the_calibration_of_the_command(usb, lines, tmp_pa
         usb.click("#export")
     assert download.value.suggested_filename == "mimu.h"
 
+    # The journal of a finished session needs no board.
+    archive = tmp_path / "plane-7.zip"
+    archive.write_bytes(taken_away(usb, "Download the journal"))
+    usb.reload()
+    usb.set_input_files("#file", archive)
+    usb.wait_for_selector("#away:not([hidden])", timeout=100_000)
+    assert "finished" in usb.inner_text("#loaded")
+    same(json.loads(taken_away(usb, "fit.json")), fit, "fit of the journal")
+
 
 def test_a_session_that_is_unplugged_goes_on_and_the_command_ends_it(usb, lines, tmp_path):
     connect(usb, lines)
@@ -200,6 +209,20 @@ def test_a_session_that_was_stopped_goes_on_in_the_page(usb, lines, tmp_path):
     assert found.count("redo") == 1 and found.count("dwell") >= 7
     usb.set_input_files("#journal", tmp_path / "page" / "journal.jsonl")
     assert "this is no ZIP archive" in usb.inner_text("#error")
+
+
+def test_axes_with_the_names_of_others_are_asked_about_and_end_the_session(usb, lines):
+    connect(usb, lines)
+    # Of both sensors alike, so that only the poses show it.
+    for at, name in enumerate(["ay", "az", "ax", "gy", "gz", "gx"], start=1):
+        usb.select_option(f"#line-role-{at}", name)
+    begin(usb)
+    usb.wait_for_selector("#question:not([hidden])", timeout=100_000)
+    assert "go on all the same?" in usb.inner_text("#question")
+    usb.click("#no")
+    usb.locator("#error", has_text="plane-7").wait_for(timeout=100_000)
+    assert usb.is_hidden("#question")
+    assert "stopped" in usb.inner_text("#prompt")
 
 
 def test_garbage_is_shown_and_says_which_field_to_correct(usb, lines):

@@ -152,9 +152,10 @@ async function begin() {
   if (!port.isOpen) await port.open(Number($("baud").value));
   // A session that has no dwell yet, or is finished, is not gone on with.
   if (!board.goesOn) await program().ask("unpack", { name: FOLDER, files: new Map() });
-  await program().begin(...wizardArguments());
+  const warnings = await program().begin(...wizardArguments());
   Object.assign(board, { stage: "session", queue: [] });
   session.begin(async () => (await program().text(`${FOLDER}/journal.jsonl`)) ?? "");
+  session.log(warnings);
   $("line").hidden = true;
   $("session").hidden = false;
   for (const id of ["go-on", "reconnect", "question", "forget"]) $(id).hidden = true;

@@ -5,7 +5,7 @@ import { element } from "./sphere.js";
 // Half of the edges along x, y and z: flat, as a board is.
 const HALF = [1, 1, 0.55];
 // From where it is seen, degrees to the right of the front and above: by how many faces are upwards, so that all of those are seen.
-const ASIDE = [32, 45, 8], ABOVE = [24, 50, 50];
+const ASIDE = [32, 45, 0], ABOVE = [24, 50, 54];
 const SCALE = 46, MIDDLE = [110, 112];
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -73,11 +73,12 @@ export class Program {
     return done;
   }
 
-  /** Begins a session with a board by these arguments of `mimu wizard`; `Refused` with its line. */
+  /** Begins a session with a board by these arguments of `mimu wizard`; its warnings, or `Refused` with its line. */
   async begin(...args) {
     await this.ready;
     const begun = await this.ask("begin", { args });
     if (begun.status !== 0) throw new Refused(lineOf(begun));
+    return begun.stderr.split("\n");
   }
 
   /** Has the session hear these lines; whether it has ended. */

@@ -95,8 +95,8 @@ function aims({ sensors, not_yet: why }) {
       const met = half <= target;
       const bar = made("progress", { max: 1, value: Math.min(1, target / half) });
       bar.setAttribute("aria-label", `${sensor} ${parameter}: target over interval`);
-      return made("tr", { className: met ? "met" : "" }, made("td", { textContent: `${sensor} ${parameter}` }), made("td", { className: "n", textContent: `±${digits(half)}` }),
-        made("td", { textContent: `of ±${digits(target)} ${unit} (${axis})${met ? " ✓" : ""}` }), made("td", {}, bar));
+      return made("tr", { className: met ? "met" : "" }, made("td", { textContent: `${met ? "✓ " : ""}${sensor} ${parameter} ${axis}` }), made("td", { className: "n", textContent: `±${digits(half)}` }),
+        made("td", { textContent: `of ±${digits(target)} ${unit}` }), made("td", {}, bar));
     }),
   );
   const caption = made("caption", { textContent: "95 % intervals of the worst axis, beside what is wanted" });
