@@ -107,7 +107,7 @@ web: toolchain ## the page that calibrates in the browser: static files in targe
 
 # Compiling the page takes four minutes of processor time, so that `make test` has its program on the PC only.
 web-tests: web ## the page in Chromium, if there is one, against the command
-	$(CARGO) build --locked -q -p mimu-cli --bin mimu
+	$(CARGO) build --locked -q -p mimu-cli -p mimu-rig --bin mimu --bin mimu-rig
 	MIMU_PAGE=$(CURDIR)/target/web ./tests/interop/run.sh target/debug/mimu -k test_web -s
 
 nightly: toolchain blind fuzz web-tests ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures

@@ -8,6 +8,7 @@ import tomllib
 
 import numpy
 import pytest
+from browser import chromium, page, server  # noqa: F401
 
 EXAMPLE = pathlib.Path(__file__).parent.parent / "example"
 G = 9.80665

@@ -99,15 +99,26 @@ export function cut(text) {
   return [...text.matchAll(/"([^"]*)"|'([^']*)'|(\S+)/g)].map((m) => m[1] ?? m[2] ?? m[3]);
 }
 
-/** Arguments of `mimu import` for the files of `looked`. */
-export function importArguments(looked, names) {
+/** What several files are: joined, a pose each, or recordings of their own. */
+export const several = (looked) => (looked.files.length > 1 ? field("several").value : "");
+
+/** For each recording that the files of `looked` make, the arguments of `mimu import` up to where it goes. */
+export function imports(looked, names) {
+  const roles = chosen();
+  const alone = ["joint", "verify"].includes(several(looked));
+  const device = names[0].replace(/\.[^.]*$/, "");
+  if (!alone) return [importArguments(looked, names, roles, device)];
+  return names.map((name, k) => importArguments({ ...looked, files: [looked.files[k]] }, [name], [roles[k]], device, alone));
+}
+
+/** Of these files; `alone`, one of those that were dropped together, whose preset may be of all of them. */
+function importArguments(looked, names, roles, device, alone = false) {
   const args = ["import", ...names];
   const add = (flag, value) => value && args.push(flag, value);
-  const roles = chosen();
   const log = looked.files.some((file) => file.log);
   if (!log) {
     const { preset } = looked;
-    const as = preset && roles.every((list, k) => list.every((role, at) => role === looked.files[k].roles[at]));
+    const as = preset && !alone && roles.every((list, k) => list.every((role, at) => role === looked.files[k].roles[at]));
     if (as) args.push("--preset", preset.name);
     else roles.forEach((list) => args.push("--columns", list.join(",")));
     if (preset && !as) preset.scales.forEach((scale) => args.push("--scale", scale));
@@ -124,8 +135,7 @@ export function importArguments(looked, names) {
   add("--gravity", field("gravity").value.trim().replace(",", "."));
   add("--latitude", field("latitude").value.trim().replace(",", "."));
   args.push("--reference", field("reference").value);
-  if (names.length > 1 && field("several").value) args.push(`--${field("several").value}`);
+  if (several(looked)) args.push(`--${several(looked)}`);
   if (field("broken").value) args.push(`--skip-broken=${field("broken").value}`);
-  const device = names[0].replace(/\.[^.]*$/, "");
-  return [...args, "--device", device, ...cut(field("more-import").value), "-o", "rec", "--replace", "--json", "import.json"];
+  return [...args, "--device", device, ...cut(field("more-import").value), "--replace", "--json", "import.json"];
 }

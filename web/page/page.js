@@ -1,14 +1,18 @@
 // The page: from dropped files to a calibration, one step after the other.
 
+import { loadJournal, offerBoards } from "./board.js";
 import { FORMATS } from "./exports.js";
-import { FIELD_OF, cut, importArguments, show } from "./fields.js";
+import { FIELD_OF, cut, imports, several, show } from "./fields.js";
 import { Cancelled, Program, Refused, load } from "./program.js";
 import { sphere } from "./sphere.js";
 
 const $ = (id) => document.getElementById(id);
 
-/** The files that were dropped last, what was found in them, and what was computed of these and of those before: the text of each file. */
-const state = { files: [], looked: null, program: null, calibration: null, noise: null, from: {}, example: false };
+/**
+ * The files that were dropped last, what was found in them, or the session with a board that came after them; and what was computed of these
+ * and of those before: the text of each file.
+ */
+const state = { files: [], looked: null, session: null, recordings: ["rec"], program: null, calibration: null, noise: null, from: {}, example: false };
 
 function made(name, properties, ...children) {
   const element = Object.assign(document.createElement(name), properties);
@@ -17,24 +21,25 @@ function made(name, properties, ...children) {
 }
 
 /** Text in which the arguments of the command lead to the field that sets them. */
-function withFields(text) {
+function withFields(text, fields = FIELD_OF) {
   return text.split(/(--[a-z-]+)/).map((part) => {
-    const id = FIELD_OF[part];
+    const id = fields[part];
     if (!id) return part;
     const button = made("button", { type: "button", className: "field-link", textContent: part });
     button.addEventListener("click", () => {
       const target = id === "files" ? $("files").querySelector("select") : $(id);
       target?.closest("details")?.setAttribute("open", "");
-      (target ?? $("columns-title")).focus();
+      if (target && !target.matches("input, select, button")) target.querySelector("select, input")?.focus();
+      else (target ?? $("columns-title")).focus();
     });
     return button;
   });
 }
 
 /** Shows the line of a refusal where the person is looking, below `place`; an empty one takes it away. */
-function refuse(line, place = $("drop").parentElement) {
+function refuse(line, place = $("drop").parentElement, fields = FIELD_OF) {
   place.after($("error"));
-  $("error").replaceChildren(...withFields(line));
+  $("error").replaceChildren(...withFields(line, fields));
   $("error").hidden = !line;
   if (line) $("error").focus();
 }
@@ -45,10 +50,11 @@ function status(text, share) {
   else $("bar").value = share;
 }
 
-/** The program, with the dropped files in its folder. */
+/** The program, with the dropped files in its folder, or those of the session. */
 async function program() {
   state.program ??= new Program(({ file, share }) => status(`reading ${file}: ${Math.round(100 * share)} %`, share));
   await state.program.files(state.files);
+  if (state.session) await state.program.ask("unpack", { name: "session", files: state.session.files });
   return state.program;
 }
 
@@ -64,21 +70,22 @@ function named(files) {
 }
 
 /** What may fail runs in here: its line is shown, and the page goes on. */
-async function guarded(work, place) {
-  refuse("", place);
+async function guarded(work, place, fields) {
+  refuse("", place, fields);
   try {
     await work();
   } catch (error) {
     if (error instanceof Cancelled) return;
-    refuse(error instanceof Refused ? error.message : `this page has a fault (${error?.message ?? error}); load it again, and report it if it comes back`, place);
+    refuse(error instanceof Refused ? error.message : `this page has a fault (${error?.message ?? error}); load it again, and report it if it comes back`, place, fields);
     if (!(error instanceof Refused)) console.error(error);
   }
 }
 
 async function open(files) {
   if (files.length === 0) return;
+  if (files.length === 1 && /\.zip$/i.test(files[0].name)) return loadJournal(files[0]);
   cancel();
-  state.files = named(files);
+  Object.assign(state, { files: named(files), session: null, recordings: ["rec"] });
   // Where the example was recorded says nothing of where this was.
   if (state.example) $("gravity").value = "";
   state.example = false;
@@ -138,36 +145,63 @@ async function compute(steps) {
 /** Imports the dropped files as the form says. */
 async function imported(mimu) {
   const names = state.files.map(({ name }) => name);
-  await step("Import", () => mimu.run(...importArguments(state.looked, names)));
-  warn((await mimu.json("import.json")).warnings);
+  const all = imports(state.looked, names);
+  state.recordings = all.map((_, k) => (k ? `rec-${k + 1}` : "rec"));
+  for (const [k, args] of all.entries()) {
+    await step(all.length > 1 ? `Import of ${names[k]}` : "Import", () => mimu.run(...args, "-o", state.recordings[k]));
+    warn((await mimu.json("import.json")).warnings);
+  }
 }
 
 async function calibrate(mimu) {
   await imported(mimu);
-  const more = cut($("more-fit").value);
+  // A diagnosis is verified by one recording; the report judges the calibration by all of them.
+  const [, ...others] = state.recordings;
+  const verify = several(state.looked) === "verify" ? others.flatMap((rec) => ["--verify", rec]) : [];
+  await fitted(mimu, state.files[0].name, cut($("more-fit").value), verify, verify.length ? [] : others);
+}
+
+/**
+ * Fits the first recording, and diagnoses it: `verify`, later recordings of the unit as arguments; `others`, those that effects are looked for
+ * in as well. `name`: what the recording is called.
+ */
+async function fitted(mimu, name, more, verify = [], others = []) {
+  const [rec] = state.recordings;
   // The readings are shown even if they cannot be fitted: there one sees why.
-  const fitted = await step("Calibration", () => mimu.run("fit", "rec", "-o", "cal.toml", "--json", "fit.json", ...more)).catch(refusal);
-  const shown = fitted instanceof Refused ? [] : ["cal.toml"];
-  const view = await step("Readings and poses", () => mimu.run("view", "rec", ...shown)).catch((why) => {
-    throw fitted instanceof Refused ? fitted : why;
+  const fit = await step("Calibration", () => mimu.run("fit", rec, "-o", "cal.toml", "--json", "fit.json", ...more)).catch(refusal);
+  const shown = fit instanceof Refused ? [] : ["cal.toml"];
+  const view = await step("Readings and poses", () => mimu.run("view", rec, ...shown)).catch((why) => {
+    throw fit instanceof Refused ? fit : why;
   });
   picture(JSON.parse(view.stdout));
   $("result").hidden = false;
-  if (fitted instanceof Refused) throw fitted;
+  if (fit instanceof Refused) throw fit;
   state.calibration = await mimu.text("cal.toml");
-  state.from["calibration.toml"] = state.files[0].name;
+  state.from["calibration.toml"] = name;
   warn((await mimu.json("fit.json")).warnings);
-  $("errors").replaceChildren(printed("mimu fit", fitted));
+  $("errors").replaceChildren(printed("mimu fit", fit));
   const shared = more.filter((_, k) => more[k] !== "--only" && more[k - 1] !== "--only");
-  const page = ["-o", "calibration.toml", "--json", "diagnosis.json", "--page", "report.html"];
-  const found = await step("Diagnosis", () => mimu.run("diagnose", "rec", ...page, ...shared)).catch(refusal);
+  const page = ["-o", "calibration.toml", "--json", "diagnosis.json", "--page", "diagnosis.html"];
+  const found = await step("Diagnosis", () => mimu.run("diagnose", rec, ...others, ...page, ...shared, ...verify.slice(0, 2))).catch(refusal);
   if (!(found instanceof Refused)) {
     state.calibration = await mimu.text("calibration.toml");
     warn((await mimu.json("diagnosis.json")).warnings);
+    verdict(await mimu.text("diagnosis.html"));
+    const given = ["--calibration", "calibration.toml", ...verify, ...optionsOf(more, OF_REPORT)];
+    await step("Report", () => mimu.run("report", rec, ...others, ...given, "-o", "report.html"));
     await report(await mimu.text("report.html"));
   }
-  await keep(mimu, ["fit.json", "diagnosis.json", "report.html"]);
+  await keep(mimu, ["fit.json", "diagnosis.json", "diagnosis.html", "report.html"]);
   if (found instanceof Refused) throw found;
+}
+
+/** Calibrates from the recordings of a session with the board called `name`. */
+async function finished(files, name) {
+  cancel();
+  Object.assign(state, { files: [], session: { files }, recordings: ["session/calibration"] });
+  $("columns").hidden = true;
+  const verify = files.has("verification/samples.csv") ? ["--verify", "session/verification"] : [];
+  await compute((mimu) => fitted(mimu, `the session with ${name}`, [], verify));
 }
 
 async function noise(mimu) {
@@ -176,6 +210,7 @@ async function noise(mimu) {
   if (state.calibration) await mimu.write("before.toml", state.calibration);
   const files = ["-o", "noise.toml", "--json", "allan.json", "--plot", "allan.svg"];
   const done = await step("Allan deviation", () => mimu.run("allan", "rec", ...files, ...by));
+  if (state.recordings.length > 1) warn([`The noise is that of ${state.files[0].name} alone.`]);
   state.noise = await mimu.text("noise.toml");
   state.from["noise.toml"] = state.files[0].name;
   warn((await mimu.json("allan.json")).warnings);
@@ -189,6 +224,14 @@ async function noise(mimu) {
 function printed(command, done) {
   const text = made("div", { className: "scroll", tabIndex: 0 }, made("pre", { textContent: done.stdout }));
   return made("details", {}, made("summary", { textContent: `What ${command} prints` }), text);
+}
+
+/** Options of `mimu fit` that `mimu report` has as well. */
+const OF_REPORT = ["--still", "--steps", "--keep"];
+
+/** Those of the arguments `more` that are one of `options`, with their values. */
+function optionsOf(more, options) {
+  return more.filter((argument, k) => options.includes(argument.split("=")[0]) || (options.includes(more[k - 1]) && !argument.startsWith("-")));
 }
 
 /** A refusal as a result; another error goes on. */
@@ -219,15 +262,19 @@ function picture(view) {
   $("next").textContent = `${view.poses.length} poses: the direction that is up, in the body frame. Equal areas. ${most}`;
 }
 
-/** Shows the report, and its verdict and errors above. */
-async function report(html) {
+/** Shows the verdict and the errors of a diagnosis. */
+function verdict(html) {
   const parsed = new DOMParser().parseFromString(html, "text/html");
-  const verdict = parsed.querySelector(".verdict");
-  $("verdict").className = verdict.className;
-  $("verdict").replaceChildren(...document.importNode(verdict, true).childNodes);
+  const found = parsed.querySelector(".verdict");
+  $("verdict").className = found.className;
+  $("verdict").replaceChildren(...document.importNode(found, true).childNodes);
   $("verdict").hidden = false;
   const errors = parsed.querySelector("table");
   if (errors) $("errors").prepend(document.importNode(errors, true));
+}
+
+/** Shows the report of the unit. */
+async function report(html) {
   $("report-part").hidden = false;
   await new Promise((loaded) => {
     $("report").onload = () => {
@@ -248,11 +295,13 @@ function save(name, bytes) {
 
 /** Offers the files that were made of this recording, and the formats that can be made of what is known of the unit. */
 async function keep(mimu, files) {
-  const recording = await mimu.read("rec");
   const ours = { "calibration.toml": state.calibration, "noise.toml": state.noise };
   for (const [name, text] of Object.entries(ours)) if (text) await mimu.write(name, text);
   const all = [...Object.keys(ours), ...files].map((name) => [name, name]);
-  all.push(...[...recording.keys()].map((name) => [`rec/${name}`, name]));
+  for (const [k, rec] of state.recordings.entries()) {
+    const names = [...(await mimu.read(rec)).keys()];
+    all.push(...names.map((name) => [`${rec}/${name}`, k ? `${rec}-${name}` : name]));
+  }
   for (const [from, name] of all) {
     const bytes = await mimu.read(from);
     if (!bytes) continue;
@@ -276,7 +325,8 @@ async function takeAway() {
   await guarded(async () => {
     const mimu = state.program;
     const from = ["calibration", "noise"].filter((of) => state[of]).flatMap((of) => [`--${of}`, `${of}.toml`]);
-    const done = await mimu.run("export", ...args, ...from, "-o", file);
+    const of = args.map((argument) => (argument === "rec" ? state.recordings[0] : argument));
+    const done = await mimu.run("export", ...of, ...from, "-o", file);
     save(file, await mimu.read(file));
     $("exported").replaceChildren(made("span", { className: "said", textContent: done.stdout.trim() }));
   }, $("exported"));
@@ -321,5 +371,6 @@ addEventListener("drop", (event) => {
   $("drop").classList.remove("over");
   open(event.dataTransfer.files);
 });
+offerBoards({ guarded, refuse, save, done: finished });
 load().catch((error) => refuse(error.message));
 if ("serviceWorker" in navigator && isSecureContext) navigator.serviceWorker.register("sw.js").catch(() => {});

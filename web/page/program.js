@@ -6,6 +6,9 @@ export class Refused extends Error {}
 /** The person has cancelled. */
 export class Cancelled extends Error {}
 
+/** The line of a refusal. */
+const lineOf = ({ stderr }) => stderr.trim().split("\n").at(-1).replace(/^mimu: /, "");
+
 let compiled;
 
 /** Compiles the program once; workers that follow one another share it. */
@@ -23,12 +26,13 @@ export function load() {
 
 /** One worker, with files of its own. */
 export class Program {
-  constructor(onProgress = () => {}) {
+  constructor(onProgress = () => {}, onSaid = () => {}) {
     this.waiting = new Map();
     this.next = 0;
     this.worker = new Worker("worker.js", { type: "module" });
     this.worker.onmessage = ({ data }) => {
       if (data.progress) return onProgress(data.progress);
+      if (data.said) return onSaid(data.said);
       const { resolve, reject } = this.waiting.get(data.id);
       this.waiting.delete(data.id);
       if (data.failed === undefined) resolve(data.answer);
@@ -65,8 +69,21 @@ export class Program {
   async run(...args) {
     await this.ready;
     const done = await this.ask("run", { args });
-    if (done.status !== 0) throw new Refused(done.stderr.trim().split("\n").at(-1).replace(/^mimu: /, ""));
+    if (done.status !== 0) throw new Refused(lineOf(done));
     return done;
+  }
+
+  /** Begins a session with a board by these arguments of `mimu wizard`; its warnings, or `Refused` with its line. */
+  async begin(...args) {
+    await this.ready;
+    const begun = await this.ask("begin", { args });
+    if (begun.status !== 0) throw new Refused(lineOf(begun));
+    return begun.stderr.split("\n");
+  }
+
+  /** Has the session hear these lines; whether it has ended. */
+  hear(lines) {
+    return this.ask("hear", { lines });
   }
 
   async text(name) {

@@ -1,102 +1,12 @@
-// The file system, the clock and the standard streams that the program asks of its system (WASI preview 1), in memory.
-//
-// A file that was dropped stays where it is: it is read in pieces, so that a log of a gigabyte takes no memory. What the program writes is
-// bytes in memory. Only one directory is handed over, the root.
+// The file system, the clock and the standard streams that the program asks of its system (WASI preview 1), in memory. Only one directory is
+// handed over, the root.
+
+import { Folder, MemoryFile } from "./files.js";
 
 const OK = 0, BADF = 8, EXIST = 20, INVAL = 28, ISDIR = 31, NOENT = 44, NOSYS = 52, NOTDIR = 54, NOTEMPTY = 55, ROFS = 69, SPIPE = 70;
 const CHARACTER = 2, DIRECTORY = 3, REGULAR = 4;
 const CREATE = 1, MUST_BE_DIRECTORY = 2, EXCLUSIVE = 4, TRUNCATE = 8, APPEND = 1;
-// Bytes of a dropped file that are read at a time: a read of the browser takes a fifth of a millisecond whatever its length.
-const PIECE = 1 << 20;
-
-let inodes = 0;
-
-/** A file that the program writes and may read again. */
-export class MemoryFile {
-  constructor(bytes = new Uint8Array(0)) {
-    this.inode = ++inodes;
-    this.bytes = bytes;
-    this.size = bytes.length;
-  }
-
-  read(at, into) {
-    const from = this.bytes.subarray(Math.min(at, this.size), Math.min(at + into.length, this.size));
-    into.set(from);
-    return from.length;
-  }
-
-  write(at, from) {
-    this.resize(Math.max(this.size, at + from.length));
-    this.bytes.set(from, at);
-  }
-
-  resize(size) {
-    if (size > this.bytes.length) {
-      const grown = new Uint8Array(Math.max(size, 2 * this.bytes.length, 4096));
-      grown.set(this.bytes.subarray(0, this.size));
-      this.bytes = grown;
-    } else if (size < this.size) {
-      this.bytes.fill(0, size, this.size);
-    }
-    this.size = size;
-  }
-
-  content() {
-    return this.bytes.subarray(0, this.size);
-  }
-}
-
-/** A file of the person's disk: read only. `heard` is told how far it has been read. */
-export class DroppedFile {
-  constructor(file, heard = () => {}) {
-    this.inode = ++inodes;
-    this.file = file;
-    this.size = file.size;
-    this.heard = heard;
-    this.from = 0;
-    this.piece = new Uint8Array(0);
-  }
-
-  read(at, into) {
-    const wanted = Math.min(into.length, this.size - at);
-    if (wanted <= 0) return 0;
-    if (at < this.from || at >= this.from + this.piece.length) {
-      this.from = at;
-      const end = Math.min(at + Math.max(PIECE, wanted), this.size);
-      this.piece = new Uint8Array(new FileReaderSync().readAsArrayBuffer(this.file.slice(at, end)));
-      this.heard(end / this.size);
-    }
-    const have = this.piece.subarray(at - this.from, at - this.from + wanted);
-    into.set(have);
-    return have.length;
-  }
-}
-
-/** Folders and files by name. */
-export class Folder {
-  constructor() {
-    this.inode = ++inodes;
-    this.entries = new Map();
-  }
-
-  /** The folder that `path` ends in, with the last name; `null` if a folder on the way is missing. */
-  parent(path) {
-    const names = path.split("/").filter((name) => name !== "" && name !== ".");
-    let folder = this;
-    for (const name of names.slice(0, -1)) {
-      folder = folder.entries.get(name);
-      if (!(folder instanceof Folder)) return null;
-    }
-    return [folder, names.at(-1)];
-  }
-
-  find(path) {
-    const found = this.parent(path);
-    if (!found) return undefined;
-    const [folder, name] = found;
-    return name === undefined ? folder : folder.entries.get(name);
-  }
-}
+const encoder = new TextEncoder(), decoder = new TextDecoder();
 
 /** The program has ended by itself. */
 class Exit extends Error {
@@ -106,20 +16,26 @@ class Exit extends Error {
   }
 }
 
-const encoder = new TextEncoder(), decoder = new TextDecoder();
-
 /**
  * Runs the program with these arguments on the files in `root`.
  * Returns its exit status and what it wrote to its standard streams. A trap of the program is thrown on.
  */
 export function run(module, root, args) {
+  return start(module, root, args)("_start");
+}
+
+/**
+ * Makes an instance of the program: what it exports is called by the function that this returns, which answers as `run`. Lines of the
+ * standard output go to `said` at once, if that is given.
+ */
+export function start(module, root, args, input, said) {
   let memory;
   const view = () => new DataView(memory.buffer);
   const bytes = (at, length) => new Uint8Array(memory.buffer, at, length);
   const text = (at, length) => decoder.decode(bytes(at, length).slice());
   const streams = ["", ""];
   const utf8 = [new TextDecoder(), new TextDecoder()];
-  const open = new Map([[0, {}], [1, { stream: 0 }], [2, { stream: 1 }], [3, { node: root }]]);
+  const open = new Map([[0, { input }], [1, { stream: 0 }], [2, { stream: 1 }], [3, { node: root }]]);
   let next = 4;
 
   const vectors = (at, count) => {
@@ -167,7 +83,8 @@ export function run(module, root, args) {
     if (handle.node instanceof Folder) return ISDIR;
     let sum = 0;
     for (const into of vectors(iovs, count)) {
-      const got = handle.node ? handle.node.read(at + sum, into) : 0;
+      const from = handle.node ?? handle.input;
+      const got = from ? from.read(at + sum, into) : 0;
       sum += got;
       if (got < into.length) break;
     }
@@ -179,13 +96,20 @@ export function run(module, root, args) {
     if (!handle) return BADF;
     let sum = 0;
     for (const from of vectors(iovs, count)) {
-      if (handle.stream !== undefined) streams[handle.stream] += utf8[handle.stream].decode(from.slice(), { stream: true });
-      else if (handle.node instanceof MemoryFile) handle.node.write(at + sum, from);
+      if (handle.stream !== undefined) {
+        streams[handle.stream] += utf8[handle.stream].decode(from.slice(), { stream: true });
+        if (said && handle.stream === 0) hand();
+      } else if (handle.node instanceof MemoryFile) handle.node.write(at + sum, from);
       else return ROFS;
       sum += from.length;
     }
     view().setUint32(result, sum, true);
     return sum;
+  };
+  const hand = () => {
+    const lines = streams[0].split("\n");
+    streams[0] = lines.pop();
+    lines.forEach(said);
   };
   const remove = (wantsFolder) => (fd, at, length) =>
     below(fd, at, length, (folder, name, node) => {
@@ -377,15 +301,17 @@ export function run(module, root, args) {
   const unknown = { get: (target, name) => target[name] ?? (() => NOSYS), has: () => true };
   const instance = new WebAssembly.Instance(module, { wasi_snapshot_preview1: new Proxy(calls, unknown) });
   memory = instance.exports.memory;
-  let status = 0;
-  try {
-    instance.exports._start();
-  } catch (stopped) {
-    if (!(stopped instanceof Exit)) {
-      stopped.stderr = streams[1];
-      throw stopped;
+  return (name) => {
+    let status = 0;
+    try {
+      status = instance.exports[name]() ?? 0;
+    } catch (stopped) {
+      if (!(stopped instanceof Exit)) {
+        stopped.stderr = streams[1];
+        throw stopped;
+      }
+      status = stopped.code;
     }
-    status = stopped.code;
-  }
-  return { status, stdout: streams[0], stderr: streams[1], memory: memory.buffer.byteLength };
+    return { status, stdout: streams[0], stderr: streams[1], memory: memory.buffer.byteLength };
+  };
 }

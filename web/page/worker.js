@@ -1,12 +1,15 @@
 // Runs the program on the person's files, away from the page, so that the page answers while it computes.
 
-import { DroppedFile, Folder, MemoryFile, run } from "./wasi.js";
+import { DroppedFile, Folder, Input, MemoryFile } from "./files.js";
+import { run, start } from "./wasi.js";
 
 // Of what is told while a file is read, ms.
 const EVERY = 100;
 
 const root = new Folder();
 let module;
+/** The session with a board that is open: the program that leads it, and what it has to hear. */
+let session = null;
 
 const tell = (() => {
   let last = 0;
@@ -47,11 +50,45 @@ const answers = {
       return { status: 1, stdout: "", stderr: `mimu: ${broken(trap)}`, ms: performance.now() - begun };
     }
   },
-  /** The content of a file that the program wrote; of a folder, all of its files. */
+  /** Begins a session with a board by the arguments of `mimu wizard`, or goes on with the one in the folder. */
+  begin({ args }) {
+    const input = new Input();
+    const said = (line) => postMessage({ said: JSON.parse(line) });
+    const call = start(module, root, ["mimu", "session", ...args], input, said);
+    const begun = call("_start");
+    session = begun.status === 0 ? { call, input } : null;
+    return begun;
+  },
+  /** Has the session hear these lines. Whether it has ended. */
+  hear({ lines }) {
+    if (!session) return true;
+    session.input.push(lines.map((line) => JSON.stringify(line) + "\n").join(""));
+    try {
+      if (session.call("mimu_go_on").status === 0) return false;
+    } catch (trap) {
+      postMessage({ said: { ended: { refused: `${broken(trap)}; the journal is whole up to the last dwell` } } });
+    }
+    session = null;
+    return true;
+  },
+  /** Puts files in folders, in the place of the folder `name`. */
+  unpack({ name, files }) {
+    root.entries.delete(name);
+    for (const [path, bytes] of files) {
+      let folder = root;
+      const names = [name, ...path.split("/")];
+      for (const part of names.slice(0, -1)) {
+        if (!folder.entries.has(part)) folder.entries.set(part, new Folder());
+        folder = folder.entries.get(part);
+      }
+      folder.entries.set(names.at(-1), new MemoryFile(bytes));
+    }
+  },
+  /** The content of a file that the program wrote; of a folder, all of its files by their paths. */
   read({ name }) {
     const found = root.find(name);
     if (found instanceof MemoryFile) return found.content().slice();
-    if (found instanceof Folder) return new Map([...found.entries].map(([entry, file]) => [entry, file.content().slice()]));
+    if (found instanceof Folder) return new Map(found.files());
     return null;
   },
 };

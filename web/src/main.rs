@@ -3,11 +3,15 @@
 //! | arguments | what it prints, as JSON |
 //! |---|---|
 //! | `columns FILE ...` | the columns of dropped files, and what each is taken for |
+//! | `board FILE SECONDS` | the columns of lines that a board has written |
+//! | `session wizard ...` | a session with a board, of which [`session`] says more |
 //! | `view REC [CALIBRATION]` | the readings with the dwells, the poses, and which pose would add most |
 //! | any other | what `mimu` prints |
 
+mod board;
 mod columns;
 mod poses;
+mod session;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -31,6 +35,16 @@ fn main() -> ExitCode {
         (Some("view"), [recording, calibration]) => {
             view(recording, Some(calibration)).and_then(json)
         }
+        (Some("board"), [file, seconds]) => {
+            let seconds = seconds.to_string_lossy().parse().unwrap_or(f64::NAN);
+            board::of(file, seconds).and_then(json)
+        }
+        (Some("session"), _) => {
+            return match session::begin(&args[2..]) {
+                Ok(()) => ExitCode::SUCCESS,
+                Err(line) => refused(line),
+            };
+        }
         _ => return mimu_cli::run(std::env::args_os()).into(),
     };
     match answer {
@@ -38,11 +52,13 @@ fn main() -> ExitCode {
             println!("{text}");
             ExitCode::SUCCESS
         }
-        Err(error) => {
-            eprintln!("mimu: {error}");
-            ExitCode::from(1)
-        }
+        Err(error) => refused(error),
     }
+}
+
+fn refused(line: impl std::fmt::Display) -> ExitCode {
+    eprintln!("mimu: {line}");
+    ExitCode::from(1)
 }
 
 fn json(answer: impl Serialize) -> Result<String> {

@@ -118,6 +118,11 @@ impl JsonArgs {
         self.path.as_deref().filter(|path| *path != Path::new("-"))
     }
 
+    /// Whether JSON is asked for.
+    pub(crate) fn is_given(&self) -> bool {
+        self.path.is_some()
+    }
+
     /// Whether it takes the place of the text; the wizard asks.
     #[cfg(not(target_family = "wasm"))]
     pub(crate) fn is_standard_output(&self) -> bool {

@@ -2,16 +2,23 @@
 //! them exists twice.
 
 use std::ffi::OsString;
+use std::pin::Pin;
+use std::sync::mpsc::Receiver;
 
 use clap::{Args, CommandFactory, Parser};
 use mimu_export::{Export, Format, Sources};
 use mimu_recording::ImportSummary;
 use mimu_recording::error::Error;
+use mimu_wizard::event::View;
+use mimu_wizard::relay::Stamped;
+use mimu_wizard::session::Outcome;
 
 use crate::Cli;
 use crate::cmd::design::DesignArgs;
 pub use crate::cmd::design::Designed;
 use crate::cmd::import::{ImportArgs, imported};
+use crate::cmd::wizard::{WizardArgs, session};
+use crate::hint;
 
 /// Why a call did nothing.
 #[derive(Debug)]
@@ -57,6 +64,37 @@ pub fn export(arguments: Vec<OsString>, from: &Sources) -> Result<Export, Refusa
     let arguments = std::iter::once("export".into()).chain(arguments);
     let to = To::try_parse_from(arguments).map_err(usage)?;
     Ok(to.format.export(from)?)
+}
+
+/// A session of the wizard: what it has come to, and the line of its failure if it is one. See [`mimu_wizard::turn`].
+pub type Session = Pin<Box<dyn Future<Output = (Option<Outcome>, Option<String>)>>>;
+
+/// A session by hand by the arguments of `mimu wizard`, with a board at a port that the caller holds. `arrivals` is what comes over it.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn wizard(
+    arguments: Vec<OsString>,
+    arrivals: Receiver<Stamped>,
+    view: Box<dyn View>,
+) -> Result<Session, Refusal> {
+    let typed = std::iter::once("mimu".into()).chain(arguments.iter().cloned());
+    let typed = crate::command_line(&typed.collect::<Vec<_>>());
+    let options = arguments.into_iter().skip(1).collect();
+    let session = session(
+        &parsed::<WizardArgs>("wizard", options)?,
+        typed,
+        arrivals,
+        view,
+    )?;
+    Ok(Box::pin(async move {
+        let command = WizardArgs::augment_args(clap::Command::new("wizard"));
+        let line = |error: Error| hint::line(&error, &command);
+        match session.await {
+            Ok((outcome, stored)) => (Some(outcome), stored.err().map(line)),
+            Err(error) => (None, Some(line(error))),
+        }
+    }))
 }
 
 /// Names of the options of `subcommand`, such as `rate-hz` and `n`.

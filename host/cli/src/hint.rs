@@ -4,7 +4,6 @@ use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
 use mimu_thermal::warning::Warning as OverTemperature;
-#[cfg(not(target_family = "wasm"))]
 use mimu_wizard::waiting::Waiting;
 
 /// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
@@ -69,7 +68,6 @@ pub(crate) fn of_warning(warning: &Warning) -> String {
     }
 }
 
-#[cfg(not(target_family = "wasm"))]
 /// Why a unit of the wizard waits, with the flag that it is about.
 pub(crate) fn of_waiting(why: &Waiting) -> String {
     match why {

@@ -26,7 +26,6 @@ mod thermal_record;
 mod trim;
 mod unit;
 mod verify;
-#[cfg(not(target_family = "wasm"))]
 mod wizard;
 
 pub use allan::allan_text;
@@ -49,5 +48,4 @@ pub(crate) use thermal_record::{thermal_progress, thermal_record_text};
 pub use trim::trim_text;
 pub use unit::{UnitReport, trace_figure, unit_page};
 pub use verify::verify_text;
-#[cfg(not(target_family = "wasm"))]
-pub(crate) use wizard::{wizard_lines, wizard_text};
+pub use wizard::{wizard_lines, wizard_text};

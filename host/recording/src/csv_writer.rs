@@ -80,9 +80,8 @@ impl CsvWriter {
     }
 
     /// The file, for another thread to wait for the disk.
-    pub fn file(&self) -> Result<File> {
-        let file = self.file.try_clone();
-        file.map_err(|error| Error::io(&self.path, &error))
+    pub fn file(&self) -> &File {
+        &self.file
     }
 
     /// Hands everything over to the system, which keeps it whatever becomes of this program.

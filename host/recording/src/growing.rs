@@ -58,13 +58,13 @@ impl Growing {
         fs::create_dir_all(directory).map_err(|error| Error::io(directory, &error))?;
         let mut csv = CsvWriter::create(&directory.join(SampleFormat::Csv.file_name()), columns)?;
         csv.flush()?;
-        let disk = Disk::new(csv.file()?).map_err(|error| Error::io(directory, &error))?;
+        let disk = Disk::new(csv.file()).map_err(|error| Error::io(directory, &error))?;
         let growing = Self {
             directory: directory.to_owned(),
             csv: Some(csv),
             columns,
             rows: 0,
-            disk: Some(disk),
+            disk,
         };
         growing.state(&Manifest {
             unfinished: true,
@@ -79,13 +79,13 @@ impl Growing {
     pub fn resume(directory: &Path, columns: Columns, rows: u64, bytes: u64) -> Result<Self> {
         let path = directory.join(SampleFormat::Csv.file_name());
         let csv = CsvWriter::append(&path, columns, bytes)?;
-        let disk = Disk::new(csv.file()?).map_err(|error| Error::io(directory, &error))?;
+        let disk = Disk::new(csv.file()).map_err(|error| Error::io(directory, &error))?;
         Ok(Self {
             directory: directory.to_owned(),
             csv: Some(csv),
             columns,
             rows,
-            disk: Some(disk),
+            disk,
         })
     }
 
@@ -94,7 +94,7 @@ impl Growing {
         let Some(csv) = &self.csv else {
             return Ok(0);
         };
-        let file = csv.file()?;
+        let file = csv.file();
         let synced = file.sync_data().and_then(|()| file.metadata());
         synced
             .map(|m| m.len())
@@ -209,7 +209,12 @@ impl Growing {
 }
 
 impl Disk {
-    fn new(file: File) -> std::io::Result<Self> {
+    /// `None` where files are in memory: there is no disk to wait for, and no thread.
+    fn new(file: &File) -> std::io::Result<Option<Self>> {
+        if cfg!(target_family = "wasm") {
+            return Ok(None);
+        }
+        let file = file.try_clone()?;
         let (stop, stopped) = channel();
         let wait = move || {
             while stopped.recv_timeout(SYNC) == Err(RecvTimeoutError::Timeout) {
@@ -219,7 +224,7 @@ impl Disk {
         };
         let name = std::thread::Builder::new().name("disk".into());
         let thread = name.spawn(wait)?;
-        Ok(Self { stop, thread })
+        Ok(Some(Self { stop, thread }))
     }
 }
 

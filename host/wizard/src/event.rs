@@ -246,6 +246,8 @@ pub struct UnitStanding {
     pub samples: u64,
     /// Samples that are missing.
     pub lost: u64,
+    /// Samples with a reading at the end of its range.
+    pub clipped: u64,
     /// Why it waits; `None` while a dwell runs.
     pub waiting: Option<Waiting>,
     /// Seconds of the dwell that are left.

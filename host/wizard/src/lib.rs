@@ -7,8 +7,10 @@
 //! |---|---|
 //! | [`procedure`] | what is asked of a session; the steps to begin with, the next best one, those that verify |
 //! | [`source`], [`device`] | where samples come from |
-//! | [`text`], [`text_line`], [`regular`] | a board of another maker: its port, its lines, and their times as a regular rate |
-//! | [`station`] | a port with a separate thread, reopened when it has vanished |
+//! | [`text`], [`text_line`], [`regular`] | a board of another maker: its bytes, its lines, and their times as a regular rate |
+//! | [`text_port`], [`relay`] | its port: read by a thread, or held by a caller who relays the bytes |
+//! | [`station`] | a unit at the end of its line; a port with a separate thread, reopened when it has vanished |
+//! | [`turn`] | a session pauses where it has to wait, and its caller resumes it |
 //! | [`waiting`] | why no dwell runs |
 //! | [`watch`] | is the unit still, which way is up, how fast does it turn |
 //! | [`refit`] | the calibration so far, every parameter beside its target |
@@ -31,6 +33,7 @@ pub mod folder;
 pub mod procedure;
 pub mod refit;
 pub mod regular;
+pub mod relay;
 pub mod resumed;
 pub mod session;
 pub mod source;
@@ -38,6 +41,8 @@ pub mod station;
 pub mod store;
 pub mod text;
 pub mod text_line;
+pub mod text_port;
+pub mod turn;
 pub mod unit_session;
 pub mod verdict;
 pub mod waiting;

@@ -17,8 +17,7 @@ use crate::folder::{Begun, Entry, Folder, Part};
 use crate::procedure::{Fixture, SessionConfig};
 use crate::refit::LEVER_ARM_M;
 use crate::resumed::resumed;
-use crate::source::Opener;
-use crate::station::Station;
+use crate::station::Connect;
 use crate::unit_session::UnitSession;
 use crate::verdict::{Judged, judge, prepared};
 use crate::wizard::{Ended, Wizard};
@@ -26,8 +25,8 @@ use mimu_equipment::drive::Driver;
 
 /// A unit to calibrate: how to open it, and its folder.
 pub struct UnitSpec {
-    /// Opens it.
-    pub opener: Opener,
+    /// Connects the session with it.
+    pub connect: Connect,
     /// Its folder.
     pub folder: PathBuf,
 }
@@ -77,8 +76,9 @@ pub struct UnitOutcome {
     pub notes: Vec<String>,
 }
 
-/// Carries out a session; one that goes on is what it was begun with ([`resumed`]).
-pub fn run(
+/// Carries out a session; one that goes on is what it was begun with ([`resumed`]). It pauses where it has to wait
+/// ([`crate::turn`]).
+pub async fn run(
     asked: SessionConfig,
     wanted: Vec<UnitSpec>,
     driver: Box<dyn Driver + '_>,
@@ -91,20 +91,20 @@ pub fn run(
     if let Some(units) = finished.collect::<Result<Option<Vec<_>>>>()? {
         return Ok(Outcome::of(units, false));
     }
-    for UnitSpec { opener, folder } in wanted {
+    for UnitSpec { connect, folder } in wanted {
         let begun = Folder::begun(&folder)?;
         let (opened, station) = match &begun {
             Some(begun) => {
                 kept = resumed(&begun.asked, &kept, &folder)?;
                 let opened = Folder::open(&folder)?;
                 let next = UnitSession::first_tick(&opened, begun.rate_hz);
-                let station = Station::open(opener, next, Some(&begun.unit_id))?;
+                let station = connect(next, Some(begun.unit_id.clone())).await?;
                 let dwells = opened.dwells(Part::Calibration).len();
                 view.tell(&Event::Resumed { dwells });
                 (opened, station)
             }
             None => {
-                let station = Station::open(opener, 0, None)?;
+                let station = connect(0, None).await?;
                 let begun = Begun {
                     format: "mimu-wizard-session/1".into(),
                     unit_id: station.unit.id.clone(),
@@ -126,7 +126,7 @@ pub fn run(
         outcomes: vec![UnitOutcome::default(); count],
         page,
     };
-    let ended = session.carry_out();
+    let ended = session.carry_out().await;
     // Whatever happens, stop the table.
     let stopped = session.wizard.driver.stop();
     let ended = ended?;
@@ -219,7 +219,7 @@ macro_rules! or_cancelled {
 mod effects;
 
 impl OpenSession<'_> {
-    fn carry_out(&mut self) -> Result<Ended> {
+    async fn carry_out(&mut self) -> Result<Ended> {
         let wizard = &mut self.wizard;
         let words = wizard.asked.gravity_words();
         wizard.tell(Event::Note { words });
@@ -233,14 +233,14 @@ impl OpenSession<'_> {
             }
         };
         wizard.begin_phase(Phase::WarmUp, words);
-        or_cancelled!(wizard.warm_up());
-        or_cancelled!(wizard.look_at_devices());
+        or_cancelled!(wizard.warm_up().await);
+        or_cancelled!(wizard.look_at_devices().await);
         let steps = wizard.asked.steps.clone();
         wizard.begin_phase(
             Phase::Calibration,
             format!("{} dwells are planned", steps.len()),
         );
-        or_cancelled!(wizard.dwells(Part::Calibration, &steps));
+        or_cancelled!(wizard.dwells(Part::Calibration, &steps).await);
         self.finish()?;
         let by_table = self.wizard.asked.fixture == Fixture::Table;
         let mut fits = Vec::new();
@@ -266,7 +266,7 @@ impl OpenSession<'_> {
         let steps = wizard.asked.verification.clone();
         let words = format!("{} poses that the fit has not used", steps.len());
         wizard.begin_phase(Phase::Verification, words);
-        or_cancelled!(wizard.dwells(Part::Verification, &steps));
+        or_cancelled!(wizard.dwells(Part::Verification, &steps).await);
         self.finish()?;
         self.wizard
             .begin_phase(Phase::Store, "storing the verified calibration".into());
@@ -284,7 +284,7 @@ impl OpenSession<'_> {
                     let words = format!("{why}: the error is diagnosed before anything is stored");
                     self.wizard.tell(Event::Note { words });
                 }
-                None if judged.passed() => or_cancelled!(self.store(k, PLAIN, &calibration)),
+                None if judged.passed() => or_cancelled!(self.store(k, PLAIN, &calibration).await),
                 None => {}
             }
             plain.push(Plain {
@@ -303,7 +303,7 @@ impl OpenSession<'_> {
             found.push(self.diagnose(k, plain)?);
         }
         if found.iter().any(Option::is_some) {
-            or_cancelled!(self.with_effects(&plain, found));
+            or_cancelled!(self.with_effects(&plain, found).await);
         }
         for (k, plain) in plain.iter().enumerate() {
             let Some(why) = plain
@@ -313,9 +313,9 @@ impl OpenSession<'_> {
             else {
                 continue;
             };
-            match self.wizard.ask(&Question::StoreRough(why.clone()))? {
+            match self.wizard.ask(&Question::StoreRough(why.clone())).await? {
                 None => return Ok(Ended::Cancelled),
-                Some(true) => or_cancelled!(self.store(k, PLAIN, &plain.calibration)),
+                Some(true) => or_cancelled!(self.store(k, PLAIN, &plain.calibration).await),
                 Some(false) => self.outcomes[k].notes.push(format!("not stored: {why}")),
             }
         }
@@ -324,11 +324,11 @@ impl OpenSession<'_> {
     }
 
     /// Writes a calibration and stores it on unit `k`.
-    fn store(&mut self, k: usize, name: &str, calibration: &Calibration) -> Result<Ended> {
+    async fn store(&mut self, k: usize, name: &str, calibration: &Calibration) -> Result<Ended> {
         let path = self.file(k, name);
         stage(&path, calibration.to_toml())?.publish()?;
         let place = path.display().to_string();
-        let ended = self.wizard.store(k, calibration, &place)?;
+        let ended = self.wizard.store(k, calibration, &place).await?;
         if ended == Ended::Done {
             self.outcomes[k].stored = Some(place);
         }

@@ -1,5 +1,6 @@
-//! A unit at its port: a separate thread receives its data, and reopens the port when it has vanished.
+//! A unit at the end of its line. At a port a separate thread receives its data, and reopens the port when it has vanished.
 
+use std::pin::Pin;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -29,20 +30,72 @@ pub enum StationEvent {
     Back(Box<Unit>),
 }
 
-type Errand = Box<dyn FnOnce(&mut Option<Box<dyn Source>>) + Send>;
+/// Something to be done with the session of a mimu device, where there is one.
+pub type Errand = Box<dyn FnOnce(&mut Option<Box<dyn Source>>) + Send>;
 
-/// A unit at its port.
+/// The line to a unit, which never waits.
+pub trait Line {
+    /// What has come; `None` if nothing has.
+    fn news(&mut self) -> Result<Option<StationEvent>>;
+
+    /// Has something done with the device; `false` where there is nobody to do it.
+    fn errand(&self, _: Errand) -> bool {
+        false
+    }
+}
+
+/// A station that is being opened.
+pub type Connecting = Pin<Box<dyn Future<Output = Result<Station>>>>;
+
+/// Connects a session with a unit: the first tick that it may use, and the id of the unit if no other will do.
+pub type Connect = Box<dyn FnOnce(u64, Option<String>) -> Connecting>;
+
+/// Connects a session with a unit at a port, which gets a thread of its own.
+pub fn at_port(opener: Opener) -> Connect {
+    Box::new(|next, wanted| {
+        let opened = Station::open(opener, next, wanted.as_deref());
+        Box::pin(std::future::ready(opened))
+    })
+}
+
+/// A unit at the end of its line.
 pub struct Station {
     /// Who it is.
     pub unit: Unit,
+    line: Box<dyn Line>,
+}
+
+/// A port with its thread.
+struct Threaded {
     news: Receiver<StationEvent>,
     errands: Option<Sender<Errand>>,
     thread: Option<JoinHandle<()>>,
 }
 
+impl Line for Threaded {
+    fn news(&mut self) -> Result<Option<StationEvent>> {
+        match self.news.try_recv() {
+            Ok(news) => Ok(Some(news)),
+            Err(TryRecvError::Empty) => Ok(None),
+            Err(TryRecvError::Disconnected) => Err(broken()),
+        }
+    }
+
+    fn errand(&self, errand: Errand) -> bool {
+        self.errands
+            .as_ref()
+            .is_some_and(|e| e.send(errand).is_ok())
+    }
+}
+
 impl Station {
-    /// Opens it. `next`: the first tick that it may use. `wanted`: only a unit with this id.
-    pub fn open(mut opener: Opener, next: u64, wanted: Option<&str>) -> Result<Self> {
+    /// Of a unit that has greeted over this line.
+    pub fn over(unit: Unit, line: Box<dyn Line>) -> Self {
+        Self { unit, line }
+    }
+
+    /// Opens a port. `next`: the first tick that it may use. `wanted`: only a unit with this id.
+    fn open(mut opener: Opener, next: u64, wanted: Option<&str>) -> Result<Self> {
         let source = opener(next)?;
         let unit = source.unit().clone();
         if let Some(wanted) = wanted.filter(|w| *w != unit.id) {
@@ -56,25 +109,21 @@ impl Station {
             .name("station".into())
             .spawn(run)
             .map_err(|e| Error::new("station", e, "close other programs"))?;
-        Ok(Self {
-            unit,
+        let line = Threaded {
             news,
             errands: Some(errands),
             thread: Some(thread),
-        })
+        };
+        Ok(Self::over(unit, Box::new(line)))
     }
 
     /// What has come; `None` if nothing has.
     pub fn news(&mut self) -> Result<Option<StationEvent>> {
-        match self.news.try_recv() {
-            Ok(StationEvent::Back(unit)) => {
-                self.unit = (*unit).clone();
-                Ok(Some(StationEvent::Back(unit)))
-            }
-            Ok(news) => Ok(Some(news)),
-            Err(TryRecvError::Empty) => Ok(None),
-            Err(TryRecvError::Disconnected) => Err(broken()),
+        let news = self.line.news()?;
+        if let Some(StationEvent::Back(unit)) = &news {
+            self.unit = (**unit).clone();
         }
+        Ok(news)
     }
 
     /// Does something with the session; what comes meanwhile is not samples. An error where there is no device, or it is gone.
@@ -110,18 +159,14 @@ impl Station {
             };
             let _ = back.send(done);
         });
-        let sent = self
-            .errands
-            .as_ref()
-            .is_some_and(|e| e.send(errand).is_ok());
-        match sent.then(|| answer.recv()) {
+        match self.line.errand(errand).then(|| answer.recv()) {
             Some(Ok(done)) => done,
             _ => Err(broken()),
         }
     }
 }
 
-impl Drop for Station {
+impl Drop for Threaded {
     fn drop(&mut self) {
         self.errands = None;
         if let Some(thread) = self.thread.take() {
@@ -139,7 +184,7 @@ fn broken() -> Error {
 }
 
 /// Why a unit is not the one.
-fn other(found: &str, wanted: &str) -> Error {
+pub(crate) fn other(found: &str, wanted: &str) -> Error {
     Error::device(
         "port",
         format!("unit {found} is at the port, but the session belongs to unit {wanted}"),

@@ -8,10 +8,13 @@ use mimu_recording::error::{Error, Result};
 
 use crate::event::{Event, Question};
 use crate::folder::Entry;
+use crate::turn::rest;
 use crate::wizard::{Ended, Wizard};
 
 /// Longest wait for a device to come back with its supply.
 const BACK: Duration = Duration::from_secs(60);
+/// Time between two greetings of one that comes back.
+const AGAIN: Duration = Duration::from_millis(200);
 /// Length of the comparison of the device's compensation with the PC's.
 const COMPARED: Duration = Duration::from_secs(1);
 /// Length of the raw stream that shows the number of samples since the start.
@@ -35,7 +38,7 @@ fn powered(session: &mut Session) -> Result<Option<f64>> {
 
 impl Wizard<'_> {
     /// Has the sensors deflected electrically, and keeps a copy of what the device holds.
-    pub fn look_at_devices(&mut self) -> Result<Ended> {
+    pub async fn look_at_devices(&mut self) -> Result<Ended> {
         for k in 0..self.units.len() {
             let unit = &self.units[k];
             let name = unit.name();
@@ -79,7 +82,7 @@ impl Wizard<'_> {
                 words: words.clone(),
             });
             if !passed {
-                match self.ask(&question)? {
+                match self.ask(&question).await? {
                     Some(true) => {}
                     Some(false) => {
                         let remedy = "check the wiring of the sensors, keep the unit still, and run the same command";
@@ -98,7 +101,12 @@ impl Wizard<'_> {
 
     /// Stores a calibration on unit `k`, reads it back, turns the supply off and on, and compares what the device makes of its readings with
     /// what the PC makes of the same. `place` is the file.
-    pub fn store(&mut self, k: usize, calibration: &Calibration, place: &str) -> Result<Ended> {
+    pub async fn store(
+        &mut self,
+        k: usize,
+        calibration: &Calibration,
+        place: &str,
+    ) -> Result<Ended> {
         let unit = &self.units[k];
         let name = unit.name();
         if !unit.station.unit.is_device {
@@ -122,12 +130,12 @@ impl Wizard<'_> {
             let driven = self.driver.power_cycle()?;
             let cycled = match driven {
                 true => Some(true),
-                false => self.ask(&Question::PowerCycled)?,
+                false => self.ask(&Question::PowerCycled).await?,
             };
             let Some(cycled) = cycled else {
                 return Ok(Ended::Cancelled);
             };
-            self.wait_for(k, hash)?;
+            self.wait_for(k, hash).await?;
             if !cycled {
                 break "not tried with the supply off".to_string();
             }
@@ -172,7 +180,7 @@ impl Wizard<'_> {
     }
 
     /// Waits until unit `k` greets with this calibration.
-    fn wait_for(&mut self, k: usize, hash: u64) -> Result<()> {
+    async fn wait_for(&mut self, k: usize, hash: u64) -> Result<()> {
         let since = Instant::now();
         loop {
             let held = self.units[k].station.with(|session| {
@@ -191,7 +199,7 @@ impl Wizard<'_> {
                     ));
                 }
                 Err(error) if since.elapsed() > BACK => return Err(error),
-                Err(_) => std::thread::sleep(Duration::from_millis(200)),
+                Err(_) => rest(AGAIN).await,
             }
         }
     }

@@ -310,7 +310,7 @@ impl Lines {
 }
 
 /// The label in front and the numbers of a line; `None` if anything else is in it.
-fn numbers(text: &str) -> Option<(&str, Vec<f64>)> {
+pub fn numbers(text: &str) -> Option<(&str, Vec<f64>)> {
     let mut label = "";
     let mut numbers = Vec::new();
     for word in text.split([',', ';', '\t', ' ']) {

@@ -103,6 +103,8 @@ pub struct UnitSession {
     /// Samples that are missing since the last dwell, and what came of the turns so far.
     turn_missing: u64,
     turns: Turns,
+    /// Samples with a reading at the end of its range since the last dwell.
+    turn_clipped: u64,
     /// Fits in a row that were refused, for another reason than that dwells lack.
     refused: u32,
     seen: Option<Seen>,
@@ -136,6 +138,7 @@ impl UnitSession {
             moved: false,
             hopeless: None,
             turn_missing: 0,
+            turn_clipped: 0,
             turns: Turns::default(),
             refused: 0,
             seen: None,
@@ -279,6 +282,11 @@ impl UnitSession {
         match &mut self.dwell {
             Some(dwell) => dwell.missing += missing,
             None => self.turn_missing += missing,
+        }
+        if chunk.saturated {
+            let clipped = chunk.values.len() as u64;
+            self.standing.clipped += clipped;
+            self.turn_clipped += clipped;
         }
         if let Some(taking) = &mut self.taking {
             taking.missing(missing);
@@ -498,8 +506,10 @@ impl UnitSession {
             words: dwell.step.words(),
         });
         let missing = std::mem::take(&mut self.turn_missing);
+        let clipped = std::mem::take(&mut self.turn_clipped);
         if asked.fixture != Fixture::Table && number > 0 {
             self.count_turn(missing, tell)?;
+            self.tell_clipped(clipped, tell);
         }
         if self.part == Part::Calibration {
             self.refit(asked);

@@ -8,6 +8,7 @@ use crate::axes;
 use crate::event::{Event, Phase, Question, Standing, View, Wish};
 use crate::folder::{Entry, Part};
 use crate::procedure::{Fixture, SessionConfig, next_step};
+use crate::turn::pause;
 use crate::unit_session::{Round, UnitSession};
 use crate::waiting::Waiting;
 use mimu_equipment::drive::Driver;
@@ -15,8 +16,6 @@ use mimu_equipment::step::Step;
 
 /// How often the standing is shown.
 const SHOWN: Duration = Duration::from_millis(100);
-/// Nothing has come: so long nothing is looked at.
-const IDLE: Duration = Duration::from_millis(4);
 /// Longest wait for a unit to say anything, or for a table's interlock.
 const SILENT: Duration = Duration::from_secs(30);
 
@@ -99,7 +98,7 @@ impl<'a> Wizard<'a> {
     }
 
     /// Listens to all units once, and shows how they stand. Whether a wish came.
-    fn round(&mut self, step: Option<&Step>, busy: bool) -> Result<Option<Wish>> {
+    async fn round(&mut self, step: Option<&Step>, busy: bool) -> Result<Option<Wish>> {
         let mut tell = Vec::new();
         let round = Round {
             asked: &self.asked,
@@ -133,7 +132,7 @@ impl<'a> Wizard<'a> {
         }
         let wish = self.view.wish();
         if !some && wish.is_none() {
-            std::thread::sleep(IDLE);
+            pause().await;
         }
         Ok(wish)
     }
@@ -143,13 +142,13 @@ impl<'a> Wizard<'a> {
     }
 
     /// Waits until all units are heard and, where that is asked, warm.
-    pub fn warm_up(&mut self) -> Result<Ended> {
+    pub async fn warm_up(&mut self) -> Result<Ended> {
         let mut since = Instant::now();
         self.current = None;
         // A session that was killed may have left the table turning.
         self.driver.stop()?;
         while self.driver.busy()? {
-            if self.round(None, true)? == Some(Wish::Cancel) {
+            if self.round(None, true).await? == Some(Wish::Cancel) {
                 return Ok(Ended::Cancelled);
             }
         }
@@ -157,7 +156,7 @@ impl<'a> Wizard<'a> {
             unit.was_turning();
         }
         loop {
-            if self.round(None, false)? == Some(Wish::Cancel) {
+            if self.round(None, false).await? == Some(Wish::Cancel) {
                 return Ok(Ended::Cancelled);
             }
             let heard = self.units.iter().all(UnitSession::is_heard);
@@ -196,7 +195,7 @@ impl<'a> Wizard<'a> {
     }
 
     /// Has the dwells of a recording: those planned that are not there yet and, for a calibration that goes by targets, more or fewer.
-    pub fn dwells(&mut self, part: Part, steps: &[Step]) -> Result<Ended> {
+    pub async fn dwells(&mut self, part: Part, steps: &[Step]) -> Result<Ended> {
         for unit in &mut self.units {
             let asked = self.asked.clone();
             unit.begin(part, &asked)?;
@@ -225,9 +224,9 @@ impl<'a> Wizard<'a> {
                 step,
                 words: step.words(),
             });
-            match self.step(&step)? {
+            match self.step(&step).await? {
                 Stepped::Had if self.driver.is_person() => {
-                    if self.goes_on(part, steps, &step)? == Ended::Cancelled {
+                    if self.goes_on(part, steps, &step).await? == Ended::Cancelled {
                         return Ok(Ended::Cancelled);
                     }
                 }
@@ -247,7 +246,7 @@ impl<'a> Wizard<'a> {
 
     /// What is left where a person may have had another pose than the `step` that was asked for: that one is off the list then, and this
     /// one comes later. Poses that all come otherwise in the same way end the session, unless the person knows better.
-    fn goes_on(&mut self, part: Part, steps: &[Step], step: &Step) -> Result<Ended> {
+    async fn goes_on(&mut self, part: Part, steps: &[Step], step: &Step) -> Result<Ended> {
         self.queue = self.left(part, steps);
         self.queue.sort_by_key(|s| self.later.contains(s));
         let limit = self.asked.fixture.tolerance_deg();
@@ -271,7 +270,7 @@ impl<'a> Wizard<'a> {
         let Some((name, why)) = mirrored.filter(|_| !self.axes_agreed) else {
             return Ok(Ended::Done);
         };
-        match self.ask(&Question::GoOn(format!("{name}: {why}")))? {
+        match self.ask(&Question::GoOn(format!("{name}: {why}"))).await? {
             Some(true) => {
                 self.axes_agreed = true;
                 Ok(Ended::Done)
@@ -325,7 +324,7 @@ impl<'a> Wizard<'a> {
         Some(next_step(&self.asked, &had, worst.progress.missed()))
     }
 
-    fn step(&mut self, step: &Step) -> Result<Stepped> {
+    async fn step(&mut self, step: &Step) -> Result<Stepped> {
         for unit in &mut self.units {
             unit.asked_for();
         }
@@ -336,7 +335,7 @@ impl<'a> Wizard<'a> {
                 self.tell(Event::Note { words: why.clone() });
                 told = true;
             }
-            if self.round(None, false)? == Some(Wish::Cancel) {
+            if self.round(None, false).await? == Some(Wish::Cancel) {
                 return Ok(Stepped::Cancelled);
             }
             if since.elapsed() > SILENT && !self.driver.is_person() {
@@ -352,7 +351,7 @@ impl<'a> Wizard<'a> {
         let mut stood = since;
         loop {
             let busy = self.driver.busy()?;
-            match self.round(Some(step), busy)? {
+            match self.round(Some(step), busy).await? {
                 Some(Wish::Cancel) => return Ok(Stepped::Cancelled),
                 Some(Wish::Skip) => return Ok(Stepped::Skipped),
                 Some(Wish::RedoLast) => {
@@ -413,7 +412,7 @@ impl<'a> Wizard<'a> {
     }
 
     /// Asks, and listens to the units meanwhile. `None`: it was cancelled.
-    pub fn ask(&mut self, question: &Question) -> Result<Option<bool>> {
+    pub async fn ask(&mut self, question: &Question) -> Result<Option<bool>> {
         self.tell(Event::Question {
             question: question.name(),
             words: question.words(),
@@ -422,7 +421,7 @@ impl<'a> Wizard<'a> {
             if let Some(answer) = self.view.ask(question) {
                 return Ok(Some(answer));
             }
-            if self.round(None, false)? == Some(Wish::Cancel) {
+            if self.round(None, false).await? == Some(Wish::Cancel) {
                 return Ok(None);
             }
         }

@@ -17,5 +17,4 @@ pub(crate) mod record;
 pub(crate) mod report;
 pub(crate) mod thermal;
 pub(crate) mod verify;
-#[cfg(not(target_family = "wasm"))]
 pub(crate) mod wizard;

@@ -1,10 +1,10 @@
 //! `mimu wizard`: arguments and what follows from them.
 
-use std::io::{IsTerminal as _, Write};
+#[cfg(not(target_family = "wasm"))]
+mod terminal;
+
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::mpsc::Receiver;
 
 use clap::{Args, ValueEnum};
 use mimu::plan::Plan;
@@ -12,26 +12,24 @@ use mimu::quantity::normal_gravity;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::warning::Warning;
-use mimu_equipment::drive::{Driver, Person, TextDriver, Together};
+use mimu_equipment::drive::Person;
 use mimu_equipment::step::Step;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, Parents, RawUnit};
-use mimu_wizard::device::DeviceSource;
+use mimu_recording::{Manifest, RawUnit};
 use mimu_wizard::event::View;
 use mimu_wizard::procedure::{Fixture, SessionConfig, Targets, first_steps, verification};
-use mimu_wizard::session::{UnitSpec, run as carry_out};
-use mimu_wizard::source::{Opener, Source};
-use mimu_wizard::text::{Text, TextOpener};
+use mimu_wizard::relay::{Stamped, relayed};
+use mimu_wizard::session::{Outcome, UnitSpec, run as carry_out};
+use mimu_wizard::text::Text;
 use mimu_wizard::text_line::Columns;
 
 use crate::arguments::JsonArgs;
 use crate::cmd::design::number;
-use crate::cmd::device::interruption;
-use crate::output::{check_outputs, now, print};
+use crate::output::now;
 use crate::report::{self, Made};
-use crate::views::answers::{Beforehand, Typed};
-use crate::views::lines::Lines;
-use crate::views::screen::Screen;
+
+#[cfg(not(target_family = "wasm"))]
+pub(crate) use terminal::run;
 
 #[derive(Args)]
 pub(crate) struct WizardArgs {
@@ -140,24 +138,23 @@ impl TextArgs {
         Some(format!("{names} in {}", self.raw_unit))
     }
 
-    /// Opens the board at this port, once for each time that it is called.
-    fn opener(&self, names: &str, port: &str, k: Option<usize>, folder: &Path) -> Result<Opener> {
+    /// The board at this port, the `k`-th of several.
+    fn board(&self, names: &str, port: &str, k: Option<usize>) -> Result<Text> {
         let numbered = |name: &String| k.map_or_else(|| name.clone(), |k| format!("{name}-{k}"));
-        let text = Text {
+        Ok(Text {
             port: port.to_owned(),
             baud: self.baud,
             columns: Columns::parse(names)?,
             raw_unit: self.raw_unit,
             name: self.device.as_ref().map(numbered),
-        };
-        // A session that goes on counts its time by the rate that it was begun with.
-        let begun = Manifest::read(&folder.join("calibration").join("recording.toml"));
-        let mut opener = TextOpener::new(text, begun.ok().map(|m| m.sample_rate_hz));
-        Ok(Box::new(move |next| {
-            let source = opener.open(next)?;
-            Ok(Box::new(source) as Box<dyn Source>)
-        }))
+        })
     }
+}
+
+/// Samples a second of the session in this folder, if one was begun: one that goes on counts its time by them.
+fn begun_rate_hz(folder: &Path) -> Option<f64> {
+    let begun = Manifest::read(&folder.join("calibration").join("recording.toml"));
+    begun.ok().map(|m| m.sample_rate_hz)
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -280,43 +277,6 @@ impl WizardArgs {
             by_device: self.by == By::Device,
         })
     }
-
-    /// The units: each with its port and its folder.
-    fn wanted(&self) -> Result<Vec<UnitSpec>> {
-        let ports: Vec<Option<String>> = match (self.ports.as_slice(), &self.text.text) {
-            ([], None) => vec![None],
-            // Who writes lines of text cannot be asked who it is.
-            ([], Some(_)) => {
-                let mimu_device::Ports {
-                    of_boards, others, ..
-                } = mimu_device::ports();
-                let there = [of_boards, others].concat().join(", ");
-                let problem =
-                    format!("the port that writes the lines is not given; there are: {there}");
-                return Err(Error::new("--text", problem, "name it with --port"));
-            }
-            (ports, _) => ports.iter().cloned().map(Some).collect(),
-        };
-        let several = ports.len() > 1;
-        let units = (1..).zip(ports).map(|(k, port)| {
-            let folder = match several {
-                true => self.output.join(format!("board-{k}")),
-                false => self.output.clone(),
-            };
-            let opener: Opener = match (&self.text.text, &port) {
-                (Some(names), Some(port)) => {
-                    let number = several.then_some(k);
-                    self.text.opener(names, port, number, &folder)?
-                }
-                _ => Box::new(move |next| {
-                    let source = DeviceSource::open(port.as_deref(), next)?;
-                    Ok(Box::new(source) as Box<dyn Source>)
-                }),
-            };
-            Ok(UnitSpec { opener, folder })
-        });
-        units.collect()
-    }
 }
 
 /// The steps of a plan.
@@ -357,106 +317,70 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
     Ok(steps)
 }
 
-/// Longest that a session may take to end once that is asked for.
-const ENDS: Duration = Duration::from_millis(900);
-/// The same where it leads a table, which it stops before it ends.
-const TABLE_STOPS: Duration = Duration::from_secs(15);
-
-/// Ends the program where the session does not hear that it is to end: a port that says nothing and a diagnosis take half a minute. What
-/// counts is on the disk, and a device that is cut off while it stores keeps a whole calibration.
-fn end_in_time(stop: Arc<AtomicBool>, ends: Duration, on_screen: bool) -> Result<()> {
-    let watch = move || {
-        while !stop.load(Ordering::Relaxed) {
-            std::thread::sleep(ENDS / 20);
-        }
-        std::thread::sleep(ends);
-        if on_screen {
-            ratatui::restore();
-        }
-        eprintln!("ended; the same command resumes here");
-        std::process::exit(130);
-    };
-    let begun = std::thread::Builder::new().name("end".into()).spawn(watch);
-    begun.map_err(|error| Error::new("wizard", error, "close other programs"))?;
-    Ok(())
-}
-
-pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
-    check_outputs(&[args.json.file()], &[])?;
-    let asked = args.asked()?;
-    let wanted = args.wanted()?;
-    let driver: Box<dyn Driver> = match args.drivers.as_slice() {
-        [] => Box::new(Person),
-        [path] => Box::new(TextDriver::open_table(path)?),
-        paths => {
-            let each = paths.iter().map(|path| -> Result<Box<dyn Driver>> {
-                Ok(Box::new(TextDriver::open_table(path)?))
-            });
-            Box::new(Together(each.collect::<Result<_>>()?))
-        }
-    };
-    let beforehand = match args.yes {
-        true => Beforehand {
-            store_effects: Some(true),
-            store_rough: Some(false),
-            go_on: Some(false),
-            power_cycle: Some(false),
-        },
-        false => Beforehand::default(),
-    };
-    let to_output = args.events.as_deref() == Some(Path::new("-"));
-    let events: Option<Box<dyn Write>> = match &args.events {
-        Some(_) if to_output => Some(Box::new(std::io::stdout())),
-        Some(path) => {
-            let _parents = Parents::create(path)?;
-            let file = std::fs::File::create(path).map_err(|e| Error::io(path, &e))?;
-            Some(Box::new(file))
-        }
-        None => None,
-    };
-    let stop = interruption()?;
-    let quiet = args.json.is_standard_output();
-    let on_screen = !args.plain && !to_output && !quiet && Screen::fits();
-    let ends = match args.drivers.is_empty() {
-        true => ENDS,
-        false => TABLE_STOPS,
-    };
-    end_in_time(stop.clone(), ends, on_screen)?;
-    let mut view: Box<dyn View> = match on_screen {
-        true => Box::new(Screen::new(stop, beforehand, events)?),
-        false => {
-            let mut lines = Lines::new(Typed::new(stop)?, beforehand);
-            lines.sketches = driver.is_person() && std::io::stdout().is_terminal();
-            lines.events = events;
-            lines.text = match (to_output, quiet) {
-                (true, _) => Some(Box::new(std::io::stderr())),
-                (false, true) => None,
-                (false, false) => Some(Box::new(std::io::stdout())),
-            };
-            Box::new(lines)
-        }
-    };
-    let page = |found: &DiagnosisResult, folder: &Path| {
+/// Makes the page of what a session has found, which names the command that was typed.
+fn page(command_line: &str) -> impl Fn(&DiagnosisResult, &Path) -> Result<String> {
+    |found, folder| {
         let made = Made {
             recording: folder.join("calibration").display().to_string(),
             command: command_line.to_owned(),
             created: now(),
         };
         report::diagnosis_page(found, &made)
-    };
-    let outcome = carry_out(asked, wanted, driver, view.as_mut(), &page);
-    // The terminal is given back before anything is printed to it.
-    drop(view);
-    let outcome = outcome?;
-    print(&args.json, &report::wizard_text(&outcome), &outcome, None)?;
+    }
+}
+
+/// Why a session that has ended is a failure: a calibration was not stored.
+fn check_stored(outcome: &Outcome, folder: &Path) -> Result<()> {
     let unstored = outcome.units.iter().filter(|u| u.stored.is_none());
     let failed: Vec<String> = unstored.flat_map(|u| u.notes.clone()).collect();
     match failed.is_empty() || outcome.cancelled {
         true => Ok(()),
         false => Err(Error::new(
-            args.output.display(),
+            folder.display(),
             failed.join(", "),
             "read the page, correct the setup, and start a new session in another folder",
         )),
     }
+}
+
+/// A session by hand with one board that writes lines of text, at a port that the caller holds: `arrivals` is what comes over it.
+/// It is gone on with by [`mimu_wizard::turn`]; what it has come to, and why that is a failure if it is one.
+pub(crate) fn session(
+    args: &WizardArgs,
+    command_line: String,
+    arrivals: Receiver<Stamped>,
+    mut view: Box<dyn View>,
+) -> Result<impl Future<Output = Result<(Outcome, Result<()>)>> + use<>> {
+    let of_a_terminal = [
+        ("--driver", !args.drivers.is_empty()),
+        ("--events", args.events.is_some()),
+        ("--json", args.json.is_given()),
+        ("--plain", args.plain),
+        ("--yes", args.yes),
+    ];
+    let by_hand = args.fixture.fixture() != Fixture::Table;
+    let unfit = of_a_terminal.iter().find(|(_, given)| *given);
+    let unfit = unfit.map(|(name, _)| *name);
+    if let Some(name) = unfit.or((!by_hand).then_some("--fixture table")) {
+        let problem = "a session in the page is led by hand, and the page shows it";
+        let remedy = "leave it out, or use the command mimu wizard";
+        return Err(Error::new(name, problem, remedy));
+    }
+    let (Some(names), [port]) = (&args.text.text, args.ports.as_slice()) else {
+        let problem = "a session in the page has one board, which writes lines of text";
+        return Err(Error::new("wizard", problem, "give --text and one --port"));
+    };
+    let board = args.text.board(names, port, None)?;
+    let (asked, folder) = (args.asked()?, args.output.clone());
+    let wanted = UnitSpec {
+        connect: relayed(board, begun_rate_hz(&folder), arrivals),
+        folder: folder.clone(),
+    };
+    Ok(async move {
+        let page = page(&command_line);
+        let driver = Box::new(Person);
+        let outcome = carry_out(asked, vec![wanted], driver, view.as_mut(), &page).await?;
+        let stored = check_stored(&outcome, &folder);
+        Ok((outcome, stored))
+    })
 }

@@ -12,7 +12,7 @@ use mimu_wizard::verdict::{Judged, SensorJudged};
 use crate::hint;
 
 /// An event as lines of text; none for what only a program wants.
-pub(crate) fn wizard_lines(event: &Event) -> Vec<String> {
+pub fn wizard_lines(event: &Event) -> Vec<String> {
     match event {
         Event::Greeted { told, unit } => {
             let mut lines: Vec<String> = told.clone();
@@ -140,7 +140,7 @@ fn judged_line(of: &SensorJudged) -> String {
 }
 
 /// What a session has come to.
-pub(crate) fn wizard_text(outcome: &Outcome) -> String {
+pub fn wizard_text(outcome: &Outcome) -> String {
     let mut text = String::new();
     if outcome.cancelled {
         text.push_str("\nended; the same command resumes here\n");

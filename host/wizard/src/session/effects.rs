@@ -115,7 +115,7 @@ impl OpenSession<'_> {
     }
 
     /// The calibrations with effects: offered, judged in a third set of poses, and stored.
-    pub(super) fn with_effects(
+    pub(super) async fn with_effects(
         &mut self,
         plain: &[Plain],
         found: Vec<Option<Found>>,
@@ -126,7 +126,7 @@ impl OpenSession<'_> {
             .flat_map(|f| f.effects.clone())
             .collect();
         let question = Question::StoreEffects(names.join(", "));
-        match self.wizard.ask(&question)? {
+        match self.wizard.ask(&question).await? {
             None => return Ok(Ended::Cancelled),
             Some(false) => return Ok(Ended::Done),
             Some(true) => {}
@@ -145,7 +145,7 @@ impl OpenSession<'_> {
             names.join(", ")
         );
         self.wizard.begin_phase(Phase::Confirmation, words);
-        or_cancelled!(self.wizard.dwells(Part::Confirmation, &steps));
+        or_cancelled!(self.wizard.dwells(Part::Confirmation, &steps).await);
         self.finish()?;
         for ((k, found), plain) in (0..).zip(found).zip(plain) {
             let Some(found) = found else { continue };
@@ -170,7 +170,7 @@ impl OpenSession<'_> {
                 continue;
             }
             if let Some(why) = judged.rough() {
-                match self.wizard.ask(&Question::StoreRough(why.clone()))? {
+                match self.wizard.ask(&Question::StoreRough(why.clone())).await? {
                     None => return Ok(Ended::Cancelled),
                     Some(true) => {}
                     Some(false) => {
@@ -179,7 +179,7 @@ impl OpenSession<'_> {
                     }
                 }
             }
-            or_cancelled!(self.store(k, WITH_EFFECTS, &found.calibration));
+            or_cancelled!(self.store(k, WITH_EFFECTS, &found.calibration).await);
         }
         Ok(Ended::Done)
     }

@@ -170,6 +170,21 @@ impl UnitSession {
         let remedy = "let the board write fewer or shorter lines, or use more bits per second; check the cable";
         Err(Error::device(self.name(), problem, remedy).about(Argument::Baud))
     }
+
+    /// Tells of readings at the end of their range in the turn to the dwell that was had: a turn is integrated from all of them.
+    pub(super) fn tell_clipped(&self, clipped: u64, tell: &mut Vec<Event>) {
+        if clipped > 0 {
+            let words = format!(
+                "{}: in the turn to it {} at the end of a range: turn it more slowly, or it is of no use for the gyro",
+                self.name(),
+                match clipped {
+                    1 => "1 sample is".into(),
+                    many => format!("{many} samples are"),
+                }
+            );
+            tell.push(Event::Note { words });
+        }
+    }
 }
 
 /// Turns between dwells by hand.

@@ -1,5 +1,6 @@
 //! `mimu wizard` with a board of another maker, which writes lines of text into a pseudo-terminal; and its full screen.
 use std::fmt::Write as _;
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -124,7 +125,12 @@ fn a_board_that_writes_lines_ends_in_a_calibration_whose_intervals_hold_its_para
         assert!(said.contains(words), "{words}: {said}");
     }
 
-    let made = Calibration::read(&folder.path().join("out/calibration.toml")).unwrap();
+    judge(&folder.path().join("out/calibration.toml"), &said);
+}
+
+/// Compares a calibration of the unit with the truth; `said` is shown where it misses it.
+pub fn judge(calibration: &Path, said: &str) {
+    let made = Calibration::read(calibration).unwrap();
     assert_eq!(made.device, "plane-7");
     let (mut inside, mut all) = (0, 0);
     for (sensor, (matrix, bias)) in [(Sensor::Gyro, GYRO), (Sensor::Accel, ACCEL)] {

@@ -1,0 +1,164 @@
+//! `mimu wizard` at a terminal: ports with their threads, tables, keyboard and screen.
+
+use std::io::{IsTerminal as _, Write};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use mimu_equipment::drive::{Driver, Person, TextDriver, Together};
+use mimu_recording::Parents;
+use mimu_recording::error::{Error, Result};
+use mimu_wizard::device::DeviceSource;
+use mimu_wizard::event::View;
+use mimu_wizard::session::{UnitSpec, run as carry_out};
+use mimu_wizard::source::{Opener, Source};
+use mimu_wizard::station::at_port;
+use mimu_wizard::text::Text;
+use mimu_wizard::text_port::TextOpener;
+use mimu_wizard::turn::complete;
+
+use super::{WizardArgs, begun_rate_hz, check_stored};
+use crate::cmd::device::interruption;
+use crate::output::{check_outputs, print};
+use crate::report;
+use crate::views::answers::{Beforehand, Typed};
+use crate::views::lines::Lines;
+use crate::views::screen::Screen;
+
+/// Opens a board that writes lines of text, once for each time that it is called.
+fn opener(text: Text, folder: &Path) -> Opener {
+    let mut opener = TextOpener::new(text, begun_rate_hz(folder));
+    Box::new(move |next| {
+        let source = opener.open(next)?;
+        Ok(Box::new(source) as Box<dyn Source>)
+    })
+}
+
+impl WizardArgs {
+    /// The units: each with its port and its folder.
+    fn wanted(&self) -> Result<Vec<UnitSpec>> {
+        let ports: Vec<Option<String>> = match (self.ports.as_slice(), &self.text.text) {
+            ([], None) => vec![None],
+            // Who writes lines of text cannot be asked who it is.
+            ([], Some(_)) => {
+                let mimu_device::Ports {
+                    of_boards, others, ..
+                } = mimu_device::ports();
+                let there = [of_boards, others].concat().join(", ");
+                let problem =
+                    format!("the port that writes the lines is not given; there are: {there}");
+                return Err(Error::new("--text", problem, "name it with --port"));
+            }
+            (ports, _) => ports.iter().cloned().map(Some).collect(),
+        };
+        let several = ports.len() > 1;
+        let units = (1..).zip(ports).map(|(k, port)| {
+            let folder = match several {
+                true => self.output.join(format!("board-{k}")),
+                false => self.output.clone(),
+            };
+            let opener: Opener = match (&self.text.text, &port) {
+                (Some(names), Some(port)) => {
+                    let number = several.then_some(k);
+                    opener(self.text.board(names, port, number)?, &folder)
+                }
+                _ => Box::new(move |next| {
+                    let source = DeviceSource::open(port.as_deref(), next)?;
+                    Ok(Box::new(source) as Box<dyn Source>)
+                }),
+            };
+            let connect = at_port(opener);
+            Ok(UnitSpec { connect, folder })
+        });
+        units.collect()
+    }
+}
+
+/// Longest that a session may take to end once that is asked for.
+const ENDS: Duration = Duration::from_millis(900);
+/// The same where it leads a table, which it stops before it ends.
+const TABLE_STOPS: Duration = Duration::from_secs(15);
+
+/// Ends the program where the session does not hear that it is to end: a port that says nothing and a diagnosis take half a minute. What
+/// counts is on the disk, and a device that is cut off while it stores keeps a whole calibration.
+fn end_in_time(stop: Arc<AtomicBool>, ends: Duration, on_screen: bool) -> Result<()> {
+    let watch = move || {
+        while !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(ENDS / 20);
+        }
+        std::thread::sleep(ends);
+        if on_screen {
+            ratatui::restore();
+        }
+        eprintln!("ended; the same command resumes here");
+        std::process::exit(130);
+    };
+    let begun = std::thread::Builder::new().name("end".into()).spawn(watch);
+    begun.map_err(|error| Error::new("wizard", error, "close other programs"))?;
+    Ok(())
+}
+
+pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
+    check_outputs(&[args.json.file()], &[])?;
+    let asked = args.asked()?;
+    let wanted = args.wanted()?;
+    let driver: Box<dyn Driver> = match args.drivers.as_slice() {
+        [] => Box::new(Person),
+        [path] => Box::new(TextDriver::open_table(path)?),
+        paths => {
+            let each = paths.iter().map(|path| -> Result<Box<dyn Driver>> {
+                Ok(Box::new(TextDriver::open_table(path)?))
+            });
+            Box::new(Together(each.collect::<Result<_>>()?))
+        }
+    };
+    let beforehand = match args.yes {
+        true => Beforehand {
+            store_effects: Some(true),
+            store_rough: Some(false),
+            go_on: Some(false),
+            power_cycle: Some(false),
+        },
+        false => Beforehand::default(),
+    };
+    let to_output = args.events.as_deref() == Some(Path::new("-"));
+    let events: Option<Box<dyn Write>> = match &args.events {
+        Some(_) if to_output => Some(Box::new(std::io::stdout())),
+        Some(path) => {
+            let _parents = Parents::create(path)?;
+            let file = std::fs::File::create(path).map_err(|e| Error::io(path, &e))?;
+            Some(Box::new(file))
+        }
+        None => None,
+    };
+    let stop = interruption()?;
+    let quiet = args.json.is_standard_output();
+    let on_screen = !args.plain && !to_output && !quiet && Screen::fits();
+    let ends = match args.drivers.is_empty() {
+        true => ENDS,
+        false => TABLE_STOPS,
+    };
+    end_in_time(stop.clone(), ends, on_screen)?;
+    let mut view: Box<dyn View> = match on_screen {
+        true => Box::new(Screen::new(stop, beforehand, events)?),
+        false => {
+            let mut lines = Lines::new(Typed::new(stop)?, beforehand);
+            lines.sketches = driver.is_person() && std::io::stdout().is_terminal();
+            lines.events = events;
+            lines.text = match (to_output, quiet) {
+                (true, _) => Some(Box::new(std::io::stderr())),
+                (false, true) => None,
+                (false, false) => Some(Box::new(std::io::stdout())),
+            };
+            Box::new(lines)
+        }
+    };
+    let page = super::page(command_line);
+    let outcome = complete(carry_out(asked, wanted, driver, view.as_mut(), &page));
+    // The terminal is given back before anything is printed to it.
+    drop(view);
+    let outcome = outcome?;
+    print(&args.json, &report::wizard_text(&outcome), &outcome, None)?;
+    check_stored(&outcome, &args.output)
+}

@@ -1,0 +1,297 @@
+//! The port of a board that writes lines of text, read by a thread that waits for what comes.
+
+use std::io::{ErrorKind, Read};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use mimu_device::Session;
+use mimu_recording::error::{Error, Result};
+
+use crate::source::{Heard, Source, Unit};
+use crate::text::{NOTHING_S, Text, TextBoard};
+
+/// Longest wait for the port: what comes together within it has one time of arrival.
+const POLL: Duration = Duration::from_millis(5);
+
+/// Opens a board, and again when it was gone: the rate that was found first stays, as time is counted by it.
+#[derive(Debug, Clone)]
+pub struct TextOpener {
+    text: Text,
+    rate_hz: Option<f64>,
+    patience_s: f64,
+}
+
+impl TextOpener {
+    /// Of a board. `rate_hz`: that of the session that goes on, if one does.
+    pub fn new(text: Text, rate_hz: Option<f64>) -> Self {
+        Self {
+            text,
+            rate_hz,
+            patience_s: NOTHING_S,
+        }
+    }
+
+    /// Opens it, and waits until its rate is known. `next`: the first tick that it may use.
+    ///
+    /// Errors: the port does not open; within 5 s no line is what was described.
+    pub fn open(&mut self, next: u64) -> Result<TextSource> {
+        let board = TextBoard::new(&self.text, self.rate_hz, next, 0.0);
+        let mut source = TextSource {
+            input: open(&self.text)?,
+            port: self.text.port.clone(),
+            began: Instant::now(),
+            board: board.with_patience(self.patience_s),
+        };
+        while !source.board.is_open(source.now_s())? {
+            source.read()?;
+        }
+        self.rate_hz = Some(source.board.unit().rate_hz);
+        Ok(source)
+    }
+}
+
+fn open(text: &Text) -> Result<Box<dyn Read + Send>> {
+    let Some(address) = text.port.strip_prefix("tcp://") else {
+        return Ok(mimu_device::serial_pair(&text.port, text.baud, POLL)?.0);
+    };
+    let connected = TcpStream::connect(address).and_then(|line| {
+        line.set_read_timeout(Some(POLL))?;
+        Ok(line)
+    });
+    let line = connected.map_err(|error| {
+        let remedy = "check that the board is on the network, and the address, tcp://HOST:PORT";
+        Error::device(&text.port, error, remedy)
+    })?;
+    Ok(Box::new(line))
+}
+
+/// The samples of a board that writes lines.
+pub struct TextSource {
+    input: Box<dyn Read + Send>,
+    port: String,
+    began: Instant,
+    board: TextBoard,
+}
+
+impl TextSource {
+    fn now_s(&self) -> f64 {
+        self.began.elapsed().as_secs_f64()
+    }
+
+    fn read(&mut self) -> Result<()> {
+        let mut bytes = [0; 4096];
+        let count = match self.input.read(&mut bytes) {
+            // A port that was pulled out, or a peer that has hung up, is at its end for ever.
+            Ok(0) => return Err(self.gone()),
+            Ok(count) => count,
+            Err(e) => match e.kind() {
+                ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted => 0,
+                _ => return Err(self.gone()),
+            },
+        };
+        self.board.take(&bytes[..count], self.now_s());
+        Ok(())
+    }
+
+    fn gone(&self) -> Error {
+        Error::device(
+            &self.port,
+            "the port has vanished",
+            "check the cable and the board",
+        )
+    }
+}
+
+impl Source for TextSource {
+    fn unit(&self) -> &Unit {
+        self.board.unit()
+    }
+
+    fn next(&mut self) -> Result<Heard> {
+        if let Some(heard) = self.board.ready() {
+            return Ok(heard);
+        }
+        self.read()?;
+        self.board.next(self.now_s())
+    }
+
+    fn aside(&mut self) -> Option<&mut Session> {
+        None
+    }
+
+    fn device(&mut self) -> Option<&mut Session> {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+    use std::io::Write as _;
+    use std::net::TcpListener;
+
+    use mimu_recording::RawUnit;
+
+    use super::*;
+    use crate::text_line::Columns;
+
+    fn board(columns: &str, writes: Vec<String>, stays: Duration) -> TextOpener {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = format!("tcp://{}", listener.local_addr().unwrap());
+        // One after the other, and hung up so long behind each.
+        std::thread::spawn(move || {
+            for text in writes {
+                let mut line = listener.accept().unwrap().0;
+                let _ = line.write_all(text.as_bytes());
+                std::thread::sleep(stays);
+            }
+        });
+        let text = Text {
+            port,
+            baud: 115_200,
+            columns: Columns::parse(columns).unwrap(),
+            raw_unit: RawUnit::Count,
+            name: None,
+        };
+        TextOpener {
+            patience_s: 0.2,
+            ..TextOpener::new(text, None)
+        }
+    }
+
+    /// Lines with a clock, which show their number as a reading; `odd` gives another one in the place of some.
+    fn numbered(rate_hz: f64, count: usize, odd: impl Fn(usize) -> Option<String>) -> String {
+        let mut text = String::from("cut\n");
+        for k in 0..count {
+            let t_us = (1e6 * k as f64 / rate_hz).round();
+            match odd(k) {
+                None => writeln!(text, "{t_us},{k},0,4096,1,2,3").unwrap(),
+                Some(other) => text.push_str(&other),
+            }
+        }
+        text
+    }
+
+    /// All samples until the line is lost: tick and number; and what was noted.
+    fn all(source: &mut TextSource) -> (Vec<(u64, usize)>, Vec<String>) {
+        let (mut samples, mut notes) = (Vec::new(), Vec::new());
+        while let Ok(heard) = source.next() {
+            match heard {
+                Heard::Samples(chunk) => {
+                    let numbered = (chunk.tick..).zip(&chunk.values);
+                    samples.extend(numbered.map(|(tick, v)| (tick, v[3] as usize)));
+                }
+                Heard::Restarted(words) | Heard::Note(words) => notes.push(words),
+                Heard::Nothing => {}
+            }
+        }
+        (samples, notes)
+    }
+
+    const CLOCKED: &str = "t_us,ax,ay,az,gx,gy,gz";
+
+    #[test]
+    fn lines_that_are_lost_or_garbled_are_missing_ticks_and_are_counted() {
+        let odd = |k: usize| match k {
+            300 => Some(String::new()),
+            400 => Some("4000000,4\u{fffd}\n".into()),
+            k if (500..540).contains(&k) => Some("#\n".into()),
+            _ => None,
+        };
+        let mut opener = board(CLOCKED, vec![numbered(100.0, 1000, odd)], Duration::ZERO);
+        let mut source = opener.open(50).unwrap();
+        assert!((source.unit().rate_hz - 100.0).abs() < 1e-6);
+        let (samples, notes) = all(&mut source);
+        assert_eq!(samples[0], (51, 0));
+        assert!(samples.iter().all(|(tick, k)| *tick == 51 + *k as u64));
+        let numbers: Vec<usize> = samples.iter().map(|s| s.1).collect();
+        let whole = (0..numbers.len() + 42).filter(|k| odd(*k).is_none());
+        assert_eq!(numbers, whole.collect::<Vec<_>>());
+        let told = [source.unit().told.clone(), notes].concat().join("; ");
+        assert!(told.contains("are not data"), "{told}");
+        assert_eq!(source.board.refused(), 41);
+    }
+
+    #[test]
+    fn a_port_that_comes_back_goes_on_behind_the_last_sample_at_the_same_rate() {
+        let first = numbered(250.0, 2000, |_| None);
+        // The second time the rate would be found otherwise.
+        let second = numbered(251.0, 2000, |_| None);
+        let mut opener = board(CLOCKED, vec![first, second], Duration::ZERO);
+        let mut source = opener.open(0).unwrap();
+        let (samples, _) = all(&mut source);
+        let next = samples.last().unwrap().0 + 1;
+        let mut again = opener.open(next).unwrap();
+        assert_eq!(again.unit().rate_hz, source.unit().rate_hz);
+        let (samples, _) = all(&mut again);
+        assert_eq!(samples[0], (next + 1, 0));
+        assert!(samples.windows(2).all(|p| p[1].0 > p[0].0));
+    }
+
+    #[test]
+    fn a_board_that_restarts_is_told_of_and_its_ticks_never_go_back() {
+        let text = numbered(100.0, 1200, |_| None).repeat(2);
+        let mut source = board(CLOCKED, vec![text], Duration::ZERO).open(0).unwrap();
+        let (samples, notes) = all(&mut source);
+        assert_eq!(notes, ["its clock has gone back"]);
+        assert!(samples.windows(2).all(|p| p[1].0 > p[0].0));
+        assert!(samples.len() > 2300, "{}", samples.len());
+    }
+
+    /// A board that writes ten lines in a tenth of a second, for three seconds.
+    fn paced(columns: &str, unit_s: f64) -> Result<TextSource> {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = format!("tcp://{}", listener.local_addr().unwrap());
+        std::thread::spawn(move || {
+            let mut line = listener.accept().unwrap().0;
+            for k in 0..300 {
+                // One of them is garbled.
+                let t = if k == 1 {
+                    9e9
+                } else {
+                    (0.01 * f64::from(k) / unit_s).round()
+                };
+                if writeln!(line, "{t},0,0,4096,1,2,3").is_err() {
+                    return;
+                }
+                if k % 10 == 9 {
+                    std::thread::sleep(Duration::from_millis(100));
+                }
+            }
+        });
+        let text = Text {
+            port,
+            baud: 115_200,
+            columns: Columns::parse(columns).unwrap(),
+            raw_unit: RawUnit::Count,
+            name: None,
+        };
+        TextOpener::new(text, None).open(0)
+    }
+
+    #[test]
+    fn stamps_in_another_unit_are_refused_within_seconds_with_the_column_that_they_are() {
+        for (names, unit_s, is) in [("t_ms", 1e-6, "t_us"), ("t_us", 1e-3, "t_ms")] {
+            let began = Instant::now();
+            let error = paced(&CLOCKED.replace("t_us", names), unit_s)
+                .err()
+                .unwrap();
+            let error = error.to_string();
+            assert!(
+                error.contains(&format!("as if its column were {is}")),
+                "{error}"
+            );
+            assert!(began.elapsed() < Duration::from_secs(4));
+        }
+    }
+
+    #[test]
+    fn where_nothing_fits_the_error_shows_the_first_lines() {
+        let text = "cut\nMPU6050 OK\n1,2,3\n1,2,3\n1,2,3\n".to_string();
+        let stays = Duration::from_secs(1);
+        let opened = board("ax,ay,az,gx,gy,gz", vec![text], stays).open(0);
+        let error = opened.err().unwrap().to_string();
+        let wanted = "no line within 5 s is 6 numbers, ax,ay,az,gx,gy,gz; the first are \"MPU6050 OK\", \"1,2,3\", \"1,2,3\"";
+        assert!(error.contains(wanted), "{error}");
+    }
+}

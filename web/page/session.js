@@ -1,0 +1,135 @@
+// How a session stands, as the page shows it: what to do next, how far it is, what has been heard and what has happened.
+
+import { pose } from "./pose.js";
+import { now } from "./serial.js";
+import { sphere } from "./sphere.js";
+
+const $ = (id) => document.getElementById(id);
+const digits = (value) => Number(value.toPrecision(3)).toString();
+const capital = (words) => words.slice(0, 1).toUpperCase() + words.slice(1);
+const WAITING = { "warm-up": "Leave the board still.", diagnosis: "The dwells are evaluated …", store: "The dwells are evaluated …" };
+
+/** `journal` reads the journal of the session that is shown. */
+let shown = {};
+
+function made(name, properties, ...children) {
+  const element = Object.assign(document.createElement(name), properties);
+  element.append(...children);
+  return element;
+}
+
+/** Begins to show a session whose journal is read by `journal`. */
+export function begin(journal) {
+  shown = { journal, part: "calibration", step: null, told: [], rate: 0, counted: null };
+  for (const id of ["log", "heard", "aims", "not-yet", "session-sphere", "pose", "phase", "count"]) $(id).replaceChildren();
+  $("session-bar").value = $("dwell-bar").value = 0;
+  $("prompt").textContent = WAITING["warm-up"];
+  $("state").textContent = "Its rate is being found …";
+}
+
+/** Adds lines to what has happened. */
+export function log(lines) {
+  const list = $("log");
+  const below = list.scrollHeight - list.scrollTop - list.clientHeight < 8;
+  list.append(...lines.filter((line) => line.trim()).map((line) => made("li", { textContent: line.trim() })));
+  if (below) list.scrollTop = list.scrollHeight;
+}
+
+/** Shows an event. */
+export function tell(event) {
+  events[event.event]?.(event);
+}
+
+/** Shows that the session is over: `done`, or stopped. */
+export function end(done) {
+  $("pose").replaceChildren();
+  $("state").textContent = "";
+  $("dwell-bar").value = 0;
+  if (done) $("session-bar").value = 1;
+  $("prompt").textContent = done ? "The session is finished." : "The session is stopped. It goes on from the last dwell, here or by the command with the journal.";
+}
+
+const events = {
+  greeted({ told }) {
+    shown.told = told;
+  },
+  phase({ phase, words }) {
+    if (["verification", "confirmation", "calibration"].includes(phase)) shown.part = phase;
+    $("phase").textContent = `${capital(phase)}: ${words}`;
+    $("pose").replaceChildren();
+    shown.step = null;
+    $("prompt").textContent = WAITING[phase] ?? "";
+    $("state").textContent = "";
+    poses();
+  },
+  step({ step, words, done, planned }) {
+    shown.step = { ...step, words };
+    $("prompt").textContent = capital(words);
+    $("pose").replaceChildren(pose(step.up, words));
+    $("session-bar").value = done / planned;
+    $("count").textContent = `pose ${done + 1} of ${planned}`;
+    poses();
+  },
+  dwell: () => poses(),
+  redo: () => poses(),
+  progress: ({ progress }) => aims(progress),
+};
+
+/** The poses of this part by the journal, and the one that comes next. */
+async function poses() {
+  const text = await shown.journal();
+  const had = new Map();
+  for (const line of text.split("\n").filter(Boolean)) {
+    const entry = JSON.parse(line);
+    if (entry.part !== shown.part) continue;
+    if (entry.entry === "dwell") had.set(entry.number, entry.step.up);
+    if (entry.entry === "redo") had.delete(entry.number);
+  }
+  const next = shown.step && { up: shown.step.up, words: shown.step.words };
+  $("session-sphere").replaceChildren(sphere({ poses: [...had.values()], map: [], cell: 0, next }));
+}
+
+function aims({ sensors, not_yet: why }) {
+  const rows = sensors.flatMap(({ sensor, aims }) =>
+    aims.map(({ parameter, axis, half_width: half, target, unit }) => {
+      const met = half <= target;
+      const bar = made("progress", { max: 1, value: Math.min(1, target / half) });
+      bar.setAttribute("aria-label", `${sensor} ${parameter}: target over interval`);
+      return made("tr", { className: met ? "met" : "" }, made("td", { textContent: `${met ? "✓ " : ""}${sensor} ${parameter} ${axis}` }), made("td", { className: "n", textContent: `±${digits(half)}` }),
+        made("td", { textContent: `of ±${digits(target)} ${unit}` }), made("td", {}, bar));
+    }),
+  );
+  const caption = made("caption", { textContent: "95 % intervals of the worst axis, beside what is wanted" });
+  $("aims").replaceChildren(...(rows.length ? [caption, made("tbody", {}, ...rows)] : []));
+  $("not-yet").textContent = rows.length ? "" : `Not determined yet: ${why ?? "more poses are needed"}`;
+}
+
+/** How the unit stands: what it waits for, and what has been heard of it. */
+export function stand({ units: [unit], phase, step }) {
+  if (!unit) return;
+  const running = unit.left_s !== null && step;
+  $("dwell-bar").value = running ? Math.min(1, Math.max(0, 1 - unit.left_s / step.dwell_s)) : 0;
+  if (running) $("state").textContent = `Keep it still: ${unit.left_s.toFixed(1)} s`;
+  else if (unit.waiting) $("state").textContent = `Waiting: ${unit.waiting}`;
+  else if (step) $("state").textContent = `Turn it so, and let it rest for ${digits(step.dwell_s)} s.`;
+  else if (phase === "warm-up") $("state").textContent = "It is being listened to at rest.";
+  const at = now();
+  const before = shown.counted;
+  if (!before || at - before.at > 1 || unit.samples < before.samples) {
+    if (before && unit.samples > before.samples) shown.rate = (unit.samples - before.samples) / (at - before.at);
+    shown.counted = { at, samples: unit.samples };
+  }
+  const times = (motion) => (motion === null ? "–" : `${motion < 10 ? motion.toFixed(1) : Math.round(motion)}`);
+  const rows = {
+    Line: shown.told.join("; "),
+    "Rate now": shown.rate ? `${digits(shown.rate)} samples a second` : "",
+    Samples: `${unit.samples}; ${unit.lost} missing; ${unit.clipped} at the end of a range`,
+    Motion: unit.motion ? `gyro ${times(unit.motion[0])}, accelerometer ${times(unit.motion[1])} times what counts as rest` : "",
+    Temperature: unit.temp_c === null ? "" : `${unit.temp_c.toFixed(1)} °C${unit.trend_c_per_min === null ? "" : `, ${unit.trend_c_per_min.toFixed(2)} °C/min`}`,
+  };
+  const lines = Object.entries(rows).filter(([, text]) => text);
+  const terms = [...$("heard").querySelectorAll("dd")];
+  // Elements that stay can be selected and read aloud.
+  if (terms.length === lines.length) lines.forEach(([, text], k) => terms[k].textContent !== text && (terms[k].textContent = text));
+  else $("heard").replaceChildren(...lines.flatMap(([name, text]) => [made("dt", { textContent: name }), made("dd", { textContent: text })]));
+}
