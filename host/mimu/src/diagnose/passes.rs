@@ -64,6 +64,14 @@ fn effects_of(decision: &Decision) -> Vec<FittedEffect> {
     decision.accepted.iter().map(|a| a.effect.clone()).collect()
 }
 
+/// What of it is taken out before the calibration. What may be a true input as well stays in: no file holds it, and its mean over the poses
+/// is then a part of the bias, as in a calibration without effects.
+fn removed_of(decision: &Decision) -> Vec<FittedEffect> {
+    let accepted = decision.accepted.iter();
+    let certain = accepted.filter(|a| a.chosen.or_true_input().is_none());
+    certain.map(|a| a.effect.clone()).collect()
+}
+
 /// By what share one affine model differs from another in scale and direction.
 fn bent(was: &Affine<f64>, is: &Affine<f64>) -> f64 {
     let inverse = was.matrix.try_inverse().unwrap_or_else(Matrix3::zeros);
@@ -297,7 +305,7 @@ impl Passes<'_> {
         };
         let mut decision = decide(without)?;
         let mut found = effects_of(&decision);
-        let mut after = (!found.is_empty()).then(|| clean(&found));
+        let mut after = (!found.is_empty()).then(|| clean(&removed_of(&decision)));
         // Bits of a code that are nearly one another's sum, and coefficients of a size that no sensor has, can lead the readings away: such an
         // effect is no explanation, and no reason to refuse the recording either.
         let mut without = without.to_vec();
@@ -316,7 +324,7 @@ impl Passes<'_> {
             without.push(self.rejected(id, Reason::NotCalibrated(error)));
             decision = decide(&without)?;
             found = effects_of(&decision);
-            after = (!found.is_empty()).then(|| clean(&found));
+            after = (!found.is_empty()).then(|| clean(&removed_of(&decision)));
         }
         let noisier = ours.iter().enumerate().flat_map(|(k, s)| {
             let mut all = noisier(s, sensor);
