@@ -297,7 +297,7 @@ pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()>
 
 fn versions(device: Version) -> String {
     format!(
-        "its protocol is {}.{}, that of this program {}.{}",
+        "it has protocol {}.{}, this program has protocol {}.{}",
         device.major, device.minor, PROTOCOL.major, PROTOCOL.minor
     )
 }

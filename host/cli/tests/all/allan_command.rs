@@ -497,7 +497,7 @@ fn a_swaying_building_is_set_aside_and_the_noise_beneath_is_exported() {
         "allan r -o noise.toml --json a.json --plot a.svg",
     );
     let says = [
-        "accel_x: set aside: 0.560",
+        "accel_x: line removed: 0.560",
         "Hz, steady, rms 1.4",
         "dB above",
         "without lines",

@@ -253,7 +253,7 @@ impl ByPoses<'_> {
             Failure::NoSolution(_) => Failure::Undetermined {
                 parameters: "scale factors and biases of the accelerometer".into(),
                 add: format!(
-                    "no pose has {faces} up: add such poses, and poses in between; if they were recorded, check the columns"
+                    "no pose has {faces} up: add such poses, and poses in between; if they were recorded, check for wrong columns"
                 )
                 .into(),
             },

@@ -262,7 +262,7 @@ fn no_size_of_a_terminal_and_no_figure_is_a_panic() {
 fn too_small_a_terminal_says_what_it_needs() {
     let standing = standing(vec![unit("mimu-1f3a5c7e")]);
     let is = as_text(&drawn(&shown(&standing, &[]), [60, 10]));
-    let words = "has 60 x 10 characters, and 80 x 24 are";
+    let words = "has 60 x 10 characters, but 80 x 24 are";
     assert!(is.contains(words), "{is}");
 }
 

@@ -115,7 +115,7 @@ fn a_damaged_parquet_file_is_refused() {
     let mut broken = good.clone();
     broken[2000..6000].fill(0xa5);
     fs::write(&path, &broken).unwrap();
-    place.fit(&[]).refused(&["samples.parquet", "write"]);
+    place.fit(&[]).refused(&["samples.parquet", "make"]);
     fs::write(&path, "t_s,gyro_x\n").unwrap();
     place.fit(&[]).refused(&["samples.parquet", "Parquet"]);
 }
@@ -413,7 +413,7 @@ fn a_recording_that_does_not_fit_its_calibration_is_told_apart() {
     other.set("device", "\"unit-8\"");
     warned(
         &verify(&other).json(),
-        &["for \"unit-7\", the recording of \"unit-8\""],
+        &["belongs to \"unit-7\", the recording to \"unit-8\""],
     );
     warned(
         &verify(&by_hand()).json(),

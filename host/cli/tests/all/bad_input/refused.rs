@@ -100,7 +100,11 @@ fn what_cannot_be_right_is_refused_in_one_line_and_leaves_no_file() {
             "twice the rate",
             by_hand,
             |s| s.set("sample_rate_hz", "200.0"),
-            &["t_s", "sample_rate_hz = 200", "the first is 0.010000 s"],
+            &[
+                "t_s",
+                "sample_rate_hz = 200",
+                "the first such interval is 0.010000 s",
+            ],
         ),
         (
             "five per cent off the rate",
@@ -112,7 +116,11 @@ fn what_cannot_be_right_is_refused_in_one_line_and_leaves_no_file() {
             "milliseconds for seconds",
             by_hand,
             |s| scale(s, "t_s", 1000.0),
-            &["t_s", "the first is 10.000000 s", "unit of t_s"],
+            &[
+                "t_s",
+                "the first such interval is 10.000000 s",
+                "unit of t_s",
+            ],
         ),
         (
             "no such rate",
