@@ -88,6 +88,7 @@ fn unit(name: &str) -> UnitStanding {
         trend_limit_c_per_min: Some(0.5),
         samples: 412_733,
         lost: 0,
+        clipped: 0,
         waiting: None,
         left_s: Some(1.4),
     }
