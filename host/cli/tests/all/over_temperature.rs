@@ -112,6 +112,8 @@ fn node(temp_c: f64) -> TemperatureNode {
             slope_o: ((o2 - o1) / (2.0 * h)).into(),
             sigma_C: None,
             sigma_o: None,
+            sigma_scale_factor: None,
+            sigma_bias: None,
         })
     };
     TemperatureNode {
