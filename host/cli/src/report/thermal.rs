@@ -92,7 +92,7 @@ fn errors_text(out: &mut String, result: &ThermalResult) {
         .present()
         .any(|(_, s)| s.held_out_rms_without_session_bias.is_some());
     let (head, width) = match verified {
-        true => ("less its bias", 15),
+        true => ("minus its bias", 15),
         false => ("", 0),
     };
     let _ = writeln!(
