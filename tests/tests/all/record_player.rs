@@ -3,8 +3,10 @@
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
+use mimu::result::fit::FitResult;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::turntable::RatedDwells;
+use mimu_cli::report::fit_text;
 use mimu_recording::error::Result;
 use mimu_recording::{
     ImportOptions, RawUnit, Recording, Reference, Turntable, TurntableRate, import,
@@ -180,6 +182,8 @@ fn rates_that_contradict_each_other_are_said_and_readings_in_si_tell_33_rpm_from
         "{}",
         said(&fit)
     );
+    let text = fit_text(&FitResult::of(&fit), false);
+    assert!(text.contains("next: correct the rates"), "{text}");
     // A unit that reports rad/s, about: 5 mV/(deg/s) about 2.5 V.
     let plan = steps(&bench::record_player_plan(14, [0.0; 2], SEED), |i| {
         i % 3 < 2

@@ -99,6 +99,13 @@ fn next(fit: &FitResult) -> String {
     if !fit.recording_problems.is_empty() {
         return format!("correct the problems of the recording, and record again; or {judge}");
     }
+    let contradict = |w: &Warning| match w {
+        Warning::Of(_, w) => matches!(**w, Warning::RatesContradict(..)),
+        _ => false,
+    };
+    if fit.warnings.iter().any(contradict) {
+        return "correct the rates or their error (mimu import --rate-dps, --rate-error), and fit again; --verbose prints more".into();
+    }
     match beyond(fit).is_empty() || fit.reference == Reference::TurntableRate {
         true => format!("{judge}; --verbose prints how it was found"),
         false => format!("find what the model lacks (mimu diagnose), then {judge}"),

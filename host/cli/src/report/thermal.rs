@@ -71,19 +71,31 @@ fn over_noise(result: &ThermalResult) -> String {
     let ratio = |s: &SensorResult| Some(s.held_out_rms.or(s.rms)? / s.noise_floor?);
     let each = result.sensors.present();
     let known: Vec<String> = each
-        .filter_map(|(name, s)| Some(format!("{} times ({name})", significant(ratio(s)?))))
+        .filter_map(|(name, s)| Some(format!("{} ({name})", significant(ratio(s)?))))
         .collect();
     match known.is_empty() {
         true => "no dwell shows the noise to compare the errors with".into(),
-        false => format!("the errors are those of noise {}", known.join(", ")),
+        false => format!(
+            "the errors are {} times those of noise",
+            known.join(" and ")
+        ),
     }
 }
 
 /// Errors and lags of both sensors in one table.
 fn errors_text(out: &mut String, result: &ThermalResult) {
+    // Held out of a verifying recording, whose biases are others since its power came.
+    let verified = result
+        .sensors
+        .present()
+        .any(|(_, s)| s.held_out_rms_without_session_bias.is_some());
+    let (head, width) = match verified {
+        true => ("minus its bias", 15),
+        false => ("", 0),
+    };
     let _ = writeln!(
         out,
-        "{:<18}{:>11}{:>11}{:>11}   lag of the dies, s",
+        "{:<18}{:>11}{head:>width$}{:>11}{:>11}   lag of the dies, s",
         "rms error", "held out", "in sample", "noise"
     );
     let mut reasons: Vec<&str> = Vec::new();
@@ -97,9 +109,13 @@ fn errors_text(out: &mut String, result: &ThermalResult) {
             }
             None => "-".into(),
         };
+        let without = match verified {
+            true => shown(s.held_out_rms_without_session_bias),
+            false => String::new(),
+        };
         let _ = writeln!(
             out,
-            "{:<18}{:>11}{:>11}{:>11}   {lag}",
+            "{:<18}{:>11}{without:>width$}{:>11}{:>11}   {lag}",
             format!("{name}, {}", unit.unit),
             shown(s.held_out_rms),
             shown(s.rms),
@@ -107,10 +123,6 @@ fn errors_text(out: &mut String, result: &ThermalResult) {
         );
         let why = s.lag_reason.as_deref().filter(|_| s.lag_s.is_none());
         reasons.extend(why.filter(|why| !reasons.contains(why)));
-        if let Some(without) = s.held_out_rms_without_session_bias {
-            let name = "  without its bias";
-            let _ = writeln!(out, "{name:<18}{:>11}", shown(Some(without)));
-        }
     }
     for why in reasons {
         wrap(out, "lag: ", why);

@@ -281,7 +281,7 @@ fn a_file_that_was_edited_or_is_not_enough_is_refused() {
         ),
         (
             good.replacen("u = [", "u = [inf, ", 1),
-            &["biases.toml, line"],
+            &["biases.toml", "not a number"],
         ),
     ];
     for (text, says) in edited {
