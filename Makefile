@@ -113,6 +113,7 @@ web-tests: web ## the page in Chromium, if there is one, against the command
 nightly: toolchain blind fuzz web-tests ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
 	$(FIRMWARE)
 	$(CARGO) test --locked --release $(ON_PC) -- --ignored --nocapture --test-threads=2
+	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/tests/run.sh -m nightly
 
 # Where the demo leaves its recordings and its page.
 DEMO ?= target/demo-$(SEED)

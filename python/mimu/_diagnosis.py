@@ -134,8 +134,8 @@ def diagnose(
 ) -> Diagnosis:
     """Finds the effect behind the residual of a unit, as ``mimu diagnose`` does.
 
-    ``recordings``: one, or more of the same unit; the calibration is that of the first. ``verify`` is another recording, which nothing is
-    found in: an effect that it contradicts is not accepted. ``calibration`` keeps its matrices, for a unit that is never turned. ``accept``
+    ``recordings``: one, or more of the same unit; the calibration is that of the first. ``verify`` is one other recording, also as a list of one, which
+    nothing is found in: an effect that it contradicts is not accepted; judge by further ones with :func:`mimu.verify`. ``calibration`` keeps its matrices, for a unit that is never turned. ``accept``
     takes terms by name that nothing but these recordings speaks for. The others are those of :func:`mimu.fit`.
     """
     first = [recordings] if isinstance(recordings, Recording) else list(recordings)
@@ -148,5 +148,3 @@ def diagnose(
             keep=_keep(keep), noise=noise,
         )
     )
-
-
