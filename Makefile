@@ -92,7 +92,7 @@ wheel: toolchain ## the wheel to hand out, target/wheels, for any Linux since gl
 book: toolchain ## the documentation as a site, target/book, with search; its links are checked
 	@test "$$(target/tools/bin/mdbook --version 2>/dev/null)" = "mdbook v$(MDBOOK)" \
 	  || $(CARGO) install --locked --root target/tools --no-default-features --features search --version $(MDBOOK) mdbook
-	python3 docs/book.py target/tools/bin/mdbook target/book
+	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) "$$(RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/environment.sh)/bin/python" docs/book.py target/tools/bin/mdbook target/book
 
 # The lowest Rust that builds the crates for PCs: that of nalgebra. The emulator needs the newest, and only tests need the emulator.
 msrv: ## the command compiles with the Rust that Cargo.toml says is enough
