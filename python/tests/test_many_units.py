@@ -112,7 +112,8 @@ def test_the_questions_find_what_is_wrong_with_the_lines(many: ModuleType, line:
     reasons = answers["share of failures by reason"].fetchall()
     broken = sum(unit.broken is not None for unit in line.units(UNITS))
     assert sum(row[1] for row in reasons) == broken and len(reasons) == len(line.BREAK)
-    assert sum(row[2] for row in reasons) == pytest.approx(100.0 * broken / UNITS)
+    # One decimal is shown.
+    assert all(abs(row[2] - 100.0 * row[1] / UNITS) <= 0.05 for row in reasons)
 
 
 def test_only_what_is_new_is_fitted_again(
