@@ -92,7 +92,7 @@ wheel: toolchain ## the wheel to hand out, target/wheels, for any Linux since gl
 book: toolchain ## the documentation as a site, target/book, with search; its links are checked
 	@test "$$(target/tools/bin/mdbook --version 2>/dev/null)" = "mdbook v$(MDBOOK)" \
 	  || $(CARGO) install --locked --root target/tools --no-default-features --features search --version $(MDBOOK) mdbook
-	python3 docs/book.py target/tools/bin/mdbook target/book
+	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) "$$(RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/environment.sh)/bin/python" docs/book.py target/tools/bin/mdbook target/book
 
 # The lowest Rust that builds the crates for PCs: that of nalgebra. The emulator needs the newest, and only tests need the emulator.
 msrv: ## the command compiles with the Rust that Cargo.toml says is enough
@@ -113,6 +113,7 @@ web-tests: web ## the page in Chromium, if there is one, against the command
 nightly: toolchain blind fuzz web-tests ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
 	$(FIRMWARE)
 	$(CARGO) test --locked --release $(ON_PC) -- --ignored --nocapture --test-threads=2
+	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/tests/run.sh -m nightly
 
 # Where the demo leaves its recordings and its page.
 DEMO ?= target/demo-$(SEED)

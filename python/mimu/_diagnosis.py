@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from mimu import _mimu
 from mimu._fit import Keep, Steps, _keep
 from mimu._mimu import Calibration, Noise, Recording
+from mimu._recording import several
 from mimu._result import Result, typed
 
 
@@ -134,19 +135,16 @@ def diagnose(
 ) -> Diagnosis:
     """Finds the effect behind the residual of a unit, as ``mimu diagnose`` does.
 
-    ``recordings``: one, or more of the same unit; the calibration is that of the first. ``verify`` is another recording, which nothing is
-    found in: an effect that it contradicts is not accepted. ``calibration`` keeps its matrices, for a unit that is never turned. ``accept``
+    ``recordings``: one, or more of the same unit; the calibration is that of the first. ``verify`` is one other recording, also as a list of one, which
+    nothing is found in: an effect that it contradicts is not accepted; judge by further ones with :func:`mimu.verify`. ``calibration`` keeps its matrices, for a unit that is never turned. ``accept``
     takes terms by name that nothing but these recordings speaks for. The others are those of :func:`mimu.fit`.
     """
-    first = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    others = [] if verify is None else [verify] if isinstance(verify, Recording) else list(verify)
+    others = [] if verify is None else several(verify)
     if len(others) > 1:
         raise TypeError("verify: a diagnosis is judged by one other recording; judge its calibration by more with mimu.verify")
     return Diagnosis(
         _mimu.diagnose(
-            first, verify=others[0] if others else None, calibration=calibration, accept=list(accept), still=still, steps=steps,
+            several(recordings), verify=others[0] if others else None, calibration=calibration, accept=list(accept), still=still, steps=steps,
             keep=_keep(keep), noise=noise,
         )
     )
-
-

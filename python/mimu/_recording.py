@@ -13,6 +13,11 @@ from mimu._mimu import Recording
 Path = str | os.PathLike[str]
 
 
+def several(recordings: Recording | Sequence[Recording]) -> list[Recording]:
+    """One recording, or more, as a list."""
+    return [recordings] if isinstance(recordings, Recording) else list(recordings)
+
+
 def read(
     *files: Path,
     output: Path | None = None,

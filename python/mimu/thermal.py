@@ -9,6 +9,7 @@ from typing import Literal
 from mimu import _mimu
 from mimu._fit import Steps
 from mimu._mimu import Calibration, Noise, Recording
+from mimu._recording import several
 from mimu._result import Array, Result, typed
 
 
@@ -110,11 +111,9 @@ def fit(
     it is known. ``range_c`` are temperatures that the curves have to cover. ``base`` is the calibration at one temperature that the biases
     of recordings at rest are added to; ``at_rest`` says that the unit lay still throughout.
     """
-    first = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    others = [verify] if isinstance(verify, Recording) else list(verify)
     return ThermalFit(
         _mimu.thermal_fit(
-            first, verify=others, estimator=estimator, lag_s=lag_s, range_c=range_c, base=base, noise=noise, still=still,
+            several(recordings), verify=several(verify), estimator=estimator, lag_s=lag_s, range_c=range_c, base=base, noise=noise, still=still,
             steps="at rest" if at_rest else steps,
         )
     )
