@@ -124,6 +124,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Means => "--means",
         Argument::SkipBroken => "--skip-broken",
         Argument::SignedLowByte => "--signed-low-byte",
+        Argument::Accept => "--accept",
         Argument::Base => "--base",
         Argument::Estimator => "--estimator",
         Argument::Range => "--range",

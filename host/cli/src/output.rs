@@ -6,13 +6,11 @@ use std::path::{Path, PathBuf};
 use anstream::AutoStream;
 use anstyle::AnsiColor;
 use indicatif::{ProgressBar, ProgressStyle};
-use mimu::recording_problem::OfRecording;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::{Staged, stage};
 use serde::Serialize;
 
 use crate::arguments::JsonArgs;
-use crate::report::text;
 
 /// Refuses outputs that cannot be written, before the work, and those that would overwrite an input or each other.
 pub(crate) fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<()> {
@@ -78,52 +76,6 @@ pub(crate) fn print(
     show(shown)
 }
 
-/// What a command that refused its recordings writes to standard output, if its JSON goes there.
-#[derive(Serialize)]
-struct Refusal<'a> {
-    format: &'static str,
-    error: Refused<'a>,
-    recording_problems: &'a [OfRecording],
-}
-
-/// The error line in its parts.
-#[derive(Serialize)]
-struct Refused<'a> {
-    place: &'a str,
-    problem: &'a str,
-    remedy: &'a str,
-}
-
-/// Lists what is wrong with the recordings that a command refused: to standard error, above the line with the error, and in JSON if that
-/// goes to standard output. A file of JSON is a result, and there is none.
-pub(crate) fn refused(
-    error: &Error,
-    problems: &[OfRecording],
-    several: bool,
-    json: Option<&JsonArgs>,
-) {
-    let mut out = String::new();
-    text::problems(&mut out, problems, several, true);
-    let mut to = AutoStream::auto(std::io::stderr().lock());
-    // Standard error that cannot be written shows no error line either.
-    let _ = to.write_all(coloured(&out).as_bytes());
-    if json.is_some_and(|json| json.path.is_some() && json.file().is_none()) {
-        let told = error.refused();
-        let refusal = Refusal {
-            format: "mimu-refusal/1",
-            error: Refused {
-                place: &told.place,
-                problem: &told.problem,
-                remedy: &told.remedy,
-            },
-            recording_problems: problems,
-        };
-        if let Ok(pretty) = serde_json::to_string_pretty(&refusal) {
-            let _ = show(&(pretty + "\n"));
-        }
-    }
-}
-
 /// Beginnings of lines that stand out on a terminal.
 const HEADS: [(&str, AnsiColor); 5] = [
     ("problems of this recording:", AnsiColor::Red),
@@ -134,7 +86,7 @@ const HEADS: [(&str, AnsiColor); 5] = [
 ];
 
 /// `text` with the heads of its lines in colour.
-fn coloured(text: &str) -> String {
+pub(crate) fn coloured(text: &str) -> String {
     let line = |line: &str| match HEADS.iter().find(|(head, _)| line.starts_with(head)) {
         Some((head, colour)) => {
             let style = colour.on_default().bold();

@@ -93,6 +93,8 @@ pub enum Argument {
     SkipBroken,
     /// Of which columns a firmware took the low byte for a signed number.
     SignedLowByte,
+    /// Products that are accepted on the evidence of one recording.
+    Accept,
     /// The calibration at one temperature that curves are added to.
     Base,
     /// The estimator of curves over temperature.

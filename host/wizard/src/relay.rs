@@ -256,7 +256,7 @@ mod tests {
         let (said, _) = all(&mut station);
         assert_eq!(said.len(), 1);
         assert!(
-            said[0].contains("no line of numbers has come for 5 s"),
+            said[0].contains("no line of numbers arrived for 5 s"),
             "{said:?}"
         );
         speak(&send, 2700, 2800);
@@ -274,7 +274,10 @@ mod tests {
         }
         let error = go_on(opening.as_mut()).unwrap().err().unwrap().to_string();
         assert!(error.contains("no line within 5 s is 6 numbers"), "{error}");
-        assert!(error.contains("give the board's bits a second"), "{error}");
+        assert!(
+            error.contains("give the board's bits per second"),
+            "{error}"
+        );
     }
 
     #[test]
@@ -285,7 +288,7 @@ mod tests {
         speak(&send, 0, 600);
         let error = go_on(opening.as_mut()).unwrap().err().unwrap().to_string();
         assert!(
-            error.contains("unit board is there, and the session is of unit plane-7"),
+            error.contains("unit board is at the port, but the session belongs to unit plane-7"),
             "{error}"
         );
     }

@@ -119,8 +119,8 @@ mod tests {
         let error = resumed(&asked(), &now, place).unwrap_err();
         let (line, arguments) = (error.to_string(), &error.refused().arguments);
         for says in [
-            "gravity was 9.71 m/s² and is 9.81 m/s²",
-            "line of the board was none and is ax,ay,az,gx,gy,gz in count",
+            "gravity was 9.71 m/s², now it is 9.81 m/s²",
+            "line of the board was none, now it is ax,ay,az,gx,gy,gz in count",
         ] {
             assert!(line.contains(says), "{line}");
         }

@@ -159,6 +159,6 @@ mod tests {
         let other = Waiting::OtherRate(-98.0, 100.0).to_string();
         assert_eq!(other, "it turns the wrong way: -98 deg/s, requested +100");
         let slow = Waiting::OtherRate(61.3, 100.0).to_string();
-        assert_eq!(slow, "it turns at +61.3 deg/s, +100.0 wanted");
+        assert_eq!(slow, "it turns at +61.3 deg/s, requested +100.0");
     }
 }

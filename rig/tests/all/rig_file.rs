@@ -230,7 +230,7 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[[effect]]\nid = \"accel_size_effect\"\narms_cm = [[0, 0, 0], [0, 0, 0], [0, 0, 0]]",
-            "4: `accel_size_effect` has no `arms_cm`; known here: arms_mm",
+            "4: `accel_size_effect` has no `arms_cm`; known are: arms_mm",
         ),
         (
             "[[effect]]\nid = \"gyro_bias_drift\"\n[[effect]]\nid = \"accel_bias_drift\"\nmg_per_hour = 3",

@@ -40,7 +40,10 @@ fn a_noise_file_in_another_unit_is_refused_with_its_channel() {
     let error = prepared.with_noise(&noise).unwrap_err();
     assert!(error.refused().place.contains("accel_y"), "{error}");
     assert!(
-        error.refused().problem.contains("readings are in V"),
+        error
+            .refused()
+            .problem
+            .contains("that of the readings is V"),
         "{error}"
     );
 }

@@ -14,8 +14,9 @@ use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, StillArgs, VerboseArgs};
-use crate::output::{now, print, refused};
+use crate::output::{now, print};
 use crate::reading::read;
+use crate::report::refused;
 
 #[derive(Args)]
 pub struct DiagnoseArgs {

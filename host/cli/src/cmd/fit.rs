@@ -12,9 +12,10 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, VerboseArgs};
-use crate::output::{now, print, refused};
+use crate::output::{now, print};
 use crate::reading::read_samples_or_means;
 use crate::report;
+use crate::report::refused;
 
 #[derive(Args)]
 pub(crate) struct FitArgs {

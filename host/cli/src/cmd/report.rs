@@ -14,8 +14,9 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{KeepArgs, NoiseArgs, StillArgs};
-use crate::output::{now, refused, show};
+use crate::output::{now, show};
 use crate::reading::read;
+use crate::report::refused;
 use crate::report::text::problems;
 use crate::report::{Made, UnitReport, unit_page};
 

@@ -35,7 +35,7 @@ use rows::{ForceErrors, FreeParameters, Rows};
 use serde::{Deserialize, Serialize};
 
 use crate::calibration::Calibration;
-use crate::effects::fitted::FittedEffect;
+use crate::effects::fitted::{FittedEffect, candidate};
 use crate::effects::removal::{removable, remove_within};
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::fit::{Fit, Options, fit, fit_biases};
@@ -44,7 +44,7 @@ use crate::quantity::{Sensor, significant};
 use crate::recording_problem::OfRecording;
 use crate::triad::{Part, Triad};
 use crate::warning::Warning;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
 /// What a diagnosis says.
@@ -236,6 +236,15 @@ impl Recordings<'_> {
                 "only the magnitude of the rate is known, but a diagnosis needs known inputs or gravity",
                 "give a recording from a rate table or by hand; a fit and a verification take this one",
             ));
+        }
+        let is_product = |id: &&String| candidate(id).is_some_and(|c| !c.is_listed());
+        if let Some(other) = self.accept.iter().find(|id| !is_product(id)) {
+            return Err(Error::new(
+                "products to accept",
+                format!("{other:?} is not the id of a product"),
+                "give an id that a diagnosis suggests, such as term:gyro_x~force_y*temp",
+            )
+            .about(Argument::Accept));
         }
         let (unit, raw_unit) = (&self.first.manifest.device, self.first.manifest.raw_unit);
         for other in self.later() {

@@ -225,9 +225,9 @@ mod tests {
         let text = text.unwrap().to_string();
         // Only the angle between x and y is open: one edge of the four tells it.
         assert!(
-            text.contains("with +x+y up")
-                || text.contains("with +x-y up")
-                || text.contains("with -x"),
+            text.contains("near +x+y up")
+                || text.contains("near +x-y up")
+                || text.contains("near -x"),
             "{text}"
         );
         assert!(!text.contains('z'), "{text}");

@@ -177,8 +177,8 @@ fn a_gyro_is_fitted_to_steps_of_known_rate_and_of_gravity_alone_is_refused_by_na
     let by_gravity = || Prepared::of_means(&with_gyro(false)).unwrap();
     let fitted = fit(by_gravity(), options()).unwrap();
     assert!(fitted.sensor(Sensor::Gyro).is_none() && fitted.sensor(Sensor::Accel).is_some());
-    let says = |w: &Warning| w.to_string().contains("gyro: turns need samples");
-    assert!(fitted.warnings.iter().any(says), "{:?}", fitted.warnings);
+    let says = Warning::MeansOfTurns.of(Sensor::Gyro);
+    assert!(fitted.warnings.contains(&says), "{:?}", fitted.warnings);
     let only = Options {
         only: Some(Sensor::Gyro),
         ..options()

@@ -120,7 +120,10 @@ fn a_base_that_the_curves_cannot_be_added_to_is_refused() {
     let mut other = base.clone();
     other.device = "another".into();
     let other = refused(&other);
-    assert!(other.contains("the calibration of \"another\""), "{other}");
+    assert!(
+        other.contains("the calibration belongs to \"another\""),
+        "{other}"
+    );
     let mut unknown = base.clone();
     unknown.recording.temp_c = None;
     let unknown = refused(&unknown);

@@ -66,7 +66,7 @@ fn a_column_that_spans_more_than_the_dwells_is_refused_with_both_spans_and_what_
     // Dwells in the first three minutes of a ramp of 80 K; behind them every row is in transit.
     let said = refusal(|_, samples| samples.step[1800..].fill(-1));
     assert!(said.contains("the column spans 80"), "{said}");
-    assert!(said.contains("the dwells that are used 5."), "{said}");
+    assert!(said.contains("the dwells that are used span 5."), "{said}");
     assert!(
         said.contains("92.5 % of the samples are outside of dwells"),
         "{said}"

@@ -148,7 +148,7 @@ fn a_turn_by_an_angle_is_that_of_a_plan_and_begins_at_rest() {
     course.tell(Command::Rate(0.5));
     let t_s = course.t_s();
     let refused = course.carrier.command(t_s, Command::Turn(turn));
-    assert!(refused.unwrap_err().contains("at rest"));
+    assert!(refused.unwrap_err().contains("starts from rest"));
 }
 
 #[test]

@@ -190,7 +190,11 @@ fn a_table_goes_where_it_is_told_and_turns_as_fast_as_it_is_told() {
         client.carry_out("MOVE 1 0 0");
 
         client.carry_out("RATE 90");
-        assert!(client.refusal("TURN inner 90 5").contains("at rest"));
+        assert!(
+            client
+                .refusal("TURN inner 90 5")
+                .contains("starts from rest")
+        );
         let truth = client.numbers("TRUTH?");
         // The Earth adds 0.004 deg/s at most.
         for (rate, wanted) in truth.iter().zip([90.0, 0.0, 0.0]) {

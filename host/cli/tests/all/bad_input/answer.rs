@@ -35,7 +35,7 @@ impl Run {
         let text = self.stderr.strip_suffix('\n').unwrap_or(&self.stderr);
         let (before, line) = text.rsplit_once('\n').unwrap_or(("", text));
         let mut lines = before.lines().peekable();
-        if lines.next_if(|l| l.starts_with("wrong with th")).is_some() {
+        if lines.next_if(|l| l.starts_with("problems of th")).is_some() {
             let listed = std::iter::from_fn(|| lines.next_if(|l| l.starts_with("  - ")));
             assert!(listed.count() > 0, "{text}");
         }

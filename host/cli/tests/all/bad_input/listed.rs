@@ -17,7 +17,7 @@ fn with_gaps(seed: u64, poses: usize, gaps: usize) -> Samples {
 
 /// The lines of the list below its head, and the head.
 fn listed(text: &str) -> (&str, Vec<&str>) {
-    let mut lines = text.lines().skip_while(|l| !l.starts_with("wrong with"));
+    let mut lines = text.lines().skip_while(|l| !l.starts_with("problems of"));
     let head = lines.next().expect("a list");
     (head, lines.take_while(|l| l.starts_with("  - ")).collect())
 }
@@ -40,7 +40,7 @@ fn each_of_several_recordings_is_named_with_what_is_wrong_with_it() {
     ]);
     assert_eq!(run.status, Some(0), "{}", run.stderr);
     let (head, lines) = listed(&run.stdout);
-    assert_eq!(head, "wrong with these recordings:");
+    assert_eq!(head, "problems of these recordings:");
     let samples = |folder: &str| format!("{folder}/samples.csv");
     let found: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
     let problems = found["recording_problems"].as_array().unwrap();
@@ -68,7 +68,7 @@ fn each_of_several_recordings_is_named_with_what_is_wrong_with_it() {
     // The same on the terminal of a report.
     let run = mimu(["report", &one, &good, "-o", &place.text("unit.html")]);
     let (head, lines) = listed(&run.stdout);
-    assert_eq!(head, "wrong with these recordings:", "{}", run.stdout);
+    assert_eq!(head, "problems of these recordings:", "{}", run.stdout);
     assert!(
         lines.iter().all(|l| l.contains(&samples(&one))),
         "{lines:?}"
@@ -76,7 +76,7 @@ fn each_of_several_recordings_is_named_with_what_is_wrong_with_it() {
     // One recording needs no name.
     let run = mimu(["diagnose", &one]);
     let (head, lines) = listed(&run.stdout);
-    assert_eq!(head, "wrong with this recording:");
+    assert_eq!(head, "problems of this recording:");
     assert!(
         lines.iter().all(|l| !l.contains("samples.csv")),
         "{lines:?}"
