@@ -275,7 +275,7 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[[effect]]\nid = \"gyro_warm_up\"\n[[effect]]\nid = \"gyro_warm_up\"",
-            "5: effect `gyro_warm_up` stands twice; remove one, or move its contents into the other",
+            "5: effect `gyro_warm_up` occurs twice; remove one, or move its contents into the other",
         ),
     ] {
         assert_eq!(parse(text).unwrap_err(), format!("RIG.toml:{complaint}"));

@@ -182,7 +182,7 @@ fn what_cannot_be_right_is_refused_in_one_line_and_leaves_no_file() {
                     }
                 }
             },
-            &["gyro: all dwells have the same input"],
+            &["gyro: not calibrated: all dwells have the same input"],
         ),
         (
             "one input with the wrong sign",
