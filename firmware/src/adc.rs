@@ -11,12 +11,12 @@
 //! - Within a stream no word can be lost unnoticed. When its FIFO overflows, the converter raises
 //!   OVR and makes no further DMA request until the flag is cleared (RM0433 25.4.27), and it is
 //!   cleared only between streams. The words in memory up to then are in order. No further word arrives, and the deadline in
-//! [`Stream::next`] turns this into an error.
+//!   [`Stream::next`] turns this into an error.
 //! - After an error the stream is over: it repeats the error until it is dropped. A new one begins
 //!   with the converter stopped, which resets the sequence to its first channel, the FIFO emptied,
 //!   and the DMA controller set up anew at the first word of the ring. It is aligned by construction, without skipping words. Every part is
-//! needed: with the eight words of an overflow left in the FIFO, all later scans would be rotated by eight places. Pausing and resuming the
-//! controller does not help: it resumes with the remaining count, but at the ring's first word.
+//!   needed: with the eight words of an overflow left in the FIFO, all later scans would be rotated by eight places. Pausing and resuming the
+//!   controller does not help: it resumes with the remaining count, but at the ring's first word.
 
 use embassy_stm32::Peri;
 use embassy_stm32::adc::Adc;
