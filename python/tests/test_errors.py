@@ -50,12 +50,12 @@ def test_an_experiment_that_does_not_determine_the_unit_is_of_its_own_kind() -> 
 @pytest.mark.parametrize(
     ("keywords", "says"),
     [
-        ({"gyro": np.zeros((10, 2))}, r"gyro: its shape is \(10, 2\), and \(10, 3\) is wanted"),
-        ({"accel": np.zeros((9, 3))}, r"accel: its shape is \(9, 3\), and \(10, 3\) is wanted"),
-        ({"gyro": np.zeros((10, 3)), "temp": np.zeros(7)}, r"temp: its shape is \(7,\), and \(10,\) is wanted"),
+        ({"gyro": np.zeros((10, 2))}, r"gyro: its shape is \(10, 2\), but \(10, 3\) is needed"),
+        ({"accel": np.zeros((9, 3))}, r"accel: its shape is \(9, 3\), but \(10, 3\) is needed"),
+        ({"gyro": np.zeros((10, 3)), "temp": np.zeros(7)}, r"temp: its shape is \(7,\), but \(10,\) is needed"),
         ({"gyro": np.zeros((10, 3)), "gravity": 1.0}, "looks like g"),
         ({"gyro": np.zeros((10, 3)), "unit": "mV"}, "write V, count or SI"),
-        ({"gyro": np.zeros((10, 3)), "t": np.zeros(10)}, "the times do not say"),
+        ({"gyro": np.zeros((10, 3)), "t": np.zeros(10)}, "the times do not give the sample rate"),
         ({}, "readings of neither sensor"),
     ],
 )
