@@ -216,7 +216,7 @@ fn queue_of_replies() -> (FrameSender, FrameReceiver) {
     FRAMES.init(Frames::new(MEMORY.take())).split()
 }
 
-/// A panic records its place and restarts the device: a unit in the field that stands still is of no use.
+/// A panic records its place and restarts the device: a unit that stands still cannot be used in the field.
 #[panic_handler]
 fn panic(panic: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();

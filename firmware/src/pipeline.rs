@@ -30,7 +30,7 @@ use crate::design_parameters::{
     ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, GYRO_STOP_MARGIN_V, GYRO_STOPS_V,
 };
 
-/// The pipeline, shared between tasks of one executor; none of them borrows it while waiting.
+/// The pipeline, shared between tasks of one executor; no task borrows it while it waits.
 pub type Shared = Mutex<NoopRawMutex, RefCell<Pipeline>>;
 
 /// Which streams are sent.

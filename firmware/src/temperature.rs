@@ -53,7 +53,7 @@ impl Thermometer {
     pub const fn of_pins(pins_c: [f32; 3]) -> Self {
         let mut new = Self::NEW;
         let mut i = 0;
-        // `while`, because a constant function has no other loop.
+        // `while`, because `for` is not allowed in a constant function.
         while i < 3 {
             new.pins[i].offset_c = Some(pins_c[i]);
             new.pins[i].learnt_s = GYRO_TEMPERATURE_BEGINNING_S;

@@ -34,7 +34,7 @@ const board = { stage: "none", text: "", first: null, queue: [], hearing: false,
 let page;
 
 let worker;
-/** The program in a worker of its own, which keeps the folder of the session. */
+/** The program in a separate worker, which keeps the folder of the session. */
 const program = () => (worker ??= new Program(() => {}, said));
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
@@ -45,7 +45,7 @@ function made(name, properties, ...children) {
   return element;
 }
 
-/** Bytes as the characters of their numbers: what is garbled comes through as it is. */
+/** Bytes as the characters of their numbers: garbled bytes come through unchanged. */
 function characters(bytes) {
   let text = "";
   for (let at = 0; at < bytes.length; at += 8192) text += String.fromCharCode(...bytes.subarray(at, at + 8192));

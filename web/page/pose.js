@@ -1,4 +1,4 @@
-// A pose as a picture: a box with the names of its faces, lying as it is to be held, seen from the front, right and above.
+// A pose as a picture: a box with the names of its faces, in the pose to be held, seen from the front, right and above.
 
 import { element } from "./sphere.js";
 
@@ -18,7 +18,7 @@ const axis = (k, sign = 1) => [0, 1, 2].map((i) => (i === k ? sign : 0));
 /** Up, front and right in the body frame: that which points up, and of what is left the face that lies most in front. */
 function frame(up) {
   const order = [0, 1, 2].sort((a, b) => Math.abs(up[b]) - Math.abs(up[a]));
-  // A face that is up hides none of the others: then the next axis is in front, as in the sketch of the command.
+  // If a face is up, it hides no other face: then the next axis is in front, as in the sketch of the command.
   const second = Math.abs(up[order[1]]) > 0.3 ? order[1] : (order[0] + 1) % 3;
   const towards = axis(second, up[second] < -0.3 ? -1 : 1);
   const front = unit(sum(towards, scaled(up, -dot(towards, up))));

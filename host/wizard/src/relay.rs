@@ -1,5 +1,5 @@
 //! A board of another maker at a port that somebody else holds, as a page in a browser does: the bytes are relayed, with the times at which
-//! they came. Nothing here waits, and there is no thread.
+//! they came. Nothing here waits or starts a thread.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, TryRecvError};

@@ -50,7 +50,7 @@ pub type Connecting = Pin<Box<dyn Future<Output = Result<Station>>>>;
 /// Connects a session with a unit: the first tick that it may use, and the id of the unit if no other will do.
 pub type Connect = Box<dyn FnOnce(u64, Option<String>) -> Connecting>;
 
-/// Connects a session with a unit at a port, which gets a thread of its own.
+/// Connects a session with a unit at a port, and starts a thread for that port.
 pub fn at_port(opener: Opener) -> Connect {
     Box::new(|next, wanted| {
         let opened = Station::open(opener, next, wanted.as_deref());

@@ -32,7 +32,7 @@ pub struct Unseen {
 pub enum Reason {
     /// At short times the curve is below white noise, as behind a low-pass filter.
     Filtered,
-    /// At short times the curve follows none of the terms, and what it follows would hide this one.
+    /// At short times the curve does not have the shape of any term, which would hide this one.
     Hidden,
     /// Models without the term fit the curve as well.
     Small {

@@ -1,7 +1,7 @@
 //! Biases over temperature of a unit that only lay still: what its readings change by, without the scale factors that would make a
 //! calibration of it.
 //!
-//! It is a file of its own, with its own `format`, and not a calibration with a mark: without C nothing can be applied, and a C of ones would
+//! It is a separate file, with its own `format`, and not a calibration with a mark: without C nothing can be applied, and a C of ones would
 //! be applied by whoever overlooks the mark. Every command that reads a calibration refuses the file by its name ([`refusal`]); the formats of
 //! autopilots, which compensate the bias alone over temperature, take it.
 
