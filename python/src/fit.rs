@@ -86,7 +86,6 @@ pub(crate) fn fit(
     let options = Options {
         method: method.map_or(Ok(Method::LeastSquares), self::method)?,
         holdout_blocks: holdout,
-        still_factor: by.still_factor,
         only: only.map(named).transpose()?,
     };
     let (source, chosen) = (recording.source.clone(), method.is_some());

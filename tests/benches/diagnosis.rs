@@ -59,7 +59,6 @@ fn main() {
         method: Method::LeastSquares,
         holdout_blocks: 0,
         only: None,
-        still_factor: STILL_FACTOR,
     };
     let found = diagnose(prepared.into(), options).expect("a diagnosis");
     let diagnosed = begun.elapsed();

@@ -15,7 +15,6 @@ use mimu::plan::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu_cli::report::{Detail, Made, diagnosis_page, diagnosis_text};
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
@@ -170,7 +169,6 @@ pub(crate) fn options() -> Options {
         method: Method::LeastSquares,
         holdout_blocks: 0,
         only: None,
-        still_factor: STILL_FACTOR,
     }
 }
 

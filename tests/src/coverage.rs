@@ -4,7 +4,6 @@ use std::sync::Mutex;
 
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::quantity::Sensor;
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::Triad;
 use mimu_recording::{Turntable, TurntableRate};
 use mimu_rig::random::Random;
@@ -85,7 +84,6 @@ fn options(method: Method) -> Options {
         method,
         holdout_blocks: 0,
         only: None,
-        still_factor: STILL_FACTOR,
     }
 }
 

@@ -81,7 +81,6 @@ impl Foreign<'_> {
             method,
             holdout_blocks: 4,
             only: None,
-            still_factor: STILL_FACTOR,
         };
         let prepared = Prepared::read(&recording, STILL_FACTOR, |_| {})?;
         fit(prepared, options)

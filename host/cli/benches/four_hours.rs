@@ -118,7 +118,6 @@ fn by_hand(folder: &Path) {
         method: Method::LeastSquares,
         holdout_blocks: 4,
         only: None,
-        still_factor: mimu::signal::stillness::STILL_FACTOR,
     };
     fit(prepared, options).expect("known to be good");
     println!(

@@ -9,7 +9,7 @@
 //! Source: src/lib/sensor_calibration/Accelerometer.hpp and Gyroscope.hpp, `Correct`; src/modules/sensors/module.yaml.
 
 use mimu::calibration::Calibration;
-use mimu::calibration::bias_cubic::BiasCubics;
+use mimu::calibration::bias_cubic::{BiasCubics, KnownConversion};
 use mimu::calibration::thermal_biases::ThermalBiases;
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Argument, Result};
@@ -110,15 +110,28 @@ pub(crate) fn cubics_at_rest(
     reference_c: f64,
     export: &mut Export,
 ) -> Result<()> {
+    each_sensor(
+        options,
+        export,
+        |sensor, known| BiasCubics::of_rest(biases, sensor, known, range_c, reference_c),
+        |sensor| format!("The recording has no readings of the {sensor}: none are written."),
+    )
+}
+
+/// Adds the cubics that `of` finds for a sensor, or the note `none` where it finds none.
+fn each_sensor(
+    options: &parameters::Options,
+    export: &mut Export,
+    of: impl Fn(Sensor, &KnownConversion) -> Result<Option<BiasCubics>>,
+    none: impl Fn(Sensor) -> String,
+) -> Result<()> {
     let mut conversions = options.conversions();
     export.notes.push(AXES_OF_THE_RECORDING.into());
     for sensor in Sensor::BOTH {
         let known = std::mem::take(&mut conversions[sensor]);
-        match BiasCubics::of_rest(biases, sensor, &known, range_c, reference_c)? {
+        match of(sensor, &known)? {
             Some(cubics) => add(cubics, export),
-            None => export.notes.push(format!(
-                "The recording has no readings of the {sensor}: none are written."
-            )),
+            None => export.notes.push(none(sensor)),
         }
     }
     Ok(())
@@ -126,6 +139,12 @@ pub(crate) fn cubics_at_rest(
 
 /// `cubics` with their formula and what they leave.
 fn add(cubics: BiasCubics, export: &mut Export) {
+    if let Some(settled_c) = cubics.settled_c {
+        export.notes.push(format!(
+            "{}: the errors below are those with the scale factors of {settled_c:.1} °C.",
+            cubics.sensor
+        ));
+    }
     let list = |values: [f64; 3]| values.map(|v| format!("{v:.6}")).join(", ");
     let [from, to] = cubics.range_c;
     export.formulas.push(format!(
@@ -209,24 +228,12 @@ pub(crate) fn cubics(
     reference_c: f64,
     export: &mut Export,
 ) -> Result<()> {
-    let mut conversions = options.conversions();
-    export.notes.push(AXES_OF_THE_RECORDING.into());
-    for sensor in Sensor::BOTH {
-        let known = std::mem::take(&mut conversions[sensor]);
-        let Some(cubics) = BiasCubics::of(calibration, sensor, &known, range_c, reference_c)?
-        else {
-            let note =
-                format!("The calibration has no curves of the {sensor}, so none are written.");
-            export.notes.push(note);
-            continue;
-        };
-        if let Some(settled_c) = cubics.settled_c {
-            export.notes.push(format!(
-                "{sensor}: the errors below are those with the scale factors of {settled_c:.1} °C."
-            ));
-        }
-        add(cubics, export);
-    }
+    each_sensor(
+        options,
+        export,
+        |sensor, known| BiasCubics::of(calibration, sensor, known, range_c, reference_c),
+        |sensor| format!("The calibration has no curves of the {sensor}, so none are written."),
+    )?;
     let places = remaining::Places {
         cross_terms: true,
         temperature: true,

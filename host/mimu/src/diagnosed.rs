@@ -31,14 +31,12 @@ pub struct Diagnosed {
 /// Those of [`diagnose`]; a given calibration with curves over temperature, or with an effect that was found anew.
 pub fn diagnosed(
     recordings: Recordings,
-    still_factor: f64,
     [second, given_name]: [Option<&str>; 2],
     created: &str,
 ) -> Result<Diagnosed> {
     let options = Options {
         method: Method::LeastSquares,
         holdout_blocks: 0,
-        still_factor,
         only: None,
     };
     let given = recordings.given;

@@ -20,7 +20,6 @@ use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::estimate::{Estimated, Observation};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
-use crate::signal::stillness::STILL_FACTOR;
 use crate::triad::Triad;
 use crate::turntable::RatedDwells;
 use crate::warning::Warning;
@@ -59,8 +58,6 @@ pub struct Options {
     pub method: Method,
     /// Number of parts that are left out in turn, contiguous blocks where that leaves the rest determined; 0: none.
     pub holdout_blocks: usize,
-    /// See [`crate::signal::stillness::STILL_FACTOR`].
-    pub still_factor: f64,
     /// Calibrate this triad only. Without a table the gyro needs the accelerometer, which is then calibrated as well.
     pub only: Option<Sensor>,
 }
@@ -83,7 +80,6 @@ impl Default for Options {
         Self {
             method: Method::LeastSquares,
             holdout_blocks: 4,
-            still_factor: STILL_FACTOR,
             only: None,
         }
     }

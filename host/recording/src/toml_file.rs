@@ -24,7 +24,12 @@ pub fn read_text(path: &Path) -> Result<String> {
 pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &str, again: Option<&str>) -> Result<T> {
     toml::from_str(text).map_err(|error| {
         let message = error.message().trim().replace('\n', ", ");
-        let missing = message.starts_with("missing field");
+        let span = error.span().unwrap_or(0..text.len());
+        let before = text.get(..span.start).unwrap_or_default();
+        let line = before.rsplit('\n').next().unwrap_or_default();
+        let whole_file = span == (0..text.len());
+        // Only what a table lacks is an error of the whole table: its heading, or the whole file.
+        let missing = whole_file || (line.trim().is_empty() && text[before.len()..].starts_with('['));
         let remedy = match (again, missing) {
             (Some(again), true) => {
                 format!("the file is cut or was edited: copy it again, or {again}")
@@ -33,17 +38,13 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &str, again: Option<&s
             (None, true) => "add the key".to_owned(),
             (None, false) => "correct the line".to_owned(),
         };
-        // A key that is missing at the top has the whole file for its place.
-        let start = error.span().map(|span| span.start.min(text.len()));
-        let whole = missing && start == Some(0);
-        let place = match start.and_then(|start| text.get(..start)) {
-            Some(before) if !whole => {
-                let line = line_after(before.as_bytes());
-                let key = before.rsplit('\n').next().and_then(|l| l.split_once('='));
-                let key = key.map_or(String::new(), |(key, _)| format!(", {}", key.trim()));
-                format!("{place}, line {line}{key}")
-            }
-            _ => place.to_owned(),
+        let place = if whole_file {
+            place.to_owned()
+        } else {
+            let key = line
+                .split_once('=')
+                .map_or(String::new(), |(key, _)| format!(", {}", key.trim()));
+            format!("{place}, line {}{key}", line_after(before.as_bytes()))
         };
         Error::new(place, message, remedy)
     })
@@ -79,6 +80,7 @@ mod tests {
             let error = parse_toml::<File>(text, "a.toml", Some("make it again")).unwrap_err();
             error.to_string()
         };
+        let lacks_a_key = |text: &str| refused(text).contains("the file is cut or was edited");
         for (text, begins, contains) in [
             ("rate_hz = \"a\"\n", "a.toml, line 1, rate_hz: ", "f64"),
             ("rate_hz = 1\nrate = 2\n", "a.toml, line 2: ", "`rate`"),
@@ -96,6 +98,7 @@ mod tests {
                 line.ends_with("or make it again") && !line.contains('\n'),
                 "{line}"
             );
+            assert_eq!(lacks_a_key(text), line.contains("missing field"), "{line}");
         }
     }
 }

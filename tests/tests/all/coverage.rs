@@ -208,7 +208,6 @@ fn options(holdout_blocks: usize) -> Options {
         method: Method::LeastSquares,
         holdout_blocks,
         only: None,
-        still_factor: STILL_FACTOR,
     }
 }
 

@@ -6,7 +6,6 @@ use mimu::diagnose::{Diagnosis, Verdict, diagnose};
 use mimu::effects;
 use mimu::fit::{Method, Options};
 use mimu::quantity::Sensor;
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_tests::blind::{Case, case, is_right, plan, reported, unit};
@@ -19,7 +18,6 @@ fn options() -> Options {
         method: Method::LeastSquares,
         holdout_blocks: 0,
         only: None,
-        still_factor: STILL_FACTOR,
     }
 }
 

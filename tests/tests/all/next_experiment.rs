@@ -5,7 +5,6 @@ use mimu::effects;
 use mimu::fit::{Method, Options};
 use mimu::plan::next_experiment::prediction::Target;
 use mimu::plan::next_experiment::{Next, Setup, next, smallest};
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile};
 use mimu_tests::bench;
@@ -45,7 +44,6 @@ fn diagnosed(plan: &str, unit: &RigFile, seed: u64) -> Diagnosis {
         method: Method::LeastSquares,
         holdout_blocks: 0,
         only: None,
-        still_factor: STILL_FACTOR,
     };
     diagnose(bench::recorded(plan, unit, seed).into(), options).unwrap()
 }

@@ -9,7 +9,6 @@ use mimu::fit::{Method, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
@@ -18,7 +17,6 @@ use mimu_tests::bench;
 const OPTIONS: Options = Options {
     method: Method::LeastSquares,
     holdout_blocks: 0,
-    still_factor: STILL_FACTOR,
     only: None,
 };
 

@@ -17,7 +17,6 @@ use mimu_tests::recordings::{Foreign, data_set};
 const OPTIONS: Options = Options {
     method: Method::LeastSquares,
     holdout_blocks: 0,
-    still_factor: STILL_FACTOR,
     only: None,
 };
 

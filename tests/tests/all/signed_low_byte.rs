@@ -14,7 +14,6 @@ const RIG: &str = include_str!("../../../rig/rigs/sign-extension.toml");
 const OPTIONS: Options = Options {
     method: Method::LeastSquares,
     holdout_blocks: 0,
-    still_factor: STILL_FACTOR,
     only: None,
 };
 

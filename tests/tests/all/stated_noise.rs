@@ -5,7 +5,6 @@ use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::budget::DwellNoise;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_rig::random::Random;
 use mimu_tests::bench;
@@ -27,7 +26,6 @@ fn gyro_floor(prepared: Prepared) -> f64 {
         method: Method::LeastSquares,
         holdout_blocks: 0,
         only: None,
-        still_factor: STILL_FACTOR,
     };
     let fitted = fit(prepared, options).unwrap();
     fitted.sensor(Sensor::Gyro).unwrap().noise_floor()

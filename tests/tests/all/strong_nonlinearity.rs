@@ -3,7 +3,6 @@
 use mimu::diagnose::{Verdict, diagnose};
 use mimu::fit::{Method, Options};
 use mimu::quantity::Sensor;
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu_rig::random::Random;
 use mimu_tests::bench;
 use mimu_tests::by_hand::{Grade, plan, unit};
@@ -25,7 +24,6 @@ fn turns(seed: u64) -> f64 {
         method: Method::LeastSquares,
         holdout_blocks: 0,
         only: None,
-        still_factor: STILL_FACTOR,
     };
     let recorded = bench::recorded(&plan(seed), &file, seed);
     let diagnosis = diagnose(recorded.into(), options).unwrap();

@@ -12,7 +12,6 @@ use mimu::plan::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu_cli::report::{Detail, Made, diagnosis_page, diagnosis_text};
 use mimu_recording::Recorded;
 use mimu_rig::random::Random;
@@ -23,7 +22,6 @@ use rayon::prelude::*;
 const OPTIONS: Options = Options {
     method: Method::LeastSquares,
     holdout_blocks: 0,
-    still_factor: STILL_FACTOR,
     only: None,
 };
 

@@ -90,7 +90,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<()> {
     let all = all.chain(&recordings.second);
     let problems: Vec<_> = all.flat_map(OfRecording::prepared).collect();
     let several = args.recordings.len() > 1 || args.verify.is_some();
-    let done = diagnosed(recordings, args.still.factor, by, &now)
+    let done = diagnosed(recordings, by, &now)
         .inspect_err(|error| refused(error, &problems, several, Some(&args.json)))?;
     let Diagnosed {
         diagnosis,

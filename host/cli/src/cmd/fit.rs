@@ -81,7 +81,6 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
             Some(MethodArg::SixPositions) => Method::SixPositions,
         },
         holdout_blocks: args.holdout,
-        still_factor: args.still.factor,
         only: args.only.map(SensorArg::sensor),
     };
     let outputs = [args.output.as_deref(), args.json.file()];

@@ -102,7 +102,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         true => None,
         false => {
             let all = || recordings.iter().chain(&others);
-            let done = found(&recordings, &others, args.still.factor, &now);
+            let done = found(&recordings, &others, &now);
             let refused = |error: &Error| {
                 let problems: Vec<_> = all().flat_map(|r| OfRecording::prepared(&r.1)).collect();
                 refused(error, &problems, all().count() > 1, None);
@@ -157,7 +157,6 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
 fn found(
     recordings: &[(String, Prepared)],
     others: &[(String, Prepared)],
-    still_factor: f64,
     created: &str,
 ) -> Result<Diagnosed> {
     let mut all = recordings.iter().map(|r| r.1.clone());
@@ -175,5 +174,5 @@ fn found(
         given: None,
         accept: Vec::new(),
     };
-    diagnosed(recordings, still_factor, [None, None], created)
+    diagnosed(recordings, [None, None], created)
 }

@@ -84,7 +84,6 @@ fn the_effect_that_is_drawn_is_the_one_that_the_unit_has() {
     let options = Options {
         method: Method::LeastSquares,
         holdout_blocks: 0,
-        still_factor: STILL_FACTOR,
         only: None,
     };
     let found = diagnose(prepared.into(), options).unwrap();

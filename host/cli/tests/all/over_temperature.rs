@@ -131,7 +131,6 @@ fn calibrations(folder: &Path) {
     let options = Options {
         method: Method::LeastSquares,
         holdout_blocks: 0,
-        still_factor: STILL_FACTOR,
         only: None,
     };
     let fit = fit(prepared, options).unwrap();

@@ -138,7 +138,6 @@ fn after(path: &Path, args: &DesignArgs) -> Result<Fit> {
     let options = Options {
         method: Method::LeastSquares,
         holdout_blocks: 0,
-        still_factor: STILL_FACTOR,
         only: None,
     };
     fit(prepared, options)

@@ -11,7 +11,6 @@ use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::blocks::Moments;
 use mimu::signal::dwell::Fault;
-use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::RawUnit;
 
 use super::unit::{SAG, fitted, named, prepared, record};
@@ -159,7 +158,6 @@ fn a_given_calibration_has_to_fit_the_recording() {
         method: Method::LeastSquares,
         holdout_blocks: 0,
         only: None,
-        still_factor: STILL_FACTOR,
     };
     let refusal = |first: Prepared, given: &Calibration| {
         let recordings = Recordings {
@@ -203,7 +201,6 @@ fn a_single_dwell_beside_a_given_calibration_leaves_nothing_to_find() {
         method: Method::LeastSquares,
         holdout_blocks: 0,
         only: None,
-        still_factor: STILL_FACTOR,
     };
     match diagnose(recordings, options) {
         Ok(found) => assert!(found.effects.is_empty()),

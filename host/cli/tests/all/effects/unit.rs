@@ -154,7 +154,6 @@ pub fn fitted(folder: &Path) -> Fit {
     let options = Options {
         method: Method::LeastSquares,
         holdout_blocks: 0,
-        still_factor: STILL_FACTOR,
         only: None,
     };
     fit(prepared(folder), options).unwrap()

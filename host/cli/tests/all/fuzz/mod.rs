@@ -25,6 +25,7 @@ use mimu::fit::{Fit, Method, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::fit::FitResult;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_cli::report;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{
@@ -162,8 +163,11 @@ fn options(random: &mut Random) -> Options {
         method: methods[if random.one_in(2) { 0 } else { random.below(4) }],
         holdout_blocks: [0, 2, 4, 1000][random.below(4)],
         only: [None, None, Some(Sensor::Gyro), Some(Sensor::Accel)][random.below(4)],
-        still_factor: [10.0, 1.0, 1e9][if random.one_in(2) { 0 } else { random.below(3) }],
     }
+}
+
+fn still_factor(random: &mut Random) -> f64 {
+    [10.0, 1.0, 1e9][if random.one_in(2) { 0 } else { random.below(3) }]
 }
 
 fn write_recording(folder: &Path, manifest: &[u8], name: &str, samples: &[u8]) {
@@ -177,12 +181,9 @@ fn manifest(reference: &str) -> Vec<u8> {
     MANIFEST.replace("REFERENCE", reference).into_bytes()
 }
 
-fn fit_recording(folder: &Path, options: Options) -> Result<Fit> {
+fn fit_recording(folder: &Path, still_factor: f64, options: Options) -> Result<Fit> {
     let recording = Recording::open(folder)?;
-    fit(
-        Prepared::read(&recording, options.still_factor, |_| {})?,
-        options,
-    )
+    fit(Prepared::read(&recording, still_factor, |_| {})?, options)
 }
 
 impl Seeds {
@@ -198,7 +199,6 @@ impl Seeds {
             method: Method::LeastSquares,
             holdout_blocks: 4,
             only: None,
-            still_factor: 10.0,
         };
         let mut calibration = String::new();
         let mut parquet = Vec::new();
@@ -209,7 +209,8 @@ impl Seeds {
                 "samples.csv",
                 text.as_bytes(),
             );
-            let fitted = fit_recording(&folder.join("seed"), options).expect("the seeds are valid");
+            let fitted = fit_recording(&folder.join("seed"), STILL_FACTOR, options)
+                .expect("the seeds are valid");
             calibration = Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z")
                 .unwrap()
                 .to_toml();
@@ -287,7 +288,7 @@ fn numbers(fit: &Fit) -> std::result::Result<(), String> {
 
 /// Runs one case; what is wrong with its answer.
 fn run(seeds: &Seeds, folder: &Path, random: &mut Random) -> std::result::Result<bool, String> {
-    let options = options(random);
+    let (still, options) = (still_factor(random), options(random));
     let recording = folder.join("rec");
     let answer = match random.below(8) {
         0..=3 => {
@@ -301,7 +302,7 @@ fn run(seeds: &Seeds, folder: &Path, random: &mut Random) -> std::result::Result
                 false => mutate_numbers(text, random),
             };
             write_recording(&recording, &manifest, "samples.csv", &samples);
-            fit_recording(&recording, options).map(Some)
+            fit_recording(&recording, still, options).map(Some)
         }
         4 => {
             let (bytes, reference) = &seeds.parquet[random.below(seeds.parquet.len())];
@@ -312,7 +313,7 @@ fn run(seeds: &Seeds, folder: &Path, random: &mut Random) -> std::result::Result
                 }
             }
             write_recording(&recording, &manifest(reference), "samples.parquet", &bytes);
-            fit_recording(&recording, options).map(Some)
+            fit_recording(&recording, still, options).map(Some)
         }
         5 => {
             let (text, reference) = &seeds.csv[random.below(seeds.csv.len())];
@@ -322,11 +323,11 @@ fn run(seeds: &Seeds, folder: &Path, random: &mut Random) -> std::result::Result
                 "samples.csv",
                 text.as_bytes(),
             );
-            fit_recording(&recording, options).map(Some)
+            fit_recording(&recording, still, options).map(Some)
         }
         6 => verify_mutated(seeds, &recording, random).map(|()| None),
         _ => import_mutated(seeds, folder, random)
-            .and_then(|()| fit_recording(&recording, options).map(Some)),
+            .and_then(|()| fit_recording(&recording, still, options).map(Some)),
     };
     match answer {
         Ok(Some(fit)) => numbers(&fit).map(|()| true),
