@@ -1,4 +1,4 @@
-//! An effect as files have it: a table of named numbers with their units.
+//! An effect as written in files: a table of named numbers with their units.
 
 use mimu_core::effects::FARTHEST_ZERO;
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
 use crate::quantity::{AXES, Sensor, significant};
 
-/// How the coefficients of an effect are applied: e is the error of the three sensors, S the norms of the rows of P.
+/// How the coefficients of an effect are applied: e is the error of the three sensors, S is diagonal with the norms of the rows of P.
 const FORMULA: &str = "x = C (u - S e) + o, e_i = sum of coefficient * regressor";
 const DIRECTION: &str = "raw to SI";
 
@@ -135,7 +135,7 @@ impl WrittenParameter {
 }
 
 impl WrittenConverter {
-    /// Those of some axes, one for each unless all are the same.
+    /// Converters of the axes: one for each, or one if all are the same.
     pub(super) fn of(codes: &Codes) -> Vec<Self> {
         let one = |axes: &str, converter: &Converter| Self {
             axes: axes.into(),
@@ -153,7 +153,7 @@ impl WrittenConverter {
         }
     }
 
-    /// Those of the axes, or what is wrong.
+    /// The converters of the axes, or what is wrong.
     fn codes(all: &[Self]) -> Result<Codes, String> {
         let mut codes: Codes = [None; 3];
         for one in all {
@@ -209,7 +209,7 @@ impl WrittenConverter {
 }
 
 impl WrittenEffect {
-    /// What it states, or what is wrong.
+    /// The effect that is written, or what is wrong.
     fn read(self) -> Result<FittedEffect, String> {
         let candidate = candidate(&self.id);
         let mut candidate = candidate.ok_or("this version does not know an effect of this id")?;
@@ -326,7 +326,7 @@ pub(crate) fn candidate(id: &str) -> Option<Candidate> {
         let quantity = all.find(|q| q.name().as_deref() == Some(name))?;
         quantities.extend(std::iter::repeat_n(quantity, power));
     }
-    // One spelling for each.
+    // Each product has one valid spelling.
     let term = Product::term(&quantities).filter(|p| p.name() == product)?;
     Some(Candidate::new(sensor, CandidateKind::Term(axis, term)))
 }
