@@ -31,7 +31,7 @@ pub struct FittedEffect {
     pub interval: Option<Interval>,
     /// Coefficients, SI, in the order of the candidate's active ones.
     pub values: Vec<f64>,
-    /// Their standard deviations, whatever the nonlinear parameter is; empty where they are not known, as on a device.
+    /// Their standard deviations, which include the uncertainty of the nonlinear parameter; empty if unknown, as on a device.
     pub sigmas: Vec<f64>,
 }
 
