@@ -80,18 +80,18 @@ pub struct Calibration {
     pub format: String,
     /// Unit that it is for.
     pub device: String,
-    /// The unit's own number, where it was recorded by `mimu record`: 24 hexadecimal digits.
+    /// The unit's own number, if `mimu record` recorded it: 24 hexadecimal digits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit_id: Option<String>,
-    /// When it was made, RFC 3339; unknown of one that a device did not keep it of.
+    /// When it was made, RFC 3339; absent if it comes from a device that does not store this.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub created: Option<String>,
-    /// When its offsets were set anew on the device, everything else kept, RFC 3339.
+    /// When its offsets were trimmed on the device, RFC 3339; everything else was kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trimmed: Option<String>,
     /// Program and version that made it.
     pub tool: String,
-    /// What it was made from.
+    /// The recording that it was made from.
     pub recording: Origin,
     /// Gyro triad.
     #[serde(default)]
@@ -102,7 +102,7 @@ pub struct Calibration {
     /// The models over temperature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<OverTemperature>,
-    /// What the affine models lack.
+    /// Errors that the affine models lack.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     effects: Vec<FittedEffect>,
 }
@@ -115,14 +115,14 @@ pub struct Origin {
     /// SHA-256 of its samples file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// What was known of its input; a device does not keep it.
+    /// The known part of its input; a device does not store it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
     pub reference: Option<Reference>,
     /// Unit of its raw columns.
     #[cfg_attr(feature = "schema", schemars(with = "String", extend("enum" = ["V", "count", "SI"])))]
     pub raw_unit: RawUnit,
-    /// Local gravity, m/s²; a device does not keep it.
+    /// Local gravity, m/s²; a device does not store it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity_mps2: Option<f64>,
     /// Mean temperature of the dwells, °C, if known.
@@ -133,8 +133,8 @@ pub struct Origin {
     pub temp_range_c: Option<[f64; 2]>,
 }
 
-/// One triad in a calibration file. Standard deviations, intervals, covariance and error figures are there all together, or not at all, as
-/// in a calibration that was fetched from a device, which keeps none.
+/// One triad in a calibration file. Standard deviations, intervals, covariance and error figures are all present or all absent. They are absent in a
+/// calibration that was fetched from a device, which stores none.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -173,12 +173,12 @@ pub struct TriadTable {
     /// 12x12.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
-    /// How well it did.
+    /// Error figures of its fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub judged: Option<Judged>,
-    /// The same calibration the other way.
+    /// The same calibration in the other direction.
     pub forward: ForwardTable,
-    /// And as physical quantities.
+    /// The same calibration as physical quantities.
     pub physical: PhysicalTable,
 }
 
@@ -189,16 +189,16 @@ pub struct TriadTable {
 pub struct Judged {
     /// How it was estimated.
     pub estimator: String,
-    /// What the figures are about.
+    /// The quantity that the figures describe.
     pub figure: String,
     /// Unit of the figures.
     pub unit: String,
-    /// On the data it was fitted to.
+    /// Rms error in sample.
     pub rms: f64,
-    /// On data it had not seen.
+    /// Rms error held out.
     #[serde(default)]
     pub held_out_rms: Option<f64>,
-    /// With noise alone; absent where the noise is unknown.
+    /// Rms error by noise alone; absent if the noise is unknown.
     #[serde(default)]
     pub noise_floor: Option<f64>,
     /// Dwells used.
@@ -228,7 +228,7 @@ pub struct ForwardTable {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PhysicalTable {
-    /// How `P` is made of them.
+    /// Formula of `P`.
     pub formula: String,
     /// Raw per SI.
     pub scale_factor: [f64; 3],

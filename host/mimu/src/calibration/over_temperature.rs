@@ -21,7 +21,7 @@ use mimu_recording::error::{Error, Result};
 pub struct OverTemperature {
     /// Dies' temperatures in the recordings that it was fitted to, °C.
     pub range_c: [f64; 2],
-    /// Whether only the biases were followed over temperature, and C is that of one temperature.
+    /// Whether only the biases depend on temperature, and C is that of one temperature.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub biases_only: bool,
     /// What is known of the dies of each triad.
@@ -41,11 +41,10 @@ pub struct DieTable {
     /// Lag behind the thermometer, s; negative: they lead. `None`: not determined, and none is applied.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lag_s: Option<f64>,
-    /// Bounds of it with 95 %, s.
+    /// 95 % interval of the lag, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_lag_s: Option<[f64; 2]>,
-    /// What heating and cooling differ by in the biases after the lag, axis by axis, SI: rms over the range, and the largest. `None`: not
-    /// known.
+    /// Difference of the biases between heating and cooling after the lag, axis by axis, SI: rms over the range, and the largest. `None`: not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hysteresis: Option<[[f64; 3]; 2]>,
 }
@@ -100,7 +99,7 @@ pub struct NodeTable {
     /// Standard deviations of o.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_o: Option<[f64; 3]>,
-    /// Standard deviations of the scale factors, raw per SI. They do not follow from those of C and o, whose errors go together.
+    /// Standard deviations of the scale factors, raw per SI. They do not follow from those of C and o, whose errors are correlated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_scale_factor: Option<[f64; 3]>,
     /// Standard deviations of the biases, raw.

@@ -33,7 +33,7 @@ pub(super) struct WrittenEffect {
     /// Its nonlinear parameter, if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     form: Option<WrittenParameter>,
-    /// Of errors by the code: the converters, of all axes or one each.
+    /// For errors that depend on the code: one converter for all axes, or one for each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     converters: Vec<WrittenConverter>,
     /// Those that the experiment determined; the others are zero.
@@ -49,10 +49,10 @@ pub struct WrittenParameter {
     pub name: String,
     /// Value.
     pub value: f64,
-    /// Lower end of its 95 % interval; `None` where the smallest value that was tried is within, or it is not known.
+    /// Lower end of its 95 % interval; `None` if the interval includes the smallest value that was tried, or is not known.
     #[serde(default)]
     pub lower: Option<f64>,
-    /// Upper end; `None` where the largest is within, or it is not known.
+    /// Upper end; `None` if the interval includes the largest value, or is not known.
     #[serde(default)]
     pub upper: Option<f64>,
     /// Smallest value that is tried.
@@ -70,11 +70,11 @@ pub struct WrittenParameter {
 pub struct WrittenConverter {
     /// Axes whose readings it gives: x, y or z, or xyz.
     pub axes: String,
-    /// Of its first bit, raw.
+    /// Weight of its first bit, raw.
     pub weight_of_bit_0_raw: f64,
     /// Reading of its code 0, raw.
     pub reading_of_code_0_raw: f64,
-    /// The last is known to within so much, raw, with 95 %; 0 where it is taken as given, as every diagnosis does now.
+    /// 95 % uncertainty of `reading_of_code_0_raw`, raw; 0 if that is taken as given, as every diagnosis does now.
     pub reading_of_code_0_within_raw: f64,
 }
 
