@@ -55,7 +55,7 @@ pub enum Method {
 /// What to fit and how to judge it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Estimator where the input is known.
+    /// Estimator if the input is known.
     pub method: Method,
     /// Number of parts that are held out in turn: contiguous blocks, if the rest determines the model. 0: none.
     pub holdout_blocks: usize,
@@ -106,7 +106,7 @@ pub struct Fit {
     pub sensors: Vec<SensorFit>,
     /// Changes of the parameters by leaving out dwells and turns; empty if none was left out.
     pub changes: Vec<change::Change>,
-    /// What a person should know about the recording.
+    /// Warnings about the recording.
     pub warnings: Vec<Warning>,
 }
 

@@ -45,7 +45,7 @@ pub struct KnownConversion {
 pub struct Remainder {
     /// Where it comes from.
     pub source: &'static str,
-    /// For which input or state it holds.
+    /// Input or state for which it holds.
     pub condition: &'static str,
     /// Root of the mean square, SI; `None` if it is not known.
     pub rms: Option<f64>,

@@ -44,7 +44,7 @@ impl Calibration {
     /// The device makes the same bytes of it.
     ///
     /// # Errors
-    /// An effect that this program does not know; `place` is where it comes from.
+    /// An effect that this program does not know; `place` names its source.
     pub fn of_device(stored: &DeviceCalibration, place: &str) -> Result<Self> {
         let singular = || Error::new(place, "C is singular", "upload a calibration again");
         let temperatures: Vec<f64> = stored.nodes.iter().map(|n| f64::from(n.temp_c)).collect();

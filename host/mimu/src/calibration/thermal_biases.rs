@@ -44,7 +44,7 @@ pub struct ThermalBiases {
     pub tool: String,
     /// Dies' temperatures in the recordings that it was fitted to, °C.
     pub range_c: [f64; 2],
-    /// What it was made from.
+    /// The recording that it was made from.
     pub recording: Origin,
     /// What is known of the dies of each triad. Its hysteresis is raw.
     #[serde(default)]
@@ -132,7 +132,7 @@ pub struct RestOfUnit {
     pub device: String,
     /// Its own number, if it is known.
     pub unit_id: Option<String>,
-    /// What it was made from.
+    /// The recording that it was made from.
     pub recording: Origin,
     /// Dies' temperatures, °C.
     pub range_c: [f64; 2],

@@ -42,7 +42,7 @@ pub struct SensorVerification {
     pub noise_floor: f64,
     /// SI unit of the figures.
     pub unit: &'static str,
-    /// What they are about.
+    /// The quantity that they describe.
     pub figure: Figure,
     /// Dwells or turns judged.
     pub count: usize,

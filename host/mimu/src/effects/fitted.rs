@@ -27,7 +27,7 @@ pub struct FittedEffect {
     pub candidate: Candidate,
     /// Its nonlinear parameter, 0 if it has none.
     pub parameter: f64,
-    /// 95 % interval of its nonlinear parameter; `None` where it has none, or it is not known.
+    /// 95 % interval of its nonlinear parameter; `None` if it has none, or if it is not known.
     pub interval: Option<Interval>,
     /// Coefficients, SI, in the order of the candidate's active ones.
     pub values: Vec<f64>,

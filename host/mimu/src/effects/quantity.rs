@@ -1,4 +1,4 @@
-//! What an error can be a function of: the state and the surroundings of a unit.
+//! Quantities on which an error can depend: the state and the surroundings of a unit.
 
 use nalgebra::Vector3;
 
@@ -33,7 +33,7 @@ pub struct Conditions {
     pub angular_acceleration: Vector3<f64>,
     /// The sensor's own input along its three sensitive directions, rad/s or m/s².
     pub sensed: Vector3<f64>,
-    /// Temperature above [`REFERENCE_C`], °C; not a number where it was not recorded.
+    /// Temperature above [`REFERENCE_C`], °C; not a number if it was not recorded.
     pub temperature_offset: f64,
     /// The same behind a first-order lag: that of the effect, or [`RATE_LAG_S`].
     pub lagged_temperature: f64,

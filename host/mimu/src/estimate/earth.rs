@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 /// Rate of the Earth, rad/s (WGS 84).
 pub const RATE: f64 = 7.292_115e-5;
 
-/// What is known of the Earth's rate.
+/// The known part of the Earth's rate, and the variance of the rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Earth {
     /// About the vertical, up positive, rad/s; 0 if the latitude is unknown, and `earth_rate` is then an effect to be found.

@@ -3,11 +3,11 @@
 //! | module            | reference | what it is                                               |
 //! |-------------------|-----------|----------------------------------------------------------|
 //! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form, six positions |
-//! | [`moving_input`]  | table     | the same least squares where inputs move within dwells     |
+//! | [`moving_input`]  | table     | the same least squares if inputs move within dwells        |
 //! | [`magnitude`]     | gravity, turntable | accelerometer from the magnitude of gravity over many poses; gyro from that of a turntable's rate |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
 //! | [`with_turns`]    | gravity   | accelerometer from magnitudes and turns together         |
-//! | [`turn`]          | gravity   | one turn, and where a calibration carries gravity in it   |
+//! | [`turn`]          | gravity   | one turn, and the direction of gravity predicted after it |
 //! | [`chains`]        | gravity   | dwells that turns connect one to the next                 |
 //! | [`earth`]         | gravity   | the Earth's rate in the gyro's readings                   |
 //! | [`least_squares`] | both      | the algebra under all of them                            |
@@ -65,7 +65,7 @@ pub struct Estimated {
     pub scatter: Vec<(Observable, Scatter)>,
     /// Condition number of the scaled design.
     pub condition: f64,
-    /// Delays of the readings, where moving inputs show them.
+    /// Delays of the readings, if moving inputs determine them.
     pub delays: Option<Delays>,
     /// What a person should know.
     pub notes: Vec<Warning>,

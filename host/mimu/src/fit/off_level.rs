@@ -20,7 +20,7 @@ const FEW: usize = 12;
 /// Fewest degrees of freedom for this part. With six faces an axis has one: whether it reads the same bias on the two other pairs.
 const FEWEST_FREE: usize = 3;
 
-/// A dwell: its error, and where its force is.
+/// A dwell: its error and its known force.
 struct Dwell<'a> {
     residual: &'a Residual,
     force: Vector3<f64>,

@@ -29,7 +29,7 @@ pub struct SensorFit {
     pub sensor: Sensor,
     /// Calibration, scatter and condition.
     pub estimated: Estimated,
-    /// What the error figures are about.
+    /// The quantity that the error figures describe.
     pub figure: Figure,
     /// One for every dwell or turn that was used; for dwells whose input moves, also those within them.
     pub residuals: Vec<Residual>,

@@ -308,7 +308,7 @@ impl WrittenEffect {
     }
 }
 
-/// The candidate of an id that a calibration may hold, with all of its coefficients.
+/// The candidate of an id that a calibration may contain, with all of its coefficients.
 pub(crate) fn candidate(id: &str) -> Option<Candidate> {
     let Some(term) = id.strip_prefix("term:") else {
         let effect = crate::effects::by_id(id).filter(|e| e.is_error() && !e.is_of_session())?;
