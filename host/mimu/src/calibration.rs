@@ -38,9 +38,9 @@ use mimu_recording::{Manifest, RawUnit, Reference, parse_toml, read_text};
 
 /// Version of the layout of a calibration at one temperature.
 const FORMAT: &str = "mimu-calibration/1";
-/// Version of one with curves over temperature: a program that does not know them refuses it by this, and does not apply the one model.
+/// Version of the layout with curves over temperature. A program that does not know curves refuses it, instead of applying the one model.
 const FORMAT_OF_CURVES: &str = "mimu-calibration/2";
-/// How a triad's numbers are applied, and from what to what.
+/// The formula that applies a triad's numbers, and its direction.
 const FORMULA: &str = "x = C u + o";
 const INVERSE_DIRECTION: &str = "raw to SI";
 
@@ -80,18 +80,18 @@ pub struct Calibration {
     pub format: String,
     /// Unit that it is for.
     pub device: String,
-    /// The unit's own number, where it was recorded by `mimu record`: 24 hexadecimal digits.
+    /// The unit's own number, if `mimu record` recorded it: 24 hexadecimal digits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit_id: Option<String>,
-    /// When it was made, RFC 3339; unknown of one that a device did not keep it of.
+    /// When it was made, RFC 3339; absent if it comes from a device that does not store this.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub created: Option<String>,
-    /// When its offsets were set anew on the device, everything else kept, RFC 3339.
+    /// When its offsets were trimmed on the device, RFC 3339; everything else was kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trimmed: Option<String>,
     /// Program and version that made it.
     pub tool: String,
-    /// What it was made from.
+    /// The recording that it was made from.
     pub recording: Origin,
     /// Gyro triad.
     #[serde(default)]
@@ -102,7 +102,7 @@ pub struct Calibration {
     /// The models over temperature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<OverTemperature>,
-    /// What the affine models lack.
+    /// Errors that the affine models lack.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     effects: Vec<FittedEffect>,
 }
@@ -115,14 +115,14 @@ pub struct Origin {
     /// SHA-256 of its samples file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// What was known of its input; a device does not keep it.
+    /// The known part of its input; a device does not store it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
     pub reference: Option<Reference>,
     /// Unit of its raw columns.
     #[cfg_attr(feature = "schema", schemars(with = "String", extend("enum" = ["V", "count", "SI"])))]
     pub raw_unit: RawUnit,
-    /// Local gravity, m/s²; a device does not keep it.
+    /// Local gravity, m/s²; a device does not store it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity_mps2: Option<f64>,
     /// Mean temperature of the dwells, °C, if known.
@@ -133,8 +133,8 @@ pub struct Origin {
     pub temp_range_c: Option<[f64; 2]>,
 }
 
-/// One triad in a calibration file. Standard deviations, intervals, covariance and error figures are there all together, or not at all, as
-/// in a calibration that was fetched from a device, which keeps none.
+/// One triad in a calibration file. Standard deviations, intervals, covariance and error figures are all present or all absent. They are absent in a
+/// calibration that was fetched from a device, which stores none.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -173,12 +173,12 @@ pub struct TriadTable {
     /// 12x12.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
-    /// How well it did.
+    /// Error figures of its fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub judged: Option<Judged>,
-    /// The same calibration the other way.
+    /// The same calibration in the other direction.
     pub forward: ForwardTable,
-    /// And as physical quantities.
+    /// The same calibration as physical quantities.
     pub physical: PhysicalTable,
 }
 
@@ -189,16 +189,16 @@ pub struct TriadTable {
 pub struct Judged {
     /// How it was estimated.
     pub estimator: String,
-    /// What the figures are about.
+    /// The quantity that the figures describe.
     pub figure: String,
     /// Unit of the figures.
     pub unit: String,
-    /// On the data it was fitted to.
+    /// Rms error in sample.
     pub rms: f64,
-    /// On data it had not seen.
+    /// Rms error held out.
     #[serde(default)]
     pub held_out_rms: Option<f64>,
-    /// With noise alone; absent where the noise is unknown.
+    /// Rms error by noise alone; absent if the noise is unknown.
     #[serde(default)]
     pub noise_floor: Option<f64>,
     /// Dwells used.
@@ -228,7 +228,7 @@ pub struct ForwardTable {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PhysicalTable {
-    /// How `P` is made of them.
+    /// Formula of `P`.
     pub formula: String,
     /// Raw per SI.
     pub scale_factor: [f64; 3],
@@ -259,8 +259,7 @@ impl Calibration {
         Self::parse(&text, &path.display().to_string())
     }
 
-    /// Parses and checks the text of a calibration file; `place` is its path. Refused, by its name, is a file of
-    /// [biases alone](thermal_biases).
+    /// Parses and checks the text of a calibration file; `place` is its path. A file of [biases alone](thermal_biases) is refused by its name.
     pub fn parse(text: &str, place: &str) -> Result<Self> {
         if thermal_biases::is_one(text) {
             return Err(thermal_biases::refusal(place));
@@ -286,18 +285,18 @@ impl Calibration {
         crate::toml_layout::to_toml(&format!("{HEADER}{effects}{curves}{keys}"), self)
     }
 
-    /// What the affine models lack.
+    /// The errors that the affine models lack.
     pub fn effects(&self) -> &[FittedEffect] {
         &self.effects
     }
 
-    /// The same as the device removes it, up to N effects of each triad that run with every sample and N that do not.
-    /// Refused, by its id, is one that this build of `core` cannot remove.
+    /// The effects as the device removes them: for each triad, up to N that run with every sample and N that do not. One that this build of `core`
+    /// cannot remove is refused by its id.
     pub fn core_effects<T: RealField + Copy, const N: usize>(&self) -> Result<Effects<T, N>> {
         on_device::core_effects(self)
     }
 
-    /// The same where a sensor that is not calibrated has a stand-in among `models`.
+    /// The same, with a substitute among `models` for a sensor that is not calibrated.
     pub(crate) fn effects_of_models<T: RealField + Copy, const N: usize>(
         &self,
         models: &Compensation<f64>,
@@ -313,13 +312,13 @@ impl Calibration {
         }
     }
 
-    /// Whether it says how well it is known. One that was fetched from a device does not.
+    /// Whether it contains standard deviations. One that was fetched from a device does not.
     pub fn is_uncertain(&self) -> bool {
         let mut tables = [&self.gyro, &self.accel].into_iter().flatten();
         tables.all(|table| table.sigma_C.is_some())
     }
 
-    /// Whether it is of the unit that was recorded: by its number where both have one, else by its name. If not, how they differ.
+    /// A warning if it belongs to another unit than the recording. Numbers are compared if both have one, otherwise names.
     pub fn other_unit(&self, manifest: &Manifest) -> Option<Warning> {
         let (ours, theirs) = (self.device.clone(), manifest.device.clone());
         match (&self.unit_id, manifest.unit_id()) {
@@ -329,7 +328,7 @@ impl Calibration {
         }
     }
 
-    /// Covariance of the inverse model of `sensor`: C by rows, then o. None where [it is not known](Self::is_uncertain).
+    /// Covariance of the inverse model of `sensor`: C by rows, then o. `None` if [it is not known](Self::is_uncertain).
     pub fn covariance(&self, sensor: Sensor) -> Option<Covariance> {
         let table = self.table(sensor).filter(|t| !t.covariance.is_empty())?;
         Some(Covariance::from_fn(|i, j| table.covariance[i][j]))
@@ -349,7 +348,7 @@ impl Calibration {
         Curves::of(self)
     }
 
-    /// The temperatures that it is for, °C, as the device takes them; `None` if they are not known.
+    /// The temperatures for which it is valid, °C, as the device takes them; `None` if they are not known.
     pub fn limits(&self) -> Option<[f64; 2]> {
         match self.curves() {
             Some(curves) => curves.table().limits(),
@@ -357,8 +356,8 @@ impl Calibration {
         }
     }
 
-    /// The inverse model of `sensor` at a temperature of the dies, °C, raw to SI: by cubic Hermite pieces between the nodes, on along the
-    /// end slope for 5 K outside, and held from there on. Without nodes it is that of all temperatures.
+    /// The inverse model of `sensor` at a temperature of the dies, °C, raw to SI. Between nodes it follows cubic Hermite polynomials; outside it
+    /// continues along the end slope for 5 K and is constant beyond. Without nodes it is that of all temperatures.
     pub fn inverse_at(&self, sensor: Sensor, die_temp_c: f64) -> Option<Affine<f64>> {
         match self.curves() {
             Some(curves) => curves.inverse(sensor, die_temp_c),

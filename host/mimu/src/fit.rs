@@ -1,4 +1,4 @@
-//! From a recording to a calibration of both triads, judged on what it was not fitted to.
+//! From a recording to a calibration of both triads, judged on held-out data.
 
 pub(crate) mod as_came;
 mod biases;
@@ -54,9 +54,9 @@ pub enum Method {
 /// What to fit and how to judge it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Estimator where the input is known.
+    /// Estimator if the input is known.
     pub method: Method,
-    /// Number of parts that are left out in turn, contiguous blocks where that leaves the rest determined; 0: none.
+    /// Number of parts that are held out in turn: contiguous blocks, if the rest determines the model. 0: none.
     pub holdout_blocks: usize,
     /// Calibrate this triad only. Without a table the gyro needs the accelerometer, which is then calibrated as well.
     pub only: Option<Sensor>,
@@ -94,15 +94,15 @@ impl Options {
 /// Fit of a recording.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// What was fitted.
+    /// The recording that was fitted.
     pub prepared: Prepared,
-    /// How.
+    /// Options of the fit.
     pub options: Options,
-    /// Gyro, then accelerometer, as far as there are any.
+    /// Gyro, then accelerometer, if fitted.
     pub sensors: Vec<SensorFit>,
-    /// What the dwells and turns that were left out change; empty where none was.
+    /// Changes of the parameters by leaving out dwells and turns; empty if none was left out.
     pub changes: Vec<change::Change>,
-    /// What a person should know of the recording.
+    /// Warnings about the recording.
     pub warnings: Vec<Warning>,
 }
 
@@ -151,7 +151,7 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     plausible::check_readings(&prepared)?;
     let mut with_all = PerSensor::default();
     if prepared.manifest.reference == Reference::Gravity {
-        // Turns go from one dwell to the next that is not left out.
+        // Turns connect dwells that are not left out, so the poses are judged first.
         with_all.accel = leave_out(&mut prepared, outlying::poses);
         with_all.gyro = leave_out(&mut prepared, outlying::turns);
     }
@@ -170,13 +170,13 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         (_, None) => fit_gravity(&prepared, options, &mut warnings)?,
     };
     let mut changes = Vec::new();
-    // The gyro is listed first, and where gravity is the only reference depends on the accelerometer.
     for sensor in &mut sensors {
         plausible::check(&prepared, sensor)?;
     }
     let by_size = |s: &&SensorFit| s.figure == Figure::GravitySize;
     let accel = sensors.iter().find(by_size);
     let accel = accel.map(|s| s.estimated.triad.clone());
+    // The gyro is listed first. If gravity is the only reference, it depends on the accelerometer, so this is checked before it.
     for sensor in sensors.iter().rev() {
         determined::check(&prepared, sensor, accel.as_ref())?;
     }
@@ -198,7 +198,7 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     })
 }
 
-/// Leaves out what `find` finds. The answer is what everything together determines, where anything was left out.
+/// Leaves out what `find` finds. Returns the triad fitted with everything, if anything was left out.
 fn leave_out(prepared: &mut Prepared, find: impl Fn(&Prepared) -> Outlying) -> Option<Triad> {
     let mut found = find(prepared);
     prepared.leave_out(&found.left_out);
@@ -206,10 +206,10 @@ fn leave_out(prepared: &mut Prepared, find: impl Fn(&Prepared) -> Outlying) -> O
     found.with_all()
 }
 
-/// A bias of 0.1 deg/s per °C is ordinary for these sensors: five degrees are half a degree a second.
+/// A bias of 0.1 deg/s per °C is ordinary for these sensors, so five degrees change it by 0.5 deg/s.
 const ISOTHERMAL_C: f64 = 5.0;
 
-/// That no model has the temperature in it, where the dwells differ in it by more than [`ISOTHERMAL_C`].
+/// Warns that the model lacks temperature, if that of the dwells differs by more than [`ISOTHERMAL_C`].
 fn without_temperature(prepared: &Prepared) -> Option<Warning> {
     let temperatures = || {
         prepared
@@ -224,7 +224,7 @@ fn without_temperature(prepared: &Prepared) -> Option<Warning> {
     (high - low > ISOTHERMAL_C).then_some(Warning::WithoutTemperature(low, high, None))
 }
 
-/// Fewer degrees of freedom than this show no error of the model.
+/// Fewer degrees of freedom than this do not reveal errors of the model.
 const FEW_DOF: f64 = 3.0;
 
 fn finish(
@@ -237,7 +237,7 @@ fn finish(
     held_out: HoldOut,
 ) -> SensorFit {
     let mut warnings = estimated.notes.clone();
-    // Means over dwells and what moves within them determine an axis together.
+    // Means of dwells and sums within dwells determine an axis together.
     let axis = |group: Observable| match group {
         Observable::Within(axis) => Observable::Axis(axis),
         other => other,
@@ -276,7 +276,7 @@ fn finish(
     }
 }
 
-/// A recording in SI whose accelerometer reads one at rest is in g.
+/// Refuses an accelerometer in g: known forces near 1, or readings in SI near 1 at rest.
 pub(crate) fn refuse_wrong_gravity(
     prepared: &Prepared,
     sensor: Sensor,
@@ -284,7 +284,7 @@ pub(crate) fn refuse_wrong_gravity(
 ) -> Result<()> {
     let g = prepared.manifest.gravity_mps2;
     if sensor == Sensor::Accel && prepared.manifest.reference == Reference::Table {
-        // Of a force that turns the mean has another size.
+        // If a force turns, its mean has another magnitude.
         let stand = observations
             .iter()
             .filter(|o| !prepared.dwells.list[o.dwell].moves(sensor));

@@ -1,6 +1,6 @@
 //! A recording compensated by a calibration, sample by sample.
 //!
-//! By the compensator of `core`, in double precision: what the device streams is what this writes.
+//! It uses the compensator of `core`, in double precision, so it writes what the device streams.
 
 use std::path::Path;
 
@@ -21,19 +21,19 @@ use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Columns, Manifest, RawUnit, Recording, SampleFormat, Source, Writer};
 
-/// Room for effects of a triad; no calibration has as many.
+/// Room for effects of a triad, more than any calibration has.
 const ROOM: usize = 32;
-/// A step of so many periods is a gap, as for blocks.
+/// An interval of so many periods is a gap, as for blocks.
 const GAP_PERIODS: f64 = 1.5;
 
-/// What became of a recording.
+/// Result of compensating a recording.
 #[derive(Debug, Clone, Serialize)]
 pub struct Applied {
     /// `mimu-apply/1`.
     pub format: &'static str,
     /// Directory of the compensated recording.
     pub recording: String,
-    /// Rows written: as many as there were.
+    /// Rows written: as many as the recording has.
     pub rows: u64,
     /// Sensors that were compensated.
     #[serde(serialize_with = "present")]
@@ -57,10 +57,10 @@ pub struct AppliedSensor {
     pub clipped: u64,
 }
 
-/// Writes `recording`, compensated by `calibration`, to `out`: rad/s and m/s². An input that is known stays beside it.
+/// Writes `recording`, compensated by `calibration`, to `out`: rad/s and m/s². Known inputs are kept.
 ///
-/// A sample without a reading of one axis, or with one at its rail, has no input of any: its three cells are empty. Refused is a calibration for
-/// another raw unit, and one with effects that the recording lacks a channel or a temperature for.
+/// If one axis has no reading in a sample, or is at its rail, the input of no axis is known: the three cells are empty. A calibration for another raw
+/// unit is refused, and so is one with effects for which the recording lacks a channel or a temperature.
 pub fn apply(
     recording: &Recording,
     calibration: &Calibration,
@@ -112,10 +112,10 @@ pub struct Compensated<'a> {
 }
 
 impl<'a> Compensated<'a> {
-    /// Of `recording` by `calibration`; `progress` is told the share of a first pass, for rails and temperatures.
+    /// Prepares `recording` for compensation by `calibration`; `progress` receives the finished share of a first pass, for rails and temperatures.
     ///
     /// # Errors
-    /// Those of [`apply`], but for its output.
+    /// Those of [`apply`], except for its output.
     pub fn new(
         recording: &'a Recording,
         calibration: &Calibration,
@@ -178,7 +178,7 @@ impl<'a> Compensated<'a> {
         &self.warnings
     }
 
-    /// Each batch of raw samples, and the same samples compensated.
+    /// Passes each batch of raw samples to `consume`, with the same samples compensated.
     ///
     /// # Errors
     /// The recording cannot be read; those of `consume`.
@@ -194,7 +194,7 @@ impl<'a> Compensated<'a> {
     }
 }
 
-/// The manifest of the compensated recording: rails are those of raw readings, and go.
+/// The manifest of the compensated recording, without the rails, which are those of raw readings.
 fn compensated_manifest(recording: &Recording, sha256: &str) -> Manifest {
     let mut out = recording.manifest.clone();
     out.raw_unit = RawUnit::Si;
@@ -209,7 +209,7 @@ fn compensated_manifest(recording: &Recording, sha256: &str) -> Manifest {
     out
 }
 
-/// A stretch of samples over which temperature and time stand still for the calibration.
+/// A segment of samples in which the calibration treats temperature and time as constant.
 struct Slow {
     first_row: u64,
     middle_s: f64,
@@ -224,13 +224,13 @@ struct Batches {
     ids: Vec<String>,
     rails: [Rails; 6],
     period_s: f64,
-    /// In their order, and those that have been reached.
+    /// In order of time; the first `reached` have been applied.
     slow: Vec<Slow>,
     reached: usize,
-    /// When the calibration was last told the time; at first, when the power came.
+    /// Time to which the compensator has followed, s; at first that of power-on.
     told_s: f64,
     last_s: f64,
-    /// Last whole reading of each triad: what the other one's effects are a function of where it has none.
+    /// Last whole reading of each triad. The other triad's effects depend on it while this triad has none.
     held: Sample<f64>,
     counts: PerSensor<AppliedSensor>,
 }
@@ -262,7 +262,7 @@ impl Batches {
             let remedy = "record what is missing, or use a calibration without this effect";
             return Err(Error::new(place, problem, remedy));
         }
-        // Before the first temperature it is that one, as for a fit.
+        // Before the first temperature that one is used, as in a fit.
         let mut temp_c = first_temp_c.unwrap_or(f64::NAN);
         let slow = blocks.iter().map(|block| {
             if block.temp_c.mean.is_finite() {
@@ -334,7 +334,7 @@ impl Batches {
             let whole = PerSensor::from_fn(|sensor| self.take(sensor, batch, row));
             let clean = self.compensator.apply(&mut self.state, &self.held);
             if whole != PerSensor::both(true) {
-                // What is held for a sample is no reading that a difference could be taken of.
+                // A held reading must not enter a difference.
                 self.state.gap();
             }
             for (sensor, input) in clean {
@@ -359,7 +359,7 @@ impl Batches {
         }
     }
 
-    /// Takes in what a triad reads; whether all of it is there.
+    /// Takes in the reading of a triad; returns whether all of it is there.
     fn take(&mut self, sensor: Sensor, batch: &Batch, row: usize) -> bool {
         if !self.has[sensor] {
             return true;

@@ -1,5 +1,5 @@
-//! The biases of a calibration over temperature as cubics, for programs that compensate nothing else over temperature, and the error
-//! that is left because scale factors, cross terms and the lag of the dies have no place there.
+//! The biases of a calibration over temperature as cubics, for programs that compensate nothing else over temperature, and the error that remains
+//! without scale factors, cross terms and the lag of the dies.
 
 mod at_rest;
 
@@ -15,11 +15,11 @@ use mimu_recording::error::{Error, Result};
 
 /// Temperatures at which a cubic is fitted and judged.
 const POINTS: usize = 401;
-/// Narrowest range, K: a cubic over less is made of the errors of the curves.
+/// Narrowest range, K: over less, a cubic would follow the errors of the curves.
 const NARROWEST_K: f64 = 10.0;
 /// Largest share of an axis' sensitivity that may lie along the other two: beyond it, the axes are permuted.
 const MOST_ACROSS: f64 = 0.3;
-/// Rate that the thermometer is taken to change at, K/s, where the lag of the dies is judged: 2 K/min, as in a chamber.
+/// Assumed rate of change of the thermometer, K/s, to judge the lag of the dies: 2 K/min, as in a chamber.
 const RAMP_K_PER_S: f64 = 2.0 / 60.0;
 
 /// How the program converts a raw reading, axis by axis: `v_i = si_per_raw_i (u_i - zero_i)`, raw to SI.
@@ -27,11 +27,11 @@ const RAMP_K_PER_S: f64 = 2.0 / 60.0;
 pub struct Conversion {
     /// rad/s or m/s² per raw unit.
     pub si_per_raw: [f64; 3],
-    /// Raw reading that it takes for no input.
+    /// Raw reading that it takes as zero input.
     pub zero_raw: [f64; 3],
 }
 
-/// What a person knows of a conversion; the rest follows from the calibration.
+/// The given part of a conversion; the rest follows from the calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct KnownConversion {
     /// One factor for the three axes, rad/s or m/s² per raw unit.
@@ -40,14 +40,14 @@ pub struct KnownConversion {
     pub zero_raw: Option<f64>,
 }
 
-/// An error that is left, over the range of temperatures and the three axes.
+/// A remaining error, over the range of temperatures and the three axes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Remainder {
     /// Where it comes from.
     pub source: &'static str,
-    /// For which input or state it holds.
+    /// Input or state for which it holds.
     pub condition: &'static str,
-    /// Root of the mean square, SI; `None` where it is not known.
+    /// Root of the mean square, SI; `None` if it is not known.
     pub rms: Option<f64>,
     /// Largest size, SI.
     pub max: Option<f64>,
@@ -64,18 +64,18 @@ pub struct BiasCubics {
     pub reference_c: f64,
     /// °C.
     pub range_c: [f64; 2],
-    /// SI/K^k, in single precision, which is what programs hold them in.
+    /// SI/K^k, in single precision, as programs store them.
     pub coefficients: [[f64; 4]; 3],
-    /// How the readings come about.
+    /// How the program converts the readings.
     pub conversion: Conversion,
-    /// Errors that are left once the cubic is subtracted and the program is calibrated at `settled_c`.
+    /// Errors that remain once the cubic is subtracted and the program is calibrated at `settled_c`.
     pub remains: Vec<Remainder>,
-    /// Temperature at which the program's own scale factors hold, °C; `None` where the calibration says nothing about them.
+    /// Temperature at which the program's own scale factors hold, °C; `None` if the calibration does not contain them.
     pub settled_c: Option<f64>,
 }
 
 impl BiasCubics {
-    /// Of `sensor` over `range_c`, about `reference_c`; `None` if the calibration has no curves of it.
+    /// The cubics of `sensor` over `range_c`, about `reference_c`; `None` if the calibration has no curves of it.
     ///
     /// # Errors
     /// A range of less than 10 K; readings that are not those of the sensor's own axes, which a bias for each axis cannot correct.
@@ -144,14 +144,14 @@ impl BiasCubics {
         }
     }
 
-    /// What the cubics leave of `biases`.
+    /// The deviation of `biases` from the cubics.
     fn misses(&self, biases: &[Vector3<f64>]) -> Remainder {
         let misses = temperatures(self.range_c).zip(biases);
         let misses: Vec<_> = misses.map(|(t, b)| b - self.at(t)).collect();
         Remainder::of("bias, which is no cubic", "without input", &misses)
     }
 
-    /// What dies that follow the thermometer by `lag_s` change the biases by; `bias` is that at a temperature of the dies.
+    /// The change of the biases if the dies follow the thermometer by `lag_s`; `bias` gives the bias at a temperature of the dies.
     fn late(
         &self,
         biases: &[Vector3<f64>],
@@ -227,7 +227,7 @@ impl Remainder {
 }
 
 impl Conversion {
-    /// What is not known follows from the unit of the readings, or else from the model `settled` where the program is calibrated.
+    /// Unknown parts follow from the unit of the readings, or else from the model `settled` at which the program is calibrated.
     ///
     /// # Errors
     /// Readings that are not those of the sensor's own axes, which an offset and a factor for each axis cannot correct.
@@ -263,7 +263,7 @@ impl Conversion {
         Ok(conversion)
     }
 
-    /// By how much a reading changes with the input of its axis: 1 where the conversion is right.
+    /// Change of a reading with the input of its axis: 1 if the conversion is right.
     pub fn gain(&self, model: &Forward) -> Vector3<f64> {
         let factor = Vector3::from(self.si_per_raw);
         model.matrix.diagonal().component_mul(&factor)
@@ -276,7 +276,7 @@ impl Conversion {
     }
 }
 
-/// Refuses a range that no cubic follows from.
+/// Refuses a range too narrow for a cubic.
 fn wide_enough(sensor: Sensor, [from, to]: [f64; 2]) -> Result<()> {
     if to - from >= NARROWEST_K {
         return Ok(());
@@ -304,7 +304,7 @@ fn forward(curves: &Curves, sensor: Sensor, temp_c: f64) -> Result<Forward> {
     })
 }
 
-/// Coefficients, about `reference_c`, of the cubic nearest to `values` at even distances over `range_c`, in single precision.
+/// Coefficients, about `reference_c`, of the cubic nearest to evenly spaced `values` over `range_c`, in single precision.
 fn cubic(values: Vec<f64>, range_c: [f64; 2], reference_c: f64) -> [f64; 4] {
     let n = values.len();
     let half = 0.5 * (range_c[1] - range_c[0]);
@@ -315,7 +315,7 @@ fn cubic(values: Vec<f64>, range_c: [f64; 2], reference_c: f64) -> [f64; 4] {
     let weighted = DMatrix::from_fn(n, 4, |k, p| weight(k) * powers[(k, p)]);
     let with = weighted.transpose() * DVector::from_vec(values);
     let gram = weighted.transpose() * &powers;
-    // Four powers of -1 to 1 at even distances: always regular.
+    // Powers of evenly spaced points from -1 to 1: never singular.
     let a = gram
         .cholesky()
         .map_or(DVector::zeros(4), |c| c.solve(&with));
@@ -330,7 +330,7 @@ fn cubic(values: Vec<f64>, range_c: [f64; 2], reference_c: f64) -> [f64; 4] {
     expanded.map(|c| f64::from(c as f32))
 }
 
-/// What scale factors and cross terms leave, against the model where the program is calibrated.
+/// Remaining errors of scale factors and cross terms, relative to the model `settled` at which the program is calibrated.
 fn linear(
     models: &[Forward],
     settled: &Forward,
@@ -372,14 +372,14 @@ fn linear(
     ]
 }
 
-/// What the biases are off by while it heats or cools: half of what both differ by, `found` with rms and largest of the axes, and raw per
-/// unit of these.
+/// Error of the biases while the unit heats or cools: half of the difference between the two. `found` has the rms and the largest difference of the
+/// axes, and raw units per unit of these.
 fn hysteresis(found: Option<(&[[f64; 3]; 2], Vector3<f64>)>, conversion: &Conversion) -> Remainder {
     const SOURCE: &str = "hysteresis";
     let Some(([rms, largest], raw)) = found else {
         return Remainder::unknown(SOURCE, "heating and cooling have no temperature in common");
     };
-    // By the program's scale factors, which may be others than those of the calibration.
+    // By the program's scale factors, which may differ from those of the calibration.
     let half =
         |sizes: &[f64; 3], k: usize| 0.5 * sizes[k] * (raw[k] * conversion.si_per_raw[k]).abs();
     let squares: f64 = (0..3).map(|k| half(rms, k).powi(2)).sum();

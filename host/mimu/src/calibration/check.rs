@@ -1,4 +1,4 @@
-//! What a calibration file has to be to be applied.
+//! Checks whether a calibration file can be applied.
 
 use mimu_core::compensation::{Affine, Implausible};
 use mimu_core::table::{TEMPERATURE_RANGE_C, is_temperature};
@@ -12,7 +12,7 @@ use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};
 
 impl Calibration {
-    /// What can be applied.
+    /// The calibration, if it can be applied.
     pub(super) fn checked(self, place: &str) -> Result<Self> {
         self.check_format(place)?;
         for sensor in Sensor::BOTH {
@@ -142,7 +142,7 @@ impl Calibration {
 }
 
 impl TriadTable {
-    /// Of what belongs together, something that is there and something that is not.
+    /// Of the entries that belong together, one that is there and one that is missing, if there are both.
     fn half_uncertain(&self) -> Option<(&'static str, &'static str)> {
         let all = [
             ("sigma_C", self.sigma_C.is_some()),
@@ -158,7 +158,7 @@ impl TriadTable {
     }
 }
 
-/// What no sensor is, by the limits that the device has too; `slope`: derivative by the temperature, per kelvin.
+/// Why no sensor has this model, by the limits that the device has too; `slope`: derivative by the temperature, per kelvin.
 pub(super) fn implausible(model: &Affine<f64>, slope: Option<&Affine<f64>>) -> Option<String> {
     model.check(slope).err().map(|problem| problem.to_string())
 }

@@ -1,8 +1,8 @@
-//! What differs between calibrations of one unit: over time, over switch-ons, between methods.
+//! Differences between calibrations of one unit: over time, over switch-ons, between methods.
 //!
-//! Each parameter is judged by the spread of its values against its own standard deviations: of n files, `Σ (v - mean)²/σ²` with weights
-//! `1/σ²` is chi-square of n - 1 degrees of freedom if nothing but the uncertainty of the fits makes them differ. Of the many parameters
-//! the least probable are judged first (Holm, 1979), so that in all 5 % of comparisons without a change name one.
+//! Each parameter is judged by the spread of its values against its own standard deviations. For n files, `Σ (v - mean)²/σ²` with weights `1/σ²` has
+//! a chi-square distribution with n - 1 degrees of freedom if only the uncertainty of the fits makes them differ. The least probable parameters are
+//! judged first (Holm, 1979), so that in total 5 % of comparisons without a change name one.
 
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -12,7 +12,7 @@ use crate::quantity::{AXES, Sensor};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
 
-/// Probability that any parameter is named as changed where none has.
+/// Probability that any parameter is named as changed although none has changed.
 const FALSE_CHANGE: f64 = 0.05;
 const ANGLES: [&str; 3] = ["yz", "zy", "zx"];
 
@@ -40,13 +40,13 @@ pub struct ComparedParameter {
     pub unit: String,
     /// Value in each file.
     pub values: Vec<f64>,
-    /// Standard deviation in each file; `None` where a file has none.
+    /// Standard deviation in each file; `None` if a file has none.
     pub sigmas: Option<Vec<f64>>,
     /// Mean of the values.
     pub mean: f64,
     /// Standard deviation of the values between the files.
     pub spread: f64,
-    /// Of it, what the uncertainty of the fits does not explain: the repeatability. `None` without standard deviations.
+    /// The part of it that the uncertainty of the fits does not explain: the repeatability. `None` without standard deviations.
     pub repeatability: Option<f64>,
     /// Probability of such a spread by the uncertainty of the fits alone; `None` without standard deviations.
     pub p: Option<f64>,
@@ -57,7 +57,7 @@ pub struct ComparedParameter {
 /// A value and its standard deviation, by sensor, name and unit.
 type Named = (Sensor, String, String, f64, Option<f64>);
 
-/// Compares calibrations; each with the file that it is from.
+/// Compares calibrations, each given with its file.
 ///
 /// # Errors
 /// Fewer than two; readings in different units; no parameter that all have.
@@ -149,7 +149,7 @@ impl ComparedParameter {
         let mean = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
         let sigmas: Option<Vec<f64>> = found.iter().map(|f| f.1).collect();
-        // What defines the frame has no standard deviation, and is the same everywhere.
+        // Parameters that define the frame have no standard deviation, and are the same everywhere.
         let sigmas = sigmas.filter(|s| s.iter().all(|s| *s > 0.0));
         let p = sigmas.as_ref().map(|sigmas| {
             let weights = || sigmas.iter().map(|s| s.powi(-2));

@@ -1,4 +1,4 @@
-//! A recording under a calibration over temperature: where the dies were, how far that is outside what the calibration is for, and what the
+//! A recording under a calibration over temperature: the temperatures of the dies, how far they are outside the calibration's range, and what the
 //! sensors would have read at one temperature.
 
 use std::sync::Arc;
@@ -13,8 +13,8 @@ use crate::quantity::{PerSensor, Sensor};
 use crate::signal::blocks::Block;
 use crate::warning::Warning;
 
-/// Temperatures of the dies, °C, in the middle of each block: those of the thermometer behind the lag. Where it has no reading it is that of
-/// the block before, and before the first that one. `None` if it has none at all.
+/// Temperatures of the dies, °C, in the middle of each block: those of the thermometer behind the lag. A block without a reading has that of the
+/// block before; blocks before the first reading have the first. `None` without any reading.
 pub fn of_blocks(blocks: &[Block], lag: &DieLag<f64>) -> Option<Vec<f64>> {
     let first = blocks
         .iter()
@@ -38,11 +38,10 @@ pub fn of_triads(blocks: &[Block], curves: &Curves) -> Option<PerSensor<Vec<f64>
     lags.map(|lag| of_blocks(blocks, lag)).transpose()
 }
 
-/// A sentence on the samples of a recording at temperatures that a calibration is not for; `None` if there are none, or if what it
-/// is for is not known.
+/// A warning about samples at temperatures for which a calibration is not valid; `None` if there are none, or if its range is not known.
 ///
-/// Curves are for the dies in their range, from the first degree on. A calibration at one temperature holds near it, and is
-/// left where the thermometer is more than 5 K outside what it was made from.
+/// Curves are valid for the dies in their range, without a margin. A calibration at one temperature is also valid near it: samples count if the
+/// thermometer is more than 5 K outside the range of its recording.
 pub fn outside(calibration: &Calibration, blocks: &[Block]) -> Option<Warning> {
     let curves = calibration.curves();
     let (temperatures, [from, to], margin_c) = match &curves {
@@ -80,9 +79,9 @@ pub fn outside(calibration: &Calibration, blocks: &[Block]) -> Option<Warning> {
     ))
 }
 
-/// The recording as its sensors would have read at the one temperature that `[gyro]` and `[accel]` of the calibration hold at: of each reading
-/// u with the model C(T), o(T) of its temperature, the one that C, o makes the same of. Whatever judges readings by the one model judges
-/// them by the curves then. `None` if the recording has no temperature or the calibration is singular.
+/// The recording as its sensors would have read at the one temperature for which `[gyro]` and `[accel]` of the calibration hold. A reading u under
+/// the model C(T), o(T) of its temperature becomes the reading that has the same input under C, o. So whatever judges it by the one model judges it
+/// by the curves. `None` if the recording has no temperature or the calibration is singular.
 pub fn at_one_temperature(
     prepared: &Prepared,
     calibration: &Calibration,
@@ -112,7 +111,7 @@ pub fn at_one_temperature(
     Some(out)
 }
 
-/// Has the readings of a triad, from channel `from` on, moved block by block.
+/// Moves the readings of a triad, from channel `from` on, block by block.
 fn move_sensor(out: &mut Prepared, prepared: &Prepared, from: usize, moved: &[Affine<f64>]) {
     let blocks = &prepared.condensed.blocks;
     let corrected = Arc::make_mut(&mut out.condensed);
@@ -134,7 +133,7 @@ fn move_sensor(out: &mut Prepared, prepared: &Prepared, from: usize, moved: &[Af
     }
     for dwell in &mut out.dwells.list {
         let range = dwell.blocks.clone();
-        // A dwell is short beside the drift of the temperature: the mean of its blocks' models is that of its mean reading.
+        // The temperature hardly drifts within a dwell, so the mean of the models of its blocks applies to its mean reading.
         let (mut matrix, mut offset) = (Matrix3::zeros(), Vector3::zeros());
         let share = 1.0 / range.len().max(1) as f64;
         for by in &moved[range] {

@@ -1,4 +1,4 @@
-//! Effects of a calibration beside each other and its triads.
+//! Checks the effects of a calibration against each other and its triads.
 
 use super::Calibration;
 use crate::effects::fitted::FittedEffect;

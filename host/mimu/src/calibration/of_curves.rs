@@ -1,4 +1,4 @@
-//! The calibration that curves over temperature give.
+//! The calibration that results from curves over temperature.
 
 use super::of_fit::triad_table;
 use super::{Calibration, Judged, Origin, OverTemperature};
@@ -10,7 +10,7 @@ use mimu_recording::{RawUnit, Reference};
 /// Digits of the error figures.
 const FIGURE_DIGITS: usize = 7;
 
-/// A triad at the temperature of one node, and how well its curves did.
+/// A triad at the temperature of one node, with the error figures of its curves.
 #[derive(Debug, Clone)]
 pub struct TriadOfCurves {
     /// The model there.
@@ -19,9 +19,9 @@ pub struct TriadOfCurves {
     pub estimator: &'static str,
     /// Rms of the compensated dwell means minus the known input, SI, at all temperatures.
     pub rms: f64,
-    /// The same on data that the curves had not seen.
+    /// The same, held out.
     pub held_out_rms: Option<f64>,
-    /// What noise alone would give.
+    /// The same by noise alone.
     pub noise_floor: f64,
     /// Dwells used.
     pub dwells: usize,
@@ -29,7 +29,7 @@ pub struct TriadOfCurves {
     pub condition: f64,
 }
 
-/// What a calibration over temperature is made of.
+/// The contents of a calibration over temperature.
 #[derive(Debug, Clone)]
 pub struct CurvesOfUnit {
     /// Name of the unit.
@@ -56,7 +56,7 @@ impl Calibration {
     /// The calibration over temperature of `unit`, made at `created` (RFC 3339).
     ///
     /// # Errors
-    /// Curves that cannot be applied, as where C is singular at a node.
+    /// Curves that cannot be applied, for example because C is singular at a node.
     pub fn of_curves(unit: CurvesOfUnit, created: &str) -> Result<Self> {
         let table = |sensor: Sensor| {
             let found = unit.triads[sensor].as_ref()?;
@@ -103,8 +103,8 @@ impl Calibration {
         calibration.checked(&format!("calibration of {:?}", unit.device))
     }
 
-    /// This calibration, which holds at one temperature, with `temperature`; made at `created` (RFC 3339). `triads` are the models of its
-    /// sensors at `temp_c` of the dies. Error figures stay those that it has.
+    /// This calibration at one temperature with `temperature` added, made at `created` (RFC 3339). `triads` are the models of its sensors at `temp_c`
+    /// of the dies. Error figures stay the same.
     ///
     /// # Errors
     /// Curves that cannot be applied.

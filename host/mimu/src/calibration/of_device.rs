@@ -1,4 +1,4 @@
-//! The calibration that a device keeps, as a file again.
+//! The calibration that a device stores, converted back to a file.
 
 use mimu_core::compensation::Affine;
 use mimu_core::effects::DeviceEffect;
@@ -31,20 +31,20 @@ pub struct DeviceCalibration {
     pub sha256: Option<String>,
     /// Temperature nodes, the coldest first: rad/s and m/s² from V.
     pub nodes: Vec<Node<f32>>,
-    /// As in [`OverTemperature::range_c`], of one node as in [`Origin::temp_range_c`].
+    /// As in [`OverTemperature::range_c`]; for one node, as in [`Origin::temp_range_c`].
     pub range_c: Option<[f32; 2]>,
     /// As in [`OverTemperature::lags_s`].
     pub lags_s: Option<PerSensor<f32>>,
-    /// What they lack. Converters of the axes of a triad are parts of one effect.
+    /// Errors that they lack. Converters of the axes of a triad are parts of one effect.
     pub effects: Vec<DeviceEffect<f32>>,
 }
 
 impl Calibration {
-    /// The calibration that a device keeps, without what it does not keep: how well the numbers are known, what was known of the
-    /// input, local gravity. The device makes the same bytes of it.
+    /// The calibration that a device stores. It lacks what a device does not store: the uncertainty of the numbers, the reference and local gravity.
+    /// The device makes the same bytes of it.
     ///
     /// # Errors
-    /// An effect that this program does not know; `place` is where it comes from.
+    /// An effect that this program does not know; `place` names its source.
     pub fn of_device(stored: &DeviceCalibration, place: &str) -> Result<Self> {
         let singular = || Error::new(place, "C is singular", "upload a calibration again");
         let temperatures: Vec<f64> = stored.nodes.iter().map(|n| f64::from(n.temp_c)).collect();
@@ -83,7 +83,7 @@ impl Calibration {
     }
 }
 
-/// The nodes, unless there is one that does not change with temperature and no lag, which is a calibration at one temperature.
+/// The nodes; `None` if there is a single one without slope and lag, which is a calibration at one temperature.
 fn over_temperature(stored: &DeviceCalibration) -> Option<OverTemperature> {
     let plain = |node: &Node<f32>| *node == Node::constant(node.temp_c, node.model);
     if let ([node], None) = (stored.nodes.as_slice(), stored.lags_s)
@@ -124,7 +124,7 @@ fn triad_table(model: &Affine<f32>, sensor: Sensor) -> Option<TriadTable> {
         matrix: model.matrix.map(f64::from),
         offset: model.offset.map(f64::from),
     };
-    // Its sigmas are of no covariance, and are left out.
+    // Without a covariance its sigmas mean nothing, so they are left out.
     let triad = Triad::from_inverse(inverse, Vec::new())?;
     let Affine { matrix, offset }: Affine<f64> = inverse;
     Some(TriadTable {
@@ -147,7 +147,7 @@ fn triad_table(model: &Affine<f32>, sensor: Sensor) -> Option<TriadTable> {
     })
 }
 
-// Also with the sign of a zero: the bytes that are made of it are the same then.
+// These keep the sign of a zero, so the device makes the same bytes of them.
 
 fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))

@@ -1,4 +1,4 @@
-//! The calibration that a fit gives.
+//! The calibration that results from a fit.
 
 use mimu_core::table::is_temperature;
 use nalgebra::{Matrix3, Vector3};
@@ -14,12 +14,12 @@ use crate::triad::{Angles, Estimate, Forward, Physical, Triad};
 use mimu_recording::error::Result;
 use mimu_recording::{RawUnit, Reference};
 
-/// Digits of what says how well something is known.
+/// Digits of standard deviations and intervals.
 const SIGMA_DIGITS: usize = 4;
 const FIGURE_DIGITS: usize = 7;
 
 impl Calibration {
-    /// The calibration of `fit`, a fit of readings without `effects`, of which it holds what lasts, made at `created` (RFC 3339).
+    /// The calibration of `fit`, made at `created` (RFC 3339). The fit is of readings without `effects`; the calibration stores their lasting part.
     ///
     /// # Errors
     /// An effect that cannot be removed, as when its sensor is not calibrated.
@@ -29,7 +29,7 @@ impl Calibration {
         let temperatures = dwells.map(|d| d.temp_c).filter(|t| is_temperature(*t));
         let temperatures: Vec<f64> = temperatures.collect();
         let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
-        // As many digits of their standard deviations as the triads have.
+        // Their standard deviations have as many digits as those of the triads.
         let lasting = effects
             .iter()
             .map(|e| e.lasting().with_digits(SIGMA_DIGITS));
@@ -169,7 +169,7 @@ pub(super) fn physical_table(physical: &Physical) -> PhysicalTable {
     }
 }
 
-// Minus zero, which only puzzles, is zero.
+// Adding 0.0 makes minus zero, which only puzzles, zero.
 
 fn by_rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)] + 0.0))

@@ -14,7 +14,7 @@ use crate::effects::fitted::NotOnDevice;
 use crate::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
-/// A calibration as `core` runs it: on these curves, or with this model at all temperatures.
+/// The compensator of `core` for a calibration: with these curves, or with this model at all temperatures.
 pub fn compensator<const N: usize>(
     calibration: &Calibration,
     model: Compensation<f64>,

@@ -21,7 +21,7 @@ use mimu_recording::error::{Error, Result};
 pub struct OverTemperature {
     /// Dies' temperatures in the recordings that it was fitted to, °C.
     pub range_c: [f64; 2],
-    /// Whether only the biases were followed over temperature, and C is that of one temperature.
+    /// Whether only the biases depend on temperature, and C is that of one temperature.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub biases_only: bool,
     /// What is known of the dies of each triad.
@@ -41,11 +41,10 @@ pub struct DieTable {
     /// Lag behind the thermometer, s; negative: they lead. `None`: not determined, and none is applied.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lag_s: Option<f64>,
-    /// Bounds of it with 95 %, s.
+    /// 95 % interval of the lag, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_lag_s: Option<[f64; 2]>,
-    /// What heating and cooling differ by in the biases after the lag, axis by axis, SI: rms over the range, and the largest. `None`: not
-    /// known.
+    /// Difference of the biases between heating and cooling after the lag, axis by axis, SI: rms over the range, and the largest. `None`: not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hysteresis: Option<[[f64; 3]; 2]>,
 }
@@ -100,7 +99,7 @@ pub struct NodeTable {
     /// Standard deviations of o.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_o: Option<[f64; 3]>,
-    /// Standard deviations of the scale factors, raw per SI. They do not follow from those of C and o, whose errors go together.
+    /// Standard deviations of the scale factors, raw per SI. They do not follow from those of C and o, whose errors are correlated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_scale_factor: Option<[f64; 3]>,
     /// Standard deviations of the biases, raw.
@@ -116,8 +115,8 @@ pub struct Curves {
     has: PerSensor<bool>,
 }
 
-/// Of nodes of these temperatures, °C, the one that stands for a calibration where one model has to: nearest to the temperature that
-/// effects count from. It follows from what a device keeps. `None` if there are none.
+/// Index of the node that represents a calibration if there can be only one model, from the `temperatures` of the nodes, °C. It is nearest to the
+/// temperature from which effects count, so it follows from what a device stores. `None` if there are no nodes.
 pub fn reference_node(temperatures: &[f64]) -> Option<usize> {
     let off = |at: &usize| (temperatures[*at] - REFERENCE_C).abs();
     (0..temperatures.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
@@ -224,7 +223,7 @@ impl OverTemperature {
         Ok(())
     }
 
-    /// Lags of the dies, s; `None` if none is determined. One that is not, where the other is, is applied as none.
+    /// Lags of the dies, s; `None` if none is determined. If only one triad's is determined, the other's is 0.
     pub fn lags_s(&self) -> Option<PerSensor<f64>> {
         let lags_s = self.dies.map(|dies| dies.lag_s);
         let known = lags_s.present().next().is_some();
@@ -248,7 +247,7 @@ impl OverTemperature {
         })
     }
 
-    /// What is wrong with a node behind one of the temperature `before`.
+    /// What is wrong with a node; `before` is the temperature of the node before it.
     fn problem(
         &self,
         node: &TemperatureNode,
@@ -290,7 +289,7 @@ impl OverTemperature {
 }
 
 impl Curves {
-    /// Those of a calibration that has nodes. A sensor without any has its one model at all temperatures.
+    /// The curves of a calibration with nodes. A sensor without nodes has its one model at all temperatures.
     pub(super) fn of(calibration: &Calibration) -> Option<Self> {
         let temperature = calibration.temperature.as_ref()?;
         let none = Affine {
@@ -330,7 +329,7 @@ impl Curves {
         &self.lags
     }
 
-    /// The same nodes for the device's arithmetic in double precision.
+    /// The nodes for the device's algorithms, in double precision.
     pub fn table(&self) -> &Table<f64, NODES> {
         &self.table
     }

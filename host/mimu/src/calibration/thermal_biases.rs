@@ -1,9 +1,8 @@
-//! Biases over temperature of a unit that only lay still: what its readings change by, without the scale factors that would make a
-//! calibration of it.
+//! Biases over temperature of a unit that was recorded at rest only: the change of its readings, without the scale factors of a calibration.
 //!
-//! It is a separate file, with its own `format`, and not a calibration with a mark: without C nothing can be applied, and a C of ones would
-//! be applied by whoever overlooks the mark. Every command that reads a calibration refuses the file by its name ([`refusal`]); the formats of
-//! autopilots, which compensate the bias alone over temperature, take it.
+//! The file has its own `format` instead of being a calibration with a mark. Without C nothing can be applied, and whoever overlooks the mark would
+//! apply a C of ones. Every command that reads a calibration refuses the file by its name ([`refusal`]). The formats of autopilots, which compensate
+//! only the bias over temperature, accept it.
 
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::stored::NODES;
@@ -45,7 +44,7 @@ pub struct ThermalBiases {
     pub tool: String,
     /// Dies' temperatures in the recordings that it was fitted to, °C.
     pub range_c: [f64; 2],
-    /// What it was made from.
+    /// The recording that it was made from.
     pub recording: Origin,
     /// What is known of the dies of each triad. Its hysteresis is raw.
     #[serde(default)]
@@ -94,7 +93,7 @@ impl RestCurves {
     }
 }
 
-/// The error of who wants a calibration and is given such a file at `place`.
+/// The error if a calibration is expected and the file at `place` is one of biases.
 pub fn refusal(place: &str) -> Error {
     Error::new(
         place,
@@ -126,14 +125,14 @@ impl BiasNode {
     }
 }
 
-/// What such a file is made of.
+/// The contents of such a file.
 #[derive(Debug, Clone)]
 pub struct RestOfUnit {
     /// Name of the unit.
     pub device: String,
     /// Its own number, if it is known.
     pub unit_id: Option<String>,
-    /// What it was made from.
+    /// The recording that it was made from.
     pub recording: Origin,
     /// Dies' temperatures, °C.
     pub range_c: [f64; 2],
@@ -144,7 +143,7 @@ pub struct RestOfUnit {
 }
 
 impl ThermalBiases {
-    /// Of `unit`, made at `created` (RFC 3339).
+    /// The file of `unit`, made at `created` (RFC 3339).
     ///
     /// # Errors
     /// Nodes that cannot be evaluated.
@@ -186,7 +185,7 @@ impl ThermalBiases {
     /// The readings over temperature. A sensor without any reads zero.
     ///
     /// # Errors
-    /// Nodes that cannot be evaluated: none that was [parsed](Self::parse).
+    /// Nodes that cannot be evaluated; those of a [parsed](Self::parse) file always can.
     pub fn curves(&self) -> Result<RestCurves> {
         self.table().map_err(|problem| wrong("nodes", problem))
     }

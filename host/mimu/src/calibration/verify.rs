@@ -22,36 +22,36 @@ use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RawUnit, Reference};
 
-/// What a calibration does to one triad of a recording. Figures as in [`Figure`].
+/// Errors of one triad of a recording with and without a calibration. Figures as in [`Figure`].
 #[derive(Debug, Clone, Serialize)]
 pub struct SensorVerification {
-    /// With the mean of the calibration's scale factors and of its biases on all three axes and no misalignment, in [`Self::unit`]: fitted
-    /// means in place of a data sheet's.
+    /// With the mean of the calibration's scale factors and of its biases on all three axes and no misalignment, in [`Self::unit`]: fitted means
+    /// replace those of a data sheet.
     pub rms_raw: f64,
-    /// The readings as they came, in [`Self::unit`]; absent where they are not in SI.
+    /// The readings as they came, in [`Self::unit`]; absent if they are not in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_as_they_came: Option<f64>,
     /// With the calibration, in [`Self::unit`].
     pub rms: f64,
-    /// With the calibration but for its effects, in [`Self::unit`]; absent if it has none.
+    /// With the calibration except its effects, in [`Self::unit`]; absent if it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_affine: Option<f64>,
     /// The largest error with the calibration, in [`Self::unit`].
     pub max: f64,
-    /// What noise alone would give, in [`Self::unit`]; null where the noise is not known.
+    /// By noise alone, in [`Self::unit`]; null if the noise is not known.
     pub noise_floor: f64,
     /// SI unit of the figures.
     pub unit: &'static str,
-    /// What they are about.
+    /// The quantity that they describe.
     pub figure: Figure,
     /// Dwells or turns judged.
     pub count: usize,
-    /// Compensated gyro dwell means without a table, rad/s; absent with one.
+    /// Compensated gyro at rest without a table, rad/s; absent with one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_rms: Option<f64>,
 }
 
-/// What a calibration does to a recording: `mimu-verify/1`.
+/// Result of verifying a calibration by a recording: `mimu-verify/1`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Verification {
     /// `mimu-verify/1`.
@@ -114,7 +114,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         let affine = judge(prepared, calibration, sensor);
         let with_effects = cleaned.as_ref().and_then(|c| judge(c, calibration, sensor));
         let (judged, refused) = match (affine, with_effects) {
-            // What the readings are judged by without a calibration is what the unit gave.
+            // Without a calibration, the readings count as the unit gave them.
             (Some((affine, _)), Some((clean, refused))) => {
                 let judged = SensorVerification {
                     rms_raw: affine.rms_raw,
@@ -173,7 +173,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     })
 }
 
-/// Refuses a calibration for another raw unit; what to say of one of another device. `place` is the recording.
+/// Refuses a calibration for another raw unit; returns a warning about one of another device. `place` is the recording.
 pub(crate) fn check_unit(
     calibration: &Calibration,
     manifest: &Manifest,
@@ -210,7 +210,7 @@ fn without_effects(prepared: &Prepared, calibration: &Calibration) -> Result<Opt
     cleaned.map(Some).ok_or_else(singular)
 }
 
-/// The figures of one sensor and what could not be used; `None` if the recording has no data to judge it.
+/// The figures of one sensor, and warnings about what could not be used; `None` if the recording has no data to judge it.
 fn judge(
     prepared: &Prepared,
     calibration: &Calibration,
@@ -222,7 +222,7 @@ fn judge(
         (Reference::Table, _) => known(prepared, sensor, &inverse),
         (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => size(prepared, &inverse),
         (Reference::TurntableRate, Sensor::Gyro) => rate(prepared, &inverse),
-        // Between the means of poses nothing says how the unit turned.
+        // Means of poses do not show how the unit turned between them.
         (Reference::Gravity, Sensor::Gyro) if prepared.manifest.means => None,
         (Reference::Gravity, Sensor::Gyro) => {
             let accel = calibration.inverse(Sensor::Accel)?;
@@ -245,7 +245,7 @@ pub fn nominal(calibrated: &Affine<f64>) -> Option<Affine<f64>> {
         let axis = p.row(i).transpose().iamax();
         forward[(i, axis)] = scale * p[(i, axis)].signum();
     }
-    // Two sensors nearest to one axis are no triad: then as they come.
+    // If two sensors are nearest to one axis, each keeps its own axis.
     let matrix = forward
         .try_inverse()
         .unwrap_or_else(|| Matrix3::from_diagonal_element(1.0 / scale));
@@ -273,7 +273,8 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().map(|v| v.abs()).fold(0.0, f64::max)
 }
 
-/// The figures of errors before and after; `None` if there is nothing to judge by. One of `floor` a dwell or turn.
+/// The figures of the errors without (`raw`) and with (`after`) the calibration; `None` if there are none. `floor` has one value for each dwell or
+/// turn.
 fn judged(
     sensor: Sensor,
     figure: Figure,
@@ -352,7 +353,7 @@ fn rate(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerificat
     })
 }
 
-/// By the magnitudes that are known of the inputs.
+/// The figures by the known magnitudes of the inputs.
 fn magnitudes(
     prepared: &Prepared,
     figure: Figure,

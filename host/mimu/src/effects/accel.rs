@@ -28,7 +28,7 @@ const PRODUCT: [Coefficient; 9] = {
     ]
 };
 
-/// Row i of `[α]× + [ω]×²`, times the place, m, at which axis i senses.
+/// The error of axis i is row i of `[α]× + [ω]×²` times the position, m, at which this axis senses.
 const ARMS: [Coefficient; 9] = {
     const fn along(first: usize, second: usize) -> Regressor {
         Regressor::Sum(
@@ -64,7 +64,7 @@ pub(super) const EFFECTS: &[Effect] = &[
         id: "accel_scale_quadratic",
         sensor: Sensor::Accel,
         about: "the gap of the sense capacitor changes: error proportional to the square of the force along the axis",
-        // MMA7260QT: 1 % of full scale at most, 15 mg at 1.5 g; a third of it at 1 g.
+        // MMA7260QT: at most 1 % of full scale, which is 15 mg at 1.5 g. A third of it is taken at 1 g.
         coefficients: &each(Regressor::power(Input, 2), 5.0 * MG / (G * G)),
         parameter: None,
         size: "5 mg/g² (MMA7260QT: 15 mg at 1.5 g)",

@@ -1,20 +1,20 @@
-//! Laws that are no effect of the list, but that an effect of it may be the shadow of.
+//! Unlisted alternative models: laws that may explain the same residuals as a listed effect.
 //!
-//! An effect that explains the rows no better than such a law is accepted, as the error goes down all the same; but which physics it is,
-//! this recording does not say, and the verdict says so.
+//! If such a law explains the rows as well as an effect, the effect is still accepted, because it reduces the error. But the recording does not show
+//! which of the two is the cause, and the verdict says so.
 
 use super::effect::{Coefficient, Effect, NonlinearParameter, Role, each};
 use super::quantity::Quantity::{Force, Input, RateMagnitude, Time};
 use super::regressor::Regressor;
 use crate::quantity::Sensor;
 
-/// A law and the effects that may be its shadow.
+/// An unlisted law and the effects whose residuals it may explain.
 pub struct Alternative {
-    /// The law, in the form of an effect that is on no list.
+    /// The law, written as an effect that is on no list.
     pub law: Effect,
-    /// Ids of the effects that may be its shadow.
+    /// Ids of the effects whose residuals it may explain.
     pub of: &'static [&'static str],
-    /// What would tell them apart.
+    /// The experiment that would distinguish them.
     pub settled_by: &'static str,
 }
 
@@ -28,15 +28,15 @@ const ONSET: Option<NonlinearParameter> = Some(NonlinearParameter {
 
 const CREEP: [Coefficient; 3] = each(Regressor::Logarithm(Time), 1.0);
 
-/// The vertical of the body axis of the same name.
+/// Each axis senses the specific force along the body axis of the same name.
 const FIELD: [Coefficient; 3] = [
     Coefficient::of(0, "x", Regressor::linear(Force(0)), 1.0),
     Coefficient::of(1, "y", Regressor::linear(Force(1)), 1.0),
     Coefficient::of(2, "z", Regressor::linear(Force(2)), 1.0),
 ];
 
-/// A supply that sags with the motor's current, or a bearing that shakes: known by no reading of the unit. But an axis reads the turns
-/// about the others as well, by a few per cent, so that fine bits of its codes can tell them from rest.
+/// A supply that sags with the motor's current, or a bearing that shakes. The unit measures neither. But an axis also reads a few per cent of the
+/// rates about the other axes, so the fine bits of its codes can distinguish turning from rest.
 const TURNING: [Coefficient; 9] = {
     let [x, y, z] = [
         Regressor::linear(RateMagnitude),
@@ -115,8 +115,8 @@ static ALTERNATIVES: [Alternative; 5] = [
         of: &["accel_warm_up", "accel_thermal_lag"],
         settled_by: LONGER,
     },
-    // Whatever field goes with the vertical, the Earth's magnetic one first of all, is felt along the axis alone; a proof mass
-    // that sags is skew to some degree.
+    // A field along the vertical, above all the Earth's magnetic field, acts on each axis only by its component along it. A proof mass that sags also
+    // responds to some force across its axis.
     Alternative {
         law: law(
             "vertical_field",
@@ -130,14 +130,14 @@ static ALTERNATIVES: [Alternative; 5] = [
     },
 ];
 
-/// Effects of the list that are one where the input along an axis is always the same, as in one pose: what the temperature does to a bias
-/// and to a scale factor.
+/// Effects that cannot be distinguished while the input along an axis is constant, as in one pose: temperature then changes the bias and the scale
+/// factor alike.
 const ONE_AT_A_CONSTANT_INPUT: [[&str; 2]; 2] = [
     ["gyro_thermal_bias", "gyro_thermal_scale"],
     ["accel_thermal_bias", "accel_thermal_scale"],
 ];
 
-/// The effect that `id` is the same as while its input is constant, if there is such a one.
+/// The effect that cannot be distinguished from `id` while the input is constant, if there is one.
 pub fn one_at_a_constant_input(id: &str) -> Option<&'static str> {
     ONE_AT_A_CONSTANT_INPUT.iter().find_map(|[a, b]| match id {
         _ if id == *a => Some(*b),

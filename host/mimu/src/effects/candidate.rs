@@ -11,14 +11,14 @@ use super::temperature::Followed;
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
 
-/// What a candidate is.
+/// Kind of a candidate.
 #[derive(Debug, Clone)]
 pub enum CandidateKind {
     /// A named effect.
     Effect(&'static Effect),
-    /// A term found from the data, of one axis.
+    /// A product found from the data, in the error of one axis.
     Term(usize, Product),
-    /// The bias of one axis is another from some time on, s, within one recording.
+    /// A jump in the bias of one axis, within one recording.
     Jump {
         /// Axis.
         axis: usize,
@@ -29,45 +29,45 @@ pub enum CandidateKind {
     },
 }
 
-/// What is tried.
+/// An effect, a product or a jump that a search tries.
 #[derive(Debug, Clone)]
 pub struct Candidate {
     /// Sensor.
     pub sensor: Sensor,
-    /// What it is.
+    /// Its kind.
     pub kind: CandidateKind,
-    /// Which of its coefficients the experiment can tell.
+    /// Coefficients that the experiment determines.
     pub active: Vec<usize>,
-    /// Of errors by the code: the converter of each axis that has one. Two axes may share one.
+    /// For errors that depend on the code: the converter of each axis that has one. Axes may share one.
     pub codes: Codes,
     /// As in [`Followed`].
     pub without_self_heating: bool,
-    /// Coefficients that would be seen at the size of data sheets.
+    /// Coefficients that the experiment would show at data-sheet size.
     pub excited: Vec<usize>,
-    /// Coefficients that the experiment shows, but not beside the active ones and the affine parameters.
+    /// Coefficients that the experiment shows, but does not separate from the active ones and the affine parameters.
     pub inseparable: Vec<usize>,
-    /// How many choices it is the best of.
+    /// Number of choices among which it is the best.
     pub choices: f64,
-    /// Coefficients to choose from: the choice is part of the search.
+    /// Coefficients among which the search chooses.
     pub offered: Vec<usize>,
 }
 
 /// Errors of a converter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OfConverter {
-    /// Axis that it reads; `None`: all of them.
+    /// Axis that it reads; `None` for all axes.
     pub axis: Option<usize>,
-    /// Its codes.
+    /// Relation between its codes and readings.
     pub converter: Converter,
-    /// Of its bits from the first down, in units of the weight of the first.
+    /// Errors of its bits from the first down, in units of the weight of the first.
     pub errors: [f64; BITS],
 }
 
-/// Values of a nonlinear parameter that are screened.
+/// Number of values of a nonlinear parameter that are screened.
 const SCREENED: usize = 9;
 
 impl Candidate {
-    /// Stable name; of a jump what a person reads.
+    /// Stable name; for a jump, a description in words.
     pub fn id(&self) -> String {
         match &self.kind {
             CandidateKind::Effect(e) => e.id.into(),
@@ -120,7 +120,7 @@ impl Candidate {
         (0..SCREENED).map(|k| from * step.powi(k as i32)).collect()
     }
 
-    /// A candidate with all of its coefficients but those of the recording alone.
+    /// A candidate with all coefficients except those specific to the recording.
     pub fn new(sensor: Sensor, kind: CandidateKind) -> Self {
         let active = match &kind {
             CandidateKind::Effect(e) => {
@@ -142,7 +142,7 @@ impl Candidate {
         }
     }
 
-    /// It with one converter for all axes.
+    /// The candidate with one converter for all axes.
     pub fn behind_one(mut self, converter: Converter) -> Self {
         self.active = (0..BITS).collect();
         self.codes = [Some(converter); 3];
@@ -154,7 +154,7 @@ impl Candidate {
         matches!(self.kind, CandidateKind::Effect(e) if e.reads_code())
     }
 
-    /// Coefficients of the recording alone, of the axes that are active.
+    /// Coefficients specific to the recording, for the axes that have an active coefficient.
     pub(crate) fn of_recording(&self) -> Vec<usize> {
         let CandidateKind::Effect(e) = &self.kind else {
             return Vec::new();
@@ -166,8 +166,8 @@ impl Candidate {
             .collect()
     }
 
-    /// The coefficient without which coefficient `k` means nothing: the slope of a curvature, since the temperature that a curvature counts
-    /// from is a convention, and the lasting coefficient of the axis of one that is specific to the recording.
+    /// The coefficient that `k` requires. A curvature requires the slope, because the temperature from which it counts is a convention. A coefficient
+    /// specific to the recording requires the lasting one of its axis.
     pub(crate) fn rests_on(&self, k: usize) -> Option<usize> {
         let CandidateKind::Effect(e) = &self.kind else {
             return None;
@@ -181,8 +181,8 @@ impl Candidate {
         all.position(|other| other.axis == own.axis && base(other))
     }
 
-    /// The excited coefficients that are like one of the active ones, on another axis. What moves one axis moves the others too: their
-    /// coefficients are found with it however small they are, as the intervals of the calibration would be too narrow without.
+    /// Excited coefficients on other axes that correspond to an active one. What acts on one axis acts on the others too, so these are fitted with it
+    /// even if they are small; without them the intervals of the calibration would be too narrow.
     pub fn siblings(&self) -> Vec<usize> {
         let CandidateKind::Effect(e) = &self.kind else {
             return Vec::new();
@@ -194,8 +194,8 @@ impl Candidate {
             .collect()
     }
 
-    /// By how much coefficients of `values` beyond the size of data sheets speak against it, in units of the deviance: a size is believed
-    /// to be log-normal, and a factor of ten is two sigmas.
+    /// Penalty for coefficients `values` beyond data-sheet size, in units of the deviance. Sizes are assumed log-normal, with a factor of ten at two
+    /// sigmas.
     pub(crate) fn unlikely(&self, values: &[f64]) -> f64 {
         let CandidateKind::Effect(e) = &self.kind else {
             return 0.0;
@@ -207,7 +207,7 @@ impl Candidate {
         each.sum()
     }
 
-    /// Regressors of its active coefficients; of a jump none.
+    /// Regressors of its active coefficients; none for a jump.
     fn active_regressors(&self) -> Vec<Regressor> {
         match &self.kind {
             CandidateKind::Effect(e) => {
@@ -219,7 +219,7 @@ impl Candidate {
         }
     }
 
-    /// Regressor of each of its [slots](Self::slots); of a jump none.
+    /// Regressor of each of its [slots](Self::slots); none for a jump.
     pub fn slot_regressors(&self) -> Vec<Regressor> {
         let all = self.active_regressors();
         let slots = self.slots();
@@ -227,20 +227,20 @@ impl Candidate {
         each.collect()
     }
 
-    /// Whether it is a smooth nonlinearity of an axis: a function of the input along its own direction, and of nothing else.
+    /// Whether it is a smooth nonlinearity of an axis: it depends only on the input along that axis.
     pub fn is_nonlinearity(&self) -> bool {
         let mut all = self.active_regressors().into_iter().peekable();
         let any = all.peek().is_some();
         any && all.all(|r| r.quantities() == [Quantity::Input])
     }
 
-    /// Whether what it does to the readings cannot be known without `need`.
+    /// Whether `need` has to be known to compute its error.
     pub(crate) fn needs(&self, need: Need) -> bool {
         let all = self.active_regressors();
         all.iter().any(|r| r.needs(need, self.sensor))
     }
 
-    /// Whether the readings err by it.
+    /// Whether it is an error of the readings; a true input is none.
     pub fn is_error(&self) -> bool {
         match &self.kind {
             CandidateKind::Effect(e) => e.is_error(),
@@ -253,7 +253,7 @@ impl Candidate {
         matches!(self.kind, CandidateKind::Effect(e) if e.is_of_session())
     }
 
-    /// It and the values of its active coefficients without those that are of a recording alone.
+    /// The candidate and the values of its coefficients, without those specific to a recording.
     pub fn lasting(&self, values: &[f64]) -> (Self, Vec<f64>) {
         let CandidateKind::Effect(e) = &self.kind else {
             return (self.clone(), values.to_vec());
@@ -269,7 +269,7 @@ impl Candidate {
         (lasting, values)
     }
 
-    /// Place among the active coefficients, and axis, of each of its regressors.
+    /// For each of its regressors: the index of the coefficient among the active ones, and the axis.
     pub fn slots(&self) -> Vec<(usize, usize)> {
         match &self.kind {
             CandidateKind::Effect(e) => {
@@ -289,7 +289,7 @@ impl Candidate {
         self.slots().into_iter().map(|s| s.1).collect()
     }
 
-    /// Adds the errors of the three axes by `values`, coefficients in the order of the active ones; SI.
+    /// Adds its errors of the three axes, SI. `values` are the coefficients in the order of the active ones.
     pub fn add_error(
         &self,
         at: &Conditions,
@@ -305,8 +305,8 @@ impl Candidate {
         }
     }
 
-    /// Of errors by the code, with the values of its active coefficients: what each converter is off by; one of all axes where that is
-    /// all there is to say.
+    /// For errors that depend on the code: the errors of each converter, from the values of the active coefficients. If all three are equal, one
+    /// entry for all axes.
     pub fn by_converter(&self, values: &[f64]) -> Vec<OfConverter> {
         let all: Vec<OfConverter> = (0..3)
             .filter_map(|axis| {
@@ -337,8 +337,8 @@ impl Candidate {
         }
     }
 
-    /// Of errors by the code, with the values of its active coefficients: the scale factor that its bits add up to, where each is worth half of
-    /// the one before; the largest of its converters.
+    /// For errors that depend on the code: the scale factor contained in the errors of the bits (the part that is proportional to their weights),
+    /// from the values of the active coefficients; the largest over the converters.
     pub(crate) fn share_of_scale(&self, values: &[f64]) -> f64 {
         let weight = |bit: usize| 0.5_f64.powi(bit as i32);
         let all: f64 = (0..BITS).map(|bit| weight(bit).powi(2)).sum();
@@ -370,7 +370,7 @@ impl Candidate {
         }
     }
 
-    /// Writes the regressors of its active coefficients under some conditions, one for each slot.
+    /// Writes the values of its regressors under the conditions `at`, one for each slot.
     pub fn regressors(&self, at: &Conditions, parameter: f64, out: &mut [f64]) {
         match &self.kind {
             CandidateKind::Effect(e) => {
@@ -397,7 +397,7 @@ impl Candidate {
         }
     }
 
-    /// Whether it moves a bias with temperature or time, and nothing else.
+    /// Whether it is a bias that depends only on temperature or time.
     pub fn is_slow_bias(&self) -> bool {
         let all = self.active_regressors();
         let slow = |r: &Regressor| {
@@ -406,24 +406,24 @@ impl Candidate {
         !all.is_empty() && all.iter().all(slow)
     }
 
-    /// Whether it moves with temperature or time.
+    /// Whether it depends on temperature or time.
     pub fn is_slow(&self) -> bool {
         let jumps = matches!(self.kind, CandidateKind::Jump { .. });
         jumps || self.active_regressors().iter().any(Regressor::is_slow)
     }
 
-    /// Whether it goes by the time since power-on.
+    /// Whether it depends on the time since power-on.
     pub fn goes_by_time(&self) -> bool {
         let mut all = self.active_regressors().into_iter();
         all.any(|r| r.quantities().contains(&Quantity::Time))
     }
 
-    /// Whether it follows the temperature.
+    /// Whether it depends on the temperature.
     pub fn is_thermal(&self) -> bool {
         self.needs(Need::Temperature)
     }
 
-    /// Lag of the temperature that its regressors want, s.
+    /// Lag of the temperature that its regressors use, s.
     pub fn lag_s(&self, parameter: f64) -> Option<f64> {
         match &self.kind {
             CandidateKind::Effect(e) if e.parameter.is_some_and(|p| p.role == Role::Lag) => {
@@ -436,7 +436,7 @@ impl Candidate {
         }
     }
 
-    /// The temperature that its regressors follow, where that is not the one recorded.
+    /// The temperature that its regressors use, if it is not the recorded one.
     pub fn followed(&self, parameter: f64) -> Option<Followed> {
         let (lag_s, without_self_heating) = (self.lag_s(parameter), self.without_self_heating);
         (without_self_heating || lag_s.is_some()).then_some(Followed {

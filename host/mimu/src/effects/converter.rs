@@ -13,21 +13,21 @@ pub type Codes = [Option<Converter>; 3];
 /// Relation between a converter's codes and readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Converter {
-    /// Of bit 0, raw.
+    /// Weight of bit 0, raw.
     pub weight: f64,
     /// Reading of code 0, raw.
     pub zero: f64,
 }
 
 impl Converter {
-    /// One of a given zero.
+    /// A converter with this weight and zero.
     pub fn of(weight: f64, zero: f64) -> Self {
         Self { weight, zero }
     }
 }
 
 impl Conditions {
-    /// The conditions with readings in units of the first bit of the converters, from their codes 0; not a number on an axis without.
+    /// The conditions with each axis's reading in units of its converter's first bit, counted from code 0; not a number for an axis without one.
     pub(crate) fn in_bits(&self, codes: &Codes) -> Self {
         let mut out = *self;
         let Reading { mean, sd, scale } = &mut out.reading;
@@ -41,11 +41,11 @@ impl Conditions {
     }
 }
 
-/// Weight of the first bit that can be seen to turn, raw: of readings in multiples of `step` from `lowest` to `highest`.
+/// Weight, raw, of the largest bit that changes within readings from `lowest` to `highest` in multiples of `step`.
 pub fn first_weight(step: f64, lowest: f64, highest: f64) -> f64 {
     let largest = lowest.abs().max(highest.abs());
     let below = step * (largest / step).log2().floor().exp2();
-    // The sign of two's complement turns at zero, and nowhere else within the range.
+    // In two's complement the sign bit changes at zero and nowhere else within the range.
     if lowest < 0.0 && highest > 0.0 {
         2.0 * below
     } else {
@@ -53,22 +53,22 @@ pub fn first_weight(step: f64, lowest: f64, highest: f64) -> f64 {
     }
 }
 
-/// Share of the time that the bit of this weight is set while readings scatter about `mean` with `sd`, both in its unit.
+/// Share of the time in which the bit of this weight is set, for readings that scatter about `mean` by `sd`, all three in one unit.
 pub(super) fn share_set(mean: f64, sd: f64, weight: f64) -> f64 {
-    // It is the same every two weights; far from the zero there is no number beside the next turn.
+    // The pattern repeats every two weights. Reducing the mean keeps the next turn distinct from this one even far from zero.
     let (mean, sd) = (mean / weight, sd / weight);
     let mean = mean - 2.0 * (0.5 * mean).floor();
     if !mean.is_finite() || !sd.is_finite() {
         return f64::NAN;
     }
     if sd > 0.5 {
-        // The bit is a square wave, of which noise leaves the first two harmonics: of the next 10⁻¹⁴.
+        // The bit is a square wave. The noise leaves its first two harmonics; the next one is below 10⁻¹⁴.
         use std::f64::consts::PI;
         let harmonic =
             |n: f64| (PI * n * mean).sin() * (-0.5 * (PI * n * sd).powi(2)).exp() * 2.0 / (PI * n);
         return 0.5 - harmonic(1.0) - harmonic(3.0);
     }
-    // It turns at every whole number: on at odd ones, off at even ones.
+    // The bit changes at every whole number: it is set from odd ones and cleared from even ones.
     let reach = 6.0 * sd;
     let (first, last) = ((mean - reach).ceil(), (mean + reach).floor());
     let odd = |turn: f64| (turn as i64) & 1 == 1;
@@ -89,7 +89,7 @@ pub(super) fn share_set(mean: f64, sd: f64, weight: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The same by counting codes.
+    /// The same share, found by counting codes.
     fn counted(mean: f64, sd: f64, weight: f64) -> f64 {
         let (mut set, mut all) = (0.0, 0.0);
         for k in -4000..=4000 {
@@ -117,11 +117,11 @@ mod tests {
 
     #[test]
     fn the_first_bit_is_the_largest_that_turns() {
-        // Codes of 16 bits, 50 µV each, of 1.1 to 3.2 V: that of 32768 codes, 1.6384 V.
+        // Codes of 16 bits, 50 µV each, from 1.1 to 3.2 V: the bit of 32768 codes, 1.6384 V.
         assert!((first_weight(50e-6, 1.1, 3.2) - 1.6384).abs() < 1e-9);
         // Averages of four.
         assert!((first_weight(12.5e-6, 1.1, 3.2) - 1.6384).abs() < 1e-9);
-        // Counts with a sign, of 16 bits, a quarter of the range: the sign, by a bit that turns at 0 only.
+        // Signed counts of 16 bits over a quarter of the range: the sign acts as a bit of 8192 that changes only at 0.
         assert!((first_weight(1.0, -8000.0, 8100.0) - 8192.0).abs() < 1e-9);
     }
 }

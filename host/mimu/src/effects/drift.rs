@@ -17,8 +17,8 @@ const SETTLING: Option<NonlinearParameter> = Some(NonlinearParameter {
     role: Role::Scale,
 });
 
-/// From the middle of the session, and in no calibration: nobody knows how far a line goes on. By a drift of 3 deg/s/h that counted from
-/// power-on, a session an hour away erred 5.5 times as much as without it.
+/// Time counts from the middle of the session, and no calibration stores the drift, because nobody knows how far a line continues. With a drift of 3
+/// deg/s/h counted from power-on, a session an hour away had 5.5 times the error that it had without.
 const LINEAR: Regressor = Regressor::linear(SessionTime);
 const SETTLED: Regressor = Regressor::Decay(Time);
 

@@ -1,10 +1,10 @@
-//! An effect: what the affine model lacks, as a sum of regressors with unknown coefficients.
+//! An effect: an error that the affine model lacks, as a sum of regressors with unknown coefficients.
 
 use super::quantity::Quantity;
 use super::regressor::{Product, Regressor};
 use crate::quantity::Sensor;
 
-/// What the nonlinear parameter of an effect is.
+/// Role of the nonlinear parameter of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// A time constant, or a scale of another quantity.
@@ -13,16 +13,16 @@ pub enum Role {
     Lag,
 }
 
-/// A parameter that the error is not linear in, searched between two values.
+/// A parameter in which the error is nonlinear; it is searched between two values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NonlinearParameter {
     /// Name, with the unit.
     pub name: &'static str,
-    /// Smallest value that is looked at.
+    /// Smallest value that is searched.
     pub from: f64,
     /// Largest.
     pub to: f64,
-    /// What it is.
+    /// Its role.
     pub role: Role,
 }
 
@@ -31,11 +31,11 @@ pub struct NonlinearParameter {
 pub struct Coefficient {
     /// Name.
     pub name: &'static str,
-    /// Axis of the sensor whose reading it is added to; `None`: to all three, each with the regressor of its own.
+    /// Axis to whose reading it is added; `None`: all three, each with its own regressor.
     pub axis: Option<usize>,
     /// What the error is proportional to.
     pub regressor: Regressor,
-    /// Size in data sheets, in its unit: an experiment that could not see it has not excited the effect.
+    /// Size in data sheets, in the unit of the coefficient. An experiment that would not show this size does not excite the effect.
     pub typical: f64,
     /// What it belongs to.
     pub scope: Scope,
@@ -44,11 +44,11 @@ pub struct Coefficient {
 /// What a coefficient belongs to. All are fitted and reported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
-    /// The unit: it is an error, written and removed.
+    /// The unit: an error that is written and removed.
     Unit,
     /// The first recording: neither written nor removed elsewhere.
     Recording,
-    /// The place: what the sensor reads is there. The calibration is found without it, and nothing takes it out of readings.
+    /// The place: a true input, which the calibration excludes and nothing removes from readings.
     Place,
 }
 
@@ -62,20 +62,20 @@ pub struct Effect {
     pub sensor: Sensor,
     /// Physics in a line.
     pub about: &'static str,
-    /// Its coefficients; those of a recording alone stand last.
+    /// Its coefficients; those specific to a recording come last.
     pub coefficients: &'static [Coefficient],
     /// Its nonlinear parameter.
     pub parameter: Option<NonlinearParameter>,
-    /// Where the typical sizes are from, in words.
+    /// Source of the typical sizes, in words.
     pub size: &'static str,
-    /// What an experiment has to have for it to be seen.
+    /// What an experiment needs to show it.
     pub needs: &'static str,
     /// What it may be mistaken for.
     pub taken_for: &'static str,
 }
 
 impl Coefficient {
-    /// One of sensor axis `axis`.
+    /// A coefficient of sensor axis `axis`.
     pub const fn of(axis: usize, name: &'static str, regressor: Regressor, typical: f64) -> Self {
         Self {
             name,
@@ -86,7 +86,7 @@ impl Coefficient {
         }
     }
 
-    /// One of all axes.
+    /// A coefficient common to all axes.
     pub const fn of_all(name: &'static str, regressor: Regressor, typical: f64) -> Self {
         Self {
             axis: None,
@@ -94,7 +94,7 @@ impl Coefficient {
         }
     }
 
-    /// It with another scope.
+    /// The coefficient with another scope.
     pub const fn scoped(self, scope: Scope) -> Self {
         Self { scope, ..self }
     }
@@ -114,7 +114,7 @@ pub(super) const fn each(regressor: Regressor, typical: f64) -> [Coefficient; 3]
     ]
 }
 
-/// A matrix by rows, whose columns have these regressors; rows are the sensor's axes.
+/// The coefficients of a matrix, by rows. Rows are the sensor's axes; the columns have these regressors.
 pub(super) const fn matrix(columns: [Regressor; 3], typical: f64) -> [Coefficient; 9] {
     let [x, y, z] = columns;
     [
@@ -147,7 +147,7 @@ pub(super) const fn times(first: Quantity, second: Quantity) -> Regressor {
 /// How the device removes an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnDevice {
-    /// Not at all: it is no error, or specific to a session.
+    /// Never: it is a true input, or specific to a session.
     Never,
     /// From the raw reading, by its code.
     ByCode,
@@ -158,12 +158,12 @@ pub enum OnDevice {
 }
 
 impl Effect {
-    /// Whether the readings err by it; else it is something that they should show.
+    /// Whether it is an error of the readings; otherwise it is a true input.
     pub fn is_error(&self) -> bool {
         self.coefficients.iter().all(|c| c.scope != Scope::Place)
     }
 
-    /// Whether it is specific to a session: it is found and reported, and no calibration holds it.
+    /// Whether it is specific to a session: it is reported, but not stored in a calibration.
     pub fn is_of_session(&self) -> bool {
         let of_session = |c: &Coefficient| c.regressor.quantities() == [Quantity::SessionTime];
         self.coefficients.iter().all(of_session)
@@ -180,7 +180,7 @@ impl Effect {
         self.coefficients.iter().filter(|c| c.scope == Scope::Unit)
     }
 
-    /// How the device removes it: what cannot be folded runs with every sample.
+    /// How the device removes it. What cannot be folded runs with every sample.
     pub fn on_device(&self) -> OnDevice {
         match self {
             e if !e.is_error() || e.is_of_session() => OnDevice::Never,
@@ -194,7 +194,7 @@ impl Effect {
     pub fn table_line(&self) -> String {
         let mut formulas: Vec<String> = Vec::new();
         for c in self.coefficients {
-            // Coefficients of each axis with the same law are one formula; those of a matrix are told apart by the other axis.
+            // Coefficients of the axes with the same law share one formula; those of a matrix are distinguished by the other axis.
             let formula = match c.regressor {
                 Regressor::Bit(_) => "probability, over the noise, that the bit is set".into(),
                 regressor => regressor.formula(None),

@@ -1,4 +1,4 @@
-//! An effect with its numbers, from the decision on it to the calibration file, the result of a diagnosis and the device.
+//! An effect with its numbers, used from the decision on it to the calibration file, the result of a diagnosis and the device.
 
 mod on_device;
 mod written;
@@ -23,29 +23,29 @@ pub use written::{WrittenCoefficient, WrittenConverter, WrittenParameter};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(into = "WrittenEffect", try_from = "WrittenEffect")]
 pub struct FittedEffect {
-    /// Which, with the coefficients that are not zero.
+    /// The effect, with the coefficients that are not zero.
     pub candidate: Candidate,
     /// Its nonlinear parameter, 0 if it has none.
     pub parameter: f64,
-    /// 95 % interval of its nonlinear parameter; `None` where it has none, or it is not known.
+    /// 95 % interval of its nonlinear parameter; `None` if it has none, or if it is not known.
     pub interval: Option<Interval>,
     /// Coefficients, SI, in the order of the candidate's active ones.
     pub values: Vec<f64>,
-    /// Their standard deviations, whatever the nonlinear parameter is; empty where they are not known, as on a device.
+    /// Their standard deviations, which include the uncertainty of the nonlinear parameter; empty if unknown, as on a device.
     pub sigmas: Vec<f64>,
 }
 
 /// A 95 % interval of a nonlinear parameter by the profile of its likelihood, in the unit of the parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
-    /// Lower end; `None` where the smallest value that is looked at is within the interval.
+    /// Lower end; `None` if the interval includes the smallest value that is searched.
     pub lower: Option<f64>,
-    /// Upper end; `None` where the largest is.
+    /// Upper end; `None` if it includes the largest.
     pub upper: Option<f64>,
 }
 
 impl FittedEffect {
-    /// One of which nothing but its numbers is known.
+    /// An effect without interval and standard deviations.
     pub fn new(candidate: Candidate, parameter: f64, values: Vec<f64>) -> Self {
         Self {
             candidate,
@@ -66,7 +66,7 @@ impl FittedEffect {
         self.candidate.sensor
     }
 
-    /// It without what is of the recording that it was found in alone.
+    /// The effect without the coefficients that are specific to its recording.
     pub fn lasting(&self) -> Self {
         let (candidate, values) = self.candidate.lasting(&self.values);
         let (_, sigmas) = self.candidate.lasting(&self.sigmas);
@@ -78,16 +78,16 @@ impl FittedEffect {
         }
     }
 
-    /// It with its standard deviations to so many digits.
+    /// The effect with its standard deviations rounded to this many digits.
     pub(crate) fn with_digits(mut self, digits: usize) -> Self {
-        // Of the two zeros there is one.
+        // -0.0 becomes 0.0.
         self.values.iter_mut().for_each(|v| *v += 0.0);
         let sigmas = self.sigmas.iter_mut();
         sigmas.for_each(|s| *s = rounded(*s, digits));
         self
     }
 
-    /// Whether it is a function of its sensor's own input alone, other than what the converter makes of it.
+    /// Whether it depends only on the input of its own sensor. Errors that depend on the converter's code do not count.
     pub fn is_of_own_input(&self) -> bool {
         let sensor = self.candidate.sensor;
         let need = match sensor {
@@ -100,7 +100,7 @@ impl FittedEffect {
         any && quantities.all(|q| q.needs(need, sensor))
     }
 
-    /// Adds its error of the three axes, SI.
+    /// Adds its errors of the three axes, SI.
     pub(super) fn add(&self, at: &Conditions, error: &mut Vector3<f64>) {
         self.candidate
             .add_error(at, self.parameter, &self.values, error);
@@ -138,14 +138,17 @@ impl FittedEffect {
         })
     }
 
-    /// Its converters: one of all axes, or one of each.
+    /// Its converters: one for all axes, or one for each.
     pub fn converters(&self) -> Vec<WrittenConverter> {
         WrittenConverter::of(&self.candidate.codes)
     }
 
-    /// Adds it to the effects of a unit. One that is known there was taken out before this was found, so that it is what is left of it:
-    /// of the same law the coefficients add up. Another time constant is another effect beside it; of codes an axis has one converter.
-    /// Refused is a second one, in words.
+    /// Adds it to the effects of a unit. Known effects were removed before this one was found, so coefficients of the same law add up. The same law
+    /// with another time constant is a separate effect.
+    ///
+    /// # Errors
+    ///
+    /// In words, if both depend on the code: an axis has only one converter.
     pub fn join(self, all: &mut Vec<Self>) -> Result<(), String> {
         let same = |e: &&mut Self| e.id() == self.id() && e.parameter == self.parameter;
         let Some(known) = all.iter_mut().find(same) else {
@@ -180,7 +183,7 @@ impl FittedEffect {
     }
 }
 
-/// What is written of both is the same.
+/// Equal if both are written alike.
 impl PartialEq for FittedEffect {
     fn eq(&self, other: &Self) -> bool {
         WrittenEffect::from(self.clone()) == WrittenEffect::from(other.clone())

@@ -8,7 +8,7 @@ use crate::quantity::Sensor;
 /// 1 deg/s, rad/s.
 const DPS: f64 = std::f64::consts::PI / 180.0;
 const G: f64 = 9.80665;
-/// Full scale of an ADXRS300, rad/s: where its nonlinearity is stated.
+/// Full scale of an ADXRS300, rad/s, at which its nonlinearity is specified.
 const FULL: f64 = 300.0 * DPS;
 
 const EARTH: [Coefficient; 1] = {
@@ -18,7 +18,7 @@ const EARTH: [Coefficient; 1] = {
 };
 
 pub(super) const EFFECTS: &[Effect] = &[
-    // The vertical part alone: about the level one nothing is known where nothing says which way is north.
+    // Only the vertical part: the level part depends on the heading, which is unknown.
     Effect {
         id: "earth_rate",
         sensor: Sensor::Gyro,
@@ -39,8 +39,8 @@ pub(super) const EFFECTS: &[Effect] = &[
         needs: "rest with each axis up and down",
         taken_for: "magnetic sensitivity, if the heading is always the same; Earth rate",
     },
-    // At rest in gravity the three squares add up to a constant, which is a bias: of each row the differences are seen, and their sum with
-    // the bias only where the size of the force changes.
+    // At rest the three squares add up to a constant, which acts as a bias. So the differences within each row are seen; the sum is separated from
+    // the bias only if the magnitude of the force changes.
     Effect {
         id: "gyro_g_squared",
         sensor: Sensor::Gyro,

@@ -1,4 +1,4 @@
-//! Effects: what an affine calibration lacks, by name, as data.
+//! Effects: the errors that an affine calibration lacks, by name, as data.
 //!
 //! | module | what |
 //! |---|---|
@@ -7,15 +7,15 @@
 //! | [`regressor`] | products of powers, absolute values, decays: what an error is proportional to |
 //! | [`effect`] | coefficients of regressors, with what excites and what removes them |
 //! | `gyro`, `accel`, `drift`, `thermal`, [`readout`] | the effects, one list each |
-//! | [`alternatives`] | laws that are on no list, whose shadow an effect may be |
+//! | [`alternatives`] | unlisted laws that may explain the same residuals as an effect |
 //! | [`candidate`] | an effect, a product found from the data or a jump, with the choice of its coefficients |
 //! | [`temperature`] | the temperature that an effect follows |
 //! | [`fitted`] | an effect with its numbers: from the decision to the file, the result and the device |
-//! | [`removal`] | taking effects out of readings |
+//! | [`removal`] | removing effects from readings |
 //!
-//! An effect is added by one entry in one of the lists, one arm in `core`, which removes it, and one truth in `rig`. What it is a function
-//! of, its units, how the device evaluates it and its line in docs/effects.md follow from the entry. Tests loop over [`all`], so that
-//! what is missing elsewhere is said.
+//! A new effect needs one entry in one of the lists, one arm in `core`, which removes it, and one simulated truth in `rig`. Its quantities, its
+//! units, how the device evaluates it and its line in docs/effects.md follow from the entry. Tests loop over [`all`] and report what is missing
+//! elsewhere.
 
 pub mod alternatives;
 pub mod candidate;
@@ -68,7 +68,7 @@ mod tests {
         assert_eq!(ids.len(), count);
         for effect in all() {
             assert!(effect.id.starts_with(effect.sensor.name()) || !effect.is_error());
-            // The device takes the coefficients of the unit as a list.
+            // The device takes the coefficients of the unit as a list, so they come first.
             let of_unit = effect
                 .coefficients
                 .iter()
@@ -77,7 +77,7 @@ mod tests {
         }
     }
 
-    /// What the data say of how often an effect has to be evaluated is what the device does.
+    /// The lists and the device agree on how often an effect has to be evaluated.
     #[test]
     fn the_device_folds_what_moves_with_temperature_and_time_only() {
         for effect in all() {
@@ -116,7 +116,6 @@ mod tests {
         assert_eq!(known.len(), removed().count());
     }
 
-    /// The table of the documentation is made of the data.
     #[test]
     fn the_table_of_the_documentation_is_that_of_the_data() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/effects.md");

@@ -1,4 +1,4 @@
-//! What an error can be a function of: the state and the surroundings of a unit.
+//! Quantities on which an error can depend: the state and the surroundings of a unit.
 
 use nalgebra::Vector3;
 
@@ -6,24 +6,24 @@ use crate::quantity::AXES;
 use crate::quantity::Sensor;
 use crate::signal::blocks::Moments;
 
-/// Temperature from which offsets count, °C.
+/// Temperature from which temperature offsets count, °C.
 pub const REFERENCE_C: f64 = 25.0;
 
-/// Lag of the filter that the rate of change of the temperature is taken by, s: unfiltered it would be noise.
+/// Time constant of the filter for the rate of change of the temperature, s; unfiltered it would be noise.
 pub const RATE_LAG_S: f64 = 30.0;
 
-/// What a unit undergoes over a short stretch of time, in the body frame.
+/// State and surroundings of a unit over a short segment of time, in the body frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conditions {
     /// Index of the recording.
     pub session: usize,
-    /// Middle of the stretch, s since the recording began.
+    /// Middle of the segment, s since the recording began.
     pub t_s: f64,
     /// The same since power-on, as the device counts it; if unknown, since the start of the recording.
     pub on_s: f64,
     /// The same since the middle of the dwells of the recording.
     pub from_middle_s: f64,
-    /// Length of the stretch, s.
+    /// Length of the segment, s.
     pub duration_s: f64,
     /// Rate, rad/s.
     pub rate: Vector3<f64>,
@@ -33,7 +33,7 @@ pub struct Conditions {
     pub angular_acceleration: Vector3<f64>,
     /// The sensor's own input along its three sensitive directions, rad/s or m/s².
     pub sensed: Vector3<f64>,
-    /// Temperature above [`REFERENCE_C`], °C; not a number where it was not recorded.
+    /// Temperature above [`REFERENCE_C`], °C; not a number if it was not recorded.
     pub temperature_offset: f64,
     /// The same behind a first-order lag: that of the effect, or [`RATE_LAG_S`].
     pub lagged_temperature: f64,
@@ -42,7 +42,7 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// One of several at the same input: the first, with the readings of all.
+    /// Conditions at the same input as one: the first, with the readings and durations of all.
     pub(crate) fn pooled(all: &[Self]) -> Self {
         let total: f64 = all.iter().map(|c| c.duration_s).sum();
         let mean = |of: &dyn Fn(&Self) -> Vector3<f64>| -> Vector3<f64> {
@@ -58,7 +58,7 @@ impl Conditions {
         pooled
     }
 
-    /// The conditions as the sensor would read them without `error` of its axes, SI.
+    /// The conditions with the readings that the sensor would give without `error` of its axes, SI.
     pub fn read_without(&self, error: &Vector3<f64>) -> Self {
         let mut clean = *self;
         clean.reading.mean -= self.reading.scale.component_mul(error);
@@ -66,7 +66,7 @@ impl Conditions {
     }
 }
 
-/// Raw readings of the three axes of a sensor over a stretch of time.
+/// Raw readings of the three axes of a sensor over a segment of time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// Their mean, raw.
@@ -78,14 +78,14 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// Where nothing was recorded: without noise, in SI.
+    /// For conditions that were not recorded: without noise, in SI.
     pub const NONE: Self = Self {
         mean: Vector3::new(0.0, 0.0, 0.0),
         sd: Vector3::new(0.0, 0.0, 0.0),
         scale: Vector3::new(1.0, 1.0, 1.0),
     };
 
-    /// Of statistical `moments` of the three axes.
+    /// The reading with these statistical `moments` of the three axes.
     pub fn of(moments: &[Moments], scale: &Vector3<f64>) -> Self {
         let mean = |i: usize| moments[i].mean;
         let sd = |i: usize| match moments[i].n {
@@ -121,7 +121,7 @@ pub enum Quantity {
     RecordingTime,
     /// Input of the sensor along the sensitive direction of the axis that errs, rad/s or m/s².
     Input,
-    /// The same of another axis of the sensor.
+    /// Input of the sensor along the sensitive direction of this axis.
     InputAlong(usize),
     /// Angular acceleration about a body axis, rad/s².
     AngularAcceleration(usize),
@@ -131,7 +131,7 @@ pub enum Quantity {
     RateMagnitude,
 }
 
-/// What an effect needs to be known for its removal.
+/// A quantity that may have to be known to remove an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Need {
     Rate,
@@ -162,7 +162,7 @@ impl Quantity {
         }
     }
 
-    /// `at` where it has another value; of one that is made of several quantities, as the vertical, unchanged.
+    /// `at` with another value of this quantity; unchanged if it is derived from several quantities, such as the vertical.
     pub fn with(self, mut at: Conditions, axis: usize, value: f64) -> Conditions {
         match self {
             Self::Rate(i) => at.rate[i] = value,
@@ -183,7 +183,7 @@ impl Quantity {
         at
     }
 
-    /// Name in the id of a term, where terms are made of it.
+    /// Name in the id of a term; `None` if terms do not contain it.
     pub fn name(self) -> Option<String> {
         Some(match self {
             Self::Rate(i) => format!("rate_{}", AXES[i]),
@@ -195,7 +195,7 @@ impl Quantity {
         })
     }
 
-    /// Those that terms are made of.
+    /// The quantities that terms contain.
     pub const OF_TERMS: [Self; 9] = [
         Self::Rate(0),
         Self::Rate(1),
@@ -208,7 +208,7 @@ impl Quantity {
         Self::Time,
     ];
 
-    /// Whether it moves with temperature and time only.
+    /// Whether it changes only with temperature and time.
     pub fn is_slow(self) -> bool {
         matches!(
             self,
@@ -221,7 +221,7 @@ impl Quantity {
         )
     }
 
-    /// Whether it follows the temperature.
+    /// Whether it depends on the temperature.
     pub fn is_thermal(self) -> bool {
         matches!(
             self,
@@ -239,7 +239,7 @@ impl Quantity {
         }
     }
 
-    /// Whether it is unknown without `need`, in an error of `sensor`. An unknown angular acceleration of a recording is taken as zero.
+    /// Whether `need` has to be known to compute it, in an error of `sensor`. An unknown angular acceleration is taken as zero.
     pub(crate) fn needs(self, need: Need, sensor: Sensor) -> bool {
         match (self, need) {
             (Self::Input | Self::InputAlong(_), Need::Rate) => sensor == Sensor::Gyro,
@@ -251,7 +251,7 @@ impl Quantity {
         }
     }
 
-    /// SI unit, of an effect of `sensor`.
+    /// SI unit, in an error of `sensor`.
     pub fn unit(self, sensor: Sensor) -> &'static str {
         match self {
             Self::Rate(_) | Self::RateMagnitude => "rad/s",
@@ -284,7 +284,7 @@ impl Quantity {
         }
     }
 
-    /// Name as a person reads it, in the error of axis `axis` of `sensor`.
+    /// Name for people, in the error of axis `axis` of `sensor`.
     pub fn in_words(self, sensor: Sensor, axis: usize) -> String {
         let along = |i: usize| match sensor {
             Sensor::Gyro => format!("rate along gyro {}", AXES[i]),
@@ -306,7 +306,7 @@ impl Quantity {
         }
     }
 
-    /// Factor from SI to the unit in which a person reads it, and that unit.
+    /// Factor from SI to the unit that people read, and that unit.
     pub fn readable(self, sensor: Sensor) -> (f64, &'static str) {
         const DPS: (f64, &str) = (180.0 / std::f64::consts::PI, "deg/s");
         const IN_G: (f64, &str) = (1.0 / 9.80665, "g");

@@ -1,25 +1,23 @@
 //! Errors that are a function of the converter's code.
 //!
-//! A converter adds up the weights of the bits that it finds, and a capacitor that is off makes one of them worth more or less
-//! than the others say. The error is then a step wherever the bit turns, as high as the weight is wrong. Codes that never come, one or
-//! a range of them, are a step as well: that of a bit so heavy that it turns once. Where the axes share the converter, as they do
-//! behind a multiplexer, they share the errors; where each has its own, or a firmware has subtracted a bias from each, the bits
-//! turn elsewhere on each.
+//! A converter adds up the weights of the bits that are set. If a capacitor is off, one bit weighs more or less than its nominal value. The error is
+//! then a step wherever that bit changes, as high as the error of its weight. Missing codes, one or a range of them, are a step as well: that of a
+//! bit so heavy that it changes once. Axes that share a converter behind a multiplexer share the errors. If each axis has its own converter, or a
+//! firmware has subtracted a bias from each, the bits change at different readings on each axis.
 //!
-//! Readings of one converter are multiples of a step: of a code, or of a fraction of one where several are averaged. The weights of
-//! its bits are powers of two times that, from a code 0 that reads 0. Converters of any other weight and zero are read from a
-//! calibration and removed, but not searched for: among thousands of periods and phases one is always near a residual, and such a
-//! search named codes in recordings that had none.
+//! Readings of a converter are multiples of a step: of a code, or of a fraction of one if several are averaged. The weights of its bits are powers of
+//! two times that step, and code 0 reads 0. Converters of any other weight and zero are read from a calibration and removed, but not searched for.
+//! Among thousands of periods and phases one always fits a residual by chance, and such a search reported code errors in recordings that had none.
 //!
-//! Noise carries a reading across a turn and back, so over a dwell a bit is set for a share of the time: that is what a mean
-//! depends on, and it bends where the code jumps.
+//! Noise carries a reading across a change and back, so over a dwell a bit is set for a share of the time. The mean depends on this share, which
+//! rises gradually where the code jumps.
 
 use super::converter::BITS;
 use super::effect::{Coefficient, Effect};
 use super::regressor::Regressor;
 use crate::quantity::Sensor;
 
-/// Of a converter of all axes, and then of each axis.
+/// Coefficients of a converter common to all axes, then of one for each axis.
 const COEFFICIENTS: [Coefficient; 4 * BITS] = {
     let mut all = [Coefficient::of_all("", Regressor::Bit(0), TYPICAL); 4 * BITS];
     let mut bit = 0;
@@ -49,7 +47,7 @@ const NAMES: [[&str; BITS]; 4] = [
     ["z bit 0", "z bit -1", "z bit -2", "z bit -3", "z bit -4", "z bit -5", "z bit -6", "z bit -7", "z bit -8"],
 ];
 
-/// STM32H743: integral nonlinearity of 4 to 12 in 65536, which is 6 in the 32768 of the first bit.
+/// STM32H743: integral nonlinearity of 4 to 12 codes of 65536. 6 codes of the 32768 of the first bit are 2e-4.
 pub const TYPICAL: f64 = 2e-4;
 const NEEDS: &str = "unprocessed readings of the converter, at many levels over its range";
 const ABOUT: &str = "converter nonlinearity (INL, DNL): bits weigh more or less than their nominal value, or codes are missing";

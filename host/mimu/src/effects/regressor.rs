@@ -1,7 +1,7 @@
 //! A regressor as data: what an error of one axis is proportional to.
 //!
-//! Its value, unit, formula, what it depends on and how often the device has to evaluate it all follow from the same few numbers, so
-//! that an effect states its law once.
+//! Its value, unit, formula, what it depends on and how often the device has to evaluate it all follow from the same few numbers, so an effect states
+//! its law once.
 
 use super::converter::share_set;
 use super::quantity::{Conditions, Need, Quantity};
@@ -12,12 +12,12 @@ use crate::quantity::Sensor;
 pub struct Product {
     /// 1 or -1.
     pub sign: f64,
-    /// In the order of the product; a power of 0 is no factor.
+    /// Quantities with their powers, in the order of the product. A power of 0 marks an unused place.
     pub factors: [(Quantity, u8); 3],
 }
 
 impl Product {
-    /// Of a power of one quantity.
+    /// A power of one quantity.
     pub const fn power(of: Quantity, power: u8) -> Self {
         let none = (of, 0);
         Self {
@@ -26,7 +26,7 @@ impl Product {
         }
     }
 
-    /// Of two quantities.
+    /// The product of two quantities.
     pub const fn of(first: Quantity, second: Quantity) -> Self {
         Self {
             sign: 1.0,
@@ -42,7 +42,7 @@ impl Product {
         }
     }
 
-    /// Of up to three quantities in ascending order, each as often as it stands there; `None` of none or more.
+    /// The product of one to three quantities in ascending order, each as often as it occurs in the list; `None` for any other list.
     pub fn term(quantities: &[Quantity]) -> Option<Self> {
         let mut parts: Vec<(Quantity, u8)> = Vec::new();
         for q in quantities {
@@ -90,7 +90,7 @@ impl Product {
         powers.fold(self.sign, |product, v| product * v)
     }
 
-    /// Name of a term: `rate_x*force_y`, `force_z^2`. Empty where terms are made of other quantities.
+    /// Name of a term: `rate_x*force_y`, `force_z^2`. Quantities that terms do not contain are left out.
     pub fn name(&self) -> String {
         let written = self.parts().filter_map(|(q, p)| {
             let name = q.name()?;
@@ -117,8 +117,8 @@ impl Product {
 
     /// Unit of the coefficient of an effect of `sensor`.
     ///
-    /// An input of the sensor itself cancels its unit; that of a body axis leaves an angle, as what is misaligned. Radians are none beside
-    /// metres: rate squared times an arm is an acceleration.
+    /// An input of the sensor itself cancels the unit of the error; along a body axis it leaves an angle, as for a misalignment. Beside metres
+    /// radians are dropped: rate squared times an arm is an acceleration.
     fn unit(&self, sensor: Sensor) -> String {
         let count = |of: &dyn Fn(Quantity) -> bool| -> u8 {
             self.parts().filter(|(q, _)| of(*q)).map(|(_, p)| p).sum()
@@ -174,7 +174,7 @@ impl Product {
     }
 }
 
-/// What an error of one axis is proportional to. The *parameter* is the nonlinear parameter of the effect.
+/// The function that an error of one axis is proportional to. The *parameter* is the nonlinear parameter of the effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Regressor {
     /// A product.
@@ -187,8 +187,8 @@ pub enum Regressor {
     Decay(Quantity),
     /// ln(1 + quantity / parameter).
     Logarithm(Quantity),
-    /// The share of the time that so manieth bit from the first down is set in the code of the reading, over the scale factor. Readings
-    /// are in units of the weight of bit 0, from code 0.
+    /// The share of the time in which this bit, counted from the first down, is set in the code of the reading, divided by the scale factor. Readings
+    /// are in units of the weight of bit 0, counted from code 0.
     Bit(usize),
 }
 
@@ -219,7 +219,7 @@ impl Regressor {
         }
     }
 
-    /// The products that it is made of; those that are no product count as a power of their quantity.
+    /// The products that it consists of. An absolute value, a decay and a logarithm count as the first power of their quantity.
     fn products(&self) -> [Option<Product>; 2] {
         match self {
             Self::Product(product) => [Some(*product), None],
@@ -256,8 +256,8 @@ impl Regressor {
         }
     }
 
-    /// Whether it is `term` in an error of `axis` of `sensor`: the input along a sensitive direction is that along the body axis, to within
-    /// the misalignment.
+    /// Whether it equals `term` in an error of `axis` of `sensor`. The input along a sensitive direction counts as that along the body axis, from
+    /// which it differs by the misalignment.
     pub(crate) fn is_on_axis(&self, term: &Product, axis: usize, sensor: Sensor) -> bool {
         let Self::Product(own) = self else {
             return false;
@@ -269,7 +269,7 @@ impl Regressor {
         let of_body = |product: &Product| {
             let parts = product.parts().map(|(q, p)| match q {
                 Quantity::Input => (along, p),
-                // They differ by a bias.
+                // The two times differ by a constant, so the errors differ by a bias.
                 Quantity::SessionTime => (Quantity::Time, p),
                 q => (q, p),
             });
@@ -280,12 +280,12 @@ impl Regressor {
         of_body(own) == of_body(term)
     }
 
-    /// Whether it moves with temperature or time.
+    /// Whether it depends on temperature or time.
     pub fn is_slow(&self) -> bool {
         self.quantities().iter().any(|q| q.is_slow())
     }
 
-    /// Whether the device can fold it into a bias or a matrix: beside what moves with temperature and time at most one factor, an input
+    /// Whether the device can fold it into a bias or a matrix: beside factors that change only with temperature and time it has at most one, an input
     /// of the sensor.
     pub fn folds(&self, sensor: Sensor) -> bool {
         let fast = |p: &Product| -> Vec<(Quantity, u8)> {
@@ -300,7 +300,7 @@ impl Regressor {
             })
     }
 
-    /// Whether it cannot be known without `need`, in an error of `sensor`.
+    /// Whether `need` has to be known to compute it, in an error of `sensor`.
     pub(crate) fn needs(&self, need: Need, sensor: Sensor) -> bool {
         self.quantities().iter().any(|q| q.needs(need, sensor))
     }

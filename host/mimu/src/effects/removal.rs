@@ -1,4 +1,4 @@
-//! Taking effects out of readings, by what the device itself measures.
+//! Removing effects from readings, by what the device itself measures.
 
 use std::sync::Arc;
 
@@ -18,7 +18,8 @@ use crate::warning::Warning;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
-/// Errors of the axes of the sensor under some conditions, SI. Of effects with a lag these have to come with that lag.
+/// Errors of the axes of the sensor under some conditions, SI. For effects with a lag, the conditions have to contain the temperature behind that
+/// lag.
 pub fn errors(effects: &[FittedEffect], conditions: &[Conditions]) -> Vec<Vector3<f64>> {
     let mut all = vec![Vector3::zeros(); conditions.len()];
     for effect in effects {
@@ -29,7 +30,7 @@ pub fn errors(effects: &[FittedEffect], conditions: &[Conditions]) -> Vec<Vector
     all
 }
 
-/// Refuses a recording that lacks what one of `effects` has to be known by where it is to be taken out: channels, or a temperature.
+/// Refuses a recording that lacks channels or temperatures without which one of `effects` cannot be removed.
 pub fn removable(prepared: &Prepared, effects: &[FittedEffect]) -> Result<()> {
     let dwells = &prepared.dwells.list;
     let mut blocks = dwells.iter().enumerate().flat_map(|(i, dwell)| {
@@ -63,12 +64,12 @@ pub fn removable(prepared: &Prepared, effects: &[FittedEffect]) -> Result<()> {
     Ok(())
 }
 
-/// A recording with `effects` taken out of the readings: of each triad, given with its inverse model, in the raw domain. `None` if a
-/// calibration is singular.
+/// A recording with `effects` removed from the readings. The affine models are the triads' inverse models; the errors are subtracted in the raw
+/// domain. `None` if a calibration is singular.
 ///
-/// The conditions are what the device has: its own compensated readings and its temperature, not the table's. An error that is
-/// a function of what its own sensor reads is evaluated twice, the second time without the error by the first: of an error
-/// with slope k its share k would stay, and k² does.
+/// The conditions are what the device knows: its own compensated readings and its temperature, instead of the table's. An error that depends on its
+/// own sensor's reading is evaluated twice, the second time without the first estimate of the error. With one evaluation a share k of an error with
+/// slope k would remain; with two, k² remains.
 pub fn remove(
     prepared: &Prepared,
     gyro: Option<&Affine<f64>>,
@@ -89,8 +90,7 @@ pub fn remove(
     Some(out)
 }
 
-/// The same of a calibration for these temperatures, °C: as on the device, beyond them the effects see the temperature go on for
-/// [`BEYOND_C`] and then stand.
+/// The same for a calibration over these temperatures, °C. As on the device, the effects use the temperature clamped to [`BEYOND_C`] beyond them.
 pub fn remove_within(
     prepared: &Prepared,
     gyro: Option<&Affine<f64>>,
@@ -103,7 +103,7 @@ pub fn remove_within(
     };
     let mut seen = prepared.clone();
     for block in &mut Arc::make_mut(&mut seen.condensed).blocks {
-        // Of what is not a number clamp() leaves that.
+        // clamp() keeps NaN.
         block.temp_c.mean = block.temp_c.mean.clamp(from - BEYOND_C, to + BEYOND_C);
     }
     let mut out = remove(&seen, gyro, accel, effects)?;
@@ -114,19 +114,19 @@ pub fn remove_within(
     Some(out)
 }
 
-/// The conditions that readings of a sensor are corrected under.
+/// The effects of a sensor, and what evaluating them needs.
 struct Stretches<'a> {
     sensor: Sensor,
-    /// Sensitive directions by rows, and how errors along them become errors in the body frame.
+    /// Sensitive directions by rows; `to_body`, their inverse, transforms errors along them to the body frame.
     direction: Matrix3<f64>,
     to_body: Matrix3<f64>,
     effects: &'a [&'a FittedEffect],
-    /// Of each effect that does not go by what the thermometer shows: the temperature and that behind the lag, by block.
+    /// For each effect that does not follow the recorded temperature: its temperature and the lagged one, by block.
     late: Vec<Option<Vec<(f64, f64)>>>,
 }
 
 impl Stretches<'_> {
-    /// The conditions as they are where the sensor errs by `error`.
+    /// The conditions without `error` of the sensor.
     fn without(&self, at: &Conditions, error: &Vector3<f64>) -> Conditions {
         let mut clean = at.read_without(error);
         let input = match self.sensor {
@@ -157,8 +157,8 @@ impl Stretches<'_> {
             }
             error
         };
-        // As the device: where the error is steeper than the input, a second look would lead away. Each axis has a code of its own, and
-        // its errors go first, as all else is a function of what would have been read without them.
+        // As on the device: if the error is steeper than the input, a second evaluation would diverge. Each axis has its own code. Errors that depend
+        // on the code are removed first, because all others are functions of the reading without them.
         let first = sum(conditions, true);
         let second = sum(&self.without(conditions, &first), true);
         let codes = first.zip_map(&second, |first, second| {
@@ -189,7 +189,7 @@ fn of_sensor(
     let blocks = &prepared.condensed.blocks;
     let t0_s = blocks.first()?.start_s;
     let middle_s = prepared.middle_s();
-    // Before the first temperature it is that one, as a lag begins there on the device too; without any the reference, as there.
+    // As on the device: before the first temperature that one is used, and without any the reference.
     let warm = offsets(blocks);
     let first = warm.iter().map(|w| w.1).find(|w| w.is_finite());
     let known = |w: f64| if w.is_nan() { first.unwrap_or(0.0) } else { w };
@@ -271,7 +271,7 @@ fn of_sensor(
     for dwell in &mut out.dwells.list {
         let range = dwell.blocks.clone();
         for i in 0..3 {
-            // As the mean of the dwell was made: of the samples that there are.
+            // Weighted by the samples present, as in the mean of the dwell.
             let samples = |b: &Block| f64::from(b.raw[from + i].n);
             let total: f64 = blocks[range.clone()].iter().map(samples).sum();
             let pairs = blocks[range.clone()].iter().zip(&of_block[range.clone()]);
@@ -285,7 +285,7 @@ fn of_sensor(
     Some(())
 }
 
-/// A dwell without a reading of the other triad is none for this one, if an effect goes by that.
+/// If an effect depends on the other triad, a dwell without readings of that triad cannot be used for this one.
 fn leave_out_unknown(sensor: Sensor, effects: &[&FittedEffect], out: &mut Prepared) {
     let (other, need) = match sensor {
         Sensor::Gyro => (Sensor::Accel, Need::Force),
@@ -312,7 +312,7 @@ fn leave_out_unknown(sensor: Sensor, effects: &[&FittedEffect], out: &mut Prepar
     }
 }
 
-/// What a channel read in each block, raw: where it has no samples, what it read before, or what it read first.
+/// Mean of a channel in each block, raw. A block without samples has that of the block before; blocks before the first reading have the first.
 fn held(blocks: &[Block], channel: usize) -> Vec<f64> {
     let read = |b: &Block| (b.raw[channel].n > 0).then_some(b.raw[channel].mean);
     let mut last = blocks.iter().find_map(read).unwrap_or(f64::NAN);

@@ -5,17 +5,17 @@ use nalgebra::{DMatrix, DVector};
 use super::quantity::REFERENCE_C;
 use crate::signal::blocks::Block;
 
-/// The temperature that an effect follows, where it is not the one recorded.
+/// The temperature that an effect follows, if it is not the recorded one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Followed {
     /// Lag, s, if it has one.
     pub lag_s: Option<f64>,
-    /// Whether the thermometer is on another die, whose self-heating after power-on the sensor does not undergo.
+    /// Whether the thermometer is on another die, whose self-heating after power-on the sensor does not share.
     pub without_self_heating: bool,
 }
 
-/// Middle of each block, s, and its temperature above [`REFERENCE_C`], °C: where there is none that of the block before, as
-/// the device does it, and not a number before the first.
+/// Middle of each block, s, and its temperature above [`REFERENCE_C`], °C. A block without one has that of the block before, as on the device; before
+/// the first it is not a number.
 pub fn offsets(blocks: &[Block]) -> Vec<(f64, f64)> {
     let mut held = f64::NAN;
     let each = blocks.iter().map(|b| {
@@ -27,7 +27,7 @@ pub fn offsets(blocks: &[Block]) -> Vec<(f64, f64)> {
     each.collect()
 }
 
-/// Behind a first-order lag: `(time in s, value)` in, the lagged value out.
+/// A first-order lag: `(time in s, value)` in, the lagged values out.
 pub fn lagged(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
     let mut state = signal
         .iter()
@@ -40,7 +40,7 @@ pub fn lagged(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
         let dt = (t - before.0).max(0.0);
         let keep = (-dt / lag_s).exp();
         if v.is_finite() && before.1.is_finite() {
-            // The input runs straight from one to the next: exact for ramps.
+            // The input is linear between two values: exact for ramps.
             let slope = if dt > 0.0 { (v - before.1) / dt } else { 0.0 };
             state = v - slope * lag_s + (state - before.1 + slope * lag_s) * keep;
         }
@@ -50,17 +50,17 @@ pub fn lagged(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
     out
 }
 
-/// Time after the beginning in which a thermometer heats itself, s: dies of such parts need 3 to 10 s.
+/// Time after the start in which a thermometer heats itself, s. The dies of such parts need 3 to 10 s.
 const START_S: f64 = 60.0;
-/// Time constants of it that are tried first: the least, s, the ratio of each to that before, and how many.
+/// Time constants of the self-heating that are tried first: the smallest, s, the ratio of each to the one before, and their number.
 const OWN_S: (f64, f64, i32) = (2.0, 1.33, 9);
-/// Least of it that counts, K.
+/// Smallest self-heating that counts, K.
 const OWN_C: f64 = 0.2;
-/// Least F: the thermometer alone has to show it beyond doubt.
+/// Smallest F statistic: the thermometer alone has to show self-heating beyond doubt.
 const OWN_F: f64 = 50.0;
 
-/// A temperature without what its thermometer warmed up by itself after power-on, which a sensor on another die did not undergo:
-/// an exponential beside a parabola, the slower course of the board, over the first minute. `None` where it shows none.
+/// A temperature without the self-heating of its thermometer after power-on, which a sensor on another die does not share. Over the first minute an
+/// exponential is fitted beside a parabola, the slower course of the board. `None` if no self-heating shows.
 pub fn without_self_heating(signal: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
     let first = signal.first()?.0;
     let start: Vec<(f64, f64)> = signal
@@ -109,7 +109,7 @@ pub fn without_self_heating(signal: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
     Some(without.collect())
 }
 
-/// Spearman's rank correlation of the values of a signal with time; `None` where fewer than three values are known or all are one.
+/// Spearman's rank correlation of the values of a signal with time; `None` if fewer than three values are known or all are equal.
 pub fn rank_correlation(signal: &[(f64, f64)]) -> Option<f64> {
     let mut known: Vec<(usize, f64)> = signal
         .iter()
@@ -156,7 +156,7 @@ mod tests {
         let step: Vec<(f64, f64)> = (0..100)
             .map(|i| (f64::from(i), f64::from(u8::from(i > 0))))
             .collect();
-        // The step is a ramp of a second: exp(-99/20) (exp(1/20) - 1) 20 is left of it.
+        // The step is a ramp of one second: exp(-99/20) (exp(1/20) - 1) 20 of it remains.
         let left = 20.0 * (-99.0_f64 / 20.0).exp() * (0.05_f64.exp() - 1.0);
         assert!((1.0 - lagged(&step, 20.0)[99] - left).abs() < 1e-12);
     }

@@ -1,4 +1,4 @@
-//! Errors by temperature.
+//! Errors that depend on the temperature.
 
 use super::effect::{Coefficient, Effect, NonlinearParameter, Role, Scope, each, times};
 use super::quantity::Quantity::{
@@ -24,7 +24,7 @@ const fn bias(slope: f64, curvature: f64) -> [Coefficient; 6] {
     ]
 }
 
-/// By the components of the input, `x`, `y`, `z`, across each axis.
+/// Products of the temperature with the components of the input across each axis: `x`, `y`, `z` are the components.
 const fn tilt(x: Quantity, y: Quantity, z: Quantity) -> [Coefficient; 6] {
     let typical = 2e-5;
     [
@@ -37,8 +37,8 @@ const fn tilt(x: Quantity, y: Quantity, z: Quantity) -> [Coefficient; 6] {
     ]
 }
 
-/// Lag of each axis, and what it was still behind by when the recording began: the die sits elsewhere than the thermometer, and after
-/// power-on each warms up by itself. What that differs from the thermometer decays with the lag.
+/// Lag of each axis, and how far it still was behind when the recording began. The die is elsewhere than the thermometer, and after power-on each
+/// warms up by itself. Their difference at the start decays with the lag.
 const fn behind(slope: f64, at_start: f64) -> [Coefficient; 6] {
     let [x, y, z] = each(Regressor::linear(TemperatureLag), slope);
     let left = Regressor::Decay(RecordingTime);

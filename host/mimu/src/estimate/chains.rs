@@ -1,4 +1,4 @@
-//! Chains of dwells that turns connect: what they tell of the Earth's rate across the vertical.
+//! Chains of dwells that turns connect: they determine the Earth's rate across the vertical.
 
 use std::collections::BTreeMap;
 
@@ -6,11 +6,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::turn::{Rest, Turn, across};
 
-/// Dwells that turns connect one to the next: in all of them the heading is known but for one angle, and so is the Earth's rate across
-/// the vertical but for two numbers, which are estimated.
+/// Dwells that turns connect one to the next. Within a chain the heading is known except for one angle. So the Earth's rate across the vertical is
+/// known except for two numbers, which are estimated.
 #[derive(Debug, Clone)]
 pub struct Chains {
-    /// Chain that each turn is a link of.
+    /// Chain to which each turn belongs.
     pub of_turn: Vec<Option<usize>>,
     /// Chain of each dwell at rest.
     pub of_rest: Vec<Option<usize>>,
@@ -18,11 +18,11 @@ pub struct Chains {
     pub count: usize,
 }
 
-/// Dwells in a chain from which on its two numbers are worth their while; of fewer, the Earth's rate across is noise.
+/// Dwells from which on a chain estimates its two numbers; in shorter chains the Earth's rate across the vertical is noise.
 const CHAIN: usize = 6;
 
 impl Chains {
-    /// Of turns in order of time.
+    /// The chains of turns, which are in order of time.
     pub fn of(turns: &[Turn], rest: &[Rest]) -> Self {
         let mut out = Self {
             of_turn: Vec::with_capacity(turns.len()),
@@ -45,7 +45,7 @@ impl Chains {
         out
     }
 
-    /// Two level directions in the body frame of each dwell of a chain, the same ones in the world; `rotations` are those of the turns.
+    /// Two level directions, fixed in the world, in the body frame of each dwell of a chain; `rotations` are those of the turns.
     pub fn level(
         &self,
         turns: &[Turn],

@@ -1,26 +1,26 @@
-//! The Earth's rate on a gyro that nothing else turns.
+//! The Earth's rate, the only rate of a gyro at rest.
 //!
-//! Its part about the vertical goes by the latitude, and the accelerometer says where up is: it is known, and taken off. Its part across
-//! goes by the heading, which hands do not know: it is noise, independent from pose to pose, in each reading at rest, and in where
-//! gravity stands after a turn. Left out, 10 of 18 clean units of three grades in somebody's hands were not called clean: 0.003 deg/s is more
-//! than the noise of a mean over 2.5 s of any gyro below 0.005 deg/s/√Hz.
+//! Its vertical part depends on the latitude. The accelerometer shows the vertical, so this part is known and subtracted. Its level part depends on
+//! the heading, which is unknown by hand. It is noise, independent from pose to pose, both in each reading at rest and in the direction of gravity
+//! after a turn. Without this noise, 10 of 18 clean units of three grades, turned by hand, were not called clean: 0.003 deg/s is more than the noise
+//! of a mean over 2.5 s of any gyro below 0.005 deg/s/√Hz.
 
 use nalgebra::Vector3;
 
 /// Rate of the Earth, rad/s (WGS 84).
 pub const RATE: f64 = 7.292_115e-5;
 
-/// What is known of the Earth's rate.
+/// The known part of the Earth's rate, and the variance of the rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Earth {
-    /// About the vertical, up positive, rad/s; 0 where the latitude is not known, and `earth_rate` is then an effect to be found.
+    /// About the vertical, up positive, rad/s; 0 if the latitude is unknown, and `earth_rate` is then an effect to be found.
     vertical: f64,
     /// Mean square of the rate along each of two level directions, rad²/s².
     level: f64,
 }
 
 impl Earth {
-    /// At a latitude in degrees. Where it is not known, the level part is that of the mean of a sphere.
+    /// At a latitude in degrees. If it is unknown, the level part is the mean over a sphere.
     pub fn at(latitude_deg: Option<f64>) -> Self {
         let (sin, cos2) = latitude_deg.map_or((0.0, 2.0 / 3.0), |degrees| {
             let (sin, cos) = degrees.to_radians().sin_cos();
@@ -32,32 +32,32 @@ impl Earth {
         }
     }
 
-    /// What a gyro at rest reads where gravity pushes along `up` (body axes, any length), rad/s: the part that is known.
+    /// The known part of what a gyro at rest reads, rad/s, if the specific force points along `up` (body axes, any length).
     pub fn rate(&self, up: &Vector3<f64>) -> Vector3<f64> {
         unit(up).map_or_else(Vector3::zeros, |up| up * self.vertical)
     }
 
-    /// Variance of the part that is not, of each axis, rad²/s².
+    /// Variance of the unknown part on each axis, rad²/s².
     pub fn variance(&self, up: &Vector3<f64>) -> Vector3<f64> {
         let level = |up: Vector3<f64>| up.map(|u| self.level * (1.0 - u * u));
         unit(up).map_or_else(|| Vector3::repeat(self.level), level)
     }
 
-    /// Variance of where gravity stands after a turn of so long, of each of two components, rad².
+    /// Variance of each of the two components of gravity's direction after a turn of this duration, rad².
     pub fn of_direction(&self, duration_s: f64) -> f64 {
         self.level * duration_s * duration_s
     }
 }
 
-/// `None` where the accelerometer says nothing.
+/// `None` without a reading of the accelerometer.
 fn unit(up: &Vector3<f64>) -> Option<Vector3<f64>> {
     up.try_normalize(0.0).filter(|up| up.norm().is_finite())
 }
 
-/// Two poses are one while their verticals are less than this apart, rad.
+/// Two poses count as one if the angle between their verticals is less than this, rad.
 const ONE_POSE: f64 = 0.05;
 
-/// For each of `ups` the first that is the same pose: in it the heading may be the same, and what a gyro reads of the Earth with it.
+/// For each of `ups` the first that is the same pose. In one pose the heading may be the same, and then so is the Earth's rate that a gyro reads.
 pub fn poses(ups: &[Vector3<f64>]) -> Vec<usize> {
     let mut leaders: Vec<usize> = Vec::new();
     let mut out = Vec::with_capacity(ups.len());

@@ -17,10 +17,10 @@ use crate::warning::Warning;
 const OPPOSITE_SHARE: f64 = 0.01;
 /// An input below this share of the largest is rest.
 const REST_SHARE: f64 = 1e-3;
-/// An input is along an axis if the rest of it is below this share.
+/// An input is along an axis if its part across is below this share.
 const ALONG_SHARE: f64 = 0.02;
 
-/// Size of the largest input; the unit in which designs are judged.
+/// Size of the largest input: the unit in which designs are judged.
 pub(super) fn span<'a>(observations: impl IntoIterator<Item = &'a Observation>) -> f64 {
     observations
         .into_iter()
@@ -43,7 +43,7 @@ pub fn observability(observations: &[Observation]) -> Result<Observability, Fail
     complete(found, observations.len())
 }
 
-/// What was found of a design `[b, P1, P2, P3]` of so many dwells, or what it leaves undetermined.
+/// The observability `found` for a design `[b, P1, P2, P3]` of so many dwells, or the parameters that it leaves undetermined.
 pub(super) fn complete(found: Observability, dwells: usize) -> Result<Observability, Failure> {
     if found.is_complete() {
         return Ok(found);
@@ -80,8 +80,8 @@ pub(super) fn complete(found: Observability, dwells: usize) -> Result<Observabil
     })
 }
 
-/// What is known of the errors of the readings of sensor `axis`. `wander` is what the means of all dwells share, axis by axis
-/// ([`crate::noise::Noise::wander`]), and part of their variances.
+/// Known errors of the readings of sensor `axis`. `wander` is the covariance of errors that the means of all dwells share, by axis
+/// ([`crate::noise::Noise::wander`]); their variances contain it.
 pub(super) fn errors(
     observations: &[Observation],
     axis: usize,
@@ -100,8 +100,8 @@ pub(super) fn errors(
 
 /// Least squares in the forward form, fang (15), (17): `u = P x + b`, sensor by sensor.
 ///
-/// The noisy reading is regressed on the known input, so that nothing is attenuated. With the `wander` that the means share,
-/// it is generalized least squares: of neighbouring dwells the difference counts, which is free of it.
+/// The noisy reading is regressed on the known input, so nothing is attenuated. With the `wander` that the means share, this is generalized least
+/// squares: it uses the differences of neighbouring dwells, in which the wander cancels.
 pub fn least_squares(
     observations: &[Observation],
     wander: Option<&[DMatrix<f64>; 3]>,
@@ -131,8 +131,8 @@ struct Measurement {
     variance: f64,
 }
 
-/// The readings of sensor `axis` as measurements with independent noise: each less its prediction from the errors of those before,
-/// and divided by what is left of the bias. Of independent readings it is themselves.
+/// The readings of sensor `axis` as measurements with independent noise: each minus the part that the errors of those before predict, divided by the
+/// remaining factor of the bias. Independent readings stay as they are.
 fn innovations(
     observations: &[Observation],
     span: f64,
@@ -175,9 +175,9 @@ fn innovations(
 
 /// The Kalman bank of fang (23)-(28), fed the dwell means one scalar at a time with a diffuse prior.
 ///
-/// Its noise is that of the dwell means; where the innovations' residual shows more, the bank is run again with
-/// the excess added, as in [`least_squares`], with which it agrees to rounding. A `wander` that the means share is no noise of
-/// one measurement: each is then fed less what those before predict of its error.
+/// Its noise is that of the dwell means. If the residuals show more, the bank runs again with the excess added, as in [`least_squares`], with which
+/// it agrees to rounding. With a `wander`, the errors of the means are correlated: from each measurement the error that those before predict is
+/// subtracted.
 pub fn kalman(
     observations: &[Observation],
     wander: Option<&[DMatrix<f64>; 3]>,
@@ -230,17 +230,17 @@ pub fn kalman(
     forward(&axes, span, observability.condition)
 }
 
-/// What was found of one sensor.
+/// The estimate of one sensor.
 pub(super) struct OfAxis {
     /// `[b, P1, P2, P3]`, inputs in units of the span.
     pub parameters: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// By group of observations; the variance of the parameters comes from all.
+    /// Scatter by group of observations; the variance of the parameters comes from all groups.
     pub scatter: Vec<(Observable, Scatter)>,
 }
 
-/// Puts `[b, P1, P2, P3]` of the three sensors (inputs in units of `span`) together.
+/// Combines `[b, P1, P2, P3]` of the three sensors (inputs in units of `span`).
 pub(super) fn forward(axes: &[OfAxis], span: f64, condition: f64) -> Result<Estimated, Failure> {
     let mut model = Forward {
         matrix: Matrix3::zeros(),
@@ -251,7 +251,7 @@ pub(super) fn forward(axes: &[OfAxis], span: f64, condition: f64) -> Result<Esti
         let (parameters, of_axis) = (&found.parameters, &found.covariance);
         let dof = found.scatter.iter().map(|s| s.1.variance_dof());
         let mut covariance = Covariance::zeros();
-        // Where b, P1, P2, P3 of this sensor stand among the twelve.
+        // Indices of b, P1, P2, P3 of this sensor among the twelve.
         let places = [9 + axis, 3 * axis, 3 * axis + 1, 3 * axis + 2];
         let unit = [1.0, span, span, span];
         model.bias[axis] = parameters[0];
@@ -358,7 +358,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
     let matrix = Matrix3::from_fn(|i, j| c_transposed[(j, i)]);
     let count = rest.len() as f64;
     let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / count;
-    // (9) and not (10): a dwell taken for rest may turn a little, and that is known.
+    // (9) instead of (10): a dwell that counts as rest may turn a little, at a known rate.
     let offsets: Vec<Vector3<f64>> = rest.iter().map(|o| o.input - matrix * o.raw).collect();
     let offset = offsets.iter().sum::<Vector3<f64>>() / count;
     let inverse = Affine { matrix, offset };
@@ -393,13 +393,13 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
             )
         })
         .collect();
-    // The readings at rest scatter by themselves: what pairs scatter by may be the table's rate.
+    // Readings at rest have their own scatter, because that of the pairs may be the table's rate.
     let mut rest_dof = [f64::INFINITY; 3];
     for axis in 0..3 {
         let values = offsets.iter().map(|o| o[axis] - offset[axis]).collect();
         let of_rest = scatter_of(values, &rest_variance, axis, count - 1.0);
         let of_pairs = scatter[axis].1;
-        // Where rest itself shows nothing, it may be for having been too few.
+        // If rest shows no excess, there may be too few rests: then that of the pairs counts.
         let (excess, dof) = if of_rest.excess > 0.0 {
             (of_rest.excess, of_rest.variance_dof())
         } else {
@@ -459,8 +459,8 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
     })
 }
 
-/// Cuts a covariance into what belongs to one row of the model, whose size the row's scatter tells, and what
-/// correlates the rows, which is known beforehand. `row_of` says which row an element belongs to.
+/// Splits a covariance: one part for each row of the model, whose size the row's scatter determines, and the part that correlates the rows, which is
+/// known beforehand. `row_of` gives the row of an element.
 fn by_row<const N: usize>(
     row_of: impl Fn(usize, usize) -> Option<usize>,
     covariance: &SMatrix<f64, N, N>,
@@ -479,8 +479,8 @@ fn by_row<const N: usize>(
     rows.chain([(of(None), f64::INFINITY)]).collect()
 }
 
-/// Covariance of three rows that are all estimated by `left` (3 or 4 by observations) when the errors of one
-/// observation are correlated across the rows as `noise(observation, row, row)` says. Row-major order, 3 a row.
+/// Covariance of three rows that are all estimated by `left` (3 or 4 by observations), if the errors of one observation are correlated across the
+/// rows by `noise(observation, row, row)`. Row-major order, 3 a row.
 fn rows_covariance(
     left: &DMatrix<f64>,
     noise: impl Fn(usize, usize, usize) -> f64,
@@ -499,7 +499,7 @@ fn rows_covariance(
 pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> {
     let observability = observability(observations)?;
     let n = observations.len();
-    // Centred and scaled, or the readings' common offset makes the normal matrix singular to rounding.
+    // Centred and scaled: otherwise the readings' common offset makes the normal matrix singular to rounding.
     let centre = observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n as f64;
     let unit = observations
         .iter()
@@ -586,8 +586,9 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
 /// The classical six positions, as baseline: every axis up and down, or turned both ways. Scale factor
 /// `(u⁺ - u⁻) / (x⁺ - x⁻)` and bias `(u⁺ + u⁻) / 2` of each sensor by itself; misalignments are taken to be zero.
 ///
-/// Two positions leave a sensor's two parameters no residual where none is repeated. But what it reads in the other four says whether its model holds: faces
-/// 4 degrees off level and a misalignment of 2 left 438 mm/s² there, beside a bias of ± 0.15 mg by the noise of the two alone.
+/// If none is repeated, the two positions of a sensor leave its two parameters no residual. Its readings in the other four then show whether the
+/// model holds: with faces 4 degrees off level and a misalignment of 2, they were off by 438 mm/s², while the noise of the two positions alone gave a
+/// bias of ± 0.15 mg.
 pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure> {
     let mut model = Forward {
         matrix: Matrix3::zeros(),
@@ -626,7 +627,7 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         let scale = (up.0 - down.0) / width;
         model.matrix[(axis, axis)] = scale;
         model.bias[axis] = 0.5 * (up.0 + down.0 - scale * middle);
-        // Repeated positions show what the noise does not; where there are none, those along the other axes do.
+        // Repeated positions show errors beyond the noise; if there are none, those along the other axes do.
         if used.len() == 2 {
             used = observations.iter().collect();
         }

@@ -1,20 +1,20 @@
-//! Weighted least squares, linear and not, with covariance and observability.
+//! Weighted least squares, linear and nonlinear, with covariance and observability.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Condition number (columns scaled) from which on a parameter counts as undetermined: at 1e5 one part
-/// in 10⁵ of error in the input, what a good table has, becomes all of the parameter.
+/// Condition number (columns scaled) from which on a parameter counts as undetermined: at 1e5 an input error of one part in 10⁵, which a good table
+/// has, is as large as the parameter.
 pub const UNDETERMINED: f64 = 1e5;
-/// Condition number from which on a warning is due.
+/// Condition number from which on there is a warning.
 pub const POORLY_DETERMINED: f64 = 1e3;
 
-/// Share of noise-only recordings in which [`excess_variance`] finds some. Intervals need it found when in doubt: an excess
-/// of half the known variance, tested at 5 %, is missed so often that nominal 95 % are 92.5 % with 18 degrees of freedom and 91 %
-/// with 3. At 30 % they are 94.9 and 94.3 % there, and over all sizes of excess between 93.0 and 96.5 %.
+/// Share of noise-only recordings in which [`excess_variance`] finds an excess. Intervals need even a doubtful excess. Tested at 5 %, an excess of
+/// half the known variance is missed so often that nominal 95 % are 92.5 % with 18 degrees of freedom and 91 % with 3. Tested at 30 %, they are 94.9
+/// and 94.3 %, and over all sizes of excess between 93.0 and 96.5 %.
 const EXCESS_IN_DOUBT: f64 = 0.3;
 
-/// Share of noise-only recordings of which [`Scatter::is_significant`] says that noise does not explain them.
+/// Share of noise-only recordings in which [`Scatter::is_significant`] reports an excess.
 const EXCESS_FALSE_ALARM: f64 = 0.05;
 
 /// How well a design determines its parameters: rank and condition of fang (29), (30), where
@@ -32,10 +32,10 @@ pub struct Observability {
 }
 
 impl Observability {
-    /// Of a `design`, rows by parameters, whose columns are in comparable units.
+    /// The observability of a `design`, rows by parameters, whose columns are in comparable units.
     pub fn of(design: &DMatrix<f64>) -> Self {
         let parameters = design.ncols();
-        // The normal matrix has every direction, also those that too few rows leave out.
+        // The normal matrix has all directions, including those that too few rows leave out.
         let eigen = (design.transpose() * design).symmetric_eigen();
         let singular = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
         let largest = singular.max();
@@ -83,7 +83,7 @@ pub struct Solution {
     pub parameters: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// Observations less prediction, in the units of the observations.
+    /// Observations minus prediction, in the units of the observations.
     pub residuals: DVector<f64>,
 }
 
@@ -97,8 +97,8 @@ pub enum Errors {
 }
 
 impl Errors {
-    /// `rows` (one for each observation) decorrelated and in units of sigma, where every observation has an independent
-    /// `excess` variance besides. `None` if the covariance is not positive definite.
+    /// `rows` (one for each observation) decorrelated and in units of sigma, with an independent variance `excess` added to each observation. `None`
+    /// if the covariance is not positive definite.
     fn whitened(&self, excess: f64, rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         match self {
             Self::Independent(variances) => {
@@ -121,7 +121,7 @@ impl Errors {
         }
     }
 
-    /// Sum of the squares of decorrelated `residuals`, where each has `excess` besides.
+    /// Sum of the squares of decorrelated `residuals`, with the variance `excess` added to each.
     fn chi2(&self, excess: f64, residuals: &DVector<f64>) -> f64 {
         match self {
             Self::Independent(variances) => {
@@ -137,8 +137,7 @@ impl Errors {
     }
 }
 
-/// Solves `observations = design * parameters + noise` for noise with the known `errors` and an independent `excess` variance
-/// besides.
+/// Solves `observations = design * parameters + noise`, for noise with the known `errors` and an additional independent variance `excess`.
 ///
 /// By QR of the whitened design: normal equations would square the condition. The design must have full rank
 /// ([`Observability::is_complete`]).
@@ -157,7 +156,7 @@ pub fn solve(
     })
 }
 
-/// `design` with the observations behind it.
+/// `design` with the observations as its last column.
 fn beside(design: &DMatrix<f64>, observations: &DVector<f64>) -> DMatrix<f64> {
     let columns = design.ncols();
     let mut both = design.clone().insert_column(columns, 0.0);
@@ -165,11 +164,11 @@ fn beside(design: &DMatrix<f64>, observations: &DVector<f64>) -> DMatrix<f64> {
     both
 }
 
-/// What decorrelated rows, the observations in the last column, say of the parameters.
+/// The solution of decorrelated rows with the observations in the last column.
 struct ByRows {
     parameters: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Of each row, the share of its own noise that its prediction has.
+    /// For each row, the share of its own noise in its prediction.
     leverage: DVector<f64>,
 }
 
@@ -205,7 +204,7 @@ fn by_qr(white: &DMatrix<f64>) -> Option<ByRows> {
     })
 }
 
-/// Observations that share what they scatter by beside their known errors.
+/// Observations that share one excess variance beside their known errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
     /// Design, a row for each.
@@ -216,11 +215,11 @@ pub struct Group {
     pub errors: Errors,
 }
 
-/// Solves a linear problem of several groups of observations that are independent of each other, adding to each the excess variance that
-/// its own residual shows. A group has as many degrees of freedom as observations, minus what the parameters take up of them.
+/// Solves a linear problem of several groups of observations that are independent of each other. Each group gets the excess variance that its own
+/// residual shows. Its degrees of freedom are its observations, minus those that the parameters take.
 pub fn solve_groups(groups: &[Group]) -> Option<(Solution, Vec<Scatter>)> {
     let mut last: Option<(Solution, Vec<Scatter>)> = None;
-    // A chi-square at the edge of doubt may come and go with the excess of another group: either answer is as good.
+    // A chi-square at the limit may get and lose its excess with that of another group: either answer is as good.
     for _ in 0..30 {
         let excess = |g: usize| last.as_ref().map_or(0.0, |l| l.1[g].excess);
         let white = groups.iter().enumerate().map(|(g, group)| {
@@ -267,7 +266,7 @@ pub fn solve_groups(groups: &[Group]) -> Option<(Solution, Vec<Scatter>)> {
     last
 }
 
-/// What scatter has, beside the noise that was known beforehand.
+/// Scatter compared with the noise that was known beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scatter {
     /// Variance beyond the known noise of each observation; zero if noise explains the residual.
@@ -279,13 +278,13 @@ pub struct Scatter {
 }
 
 impl Scatter {
-    /// Whether noise does not explain the scatter: what a person should be told.
+    /// Whether the scatter exceeds the noise so clearly that a person should know.
     pub fn is_significant(&self) -> bool {
         self.excess > 0.0 && exceeds(self.chi2, self.dof, EXCESS_FALSE_ALARM)
     }
 
-    /// Degrees of freedom of a variance that this scatter is part of: infinite while the noise is known beforehand,
-    /// those of the residual when its size had to be found from it.
+    /// Degrees of freedom of a variance that this scatter is part of: infinite if the noise is known beforehand, those of the residual if the excess
+    /// was estimated from it.
     pub fn variance_dof(&self) -> f64 {
         if self.excess > 0.0 && self.dof >= 1.0 {
             self.dof
@@ -295,21 +294,21 @@ impl Scatter {
     }
 }
 
-/// Whether chance alone makes chi-square as large as this in less than `share` of the cases.
+/// Whether noise alone makes chi-square as large as this in less than `share` of the cases.
 fn exceeds(chi2: f64, dof: f64, share: f64) -> bool {
     ChiSquared::new(dof).is_ok_and(|d| chi2 > d.inverse_cdf(1.0 - share))
 }
 
-/// Variance to add to the known `variances` so that `residuals` are as large as expected (Paule and
-/// Mandel): zero where chi-square has nothing against the known noise.
+/// Variance to add to the known `variances` so that `residuals` are as large as expected (Paule and Mandel); zero if chi-square agrees with the known
+/// noise.
 ///
-/// Added and not multiplied: what a model lacks is the same for a long dwell and a short one.
+/// It is added instead of multiplied, because a model error is the same for a long dwell and a short one.
 pub fn excess_variance(residuals: &[f64], variances: &[f64], dof: f64) -> Scatter {
     let errors = Errors::Independent(DVector::from_column_slice(variances));
     excess_of(&DVector::from_column_slice(residuals), &errors, dof)
 }
 
-/// [`excess_variance`] beside errors that may be correlated.
+/// [`excess_variance`] for errors that may be correlated.
 pub fn excess_of(residuals: &DVector<f64>, errors: &Errors, dof: f64) -> Scatter {
     let chi2_at = |s: f64| errors.chi2(s, residuals);
     let chi2 = chi2_at(0.0);
@@ -396,7 +395,7 @@ pub fn minimize(
         }
         let step = -damped.cholesky()?.solve(&gradient);
         let predicted = -(step.dot(&gradient) + 0.5 * (&here.jacobian * &step).norm_squared());
-        // What a step can still gain is below the rounding of the cost.
+        // A further step gains less than the rounding of the cost.
         if !(predicted > 1e-14 * cost) {
             return Some((at, here));
         }

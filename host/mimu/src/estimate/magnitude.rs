@@ -1,11 +1,10 @@
 //! Calibration of a triad from the magnitude of its input alone, over many orientations.
 //!
-//! At rest `|C u + o| = g` in every pose of an accelerometer (references 14 of fang and 19 of xu, among many); on a turntable that lies under a
-//! gyro in any orientation `|C u + o|` is the rate, and `C u + o = 0` at rest. A rotation of the whole leaves
-//! every magnitude as it is, so the frame has to be chosen: C is lower triangular with a positive diagonal,
-//! that is, the body frame has its x axis along the sensor x and its xy plane through the sensor y, fang (13) with
-//! `Mp = 1`. Nine parameters, and at least nine poses, or rests and six orientations; which way an axis is positive cannot be seen
-//! from magnitudes either and is taken from the raw readings.
+//! At rest `|C u + o| = g` in every pose of an accelerometer (references 14 of fang and 19 of xu, among many). For a gyro in any orientation on a
+//! turntable, `|C u + o|` is the rate, and `C u + o = 0` at rest. Magnitudes do not change if the whole triad is rotated, so the frame has to be
+//! chosen: C is lower triangular with a positive diagonal. So the body frame has its x axis along the sensor x and its xy plane through the sensor y,
+//! fang (13) with `Mp = 1`. The nine parameters need at least nine poses, or rests and six orientations. Magnitudes do not show the sign of an axis
+//! either: it is taken from the raw readings.
 
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
@@ -27,15 +26,15 @@ const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 
 /// What is known of the input of a triad.
 #[derive(Debug, Clone, Copy)]
 pub struct KnownMagnitudes<'a> {
-    /// Whose input.
+    /// The sensor with this input.
     pub sensor: Sensor,
     /// Magnitudes that occur, SI.
     pub levels: &'a [f64],
-    /// Standard deviation of each level, as a share of it: an error that all its observations share. 0: exact.
+    /// Relative standard deviation of each level, an error that all its observations share; 0: exact.
     pub level_sigma: f64,
-    /// Which of the levels each observation has.
+    /// Index of the level of each observation.
     pub level_of: &'a [usize],
-    /// Dwells whose input is known whole, as that of a gyro at rest.
+    /// Dwells whose input vector is known, such as a gyro at rest.
     pub rests: &'a [Rest],
 }
 
@@ -46,9 +45,9 @@ struct Sphere {
 }
 
 impl Sphere {
-    /// Sphere through the readings by linear least squares, those at rest in its centre; `shares` are the magnitudes over the largest.
+    /// Sphere through the readings by linear least squares; those at rest are at its centre. `shares` are the magnitudes over the largest.
     ///
-    /// Of unknown centre c and radius r, `|u|² = 2 c·u + r² m² - |c|²`: linear in c, r² and the constant. With one magnitude the last two are one.
+    /// For unknown centre c and radius r, `|u|² = 2 c·u + r² m² - |c|²` is linear in c, r² and the constant. With one magnitude the last two merge.
     fn through(observations: &[Observation], shares: &[f64], rests: &[Rest]) -> Option<Self> {
         let readings = || {
             let spun = observations
@@ -87,10 +86,10 @@ impl Sphere {
     }
 }
 
-/// Extent of the readings across a plane over that along it, below which they lie in it.
+/// Readings whose extent across a plane is below this share of that along it lie in the plane.
 const FLAT: f64 = 0.01;
 
-/// The axes across which the readings have no extent, if they lie in a plane or on a line: some sensor has not seen the input.
+/// The axes perpendicular to the readings, if these lie in a plane or on a line: some sensor has not seen the input.
 fn flat(raw: &[Vector3<f64>]) -> Vec<usize> {
     let mean = raw.iter().sum::<Vector3<f64>>() / raw.len() as f64;
     let products = raw.iter().map(|u| (u - mean) * (u - mean).transpose());
@@ -98,7 +97,7 @@ fn flat(raw: &[Vector3<f64>]) -> Vec<usize> {
     let largest = eigen.eigenvalues.max();
     // All readings equal are flat too.
     let thin = (0..3).filter(|k| eigen.eigenvalues[*k] <= FLAT * FLAT * largest);
-    // How much of each axis lies across: the directions themselves are any two where the readings lie on a line.
+    // Share of each axis across the readings. If these lie on a line, the two directions themselves are arbitrary.
     let across = thin.fold(Vector3::zeros(), |sum: Vector3<f64>, k| {
         let direction = eigen.eigenvectors.column(k);
         sum + direction.component_mul(&direction)
@@ -109,7 +108,7 @@ fn flat(raw: &[Vector3<f64>]) -> Vec<usize> {
         .collect()
 }
 
-/// First guess, by the sphere through the readings: one scale factor for all axes. `None` if they lie on none.
+/// First guess, by the sphere through the readings: one scale factor for all axes. `None` if they do not lie on a sphere.
 pub fn first_guess(observations: &[Observation], gravity: f64) -> Option<Affine<f64>> {
     let sphere = Sphere::through(observations, &vec![1.0; observations.len()], &[])?;
     let matrix = Matrix3::from_diagonal_element(gravity / sphere.radius);
@@ -139,7 +138,7 @@ pub fn by_gravity(
 fn refuse_too_little(observations: &[Observation], known: &KnownMagnitudes) -> Result<(), Failure> {
     let n = observations.len();
     let rows = n + 3 * known.rests.len();
-    // The rests show o, and nothing of C.
+    // The rests determine o only.
     let needed = if known.rests.is_empty() {
         PARAMETERS
     } else {
@@ -199,9 +198,8 @@ fn refuse_too_little(observations: &[Observation], known: &KnownMagnitudes) -> R
 
 /// Fits C and o to `|C u + o| = m` over all observations and `C u + o = x` over the rests, and the levels m to within their error.
 ///
-/// `variances` are those of the magnitudes by noise, SI squared, one for each observation. The levels' errors are parameters beside the nine, each
-/// with its standard deviation as an observation: what they leave open of C cannot be averaged away, and is a part of the
-/// covariance of its own.
+/// `variances` are those of the magnitudes by noise, SI squared, one for each observation. The errors of the levels are further parameters, each with
+/// its standard deviation as an observation. The uncertainty of C that they cause cannot be averaged away, and is a separate part of the covariance.
 pub fn estimate(
     observations: &[Observation],
     variances: &[f64],
@@ -286,7 +284,7 @@ pub fn estimate(
         }
         out
     };
-    // A noiseless recording has none; any positive number weighs all poses alike then.
+    // A noiseless recording has no variances; any positive number then weights all poses alike.
     let to_si = unit / sphere.radius;
     let at_rest = rests.iter().flat_map(|r| {
         let noise = r.variance * (to_si * to_si) + r.rate_variance;
@@ -310,7 +308,7 @@ pub fn estimate(
         start[k] = 1.0;
     }
     let alike = vec![1.0; ends[1]];
-    // What the experiment shows of the nine: levels that are known cannot make it worse by more than their error.
+    // Observability of the nine at known levels: the levels can worsen it only by their error.
     let shape_of = |p: &DVector<f64>| {
         let all = evaluate(p, &alike).jacobian;
         Observability::of(&all.view((0, 0), (ends[1], PARAMETERS)).into_owned())
@@ -320,7 +318,7 @@ pub fn estimate(
         return Err(undetermined(&shape, known.sensor));
     }
     let first = minimize(start.clone(), |p| evaluate(p, &alike));
-    // Where nothing holds the angles between the sensors, the fit runs off towards C = 0 and |o| = g, which fits every pose.
+    // If the poses do not determine the angles between the sensors, the fit diverges towards C = 0 and |o| = g, which fits every pose.
     let Some((mut p, _)) = first.filter(|(p, _)| is_triad(&unpack(p).0)) else {
         let weak = weak_beside_scatter(&start, |p| evaluate(p, &alike));
         return Err(weak.map_or_else(lost, |shape| undetermined(&shape, known.sensor)));
@@ -348,8 +346,8 @@ pub fn estimate(
                 .clone()
                 .map(|i| here.residuals[i] * weights[i].sqrt())
                 .collect();
-            // Without rests and levels this is the number of poses less nine, to within rounding of the trace. Ten poses left less than one
-            // degree of freedom by 1e-12, and its interval was a sixth of what it is.
+            // Without rests and levels this is the number of poses minus nine, to within rounding of the trace. Ten poses once gave 1e-12 less than
+            // one degree of freedom, and intervals a sixth of the right ones.
             let left = own.len() as f64 - taken;
             let whole = (left - left.round()).abs() < 1e-6;
             let dof = if whole { left.round() } else { left };
@@ -379,8 +377,8 @@ pub fn estimate(
     for k in 0..3 {
         change[(9 + k, 6 + k)] = unit;
     }
-    // A row's sign cannot be seen: the raw reading decides, and flipping rows keeps sizes. What must not
-    // happen is a negative diagonal, which the start (the unit matrix) makes all but impossible.
+    // Magnitudes do not show the sign of a row, and flipping rows keeps them: the raw reading decides. The diagonal has to be positive; the start
+    // (the unit matrix) makes a negative one all but impossible.
     let mut flips = SVector::<f64, 12>::repeat(1.0);
     for row in 0..3 {
         if c[(row, row)] < 0.0 {
@@ -420,7 +418,7 @@ pub fn estimate(
     }
     let mut notes = Vec::new();
     if levels > 0 {
-        // What somebody says of a turntable is not found out from the dwells.
+        // The error of a turntable's rate is given; the dwells do not determine it.
         parts.push(part(ends[1]..rows, f64::INFINITY));
         let off = (0..levels).map(|l| p[PARAMETERS + l]);
         let worst = off
@@ -441,7 +439,7 @@ pub fn estimate(
     })
 }
 
-/// Sigmas from which on a level is not what was given: with two levels each moves by half of what they contradict each other.
+/// A level that moves by more sigmas than this contradicts the given one. With two levels each moves by half of their contradiction.
 const CONTRADICTED: f64 = 2.5;
 
 fn normal_inverse(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, Failure> {
@@ -450,10 +448,10 @@ fn normal_inverse(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, Failure> {
         .ok_or_else(|| Failure::NoSolution("the normal matrix is singular".into()))
 }
 
-/// Off-diagonal over diagonal element of C from which on this is no triad: 30 degrees from a right angle.
+/// An off-diagonal element of C over the diagonal one from which on this is not a triad: 30 degrees from a right angle.
 const SKEWED: f64 = 0.5;
 
-/// Sigma, in units of gravity, from which on a parameter is not measured: 3 degrees, 5 %, 0.05 g. Assembly is better.
+/// Sigma, in units of gravity, from which on a parameter counts as not measured: 3 degrees, 5 %, 0.05 g. Assembly is better.
 const USELESS_SIGMA: f64 = 0.05;
 
 fn is_triad(c: &Matrix3<f64>) -> bool {
@@ -461,8 +459,8 @@ fn is_triad(c: &Matrix3<f64>) -> bool {
     off_diagonal.all(|&(i, j)| c[(i, j)].abs() < SKEWED * c[(i, i)].abs())
 }
 
-/// The parameters that the poses determine, but not beside their own scatter: six faces up to a degree or two. Scatter is
-/// that of scale factors and biases alone, which six faces do determine.
+/// The parameters that the poses determine, but not better than [`USELESS_SIGMA`] with their own scatter: six faces up to a degree or two. The
+/// scatter is that of a fit of scale factors and biases alone, which six faces do determine.
 fn weak_beside_scatter(
     start: &DVector<f64>,
     evaluate: impl Fn(&DVector<f64>) -> Linearized,
@@ -509,7 +507,7 @@ fn undetermined(shape: &Observability, sensor: Sensor) -> Failure {
         None => format!("o_{}", AXES[k - 6]),
     };
     let names: Vec<String> = shape.undetermined.iter().map(|(k, _)| name(*k)).collect();
-    // An axis that nothing distinguishes from the others is where the poses are missing.
+    // Poses are missing along an axis whose scale factor or bias is undetermined.
     let weak: Vec<&str> = (0..3)
         .filter(|a| {
             shape

@@ -3,13 +3,13 @@
 //! | module            | reference | what it is                                               |
 //! |-------------------|-----------|----------------------------------------------------------|
 //! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form, six positions |
-//! | [`moving_input`]  | table     | the same least squares where inputs move within dwells     |
+//! | [`moving_input`]  | table     | the same least squares if inputs move within dwells        |
 //! | [`magnitude`]     | gravity, turntable | accelerometer from the magnitude of gravity over many poses; gyro from that of a turntable's rate |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
 //! | [`with_turns`]    | gravity   | accelerometer from magnitudes and turns together         |
-//! | [`turn`]          | gravity   | one turn, and where a calibration carries gravity in it   |
+//! | [`turn`]          | gravity   | one turn, and the direction of gravity predicted after it |
 //! | [`chains`]        | gravity   | dwells that turns connect one to the next                 |
-//! | [`earth`]         | gravity   | what the turning Earth adds to it                         |
+//! | [`earth`]         | gravity   | the Earth's rate in the gyro's readings                   |
 //! | [`least_squares`] | both      | the algebra under all of them                            |
 
 pub mod chains;
@@ -30,7 +30,7 @@ use crate::triad::Triad;
 use crate::warning::Warning;
 use least_squares::Scatter;
 
-/// The mean of a dwell as an estimator sees it; or, where its input moves, another sum over the dwell, with weights that add to zero.
+/// The mean of a dwell. If the input moves within the dwell, also another weighted sum over it, with weights that add to zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
     /// Index of the dwell it comes from.
@@ -39,15 +39,15 @@ pub struct Observation {
     pub raw: Vector3<f64>,
     /// Variance of `raw` by the noise within dwells, raw units squared.
     pub variance: Vector3<f64>,
-    /// The same of the true input in SI; not a number where only the magnitude of gravity is known.
+    /// The same of the true input in SI; not a number if only the magnitude of gravity is known.
     pub input: Vector3<f64>,
-    /// The same of the rate of change of the true input, SI/s; zero where it stands.
+    /// The same of the rate of change of the true input, SI/s; zero if it is constant.
     pub change: Vector3<f64>,
 }
 
-/// By how much the readings of three axes are behind the reference, s.
+/// Delays of the readings of three axes behind the reference, s.
 ///
-/// Filters of the sensor and the clocks of table and converter: both are a shift in time to first order.
+/// They come from filters of the sensor and from the clocks of table and converter. To first order both shift the time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delays {
     /// Estimates.
@@ -56,24 +56,24 @@ pub struct Delays {
     pub sigma: Vector3<f64>,
 }
 
-/// What an estimator found for one triad.
+/// The estimate of one triad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimated {
     /// The calibration.
     pub triad: Triad,
-    /// Scatter by axis where the axes are fitted one by one, by group otherwise.
+    /// Scatter: by axis if the axes are fitted one by one, otherwise by group.
     pub scatter: Vec<(Observable, Scatter)>,
     /// Condition number of the scaled design.
     pub condition: f64,
-    /// Delays of the readings, where moving inputs show them.
+    /// Delays of the readings, if moving inputs determine them.
     pub delays: Option<Delays>,
     /// What a person should know.
     pub notes: Vec<Warning>,
 }
 
 impl Estimated {
-    /// Error of an observation whose input is known, SI: what it is by the calibration, its delay taken out, minus its input. `bias` is the
-    /// sum of its weights: 1 of a mean, 0 of the other sums.
+    /// Error of an observation with a known input, SI: its calibrated value, corrected for the delay, minus its input. `bias` is the sum of the
+    /// weights: 1 for a mean, 0 for the other sums.
     pub fn error(&self, o: &Observation, bias: f64) -> Vector3<f64> {
         let behind = match &self.delays {
             Some(delays) => delays
@@ -105,7 +105,7 @@ pub enum Failure {
 pub enum Addition {
     /// Dwells with inputs along these axes.
     Inputs(String),
-    /// What these words say.
+    /// Other additions, in words.
     Words(String),
 }
 

@@ -1,8 +1,8 @@
 //! Least squares with known inputs that move within dwells.
 //!
-//! To the means of dwells come the other sums over those whose input moves, which know nothing of the bias. A reading is behind its reference, by the
-//! filters of the sensor and by the clocks of table and converter: half a millisecond at 200 deg/s is an error of 17 mm/s², a hundred
-//! times what the means are known to. So each axis has a delay besides: `u = b + P (x - τ ẋ)`.
+//! Besides the means of dwells it fits the other sums over dwells whose input moves, in which the bias cancels. A reading lags its reference, because
+//! of the filters of the sensor and the clocks of table and converter. Half a millisecond at 200 deg/s is an error of 17 mm/s², a hundred times the
+//! uncertainty of the means. So each axis also has a delay: `u = b + P (x - τ ẋ)`.
 
 use nalgebra::{DMatrix, DVector, RowVector3, Vector3};
 
@@ -14,20 +14,20 @@ use super::{Delays, Estimated, Failure, Observation};
 use crate::observable::Observable;
 use crate::warning::Warning;
 
-/// Steps of the iteration for the delay: the model is linear but for its product with the scale factor, and the third changes nothing.
+/// Iterations for the delay. The model is linear except for the product of delay and scale factor, and the third iteration changes nothing.
 const STEPS: usize = 6;
-/// Share of its sigma below which a step of a delay changes nothing.
+/// A change of a delay by less than this share of its sigma ends the iteration.
 const SETTLED: f64 = 1e-3;
 
-/// Means of dwells, and the other sums.
+/// The means of dwells (0) and the other sums (1).
 struct Experiment<'a> {
     parts: [&'a [Observation]; 2],
     span: f64,
 }
 
 impl Experiment<'_> {
-    /// Design of means (0) or other sums (1): `[b, P1, P2, P3]`, inputs in units of the span and behind by `delay`; and the delay
-    /// itself where `forward` says what a change of the input does to the reading, raw/(SI/s).
+    /// Design of means (0) or other sums (1): `[b, P1, P2, P3]`, inputs in units of the span and delayed by `delay`. With `forward`, the change of
+    /// the reading with the input, raw/SI, it has a column for the delay too.
     fn design(&self, part: usize, delay: f64, forward: Option<RowVector3<f64>>) -> DMatrix<f64> {
         let all = self.parts[part];
         DMatrix::from_fn(all.len(), 4 + usize::from(forward.is_some()), |i, j| {
@@ -67,14 +67,14 @@ impl Experiment<'_> {
         solve_groups(&groups)
     }
 
-    /// What a change of the input does to the reading, by a solution.
+    /// The change of the reading with the input by a solution, raw/SI.
     fn forward(&self, solution: &Solution) -> RowVector3<f64> {
         RowVector3::from_fn(|_, k| solution.parameters[k + 1] / self.span)
     }
 }
 
-/// Least squares as [`super::known_input::least_squares`] does it, of means and the other `sums` together, with a delay of each axis as
-/// far as the inputs tell it from the matrix.
+/// Least squares as in [`super::known_input::least_squares`], of means and the other `sums` together. If the inputs distinguish delays from the
+/// matrix, each axis has one.
 pub fn least_squares(
     means: &[Observation],
     sums: &[Observation],
@@ -99,7 +99,7 @@ pub fn least_squares(
         let (mut solution, mut scatter) =
             all.solve(axis, &errors, 0.0, None).ok_or_else(singular)?;
         let by = all.forward(&solution);
-        // Columns of one size, as the observability asks for.
+        // The observability needs columns of one size.
         let mut design = all.whole(0.0, Some(by));
         let size = design.column(4).amax().max(f64::MIN_POSITIVE);
         design.column_mut(4).unscale_mut(size);

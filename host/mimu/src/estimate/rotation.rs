@@ -1,9 +1,8 @@
 //! Gyro calibration without a table: from the turns between dwells, and from the dwells themselves.
 //!
-//! Gravity is the reference. Carried along by the integrated gyro, the direction of gravity of one
-//! dwell must meet the direction measured in the next (references 19 of xu and 12 of fang); at rest the rate is zero.
-//! Both are fitted together, as the bias that the turns want and the readings at rest need not agree
-//! when the model lacks something. The frame is that of the accelerometer, so the full 3x3 matrix holds
+//! Gravity is the reference. The integrated gyro rotates the direction of gravity of one dwell into the frame of the next, where it must agree with
+//! the measured direction (references 19 of xu and 12 of fang); at rest the rate is zero. Both are fitted together, because the turns and the
+//! readings at rest may need different biases if the model lacks something. The frame is that of the accelerometer, so the full 3x3 matrix contains
 //! the alignment of gyro to accelerometer.
 
 use mimu_core::compensation::Affine;
@@ -20,11 +19,10 @@ use crate::triad::{Covariance, Part, Triad};
 /// Number of parameters: nine of C, three of o.
 pub const PARAMETERS: usize = 12;
 
-/// First guess of C, to within some ten per cent: a direction that rests in the world moves by `f × ω` in the body,
-/// so `df = [f]× C (u - u0) dt` is linear in C. Takes any mounting of the gyro, and any scale.
+/// First guess of C, to within some ten per cent. A direction fixed in the world moves by `f × ω` in the body, so `df = [f]× C (u - u0) dt` is linear
+/// in C. It works for any mounting of the gyro and any scale.
 ///
-/// Hands shake, and then the accelerometer shows more than gravity: a pair counts the less, the more its
-/// size is off.
+/// If hands shake, the accelerometer shows more than gravity: a pair has the less weight, the more its magnitude is off.
 fn guess(motions: &[Motion], rest: &Vector3<f64>, gravity: f64) -> Option<Matrix3<f64>> {
     let mut normal = SMatrix::<f64, 9, 9>::zeros();
     let mut right = SVector::<f64, 9>::zeros();
@@ -57,9 +55,9 @@ fn guess(motions: &[Motion], rest: &Vector3<f64>, gravity: f64) -> Option<Matrix
 
 /// Fits `ω = C u + o` to the turns and to the dwells (`rest`) together.
 ///
-/// The directions of gravity come from `accel`, whose own errors all turns share: its covariance is carried on into that
-/// of the gyro. (Left out, the intervals of a quiet gyro beside a noisy accelerometer held the truth in 75 to 81 % of the
-/// cases.) `motions` give the first guess unless `start` does; `gravity` in m/s².
+/// The directions of gravity come from `accel`. Its errors are common to all turns, so its covariance is propagated into that of the gyro. (Without
+/// this, the intervals of a quiet gyro beside a noisy accelerometer contained the truth in 75 to 81 % of the cases.) `motions` give the first guess
+/// unless `start` does; `gravity` in m/s².
 pub fn estimate(
     turns: &[Turn],
     rest: &[Rest],
@@ -209,7 +207,7 @@ pub fn estimate(
         chi2: 0.0,
         dof: 1.0,
     }; 2];
-    // The first weights: half a degree, and what the dwells scatter by.
+    // The first weights: half a degree, and the scatter of the dwells.
     let (r, _) = linearize(&p);
     groups[0].excess = 0.5f64.to_radians().powi(2);
     groups[1].excess = r.rows(n_turns, n_rest).norm_squared() / n_rest as f64;
@@ -258,8 +256,8 @@ pub fn estimate(
         let covariance = (last.jacobian.transpose() * &last.jacobian)
             .try_inverse()
             .ok_or_else(|| Failure::NoSolution("the normal matrix is singular".into()))?;
-        // What the accelerometer's calibration errs by is common to all turns: it goes into the parameters whole, and
-        // into the size that residuals may have, but into no weight.
+        // Errors of the accelerometer's calibration are common to all turns. They go into the parameters in full, and into the size that residuals
+        // may have, but not into the weights.
         let by = by_accelerometer(&p);
         let mut weighted = by.clone();
         for (mut row, weight) in weighted.row_iter_mut().zip(&weights) {
@@ -276,10 +274,10 @@ pub fn estimate(
             .enumerate()
             .map(|(k, v)| v + common.get(k).copied().unwrap_or(0.0))
             .collect();
-        // What each group keeps of its degrees of freedom: rows less what the parameters take up there.
+        // Leverage: the degrees of freedom that the parameters take from the rows of a group.
         let leverage = |from: usize, rows: usize| {
             let j = last.jacobian.rows(from, rows);
-            // The trace of J C J' without the matrix, which for thousands of dwells would fill the memory.
+            // The trace of J C J' without that matrix, which would fill the memory for thousands of dwells.
             (j * &covariance).component_mul(&j).sum()
         };
         let before = groups;

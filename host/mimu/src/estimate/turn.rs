@@ -1,7 +1,7 @@
-//! A turn from dwell to dwell, and where a gyro's calibration carries the direction of gravity in it.
+//! A turn from dwell to dwell, and the direction of gravity that a gyro's calibration predicts after it.
 //!
-//! Gravity is the reference: carried along by the integrated gyro, the direction of gravity of one dwell must meet the direction
-//! measured in the next (references 19 of xu and 12 of fang).
+//! Gravity is the reference: the integrated gyro rotates the direction of gravity of one dwell into the frame of the next, where it must agree with
+//! the measured direction (references 19 of xu and 12 of fang).
 
 use std::cell::RefCell;
 
@@ -27,7 +27,7 @@ pub struct Turn<'a> {
     pub raw: [Vector3<f64>; 2],
     /// Variance of the angle between the two directions by the accelerometer's noise, rad² (one component).
     pub direction_variance: f64,
-    /// The same by the Earth's rate across the vertical, where nothing says which way is north.
+    /// The same by the Earth's rate across the vertical, if the heading is unknown.
     pub earth_variance: f64,
     /// Variance of the integral of the gyro by its noise, raw²·s², mean of the three axes.
     pub integral_variance: f64,
@@ -36,19 +36,18 @@ pub struct Turn<'a> {
 }
 
 impl Turn<'_> {
-    /// Variance of one component of the direction error by noise, rad², for a gyro with a mean square of `c2` per row of
-    /// C.
+    /// Variance of one component of the direction error by noise, rad², for a gyro with a mean square of `c2` per row of C.
     pub fn variance(&self, c2: f64) -> f64 {
         self.direction_variance + c2 * self.integral_variance
     }
 
-    /// Size of the direction error (rad, two components) that noise alone gives; `c2` as the mean square of a row of C.
+    /// Size of the direction error (rad, two components) by noise alone, with `c2` as for [`Self::variance`].
     pub fn floor(&self, c2: f64) -> f64 {
         (2.0 * self.variance(c2)).sqrt()
     }
 }
 
-/// A dwell, in which nothing but the Earth turns the gyro.
+/// A dwell at rest: only the Earth turns the gyro.
 #[derive(Debug, Clone, Copy)]
 pub struct Rest {
     /// Index of the dwell.
@@ -57,9 +56,9 @@ pub struct Rest {
     pub raw: Vector3<f64>,
     /// Its variances by noise, raw².
     pub variance: Vector3<f64>,
-    /// What is known of the rate, rad/s.
+    /// The known part of the rate, rad/s.
     pub rate: Vector3<f64>,
-    /// Variances of the rest of it, rad²/s².
+    /// Variances of the unknown part, rad²/s².
     pub rate_variance: Vector3<f64>,
 }
 
@@ -76,7 +75,7 @@ pub struct Motion {
     pub duration_s: f64,
 }
 
-/// An increment with the reading at rest taken out.
+/// An increment with the reading at rest subtracted.
 struct Centred {
     integral: Vector3<f64>,
     coning: Vector3<f64>,
@@ -142,8 +141,8 @@ fn exponential(phi: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     (one + k * a + k2 * b, one - k * b + k2 * c)
 }
 
-/// Rotation over `pieces` under `ω = C (u - rest) + o`, as the matrix that takes a direction from the
-/// body frame before into that after; and the turn (rad, in the frame after) by each column of C and by o.
+/// Rotation over `pieces` under `ω = C (u - rest) + o`, as the matrix that transforms a direction from the body frame before into that after; and the
+/// derivatives of the turn (rad, in the frame after) by each column of C and by o.
 fn integrate(
     pieces: &[Centred],
     c: &Matrix3<f64>,
@@ -152,7 +151,7 @@ fn integrate(
     let cofactor = cofactor(c) * 0.5;
     let mut after = Matrix3::identity();
     let mut by = [Matrix3::zeros(); 4];
-    // Backwards, so that what is left of the turn carries each piece into the frame at its end.
+    // Backwards: the product of the later pieces transforms each piece into the frame at the end.
     for piece in pieces.iter().rev() {
         let phi = piece.rotation(c, o, &cofactor);
         let (turn, right) = exponential(&phi);
@@ -166,8 +165,8 @@ fn integrate(
     (after, by)
 }
 
-/// Turn, rad, by which calibrations may differ for the rotations of one to follow from those of the other to first order: what is
-/// neglected is half its square, 5e-9 rad, where the best gyros and accelerometers show 1e-5.
+/// If calibrations differ by less than this turn, rad, the rotations of one follow from those of the other to first order. The neglected term is half
+/// its square, 5e-9 rad; the best gyros and accelerometers show 1e-5.
 const NEAR: f64 = 1e-4;
 
 /// Rotations of turns as [`integrate`] gives them, at one calibration.
@@ -177,15 +176,15 @@ struct Reference {
     turned: Vec<(Matrix3<f64>, [Matrix3<f64>; 4])>,
 }
 
-/// The rotations of turns under calibrations that a fit tries one after the other. All but the first few are near each other, and are not
-/// integrated again: of a fit of 36 turns with its held-out refits integrating took 80 % of the time.
+/// The rotations of turns under calibrations that a fit tries one after the other. After the first few these are near each other, and are not
+/// integrated again: integrating took 80 % of the time of a fit of 36 turns with its held-out refits.
 pub(super) struct Rotations {
     pieces: Vec<Vec<Centred>>,
     reference: RefCell<Option<Reference>>,
 }
 
 impl Rotations {
-    /// Of `turns`, with the reading at rest taken out.
+    /// The rotations of `turns`, with the reading at rest subtracted.
     pub(super) fn new(turns: &[Turn], rest: &Vector3<f64>) -> Self {
         let centred = |turn: &Turn| {
             let pieces = turn.increments.iter();
@@ -197,7 +196,7 @@ impl Rotations {
         }
     }
 
-    /// Of each turn what [`integrate`] gives under `ω = C (u - rest) + o`, sensitivities included.
+    /// The result of [`integrate`] for each turn under `ω = C (u - rest) + o`, sensitivities included.
     pub(super) fn at(
         &self,
         c: &Matrix3<f64>,
@@ -227,8 +226,8 @@ impl Rotations {
     }
 }
 
-/// Angle from the direction that a calibration predicts to that measured after the turn, as a
-/// rotation vector (rad) in the body frame after it.
+/// Rotation from the direction of gravity that a calibration predicts after the turn to the measured one, as a rotation vector (rad) in the body
+/// frame after it.
 pub fn direction_error(turn: &Turn, gyro: &Affine<f64>) -> Vector3<f64> {
     let (c, o) = (&gyro.matrix, &gyro.offset);
     let half = cofactor(c) * 0.5;
@@ -240,18 +239,18 @@ pub fn direction_error(turn: &Turn, gyro: &Affine<f64>) -> Vector3<f64> {
     between(&(after * turn.before.normalize()), &turn.after.normalize())
 }
 
-/// The direction error of a turn and what it owes to each piece of it.
+/// The direction error of a turn and its derivatives.
 #[derive(Debug, Clone)]
 pub struct Sensitivity {
-    /// Takes a direction from the body frame before the turn into that after it.
+    /// Transforms a direction from the body frame before the turn into that after it.
     pub rotation: Matrix3<f64>,
-    /// Directions of the two, body frame after the turn.
+    /// Directions of the two components of the error, body frame after the turn.
     pub sides: [Vector3<f64>; 2],
-    /// What each of them owes to the force before and after the turn, rad/(m/s²).
+    /// Derivatives of each component by the force before and after the turn, rad/(m/s²).
     pub by_force: [[Vector3<f64>; 2]; 2],
-    /// Its two components across the measured direction, rad.
+    /// The two components of the error, across the measured direction, rad.
     pub error: [f64; 2],
-    /// Derivatives of the two by the rotation vector of each increment, rad/rad, body frame.
+    /// Derivatives of the two components by the rotation vector of each increment, rad/rad, body frame.
     pub by: Vec<[Vector3<f64>; 2]>,
 }
 
@@ -299,8 +298,8 @@ pub fn sensitivity(turn: &Turn, gyro: &Affine<f64>) -> Sensitivity {
     }
 }
 
-/// What the component `e` of the direction error of a turn owes to the force before and after it; `rotation` takes a direction from the
-/// body frame before into that after. A direction moves by what of an error of the force lies across it.
+/// Derivatives of the component `e` of the direction error of a turn by the force before and after it; `rotation` transforms a direction from the
+/// body frame before into that after. Only the part of a force error across a direction moves the direction.
 pub(super) fn by_forces(
     turn: &Turn,
     rotation: &Matrix3<f64>,
@@ -337,7 +336,7 @@ pub(super) fn across(w: &Vector3<f64>) -> [Vector3<f64>; 2] {
 mod tests {
     use super::*;
 
-    /// Rotation by the rate `ω(t)` in ten thousand small steps: no correction needed, none taken.
+    /// Rotation by the rate `ω(t)` in ten thousand small steps, which need no correction.
     fn brute_force(rate: impl Fn(f64) -> Vector3<f64>, from: f64, to: f64) -> Matrix3<f64> {
         let steps = 10_000;
         let h = (to - from) / f64::from(steps);
@@ -355,7 +354,7 @@ mod tests {
         );
         let o = Vector3::new(-0.5, 0.3, 0.1);
         let to_raw = |w: Vector3<f64>| c.try_inverse().unwrap() * (w - o);
-        // Straight between the ends, as the condenser takes it: 10 ms pieces of 1 ms samples.
+        // The rate is linear between samples, as the condenser assumes: 10 ms pieces of 1 ms samples.
         let mut increments = Vec::new();
         let sample = |k: usize| rate(1e-3 * k as f64);
         for piece in 0..100 {
@@ -396,7 +395,7 @@ mod tests {
             },
         )
         .norm();
-        // 1 ms samples of a rate that bends by 75 rad/s³ are off by 1e-3²/12 * 75 rad in a second.
+        // 1 ms samples of a rate with a curvature of 75 rad/s³ err by 1e-3²/12 * 75 rad in a second.
         assert!(error < 1e-5, "{error:e} rad");
     }
 }

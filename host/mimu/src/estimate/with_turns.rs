@@ -1,13 +1,13 @@
 //! Accelerometer calibration from the magnitude of gravity and from the turns between the poses together.
 //!
-//! Where the poses leave an end of an axis unseen, the magnitude alone hardly determines that axis ([`super::magnitude`]): ten poses
-//! of a fixture ended in a scale factor of 6.0 ± 9.1. But the gyro carries the direction of gravity from pose to pose, and a direction
-//! that the accelerometer measures wrongly does not meet it. Here C and o of the accelerometer (nine parameters, as in
-//! [`super::magnitude`]) and C and o of the gyro (twelve) are fitted to the magnitudes, the turns and the readings at rest at once.
+//! If the poses do not show both ends of an axis, the magnitude alone hardly determines that axis ([`super::magnitude`]): ten poses of a fixture gave
+//! a scale factor of 6.0 ± 9.1. But the gyro carries the direction of gravity from pose to pose, and an error of the accelerometer's direction shows
+//! against it. Here C and o of the accelerometer (nine parameters, as in [`super::magnitude`]) and C and o of the gyro (twelve) are fitted to the
+//! magnitudes, the turns and the readings at rest at once.
 //!
-//! Only the accelerometer is returned. The gyro that [`super::rotation`] fits beside it is the one of the joint minimum, and with the
-//! covariance of this accelerometer carried on has the covariance of the joint fit: that is the inverse of a matrix of blocks.
-//! Errors of the gyro's model go into the accelerometer this way, so it is not used where the magnitude alone will do.
+//! Only the accelerometer is returned. With it, [`super::rotation`] finds the gyro of the joint minimum. If it also propagates the covariance of this
+//! accelerometer, the gyro's covariance is that of the joint fit, by the inverse of a block matrix. Errors of the gyro's model enter the
+//! accelerometer this way, so this fit is used only if the magnitude alone does not suffice.
 
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
@@ -26,13 +26,13 @@ const ALL: usize = ACCEL + 12;
 /// Row and column of the six elements of the accelerometer's C.
 const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
-/// What is fitted together.
+/// The data of the joint fit.
 pub struct Together<'a> {
     /// Poses.
     pub poses: &'a [Observation],
     /// Variances of their magnitudes by noise, (m/s²)².
     pub variances: &'a [f64],
-    /// Turns between them; of their forces only the raw readings count.
+    /// Turns between them; only the raw readings of their forces are used.
     pub turns: &'a [Turn<'a>],
     /// Readings of the gyro at rest.
     pub rest: &'a [Rest],
@@ -46,13 +46,13 @@ pub struct Together<'a> {
 
 /// Both models at some parameters.
 struct Models {
-    /// Of the readings that the first guess makes of order one: `f = g (C v + o)`.
+    /// For readings that the first guess scales to order one: `f = g (C v + o)`.
     accel: Affine<f64>,
     gyro: Affine<f64>,
 }
 
 impl Together<'_> {
-    /// Fits both; the accelerometer.
+    /// Fits both and returns the accelerometer.
     pub fn estimate(&self) -> Result<Estimated, Failure> {
         let g = self.gravity;
         let at_rest =
@@ -78,7 +78,7 @@ impl Together<'_> {
         let order_one = |raw: &Vector3<f64>| self.accel.apply(raw) / g;
         let rows = [self.poses.len(), 2 * self.turns.len(), 3 * self.rest.len()];
         let from = [0, rows[0], rows[0] + rows[1]];
-        // Residuals without weights: of gravity, rad, rad/s.
+        // Residuals without weights: share of gravity, rad, rad/s.
         let linearize = |p: &DVector<f64>| {
             let Models { accel, gyro } = unpack(p);
             let mut r = DVector::zeros(rows.iter().sum());
@@ -166,7 +166,7 @@ impl Together<'_> {
         let lost = || {
             Failure::NoSolution("the fit to the magnitudes and the turns does not converge".into())
         };
-        // The first weights: 5 milli-g, half a degree, and what the dwells scatter by.
+        // The first weights: 5 milli-g, half a degree, and the scatter of the dwells.
         let (r, _) = linearize(&p);
         let at_rest_variance = r.rows(from[2], rows[2]).norm_squared() / rows[2].max(1) as f64;
         let mut groups = [0, 1, 2].map(|_| excess_variance(&[], &[], 0.0));
@@ -222,7 +222,7 @@ impl Together<'_> {
         if (0..3).any(|k| !(c[(k, k)] > 0.0)) {
             return Err(lost());
         }
-        // Of the accelerometer's parameters, whose columns have one unit; the gyro's are whatever they are.
+        // Only of the accelerometer's parameters: their columns have one unit, those of the gyro any.
         let own = covariance.view((0, 0), (ACCEL, ACCEL)).into_owned();
         let eigen = own.symmetric_eigenvalues();
         let condition = (eigen.max() / eigen.min()).sqrt();
@@ -267,7 +267,7 @@ impl Together<'_> {
     }
 }
 
-/// Adds to `row` of a Jacobian what a component of the force, `side`, owes to C and o of the accelerometer at the reading `v`.
+/// Adds to `row` of a Jacobian the derivatives of the force component along `side` by C and o of the accelerometer, at the reading `v`.
 fn by_accel(j: &mut DMatrix<f64>, row: usize, side: &Vector3<f64>, v: &Vector3<f64>) {
     for (k, (i, column)) in LOWER.iter().enumerate() {
         j[(row, k)] += side[*i] * v[*column];

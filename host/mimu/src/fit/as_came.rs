@@ -1,7 +1,7 @@
 //! The readings as they came, judged like a calibration.
 //!
-//! A unit with readings in SI is calibrated already, and a new calibration has to improve its readings. Ten poses by hand once
-//! ended in a calibration that turned gravity 1.65 degrees off, in sample, where the readings themselves were 0.44 degrees off.
+//! A unit with readings in SI is calibrated already, and a new calibration has to improve its readings. Ten poses by hand once gave a calibration
+//! whose direction of gravity was 1.65 degrees off in sample, while that of the readings themselves was 0.44 degrees off.
 
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
@@ -23,7 +23,7 @@ pub(super) fn inputs<'a>(
     in_si(prepared).then(|| rms(Figure::Input, observations.map(|o| o.raw - o.input)))
 }
 
-/// Error of the magnitudes of observations as they came, each with the one that is known.
+/// Error of the magnitudes of observations as they came; `known` has each with its known magnitude.
 pub(super) fn magnitudes(
     prepared: &Prepared,
     figure: Figure,
@@ -77,7 +77,7 @@ pub(super) fn compare(fit: &mut SensorFit) {
 /// Probability that a reported difference is chance.
 const BY_CHANCE: f64 = 0.025;
 
-/// Numbers that `count` errors of a figure are.
+/// Number of components of `count` errors of a figure.
 pub(crate) fn errors(figure: Figure, count: usize) -> usize {
     count
         * match figure {
@@ -87,8 +87,8 @@ pub(crate) fn errors(figure: Figure, count: usize) -> usize {
         }
 }
 
-/// Whether an rms is larger than another one of as many `errors`, and not by chance: the ratio of two variances. Three errors that are 3.6
-/// times as large show nothing. Errors of the same dwells are alike, which makes the test a careful one.
+/// Whether an rms significantly exceeds another one of as many `errors`, by the ratio of the two variances. Three errors that are 3.6 times as large
+/// show nothing. Errors of the same dwells are correlated, which makes the test conservative.
 pub(crate) fn exceeds(rms: f64, other: f64, errors: usize) -> bool {
     let dof = errors as f64;
     let by_chance = FisherSnedecor::new(dof, dof).map_or(1.0, |f| f.sf((rms / other).powi(2)));

@@ -14,8 +14,8 @@ use crate::warning::Warning;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
-/// What the covariance of a given C, by rows, is of a model whose biases were found beside it: where the readings are on average, the error
-/// of the matrix is in the bias.
+/// The uncertainty that a given C, with this covariance by rows, causes in a model whose biases were fitted beside it. At the mean reading the fitted
+/// bias cancels the error of the matrix.
 fn with_biases(covariance: &Covariance, mean: &Vector3<f64>) -> Part {
     let mut by = Covariance::zeros();
     for i in 0..9 {
@@ -28,8 +28,8 @@ fn with_biases(covariance: &Covariance, mean: &Vector3<f64>) -> Part {
     }
 }
 
-/// Fits the biases of `prepared` to matrices that are `given`: gyro, accelerometer, raw to SI; `covariances` are those of C by rows, then o,
-/// where they are known.
+/// Fits the biases of `prepared` to matrices that are `given`: gyro, accelerometer, raw to SI. `covariances` are those of C by rows, then o, if they
+/// are known.
 pub fn fit_biases(
     prepared: Prepared,
     options: Options,
@@ -151,7 +151,7 @@ mod tests {
             (by.transpose() * part.covariance * by)[0]
         };
         assert!(variance(mean).abs() < 1e-12);
-        // A unit away along one axis it is the variance of one element.
+        // One unit away along an axis the variance is that of one element.
         assert!((variance(mean + Vector3::x()) - 1.0).abs() < 1e-12);
     }
 }

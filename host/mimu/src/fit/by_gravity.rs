@@ -89,7 +89,7 @@ pub(super) fn fit_gravity(
         residual.held_out = refit.map(|refit| size_error(&refit.triad, o));
     }
     let mut sensors = Vec::new();
-    // The turns of a table of means are not known, which its warnings say.
+    // A table of means has no turns; its warnings say so.
     if prepared.has(Sensor::Gyro) && options.wants(Sensor::Gyro) && !prepared.manifest.means {
         let parts = Parts {
             count: parts,
@@ -97,7 +97,7 @@ pub(super) fn fit_gravity(
             accel_without: &without,
         };
         let turns = fit_turns(prepared, &accel, &parts, warnings);
-        // An accelerometer that only the turns determined, and turns that determine no gyro: what is wrong is in the poses.
+        // If only the turns determined the accelerometer, and they do not determine the gyro, the poses are wrong.
         if let (Err(_), Some(_), Err(failure)) = (&turns, &with_turns, by_poses.alone()) {
             return Err(prepared.refused(by_poses.with_faces(failure), Sensor::Accel));
         }
@@ -120,13 +120,13 @@ pub(super) fn fit_gravity(
     Ok(sensors)
 }
 
-/// Condition of the poses from which on the turns between them help to determine the accelerometer. Twenty poses all around have 2 to 5,
-/// ten of a fixture that tips by 60 degrees 73 to 96; there the misfit of 5 mm/s² that real recordings have becomes 4 % of a scale factor.
+/// Condition of the poses from which on the turns between them help to determine the accelerometer. Twenty poses all around have 2 to 5. Ten poses of
+/// a fixture that tips by 60 degrees have 73 to 96: the misfit of 5 mm/s² in real recordings then becomes 4 % of a scale factor.
 pub(super) const POOR_POSES: f64 = 100.0;
-/// Turns between the poses, at least: as many as determine a gyro.
+/// Fewest turns between the poses: as many as determine a gyro.
 const FEWEST_TURNS: usize = 5;
 
-/// The accelerometer by its poses, and where these are poor by the turns between them as well.
+/// The accelerometer by its poses and, if these determine it poorly, by the turns between them as well.
 struct ByPoses<'a> {
     prepared: &'a Prepared,
     poses: &'a [Observation],
@@ -160,7 +160,7 @@ impl ByPoses<'_> {
         Ok((alone?, None))
     }
 
-    /// Readings in SI are about right as they came; of others a sphere is taken.
+    /// First guess: the readings as they came if they are in SI, otherwise by the sphere through them.
     fn first_accel(&self) -> Option<Affine<f64>> {
         match self.prepared.manifest.raw_unit {
             RawUnit::Si => Some(Affine {
@@ -173,7 +173,7 @@ impl ByPoses<'_> {
 
     fn guesses(&self) -> Option<Guesses> {
         let prepared = self.prepared;
-        // Between the rests of a turntable lie its turns, of which no angle is known.
+        // On a turntable the rests are separated by turns of unknown angle.
         let by_hand = prepared.manifest.reference == Reference::Gravity;
         if !by_hand || prepared.manifest.means || !prepared.has(Sensor::Gyro) {
             return None;
@@ -192,7 +192,7 @@ impl ByPoses<'_> {
         })
     }
 
-    /// By the dwells that are `kept`, with the turns between them where there are `guesses`.
+    /// The fit to the `kept` dwells; with `guesses`, to the turns between them as well.
     fn without(
         &self,
         kept: &dyn Fn(usize) -> bool,
@@ -213,7 +213,7 @@ impl ByPoses<'_> {
             .collect();
         let rest = self.prepared.rest(accel).into_iter();
         let rest: Vec<Rest> = rest.filter(|o| kept(o.dwell)).collect();
-        // The rest says the gyro's bias; its matrix and the accelerometer have to be in the others.
+        // The rests determine the gyro's bias; poses and turns have to determine its matrix and the accelerometer.
         if poses.len() + 2 * turns.len() <= magnitude::PARAMETERS + 9 {
             return Err(Failure::Undetermined {
                 parameters: "accelerometer and gyro together".into(),
@@ -249,7 +249,7 @@ impl ByPoses<'_> {
                 parameters,
                 add: format!("{} (no pose has {faces} up)", add.words(Sensor::Accel)).into(),
             },
-            // A fit that runs away from a cap of poses has nothing wrong with its columns.
+            // If the poses cover only a cap of directions, the fit diverges, although the columns are right.
             Failure::NoSolution(_) => Failure::Undetermined {
                 parameters: "scale factors and biases of the accelerometer".into(),
                 add: format!(
@@ -261,15 +261,15 @@ impl ByPoses<'_> {
     }
 }
 
-/// How a recording is cut into parts, and what its accelerometer is without one.
+/// The parts of a recording, and its accelerometer fitted without one of them.
 struct Parts<'a> {
     count: usize,
     of: &'a (dyn Fn(Split, usize) -> usize + Sync),
     accel_without: &'a (dyn Fn(Split, usize) -> std::result::Result<Estimated, Failure> + Sync),
 }
 
-/// The gyro from the turns. A turn belongs to the part of the dwell that it ends in, and no turn that touches
-/// a dwell of a part is used while the part is left out.
+/// The gyro from the turns. A turn belongs to the part of the dwell in which it ends. While a part is left out, no turn that touches one of its
+/// dwells is used.
 fn fit_turns(
     prepared: &Prepared,
     accel: &Estimated,

@@ -1,6 +1,6 @@
-//! A gyro on a turntable in orientations that are not known: only the magnitude of the rate is.
+//! A gyro on a turntable in unknown orientations: only the magnitude of the rate is known.
 //!
-//! What the rates do to an accelerometer beside the axis nothing says; it is fitted by gravity, from the dwells at rest.
+//! The turntable's force on an accelerometer beside the axis is unknown, so the accelerometer is fitted to gravity, from the dwells at rest.
 
 use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
@@ -37,7 +37,7 @@ pub(super) fn fit_rates(
         match fit_gravity(prepared, alone, warnings) {
             Ok(accel) => sensors.extend(accel),
             Err(error) if sensors.is_empty() => return Err(error),
-            // Who came with a record player came for the gyro.
+            // A turntable is there for the gyro, so the gyro's fit stays.
             Err(error) => warnings
                 .push(Warning::NoRestsToFit(error.refused().problem.clone()).of(Sensor::Accel)),
         }
@@ -74,7 +74,7 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
             level_of: &rate_of,
             rests: &rests,
         };
-        // Noise is in raw units, and a sphere through the readings says well enough how much that is in SI.
+        // Noise is in raw units; a sphere through the readings converts it to SI well enough.
         let sphere = magnitude::first_guess(&turning, dwells.rates[0]);
         let rough = sphere.map_or_else(|| vec![0.0; turning.len()], |s| variances(&s, &turning));
         let first = magnitude::estimate(&turning, &rough, &known)?;
@@ -107,7 +107,7 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
     let typical = typical(Figure::RateSize, &residuals);
     let parts = options.holdout_blocks.min(rated.len());
     let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
-    // The error of the rates is common to what is kept and what is held out: no refit can be judged by it.
+    // The error of the rates is common to kept and held-out dwells, so no refit is judged by it.
     let held_out = HeldOut::of(parts, |split, part| {
         let refit = estimate(&|dwell| part_of(split, dwell) != part)?;
         let open = rated
@@ -152,7 +152,7 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
     Ok(fit)
 }
 
-/// Variances of the compensated magnitudes by noise, (rad/s)²; zero where nothing shows the noise.
+/// Variances of the compensated magnitudes by noise, (rad/s)²; zero if the noise is unknown.
 pub(crate) fn variances(inverse: &Affine<f64>, observations: &[Observation]) -> Vec<f64> {
     let along = |o: &Observation| {
         let up = inverse.apply(&o.raw).normalize();

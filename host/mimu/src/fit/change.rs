@@ -1,4 +1,4 @@
-//! What leaving something out of a fit does to its parameters.
+//! Changes of the parameters of a fit by leaving something out.
 
 use mimu_recording::RawUnit;
 use serde::Serialize;
@@ -12,22 +12,22 @@ use crate::warning::Warning;
 /// A parameter fitted with everything, and without what was left out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
-    /// Of which sensor.
+    /// Its sensor.
     pub sensor: Sensor,
-    /// Which.
+    /// The parameter.
     #[serde(rename = "name")]
     pub parameter: TriadParameter,
     /// Value with everything in the fit.
     pub with_all: f64,
-    /// As fitted.
+    /// Fitted without what was left out.
     #[serde(flatten)]
     pub fitted: Estimate,
-    /// Unit of all.
+    /// Unit of all numbers.
     pub unit: String,
 }
 
 impl Change {
-    /// In half widths of the 95 % interval as fitted.
+    /// The change in half widths of the fitted 95 % interval.
     fn size(&self) -> f64 {
         (self.with_all - self.fitted.value).abs() / self.fitted.interval.max(f64::MIN_POSITIVE)
     }
@@ -51,7 +51,7 @@ impl Change {
     }
 }
 
-/// All parameters of `sensor` that people know, in the order of lists.
+/// Changes of all parameters of `sensor` except those of the inverse model, in the order of lists.
 pub(super) fn changes(
     sensor: Sensor,
     raw: RawUnit,
@@ -71,7 +71,7 @@ pub(super) fn changes(
         .collect()
 }
 
-/// The largest of the `changes` in words, at most three and those that leave the interval as fitted.
+/// The largest of the `changes` in words: those beyond the fitted interval, at least one and at most three.
 pub(super) fn described(changes: &[Change]) -> Option<Warning> {
     let mut largest: Vec<&Change> = changes.iter().filter(|c| c.fitted.interval > 0.0).collect();
     largest.sort_by(|a, b| b.size().total_cmp(&a.size()));

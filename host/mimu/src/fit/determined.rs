@@ -1,7 +1,7 @@
-//! Refuses parameters that the data leave open, by the width of their intervals.
+//! Refuses undetermined parameters, by the width of their intervals.
 //!
-//! A condition says how unevenly an experiment determines its parameters, and not whether it does: noise and misfit decide that. A scale
-//! factor of 6.0 ± 9.1 came from a design whose condition of 1464 was only warned of.
+//! A condition shows how unevenly an experiment determines its parameters. Whether it determines them depends on noise and misfit too: a scale factor
+//! of 6.0 ± 9.1 came from a design whose condition of 1464 only gave a warning.
 
 use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
@@ -17,12 +17,11 @@ use crate::warning::Warning;
 use mimu_recording::Reference;
 use mimu_recording::error::{Argument, Result};
 
-/// Half of the 95 % interval of a scale factor over itself, and of an angle in rad, from which on it is not determined. Data sheets
-/// promise a scale factor to within ten per cent and a mounting to within some degrees: what is known to a fifth only is known
-/// better without the experiment.
+/// A parameter is undetermined if half of its 95 % interval exceeds this: relative for a scale factor, in rad for an angle. Data sheets promise a
+/// scale factor to within ten per cent and a mounting to within some degrees, which is better than a fifth.
 const WIDEST: f64 = 0.2;
 
-/// Refuses a fit in which a scale factor or an angle is not determined. `accel` is the accelerometer where gravity is the only reference.
+/// Refuses a fit in which a scale factor or an angle is not determined. `accel` is the accelerometer if gravity is the only reference.
 pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>) -> Result<()> {
     let physical = fit.estimated.triad.physical(Angles::Exact);
     let scale_unit = crate::quantity::scale_unit(prepared.manifest.raw_unit, fit.sensor.unit());
@@ -59,7 +58,7 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
             );
         }
     }
-    // A triad's own axes are the frame where only a magnitude is known.
+    // If only a magnitude is known, a triad's own axes are the frame.
     if !fit.figure.is_magnitude() {
         for (axis, e) in AXES.iter().zip(physical.misalignment) {
             if !(e.interval <= WIDEST) {
@@ -77,7 +76,7 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
             "add poses: each axis up, down and in between; hold each still".into()
         }
         (Figure::RateSize, _) => "lay the unit on the turntable with each axis up, down and slanted, and record rests too".into(),
-        // What the accelerometer errs by, whose directions the turns are judged by, is in the intervals of the gyro.
+        // The turns are judged by the accelerometer's directions, so its errors are in the intervals of the gyro.
         (Figure::Direction, Some(poses)) => {
             format!("{poses}: the accelerometer gives the direction of gravity after each turn").into()
         }
@@ -93,7 +92,7 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
     })
 }
 
-/// Whether the intervals are wide by what a model with temperature in it explains: then that is what a person has to hear, and does.
+/// Whether a model with temperature explains the wide intervals; then another warning tells the person so.
 fn by_temperature(prepared: &Prepared, fit: &SensorFit) -> bool {
     let with = match fit.figure {
         Figure::Input => with_temperature(prepared, fit.sensor, &fit.residuals),
@@ -102,9 +101,9 @@ fn by_temperature(prepared: &Prepared, fit: &SensorFit) -> bool {
     with.is_some_and(|with| with.rms < 0.5 * fit.rms())
 }
 
-/// Standard deviation of the magnitude of specific force, over gravity, from which on a direction is not seen.
+/// Standard deviation of the magnitude of specific force, over gravity, from which on a direction counts as unseen.
 const UNSEEN: f64 = 0.01;
-/// Poses that are named at most.
+/// Most poses that are named.
 const NAMED: usize = 4;
 
 /// The faces and edges of the unit that the poses leave the most open, in words.
@@ -120,11 +119,11 @@ fn missing_poses(prepared: &Prepared, triad: &Triad) -> Option<String> {
     })
 }
 
-/// By how many times what is left in the poses that were held, `typical`, another may be open before that is said.
+/// A pose is reported if its magnitude is uncertain by more than this many times the residual of the poses that were held, `typical`.
 const OPEN: f64 = 10.0;
 
-/// What to say of poses that were not held, if the calibration errs there by far more than where it was fitted. Six faces and eight edges,
-/// none of them between x and y, left the magnitude open by 35 mm/s² there: the file was worse than none on the corners.
+/// The warning about poses that were not held, if the calibration errs there by far more than where it was fitted. Six faces and eight edges, none of
+/// them between x and y, left the magnitude uncertain by 35 mm/s² there: on the corners the file was worse than none.
 pub(super) fn unseen_poses(gravity: f64, triad: &Triad, typical: f64) -> Option<Warning> {
     let open = open_poses(gravity, triad, OPEN * typical);
     let (_, worst) = open.first()?;
@@ -132,8 +131,8 @@ pub(super) fn unseen_poses(gravity: f64, triad: &Triad, typical: f64) -> Option<
     Some(Warning::UnseenPoses(names, *worst, typical).of(Sensor::Accel))
 }
 
-/// Faces and edges in which the magnitude of specific force has a standard deviation of more than `limit`, m/s², and that one; the worst
-/// first. Each is taken as measured before the next is sought.
+/// Faces and edges in which the magnitude of specific force has a standard deviation of more than `limit`, m/s², with this deviation; the worst
+/// first. Each counts as measured when the next is sought.
 fn open_poses(g: f64, triad: &Triad, limit: f64) -> Vec<(String, f64)> {
     let mut covariance = triad.inverse_covariance;
     let mut open: Vec<(String, f64)> = Vec::new();
@@ -175,7 +174,7 @@ fn directions() -> Vec<(String, Vector3<f64>)> {
     all
 }
 
-/// The faces that no pose has up, to within 45 degrees, by a first guess of the accelerometer: `-x, +z`. `None` where all have been.
+/// The faces that no pose has up, to within 45 degrees, by a first guess of the accelerometer: `-x, +z`. `None` if every face was up.
 pub(crate) fn faces_not_up(guess: &Affine<f64>, raw: &[Vector3<f64>]) -> Option<String> {
     let faces = directions().into_iter().take(6);
     let unseen = faces.filter(|(_, face)| {
@@ -190,7 +189,7 @@ pub(crate) fn faces_not_up(guess: &Affine<f64>, raw: &[Vector3<f64>]) -> Option<
 mod tests {
     use super::*;
 
-    /// A perfect accelerometer, known by the magnitude of gravity in poses with a noise of `sigma`, m/s².
+    /// A perfect accelerometer, fitted to the magnitude of gravity in poses with a noise of `sigma`, m/s².
     fn known_by(poses: impl Iterator<Item = Vector3<f64>>, sigma: f64) -> Triad {
         let lower = [0, 3, 4, 6, 7, 8, 9, 10, 11];
         let mut information = nalgebra::SMatrix::<f64, 9, 9>::identity() * 1e-3;
@@ -223,7 +222,7 @@ mod tests {
         let poses = directions().into_iter().filter(|p| !flat(p)).map(|p| p.1);
         let text = unseen_poses(9.8, &known_by(poses, 3e-3), 3e-3);
         let text = text.unwrap().to_string();
-        // Only the angle between x and y is open: one edge of the four tells it.
+        // Only the angle between x and y is open: one of the four edges determines it.
         assert!(
             text.contains("near +x+y up")
                 || text.contains("near +x-y up")

@@ -1,4 +1,4 @@
-//! Holding parts of a recording out: the rest is fitted, and the part judged.
+//! Holding out parts of a recording: the rest is fitted, and the part is judged.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -13,13 +13,13 @@ use crate::warning::Warning;
 pub enum Split {
     /// Contiguous blocks of time.
     Blocks,
-    /// Every so manieth dwell: where one block holds what nothing else determines, like all slanted poses or the whole warm-up.
+    /// Every n-th dwell, for n parts. It is used if one block contains what nothing else determines, such as all slanted poses or the whole warm-up.
     Interleaved,
 }
 
 impl Split {
-    /// The one of `parts` parts that item `i` of `n` falls into, in order of time. Sizes of blocks differ by one at most, the larger
-    /// ones first (as k-fold cross-validation is commonly cut, so that figures compare).
+    /// The part, of `parts`, to which item `i` of `n` belongs, in order of time. Sizes of blocks differ by one at most, the larger ones first, as is
+    /// common in k-fold cross-validation, so that figures compare.
     pub fn part(self, i: usize, n: usize, parts: usize) -> usize {
         if parts == 0 {
             return 0;
@@ -40,13 +40,13 @@ impl Split {
 /// How the parts of a recording were held out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HoldOut {
-    /// How they are cut.
+    /// How the recording is split.
     pub split: Split,
-    /// How many there are.
+    /// Number of parts.
     pub parts: usize,
-    /// How many of them were held out.
+    /// Number of parts that were held out.
     pub count: usize,
-    /// Why not in blocks, or why some parts were not held out.
+    /// Why they are not blocks, or why some parts were not held out.
     pub reasons: Vec<Warning>,
 }
 
@@ -64,15 +64,15 @@ impl HoldOut {
 
 /// Fits without each part.
 pub(super) struct HeldOut<T> {
-    /// How the parts are cut.
+    /// How the recording is split.
     pub split: Split,
     /// One for each part.
     pub refits: Vec<Result<T, Failure>>,
-    /// Why not in blocks, and why some parts are not held out.
+    /// Why the parts are not blocks, and why some were not held out.
     pub reasons: Vec<Warning>,
 }
 
-/// Which parts cannot be held out, and why the first of them cannot.
+/// The parts that cannot be held out, and why the first of them cannot.
 fn cannot<T>(blocks: bool, refits: &[Result<T, Failure>]) -> Option<Warning> {
     let failed = refits.iter().enumerate();
     let failed = failed.filter_map(|(part, refit)| Some((part + 1, refit.as_ref().err()?)));
@@ -82,8 +82,8 @@ fn cannot<T>(blocks: bool, refits: &[Result<T, Failure>]) -> Option<Warning> {
 }
 
 impl<T: Send> HeldOut<T> {
-    /// Fits without each of `parts` blocks, side by side; where some cannot be held out, without every so manieth dwell instead if that
-    /// leaves fewer out.
+    /// Fits without each of `parts` blocks, in parallel. If some blocks cannot be held out, it tries every n-th dwell instead, and keeps this if
+    /// fewer parts fail.
     pub fn of(
         parts: usize,
         refit: impl Fn(Split, usize) -> Result<T, Failure> + Sync + Send,
@@ -118,7 +118,7 @@ impl<T: Send> HeldOut<T> {
         }
     }
 
-    /// The fit that has not seen `part`.
+    /// The fit without `part`.
     pub fn without(&self, part: usize) -> Option<&T> {
         self.refits.get(part)?.as_ref().ok()
     }
@@ -135,12 +135,12 @@ impl<T> From<HeldOut<T>> for HoldOut {
     }
 }
 
-/// By how many times what noise and model leave in sample a fit without a part may leave it open.
+/// Without a part, its predictions may be uncertain by this many times the residual in sample.
 const OPEN: f64 = 10.0;
 
-/// Refuses a fit whose parameters leave a part open by much more than what is left in sample, `typical`: its error is that of the cut. One
-/// block held all slanted poses of a recording, and the held-out error was 2451 mm/s². `open` are the variances of the part's
-/// rows by the parameters, of the size that `typical` is of, both in the unit of `figure`.
+/// Refuses a fit without a part if its predictions for the part are far more uncertain than the residual in sample, `typical`. The error would
+/// measure the split: one block contained all slanted poses of a recording, and the held-out error was 2451 mm/s². `open` are the variances of the
+/// predictions by the parameters, for the same quantity as `typical`, both in the unit of `figure`.
 pub(super) fn determined(
     open: impl Iterator<Item = f64>,
     typical: f64,

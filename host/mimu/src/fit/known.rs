@@ -68,7 +68,7 @@ pub(super) fn fit_known(
         let estimate = |o: &[Observation], within: &[Observation]| by(o, within, shared.as_ref());
         let estimated = match estimate(&weighed, &within) {
             Ok(estimated) => estimated,
-            // A level cube tells nothing of the gyro, and a rate table not much of the accelerometer.
+            // A level cube does not determine the gyro, and a rate table hardly the accelerometer.
             Err(_)
                 if within.is_empty()
                     && observations
@@ -127,7 +127,7 @@ pub(super) fn fit_known(
             .collect();
         let n = observations.len();
         let parts = options.holdout_blocks.min(n);
-        // What a dwell shows within itself is held out with its mean.
+        // The sums within a dwell are held out with its mean.
         let part_of = |split: Split, dwell: usize| {
             let at = observations.partition_point(|o| o.dwell < dwell);
             split.part(at.min(n - 1), n, parts)
@@ -154,7 +154,7 @@ pub(super) fn fit_known(
             let refit = held_out.without(part_of(held_out.split, o.dwell));
             residual.held_out = refit.map(|refit| refit.error(o, *bias));
         }
-        // Where the arm acts its force is no error of the sensor.
+        // In dwells that spin, the force of the arm is not an error of the sensor.
         let at_rest = |r: &Residual| !dwells[r.dwell].spins();
         if off_axis && residuals.iter().any(at_rest) {
             residuals.retain(at_rest);

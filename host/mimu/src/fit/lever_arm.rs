@@ -1,8 +1,8 @@
 //! The centripetal force of an accelerometer that is not on the axis of the table.
 //!
-//! At 250 deg/s a board 4 mm beside the axis feels 76 mm/s², of which no known force says anything. Where the arm is shall be nobody's
-//! business: it is a nuisance parameter of each axis with a mean of zero. Its covariance, added to that of the dwell means, makes least
-//! squares the joint estimate of parameters and arm where the rates tell the two apart, and widens the intervals where they do not.
+//! At 250 deg/s a board 4 mm beside the axis feels 76 mm/s², which the known forces do not contain. The arm is not reported: it is a nuisance
+//! parameter of each axis with a mean of zero. Its covariance is added to that of the dwell means. Then least squares is the joint estimate of
+//! parameters and arm if the rates distinguish the two, and widens the intervals if they do not.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -10,14 +10,14 @@ use crate::estimate::Observation;
 use crate::quantity::Sensor;
 use crate::signal::dwell::Dwell;
 
-/// What the mean readings over `dwells` share of that force, raw units squared, axis by axis: with an arm of `sigma_m` and the
-/// sensor's `forward` matrix, raw per m/s².
+/// Covariance of the mean readings over `dwells` by that force, raw units squared, axis by axis, for an arm of `sigma_m` and the sensor's `forward`
+/// matrix, raw per m/s².
 pub(super) fn covariance(
     dwells: &[Dwell],
     forward: &Matrix3<f64>,
     sigma_m: f64,
 ) -> [DMatrix<f64>; 3] {
-    // The reading of each axis by an arm of a metre.
+    // The reading of each axis by an arm of one metre.
     let by_arm: Vec<Matrix3<f64>> = dwells
         .iter()
         .map(|dwell| {
@@ -32,7 +32,7 @@ pub(super) fn covariance(
     })
 }
 
-/// `observations` with the variance of that force, to `covariance`.
+/// `observations` with the variances of that force added, from `covariance`.
 pub(super) fn widened(
     observations: &[Observation],
     covariance: &[DMatrix<f64>; 3],

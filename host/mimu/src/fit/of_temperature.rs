@@ -1,7 +1,7 @@
-//! What of a residual temperature explains: whether readings that an affine model does not make follow their inputs do so beside it.
+//! The part of a residual that temperature explains: whether readings follow their inputs with temperature in the model, if they do not without.
 //!
-//! A chamber that goes through 80 °C moves the bias of an ordinary gyro by 8 deg/s, which is as much as all rates of a plan that is made for
-//! temperatures. No affine model follows the inputs then, and the recording is good all the same.
+//! A chamber that sweeps 80 °C changes the bias of an ordinary gyro by 8 deg/s, which is as much as all rates of a thermal plan. Then no affine model
+//! follows the inputs, although the recording is good.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -11,25 +11,25 @@ use crate::estimate::Observation;
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 
-/// Constant, input, T, T² and T behind a lag: what a bias does. A scale factor that moves by 300 ppm/K moves by 3 % of the inputs in 100 K,
-/// and a plan that has all of its rates at one temperature does not show it.
+/// Constant, input, T, T² and T behind a lag: the changes of a bias. Scale factors are left out: 300 ppm/K is 3 % of the inputs in 100 K, and a plan
+/// with all of its rates at one temperature does not show it.
 const COLUMNS: usize = 7;
-/// Lag of the die behind the thermometer, s: of some tens of seconds to some minutes one is much like another on a ramp.
+/// Lag of the die behind the thermometer, s. On a ramp, lags from some tens of seconds to some minutes look alike.
 const LAG_S: f64 = 60.0;
-/// As many dwells as there are columns again have to be left: with fewer, temperature would explain what it has no part in.
+/// Fewest dwells, twice the columns: with fewer, temperature would explain unrelated errors.
 const LEAST: usize = 2 * COLUMNS;
 
-/// What is left of a fit with temperature in its model.
+/// Residuals of a fit with temperature in its model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct WithTemperature {
-    /// Root mean square of the residuals that are left, corrected for the coefficients, SI.
+    /// Root mean square of these residuals, corrected for the number of coefficients, SI.
     pub rms: f64,
     /// Mean temperature of the dwells, °C.
     pub mean_c: f64,
 }
 
-/// Of the dwells of `residuals`, which have a known input. `None` where the temperature is unknown or hardly moves, where there are too few
-/// dwells, and where the readings go by the temperature and by no input.
+/// Fits the dwells of `residuals`, which have a known input. `None` if the temperature is unknown or hardly changes, if there are too few dwells, or
+/// if the readings depend on the temperature and on no input.
 pub(super) fn with_temperature(
     prepared: &Prepared,
     sensor: Sensor,

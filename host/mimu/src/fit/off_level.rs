@@ -1,6 +1,6 @@
-//! Known forces that point elsewhere than the reference says: faces off level.
+//! Known forces whose direction differs from the reference: faces off level.
 //!
-//! A tilt leaves the size of a force and moves its direction, and so errs across it; a sensor's own errors lie along it as well.
+//! A tilt keeps the magnitude of a force and changes its direction, so its error is across the force. A sensor's own errors are along it as well.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -9,24 +9,24 @@ use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
 use crate::warning::Warning;
 
-/// Errors across the known force over those along it, and over noise, from which on the force is not where the reference says.
+/// If the errors across the known force exceed those along it and the noise by this factor, the force has another direction.
 const ACROSS: f64 = 3.0;
-/// Root mean square angle, rad, below which that is not said: a fifth of a degree, what a good level shows.
+/// Root mean square angle, rad, below which there is no warning: a fifth of a degree, what a good level shows.
 const LEVEL: f64 = 3.5e-3;
-/// With so many dwells, two on each face, or fewer a model with cross terms has taken up most of a tilt, and smeared what is left over all
-/// directions: of six faces 2.5 times as much lies across as along, where the tilts themselves have nothing along. There only what no error
-/// along the forces can be is compared, and with the noise alone.
+/// With this many dwells or fewer (two on each face), a model with cross terms takes up most of a tilt and spreads the rest over all directions: with
+/// six faces 2.5 times as much is across as along, although the tilts have nothing along. Then only the part that no errors along the forces explain
+/// is compared, with the noise alone.
 const FEW: usize = 12;
-/// Fewest degrees of freedom that are left for it: of six faces an axis has one, whether it reads the same bias on the two other pairs.
+/// Fewest degrees of freedom for this part. With six faces an axis has one: whether it reads the same bias on the two other pairs.
 const FEWEST_FREE: usize = 3;
 
-/// A dwell: its error, and where its force is.
+/// A dwell: its error and its known force.
 struct Dwell<'a> {
     residual: &'a Residual,
     force: Vector3<f64>,
 }
 
-/// What to say of an accelerometer whose faces were off level, whatever estimator found it.
+/// The warning about an accelerometer whose faces were off level, for any estimator.
 pub fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     if fit.sensor != Sensor::Accel || fit.figure != Figure::Input {
         return None;
@@ -43,7 +43,7 @@ pub fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     (angle > LEVEL).then(|| Warning::OffLevel(angle).of(Sensor::Accel))
 }
 
-/// Angle, rad, if the errors across the forces are far beyond those along them and the noise.
+/// Root mean square angle, rad, if the errors across the forces are far beyond those along them and the noise.
 fn beside_those_along(dwells: &[Dwell<'_>]) -> Option<f64> {
     let (mut along, mut across, mut floor, mut angles) = (0.0, 0.0, 0.0, 0.0);
     for Dwell { residual, force } in dwells {
@@ -58,7 +58,7 @@ fn beside_those_along(dwells: &[Dwell<'_>]) -> Option<f64> {
     beyond.then(|| (angles / dwells.len() as f64).sqrt())
 }
 
-/// The same for few dwells, by the part of their errors that neither the model nor errors along the forces can be.
+/// The same for few dwells, by the part of their errors that neither the model nor errors along the forces explain.
 fn no_error_along(dwells: &[Dwell<'_>]) -> Option<f64> {
     let n = dwells.len();
     if n > FEW {
@@ -90,8 +90,7 @@ fn no_error_along(dwells: &[Dwell<'_>]) -> Option<f64> {
     let [across, rest] = [error.norm_squared() - taken, taken];
     let across = across / free as f64;
     let floor = dwells.iter().map(|d| d.residual.floor.powi(2)).sum::<f64>() / n as f64;
-    // Where the noise is not known nothing tells that it is not all there is, and where what errors along the forces would explain is far larger
-    // it is they.
+    // If the noise is not known, the errors may be noise; if errors along the forces explain far more, they are the cause.
     let beyond = across > ACROSS * ACROSS * floor && rest < ACROSS * ACROSS * across * free as f64;
     beyond.then(|| (2.0 * across).sqrt() / size)
 }

@@ -1,8 +1,8 @@
-//! Dwells and turns that err by far more than the others predict, left out before anything is concluded from them.
+//! Leaves out dwells and turns that err by far more than the others predict, before anything is concluded from them.
 //!
-//! One turn in which samples were lost, or one dwell against a soft cushion, bends all parameters, and its error then passes for an
-//! effect. A robust fit (iteratively reweighted, with Cauchy's weights) names suspects; a suspect is left out if the fit of the others
-//! contradicts it, by its studentised deletion residual, and determines without it what it determines with it ([`deletion`]).
+//! One turn in which samples were lost, or one dwell against a soft cushion, falsifies all parameters, and its error then passes for an effect. A
+//! robust fit (iteratively reweighted, with Cauchy's weights) names suspects. A suspect is left out if the fit of the others contradicts it, by its
+//! studentised deletion residual, and if the others determine all parameters without it ([`deletion`]).
 
 mod deletion;
 
@@ -20,18 +20,18 @@ use crate::triad::Triad;
 use crate::warning::Warning;
 use deletion::{Judged, Row, against_others, contradicted};
 
-/// Standard deviations, by the noise or by the scatter of the others where that is more, from which on something is outlying.
+/// Standard deviations from which on something is outlying, by the noise or, if larger, by the scatter of the others.
 const SIGMAS: f64 = 5.0;
-/// And over the error that one in ten exceeds: where an effect is missing in the model, many err, and nothing stands out.
+/// It also has to exceed the error that one in ten exceeds by this factor: if the model lacks an effect, many errors are large and none stands out.
 const OVER_TENTH: f64 = 2.0;
-/// One in so many at most is left out: where more are, it is the model that is wrong.
+/// At most one in so many is left out: if more are outlying, the model is wrong.
 const ONE_IN: usize = 10;
-/// Cosine of the angle within which poses are near one axis of the sensor, either end up.
+/// Cosine of the angle within which two poses are near the same axis, whichever end is up.
 const NEAR: f64 = 0.9;
-/// Standard deviations from which on a pose near the same axis errs as well: then both show an effect.
+/// If another pose near the same axis errs by more standard deviations than this, both show an effect.
 const WITNESS: f64 = 3.0;
 
-/// The outlying ones, worst first, at most `most`.
+/// Indices of the outlying ones, worst first, at most `most`.
 fn outlying(found: &[(f64, f64)], most: usize) -> Vec<usize> {
     let mut sigmas: Vec<f64> = found.iter().map(|f| f.1).collect();
     let tenth = quantile(&mut sigmas, 0.9).unwrap_or(f64::INFINITY);
@@ -42,19 +42,19 @@ fn outlying(found: &[(f64, f64)], most: usize) -> Vec<usize> {
     all
 }
 
-/// What the others of a recording contradict, of one sensor.
+/// Dwells or turns of one sensor that the others of the recording contradict.
 #[derive(Debug, Default)]
 pub(super) struct Outlying {
     /// Dwells of the accelerometer, or turns of the gyro, to be left out.
     pub left_out: Vec<LeftOut>,
-    /// What is said of these, and of those that cannot be spared.
+    /// Warnings about these, and about those that cannot be spared.
     pub warnings: Vec<Warning>,
-    /// What everything together determines.
+    /// The triad fitted with everything.
     with_all: Option<Triad>,
 }
 
 impl Outlying {
-    /// What would have been determined with everything, where something is left out.
+    /// The triad fitted with everything, if something is left out.
     pub fn with_all(self) -> Option<Triad> {
         self.with_all.filter(|_| !self.left_out.is_empty())
     }
@@ -65,18 +65,18 @@ fn applies(prepared: &Prepared) -> bool {
     prepared.has(Sensor::Accel) && !prepared.dwells.keep.everything()
 }
 
-/// Dwells of the accelerometer that the others contradict by the size of gravity.
+/// Poses whose magnitude of gravity the others contradict.
 pub(super) fn poses(prepared: &Prepared) -> Outlying {
     let mut out = Outlying::default();
     if !applies(prepared) {
         return out;
     }
     let poses = prepared.observations(Sensor::Accel);
-    // Of fewer, none may be left out.
+    // Of fewer poses none may be left out.
     if poses.len() < ONE_IN {
         return out;
     }
-    // Where the poses hardly determine the accelerometer, they contradict nothing.
+    // If the poses hardly determine the accelerometer, they contradict nothing.
     let accel = fit_poses(prepared, &poses).filter(|a| a.condition <= POOR_POSES);
     let Some(accel) = accel else { return out };
     for judged in outlying_poses(prepared, &poses, &accel.triad.inverse) {
@@ -106,7 +106,7 @@ pub(super) fn poses(prepared: &Prepared) -> Outlying {
     out
 }
 
-/// Parameters of the accelerometer that the rows of its poses are derived by.
+/// Parameters of the accelerometer, in the order of the derivatives in the rows of poses.
 const ACCEL_PARAMETERS: [&str; 9] = [
     "the scale factor of x",
     "the angle between x and y",
@@ -132,7 +132,7 @@ fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64
     let up: Vec<Vector3<f64>> = poses.iter().map(|o| accel.apply(&o.raw)).collect();
     let rows = poses.iter().enumerate().map(|(k, o)| {
         let direction = up[k].normalize();
-        // By the lower triangle of C, which the size determines, and o.
+        // Derivatives by the lower triangle of C, which magnitudes determine, and by o.
         let by = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
         let slope = |j: usize| match by.get(j) {
             Some((row, column)) => direction[*row] * o.raw[*column],
@@ -160,7 +160,7 @@ fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64
     contradicted(&rows, rows.len(), 1.0, &suspects)
 }
 
-/// Turns of the gyro that the others contradict by the direction of gravity. Begins and ends in dwells that are not left out.
+/// Turns whose direction of gravity the others contradict. They begin and end in dwells that are not left out.
 pub(super) fn turns(prepared: &Prepared) -> Outlying {
     let mut out = Outlying::default();
     if !applies(prepared) || !prepared.has(Sensor::Gyro) {
@@ -243,9 +243,9 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
     out
 }
 
-/// Derivatives of the direction error of a turn by C (rows first) and o, by differences.
+/// Derivatives of the direction error of a turn by C (rows first) and o, by finite differences.
 fn slopes(turn: &Turn, gyro: &Affine<f64>) -> DMatrix<f64> {
-    // Turns of some radians: a thousandth of C moves the direction by milliradians, far above rounding and far below a bend.
+    // In turns of some radians a thousandth of C moves the direction by milliradians: far above rounding, and still linear.
     let size = gyro.matrix.norm() / 3f64.sqrt();
     let steps = [1e-3 * size, 1e-3 / turn.duration_s.max(1e-3)];
     let mut by = DMatrix::zeros(3, 12);

@@ -1,7 +1,7 @@
-//! Whether a fit can be what it claims to be: what no interval shows, because the data agree with themselves.
+//! Plausibility of a fit: errors that no interval shows, because the data agree with each other.
 //!
-//! Swapped columns, a wrong unit, one dwell with the wrong input: each leaves a trace, and each would otherwise end in a
-//! calibration file. What cannot be right is refused; what may be meant is a warning.
+//! Swapped columns, a wrong unit, one dwell with the wrong input: each leaves a trace, and each would otherwise end in a calibration file. What
+//! cannot be right is refused; what may be intended gives a warning.
 
 use super::of_temperature::with_temperature;
 use super::off_level::off_level;
@@ -15,20 +15,20 @@ use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RAW_COLUMNS, RawUnit, Reference};
 
-/// Error of a fit over the spread of its inputs from which on the readings do not follow the inputs. Swapped
-/// sensors are beyond one; the worst table is a hundred times below.
+/// If the error of a fit over the spread of its inputs exceeds this, the readings do not follow the inputs. Swapped sensors are beyond one; the worst
+/// table is a hundred times below.
 const FOLLOWS_NOTHING: f64 = 0.3;
-/// A residual this many times the median, and the noise, is no tail of a distribution.
+/// A residual this many times the median, and the noise, is an outlier.
 const OUTLIER: f64 = 10.0;
-/// Fewer residuals have no median to speak of.
+/// Fewer residuals have no meaningful median.
 const OUTLIER_COUNT: usize = 6;
-/// A residual below this share of the largest is rounding. The dwell determines a parameter alone, so nothing contradicts it, and its
-/// residual is typical of nothing: among six dwells three such made "2385361721304 times the median" of the others.
+/// A residual below this share of the largest is rounding. Its dwell determines a parameter alone, so nothing contradicts it, and it must not count
+/// in the median: among six dwells three such made "2385361721304 times the median" of the others.
 const EXACT: f64 = 1e-9;
-/// Axes turned by more than this, degrees, are more than a careless mounting.
+/// Axes rotated by more than this, degrees, are more than a careless mounting.
 const TURNED_DEG: f64 = 20.0;
 
-/// Refuses readings that a firmware put together wrongly: their errors of 256 counts are no effect of a sensor.
+/// Refuses readings that a firmware assembled wrongly: their errors of 256 counts do not come from a sensor.
 pub fn check_readings(prepared: &Prepared) -> Result<()> {
     let faults = &prepared.condensed.signed_low_byte;
     let found = (0..6).filter(|c| faults[*c].is_some());
@@ -60,7 +60,7 @@ pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
         off_level(prepared, fit),
     ];
     fit.warnings.extend(found.into_iter().flatten());
-    // By the limits of the device, and last: why it is so has a better word above.
+    // The limits of the device come last, because the checks above name the cause.
     match fit.estimated.triad.inverse.check(None) {
         Ok(()) => Ok(()),
         Err(_) => {
@@ -70,7 +70,7 @@ pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
     }
 }
 
-/// Refuses a fit that ends in something that is not a number.
+/// Refuses a fit with a result that is not a number.
 pub fn check_numbers(fit: &SensorFit) -> Result<()> {
     let triad = &fit.estimated.triad;
     let models = triad.inverse.matrix.iter().chain(&triad.inverse.offset);
@@ -86,7 +86,7 @@ pub fn check_numbers(fit: &SensorFit) -> Result<()> {
     Err(Failure::NoSolution(seen).into_error(fit.sensor))
 }
 
-/// Root mean square of the inputs about their mean; of what the figure is about elsewhere.
+/// Root mean square of the inputs about their mean; if these are unknown, the size of the quantity that the figure describes.
 fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
     match fit.figure {
         Figure::Direction => 1.0,
@@ -113,7 +113,7 @@ fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
     }
 }
 
-/// Refuses readings that do not follow their inputs. Those that do beside the temperature are fitted, with a warning.
+/// Refuses readings that do not follow their inputs. If they do with temperature in the model, they are fitted, with a warning.
 fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warning>> {
     let spread = spread(prepared, fit);
     let share = fit.rms() / spread;
@@ -178,7 +178,7 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let median = sorted[sorted.len() / 2].value.norm();
     let off = |r: &&&Residual| {
         let size = r.value.norm();
-        // Where the noise is not known, the median alone decides.
+        // If the noise is not known, the median alone decides.
         size > OUTLIER * median && (r.floor.is_nan() || size > OUTLIER * r.floor)
     };
     let bad: Vec<_> = sorted.iter().filter(off).collect();
@@ -190,7 +190,7 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     Some(warning.of(fit.sensor))
 }
 
-/// What claims to be in SI reads about what it measures.
+/// Warns about readings in SI whose scale factor is wrong.
 fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let matrix = &fit.estimated.triad.forward.matrix;
     let scale = matrix.row_iter().map(|r| r.norm()).sum::<f64>() / 3.0;
@@ -205,12 +205,12 @@ fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     )
 }
 
-/// Gyro rests that are not rests.
+/// Warns about rests in which the gyro turns.
 fn rests(fit: &SensorFit) -> Option<Warning> {
     fit.static_rms.and_then(|(rms, _)| restless(rms))
 }
 
-/// How the axes lie to those that they are referred to.
+/// Warns about axes that are rotated far from those of the reference.
 fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     if fit.figure.is_magnitude() {
         return None; // its axes are the frame

@@ -10,13 +10,13 @@ use crate::warning::Warning;
 /// One residual: where it is, and how large in sample and held out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
-    /// Dwell, or the dwell that a turn ends in.
+    /// Dwell, or the dwell in which a turn ends.
     pub dwell: usize,
-    /// Whether it is not of the mean of the dwell, but of how the reading follows an input that moves within it.
+    /// Whether it belongs to the moving input within the dwell instead of the mean.
     pub within: bool,
-    /// Vector residual: input error, direction error; for a size, the error stands first.
+    /// Vector residual: input error or direction error; for a magnitude, the error is the first component.
     pub value: Vector3<f64>,
-    /// The same by a calibration that has not seen it. `None`: could not be held out.
+    /// The same by a calibration fitted without it; `None` if it could not be held out.
     pub held_out: Option<Vector3<f64>>,
     /// Standard deviation that noise alone gives it (root mean square over its parts).
     pub floor: f64,
@@ -25,13 +25,13 @@ pub struct Residual {
 /// Fit of one triad.
 #[derive(Debug, Clone)]
 pub struct SensorFit {
-    /// Which.
+    /// The triad.
     pub sensor: Sensor,
     /// Calibration, scatter and condition.
     pub estimated: Estimated,
-    /// What the error figures are about.
+    /// The quantity that the error figures describe.
     pub figure: Figure,
-    /// One for every dwell or turn that was used, and of dwells whose input moves those within them.
+    /// One for every dwell or turn that was used; for dwells whose input moves, also those within them.
     pub residuals: Vec<Residual>,
     /// Number of dwells used.
     pub dwells: usize,
@@ -39,14 +39,14 @@ pub struct SensorFit {
     pub static_rms: Option<(f64, Option<f64>)>,
     /// How its residuals were held out.
     pub held_out: HoldOut,
-    /// The error of the readings as they came, where they are in SI: what [`Self::rms`] is without a calibration.
+    /// Error of the readings as they came, if they are in SI: [`Self::rms`] without a calibration.
     pub as_came: Option<f64>,
     /// What a person should know.
     pub warnings: Vec<Warning>,
 }
 
 impl SensorFit {
-    /// Root mean square of the residuals: over axes where the input is known, of angle or size elsewhere.
+    /// Root mean square of the residuals: over axes if the input is known, otherwise of the angle or magnitude.
     pub fn rms(&self) -> f64 {
         rms(self.figure, self.residuals.iter().map(|r| r.value))
     }
@@ -57,8 +57,8 @@ impl SensorFit {
         (held().count() > 0).then(|| rms(self.figure, held()))
     }
 
-    /// What [`Self::rms`] would be with noise alone. Not a number where the noise is unknown, as that of means without standard deviations:
-    /// a floor of 0 would say that there is none.
+    /// [`Self::rms`] by noise alone. Not a number if the noise is unknown, as for means without standard deviations: a floor of 0 would mean that
+    /// there is no noise.
     pub fn noise_floor(&self) -> f64 {
         if self.residuals.iter().all(|r| r.floor == 0.0) {
             return f64::NAN;
@@ -72,14 +72,14 @@ impl SensorFit {
     }
 }
 
-/// What is left in sample, or what noise alone would leave where that is more: few residuals of many parameters say little.
+/// The rms in sample or, if larger, that by noise alone: with many parameters few residuals are too small.
 pub(super) fn typical(figure: Figure, residuals: &[Residual]) -> f64 {
     let floor = |r: &Residual| Vector3::new(r.floor, 0.0, 0.0);
     let in_sample = rms(figure, residuals.iter().map(|r| r.value));
     in_sample.max(rms(Figure::GravitySize, residuals.iter().map(floor)))
 }
 
-/// Root mean square: over axes where the input is known, of angle or size elsewhere.
+/// Root mean square: over axes if the input is known, otherwise of the angle or magnitude.
 pub(super) fn rms(figure: Figure, values: impl Iterator<Item = Vector3<f64>>) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
     for v in values {

@@ -1,5 +1,5 @@
-//! The biases of a session, where the matrix is known from another: a unit at rest in a chamber has no more to tell, and biases
-//! are others after every power-on.
+//! The biases of a session, with the matrix known from another. A unit at rest in a chamber shows no more than these, and biases differ after every
+//! power-on.
 
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -13,13 +13,13 @@ use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
 use mimu_recording::Reference;
 
-/// Steps of the iteration for sizes: from a bias of a tenth of gravity the third changes nothing.
+/// Iterations for magnitudes: from a bias of a tenth of gravity the third changes nothing.
 const STEPS: usize = 6;
 
 /// Inverse model of `sensor` with the matrix of `known` and the biases of `prepared`, raw to SI.
 ///
-/// Where the input is known, and for a gyro at rest, by the mean error of each axis; for an accelerometer by the magnitude of gravity,
-/// across which a single pose says nothing: there the bias stays that of `known`.
+/// If the input is known, and for a gyro at rest, by the mean error of each axis. For an accelerometer by the magnitude of gravity: a single pose
+/// does not show the bias across gravity, which then stays that of `known`.
 pub fn estimate(
     prepared: &Prepared,
     sensor: Sensor,

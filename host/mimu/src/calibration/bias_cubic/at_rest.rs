@@ -1,4 +1,4 @@
-//! Cubics of a unit that only lay still, whose scale factors the program that takes them has to know itself.
+//! Cubics of a unit that was recorded at rest only. A program that uses them has to know the scale factors itself.
 
 use nalgebra::Vector3;
 
@@ -11,10 +11,10 @@ use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
 
 impl BiasCubics {
-    /// Of `sensor` over `range_c`, about `reference_c`; `None` if `biases` has no readings of it.
+    /// The cubics of `sensor` over `range_c`, about `reference_c`; `None` if `biases` has no readings of it.
     ///
-    /// The cubic of an accelerometer is 0 at `reference_c`: its readings at rest contain gravity in a pose that nobody knows, and only their
-    /// change is one of the bias. That of a gyro is the whole of the bias, with the Earth's rate.
+    /// The cubic of an accelerometer is 0 at `reference_c`: its readings at rest contain gravity in an unknown pose, so only their change is that of
+    /// the bias. The cubic of a gyro is the whole bias, with the Earth's rate.
     ///
     /// # Errors
     /// A range of less than 10 K; readings that are not SI, with no factor to convert them.

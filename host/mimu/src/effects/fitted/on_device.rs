@@ -1,4 +1,4 @@
-//! Effects in the words of the device, and back.
+//! Effects in the form that the device takes, and back.
 
 use std::fmt;
 
@@ -16,13 +16,13 @@ use crate::effects::readout;
 /// Why no device removes an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NotOnDevice {
-    /// None has its law.
+    /// No device has its law.
     NoLaw,
-    /// None has a factor of the product.
+    /// No device has a factor of the product.
     NoFactor,
-    /// It is over.
+    /// It is a jump, which is over.
     Jump,
-    /// One that has its law does not take its numbers.
+    /// A device has its law, but does not take its numbers.
     Numbers,
 }
 
@@ -40,7 +40,7 @@ impl fmt::Display for NotOnDevice {
 }
 
 impl FittedEffect {
-    /// It as the device takes it, in its precision or a better one: of converters of the axes one for each.
+    /// The effect as the device takes it, in the device's precision or a better one. Different converters of the axes give one device effect each.
     ///
     /// # Errors
     /// Why no device removes it.
@@ -62,7 +62,7 @@ impl FittedEffect {
                 all.into_iter().map(of).collect()
             }
             CandidateKind::Effect(effect) => {
-                // Those of a recording stand last; no file has them, and the device takes none.
+                // Coefficients of a recording come last; no file has them, and the device takes none.
                 let mut coefficients = vec![T::zero(); effect.of_unit().count()];
                 for (k, value) in candidate.active.iter().zip(&self.values) {
                     if let Some(slot) = coefficients.get_mut(*k) {
@@ -87,10 +87,10 @@ impl FittedEffect {
         }
     }
 
-    /// The effects that a device keeps; converters of the axes of a triad are parts of one.
+    /// The effects that a device stores; converters of the axes of a triad are joined into one effect.
     ///
     /// # Errors
-    /// The first that this program does not know.
+    /// The first effect that this program does not know.
     pub fn all_of_device(on_device: &[DeviceEffect<f32>]) -> Result<Vec<Self>, DeviceEffect<f32>> {
         let mut all: Vec<Self> = Vec::new();
         for one in on_device {
@@ -115,7 +115,7 @@ impl FittedEffect {
     fn of_device(one: &DeviceEffect<f32>) -> Option<Self> {
         let mut candidate = candidate(&one.to_string())?;
         let all = one.coefficients();
-        // What was not determined is zero there, and stays out of the file.
+        // Coefficients that were not determined are zero on the device, and are left out of the file.
         let any = all.iter().any(|c| *c != 0.0);
         let first = match one.converter() {
             Some(of) => {

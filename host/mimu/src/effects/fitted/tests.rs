@@ -132,7 +132,7 @@ fn an_effect_that_is_found_again_adds_to_what_is_known() {
     assert_eq!(of("xx"), (2e-5, 3e-6));
     let (value, sigma) = of("zy");
     assert!((value - 1.2e-4).abs() < 1e-18 && (sigma - 18_f64.sqrt() * 1e-6).abs() < 1e-18);
-    // Of exponentials each has its own time.
+    // Exponentials with different time constants are separate effects.
     fitted("gyro_warm_up", 1e-3, 60.0).join(&mut all).unwrap();
     fitted("gyro_warm_up", 1e-3, 90.0).join(&mut all).unwrap();
     assert_eq!(all.len(), 3);
@@ -186,7 +186,7 @@ fn an_effect_in_a_file_is_the_one_that_was_fitted() {
     let read: FittedEffect = toml::from_str(&text).unwrap();
     assert_eq!(read, lag);
     assert_eq!(read.interval, lag.interval);
-    // And the one that comes back from a device, but for what that does not keep.
+    // The same holds for an effect that comes back from a device, except for what the device does not store.
     let kept = FittedEffect::all_of_device(&lag.on_device().unwrap()).unwrap();
     assert_eq!(kept[0].candidate.active, [0, 2]);
     assert_eq!(kept[0].values, [f64::from(1e-3_f32), f64::from(-2e-3_f32)]);

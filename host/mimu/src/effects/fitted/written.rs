@@ -1,4 +1,4 @@
-//! An effect as files have it: a table of named numbers with their units.
+//! An effect as written in files: a table of named numbers with their units.
 
 use mimu_core::effects::FARTHEST_ZERO;
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
 use crate::quantity::{AXES, Sensor, significant};
 
-/// How the coefficients of an effect are applied: e is the error of the three sensors, S the norms of the rows of P.
+/// How the coefficients of an effect are applied: e is the error of the three sensors, S is diagonal with the norms of the rows of P.
 const FORMULA: &str = "x = C (u - S e) + o, e_i = sum of coefficient * regressor";
 const DIRECTION: &str = "raw to SI";
 
@@ -33,7 +33,7 @@ pub(super) struct WrittenEffect {
     /// Its nonlinear parameter, if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     form: Option<WrittenParameter>,
-    /// Of errors by the code: the converters, of all axes or one each.
+    /// For errors that depend on the code: one converter for all axes, or one for each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     converters: Vec<WrittenConverter>,
     /// Those that the experiment determined; the others are zero.
@@ -49,10 +49,10 @@ pub struct WrittenParameter {
     pub name: String,
     /// Value.
     pub value: f64,
-    /// Lower end of its 95 % interval; `None` where the smallest value that was tried is within, or it is not known.
+    /// Lower end of its 95 % interval; `None` if the interval includes the smallest value that was tried, or is not known.
     #[serde(default)]
     pub lower: Option<f64>,
-    /// Upper end; `None` where the largest is within, or it is not known.
+    /// Upper end; `None` if the interval includes the largest value, or is not known.
     #[serde(default)]
     pub upper: Option<f64>,
     /// Smallest value that is tried.
@@ -70,11 +70,11 @@ pub struct WrittenParameter {
 pub struct WrittenConverter {
     /// Axes whose readings it gives: x, y or z, or xyz.
     pub axes: String,
-    /// Of its first bit, raw.
+    /// Weight of its first bit, raw.
     pub weight_of_bit_0_raw: f64,
     /// Reading of its code 0, raw.
     pub reading_of_code_0_raw: f64,
-    /// The last is known to within so much, raw, with 95 %; 0 where it is taken as given, as every diagnosis does now.
+    /// 95 % uncertainty of `reading_of_code_0_raw`, raw; 0 if that is taken as given, as every diagnosis does now.
     pub reading_of_code_0_within_raw: f64,
 }
 
@@ -135,7 +135,7 @@ impl WrittenParameter {
 }
 
 impl WrittenConverter {
-    /// Those of some axes, one for each unless all are the same.
+    /// Converters of the axes: one for each, or one if all are the same.
     pub(super) fn of(codes: &Codes) -> Vec<Self> {
         let one = |axes: &str, converter: &Converter| Self {
             axes: axes.into(),
@@ -153,7 +153,7 @@ impl WrittenConverter {
         }
     }
 
-    /// Those of the axes, or what is wrong.
+    /// The converters of the axes, or what is wrong.
     fn codes(all: &[Self]) -> Result<Codes, String> {
         let mut codes: Codes = [None; 3];
         for one in all {
@@ -209,7 +209,7 @@ impl WrittenConverter {
 }
 
 impl WrittenEffect {
-    /// What it states, or what is wrong.
+    /// The effect that is written, or what is wrong.
     fn read(self) -> Result<FittedEffect, String> {
         let candidate = candidate(&self.id);
         let mut candidate = candidate.ok_or("this version does not know an effect of this id")?;
@@ -308,7 +308,7 @@ impl WrittenEffect {
     }
 }
 
-/// The candidate of an id that a calibration may hold, with all of its coefficients.
+/// The candidate of an id that a calibration may contain, with all of its coefficients.
 pub(crate) fn candidate(id: &str) -> Option<Candidate> {
     let Some(term) = id.strip_prefix("term:") else {
         let effect = crate::effects::by_id(id).filter(|e| e.is_error() && !e.is_of_session())?;
@@ -326,7 +326,7 @@ pub(crate) fn candidate(id: &str) -> Option<Candidate> {
         let quantity = all.find(|q| q.name().as_deref() == Some(name))?;
         quantities.extend(std::iter::repeat_n(quantity, power));
     }
-    // One spelling for each.
+    // Each product has one valid spelling.
     let term = Product::term(&quantities).filter(|p| p.name() == product)?;
     Some(Candidate::new(sensor, CandidateKind::Term(axis, term)))
 }

@@ -1,17 +1,17 @@
-//! Something judged by the others: what these predict of it, how surely, and what they would determine without it.
+//! Judges a dwell or turn by the others: what they predict for it, how surely, and what they determine without it.
 //!
-//! A robust fit names suspects. It does not convict them: with thirteen poses and nine parameters it follows nine of them closely, the
-//! scatter of the others looks like nothing, and a pose that alone has its end of an axis up is 14 sigma off. Each suspect is
-//! therefore judged again by its studentised deletion residual: the distance from what the fit of the others predicts, over the
-//! standard deviation of that difference, which has the uncertainty of their parameters in it and is estimated from their scatter,
-//! with Student's distribution for the degrees of freedom they have (Belsley, Kuh and Welsch, 1980, section 2.1).
+//! A robust fit names suspects, but does not convict them. With thirteen poses and nine parameters it follows nine of them closely, the scatter of
+//! the others looks negligible, and a pose that alone has its end of an axis up is 14 sigma off. So each suspect is judged again by its studentised
+//! deletion residual: its distance from the prediction of the others, over the standard deviation of that difference. This deviation contains the
+//! uncertainty of their parameters and is estimated from their scatter, with Student's distribution for their degrees of freedom (Belsley, Kuh and
+//! Welsch, 1980, section 2.1).
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::signal::blocks::quantile;
 
-/// Something judged: its error, the derivatives of that by the parameters, and the variance by noise.
+/// An observation to judge: its error, the derivatives of the error by the parameters, and its variance by noise.
 pub(super) struct Row {
     pub error: Vector3<f64>,
     pub by: DMatrix<f64>,
@@ -42,7 +42,7 @@ pub(super) fn against_others(
         let scaled = DMatrix::from_fn(parameters, parameters, |i, j| {
             normal[(i, j)] / (scale[i] * scale[j])
         });
-        // The decomposition never ends on what is not a number.
+        // The decomposition does not end if an element is not a number.
         if scaled.iter().any(|x| !x.is_finite()) {
             return None;
         }
@@ -56,7 +56,7 @@ pub(super) fn against_others(
             let hat = &row.by * &inverse * row.by.transpose() * (weight / row.variance);
             let free = Matrix3::from_fn(|i, j| f64::from(u8::from(i == j)) - hat[(i, j)]);
             let inverse = free.try_inverse().unwrap_or_else(Matrix3::identity);
-            // What nothing else determines is predicted by nothing.
+            // A row that alone determines a parameter has no prediction.
             let inverse = match inverse.trace() < 100.0 {
                 true => inverse,
                 false => Matrix3::identity(),
@@ -70,7 +70,7 @@ pub(super) fn against_others(
             let mut sizes: Vec<f64> = part.iter().map(|f| f.1).collect();
             quantile(&mut sizes, 0.5).unwrap_or(0.0)
         };
-        // What is judged, and what only holds the parameters as well, may have more than its noise.
+        // Both the judged rows and the others may scatter by more than their noise.
         let scales = [&found[..judged], &found[judged..]].map(|p| (typical(p) / median).max(1.0));
         for (k, (f, weight)) in found.iter_mut().zip(&mut weights).enumerate() {
             f.1 /= scales[usize::from(k >= judged)];
@@ -81,14 +81,14 @@ pub(super) fn against_others(
     Some(found)
 }
 
-/// Chance that in a whole recording without outliers anything is left out. With 38 poses this is 4.7 sigma, below the limit of
-/// suspicion; with thirteen, whose scatter three degrees of freedom say, 13.
+/// Probability that anything is left out of a whole recording without outliers. With 38 poses this is 4.7 sigma, below the limit of suspicion; with
+/// thirteen, whose scatter has three degrees of freedom, 13.
 const BY_CHANCE: f64 = 0.005;
-/// By how many times the standard deviation of a parameter may grow without what is left out. An observation with this much leverage
-/// (0.89) determines the parameter nearly alone, and takes eight ninths of its own error into the fit.
+/// Factor by which the standard deviation of a parameter may grow without what is left out. An observation with this much leverage (0.89) determines
+/// the parameter nearly alone, and eight ninths of its own error go into the fit.
 const GROWS: f64 = 3.0;
 
-/// What the others say of a suspect.
+/// A suspect, judged by the others.
 pub(super) struct Judged {
     /// Index of the row.
     pub row: usize,
@@ -101,7 +101,7 @@ pub(super) struct Judged {
 }
 
 impl Judged {
-    /// Whether the others determine without it what they determine with it.
+    /// Whether the others determine all parameters without it.
     pub fn can_be_spared(&self) -> bool {
         self.grows.1 <= GROWS
     }
@@ -111,13 +111,13 @@ impl Judged {
 struct Others {
     step: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Variance over that by noise, of what is judged and of the rest, never below one.
+    /// Variance over that by noise, of the judged rows and of the others; at least one.
     scale: [f64; 2],
-    /// Degrees of freedom of the first.
+    /// Degrees of freedom of the judged rows.
     dof: f64,
 }
 
-/// Inverse of a normal matrix; `None` where it determines less than it has parameters.
+/// Inverse of a normal matrix; `None` if it leaves a parameter undetermined.
 fn inverted(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = normal.nrows();
     let scale = normal.diagonal().map(|d| d.sqrt().max(f64::MIN_POSITIVE));
@@ -139,7 +139,7 @@ fn inverted(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 impl Others {
-    /// Of all rows but `without`; `None` if these leave a parameter undetermined.
+    /// The fit of all rows except `without`; `None` if these leave a parameter undetermined.
     fn of(rows: &[Row], judged: usize, dimensions: f64, without: &[usize]) -> Option<Self> {
         let kept = || {
             let all = rows.iter().enumerate();
@@ -185,7 +185,7 @@ impl Others {
         Some(found)
     }
 
-    /// Their prediction for a row outside them.
+    /// Judges a row outside them by their prediction.
     fn judge(&self, k: usize, row: &Row) -> Judged {
         let error = row.error - &row.by * &self.step;
         let error = Vector3::new(error[0], error[1], error[2]);
@@ -195,7 +195,7 @@ impl Others {
         let squares = total
             .cholesky()
             .map_or(f64::NAN, |c| error.dot(&c.solve(&error)));
-        // With it, by the information that it adds.
+        // The covariance with this row, by the information that it adds.
         let inverse = total.try_inverse().unwrap_or_else(Matrix3::zeros);
         let gain = row
             .by
@@ -218,22 +218,22 @@ impl Others {
         }
     }
 
-    /// Whether chance makes a deletion residual of `sigmas` in a recording of `count` things to judge.
+    /// Whether a deletion residual of `sigmas` may be chance in a recording with `count` rows to judge.
     fn by_chance(&self, sigmas: f64, dimensions: f64, count: usize) -> bool {
         if !(self.dof >= 1.0) {
             return true;
         }
         let chance = match dimensions < 1.5 {
             true => StudentsT::new(0.0, 1.0, self.dof).map_or(1.0, |t| 2.0 * t.sf(sigmas)),
-            // Half of the square is distributed like F with two degrees of freedom above, which has a closed form.
+            // Half of the square has an F distribution with two degrees of freedom in the numerator, which has a closed form.
             false => (1.0 + sigmas * sigmas / self.dof).powf(-0.5 * self.dof),
         };
         chance * count as f64 > BY_CHANCE
     }
 }
 
-/// The `suspects`, worst first, that the other rows contradict: each by what the fit without any of them predicts. What only the
-/// suspects themselves determine is judged by nothing: then the least suspicious are believed one by one.
+/// The `suspects`, worst first, that the other rows contradict. Each is judged by the fit without all suspects. If that fit leaves a parameter
+/// undetermined, the least suspicious are trusted one by one.
 pub(super) fn contradicted(
     rows: &[Row],
     judged: usize,
@@ -274,7 +274,7 @@ mod tests {
         }
     }
 
-    /// Rows of a mean, with the deviations that are given, and of a slope.
+    /// Rows of a mean, with fixed errors, and of a slope, with the given errors and variances.
     fn rows(slope: &[(f64, f64)]) -> Vec<Row> {
         let mean = (0..12).map(|k| row([0.9, -1.1, 1.0, -0.8][k % 4], [1.0, 0.0], 1.0));
         let slope = slope.iter().map(|(e, v)| row(*e, [1.0, 1.0], *v));
@@ -286,7 +286,7 @@ mod tests {
         let alone = rows(&[(50.0, 1.0)]);
         let found = contradicted(&alone, alone.len(), 1.0, &[12]);
         assert!(found.iter().all(|j| !j.can_be_spared()) && found.len() == 1);
-        // Nearly alone: a second one knows the slope ten times worse.
+        // Nearly alone: a second row determines the slope ten times worse.
         let nearly = rows(&[(80.0, 1.0), (0.5, 100.0)]);
         let found = contradicted(&nearly, nearly.len(), 1.0, &[12]);
         assert!(
@@ -295,7 +295,7 @@ mod tests {
             found[0].grows
         );
         assert_eq!(found[0].grows.0, 1);
-        // As well as the first: then it can.
+        // If others determine the slope as well, it can be spared.
         let both = rows(&[(80.0, 1.0), (0.5, 1.0), (-0.4, 1.0)]);
         let found = contradicted(&both, both.len(), 1.0, &[12]);
         assert!(found.len() == 1 && found[0].can_be_spared());
@@ -303,7 +303,7 @@ mod tests {
 
     #[test]
     fn few_others_contradict_only_what_is_far_beyond_their_scatter() {
-        // Four rows of a mean and two of another have four degrees of freedom, and scatter by 1: 8 of them are no proof, 40 are.
+        // Four rows of a mean and two of another scatter by 1, with four degrees of freedom: 8 proves nothing, 40 does.
         let four = |last: f64| -> Vec<Row> {
             let errors = [1.0, -1.0, 0.8, -0.8, last];
             let all = errors.iter().map(|e| row(*e, [1.0, 0.0], 1e-4));
@@ -325,7 +325,7 @@ mod tests {
             "{}",
             found[0].error
         );
-        // Its own variance and that of their mean, scaled by what all of them scatter by.
+        // Its own variance and that of their mean, scaled by the scatter of all.
         let squares = 3.0 * (0.9f64.powi(2) + 1.1f64.powi(2) + 1.0 + 0.8f64.powi(2));
         let within = squares + 2.0 * 0.45f64.powi(2);
         let scale = (within / 12.0).max(1.0);
