@@ -78,14 +78,14 @@ interop:
 	./tests/interop/run.sh target/debug/mimu
 
 DIST_TARGET ?= x86_64-unknown-linux-gnu
-dist: toolchain ## an archive for any Linux since glibc 2.28: command, manual, completions, udev rule; DIST_TARGET=aarch64-unknown-linux-gnu is another
+dist: toolchain ## an archive for any Linux with glibc 2.28 or later: command, manual, completions, udev rule; or DIST_TARGET=aarch64-unknown-linux-gnu
 	@rustup target add --toolchain $(TOOLCHAIN) $(DIST_TARGET)
 	./packaging/dist.sh "$(CARGO)" $(DIST_TARGET)
 
 python: toolchain ## the Python package: builds the wheel and runs its tests
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/tests/run.sh
 
-wheel: toolchain ## the wheel to hand out, target/wheels, for any Linux since glibc 2.28, with the command; DIST_TARGET as of dist
+wheel: toolchain ## the wheel for distribution, target/wheels, for any Linux with glibc 2.28 or later, with the command; DIST_TARGET as for dist
 	@rustup target add --toolchain $(TOOLCHAIN) $(DIST_TARGET)
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./packaging/wheel.sh $(DIST_TARGET)
 
@@ -95,11 +95,11 @@ book: toolchain ## the documentation as a site, target/book, with search; its li
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) "$$(RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/environment.sh)/bin/python" docs/book.py target/tools/bin/mdbook target/book
 
 # The lowest Rust version that builds the crates for PCs, determined by nalgebra. The emulator needs the newest, but only tests need the emulator.
-msrv: ## the command compiles with the Rust that Cargo.toml says is enough
+msrv: ## the command compiles with the lowest Rust version stated in Cargo.toml
 	rustup toolchain install $(LOWEST) --profile minimal
 	cargo +$(LOWEST) check --locked -p mimu-cli
 
-package: toolchain ## every crate that is published, as its archive, built from it
+package: toolchain ## every published crate as an archive, and a build from it
 	$(CARGO) package --locked $(PUBLISHED:%=-p %)
 
 web: toolchain ## the page that calibrates in the browser: static files in target/web, to put on any server
@@ -118,25 +118,25 @@ nightly: toolchain blind fuzz web-tests ## what takes hours: more seeds, ten min
 # Directory of the demo's recordings and page.
 DEMO ?= target/demo-$(SEED)
 SEED ?= 1
-demo: toolchain ## an uncalibrated board on the virtual bench, to a verified one; SEED=n is another unit with another effect
+demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is another unit with another effect
 	@$(FIRMWARE) -q
 	@$(CARGO) build --locked -q -p mimu-cli -p mimu-board-tests --bin mimu --bin demo
 	@rm -rf $(DEMO)
 	@target/debug/demo $(SEED) $(DEMO)
 
-faults: toolchain ## what can go wrong in a session of the wizard, done to it on purpose
+faults: toolchain ## a session of the wizard with faults caused on purpose
 	@$(FIRMWARE) -q
 	$(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bins
 	target/debug/faults
 
-example: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
+example: toolchain ## import and fit a recording: the best real one available, or the small one in tests/
 	$(CARGO) build --locked --release --bin mimu
 	./tests/example.sh target/release/mimu
 
 papers: toolchain ## compute every figure and plot of docs/papers.md
 	$(CARGO) run --locked --release -p mimu-tests --bin papers
 
-blind: toolchain ## undeclared effects on hundreds of units, and what the diagnosis says of them
+blind: toolchain ## undeclared effects on hundreds of units, and their diagnoses
 	$(CARGO) run --locked --release -p mimu-tests --bin blind
 
 bench: toolchain ## rates and peak memory on four hours at 1 kHz, and of a diagnosis
@@ -149,7 +149,7 @@ budget: toolchain ## instructions, load and memory of the firmware, counted on t
 	$(COUNTED)
 	$(CARGO) run --locked -p mimu-board-tests --bin budget
 
-device: toolchain ## of the nightly tests those of the device; draws docs/device/supply-cuts.svg
+device: toolchain ## the nightly tests of the device; draws docs/device/supply-cuts.svg
 	$(FIRMWARE)
 	$(CARGO) test --locked --release -p mimu-board-tests -- --ignored --nocapture
 

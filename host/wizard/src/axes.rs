@@ -6,9 +6,9 @@ use mimu::quantity::{AXES, Sensor};
 use mimu::triad::directions;
 use nalgebra::{Matrix3, Vector3};
 
-/// Fewest poses requested so far, all changed in the same way: with two poses, one axis remains ambiguous.
+/// Fewest poses to conclude this from: with two poses, one axis remains ambiguous.
 const FEWEST_POSES: usize = 3;
-/// Fewest of them that differ from the requested pose: one may be a mistake.
+/// Fewest of them that have to differ from the requested pose: a single one may be a mistake.
 const FEWEST_OTHERS: usize = 2;
 /// Angle between axes of the same name of gyro and accelerometer, degrees. In no package are they so far apart.
 const APART_DEG: f64 = 30.0;

@@ -55,7 +55,7 @@ impl Wizard<'_> {
                     mimu_recording::result_file::stage(&copy, bytes.as_slice())?.publish()?;
                 }
             }
-            // A resumed session has a copy already.
+            // A resumed session has run its self-test already.
             if unit
                 .folder
                 .entries()
