@@ -1,21 +1,21 @@
-# Everything that a fresh machine with rustup, gcc and make needs to test, try and measure mimu.
+# Everything that a new machine with rustup, gcc and make needs to test, try and measure mimu.
 
 TOOLCHAIN := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
 TARGET := thumbv7em-none-eabihf
-# Of the page.
+# Target of the page.
 WEB_TARGET := wasm32-wasip1
 CARGO := cargo +$(TOOLCHAIN)
-# One by one: built together, the second would be given the vector table that the first brings.
+# Built separately: in a common build, the second would get the vector table of the first.
 FIRMWARE := $(CARGO) build --locked -p mimu-firmware --profile image --target $(TARGET)
 COUNTED := $(CARGO) build --locked -p mimu-counted --profile image --target $(TARGET)
-# All whose tests run on the PC. The extension module for Python is tested from there.
+# All crates whose tests run on the PC. The Python extension module is tested from Python.
 ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic --exclude mimu-python
 
 MDBOOK := 0.5.4
 LOWEST := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device mimu-equipment mimu-export mimu-wizard mimu-cli
 
-# Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
+# Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python
 
 .PHONY: help test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example papers blind bench budget device fuzz audit toolchain
@@ -23,7 +23,7 @@ STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop pytho
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
 
-# Automatic installation may be switched off, so it is asked for. The list makes a second run offline and quick.
+# Automatic installation may be switched off, so it is requested explicitly. With the checks, a second run is fast and works offline.
 toolchain:
 	@rustup toolchain list | grep -q '^$(TOOLCHAIN)' \
 	  && rustup target list --toolchain $(TOOLCHAIN) --installed | grep -q $(TARGET) \
@@ -39,8 +39,8 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests but the
 	  took="$$took$$(printf '%-12s %4d s' $$stage $$(( $$(date +%s) - begun )))\n"; \
 	done; printf '\n%b' "$$took"
 
-# A fresh build compiles each crate once, so that nothing need be kept for compiling it again in parts. The demo and the faults use what the
-# tests have built: with another setting they would compile the workspace again.
+# A fresh build compiles each crate once, so intermediate results for incremental builds are not needed. The demo and the faults use the builds of the
+# tests: with another setting they would compile the workspace again.
 test $(STAGES) demo faults nightly: export CARGO_INCREMENTAL = 0
 
 fmt:
@@ -57,7 +57,7 @@ clippy:
 rustdoc:
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 
-# With USB first, as the image without it has the same name and is what the tests run.
+# With USB first: the image without it has the same name, and is the one that the tests run.
 images:
 	$(CARGO) build --locked -p mimu-firmware --profile image --features usb --target $(TARGET)
 	$(FIRMWARE)
@@ -72,20 +72,20 @@ build-tests:
 run-tests:
 	$(CARGO) test --locked $(ON_PC)
 
-# With the features that the extension module asks of shared crates, so that `python` uses what is compiled here.
+# Built with the features that the extension module needs from shared crates, so that `python` does not compile them again.
 interop:
 	$(CARGO) build --locked -q -p mimu-cli -p mimu-python --bin mimu
 	./tests/interop/run.sh target/debug/mimu
 
 DIST_TARGET ?= x86_64-unknown-linux-gnu
-dist: toolchain ## an archive for any Linux since glibc 2.28: command, manual, completions, udev rule; DIST_TARGET=aarch64-unknown-linux-gnu is another
+dist: toolchain ## an archive for any Linux with glibc 2.28 or later: command, manual, completions, udev rule; or DIST_TARGET=aarch64-unknown-linux-gnu
 	@rustup target add --toolchain $(TOOLCHAIN) $(DIST_TARGET)
 	./packaging/dist.sh "$(CARGO)" $(DIST_TARGET)
 
 python: toolchain ## the Python package: builds the wheel and runs its tests
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/tests/run.sh
 
-wheel: toolchain ## the wheel to hand out, target/wheels, for any Linux since glibc 2.28, with the command; DIST_TARGET as of dist
+wheel: toolchain ## the wheel for distribution, target/wheels, for any Linux with glibc 2.28 or later, with the command; DIST_TARGET as for dist
 	@rustup target add --toolchain $(TOOLCHAIN) $(DIST_TARGET)
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./packaging/wheel.sh $(DIST_TARGET)
 
@@ -94,18 +94,18 @@ book: toolchain ## the documentation as a site, target/book, with search; its li
 	  || $(CARGO) install --locked --root target/tools --no-default-features --features search --version $(MDBOOK) mdbook
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) "$$(RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/environment.sh)/bin/python" docs/book.py target/tools/bin/mdbook target/book
 
-# The lowest Rust that builds the crates for PCs: that of nalgebra. The emulator needs the newest, and only tests need the emulator.
-msrv: ## the command compiles with the Rust that Cargo.toml says is enough
+# The lowest Rust version that builds the crates for PCs, determined by nalgebra. The emulator needs the newest, but only tests need the emulator.
+msrv: ## the command compiles with the lowest Rust version stated in Cargo.toml
 	rustup toolchain install $(LOWEST) --profile minimal
 	cargo +$(LOWEST) check --locked -p mimu-cli
 
-package: toolchain ## every crate that is published, as its archive, built from it
+package: toolchain ## every published crate as an archive, and a build from it
 	$(CARGO) package --locked $(PUBLISHED:%=-p %)
 
 web: toolchain ## the page that calibrates in the browser: static files in target/web, to put on any server
 	./web/build.sh $(CARGO)
 
-# Compiling the page takes four minutes of processor time, so that `make test` has its program on the PC only.
+# Compiling the page takes four minutes of processor time, so `make test` compiles its program for the PC only.
 web-tests: web ## the page in Chromium, if there is one, against the command
 	$(CARGO) build --locked -q -p mimu-cli -p mimu-rig --bin mimu --bin mimu-rig
 	MIMU_PAGE=$(CURDIR)/target/web ./tests/interop/run.sh target/debug/mimu -k test_web -s
@@ -115,28 +115,28 @@ nightly: toolchain blind fuzz web-tests ## what takes hours: more seeds, ten min
 	$(CARGO) test --locked --release $(ON_PC) -- --ignored --nocapture --test-threads=2
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/tests/run.sh -m nightly
 
-# Where the demo leaves its recordings and its page.
+# Directory of the demo's recordings and page.
 DEMO ?= target/demo-$(SEED)
 SEED ?= 1
-demo: toolchain ## an uncalibrated board on the virtual bench, to a verified one; SEED=n is another unit with another effect
+demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is another unit with another effect
 	@$(FIRMWARE) -q
 	@$(CARGO) build --locked -q -p mimu-cli -p mimu-board-tests --bin mimu --bin demo
 	@rm -rf $(DEMO)
 	@target/debug/demo $(SEED) $(DEMO)
 
-faults: toolchain ## what can go wrong in a session of the wizard, done to it on purpose
+faults: toolchain ## a session of the wizard with faults caused on purpose
 	@$(FIRMWARE) -q
 	$(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bins
 	target/debug/faults
 
-example: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
+example: toolchain ## import and fit a recording: the best real one available, or the small one in tests/
 	$(CARGO) build --locked --release --bin mimu
 	./tests/example.sh target/release/mimu
 
 papers: toolchain ## compute every figure and plot of docs/papers.md
 	$(CARGO) run --locked --release -p mimu-tests --bin papers
 
-blind: toolchain ## undeclared effects on hundreds of units, and what the diagnosis says of them
+blind: toolchain ## undeclared effects on hundreds of units, and their diagnoses
 	$(CARGO) run --locked --release -p mimu-tests --bin blind
 
 bench: toolchain ## rates and peak memory on four hours at 1 kHz, and of a diagnosis
@@ -149,7 +149,7 @@ budget: toolchain ## instructions, load and memory of the firmware, counted on t
 	$(COUNTED)
 	$(CARGO) run --locked -p mimu-board-tests --bin budget
 
-device: toolchain ## of the nightly tests those of the device; draws docs/device/supply-cuts.svg
+device: toolchain ## the nightly tests of the device; draws docs/device/supply-cuts.svg
 	$(FIRMWARE)
 	$(CARGO) test --locked --release -p mimu-board-tests -- --ignored --nocapture
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A virtual environment of Python with the packages of a requirements.txt: made at the first call, and again where the file has changed.
+# Makes a virtual environment of Python with the packages of a requirements.txt, unless an up-to-date one exists.
 # Usage: environment.sh REQUIREMENTS FOLDER
 set -euo pipefail
 if ! cmp -s "$1" "$2/requirements.txt"; then

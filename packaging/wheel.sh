@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The wheel to hand out: one for Python 3.10 and later on Linux from glibc 2.28 on (Debian 10, Ubuntu 18.10, RHEL 8), with the command.
-# Linked by zig, as dist.sh does and for the same reason. Usage: wheel.sh [TARGET]; RUSTUP_TOOLCHAIN chooses the compiler.
+# Builds the wheel for distribution: for Python 3.10 and later on Linux with glibc 2.28 or later (Debian 10, Ubuntu 18.10, RHEL 8), with the command.
+# zig links it, for the same reason as in dist.sh. Usage: wheel.sh [TARGET]; RUSTUP_TOOLCHAIN selects the compiler.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=${1:-x86_64-unknown-linux-gnu}
@@ -9,7 +9,7 @@ out=${CARGO_TARGET_DIR:-target}
 tools=$out/dist-tools
 packaging/environment.sh packaging/requirements.txt "$tools"
 rm -rf "$out/wheels"
-# Its profile is in python/pyproject.toml. maturin checks that no symbol is newer than the tag says.
+# The profile is in python/pyproject.toml. maturin checks that no symbol is newer than the tag allows.
 PATH=$(realpath "$tools")/bin:$PATH maturin build --locked --zig --compatibility manylinux_2_28 --target "$target" \
     --manifest-path python/Cargo.toml --out "$out/wheels"
 for wheel in "$out"/wheels/*.whl; do echo "$wheel: $(stat -c %s "$wheel") bytes"; done

@@ -53,7 +53,7 @@ pub(crate) struct KeepArgs {
 }
 
 impl KeepArgs {
-    /// `prepared` with what may not be left out of it.
+    /// `prepared`, with the dwells that must be kept.
     pub(crate) fn apply(&self, mut prepared: Prepared) -> Prepared {
         prepared.dwells.keep = self.keep.clone().unwrap_or_default();
         prepared
@@ -89,7 +89,7 @@ pub(crate) struct NoiseArgs {
 }
 
 impl NoiseArgs {
-    /// `prepared` with the noise of the file, if there is one.
+    /// `prepared`, with the noise of the file if one is given.
     pub(crate) fn state(&self, prepared: Prepared) -> Result<Prepared> {
         match &self.file {
             Some(path) => prepared.with_noise(&NoiseFile::read(path)?),
@@ -113,17 +113,17 @@ pub(crate) struct JsonArgs {
 }
 
 impl JsonArgs {
-    /// The file to write, if it is one.
+    /// The file to write, unless JSON goes to standard output.
     pub(crate) fn file(&self) -> Option<&Path> {
         self.path.as_deref().filter(|path| *path != Path::new("-"))
     }
 
-    /// Whether JSON is asked for.
+    /// Whether JSON is requested.
     pub(crate) fn is_given(&self) -> bool {
         self.path.is_some()
     }
 
-    /// Whether it takes the place of the text; the wizard asks.
+    /// Whether JSON replaces the text on standard output. Only the wizard asks.
     #[cfg(not(target_family = "wasm"))]
     pub(crate) fn is_standard_output(&self) -> bool {
         self.path.is_some() && self.file().is_none()

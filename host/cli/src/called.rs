@@ -1,5 +1,4 @@
-//! Subcommands that are nothing but options, as another program calls them: by the same arguments, so that no option, default or check of
-//! them exists twice.
+//! Subcommands for other programs, with the same arguments as on the command line: no option, default or check is defined twice.
 
 use std::ffi::OsString;
 use std::pin::Pin;
@@ -20,12 +19,12 @@ use crate::cmd::import::{ImportArgs, imported};
 use crate::cmd::wizard::{WizardArgs, session};
 use crate::hint;
 
-/// Why a call did nothing.
+/// Why a call was refused.
 #[derive(Debug)]
 pub enum Refusal {
-    /// There are no such arguments.
+    /// The arguments are invalid.
     Usage(String),
-    /// The data, as the command says it.
+    /// The command refused the data.
     Data(Error),
 }
 
@@ -35,7 +34,7 @@ impl From<Error> for Refusal {
     }
 }
 
-/// Makes a recording by the arguments of `mimu import`.
+/// Makes a recording, with the arguments of `mimu import`.
 ///
 /// # Errors
 /// See [`Refusal`].
@@ -43,7 +42,7 @@ pub fn import(arguments: Vec<OsString>) -> Result<ImportSummary, Refusal> {
     Ok(imported(parsed::<ImportArgs>("import", arguments)?)?)
 }
 
-/// What `mimu design` makes by its arguments, and the plan as TOML, which a comparison does not have.
+/// Result of `mimu design` with these arguments, and the plan as TOML; a comparison has no plan.
 ///
 /// # Errors
 /// See [`Refusal`].
@@ -51,7 +50,7 @@ pub fn design(arguments: Vec<OsString>) -> Result<(Designed, Option<String>), Re
     Ok(parsed::<DesignArgs>("design", arguments)?.made()?)
 }
 
-/// What `mimu export` writes, by its arguments from the name of the format on.
+/// File of `mimu export`; its arguments begin with the name of the format.
 ///
 /// # Errors
 /// See [`Refusal`].
@@ -66,10 +65,10 @@ pub fn export(arguments: Vec<OsString>, from: &Sources) -> Result<Export, Refusa
     Ok(to.format.export(from)?)
 }
 
-/// A session of the wizard: what it has come to, and the line of its failure if it is one. See [`mimu_wizard::turn`].
+/// A session of the wizard: its result, and the error line if it failed ([`mimu_wizard::turn`]).
 pub type Session = Pin<Box<dyn Future<Output = (Option<Outcome>, Option<String>)>>>;
 
-/// A session by hand by the arguments of `mimu wizard`, with a board at a port that the caller holds. `arrivals` is what comes over it.
+/// A session by hand, with the arguments of `mimu wizard` and a board at a port that the caller reads. `arrivals` receives the bytes.
 ///
 /// # Errors
 /// See [`Refusal`].
@@ -114,7 +113,7 @@ fn parsed<A: Args>(name: &'static str, arguments: Vec<OsString>) -> Result<A, Re
     A::from_arg_matches(&matches).map_err(usage)
 }
 
-/// What clap says of wrong arguments, in one line.
+/// clap's message about invalid arguments, in one line.
 fn usage(error: clap::Error) -> Refusal {
     let text = error.render().to_string();
     let said = text.lines().take_while(|line| !line.starts_with("Usage:"));

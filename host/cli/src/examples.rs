@@ -1,10 +1,10 @@
-//! Examples at the end of the help of every subcommand, in one place: a test parses each of them.
+//! Examples at the end of each subcommand's help. A test parses each of them.
 
 use clap::CommandFactory;
 
 use crate::Cli;
 
-/// Subcommand, and what a person types.
+/// Name of a subcommand, and its command lines.
 const EXAMPLES: [(&str, &[&str]); 16] = [
     (
         "wizard",
@@ -95,12 +95,12 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
     ("man", &["mimu man -o man1"]),
 ];
 
-/// Formats of an export that have a place for noise: those of the others do not list the option.
+/// Export formats that store noise; the others do not list the option.
 const WITH_NOISE: [&str; 6] = [
     "kalibr", "openvins", "vins", "orbslam3", "liosam", "fastlio",
 ];
 
-/// The formats of `mimu export`, of which only some list the option `--noise`.
+/// Hides `--noise` from the formats of `mimu export` that do not store noise.
 fn formats(mut export: clap::Command) -> clap::Command {
     let names: Vec<String> = export
         .get_subcommands()
@@ -120,7 +120,7 @@ fn formats(mut export: clap::Command) -> clap::Command {
 pub(crate) fn command() -> clap::Command {
     let mut command = Cli::command().mut_subcommand("export", formats);
     for (name, lines) in EXAMPLES {
-        // Where there is no port there are fewer commands.
+        // A build without ports has fewer commands.
         if command.find_subcommand(name).is_none() {
             continue;
         }

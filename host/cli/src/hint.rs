@@ -1,4 +1,4 @@
-//! The flags of the command beside what an error of a library says to set otherwise.
+//! Adds the flags of the command line to errors and warnings of the libraries.
 
 use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::warning::Warning;
@@ -6,7 +6,7 @@ use mimu_recording::error::{Argument, Error};
 use mimu_thermal::warning::Warning as OverTemperature;
 use mimu_wizard::waiting::Waiting;
 
-/// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
+/// Flags of the import. They are a remedy after any command that reads a recording; other flags only after the command that refused.
 const OF_THE_IMPORT: [&str; 15] = [
     "--columns",
     "--rate-hz",
@@ -25,12 +25,12 @@ const OF_THE_IMPORT: [&str; 15] = [
     "--signed-low-byte",
 ];
 
-/// The error in one line, with those flags of `command` that set what it is about. The same refusal comes from several commands, and a
-/// flag that the one at hand lacks is no remedy.
+/// The error in one line, with the flags of `command` that can remedy it. Several commands can cause the same refusal, and a flag that the present
+/// one lacks is no remedy.
 pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     let arguments = &error.refused().arguments;
     let named = |flag: &'static str| {
-        // A remedy in another command whatever the one at hand is.
+        // A remedy in another command applies after any command.
         if flag.starts_with("mimu ") {
             return Some(flag.to_string());
         }
@@ -44,7 +44,7 @@ pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
         match has {
             true => Some(flag.to_string()),
             false if OF_THE_IMPORT.contains(&flag) => Some(format!("mimu import {flag}")),
-            // A diagnosis is of both sensors; one of them alone is a fit's.
+            // A diagnosis needs both sensors; only a fit accepts one.
             false if flag == "--only" => Some(format!("mimu fit {flag}")),
             false => None,
         }
@@ -60,7 +60,7 @@ pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     }
 }
 
-/// The warning in one line, with the flag that makes it go.
+/// The warning in one line, with the flag that suppresses its cause.
 pub(crate) fn of_warning(warning: &Warning) -> String {
     match warning.left_out() {
         Some(step) => format!("{warning} (--keep {step})"),
@@ -68,7 +68,7 @@ pub(crate) fn of_warning(warning: &Warning) -> String {
     }
 }
 
-/// Why a unit of the wizard waits, with the flag that it is about.
+/// Why a unit of the wizard waits, with the flag that controls it.
 pub(crate) fn of_waiting(why: &Waiting) -> String {
     match why {
         Waiting::Exchanged => format!("{why} (--text)"),
@@ -76,7 +76,7 @@ pub(crate) fn of_waiting(why: &Waiting) -> String {
     }
 }
 
-/// The warning of a fit over temperature in one line, with the flag that makes it go.
+/// The warning of a fit over temperature in one line, with the flag that suppresses its cause.
 pub(crate) fn of_thermal(warning: &OverTemperature) -> String {
     match warning {
         OverTemperature::WithoutNoise => format!("{warning} (--noise)"),
@@ -84,7 +84,7 @@ pub(crate) fn of_thermal(warning: &OverTemperature) -> String {
     }
 }
 
-/// Why an effect was rejected, with the flags by which it would not be.
+/// Why an effect was rejected, with the flags that would accept it.
 pub(crate) fn of_rejected(rejected: &Rejected) -> String {
     let Rejected { id, reason, .. } = rejected;
     match reason {
@@ -156,7 +156,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Prefix => "--prefix",
         Argument::Every => "--every",
         Argument::CalibrationOfNoise => "mimu allan --calibration",
-        // An argument that this version of the command has no flag for.
+        // The command has no flag for this argument.
         _ => return None,
     })
 }

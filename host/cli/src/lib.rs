@@ -1,15 +1,15 @@
-//! The command `mimu`: one subcommand a file, and all presentation of results.
+//! The command `mimu`: one subcommand per file, and the presentation of all results.
 //!
-//! | module | what |
+//! | module | contents |
 //! |---|---|
-//! | `cmd` | the subcommands: arguments, and what is done with them |
-//! | [`called`] | those that are nothing but options, as another program calls them |
-//! | `arguments` | arguments that several share |
-//! | `reading`, `output` | the recording in; text, JSON and files out |
+//! | `cmd` | the subcommands: arguments and execution |
+//! | [`called`] | subcommands that other programs can call |
+//! | `arguments` | arguments that several subcommands share |
+//! | `reading`, `output` | reads recordings; writes text, JSON and files |
 //! | [`report`] | results as JSON, text and page |
-//! | `views` | how a session of the wizard is shown while it runs |
-//! | `examples` | the examples at the end of every help |
-//! | `hint` | flags of the command beside what an error says to set otherwise |
+//! | `views` | shows a session of the wizard while it runs |
+//! | `examples` | examples at the end of each help |
+//! | `hint` | adds the flags of the command line to errors of the libraries |
 
 mod arguments;
 pub mod called;
@@ -80,7 +80,7 @@ enum Command {
     Man(cmd::man::ManArgs),
 }
 
-/// Runs the subcommand of `arguments`, of which the first is the program; prints an error in one line. Returns the exit status.
+/// Runs the subcommand of `arguments`, whose first element is the program, and prints an error in one line. Returns the exit status.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let parsed = examples::command()
@@ -89,7 +89,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let (cli, matches) = match parsed {
         Ok(both) => both,
         Err(error) => {
-            // Help and version are such errors too. If they cannot be printed, the status says so.
+            // clap returns help and version as errors too. If they cannot be printed, the exit status shows it.
             let printed = error.print();
             return printed.map_or(1, |()| u8::try_from(error.exit_code()).unwrap_or(2));
         }
@@ -135,7 +135,7 @@ fn command_line(arguments: &[OsString]) -> String {
     all.join(" ")
 }
 
-/// The subcommand that `matches` are of, with its flags.
+/// The innermost subcommand of `matches`, with its flags.
 fn innermost(matches: &clap::ArgMatches) -> clap::Command {
     let mut command = examples::command();
     let mut at = matches;
@@ -161,8 +161,8 @@ mod tests {
         examples::command().debug_assert();
     }
 
-    /// `debug_assert` lets a conflict with an argument pass that does not exist; then nothing is refused, and completions for zsh cannot be
-    /// made.
+    /// clap's `debug_assert` accepts a conflict with an argument that does not exist. Such a conflict has no effect, and prevents completions for
+    /// zsh.
     fn conflicts_with_what_is_there(command: &clap::Command) {
         for argument in command.get_arguments() {
             command.get_arg_conflicts_with(argument);

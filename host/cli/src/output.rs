@@ -1,4 +1,4 @@
-//! What a subcommand leaves: text or JSON, files that appear whole or not at all, and progress while it works.
+//! Output of the subcommands: text or JSON, files that are written complete or not at all, and progress.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,14 +12,14 @@ use serde::Serialize;
 
 use crate::arguments::JsonArgs;
 
-/// Refuses outputs that cannot be written, before the work, and those that would overwrite an input or each other.
+/// Before the work, refuses outputs that cannot be written, and those that would overwrite an input or each other.
 pub(crate) fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<()> {
     let mut taken: Vec<PathBuf> = inputs
         .iter()
         .filter_map(|p| p.canonicalize().ok())
         .collect();
     for path in outputs.iter().flatten() {
-        // Only a try: dropped, it leaves nothing.
+        // Dropped at once: only tests that the folder is writable.
         let folder = stage(path, String::new())?.folder();
         let name = path.file_name().unwrap_or_default();
         let full = path.canonicalize().unwrap_or_else(|_| folder.join(name));
@@ -34,7 +34,7 @@ pub(crate) fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Resu
     Ok(())
 }
 
-/// The time, RFC 3339, in whole seconds.
+/// The present time, RFC 3339, in whole seconds.
 pub fn now() -> String {
     let now = jiff::Timestamp::now().round(jiff::Unit::Second);
     now.unwrap_or_default().to_string()
@@ -49,8 +49,8 @@ pub(crate) fn progress(what: &'static str) -> ProgressBar {
     bar
 }
 
-/// Prints the text, or writes the JSON and prints the text unless both would go to standard output. All files appear
-/// when all of them are written.
+/// Prints the text, or writes the JSON and prints the text unless both would go to standard output. The files are published only after all of them
+/// were written.
 pub(crate) fn print(
     json: &JsonArgs,
     text: &str,
@@ -76,7 +76,7 @@ pub(crate) fn print(
     show(shown)
 }
 
-/// Beginnings of lines that stand out on a terminal.
+/// Beginnings of lines that are coloured on a terminal.
 const HEADS: [(&str, AnsiColor); 5] = [
     ("problems of this recording:", AnsiColor::Red),
     ("problems of these recordings:", AnsiColor::Red),
@@ -85,7 +85,7 @@ const HEADS: [(&str, AnsiColor); 5] = [
     ("next:", AnsiColor::Cyan),
 ];
 
-/// `text` with the heads of its lines in colour.
+/// `text` with its heads in colour.
 pub(crate) fn coloured(text: &str) -> String {
     let line = |line: &str| match HEADS.iter().find(|(head, _)| line.starts_with(head)) {
         Some((head, colour)) => {
@@ -97,12 +97,12 @@ pub(crate) fn coloured(text: &str) -> String {
     text.split_inclusive('\n').map(line).collect()
 }
 
-/// Prints text to standard output: in colour on a terminal, unless NO_COLOR is set or the terminal knows none.
+/// Prints text to standard output: in colour on a terminal that supports it, unless NO_COLOR is set.
 pub(crate) fn show(text: &str) -> Result<()> {
     let mut out = AutoStream::auto(std::io::stdout().lock());
     let text = coloured(text);
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        // `mimu fit ... | head` is no error.
+        // `mimu fit ... | head` is not an error.
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other.map_err(|e| Error::io(Path::new("standard output"), &e)),
     }

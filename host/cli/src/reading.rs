@@ -1,4 +1,4 @@
-//! Reading the recording of a subcommand.
+//! Reads the recording of a subcommand.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use mimu_recording::{MANIFEST_FILE, PoseMeans, Recording};
 
 use crate::output::{check_outputs, progress};
 
-/// A recording of samples or of means; see [`read`].
+/// Reads a recording of samples or of means like [`read`].
 pub(crate) fn read_samples_or_means(
     directory: &Path,
     finding: Finding,
@@ -26,7 +26,7 @@ pub(crate) fn read_samples_or_means(
     Prepared::of_means(&PoseMeans::open(directory)?)
 }
 
-/// Opens and reads a recording, after checking that the results can be written and take the place of no input.
+/// Reads a recording, after checking that the results can be written and overwrite no input.
 pub(crate) fn read(
     directory: &Path,
     finding: Finding,

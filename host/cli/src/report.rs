@@ -1,7 +1,7 @@
-//! Views of results: text for people, and pages and plots.
+//! Presentation of results: text, pages and plots.
 //!
-//! JSON is the result itself, SI throughout ([`mimu::result`]). A view is handed nothing else, so that it can show nothing that JSON
-//! lacks; units and digits are those of [`mimu::readable`] and [`mimu::quantity`].
+//! JSON is the result itself, in SI ([`mimu::result`]). A view receives only the result, so that it cannot show anything that JSON lacks. Units and
+//! digits are those of [`mimu::readable`] and [`mimu::quantity`].
 
 mod allan;
 pub mod allan_plot;

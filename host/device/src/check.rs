@@ -1,4 +1,4 @@
-//! The compensated stream against this program's own compensation of the raw stream, sample by sample.
+//! Compares the compensated stream with this program's compensation of the raw stream, sample by sample.
 
 mod twin;
 
@@ -19,50 +19,50 @@ use twin::HostReference;
 
 pub use twin::rounding;
 
-/// Longest silence of a stream.
+/// Longest silence of a stream before the comparison fails.
 const SILENCE: Duration = Duration::from_secs(3);
 
-/// Largest differences of one triad.
+/// Largest differences found in one triad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Difference {
-    /// Between device and PC in the same single precision, in units of the last place of the larger of the two.
+    /// Device minus PC in the same single precision, in units of the last place of the larger of the two.
     pub ulps: u32,
-    /// The same, in [`Self::unit`].
+    /// The same difference in [`Self::unit`].
     pub single: f64,
-    /// Between device and the PC in double precision from the calibration file, in [`Self::unit`].
+    /// Device minus the PC in double precision from the calibration file, in [`Self::unit`].
     pub double: f64,
-    /// The last, as a share of what rounding can make of it at most ([`rounding`]).
+    /// [`Self::double`] divided by the largest error that rounding can cause ([`rounding`]).
     pub rounding_share: f64,
     /// rad/s or m/s^2.
     pub unit: &'static str,
 }
 
-/// What a comparison has found: the result of `mimu device check`.
+/// Result of `mimu device check`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Checked {
     /// Samples compared.
     pub samples: u64,
-    /// Samples of one stream whose counterpart was lost on the way.
+    /// Samples of one stream whose counterpart in the other was lost on the line.
     pub unpaired: u64,
-    /// Of the gyro.
+    /// Differences of the gyro.
     pub gyro: Difference,
-    /// Of the accelerometer.
+    /// Differences of the accelerometer.
     pub accel: Difference,
-    /// Between the temperature of the dies that the device has compensated at and the PC's from the thermometer, K; `None` if no lag is
+    /// Largest difference of the dies' temperature, K: the one the device compensated at, minus the PC's from the thermometer. `None` if no lag is
     /// applied.
     pub die_temperature_k: Option<f64>,
-    /// The coldest and the warmest that the dies were meanwhile, °C: the stretch of the curves that was compared.
+    /// Lowest and highest temperature of the dies during the comparison, °C. Only this segment of the curves was compared.
     pub die_range_c: Option<[f32; 2]>,
-    /// Ids of effects that remember what was before the comparison, so that double precision could not be judged.
+    /// Ids of effects that depend on samples from before the comparison. Double precision could not be judged with them.
     pub not_judged_for: Vec<String>,
-    /// Whether device and PC differ by rounding only. With effects that remember the time before, only time tells.
+    /// Whether device and PC differ by rounding only.
     pub holds: bool,
 }
 
-/// Most that the two may differ by, K: both add up steps of some microkelvin of rounding, and forget them within the lag.
+/// Largest difference of the dies' temperature, K. Both sides add up rounding steps of some microkelvin, which decay within the lag.
 const DIE_K: f64 = 1e-3;
 
-/// Compares for `duration` of samples. Refused if the device stores a calibration other than that of the file.
+/// Compares for `duration` of samples. Refuses a device that stores another calibration than the file.
 pub fn check(
     session: &mut Session,
     calibration: &Calibration,
@@ -179,7 +179,7 @@ impl Difference {
         for i in 0..3 {
             self.ulps = self.ulps.max(ulps(device[i], single[i]));
             let device = f64::from(device[i]);
-            // A NaN on one side is as far off as can be.
+            // A NaN on one side counts as an infinite difference.
             let off = |of: f64| match (device - of).abs() {
                 x if x.is_nan() => f64::INFINITY,
                 x => x,
@@ -193,9 +193,9 @@ impl Difference {
     }
 }
 
-/// Floating-point numbers from one to the other.
+/// Number of floating-point values from one to the other.
 pub fn ulps(a: f32, b: f32) -> u32 {
-    // In the order of the numbers, so that neighbours differ by one, across zero too.
+    // Maps the bits to the order of the numbers, so that neighbours differ by one, also across zero.
     let place = |x: f32| match x.to_bits() {
         bits if bits >> 31 == 0 => i64::from(bits),
         bits => -i64::from(bits & 0x7fff_ffff),

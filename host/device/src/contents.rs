@@ -1,4 +1,4 @@
-//! Contents of a stored calibration: nodes and effects as [`mimu_core::stored`] reads them, for people and as a calibration file.
+//! Contents of a stored calibration: nodes and effects as [`mimu_core::stored`] reads them, as text and as a calibration file.
 
 use mimu_core::compensation::Affine;
 use mimu_core::effects::DeviceEffect;
@@ -15,13 +15,13 @@ use mimu_recording::error::{Error, Result};
 /// A stored calibration, number by number: the result of `mimu device download`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Contents {
-    /// Calibration file that it is written to, if it is.
+    /// Calibration file that it was written to, if any.
     pub file: Option<String>,
-    /// File that the bytes are written to as the device stores them, if they are.
+    /// File that the stored bytes were written to, if any.
     pub bytes_file: Option<String>,
-    /// Number of the bytes.
+    /// Length of the stored calibration.
     pub bytes: usize,
-    /// What the calibration is told apart by.
+    /// Identifies the calibration.
     pub hash: Hash,
     /// Number of the unit that it belongs to, if given.
     pub unit_id: Option<String>,
@@ -29,19 +29,19 @@ pub struct Contents {
     pub created: Option<String>,
     /// SHA-256 of the samples that it was made from, if given.
     pub samples_sha256: Option<String>,
-    /// When its offsets were set anew on the device, RFC 3339, if they were.
+    /// When its offsets were trimmed on the device, RFC 3339, if they were.
     pub trimmed: Option<String>,
     /// `x = C u + o`.
     pub formula: &'static str,
     /// `raw to SI`.
     pub direction: &'static str,
-    /// Unit of u, at the sensors.
+    /// Unit of u at the sensors.
     pub raw_unit: &'static str,
     /// Frame of x.
     pub frame: &'static str,
-    /// Dies' temperatures that it is for, °C, if they are known.
+    /// Temperatures of the dies that the calibration covers, °C, if known.
     pub range_c: Option<[f32; 2]>,
-    /// Lag of the dies behind the thermometer, s, if known; that of the gyros if the accelerometer has a separate one.
+    /// Lag of the dies behind the thermometer, s, if known. If the accelerometer has a separate lag, this one is the gyros'.
     pub lag_s: Option<f32>,
     /// Lag of the accelerometer's die, s, if it is separate.
     pub accel_lag_s: Option<f32>,
@@ -49,22 +49,22 @@ pub struct Contents {
     pub between_nodes: &'static str,
     /// Temperature nodes, the coldest first.
     pub nodes: Vec<NodeContents>,
-    /// What the affine model lacks.
+    /// Errors that the affine model lacks.
     pub effects: Vec<DeviceEffect<f32>>,
 }
 
 /// A temperature node.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NodeContents {
-    /// Of the dies, °C.
+    /// Temperature of the dies, °C.
     pub temp_c: f32,
-    /// Of the gyro.
+    /// Inverse model of the gyro.
     pub gyro: Inverse,
-    /// Of the accelerometer.
+    /// Inverse model of the accelerometer.
     pub accel: Inverse,
-    /// Derivatives of the numbers of the gyro, per kelvin.
+    /// Slopes of the gyro's coefficients, per kelvin.
     pub gyro_slope: Inverse,
-    /// Of those of the accelerometer.
+    /// Slopes of the accelerometer's coefficients, per kelvin.
     pub accel_slope: Inverse,
 }
 
@@ -76,7 +76,7 @@ pub struct Inverse {
     pub C: [[f32; 3]; 3],
     /// In [`Self::unit`].
     pub o: [f32; 3],
-    /// Of x: rad/s or m/s^2.
+    /// Unit of x: rad/s or m/s^2.
     pub unit: &'static str,
 }
 
@@ -112,7 +112,7 @@ pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::StoredErr
     })
 }
 
-/// The calibration file of `bytes` that [`contents`] has read, of the unit of this name; `place` is where they come from.
+/// The calibration file of `bytes` that [`contents`] has read, for the unit named `device`; `place` names their origin in errors.
 ///
 /// # Errors
 /// Bytes that the device would refuse.

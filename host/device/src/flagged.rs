@@ -1,30 +1,30 @@
-//! Samples whose batch carries a flag, counted.
+//! Counts samples whose batch carries a flag.
 
 use mimu::quantity::AXES;
 use mimu_core::wire::flags;
 use serde::Serialize;
 
-/// Samples in batches that carry each of the [`flags`] which say that something is wrong with them.
+/// Samples in batches with each of the [`flags`] that report a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Flagged {
-    /// A reading was at a stop of a sensor's output.
+    /// A reading was at a rail of a sensor's output.
     pub saturated: u64,
-    /// The gyros' reference was not there.
+    /// The gyros' reference voltage was missing.
     pub without_reference: u64,
-    /// The TEMP pin of gyro x, y, z was left out of the temperature.
+    /// The TEMP pin of gyro x, y, z was excluded from the temperature.
     pub temperature_left_out: [u64; 3],
-    /// No TEMP pin was left: the temperature is the last good one.
+    /// No TEMP pin was usable: the temperature is the last good one.
     pub without_temperature: u64,
-    /// The time since power-on was not known to the device.
+    /// The device did not know its time since power-on.
     pub power_on_unknown: u64,
     /// A self-test deflected the sensors.
     pub self_test: u64,
-    /// The dies were at a temperature that the calibration is not for.
+    /// The dies' temperature was outside the calibrated range.
     pub outside_range: u64,
 }
 
 impl Flagged {
-    /// Takes in so many samples of a batch with these flags.
+    /// Adds the samples of a batch with these flags.
     pub fn count(&mut self, of: u16, samples: u64) {
         let [x, y, z] = &mut self.temperature_left_out;
         let [left_out_x, left_out_y, left_out_z] = flags::TEMPERATURE_LEFT_OUT;
@@ -45,7 +45,7 @@ impl Flagged {
         }
     }
 
-    /// A sentence for each that there are samples of.
+    /// A sentence for each flag that occurred.
     pub fn warnings(&self) -> Vec<String> {
         let mut all = Vec::new();
         let mut warn = |count: u64, what: &str| {

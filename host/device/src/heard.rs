@@ -1,4 +1,4 @@
-//! What comes from the device, kept: messages borrow from a frame, and the frame is gone with the next byte.
+//! Messages of the device as owned values: a decoded message borrows from its frame, which the next byte overwrites.
 
 use mimu_core::compensation::Sample;
 use mimu_core::wire::{
@@ -12,43 +12,43 @@ use super::identity::{Identity, beginning};
 /// Answer to a call.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Answer {
-    /// Who it is.
+    /// The device's identity.
     Greeting(Box<Identity>),
-    /// Done, and there is nothing to tell.
+    /// The request was carried out, and returns no data.
     Done,
-    /// What has been counted.
+    /// The device's counters.
     Counters(Counters),
-    /// How the sensors answered.
+    /// Results of the self-test.
     SelfTest(SelfTest),
     /// Part of the stored calibration.
     Stored {
-        /// Of the first byte.
+        /// Offset of the first byte.
         offset: u32,
-        /// Length of the whole, bytes.
+        /// Length of the whole calibration, bytes.
         length: u32,
-        /// The part.
+        /// The bytes of this part.
         bytes: Vec<u8>,
     },
-    /// Last state of a bank.
+    /// Final state of a bank.
     Kalman(Box<KalmanState>),
-    /// Not done.
+    /// The request was refused.
     Refused(Refusal),
 }
 
 /// Consecutive samples: V at the sensors, or rad/s and m/s² in the body frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Samples {
-    /// What holds for all of them.
+    /// Number of the first sample, flags and temperature, common to all samples.
     pub head: BatchHead,
-    /// Temperatures by the TEMP pins of gyro x, y, z, °C; of raw readings only.
+    /// Temperatures by the TEMP pins of gyro x, y, z, °C; for raw readings only.
     pub gyro_temps_c: Option<[f32; 3]>,
-    /// Temperatures of the dies, °C; of compensated samples only.
+    /// Temperatures of the dies, °C; for compensated samples only.
     pub dies_c: Option<mimu_core::PerSensor<f32>>,
-    /// One after the other, the first of the number [`BatchHead::first`].
+    /// Consecutive samples. The first has the number [`BatchHead::first`].
     pub values: Vec<Sample<f32>>,
 }
 
-/// What comes without being asked each time.
+/// A message that the device sends without a call.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
     /// The device has just started.
@@ -57,36 +57,36 @@ pub enum Event {
     Raw(Samples),
     /// Compensated samples, SI.
     Compensated(Samples),
-    /// A running bank.
+    /// State of a running bank.
     Kalman(Box<KalmanState>),
 }
 
 /// A message.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Heard {
-    /// Answer to the call of this number.
+    /// Answer to the call with this number.
     Answer(u16, Answer),
-    /// Nobody asked.
+    /// Message without a call.
     Event(Event),
-    /// A greeting of an incompatible device: number of the call, its first bytes, its version.
+    /// Greeting of an incompatible device: number of the call, first bytes and version.
     Stranger(u16, [u8; 4], Version),
 }
 
-/// What has been heard, counted.
+/// Counts of what was received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct LineCount {
     /// Bytes received.
     pub bytes: u64,
-    /// Frames that arrived whole.
+    /// Complete frames.
     pub frames: u64,
-    /// Frames that did not.
+    /// Garbled frames.
     pub garbled: u32,
-    /// Whole frames that this program does not understand.
+    /// Complete frames that this program does not understand.
     pub not_understood: u32,
 }
 
 impl LineCount {
-    /// Both together.
+    /// Sum of both counts.
     pub fn and(&self, other: &Self) -> Self {
         Self {
             bytes: self.bytes + other.bytes,
@@ -96,7 +96,7 @@ impl LineCount {
         }
     }
 
-    /// What has been heard since `before`.
+    /// Counts since `before`.
     pub fn since(&self, before: &Self) -> Self {
         Self {
             bytes: self.bytes - before.bytes,
@@ -107,8 +107,7 @@ impl LineCount {
     }
 }
 
-/// Bytes in, messages out. Nothing that comes over the line makes it fail: what is not a whole frame, and what is not a message, is
-/// counted.
+/// Decodes bytes into messages. No input makes it fail: garbled frames and unknown messages are counted.
 #[derive(Debug, Default)]
 pub struct Receiver {
     decoder: Decoder,
@@ -116,7 +115,7 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// Takes bytes; `hear` is given the messages that they end.
+    /// Decodes bytes and calls `hear` for each message that they complete.
     pub fn take(&mut self, bytes: &[u8], mut hear: impl FnMut(Heard)) {
         for byte in bytes {
             self.count.bytes += 1;
@@ -132,7 +131,7 @@ impl Receiver {
         self.count.garbled = self.decoder.garbled();
     }
 
-    /// What has been heard so far.
+    /// Counts so far.
     pub fn count(&self) -> LineCount {
         self.count
     }
@@ -147,7 +146,7 @@ fn understood(frame: &Frame<'_>) -> Option<Heard> {
         return Some(Heard::Stranger(id, magic, version));
     }
     Some(match message? {
-        // Nobody's call has the number 0: it has just started.
+        // Calls are numbered from 1. Number 0 means that the device has just started.
         Message::Greeting { id: 0, greeting } => {
             Heard::Event(Event::Started(Box::new(Identity::from(&greeting))))
         }

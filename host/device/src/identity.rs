@@ -1,4 +1,4 @@
-//! Who the device is: its greeting, kept.
+//! The device's identity: an owned copy of its greeting.
 
 use std::fmt;
 
@@ -12,10 +12,10 @@ use mimu_core::wire::{
 use super::origin;
 use mimu_recording::error::{Error, Result};
 
-/// A [`Greeting`], kept: the result of `mimu device info`.
+/// An owned copy of a [`Greeting`]: the result of `mimu device info`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Identity {
-    /// What it speaks.
+    /// Version of the protocol.
     pub protocol: Version,
     /// Version of the firmware.
     pub firmware: String,
@@ -23,54 +23,54 @@ pub struct Identity {
     pub board: String,
     /// The microcontroller's own number, 24 hexadecimal digits.
     pub unit_id: String,
-    /// What it can do; by name in JSON.
+    /// Optional functions of the firmware; by name in JSON.
     #[serde(serialize_with = "named")]
     pub capabilities: Capabilities,
-    /// Ids of the effects that it removes.
+    /// Ids of the effects that the firmware compensates.
     pub effects: Vec<&'static str>,
-    /// What it has room for.
+    /// Largest calibration that it stores.
     pub room: Room,
     /// Samples per second.
     pub sample_rate_hz: u32,
-    /// Channels of a sample in their order.
+    /// Channels of a sample, in order.
     pub channels: Vec<String>,
     /// Unit of a raw reading.
     pub raw_unit: String,
-    /// Why it started.
+    /// The last reset cause.
     pub start: Started,
-    /// Starts without a power failure in between, this one counted.
+    /// Starts since the last power failure, including this one.
     pub starts: u32,
     /// The calibration in use.
     pub stored: Option<Held>,
-    /// What is in the two places for a calibration, in words.
+    /// Contents of the two slots for a calibration, in words.
     pub slots: [String; 2],
     /// Time since power-on at the start of sampling, ms; `None` if the device does not know it.
     pub powered_for_ms: Option<u32>,
-    /// One sentence if the device is older or newer and can be talked to all the same.
+    /// A sentence if the device is older or newer but compatible.
     pub warnings: Vec<String>,
 }
 
-/// The most that a device stores.
+/// Largest calibration that a device stores.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Room {
-    /// Effects of each triad that run with every sample, and as many that do not.
+    /// Effects of each triad that run with every sample, and as many slow ones.
     pub effects: u8,
-    /// Temperature nodes.
+    /// Number of temperature nodes.
     pub nodes: u8,
-    /// Bytes of a calibration.
+    /// Length of a calibration, bytes.
     pub bytes: u32,
 }
 
-/// The calibration that a device uses, from its greeting.
+/// The calibration in use, from the device's greeting.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Held {
-    /// What it is told apart by.
+    /// Identifies the calibration.
     pub hash: Hash,
-    /// Its length.
+    /// Length, bytes.
     pub bytes: u32,
-    /// Temperature nodes.
+    /// Number of temperature nodes.
     pub nodes: u8,
-    /// Effects.
+    /// Number of effects.
     pub effects: u8,
     /// Number of the unit that it belongs to, if given.
     pub unit_id: Option<String>,
@@ -94,17 +94,17 @@ impl Serialize for Hash {
     }
 }
 
-/// Why the device started: [`Start`], kept.
+/// The device's last reset cause: an owned copy of [`Start`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "reason", rename_all = "kebab-case")]
 pub enum Started {
-    /// Power came, or was too low in between.
+    /// Power was switched on, or had been too low.
     PowerOn,
     /// The reset pin.
     ResetPin,
     /// The watchdog.
     Watchdog,
-    /// The program asked for it.
+    /// The firmware requested it.
     Software,
     /// A panic.
     Panic {
@@ -120,9 +120,9 @@ pub enum Started {
         /// The fault status register CFSR.
         cfsr: u32,
     },
-    /// None of these.
+    /// Another cause.
     Other,
-    /// A reason that this program does not know.
+    /// A cause that this program does not know.
     NotKnown,
 }
 
@@ -203,7 +203,7 @@ impl From<&Greeting<'_>> for Identity {
 }
 
 impl Identity {
-    /// Names of what it can do.
+    /// Names of the optional functions.
     pub fn capability_names(&self) -> Vec<&'static str> {
         names(self.capabilities).collect()
     }
@@ -239,10 +239,9 @@ fn version_warning(device: Version) -> Option<String> {
     }
 }
 
-/// The beginning of a greeting, the same since version 1: number of the call, first bytes, version.
+/// Decodes the beginning of a greeting, the same since version 1: number of the call, first bytes, version.
 ///
-/// Read separately, because a device with another major version may send more after it that this program cannot read, and still has to be
-/// identified.
+/// Decoded separately: a device with another major version may send more than this program can read, but it still has to be identified.
 pub(super) fn beginning(payload: &[u8]) -> Option<(u16, [u8; 4], Version)> {
     // The first variant of `Message`.
     let mut rest = payload.strip_prefix(&[0])?;
@@ -262,9 +261,9 @@ pub(super) fn beginning(payload: &[u8]) -> Option<(u16, [u8; 4], Version)> {
     Some((u16::try_from(id).ok()?, *magic, Version { major, minor }))
 }
 
-/// Refuses a device that cannot be talked to, by the beginning of its greeting.
+/// Refuses an incompatible device by the beginning of its greeting.
 pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()> {
-    // Of the greeting only these two are looked at.
+    // Only `magic` and `protocol` are checked.
     let stub = Greeting {
         magic,
         protocol,
@@ -302,12 +301,12 @@ fn versions(device: Version) -> String {
     )
 }
 
-/// Name of a unit that was given none: by its number.
+/// Default name of a unit: its number.
 pub fn unit_name(unit_id: &str) -> String {
     format!("mimu-{unit_id}")
 }
 
-/// What is in a place for a calibration, in words.
+/// Contents of a slot for a calibration, in words.
 fn slot(slot: &Slot) -> String {
     match slot {
         Slot::Empty => "empty".into(),

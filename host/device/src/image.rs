@@ -1,4 +1,4 @@
-//! A calibration file as the bytes that the device stores, and the reasons why it cannot store them.
+//! Encodes a calibration file as the device stores it, and refuses files that it cannot store.
 
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{DeviceEffect, REFERENCE_C};
@@ -18,13 +18,13 @@ use mimu_recording::error::{Argument, Error, Result};
 /// A calibration as the device stores it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
-    /// What is sent: see [`mimu_core::stored`].
+    /// Encoded calibration ([`mimu_core::stored`]).
     pub bytes: Vec<u8>,
-    /// What it is told apart by.
+    /// Identifies the calibration.
     pub hash: Hash,
-    /// Unit, time and recording that it is of.
+    /// Unit, time and recording of the calibration.
     pub origin: Origin,
-    /// Temperatures of its nodes, °C. A single one is for all temperatures.
+    /// Temperatures of its nodes, °C. A single node applies at all temperatures.
     pub node_temp_c: Vec<f32>,
     /// Ids of its effects.
     pub effects: Vec<String>,
@@ -33,8 +33,8 @@ pub struct Image {
 }
 
 impl Image {
-    /// The image of a calibration; `place` is its file. Refused: raw readings in anything but volts, which are what the device measures,
-    /// one triad alone, and effects that no device removes.
+    /// The image of a calibration; `place` is its file. Refuses raw readings in other units than volts, which the device measures; a calibration of
+    /// one triad alone; and effects that the device cannot remove.
     pub fn new(calibration: &Calibration, place: &str) -> Result<Self> {
         let model = Compensation {
             gyro: model(calibration, Sensor::Gyro, place)?,
@@ -67,7 +67,7 @@ impl Image {
             Error::new(place, problem, "use fewer effects")
         })?;
         bytes.truncate(length);
-        // What would be refused over there is refused here, and by its name.
+        // Anything that the device would refuse is refused here, where the message can name it.
         check_room(&effects, ROOM, place)?;
         stored::decode(&bytes).map_err(|refused| {
             let problem = format!("the device could not use it: {}", refused);
@@ -87,7 +87,7 @@ impl Image {
         })
     }
 
-    /// The image of bytes that a device has stored.
+    /// The image of bytes that were read from a device.
     pub(super) fn stored_before(bytes: Vec<u8>) -> std::result::Result<Self, stored::StoredError> {
         let (mut node_temp_c, mut effects) = (Vec::new(), Vec::new());
         let stored = stored::read(
@@ -105,7 +105,7 @@ impl Image {
         })
     }
 
-    /// Refuses a calibration of a unit other than that of this greeting.
+    /// Refuses a calibration of another unit than the greeting's.
     pub fn check_unit(&self, who: &Identity, place: &str) -> Result<()> {
         let of = self.origin.unit_id.as_ref().map(origin::digits);
         match of.filter(|of| *of != who.unit_id) {
@@ -122,7 +122,7 @@ impl Image {
         }
     }
 
-    /// Refuses what the device of this greeting could not use, by the name of the effect: before anything is sent.
+    /// Refuses effects and sizes that the device cannot use, by name, before anything is sent.
     pub fn check_device(
         &self,
         calibration: &Calibration,
@@ -179,13 +179,13 @@ impl Image {
         Ok(())
     }
 
-    /// The same calibration as the device computes with it.
+    /// The calibration as the device decodes it.
     pub fn stored(&self) -> std::result::Result<Stored, stored::StoredError> {
         stored::decode(&self.bytes)
     }
 }
 
-/// The nodes of a calibration: those of its curves, or one with the model `at_all` of all temperatures.
+/// The nodes of a calibration: those of its curves, or a single one with the model `at_all` for all temperatures.
 fn nodes(
     calibration: &Calibration,
     at_all: Compensation<f32>,
@@ -220,7 +220,7 @@ fn nodes(
     nodes.collect()
 }
 
-/// Inverse model of a triad, raw in V.
+/// Inverse model of a triad, from raw readings in V.
 fn model(calibration: &Calibration, sensor: Sensor, place: &str) -> Result<Affine<f32>> {
     let at = || format!("{place}, [{sensor}]");
     let Some(table) = calibration.table(sensor) else {
@@ -244,7 +244,7 @@ fn model(calibration: &Calibration, sensor: Sensor, place: &str) -> Result<Affin
     })
 }
 
-/// The effects of a calibration in the words of the device; refused by name is one that no device removes.
+/// The effects of a calibration in the device's representation. Refuses, by name, an effect that the device cannot remove.
 pub(super) fn effects_of(calibration: &Calibration, place: &str) -> Result<Vec<DeviceEffect<f32>>> {
     let parts = calibration.effects().iter().map(|effect| {
         effect.on_device().map_err(|why| {
@@ -259,10 +259,10 @@ pub(super) fn effects_of(calibration: &Calibration, place: &str) -> Result<Vec<D
     Ok(parts.collect::<Result<Vec<_>>>()?.concat())
 }
 
-/// Refuses the first effect that has no room among `room` of its triad and kind: with every sample, or with temperature and time only.
+/// Refuses the first effect that does not fit into `room`, counted for each triad separately for effects with every sample and for slow ones.
 fn check_room(effects: &[DeviceEffect<f32>], room: usize, place: &str) -> Result<()> {
     let mut taken = PerSensor::both([0; 2]);
-    // Of errors by the code each axis has room for one, and a file that has two for an axis was refused.
+    // Converter nonlinearity is not counted: each axis has room for one, and a file with two for an axis was refused.
     for effect in effects.iter().filter(|e| e.converter().is_none()) {
         let count = &mut taken[effect.sensor()][usize::from(effect.is_slow())];
         *count += 1;

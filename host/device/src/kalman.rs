@@ -1,4 +1,4 @@
-//! The Kalman bank on the device, told the inputs that are applied, and the same bank here in double precision on the same samples.
+//! Runs the Kalman bank on the device with known inputs, and the same bank in double precision here on the same samples.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -14,25 +14,25 @@ use super::session::{PATIENCE, Session};
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 
-/// Shortest stretch under one input: the device reports five times a second, and a report from within tells which samples it took in.
+/// Shortest time under one input. The device reports five times a second, and a report during the input shows which samples were used.
 pub const SHORTEST: Duration = Duration::from_secs(1);
-/// Samples that the noise is taken from, if it is not given: a second.
+/// Samples that give the noise if it is not given: a second.
 const NOISE_SAMPLES: usize = 1000;
-/// Smallest variance of a reading, V²: that of rounding to 25 µV, the quantisation step of the converter's sums.
+/// Smallest variance of a reading, V²: rounding to 25 µV, the quantisation step of the converter's sums.
 const LEAST_VARIANCE: f64 = 25e-6 * 25e-6 / 12.0;
-/// Longest silence of the stream or of the bank.
+/// Longest silence of the stream or the bank before the run fails.
 const SILENCE: Duration = Duration::from_secs(3);
 
-/// What to run.
+/// Inputs and settings of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KalmanPlan {
-    /// Which sensors.
+    /// Triad to calibrate.
     pub sensor: Sensor,
-    /// True inputs one after the other: rad/s or m/s² in the body frame (specific force at rest points up).
+    /// True inputs in order: rad/s or m/s² in the body frame (specific force at rest points up).
     pub inputs: Vec<[f32; 3]>,
-    /// How long each.
+    /// Duration of each input.
     pub each: Duration,
-    /// Variances of single readings of the sensors x, y, z, V²; `None`: from a second of readings before the first input.
+    /// Variances of single readings of the sensors x, y, z, V². `None`: estimated from a second of readings before the first input.
     pub noise: Option<[f32; 3]>,
 }
 
@@ -45,10 +45,10 @@ pub struct AxisEstimate {
     pub sigma: [f64; STATES],
 }
 
-/// What a run has found: the result of `mimu device kalman`. Forward model `u = P x + b`, SI to raw.
+/// Result of `mimu device kalman`. Forward model `u = P x + b`, SI to raw.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KalmanRun {
-    /// Which sensors: gyro or accel.
+    /// Triad: gyro or accel.
     pub triad: Sensor,
     /// Names of the four states of a sensor.
     pub parameters: [&'static str; STATES],
@@ -58,21 +58,21 @@ pub struct KalmanRun {
     pub units: [&'static str; STATES],
     /// Unit of the inputs.
     pub input_unit: &'static str,
-    /// Variances that were used, V².
+    /// Variances used, V².
     pub noise_v2: [f32; 3],
-    /// Inputs, one after the other.
+    /// Inputs in order.
     pub inputs: Vec<Applied>,
     /// Samples that at least one filter of the device rejected.
     pub rejected: u32,
-    /// By the device, sensors x, y, z.
+    /// Estimates by the device, sensors x, y, z.
     pub device: [AxisEstimate; 3],
-    /// By this program, on the same samples.
+    /// Estimates by this program from the same samples.
     pub host: [AxisEstimate; 3],
     /// Differences of the means, device minus host, in standard deviations of the host.
     pub distance_sigma: [[f64; STATES]; 3],
-    /// The largest of them.
+    /// The largest of these differences.
     pub largest_distance_sigma: f64,
-    /// States as they converged.
+    /// Reports during the run.
     pub history: Vec<Converging>,
 }
 
@@ -81,16 +81,16 @@ pub struct KalmanRun {
 pub struct Applied {
     /// rad/s or m/s², body frame.
     pub input: [f32; 3],
-    /// Number of the first sample that was taken in under it.
+    /// Number of the first sample used under this input.
     pub first: u32,
-    /// Of the last.
+    /// Number of the last.
     pub last: u32,
 }
 
-/// A report of the device while it runs.
+/// A report of the device during the run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Converging {
-    /// Samples taken in.
+    /// Samples used so far.
     pub updates: u32,
     /// Sensors x, y, z.
     pub axes: [AxisEstimate; 3],
@@ -110,14 +110,14 @@ fn largest(distances: &[[f64; STATES]; 3]) -> f64 {
     sizes.fold(0.0, f64::max)
 }
 
-/// What was heard of a run.
+/// Everything received during a run.
 struct Log {
     samples: BTreeMap<u32, Sample<f32>>,
     reports: Vec<KalmanState>,
     heard: Instant,
 }
 
-/// Runs a bank on the device. `apply` is called before each input, and returns when it is applied; `progress` hears the share that is done.
+/// Runs a bank on the device. `apply` is called before each input and returns once it is applied; `progress` gets the fraction done.
 pub fn kalman(
     session: &mut Session,
     plan: &KalmanPlan,
@@ -150,7 +150,7 @@ pub fn kalman(
         apply(input)?;
         log.heard = Instant::now();
         session.begin_stream(raw)?;
-        // A stream begins with a batch, an input with a sample: those in between would be missing here.
+        // The input is set only after the first batch: the samples before it are missing here, and the bank must not use them.
         let before = log.samples.len();
         while log.samples.len() == before {
             log.listen(session, sensor)?;
@@ -179,7 +179,7 @@ pub fn kalman(
         }
         let set = |input| Request::KalmanInput { sensor, input };
         session.done(set(Some(*input)), "to take an input")?;
-        // By the device's time, as everything here.
+        // Counts samples, that is the device's time.
         let (from, wanted) = (log.samples.len(), (each.as_secs_f64() * rate_hz) as usize);
         while log.samples.len() < from + wanted {
             log.listen(session, sensor)?;
@@ -259,7 +259,7 @@ impl Log {
         Ok(())
     }
 
-    /// Listens until two reports in turn have taken in as many samples; how many.
+    /// Waits until two successive reports have used the same number of samples, and returns that number.
     fn settled(&mut self, session: &mut Session, sensor: Sensor) -> Result<u32> {
         let (from, since) = (self.reports.len(), Instant::now());
         loop {
@@ -277,7 +277,7 @@ impl Log {
     }
 }
 
-/// Which samples were taken in under each input: those before a report from within the stretch, back to the last of the stretch before.
+/// Which samples the bank used under each input, from a report during the input: it links a count of used samples to a sample number.
 fn taken_in(
     port: &str,
     plan: &KalmanPlan,
@@ -305,7 +305,7 @@ fn taken_in(
     Ok(all)
 }
 
-/// The same bank in double precision, diffuse from the same noise and span.
+/// Runs the same bank in double precision, with the same noise and span.
 fn replay(
     port: &str,
     plan: &KalmanPlan,
@@ -347,7 +347,7 @@ fn replay(
     }))
 }
 
-/// Variances of single readings from the differences of neighbours, V²: what is slower than a sample does not count.
+/// Variances of single readings from the differences of neighbours, V²: noise slower than a sample does not count.
 fn variances(samples: &BTreeMap<u32, Sample<f32>>, sensor: Sensor) -> [f32; 3] {
     let readings: Vec<_> = samples.values().map(|s| s[sensor].map(f64::from)).collect();
     let squares: Vector3<f64> = readings

@@ -1,24 +1,24 @@
-//! The device, seen from the PC: who is at the port, and what can be asked of it.
+//! The device, seen from the PC: its identity and its functions.
 //!
-//! | module       | what it is                                                                             |
-//! |--------------|----------------------------------------------------------------------------------------|
-//! | `port`       | the serial port, and why it cannot be opened                                           |
-//! | `heard`      | bytes into messages; what is garbled is counted                                        |
-//! | `line`, `session` | calls, each repeated until it is answered or refused                              |
-//! | `who`        | the greeting: what is there, and whether it can be talked to                           |
-//! | `nominal`    | the sensors by their data sheets                                                       |
-//! | `image`      | a calibration file as the bytes that the device stores                                 |
-//! | `origin`     | the unit, the date and the recording of a calibration                                  |
-//! | `upload`     | sending them and fetching them back                                                    |
-//! | `contents`   | contents of stored calibrations                                                        |
-//! | `trim`       | offsets of the stored calibration set anew while the unit lies still                   |
-//! | `self_test`  | the self-test, and whether the unit stood still for it                                 |
-//! | `flagged`    | samples that carry a flag, counted                                                     |
-//! | `stream`     | samples as they come                                                                   |
-//! | `check`      | the device's compensation against the PC's, sample by sample                           |
-//! | [`record`]   | recording its raw stream                                                               |
-//! | `result`     | what a command found, with where: the JSON that it writes                              |
-//! | `kalman`     | the device's Kalman bank against the PC's, on the same samples                         |
+//! | module            | what it is                                                               |
+//! |-------------------|--------------------------------------------------------------------------|
+//! | `port`            | the serial port, and why it cannot be opened                             |
+//! | `heard`           | decodes bytes into messages, and counts garbled ones                     |
+//! | `line`, `session` | calls, each repeated until it is answered or refused                     |
+//! | `identity`        | the greeting: the device's identity, and whether it is compatible        |
+//! | `nominal`         | the sensors by their data sheets                                         |
+//! | `image`           | a calibration file as the device stores it                               |
+//! | `origin`          | the unit, the date and the recording of a calibration                    |
+//! | `upload`          | sends a calibration and reads it back                                    |
+//! | `contents`        | contents of stored calibrations                                          |
+//! | `trim`            | corrects the offsets of the stored calibration while the unit is at rest |
+//! | `self_test`       | the self-test, and whether the unit was at rest during it                |
+//! | `flagged`         | counts samples that carry a flag                                         |
+//! | `stream`          | receives samples                                                         |
+//! | `check`           | compares the device's compensation with the PC's, sample by sample       |
+//! | [`record`]        | records the raw stream                                                   |
+//! | `result`          | a command's result with port and command, as written in JSON             |
+//! | `kalman`          | compares the device's Kalman bank with the PC's on the same samples      |
 
 mod check;
 mod contents;

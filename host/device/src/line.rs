@@ -1,4 +1,4 @@
-//! Calls and answers on an open port, before and after it is known who is there.
+//! Calls and answers on an open port, before and after the device is identified.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -10,22 +10,21 @@ use super::identity::check;
 use super::port::Port;
 use mimu_recording::error::{Error, Result};
 
-/// Times that a call is made: a garbled frame is lost, either way, and every call may be repeated.
+/// Attempts at a call. Garbled frames are lost in both directions, and every call may be repeated.
 pub(super) const ATTEMPTS: u32 = 4;
-/// Wait for an answer behind a frame that was garbled: longer than the 1 to 4 s that a sector takes to be erased, of the 15 that a commit is
-/// waited for otherwise.
+/// Wait for an answer after a garbled frame: longer than the 1 to 4 s of erasing a sector, shorter than the 15 s wait for a commit.
 const GARBLED: Duration = Duration::from_millis(4500);
-/// Largest queue of unread events: a minute of both streams. Beyond, the caller has stopped reading.
+/// Largest queue of unread events: a minute of both streams. If it is full, the caller has stopped reading.
 const WAITING: usize = 6000;
 
-/// A port, and what has been heard on it.
+/// A port, and what was received on it.
 #[derive(Debug)]
 pub(super) struct Line {
     pub port: Port,
     pub ear: Receiver,
     pub waiting: VecDeque<Event>,
     pub overflowed: u64,
-    /// How many of those that wait came before the last answer.
+    /// How many of the waiting events came before the last answer.
     pub before_answer: usize,
     /// Calls that had to be repeated.
     pub repeated: u32,
@@ -46,7 +45,7 @@ impl Line {
         }
     }
 
-    /// Makes a call until it is answered, each time waiting so long; `None` if it never is.
+    /// Repeats a call until it is answered, waiting `wait` each time; `None` if no answer comes.
     pub fn ask(&mut self, request: Request<'_>, wait: Duration) -> Result<Option<Answer>> {
         let mut frame = [0; MAX_FRAME];
         for attempt in 0..ATTEMPTS {
@@ -67,7 +66,7 @@ impl Line {
                 if let Some(answer) = self.listen(Some(id))? {
                     return Ok(Some(answer));
                 }
-                // That may have been the answer, and a call may be repeated.
+                // The garbled frame may have been the answer. The call is then repeated earlier.
                 if !was_garbled && self.ear.count().garbled > garbled {
                     was_garbled = true;
                     until = until.min(Instant::now() + GARBLED);
@@ -77,7 +76,7 @@ impl Line {
         Ok(None)
     }
 
-    /// Reads once; the answer to the call of this number, if it came. Events wait.
+    /// Reads once, and returns the answer to call `wanted` if it came. Events are queued.
     pub fn listen(&mut self, wanted: Option<u16>) -> Result<Option<Answer>> {
         let mut bytes = [0; 4096];
         let count = self.port.read(&mut bytes)?;
@@ -99,7 +98,7 @@ impl Line {
         match stranger {
             Some((magic, version)) => {
                 check(self.port.name(), magic, version)?;
-                // Of this protocol, whose greeting is read whatever its length.
+                // The protocol matches, but the rest of the greeting is not as it defines.
                 Err(Error::device(
                     self.port.name(),
                     "the device uses this program's protocol, but its greeting cannot be read",

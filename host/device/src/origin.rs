@@ -1,10 +1,10 @@
-//! Unit, time and recording of a calibration, as the file and as the device writes them.
+//! Unit, time and recording of a calibration, as the file and the device write them.
 
 use jiff::Timestamp;
 use mimu::calibration::Calibration;
 use mimu_core::stored::Origin;
 
-/// Origin of a calibration file; `place` is its path. If the number of the unit is missing, a sentence is added to `warnings`.
+/// Origin of a calibration file; `place` is its path. If the unit's number is missing, a sentence is added to `warnings`.
 pub(super) fn of(calibration: &Calibration, place: &str, warnings: &mut Vec<String>) -> Origin {
     let unit_id = calibration.unit_id.as_deref().and_then(bytes);
     if unit_id.is_none() {
@@ -24,7 +24,7 @@ pub(super) fn of(calibration: &Calibration, place: &str, warnings: &mut Vec<Stri
     }
 }
 
-/// Bytes of as many pairs of hexadecimal digits; `None` if these are not such digits, or all zero, which means unknown.
+/// Decodes N pairs of hexadecimal digits. `None` if they are no such digits, or all zero, which means unknown.
 fn bytes<const N: usize>(digits: &str) -> Option<[u8; N]> {
     let mut bytes = [0; N];
     let (pairs, _) = digits.as_bytes().as_chunks::<2>();

@@ -1,4 +1,4 @@
-//! The serial port that the device is at.
+//! The device's serial port.
 
 use std::io::{ErrorKind as Io, Read as _, Write as _};
 use std::path::Path;
@@ -8,13 +8,13 @@ use serialport::{ClearBuffer, ErrorKind, SerialPort, SerialPortInfo, SerialPortT
 
 use mimu_recording::error::{Error, Result};
 
-/// Speed of the line, 8 data bits, no parity, 1 stop bit. That of the firmware's `BAUD`; over native USB it means nothing.
+/// Baud rate of the line, with 8 data bits, no parity and 1 stop bit; equal to the firmware's `BAUD`. Native USB ignores it.
 pub const BAUD: u32 = 1_000_000;
 
-/// Longest time that a read waits: what is looked at between reads (Ctrl-C, deadlines) is then never later than this.
+/// Longest wait of a read. It bounds the delay of everything that is checked between reads (Ctrl-C, deadlines).
 const POLL: Duration = Duration::from_millis(20);
 
-/// A port that is open, for this program alone.
+/// An open port, locked for this program.
 pub struct Port {
     name: String,
     serial: Box<dyn SerialPort>,
@@ -28,7 +28,7 @@ impl Port {
             .timeout(POLL)
             .open()
             .map_err(|error| not_opened(name, &error))?;
-        // Bytes that an earlier program has not read are not answers to this one.
+        // Bytes that an earlier program left unread must not be taken for answers.
         let _ = serial.clear(ClearBuffer::Input);
         Ok(Self {
             name: name.to_owned(),
@@ -37,15 +37,15 @@ impl Port {
         })
     }
 
-    /// Path that it was opened by.
+    /// Path given to [`Self::open`].
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Reads what is there, or waits a little for it; 0 if nothing came. An error means that the port is gone.
+    /// Reads available bytes, or waits for them up to the poll interval; 0 if none came. An error means that the port is gone.
     pub fn read(&mut self, bytes: &mut [u8]) -> Result<usize> {
         match self.serial.read(bytes) {
-            // A device that was pulled out is at its end for ever.
+            // A device that was unplugged reports end of file.
             Ok(0) => Err(self.gone()),
             Ok(count) => Ok(count),
             Err(e) if matches!(e.kind(), Io::TimedOut | Io::WouldBlock | Io::Interrupted) => Ok(0),
@@ -55,7 +55,7 @@ impl Port {
 
     /// Sends all of `bytes`.
     pub fn write(&mut self, mut bytes: &[u8]) -> Result<()> {
-        // A frame takes 5 ms; a line that takes nothing for this long is stuck.
+        // A frame takes 5 ms. A line that accepts nothing for this long is stuck.
         let mut patience = 100;
         while !bytes.is_empty() {
             match self.serial.write(bytes) {
@@ -76,7 +76,7 @@ impl Port {
         Ok(())
     }
 
-    /// Whether it has vanished.
+    /// Whether the port has vanished.
     pub fn is_lost(&self) -> bool {
         self.lost
     }
@@ -97,7 +97,7 @@ impl std::fmt::Debug for Port {
     }
 }
 
-/// Both ends of a serial port that anything but a mimu device is at: to read from and to write to. A read waits at most `poll`.
+/// Reading and writing end of a serial port for a device other than mimu's. A read waits at most `poll`.
 pub fn serial_pair(name: &str, baud: u32, poll: Duration) -> Result<SerialPair> {
     let write = serialport::new(name, baud)
         .timeout(poll)
@@ -115,8 +115,8 @@ pub type SerialPair = (
     Box<dyn std::io::Write + Send>,
 );
 
-/// Vendor of the debuggers on ST's boards, and the products of them that have a serial port: ST-LINK/V2-1, with and without a drive, and
-/// STLINK-V3E, -V3S, -V3 with two ports, -V3E without a drive, -V3PWR (OpenOCD's list, `stlink_usb.c`).
+/// USB vendor of ST's debuggers, and those products that have a serial port: ST-LINK/V2-1 with and without a drive, STLINK-V3E, -V3S, -V3 with two
+/// ports, -V3E without a drive, -V3PWR (OpenOCD's list, `stlink_usb.c`).
 const ST_LINK: (u16, &[u16]) = (
     0x0483,
     &[0x374b, 0x3752, 0x374e, 0x374f, 0x3753, 0x3754, 0x3757],
@@ -127,11 +127,11 @@ const OWN: (u16, &[u16]) = (0x1209, &[0x0001]);
 /// The serial ports of this computer.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Ports {
-    /// Those that a board can be at: a debugger of ST, or the firmware's own USB.
+    /// Ports where a board can be: a debugger of ST, or the firmware's own USB.
     pub of_boards: Vec<String>,
     /// The other ports with their descriptions. Nothing is sent to them unless the user names one, because other devices may be there.
     pub others: Vec<String>,
-    /// The system does not list its ports, as in a container without `/sys`. One that is named still opens.
+    /// The system does not list its ports, as in a container without `/sys`. A port that the user names can still be opened.
     pub unlisted: bool,
 }
 
@@ -144,7 +144,7 @@ pub fn ports() -> Ports {
 }
 
 fn listed_in(folder: &Path) -> Ports {
-    // `serialport` 4.10 panics where the folder is missing.
+    // `serialport` 4.10 panics if the folder is missing.
     if cfg!(target_os = "linux") && !folder.is_dir() {
         return Ports {
             unlisted: true,
@@ -192,7 +192,7 @@ fn sorted(mut all: Vec<SerialPortInfo>) -> Ports {
 }
 
 impl Ports {
-    /// What there is to choose from, as a remedy.
+    /// The available ports, as a remedy of an error.
     pub(super) fn listed(&self) -> String {
         match [&self.of_boards[..], &self.others].concat().as_slice() {
             [] if self.unlisted => format!(
@@ -203,7 +203,7 @@ impl Ports {
         }
     }
 
-    /// What was not tried, as a part of a sentence; empty if there is nothing.
+    /// The ports that were not tried, as a part of a sentence; empty if there are none.
     pub(super) fn left_alone(&self) -> String {
         match self.others.as_slice() {
             [] => String::new(),
@@ -216,7 +216,7 @@ impl Ports {
 }
 
 fn not_opened(name: &str, error: &serialport::Error) -> Error {
-    // A pseudo-terminal or a board that was just unplugged may fail differently; the message is then the system's.
+    // A pseudo-terminal or a board that was just unplugged may fail differently. The message is then the system's.
     let (problem, remedy) = match error.kind() {
         ErrorKind::Io(Io::NotFound) => ("the port does not exist".into(), ports().listed()),
         ErrorKind::Io(Io::PermissionDenied) => (
@@ -224,7 +224,7 @@ fn not_opened(name: &str, error: &serialport::Error) -> Error {
             "join the group that owns the port (`sudo usermod -aG dialout $USER` on Debian) and log in again"
                 .into(),
         ),
-        // What `serialport` makes of EBUSY, and of a lock that another program holds.
+        // `serialport` reports this for EBUSY and for a lock held by another program.
         ErrorKind::NoDevice => (
             "the port is busy: another program has it open".into(),
             "close that program (a terminal, a recording), or wait until it is done".into(),
@@ -266,7 +266,7 @@ mod tests {
             port("ttyS0", None),
             port("ttyACM2", Some((0x2341, 0x0043, "Uno"))),
             port("ttyACM0", Some((0x1209, 0x0001, "mimu"))),
-            // Of the same maker but not a debugger: another device.
+            // Same vendor, but not a debugger: another device.
             port("ttyACM3", Some((0x0483, 0x5740, "VCP"))),
         ]);
         assert_eq!(ports.of_boards, ["ttyACM0", "ttyACM1"]);

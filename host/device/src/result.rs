@@ -1,4 +1,4 @@
-//! What is found out about a device, with where and by what: each result is one type, and JSON is that type.
+//! Results of `mimu device` commands. Each result is one type, and the JSON output serialises that type.
 
 use mimu_core::wire::Counters;
 use serde::Serialize;
@@ -6,7 +6,7 @@ use serde::Serialize;
 /// This program and its version.
 pub(crate) const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));
 
-/// What a command found out about the device at a port, `mimu-device/1`.
+/// Result of a command for the device at a port, `mimu-device/1`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceResult<T> {
     /// `mimu-device/1`.
@@ -17,13 +17,13 @@ pub struct DeviceResult<T> {
     pub command: &'static str,
     /// Port of the device.
     pub port: String,
-    /// What was found.
+    /// The command's own result.
     #[serde(flatten)]
     pub found: T,
 }
 
 impl<T> DeviceResult<T> {
-    /// What `command` found at `port`.
+    /// Result of `command` at `port`.
     pub fn new(command: &'static str, port: &str, found: T) -> Self {
         Self {
             format: "mimu-device/1",
@@ -35,11 +35,11 @@ impl<T> DeviceResult<T> {
     }
 }
 
-/// What the device has counted: the result of `mimu device counters`.
+/// The device's counters: the result of `mimu device counters`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Counted {
-    /// Since its start, or since they were reset.
+    /// Counts since the start or the last reset of the counters.
     pub counters: Counters,
-    /// Whether they were reset afterwards.
+    /// Whether they were reset after reading.
     pub reset: bool,
 }

@@ -1,7 +1,7 @@
-//! The device's self-test, and whether the unit stood still for it.
+//! The device's self-test, and whether the unit was at rest during it.
 //!
-//! The device deflects its sensors one state after the other and compares the means, so that a unit that begins to turn in
-//! between fails like one whose self-test pins are open. The raw stream before and after tells the two apart.
+//! The device deflects its sensors one after the other and compares the means. A unit that begins to turn in between therefore fails like one with
+//! open self-test pins. The raw stream before and after distinguishes the two.
 
 use std::time::Duration;
 
@@ -14,46 +14,45 @@ use super::session::Session;
 use super::stream::{Moments, Stream, Streamed, stream};
 use mimu_recording::error::Result;
 
-/// The self-test takes a second; a device that is slow to start it gets as much again, and then some.
+/// Wait for the self-test, which takes a second: the rest is reserve for a slow start.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// What is looked at before and after.
+/// Length of the raw stream before and after.
 const LOOK: Duration = Duration::from_millis(250);
-/// Largest scatter of a gyro at rest, V, as a standard deviation and as a change of the mean: 4 deg/s. Its noise is
-/// 3.5 mV, and what decides the test is 120 mV.
+/// Largest scatter of a gyro at rest, V, as a standard deviation and as a change of the mean: 4 deg/s. Its noise is 3.5 mV; the test's threshold is
+/// 120 mV.
 const STILL_GYRO_V: f64 = 0.02;
-/// The same of the accelerometer, V: 50 mg, or a tilt by 3 degrees. Its noise is 5 mV, and what decides is 150 mV.
+/// The same limit for the accelerometer, V: 50 mg, or a tilt by 3 degrees. Its noise is 5 mV; the test's threshold is 150 mV.
 const STILL_ACCEL_V: f64 = 0.04;
 
-/// Least change between its ranges by which an axis of the accelerometer has shown that it senses, V: two fifths of gravity, which is more
-/// than nulls can differ by.
+/// Least change between the ranges that proves that an axis of the accelerometer responds, V: two fifths of gravity, more than nulls can differ by.
 const SEEN_V: f32 = 0.24;
 
-/// What a self-test has found: the result of `mimu device self-test`.
+/// Result of `mimu device self-test`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SelfTested {
-    /// As the device judges it.
+    /// Verdict of the device.
     pub passed: Passed,
     /// Change of the gyros' outputs x, y, z by ST1, V at the gyro.
     pub gyro_st1_v: [f32; 3],
-    /// The same by ST2.
+    /// Change of the gyros' outputs x, y, z by ST2, V at the gyro.
     pub gyro_st2_v: [f32; 3],
     /// Outputs of the accelerometer in its finest range, V.
     pub accel_fine_v: [f32; 3],
-    /// The same in its coarsest.
+    /// Outputs of the accelerometer in its coarsest range, V.
     pub accel_coarse_v: [f32; 3],
     /// Temperatures by the TEMP pins of gyro x, y, z, °C.
     pub gyro_temps_c: [f32; 3],
-    /// Reference of the gyros, V at the gyro.
+    /// Reference voltage of the gyros, V at the gyro.
     pub reference_v: f32,
-    /// Supply of converter and accelerometer, V.
+    /// Supply voltage of converter and accelerometer, V.
     pub supply_v: f32,
-    /// Axes of the accelerometer that lie across gravity: one that is stuck at its null would read the same in this pose.
+    /// Horizontal axes of the accelerometer. One that is stuck at its null would read the same in this pose.
     pub accel_not_shown: Vec<&'static str>,
-    /// The sensor with the largest motion, in words, if the unit did not stand still.
+    /// The sensor with the largest motion, in words, if the unit moved.
     pub moved: Option<String>,
 }
 
-/// Whether the sensors answered as their data sheets state, and are supplied as they are to be.
+/// Whether sensors and supplies are within their data sheets' limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Passed {
     /// Gyro x.
@@ -62,23 +61,23 @@ pub struct Passed {
     pub gyro_y: bool,
     /// Gyro z.
     pub gyro_z: bool,
-    /// Accelerometer x: it follows its range, about a null that its data sheet allows.
+    /// Accelerometer x: its output scales with the range, and its null is within the data sheet's limits.
     pub accel_x: bool,
     /// Accelerometer y.
     pub accel_y: bool,
     /// Accelerometer z.
     pub accel_z: bool,
-    /// All three of them together see gravity.
+    /// The three accelerometers together measure gravity.
     pub gravity: bool,
-    /// TEMP of gyro x: in its range, and in agreement with the others.
+    /// TEMP of gyro x: within its range, and consistent with the others.
     pub temp_x: bool,
     /// TEMP of gyro y.
     pub temp_y: bool,
     /// TEMP of gyro z.
     pub temp_z: bool,
-    /// Reference of the gyros.
+    /// Reference voltage of the gyros.
     pub reference: bool,
-    /// Supply of converter and accelerometer.
+    /// Supply voltage of converter and accelerometer.
     pub supply: bool,
 }
 
@@ -104,7 +103,7 @@ impl Passed {
         }
     }
 
-    /// Each with its name, in the order of the fields.
+    /// Each check with its name, in the order of the fields.
     pub fn all(self) -> [(&'static str, bool); 12] {
         [
             ("gyro x", self.gyro_x),
@@ -123,7 +122,7 @@ impl Passed {
     }
 }
 
-/// Deflects the sensors and measures what comes of it. Takes two seconds.
+/// Runs the self-test, and measures the raw stream before and after. Takes two seconds.
 pub fn self_test(session: &mut Session) -> Result<SelfTested> {
     let before = look(session)?;
     let purpose = "to test its sensors";
@@ -158,7 +157,7 @@ fn look(session: &mut Session) -> Result<Streamed> {
     stream(session, Stream::Raw, Some(LOOK), || false, |_, _, _| Ok(()))
 }
 
-/// `before` and `after`: gyro and accelerometer, V.
+/// Describes the largest motion between `before` and `after` (gyro and accelerometer, V), if it exceeds the limits.
 fn moved(before: [&Moments; 2], after: [&Moments; 2]) -> Option<String> {
     let mut worst = (1.0, None);
     for (triad, (name, limit)) in [("gyro", STILL_GYRO_V), ("accel", STILL_ACCEL_V)]

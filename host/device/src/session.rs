@@ -1,4 +1,4 @@
-//! Talking with a device: calls, each answered or refused, and what comes without being asked.
+//! A session with a device: calls, each answered or refused, and events.
 
 use std::time::Duration;
 
@@ -11,11 +11,11 @@ use super::origin;
 use super::port::{Port, ports};
 use mimu_recording::error::{Argument, Error, Result};
 
-/// Longest wait for an answer that needs no work: a frame takes 5 ms, and one of samples may be before it. With the times that a call
-/// is made it is long enough for a device that is still storing what a program before this one has committed.
+/// Longest wait for an answer without work. A frame takes 5 ms, and a frame of samples may be sent before it. With all attempts of a call, the wait
+/// also covers a device that is still storing what an earlier program committed.
 pub(super) const PATIENCE: Duration = Duration::from_millis(1500);
 
-/// An open line to a device that has greeted and can be talked to.
+/// An open line to a compatible device that has sent its greeting.
 #[derive(Debug)]
 pub struct Session {
     line: Line,
@@ -23,7 +23,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Opens the port and greets. Without a name, tries those that a board of ours can be at: exactly one has to greet.
+    /// Opens the port and asks for the greeting. Without a name, tries the ports where a board can be; exactly one must answer.
     pub fn open(port: Option<&str>) -> Result<Self> {
         if let Some(name) = port {
             return Self::greet(Port::open(name)?);
@@ -64,7 +64,7 @@ impl Session {
         }
     }
 
-    /// Whether the port has vanished: the board was unplugged, or is without power.
+    /// Whether the port has vanished: the board was unplugged or lost its power.
     pub fn is_lost(&self) -> bool {
         self.line.port.is_lost()
     }
@@ -76,14 +76,14 @@ impl Session {
         };
         let mut session = Self { line, who: *who };
         if !session.line.waiting.is_empty() {
-            // It still streams for a program that did not end it.
+            // The device may still stream for an earlier program.
             session.done(Request::Stop, "to stop streaming")?;
             session.forget_events();
         }
         Ok(session)
     }
 
-    /// Who it is, by its last greeting.
+    /// The device's identity, from its last greeting.
     pub fn who(&self) -> &Identity {
         &self.who
     }
@@ -93,7 +93,7 @@ impl Session {
         self.line.port.name()
     }
 
-    /// What has been heard so far.
+    /// Counts of what was received so far.
     pub fn count(&self) -> LineCount {
         self.line.ear.count()
     }
@@ -103,7 +103,7 @@ impl Session {
         self.line.repeated
     }
 
-    /// Greets again.
+    /// Asks for the greeting again.
     pub fn hello(&mut self) -> Result<&Identity> {
         match self.call(Request::Hello, "to greet", PATIENCE)? {
             Answer::Greeting(who) => self.who = *who,
@@ -112,7 +112,7 @@ impl Session {
         Ok(&self.who)
     }
 
-    /// Makes a call until it is answered; `purpose` completes "the request ...". A refusal is an error here.
+    /// Repeats a call until it is answered; `purpose` completes "the request ...". A refusal is an error.
     pub fn call(&mut self, request: Request<'_>, purpose: &str, wait: Duration) -> Result<Answer> {
         match self.attempt(request, purpose, wait)? {
             Answer::Refused(refusal) => Err(refused(self.line.port.name(), purpose, &refusal)),
@@ -120,7 +120,7 @@ impl Session {
         }
     }
 
-    /// The same for calls that are answered by [`Answer::Done`].
+    /// Like [`Self::call`], for requests that are answered by [`Answer::Done`].
     pub fn done(&mut self, request: Request<'_>, purpose: &str) -> Result<()> {
         match self.call(request, purpose, PATIENCE)? {
             Answer::Done => Ok(()),
@@ -128,7 +128,7 @@ impl Session {
         }
     }
 
-    /// The same, and a refusal is an answer.
+    /// Like [`Self::call`], but returns a refusal as an answer.
     pub(super) fn attempt(
         &mut self,
         request: Request<'_>,
@@ -149,7 +149,7 @@ impl Session {
         }
     }
 
-    /// An answer of another kind than was asked for.
+    /// Error for an answer of the wrong kind.
     pub fn unexpected(&self, purpose: &str) -> Error {
         Error::device(
             self.line.port.name(),
@@ -158,7 +158,7 @@ impl Session {
         )
     }
 
-    /// The next event, or `None` if none came within a little while ([`Port::read`]).
+    /// The next event, or `None` if none came within the wait of [`Port::read`].
     pub fn event(&mut self) -> Result<Option<Event>> {
         if self.line.waiting.is_empty() {
             self.line.listen(None)?;
@@ -177,8 +177,7 @@ impl Session {
         Ok(event)
     }
 
-    /// Has the device stream, and forgets what came before it said so: batches of an older stream may still have been on the way,
-    /// and would be followed by a gap.
+    /// Starts a stream, and discards events from before its confirmation. They may be batches of an earlier stream, which a gap would follow.
     pub fn begin_stream(&mut self, request: Request<'_>) -> Result<()> {
         self.done(request, "to stream")?;
         let old = self.line.before_answer.min(self.line.waiting.len());
@@ -187,14 +186,14 @@ impl Session {
         Ok(())
     }
 
-    /// Forgets the events that wait.
+    /// Discards the waiting events.
     pub fn forget_events(&mut self) {
         self.line.waiting.clear();
         self.line.overflowed = 0;
     }
 }
 
-/// Why what is at the port is not a mimu device.
+/// Error for a port without a mimu device.
 fn no_greeting(port: &str, count: &LineCount) -> Error {
     match (count.bytes, count.frames) {
         (0, _) => Error::device(
@@ -219,7 +218,7 @@ fn no_greeting(port: &str, count: &LineCount) -> Error {
     }
 }
 
-/// A refusal of the device as one line.
+/// Error for a refusal by the device.
 pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
     let (why, remedy) = match refusal {
         Refusal::Unknown => (

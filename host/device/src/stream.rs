@@ -1,4 +1,4 @@
-//! One of the streams, sample by sample, with a summary.
+//! Receives one of the streams, sample by sample, and summarises it.
 
 use std::time::{Duration, Instant};
 
@@ -11,49 +11,49 @@ use super::heard::{Event, LineCount};
 use super::session::Session;
 use mimu_recording::error::{Error, Result};
 
-/// Longest silence of a stream.
+/// Longest silence of a stream before the command fails.
 const SILENCE: Duration = Duration::from_secs(3);
 
 /// Which stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stream {
-    /// Readings, V at the sensors.
+    /// Raw readings, V at the sensors.
     Raw,
     /// Compensated on the device, rad/s and m/s² in the body frame.
     Compensated,
 }
 
-/// What was received: the result of `mimu device stream`.
+/// Summary of a stream: the result of `mimu device stream`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Streamed {
     /// Which stream.
     pub stream: Stream,
     /// Samples.
     pub samples: u64,
-    /// Numbers that are missing between the first and the last.
+    /// Samples missing between the first and the last.
     pub missing: u64,
-    /// Number of the first.
+    /// Number of the first sample.
     pub first: Option<u32>,
-    /// °C, the last.
+    /// The last temperature, °C.
     pub temp_c: f64,
-    /// By the TEMP pins of gyro x, y, z, °C, the last; of the raw stream only.
+    /// Last temperatures by the TEMP pins of gyro x, y, z, °C; for the raw stream only.
     pub gyro_temps_c: Option<[f32; 3]>,
     /// Faults that the device flags.
     #[serde(flatten)]
     pub flagged: Flagged,
-    /// Gyro.
+    /// Statistics of the gyro.
     pub gyro: Moments,
-    /// Accelerometer.
+    /// Statistics of the accelerometer.
     pub accel: Moments,
-    /// What was heard on the line.
+    /// Counts of what was received on the line.
     pub line: LineCount,
 }
 
 /// Mean and standard deviation of the samples of a triad, x, y, z.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Moments {
-    /// Of both.
+    /// Unit of mean and standard deviation.
     pub unit: &'static str,
     /// Means.
     pub mean: [f64; 3],
@@ -87,7 +87,7 @@ impl Streamed {
     }
 }
 
-/// Receives samples for `duration` of the device's time, or until `stop` is set. `take` gets each sample with its number.
+/// Receives samples for `duration` of the device's time, or until `stop` returns true. `take` gets each sample with its number.
 pub fn stream(
     session: &mut Session,
     which: Stream,
@@ -143,8 +143,8 @@ pub fn stream(
             expected = Some(number.wrapping_add(1));
             found.samples += 1;
             found.flagged.count(batch.head.flags, 1);
-            // Welford: of a bias of volts and a noise of microvolts the plain sums lose the noise. The deviations are sums of
-            // squares until the end.
+            // Welford's method: with a bias of volts and noise of microvolts, plain sums would lose the noise. Until the end, `deviation` contains
+            // sums of squares.
             let triads = [
                 (&mut found.gyro, &sample.gyro),
                 (&mut found.accel, &sample.accel),

@@ -1,4 +1,4 @@
-//! Offsets of the stored calibration set anew while the unit lies still: biases move by more within a month than anything else does, and
+//! Corrects the offsets of the stored calibration while the unit is at rest. Within a month, biases change more than any other parameter, and they
 //! need no rate table.
 
 use std::time::Duration;
@@ -15,82 +15,82 @@ use super::upload::{download, upload};
 use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
-/// Length of the segments whose means are compared, s: their scatter shows the remaining noise, whatever its spectrum within a segment.
+/// Length of the segments whose means are compared, s. The scatter of these means shows the remaining noise, whatever its spectrum within a segment.
 const STRETCH_S: f64 = 0.5;
-/// Shortest average, s: eight segments, which determine a standard deviation to a quarter.
+/// Shortest average, s: eight segments, which determine a standard deviation to within a quarter.
 pub const SHORTEST_TRIM_S: f64 = 8.0 * STRETCH_S;
-/// Most that the means of stretches scatter by, and differ between the halves, while the unit lies still: 0.5 deg/s, where a gyro's noise makes
-/// 0.1, and 0.1 m/s², a tilt by 0.6 degrees, where the accelerometer's makes 0.004.
+/// Limit at rest for the scatter of the segments' means and for the difference between the two halves. 0.5 deg/s, where a gyro's noise causes 0.1;
+/// and 0.1 m/s², a tilt by 0.6 degrees, where the accelerometer's noise causes 0.004.
 const STILL: PerSensor<f64> = PerSensor {
     gyro: 0.0087,
     accel: 0.1,
 };
-/// Most that is trimmed: 10 deg/s and 2 m/s². Biases do not drift so far within the sensors' range of temperature; a unit that turns steadily about
-/// the vertical, and one in another pose than the one that was given, look like it.
+/// Largest correction: 10 deg/s and 2 m/s². Biases do not drift so far within the sensors' temperature range. A larger error suggests a unit that
+/// turns steadily about the vertical, or a pose other than the given one.
 const MOST: PerSensor<f64> = PerSensor {
     gyro: 0.175,
     accel: 2.0,
 };
 
-/// What is known of the state of the unit while it lies still.
+/// Known input of the unit at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// Specific force in the body frame, m/s²: gravity's magnitude along the direction that points up. `None`: not known, and the
-    /// accelerometer keeps its offsets. Its magnitude alone would not do: it is one number for three offsets, and the one that it gives, along the
-    /// pose, is as well an error of scale.
+    /// Specific force in the body frame, m/s²: gravity along the direction that points up. If `None`, the accelerometer keeps its offsets. The
+    /// magnitude of gravity alone would not suffice: it is one number for three offsets, and an error along the pose may as well be a scale-factor
+    /// error.
     pub force_mps2: Option<[f64; 3]>,
 }
 
-/// Errors of the output of a triad while the unit lay still.
+/// Errors of a triad's output while the unit was at rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrimmedTriad {
-    /// Whether its offsets were set anew.
+    /// Whether its offsets were corrected.
     pub trimmed: bool,
-    /// Mean error of the compensated output x, y, z before; without a known input, the output.
+    /// Mean error of the compensated output x, y, z before the trim; without a known input, the mean output.
     pub before: [f64; 3],
     /// Standard deviations of these means.
     pub sigma_before: [f64; 3],
-    /// The same after it was stored, by new samples.
+    /// Mean error after the new offsets were stored, from new samples.
     pub after: [f64; 3],
     /// Standard deviations of these.
     pub sigma_after: [f64; 3],
-    /// What was added to o of every node.
+    /// Correction added to o of every node.
     pub added: [f32; 3],
     /// rad/s or m/s^2.
     pub unit: &'static str,
 }
 
-/// How a trim went: the result of `mimu device trim`.
+/// Result of `mimu device trim`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trimmed {
-    /// The triads.
+    /// Results of the two triads.
     #[serde(flatten)]
     pub triads: PerSensor<TrimmedTriad>,
-    /// Temperature of the dies, °C, that it was done at. The curves move by the same everywhere.
+    /// Temperature of the dies during the trim, °C. The correction is the same at all temperatures.
     pub temp_c: f64,
-    /// Averaged before and after, s each.
+    /// Averaging time before and after, s each.
     pub averaged_s: f64,
     /// Hash of the calibration before.
     pub before: Hash,
-    /// Hash of the one now.
+    /// Hash of the new calibration.
     pub hash: Hash,
-    /// One sentence for each thing that a person should know.
+    /// Warnings, one sentence each.
     pub warnings: Vec<String>,
 }
 
 /// Mean errors of the axes of a triad, and their standard deviations.
 type Means = ([f64; 3], [f64; 3]);
 
-/// Means of stretches of the compensated stream.
+/// Means of segments of the compensated stream.
 struct Average {
     means: Vec<Sample<f64>>,
     summary: Streamed,
 }
 
-/// Averages the compensated output for `duration` while the unit lies still, adds to the offsets of all nodes what makes it right, has the
-/// calibration stored, and looks at the output again. `trimmed_s`: now, UTC seconds since 1970. `progress` hears the share that is done.
+/// Averages the compensated output for `duration` while the unit is at rest, corrects the offsets of all nodes, stores the calibration and averages
+/// again. `trimmed_s` is the present time, UTC seconds since 1970. `progress` gets the fraction done.
 ///
-/// Unit, date and recording of the calibration stay those that they were.
+/// The calibration keeps its unit, date and recording.
 pub fn trim(
     session: &mut Session,
     pose: &Pose,
@@ -100,7 +100,7 @@ pub fn trim(
 ) -> Result<Trimmed> {
     let mut bytes = download(session)?;
     let held = Hash(stored::hash(&bytes));
-    // Refused before the time is spent: the numbers do not matter.
+    // A calibration that cannot be trimmed is refused before the averaging. The values do not matter here.
     stored::trim(&mut bytes.clone(), PerSensor::default(), trimmed_s)
         .map_err(|refused| refuse(session, &refused))?;
     let before = average(session, duration, |share| progress(0.45 * share))?;
@@ -120,7 +120,7 @@ pub fn trim(
     });
     stored::trim(&mut bytes, add, trimmed_s).map_err(|refused| refuse(session, &refused))?;
     let image = Image::stored_before(bytes).map_err(|refused| refuse(session, &refused))?;
-    // The device holds a calibration of this unit already: somebody has insisted on it then.
+    // `true`: the device stores this calibration already, so its unit was accepted before.
     upload(session, &image, true, |share| progress(0.45 + 0.1 * share))?;
     let after = average(session, duration, |share| progress(0.55 + 0.45 * share))?;
     let left = after.errors(input);
@@ -158,7 +158,7 @@ fn warnings(before: &Average, after: &Average) -> Vec<String> {
     all
 }
 
-/// Refuses a trim that no drift explains.
+/// Refuses a correction larger than any drift.
 fn check_size(
     session: &Session,
     errors: &PerSensor<Means>,
@@ -196,7 +196,7 @@ fn refuse(session: &Session, refused: &StoredError) -> Error {
     Error::device(session.port(), problem, remedy)
 }
 
-/// The compensated output of a unit that lies still.
+/// Averages the compensated output of a unit at rest.
 fn average(session: &mut Session, duration: Duration, progress: impl Fn(f64)) -> Result<Average> {
     let rate_hz = f64::from(session.who().sample_rate_hz);
     let stretch = (STRETCH_S * rate_hz).round() as u64;
@@ -229,7 +229,7 @@ fn zero() -> Sample<f64> {
 }
 
 impl Average {
-    /// Errors against these inputs.
+    /// Mean errors relative to these inputs.
     fn errors(&self, input: PerSensor<Option<[f64; 3]>>) -> PerSensor<Means> {
         let values = |sensor: Sensor, axis: usize| {
             let means = self.means.iter();
@@ -248,7 +248,7 @@ impl Average {
         })
     }
 
-    /// What moved, if anything did: the first half against the second, and the scatter of all.
+    /// Describes the motion, if any: compares the two halves, and the scatter of all segments.
     fn motion(&self) -> Option<String> {
         let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len().max(1) as f64;
         for sensor in Sensor::BOTH {
@@ -294,7 +294,7 @@ mod tests {
         let input = [[0.0; 3], [0.0, 0.0, 9.8]].map(Some);
         let errors = found.errors(input.into());
         let ((gyro, sigma), (accel, none)) = (errors.gyro, errors.accel);
-        // 16 values of ±1 have a standard deviation of sqrt(16/15), and their mean one of that over 4.
+        // 16 values of ±1 have a standard deviation of sqrt(16/15); that of their mean is 1/4 of it.
         let expected = 0.001 * (16.0_f64 / 15.0).sqrt() / 4.0;
         for axis in 0..3 {
             assert!((gyro[axis] - [0.01, 0.0, -0.02][axis]).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! Sending a calibration, and fetching the one that is stored.
+//! Sends a calibration, and reads the stored one.
 
 use std::time::Duration;
 
@@ -16,23 +16,23 @@ use super::stream::{Stream, stream};
 use mimu::calibration::Calibration;
 use mimu_recording::error::{Error, Result};
 
-/// Longest wait for a commit: a sector is erased, which takes about a second, and 4 kB are programmed.
+/// Longest wait for a commit: erasing a sector takes 1 to 4 s, then 4 kB are programmed.
 const COMMIT: Duration = Duration::from_secs(15);
 /// Length of the raw stream that gives the temperature.
 const LOOK: Duration = Duration::from_millis(100);
-/// Times that an upload begins anew: a device that restarts in the middle of it has forgotten it.
+/// Attempts at an upload: a device that restarts in the middle has lost the first part.
 const BEGINNINGS: u32 = 3;
 
-/// How an upload went: the result of `mimu device upload`.
+/// Result of `mimu device upload`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Uploaded {
-    /// What the calibration is told apart by.
+    /// Identifies the calibration.
     pub hash: Hash,
-    /// Its length.
+    /// Length of the calibration.
     pub bytes: usize,
-    /// Hash of the calibration before, if there was one.
+    /// Hash of the previous calibration, if there was one.
     pub before: Option<Hash>,
-    /// The device held it already, byte by byte, and nothing was written.
+    /// The device stored the same bytes already, so nothing was written.
     pub was_there: bool,
     /// Messages that had to be repeated.
     pub repeated: u32,
@@ -50,10 +50,9 @@ pub struct Uploaded {
 
 /// Sends a calibration, stores it, and reads it back byte by byte. `progress` gets the fraction done, up to 1.
 ///
-/// `other_unit`: also if it is of another unit; refused by the device else.
+/// `other_unit`: accept a calibration of another unit, which the device otherwise refuses.
 ///
-/// Whatever fails, the device stores either the old calibration or the new one, complete. The error says which, if the device still
-/// answers.
+/// After any failure the device stores either the old or the new calibration, complete. The error says which, if the device still answers.
 pub fn upload(
     session: &mut Session,
     image: &Image,
@@ -100,7 +99,7 @@ pub fn upload(
     })
 }
 
-/// Sends it once; `false` if the device has forgotten the beginning.
+/// One attempt; returns `false` if the device has lost the first part.
 fn send(
     session: &mut Session,
     image: &Image,
@@ -125,7 +124,7 @@ fn send(
         match session.attempt(chunk, purpose, PATIENCE)? {
             Answer::Done => offset += part.len(),
             Answer::Refused(Refusal::NoUpload) => return Ok(false),
-            // It knows better what it has.
+            // The device knows best how much it has received.
             Answer::Refused(Refusal::WrongOffset { expected }) if (expected as usize) < offset => {
                 offset = expected as usize;
             }
@@ -137,7 +136,7 @@ fn send(
     let purpose = "to store the calibration";
     match session.attempt(Request::UploadCommit, purpose, COMMIT)? {
         Answer::Done => {}
-        // Either it restarted in between, or it has stored it and the answer was lost: the greeting tells the two apart.
+        // Either the device restarted, or it stored the calibration and its answer was lost. The greeting distinguishes the two.
         Answer::Refused(Refusal::NoUpload) => {
             return Ok(session
                 .hello()?
@@ -163,8 +162,8 @@ fn send(
     Ok(true)
 }
 
-/// A warning if the device is now at a temperature that a calibration is not for: outside its curves, or for a calibration at one
-/// temperature by more than 5 K. `None` if it is not, or if what it is for is not known; a tenth of a second of its raw stream is looked at.
+/// A warning if the device's present temperature is outside the calibration's range: outside its curves or, for a calibration at one temperature,
+/// more than 5 K away. Measured in a tenth of a second of the raw stream. `None` if it is inside, or if the range is unknown.
 pub fn outside_now(session: &mut Session, calibration: &Calibration) -> Result<Option<String>> {
     let Some([from, to]) = calibration.limits() else {
         return Ok(None);
@@ -183,7 +182,7 @@ pub fn outside_now(session: &mut Session, calibration: &Calibration) -> Result<O
     }))
 }
 
-/// `error`, with what the device holds now.
+/// `error`, with the calibration that the device stores now.
 fn told(session: &mut Session, image: &Image, error: Error) -> Error {
     let holds = match session.hello() {
         Ok(who) => match &who.stored {
@@ -196,7 +195,7 @@ fn told(session: &mut Session, image: &Image, error: Error) -> Error {
     error.map(|e| e.problem = format!("{}; {holds}", e.problem).replace("; ", ", "))
 }
 
-/// The calibration in use, as the device stores it: read in parts, its hash compared with that of the greeting.
+/// The calibration in use, as the device stores it: read in parts, and checked against the greeting's hash.
 pub fn download(session: &mut Session) -> Result<Vec<u8>> {
     let Some(info) = session.hello()?.stored.clone() else {
         let [a, b] = &session.who().slots;

@@ -1,5 +1,5 @@
-//! A procedure over temperature, carried out: the chamber is led along its temperatures, the table through its dwells and turns, and one
-//! recording is made of all of it.
+//! Carries out a procedure over temperature: sets the chamber's temperatures, moves the table through dwells and turns, and makes one recording of it
+//! all.
 
 mod checked;
 mod equipment;
@@ -21,29 +21,29 @@ use sequence::{Seen, Sequence};
 pub use needs::Equipped;
 pub use progress::Progress;
 
-/// What became of a procedure: the result of `mimu thermal record`.
+/// Result of `mimu thermal record`.
 #[derive(Debug, Serialize)]
 pub struct CarriedOut {
     /// `mimu-thermal-record/1`.
     pub format: &'static str,
     /// Completed dwells and turns.
     pub dwells_done: usize,
-    /// As planned.
+    /// Planned dwells and turns.
     pub dwells_planned: usize,
     /// Completed rounds.
     pub rounds_done: usize,
-    /// As planned.
+    /// Planned rounds.
     pub rounds_planned: usize,
-    /// Whether a table moved the unit: its inputs are known then, and gravity alone otherwise.
+    /// Whether a table moved the unit. Then the inputs are known; otherwise only gravity is.
     pub table: bool,
-    /// Temperatures that the chamber was set to on the way.
+    /// Number of temperatures that the chamber was set to.
     pub set_points: usize,
-    /// What the chamber was left at, °C; `None` without one.
+    /// Temperature that the chamber was left at, °C; `None` without a chamber.
     pub rest_c: Option<f64>,
-    /// Why it ended before it was to: the recording is whole up to there.
+    /// Why it ended early. The recording is complete up to that point.
     #[serde(serialize_with = "as_words")]
     pub cut_short: Option<Error>,
-    /// What could not be brought to rest.
+    /// Equipment that could not be brought to rest.
     #[serde(serialize_with = "each_as_words")]
     pub not_at_rest: Vec<Error>,
     /// The recording.
@@ -58,10 +58,10 @@ fn each_as_words<S: Serializer>(of: &[Error], to: S) -> std::result::Result<S::O
     to.collect_seq(of.iter().map(Error::to_string))
 }
 
-/// Carries out `procedure` with `equipped`, and records into what `options` say. `stop` is asked many times a second whether somebody
-/// has had enough; `show` is shown how it stands; `finishing` as of [`record`].
+/// Carries out `procedure` with `equipped`, and records with `options`. `stop` is called many times a second, and returns true to end the procedure;
+/// `show` is given the progress; `finishing` as for [`record`].
 ///
-/// An error means that no recording was made. The table is at rest and the chamber at its temperature of rest whatever happens.
+/// An error means that no recording was made. In every case the table is stopped and the chamber is set to its rest temperature.
 pub fn carry_out(
     session: &mut Session,
     options: &RecordOptions,
@@ -93,7 +93,7 @@ pub fn carry_out(
     };
     let recorded = record(session, options, known, look, finishing);
     let mut run = run.into_inner();
-    // A recording that could not even be begun was never looked at.
+    // If the recording could not even begin, `look` was never called.
     run.rest();
     let done = run.sequence.done();
     let planned = procedure.dwells.len();
@@ -125,14 +125,14 @@ struct Run<'a> {
     procedure: &'a Procedure,
     equipment: Option<Equipment>,
     sequence: Sequence<'a>,
-    /// Whether the unit undergoes what the table was told; without a table nothing was.
+    /// Compares the unit's motion with the commands; `None` without a table.
     checked: Option<Checked>,
     cut_short: Option<Error>,
     not_at_rest: Vec<Error>,
 }
 
 impl Run<'_> {
-    /// What comes next.
+    /// Advances the procedure, and returns the requests to the recording.
     fn look(&mut self, standing: &Standing, stop: &impl Fn() -> bool) -> Wish {
         if standing.ended {
             self.rest();
@@ -179,7 +179,7 @@ impl Run<'_> {
         }
     }
 
-    /// Ends it all; a dwell that runs `spoiled` does not count.
+    /// Ends the procedure. If `spoiled`, the running dwell is discarded.
     fn end(&mut self, error: Error, spoiled: bool) -> Wish {
         self.cut_short = Some(error);
         self.rest();

@@ -1,4 +1,4 @@
-//! Moves and warms the unit: a person with instructions, or a table and a chamber with text commands.
+//! Moves the unit and changes its temperature: a person with instructions, or a table and a chamber with text commands.
 
 mod file;
 mod line;
@@ -12,29 +12,29 @@ pub use text_driver::TextDriver;
 
 use crate::step::Step;
 
-/// Turns the unit, its supply off and on, and warms it.
+/// Moves the unit, switches its supply, and changes its temperature.
 pub trait Driver: Send {
-    /// Why nothing may move now: the interlock; `None` if it may.
+    /// Why motion is blocked by the interlock; `None` if it is allowed.
     fn held(&mut self) -> Result<Option<String>>;
 
-    /// Begins to carry out a step.
+    /// Begins to move to a step.
     fn go(&mut self, step: &Step) -> Result<()>;
 
-    /// Whether it still moves on its way to the step, or in a turn.
+    /// Whether it still moves to the step, or turns by an angle.
     fn busy(&mut self) -> Result<bool>;
 
-    /// Ends all motion.
+    /// Stops all motion.
     fn stop(&mut self) -> Result<()>;
 
-    /// Turns the supply off and on; `false`: a person has to do it.
+    /// Switches the supply off and on. `false`: a person has to do it.
     fn power_cycle(&mut self) -> Result<bool>;
 
-    /// Whether a person has to be told what to do.
+    /// Whether a person needs instructions.
     fn is_person(&self) -> bool {
         false
     }
 
-    /// What it can do beside that, and how far.
+    /// Optional abilities and limits.
     fn abilities(&self) -> Abilities {
         Abilities::default()
     }
@@ -49,7 +49,7 @@ pub trait Driver: Send {
         Err(unable("set a temperature"))
     }
 
-    /// Temperature in the chamber, °C, where it can be asked.
+    /// Temperature in the chamber, °C, if it can be read.
     fn chamber_c(&mut self) -> Result<Option<f64>> {
         Ok(None)
     }
@@ -59,24 +59,24 @@ fn unable(what: &str) -> Error {
     Error::new("driver", format!("it cannot {what}"), "give another one")
 }
 
-/// What a driver can do, and how far.
+/// Abilities and limits of a driver.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Abilities {
-    /// Its file.
+    /// Path of the driver file.
     pub place: String,
-    /// Whether it brings the unit to a pose.
+    /// Whether it moves the unit to a pose.
     pub moves: bool,
-    /// Whether it turns it at a rate.
+    /// Whether it turns the unit at a rate.
     pub rates: bool,
-    /// Axes that it turns by an angle.
+    /// Axes that it can turn by an angle.
     pub turns: Vec<TableAxis>,
-    /// How far its table goes.
+    /// Limits of its table.
     pub limits: Limits,
-    /// Its chamber.
+    /// Limits of its chamber, if it has one.
     pub chamber: Option<ChamberLimits>,
 }
 
-/// What a table can do.
+/// Limits of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
@@ -88,7 +88,7 @@ pub struct Limits {
     pub turn_dps: Option<f64>,
 }
 
-/// What a chamber can do.
+/// Limits of a chamber.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChamberLimits {
     /// Lowest temperature, °C.
@@ -97,11 +97,11 @@ pub struct ChamberLimits {
     pub to_c: f64,
     /// Largest ramp, K/min.
     pub c_per_min: Option<f64>,
-    /// What it is left at, °C.
+    /// Rest temperature, °C.
     pub rest_c: f64,
 }
 
-/// A person, who reads what to do.
+/// A person who reads instructions.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Person;
 
@@ -131,7 +131,7 @@ impl Driver for Person {
     }
 }
 
-/// Several that are all told the same: fixtures side by side, each with its boards.
+/// Several drivers that receive the same commands: fixtures side by side, each with its boards.
 pub struct Together(pub Vec<Box<dyn Driver>>);
 
 impl Driver for Together {

@@ -1,10 +1,10 @@
-//! Equipment that turns and warms a unit, and what is carried out with it.
+//! Equipment that moves a unit and changes its temperature, and procedures with it.
 //!
 //! | module | what it is |
 //! |---|---|
-//! | [`step`] | a dwell that is wanted: which way is up, how fast it turns, how long |
-//! | [`drive`] | what turns and warms the unit: a person, or a table and a chamber that take text commands |
-//! | [`carry_out`] | a procedure over temperature: chamber and table led through a plan, and one recording of it |
+//! | [`step`] | a requested dwell: which direction points up, the rate, and the duration |
+//! | [`drive`] | moves the unit and changes its temperature: a person, or a table and a chamber with text commands |
+//! | [`carry_out`] | a procedure over temperature: moves chamber and table through a plan, and makes one recording of it |
 
 pub mod carry_out;
 pub mod drive;

@@ -1,4 +1,4 @@
-//! One thing to do: a direction that is to point up, a rate about it, and how long.
+//! A requested dwell: the direction that points up, a rate about it, and the duration.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Step {
     /// Direction in the body frame that points up, of length 1.
     pub up: [f64; 3],
-    /// Rate about the upward vertical, deg/s, right-hand rule.
+    /// Rate about the upward vertical, deg/s, by the right-hand rule.
     #[serde(default)]
     pub rate_dps: f64,
     /// Length of the dwell, s.
@@ -16,7 +16,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// At rest.
+    /// A dwell at rest.
     pub fn at_rest(up: Vector3<f64>, dwell_s: f64) -> Self {
         Self {
             up: up.normalize().into(),
@@ -25,17 +25,17 @@ impl Step {
         }
     }
 
-    /// Direction that points up.
+    /// Direction in the body frame that points up.
     pub fn up(&self) -> Vector3<f64> {
         Vector3::from(self.up)
     }
 
-    /// Rate, rad/s in the body frame.
+    /// Angular rate in the body frame, rad/s.
     pub fn rate(&self) -> Vector3<f64> {
         self.up() * self.rate_dps.to_radians()
     }
 
-    /// In a few words.
+    /// Short description.
     pub fn words(&self) -> String {
         let pose = words(&self.up());
         match self.rate_dps {
@@ -45,7 +45,7 @@ impl Step {
     }
 }
 
-/// Axes with their signs, the largest first, of those that are within a factor of three of the largest.
+/// Axes with their signs, the largest first. Includes those within a factor of three of the largest.
 fn parts(up: &Vector3<f64>) -> Vec<(usize, f64)> {
     let largest = up.amax();
     let mut parts: Vec<(usize, f64)> = (0..3)
@@ -56,7 +56,7 @@ fn parts(up: &Vector3<f64>) -> Vec<(usize, f64)> {
     parts
 }
 
-/// `+z face up`, `edge between +x and -y up`, `corner of +x, +y and -z up`; others by their angles to the nearest of these.
+/// `+z face up`, `edge between +x and -y up`, `corner of +x, +y and -z up`. Other poses are named by their angles to the nearest of these.
 pub fn words(up: &Vector3<f64>) -> String {
     let name = |p: &(usize, f64)| {
         let sign = if p.1 < 0.0 { '-' } else { '+' };
@@ -80,10 +80,10 @@ pub fn words(up: &Vector3<f64>) -> String {
     }
 }
 
-/// A box seen from the front right above, its faces named as they lie with `up` upwards: what is on top, in front and to the right.
+/// A box seen from above, front and right, in the pose with `up` upwards, with the names of its top, front and right faces.
 ///
-/// Only faces can be drawn so: an edge or a corner is drawn on its first face, turned so that what is to be lifted is seen, and beside
-/// it stands what to lift.
+/// Only faces can be drawn this way. An edge or a corner is drawn as the pose of its first face, turned so that the part to lift is visible, and a
+/// note says what to lift.
 pub fn sketch(up: &Vector3<f64>) -> [String; 7] {
     let faces: Vec<Vector3<f64>> = parts(up)
         .iter()
@@ -102,7 +102,7 @@ pub fn sketch(up: &Vector3<f64>) -> [String; 7] {
             (*top, Vector3::ith(axis, 1.0))
         }
         [top, one] => (*top, *one),
-        // One of the two orders has the other face to the right, and not hidden to the left.
+        // Of the two orders, only one puts the other face on the right, where it is visible.
         [top, one, other, ..] if top.cross(one) == *other => (*top, *one),
         [top, _, other, ..] => (*top, *other),
     };
@@ -161,7 +161,7 @@ mod tests {
                 .split(|c: char| !(c == '+' || c == '-' || c.is_alphabetic()))
                 .filter(|w| w.starts_with(['+', '-']))
                 .collect();
-            // As they are read, from the top: top, right, front.
+            // In reading order from the top: top, right, front.
             let [top, right, front] = [names[0], names[1], names[2]].map(at);
             assert_eq!(front.cross(&right), top, "{lines}");
             let seen = match lines.contains("lift") {

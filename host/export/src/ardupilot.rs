@@ -1,13 +1,13 @@
 //! Parameters of ArduPilot.
 //!
-//! ArduPilot subtracts from each axis of the readings, before its own scale factors, `c(T) - c(CALTEMP)` and then OFFS, where
-//! `c = 1e-6 (k1 d + k2 d² + k3 d³)` with `d = T - 35 °C`, T held within TMIN to TMAX, which are within -70 to 80 °C. Source: Copter
-//! documentation, "IMU Temperature Calibration"; parameter list, INS_TCAL1_*.
+//! Before its own scale factors, ArduPilot subtracts `c(T) - c(CALTEMP)` and then OFFS from each axis of the readings, where `c = 1e-6 (k1 d + k2 d²
+//! + k3 d³)` with `d = T - 35 °C`. T is clamped to TMIN to TMAX, which lie within -70 to 80 °C. Source: Copter documentation, "IMU Temperature
+//! Calibration"; parameter list, INS_TCAL1_*.
 //!
-//! A calibration at one temperature becomes INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS (of the other units INS_ACC2OFFS, INS_ACC2SCAL,
-//! INS_GYR2OFFS and so on): ArduPilot computes `(accel - offset) * scale` and `gyro - offset`, behind the rotation of the sensor and before
-//! that of the board. Source: libraries/AP_InertialSensor/AP_InertialSensor_Backend.cpp, `_rotate_and_correct_accel` and `_gyro`;
-//! AP_InertialSensor.cpp for names and ranges.
+//! A calibration at one temperature becomes INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS (for the other units INS_ACC2OFFS, INS_ACC2SCAL, INS_GYR2OFFS
+//! and so on). ArduPilot computes `(accel - offset) * scale` and `gyro - offset` after the rotation of the sensor and before that of the board.
+//! Source: libraries/AP_InertialSensor/AP_InertialSensor_Backend.cpp, `_rotate_and_correct_accel` and `_gyro`; AP_InertialSensor.cpp for names and
+//! ranges.
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
@@ -21,22 +21,23 @@ use crate::{Export, Sources, heading, parameters, px4};
 
 /// Reference temperature, °C.
 const REFERENCE_C: f64 = 35.0;
-/// Coefficients are so many times those in SI.
+/// Factor between ArduPilot's coefficients and those in SI.
 const FACTOR: f64 = 1e6;
-/// Temperatures that the limits may have, °C.
+/// Range of the temperature limits, °C.
 const RANGE_C: [f64; 2] = [-70.0, 80.0];
 /// Largest offset that ArduPilot documents for an accelerometer, m/s².
 const MOST_OFFSET: f64 = 3.5;
-/// Scale factors that it documents for one.
+/// Range of an accelerometer's scale factors that it documents.
 const SCALES: [f64; 2] = [0.8, 1.2];
 
-/// What a person knows of the autopilot.
+/// Options of ArduPilot's parameters.
 pub type Options = parameters::Options;
 
-/// Biases over temperature, or offsets and scale factors at one.
+/// Parameters for biases over temperature, or for offsets and scale factors at one temperature.
 ///
 /// # Errors
-/// The calibration is missing; those of [`BiasCubics::of`], [`BiasCubics::of_rest`] or of `Conversion::of`; an offset or a scale factor beyond what ArduPilot takes.
+/// The calibration is missing, an offset or a scale factor exceeds ArduPilot's range, or an error of [`BiasCubics::of`], [`BiasCubics::of_rest`] or
+/// `Conversion::of`.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     if let Some(biases) = from.biases {
         return at_rest(biases, options);
@@ -64,7 +65,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     Ok(export)
 }
 
-/// The range that ArduPilot has of `range_c`.
+/// `range_c`, limited to ArduPilot's range.
 fn cut([from_c, to_c]: [f64; 2], export: &mut Export) -> [f64; 2] {
     let range_c = [from_c.max(RANGE_C[0]), to_c.min(RANGE_C[1])];
     if range_c != [from_c, to_c] {
@@ -74,9 +75,8 @@ fn cut([from_c, to_c]: [f64; 2], export: &mut Export) -> [f64; 2] {
     range_c
 }
 
-/// Coefficients alone: ArduPilot's own calibration over temperature, which is made at rest too, writes no others and leaves the offsets to
-/// the calibrations at one temperature, with their CALTEMP. Source: libraries/AP_InertialSensor/AP_InertialSensor_tempcal.cpp,
-/// `save_calibration`.
+/// Writes the coefficients alone. ArduPilot's own calibration over temperature is made at rest too, and does the same: it leaves the offsets to the
+/// calibrations at one temperature, with their CALTEMP. Source: libraries/AP_InertialSensor/AP_InertialSensor_tempcal.cpp, `save_calibration`.
 fn at_rest(biases: &ThermalBiases, options: &Options) -> Result<Export> {
     let (imu, n) = (options.imu, number(options.imu));
     let mut export = Export::new("ardupilot");
@@ -93,7 +93,7 @@ fn at_rest(biases: &ThermalBiases, options: &Options) -> Result<Export> {
     Ok(export)
 }
 
-/// A sensor in names.
+/// Short name of a sensor in parameter names.
 fn short(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Gyro => "GYR",
@@ -101,7 +101,7 @@ fn short(sensor: Sensor) -> &'static str {
     }
 }
 
-/// A unit in names: the first one has no number.
+/// Number of a unit in parameter names; the first unit has none.
 fn number(imu: u8) -> String {
     match imu {
         1 => String::new(),
@@ -136,7 +136,7 @@ fn at_one_temperature(
     Ok(())
 }
 
-/// An offset, SI.
+/// Parameter of an offset, SI.
 fn offset_parameter(sensor: Sensor, axis: usize, imu: u8, offset: f64) -> Result<Parameter> {
     let (short, number) = (short(sensor), number(imu));
     let name = format!("INS_{short}{number}OFFS_{}", LETTERS[axis]);
@@ -151,7 +151,7 @@ fn offset_parameter(sensor: Sensor, axis: usize, imu: u8, offset: f64) -> Result
     Ok(Parameter::real(name, offset))
 }
 
-/// Range and coefficients.
+/// Parameters of the temperature range and the coefficients.
 fn coefficients(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) {
     let Some(first) = sensors.first() else {
         return;
@@ -179,7 +179,7 @@ fn parameters_of(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) -> R
             continue;
         };
         let short = short(cubics.sensor);
-        // CALTEMP has a number always, and offsets have none of the first unit.
+        // CALTEMP of the first unit has its number; offsets of the first unit have none.
         let name = format!("INS_{short}{imu}_CALTEMP");
         out.push(Parameter::real(name, settled_c));
         let settled = cubics.at(settled_c);

@@ -1,9 +1,9 @@
 //! A C99 header: constants, and functions that convert raw readings to SI as `mimu apply` does, in single precision.
 //!
-//! It needs no library but `<math.h>`, and that only where something follows temperature or time. What it computes is what
-//! [`mimu_core::compensator`] does, in the same order:
+//! The header needs only `<math.h>`, and that only if something depends on temperature or time. It computes the same as [`mimu_core::compensator`],
+//! in the same order:
 //!
-//! 1. errors of the converter's code are taken out of the raw reading, and `x = C u + o` (`PREFIX_gyro`, `PREFIX_accel`);
+//! 1. converter nonlinearity is removed from the raw reading, and `x = C u + o` (`PREFIX_gyro`, `PREFIX_accel`);
 //! 2. C and o at the temperature of the dies, by cubic Hermite pieces as in [`mimu_core::table`] behind the lag of
 //!    [`mimu_core::die`] (`PREFIX_follow`, some times a second);
 //! 3. the other effects are removed from x (`PREFIX_remove_effects`), each evaluated as its regressor is written
@@ -23,7 +23,7 @@ use crate::remaining::{self, Places};
 use crate::{Export, Sources, heading};
 use effects::Effects;
 
-/// What the person has decided about the header.
+/// Options of the header.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
@@ -38,7 +38,7 @@ pub struct Options {
 /// Text of the header.
 ///
 /// # Errors
-/// The calibration is missing; the prefix is no name in C; an effect that no device removes.
+/// The calibration is missing, the prefix is not a valid C identifier, or an effect cannot be removed on a device.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, _) = from.calibration()?;
     let prefix = options.prefix.as_str();
@@ -79,7 +79,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     Ok(export)
 }
 
-/// What a header is made of.
+/// Everything that the header is written from.
 struct Header<'a> {
     prefix: &'a str,
     calibration: &'a Calibration,
@@ -87,29 +87,29 @@ struct Header<'a> {
 }
 
 impl Header<'_> {
-    /// Sensors that are calibrated.
+    /// The calibrated triads.
     fn sensors(&self) -> impl Iterator<Item = Sensor> + '_ {
         let both = Sensor::BOTH.into_iter();
         both.filter(|s| self.calibration.table(*s).is_some())
     }
 
-    /// Whether C and o of `sensor` follow the temperature.
+    /// Whether C and o of `sensor` depend on temperature.
     fn has_curves(&self, sensor: Sensor) -> bool {
         let over = self.calibration.temperature.as_ref();
         over.is_some_and(|over| over.has(sensor))
     }
 
-    /// Whether anything follows the temperature of the dies.
+    /// Whether anything depends on the temperature of the dies.
     fn follows_dies(&self) -> bool {
         Sensor::BOTH.into_iter().any(|s| self.has_curves(s))
     }
 
-    /// Whether there is anything to be told of temperature and time.
+    /// Whether the functions need temperature or time.
     fn follows(&self) -> bool {
         self.follows_dies() || self.effects.is_slow()
     }
 
-    /// Whether something is remembered from one call to the next.
+    /// Whether the functions keep state between calls.
     fn has_state(&self) -> bool {
         self.follows() || !self.effects.is_empty()
     }
@@ -222,7 +222,7 @@ fn twelve(model: &Affine<f64>) -> impl Iterator<Item = f64> + '_ {
     rows.chain(model.offset.iter().copied())
 }
 
-/// The shortest decimals that are this number in single precision, as C has it.
+/// The shortest decimal number that equals this value in single precision, as a C literal.
 fn number(value: f64) -> String {
     format!("{:?}f", value as f32)
 }

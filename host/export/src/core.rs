@@ -1,14 +1,14 @@
-//! The bytes that a device stores, for programs with `mimu-core` ([`mimu_core::stored`]).
+//! A calibration in the encoding of the device, for programs with `mimu-core` ([`mimu_core::stored`]).
 
 use mimu_device::Image;
 use mimu_recording::error::Result;
 
 use crate::{Export, Sources};
 
-/// The bytes of the calibration.
+/// The encoded calibration.
 ///
 /// # Errors
-/// Those of [`Image::new`]: a triad is missing, readings are not in volts, or no device removes an effect.
+/// The errors of [`Image::new`]: a triad is missing, readings are not in volts, or an effect cannot be removed on a device.
 pub fn export(from: &Sources) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let image = Image::new(calibration, place)?;

@@ -1,7 +1,7 @@
-//! Readings in SI as a driver gives them.
+//! Readings in SI, as converted by a driver.
 //!
-//! Many programs get readings that a driver has already converted, axis by axis: `y_i = si_per_raw_i (u_i - zero_i)`. What they hold
-//! is then about y, while a calibration is about the raw readings u.
+//! Many programs receive readings that a driver has converted axis by axis: `y_i = si_per_raw_i (u_i - zero_i)`. Their calibrations apply to y, while
+//! a calibration file applies to the raw readings u.
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::{Conversion, KnownConversion};
@@ -12,7 +12,7 @@ use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::{Matrix3, Vector3};
 
-/// What a person knows of the driver.
+/// The user's knowledge of the driver.
 #[derive(Debug, Clone, Default)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
@@ -30,7 +30,7 @@ pub struct Options {
     pub accel_zero: Option<f64>,
 }
 
-/// How a driver's readings of a triad depend on the input, and back.
+/// Relation between the input and a driver's readings of a triad, in both directions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Readings {
     /// The triad.
@@ -44,7 +44,7 @@ pub struct Readings {
 }
 
 impl Options {
-    /// How the driver converts, as far as a person knows it.
+    /// Conversions of the drivers, as far as the user knows them.
     pub fn conversions(&self) -> PerSensor<KnownConversion> {
         PerSensor {
             gyro: KnownConversion {
@@ -58,10 +58,11 @@ impl Options {
         }
     }
 
-    /// Refuses options that nothing uses: without a calibration nobody knows what a driver's factor has to be.
+    /// Refuses options that would be ignored. Without a calibration, a driver's factor has nothing to be compared with.
     ///
     /// # Errors
-    /// There is an option.
+    ///
+    /// An option is given.
     pub fn unused(&self) -> Result<()> {
         let given = [
             (
@@ -93,8 +94,8 @@ impl Options {
         }
     }
 
-    /// The driver's readings of `sensor`. A factor that nobody has given is 1 for readings in SI, and else one over the scale factor
-    /// of the axis: the driver then converts as well as three factors can.
+    /// The driver's readings of `sensor`. If no factor is given, it is 1 for readings in SI, and otherwise one over the scale factor of the axis: the
+    /// best conversion by three factors.
     ///
     /// # Errors
     /// `sensor` is not calibrated; C is singular.
@@ -143,7 +144,7 @@ impl Options {
 }
 
 impl Readings {
-    /// What the driver does, for the head of a file.
+    /// Describes the driver's conversion for the head of a file.
     pub fn line(&self) -> String {
         let [factors, zeros] = [self.conversion.si_per_raw, self.conversion.zero_raw];
         let list = |values: [f64; 3]| values.map(|v| format!("{v:.6e}")).join(", ");

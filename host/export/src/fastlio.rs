@@ -1,7 +1,7 @@
 //! Noise for FAST-LIO: acc_cov, gyr_cov, b_acc_cov and b_gyr_cov of its configuration.
 //!
-//! All four are variances of one sample at the rate of the messages: with each, the filter adds `(dt F_w) Q (dt F_w)ᵀ` with these on the
-//! diagonal of Q. White noise N then has the variance `N² rate`, and a bias whose variance grows by `K² dt` a message has `K² rate`.
+//! All four are variances of one sample at the message rate: with each sample the filter adds `(dt F_w) Q (dt F_w)ᵀ`, with these on the diagonal of
+//! Q. White noise N has the variance `N² rate`. A bias whose variance grows by `K² dt` per message has the variance `K² rate`.
 //! Source: hku-mars/FAST_LIO, src/IMU_Processing.hpp, `UndistortPcl`; include/IKFoM_toolkit/esekfom/esekfom.hpp, `predict` (2024-07);
 //! config/*.yaml on main and on its branch ROS2.
 
@@ -10,14 +10,14 @@ use mimu_recording::error::Result;
 use crate::worst_axis::{NoiseOptions, line};
 use crate::{Export, Sources, heading};
 
-/// What the person has decided about the file.
+/// Options of the file.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
     /// Layout of parameters in ROS 2
     #[cfg_attr(feature = "clap", arg(long))]
     pub ros2: bool,
-    /// What all files of noise have to be told.
+    /// Options common to all noise files.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub noise: NoiseOptions,
 }
@@ -25,7 +25,7 @@ pub struct Options {
 /// The keys of the inertial unit.
 ///
 /// # Errors
-/// The noise is missing; those of [`crate::worst_axis::WalkOptions::densities`].
+/// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.noise.walks.calibrated(noise)?;

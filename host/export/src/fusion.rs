@@ -1,9 +1,9 @@
 //! Misalignment, sensitivity and offset for Fusion of x-io Technologies: a header in C.
 //!
-//! `calibrated = misalignment (sensitivity ∘ (uncalibrated - offset))`, raw readings to deg/s and g, which is what its AHRS takes. So
-//! misalignment times the diagonal of sensitivity is C, and offset is the bias of the raw readings. The function is
-//! `FusionModelInertial`, and `FusionCalibrationInertial` in versions before 1.3; Python has `imufusion.model_inertial`. Names as in its
-//! example. Source: xioTechnologies/Fusion, Fusion/FusionModel.h, Examples/C/Advanced/main.c (2026-08).
+//! `calibrated = misalignment (sensitivity ∘ (uncalibrated - offset))`, raw readings to deg/s and g, the units of its AHRS. Therefore misalignment
+//! times the diagonal of sensitivity is C, and offset is the bias of the raw readings. The function is `FusionModelInertial`, or
+//! `FusionCalibrationInertial` in versions before 1.3, and `imufusion.model_inertial` in Python. Names as in its example. Source:
+//! xioTechnologies/Fusion, Fusion/FusionModel.h, Examples/C/Advanced/main.c (2026-08).
 
 use std::fmt::Write as _;
 
@@ -19,7 +19,7 @@ use crate::{Export, Sources, heading};
 /// Text of the header.
 ///
 /// # Errors
-/// The calibration is missing; those of [`Misalignment::of`].
+/// The calibration is missing, or an error of [`Misalignment::of`].
 pub fn export(from: &Sources) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let mut export = Export::new("fusion");

@@ -1,4 +1,4 @@
-//! The comments at the head of every file: whose calibration it is, what to compute with it, and what it leaves.
+//! Comments at the head of every file: the calibrated unit, the formula, and the remaining errors.
 
 use mimu::calibration::Calibration;
 use mimu::calibration::thermal_biases::ThermalBiases;
@@ -7,7 +7,7 @@ use mimu::quantity::Sensor;
 
 use crate::{Export, Sources};
 
-/// Lines of a file that is made from a calibration, without comment signs.
+/// Header of a file made from a calibration, without comment signs.
 pub fn of_calibration(calibration: &Calibration, export: &Export) -> Vec<String> {
     let date = calibration.created.as_deref().unwrap_or("an unknown date");
     let mut lines = vec![format!(
@@ -33,7 +33,7 @@ pub fn of_calibration(calibration: &Calibration, export: &Export) -> Vec<String>
     lines
 }
 
-/// Lines of a file that is made from biases over temperature alone, without comment signs.
+/// Header of a file made from biases over temperature alone, without comment signs.
 pub fn of_biases(biases: &ThermalBiases, export: &Export) -> Vec<String> {
     let unit = match &biases.unit_id {
         Some(id) => format!("unit {id}, "),
@@ -55,7 +55,7 @@ pub fn of_biases(biases: &ThermalBiases, export: &Export) -> Vec<String> {
     lines
 }
 
-/// Lines of a file that is made from noise, without comment signs.
+/// Header of a file made from noise, without comment signs.
 pub fn of_noise(noise: &NoiseFile, export: &Export) -> Vec<String> {
     let mut lines = vec![
         format!(
@@ -74,7 +74,7 @@ pub fn of_noise(noise: &NoiseFile, export: &Export) -> Vec<String> {
     lines
 }
 
-/// How long the unit was recorded for its noise.
+/// Length of the recording that the noise was estimated from.
 pub fn noise_from(noise: &NoiseFile) -> String {
     format!(
         "noise of {} from {:.0} s at rest",
@@ -82,21 +82,21 @@ pub fn noise_from(noise: &NoiseFile) -> String {
     )
 }
 
-/// At which temperature a calibration with curves holds, where a format has no place for curves.
+/// For a format without curves: the temperature at which the exported calibration is valid.
 pub fn temperature(calibration: &Calibration) -> Option<String> {
     calibration.temperature.as_ref()?;
     let temp_c = calibration.recording.temp_c?;
     Some(format!("The numbers are those at {temp_c:.1} °C."))
 }
 
-/// What to tell a person who gives a calibration to a program that has no place for one.
+/// A note on a calibration that a program cannot take.
 pub fn needs_calibrated(from: &Sources) -> Option<String> {
     from.calibration.map(|_| {
         "The program has no place for a calibration: it needs calibrated readings, as `mimu apply` and the device make them.".into()
     })
 }
 
-/// The lines below the first ones: for the file and for the terminal.
+/// Lines after the first ones, for the file and the terminal.
 pub fn said(export: &Export) -> Vec<String> {
     let mut lines = export.formulas.clone();
     lines.extend(export.notes.iter().cloned());
@@ -108,7 +108,7 @@ pub fn said(export: &Export) -> Vec<String> {
     lines
 }
 
-/// `lines` as comments that begin with `sign`.
+/// `lines` as comments with the sign `sign`.
 pub fn comments(sign: &str, lines: &[String]) -> String {
     let line = |line: &String| format!("{sign} {line}").trim_end().to_string() + "\n";
     lines.iter().map(line).collect()

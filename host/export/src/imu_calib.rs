@@ -1,8 +1,8 @@
 //! The accelerometer for the ROS package imu_calib: imu_calib.yaml.
 //!
-//! `corrected = SM raw - bias`, the readings of a driver in SI to SI, so SM = C and bias = -o; SM by rows in one list. The node `apply_calib`
-//! has no calibration of the gyro: it subtracts the mean of the first messages, and scale factors and cross terms stay. Source:
-//! dpkoch/imu_calib, src/accel_calib/accel_calib.cpp, `loadCalib` and `applyCalib`; src/apply_calib.cpp (2016-06).
+//! `corrected = SM raw - bias`, readings of a driver, SI to SI. Therefore SM = C and bias = -o; SM is one list by rows. The node `apply_calib` has no
+//! calibration of the gyro: it subtracts the mean of the first messages, and leaves scale factors and cross terms. Source: dpkoch/imu_calib,
+//! src/accel_calib/accel_calib.cpp, `loadCalib` and `applyCalib`; src/apply_calib.cpp (2016-06).
 
 use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
@@ -10,13 +10,13 @@ use mimu_recording::error::Result;
 use crate::remaining::{self, Places, Remaining};
 use crate::{Export, Sources, driver, heading, yaml};
 
-/// What the person has decided about the file.
+/// Options of the file.
 pub type Options = driver::Options;
 
 /// Text of `imu_calib.yaml`.
 ///
 /// # Errors
-/// The calibration is missing of an accelerometer; C is singular.
+/// No accelerometer is calibrated, or C is singular.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let readings = options.readings(calibration, place, Sensor::Accel)?;

@@ -1,8 +1,8 @@
 //! One triad for IMU-TK: acc.calib or gyro.calib.
 //!
-//! `x = T K (raw - B)`, raw readings to SI: nine numbers of T by rows, nine of K, which is diagonal, and three of B. So T K = C, T has ones
-//! on its diagonal, and B is the bias of the raw readings. `load` reads these 21 numbers and stops, so the comments are below them. Source:
-//! imu_tk, include/imu_tk/calibration.h, `CalibratedTriad_` (2016-02).
+//! `x = T K (raw - B)`, raw readings to SI: nine numbers of T by rows, nine of the diagonal matrix K, and three of B. T has ones on its diagonal, so
+//! T K = C, and B is the bias of the raw readings. `load` reads only these 21 numbers, so the comments are below them. Source: imu_tk,
+//! include/imu_tk/calibration.h, `CalibratedTriad_` (2016-02).
 
 use std::fmt::Write as _;
 
@@ -15,7 +15,7 @@ use crate::misalignment::Misalignment;
 use crate::remaining::{self, Places};
 use crate::{Export, Sources, heading};
 
-/// A triad, as the option names it.
+/// The triad that the option names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Triad {
@@ -25,7 +25,7 @@ pub enum Triad {
     Accel,
 }
 
-/// What the person has decided about the file.
+/// Options of the file.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
@@ -37,7 +37,7 @@ pub struct Options {
 /// Text of the file.
 ///
 /// # Errors
-/// The calibration is missing of the triad; those of [`Misalignment::of`].
+/// The triad is not calibrated, or an error of [`Misalignment::of`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let sensor = match options.sensor {

@@ -1,8 +1,7 @@
-//! The two triads as a triangular matrix times a rotation each, with the gyro's g-sensitivity: what Kalibr and OpenVINS hold.
+//! Both triads, each as a triangular matrix times a rotation, with the gyro's g-sensitivity: the parameters of Kalibr and OpenVINS.
 //!
-//! Readings are those of a [driver]: `y = P x + b`, SI to SI. `P = T R` with T triangular and R a rotation is a QR
-//! factorisation from the other side, so that nothing of P is lost: scale factors and non-orthogonality are in T, the misalignment of the
-//! package in R.
+//! Readings are those of a [driver]: `y = P x + b`, SI to SI. `P = T R` with T triangular and R a rotation is the exact counterpart of a QR
+//! factorisation: scale factors and non-orthogonality are in T, the misalignment of the package is in R.
 
 use mimu::calibration::Calibration;
 use mimu::quantity::{PerSensor, Sensor};
@@ -13,45 +12,45 @@ use crate::driver::{self, Readings};
 use crate::remaining::{self, Places, Remaining};
 use crate::{Export, heading};
 
-/// Id of the effect that has a place here.
+/// Id of the only effect that these formats can store.
 const G_SENSITIVITY: &str = "gyro_g_sensitivity";
 
 /// Which half of the matrix is not zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Triangle {
-    /// Below the diagonal.
+    /// Below and on the diagonal.
     Lower,
-    /// Above it.
+    /// Above and on the diagonal.
     Upper,
 }
 
-/// A matrix as `triangle * rotation`.
+/// Factors of a matrix `triangle * rotation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Factors {
     /// Triangular.
     pub triangle: Matrix3<f64>,
-    /// Orthogonal, with the determinant 1.
+    /// Orthogonal, with determinant 1.
     pub rotation: Matrix3<f64>,
 }
 
-/// Both triads.
+/// Intrinsics of both triads.
 #[derive(Debug, Clone)]
 pub struct Intrinsics {
-    /// `P = T R`; R turns from the body frame of the calibration to that of the triad.
+    /// `P = T R`; R rotates from the calibration's body frame to the triad's frame.
     pub factors: PerSensor<Factors>,
     /// Error of the gyro's readings by the specific force in the body frame, (rad/s)/(m/s²).
     pub g_sensitivity: Matrix3<f64>,
     /// The driver's readings.
     pub readings: PerSensor<Readings>,
-    /// What of the calibration has no place here.
+    /// Parts of the calibration that are not included.
     pub remaining: Vec<Remaining>,
 }
 
 impl Factors {
-    /// Of a regular matrix. Where the axes are mirrored, the diagonal is negative on the one that fits an inverted sensor best, as no
-    /// rotation inverts one axis alone.
+    /// Factors of a regular matrix. If the axes are mirrored, no rotation can invert one alone: the diagonal is then negative for the axis that looks
+    /// most like an inverted sensor.
     pub fn of(matrix: &Matrix3<f64>, half: Triangle) -> Self {
-        // Rows and columns in reverse order make an upper triangle of a lower one.
+        // Reversing rows and columns turns a lower triangle into an upper one.
         let reverse = match half {
             Triangle::Lower => Matrix3::identity(),
             Triangle::Upper => Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0),
@@ -73,10 +72,10 @@ impl Factors {
 }
 
 impl Intrinsics {
-    /// Of both triads of `calibration`.
+    /// Intrinsics of both triads of `calibration`.
     ///
     /// # Errors
-    /// Those of [`driver::Options::readings`].
+    /// The errors of [`driver::Options::readings`].
     pub fn of(
         calibration: &Calibration,
         place: &str,
@@ -90,12 +89,12 @@ impl Intrinsics {
         let mut sag = Matrix3::zeros();
         for effect in calibration.effects() {
             if effect.id() == G_SENSITIVITY {
-                // Coefficients are by rows; those that the experiment did not show are absent.
+                // Coefficients are by rows. Those that the experiment did not determine are absent.
                 let known = effect.candidate.active.iter().zip(&effect.values);
                 known.for_each(|(k, value)| sag[(k / 3, k % 3)] += value);
             }
         }
-        // An effect is in SI of each sensor's own axis: x = C (u - S e) + o.
+        // Effects are in SI along each sensor's axis: x = C (u - S e) + o.
         let gain = Vector3::from(readings.gyro.noise_gain());
         let places = Places {
             cross_terms: true,
@@ -112,7 +111,7 @@ impl Intrinsics {
         })
     }
 
-    /// What every file with intrinsics says of them.
+    /// Adds the notes common to all files with intrinsics.
     pub fn describe(self, calibration: &Calibration, export: &mut Export) {
         export.notes.extend(heading::temperature(calibration));
         for sensor in [Sensor::Accel, Sensor::Gyro] {
@@ -153,7 +152,7 @@ mod tests {
                 assert!((other - Matrix3::from_diagonal(&triangle.diagonal())).amax() < 1e-12);
             }
         }
-        // One inverted axis is a negative diagonal there, and hardly a rotation.
+        // An inverted axis appears as a negative diagonal, with almost no rotation.
         let Factors { triangle, rotation } = Factors::of(&(inverted * p), Triangle::Lower);
         assert!(triangle[(1, 1)] < -0.9 && (rotation - Matrix3::identity()).amax() < 0.1);
     }

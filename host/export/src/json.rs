@@ -1,7 +1,7 @@
-//! JSON with everything that a calibration file has, under the same names, and a schema of it.
+//! JSON with the contents of a calibration file under the same names, and its schema.
 //!
-//! Nothing is left out, so that a program needs no other file: C, o, P and b, the physical quantities, standard deviations, intervals,
-//! covariance, effects and curves. Units are in the names, or beside as `unit` and `raw_unit`.
+//! The file is complete: C, o, P and b, the physical quantities, standard deviations, intervals, covariance, effects and curves. Units are in the
+//! names, or next to the values as `unit` and `raw_unit`.
 
 use mimu::calibration::Calibration;
 use mimu_recording::error::{Error, Result};
@@ -26,7 +26,7 @@ struct CalibrationJson<'a> {
 /// Text of the file.
 ///
 /// # Errors
-/// The calibration is missing; an effect that this build cannot evaluate.
+/// The calibration is missing, or this build cannot evaluate an effect.
 pub fn export(from: &Sources) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let mut export = Export::new("json");
@@ -61,6 +61,6 @@ pub fn schema() -> String {
     let schema = settings
         .into_generator()
         .into_root_schema_for::<CalibrationJson>();
-    // A value that was just made has only keys that are text.
+    // Serialising cannot fail: all keys are strings.
     serde_json::to_string_pretty(&schema).unwrap_or_default() + "\n"
 }

@@ -2,19 +2,18 @@
 //!
 //! Noise: continuous-time densities of the worst axis ([`crate::worst_axis`]).
 //!
-//! Intrinsics, where a calibration is given: those of `--imu-models scale-misalignment`, true to reading, SI to SI,
+//! Intrinsics, if a calibration is given: those of `--imu-models scale-misalignment`, true input to reading, SI to SI,
 //!
 //! ```text
 //! accelerometer = M a + b,   gyroscope = M C_gyro_i w + A C_gyro_i a + b
 //! ```
 //!
-//! with M lower triangular. That of the accelerometer has no rotation, so it defines the frame i that a and w are given in: where
-//! `P = M R` for the accelerometer, `x_i = R x_body`. Of the gyro `P = M Q`, hence `C_gyro_i = Q Rᵀ`, and `A = G Qᵀ` of a g-sensitivity G
-//! in the body frame.
+//! with M lower triangular. The accelerometer's matrix includes no rotation, so it defines the frame i of a and w: with `P = M R` for the
+//! accelerometer, `x_i = R x_body`. With `P = M Q` for the gyro, `C_gyro_i = Q Rᵀ`. A g-sensitivity G in the body frame gives `A = G Qᵀ`.
 //!
-//! Kalibr estimates these itself and starts from the identity; keys that it does not read it passes on to its result. The layout of the
-//! result has everything below `imu0`. Source: ethz-asl/kalibr, kalibr_imu_camera_calibration/IccSensors.py,
-//! `IccScaledMisalignedImu`; kalibr_common/ConfigReader.py, `ImuParameters` (2024-03).
+//! Kalibr estimates these itself and starts from the identity. It passes keys that it does not read on to its result, whose layout has everything
+//! below `imu0`. Source: ethz-asl/kalibr, kalibr_imu_camera_calibration/IccSensors.py, `IccScaledMisalignedImu`; kalibr_common/ConfigReader.py,
+//! `ImuParameters` (2024-03).
 
 use std::fmt::Write as _;
 
@@ -26,7 +25,7 @@ use crate::intrinsics::{Intrinsics, Triangle};
 use crate::worst_axis::{Densities, NoiseOptions, line};
 use crate::{Export, Sources, driver, heading, yaml};
 
-/// What the person has decided about Kalibr's file.
+/// Options of Kalibr's file.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
@@ -39,10 +38,10 @@ pub struct Options {
     /// Layout of Kalibr's result (below imu0), for programs that read this layout
     #[cfg_attr(feature = "clap", arg(long))]
     pub result: bool,
-    /// What all files of noise have to be told.
+    /// Options common to all noise files.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub noise: NoiseOptions,
-    /// How the messages came about.
+    /// The driver's conversion.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub driver: driver::Options,
 }
@@ -50,7 +49,7 @@ pub struct Options {
 /// Text of `imu.yaml`.
 ///
 /// # Errors
-/// The noise is missing; those of [`crate::worst_axis::WalkOptions::densities`] and of [`Intrinsics::of`].
+/// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`] or [`Intrinsics::of`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let mut export = Export::new("kalibr");
@@ -102,7 +101,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     Ok(export)
 }
 
-/// The four keys that Kalibr and OpenVINS have in common.
+/// The four noise keys that Kalibr and OpenVINS share.
 pub fn write_densities(out: &mut String, indent: &str, densities: &PerSensor<Densities>) {
     for sensor in [Sensor::Accel, Sensor::Gyro] {
         let (prefix, units) = match sensor {

@@ -1,18 +1,17 @@
 //! Calibrations and noise in the formats of other programs.
 //!
-//! One file for each format, with its options, its formula and its source. To add a format: write its file, and add its variant to
-//! [`Format`].
+//! Each format has a file with its options, its formula and its source. To add a format, write its file and add its variant to [`Format`].
 //!
-//! | module | what |
+//! | module | contents |
 //! |---|---|
 //! | [`kalibr`], [`openvins`], [`px4`], [`core`] ... | one format each |
-//! | [`worst_axis`] | noise as programs take it that have one number for three axes |
-//! | [`driver`] | readings in SI as a driver gives them |
+//! | [`worst_axis`] | noise for programs that have one number for three axes |
+//! | [`driver`] | readings in SI, as converted by a driver |
 //! | [`misalignment`] | misalignment times sensitivity, for IMU-TK and Fusion |
 //! | [`intrinsics`] | triangular matrices and rotations, for Kalibr and OpenVINS |
-//! | [`remaining`] | the errors that a format leaves because it has no place for a part of the calibration |
+//! | [`remaining`] | errors that remain because a format cannot store a part of the calibration |
 //! | [`heading`] | the comments at the head of every file |
-//! | [`parameters`] | parameters of autopilots, and how files hold them |
+//! | [`parameters`] | parameters of autopilots, and their file layouts |
 
 pub mod ardupilot;
 pub mod c;
@@ -55,7 +54,7 @@ use serde::Serialize;
 use crate::parameters::Parameter;
 use crate::remaining::Remaining;
 
-/// A format, with what a person decides about it.
+/// A format with its options.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Subcommand))]
 pub enum Format {
@@ -101,34 +100,34 @@ pub enum Format {
     Core,
 }
 
-/// What an export is made from.
+/// Sources of an export.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sources<'a> {
-    /// The calibration, and the file that it is from.
+    /// The calibration, and its file.
     pub calibration: Option<(&'a Calibration, &'a str)>,
-    /// In its place, biases over temperature of a unit that only lay still: for [formats that take them](Format::takes_biases).
+    /// Instead of a calibration: biases over temperature of a unit that stayed at rest, for [formats that take them](Format::takes_biases).
     pub biases: Option<&'a ThermalBiases>,
     /// Noise of the unit.
     pub noise: Option<&'a NoiseFile>,
 }
 
-/// What was made for another program.
+/// An exported file.
 #[derive(Debug, Clone, Serialize)]
 pub struct Export {
     /// `mimu-export/1`.
     pub format: &'static str,
-    /// The format, as the command names it.
+    /// Name of the format in the command.
     pub to: &'static str,
-    /// What the program computes with the file, one line each.
+    /// Formulas that the program computes with the file, one line each.
     pub formulas: Vec<String>,
-    /// What a person has to know or to do.
+    /// Notes for the user.
     pub notes: Vec<String>,
-    /// What of the calibration has no place in the file, and the error that this leaves.
+    /// Parts of the calibration that the file cannot store, and the errors that remain.
     pub remaining: Vec<Remaining>,
-    /// In the order of the file, where it consists of parameters.
+    /// Parameters in the order of the file, if it consists of parameters.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Parameter>,
-    /// Biases over temperature, where the format holds them as cubics.
+    /// Biases over temperature, if the format stores them as cubics.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cubics: Vec<BiasCubics>,
     /// Bytes of the file.
@@ -137,7 +136,7 @@ pub struct Export {
 }
 
 impl Export {
-    /// One without content yet.
+    /// An export without content.
     pub fn new(to: &'static str) -> Self {
         Self {
             format: "mimu-export/1",
@@ -153,10 +152,10 @@ impl Export {
 }
 
 impl Sources<'_> {
-    /// The calibration, and the file that it is from.
+    /// The calibration and its file.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no calibration.
     pub fn calibration(&self) -> Result<(&Calibration, &str)> {
         self.calibration.ok_or_else(|| {
             Error::new(
@@ -168,10 +167,10 @@ impl Sources<'_> {
         })
     }
 
-    /// The noise.
+    /// The noise of the unit.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no noise.
     pub fn noise(&self) -> Result<&NoiseFile> {
         self.noise.ok_or_else(|| {
             Error::new(
@@ -185,7 +184,7 @@ impl Sources<'_> {
 }
 
 impl Format {
-    /// Whether it has a place for the noise of a unit.
+    /// Whether it stores the noise of a unit.
     pub fn has_noise(&self) -> bool {
         matches!(
             self,
@@ -198,12 +197,12 @@ impl Format {
         )
     }
 
-    /// Whether biases over temperature alone are enough for it.
+    /// Whether it can be written from biases over temperature alone.
     pub fn takes_biases(&self) -> bool {
         matches!(self, Self::Px4(_) | Self::ArduPilot(_))
     }
 
-    /// Files that it reads beside its [`Sources`]: no result may take their place.
+    /// Files that it reads in addition to its [`Sources`]; output must not overwrite them.
     pub fn inputs(&self) -> Vec<PathBuf> {
         match self {
             Self::Mcap(options) => ["recording.toml", "samples.csv", "samples.parquet"]
@@ -216,7 +215,7 @@ impl Format {
     /// The file of this format.
     ///
     /// # Errors
-    /// A source is missing; the calibration or the noise has no place in the format, as each module says.
+    /// A source is missing, or the format cannot store the calibration or the noise, as each module describes.
     pub fn export(&self, from: &Sources) -> Result<Export> {
         match self {
             Self::C(options) => c::export(from, options),

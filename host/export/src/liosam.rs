@@ -1,8 +1,8 @@
 //! Noise for LIO-SAM: imuAccNoise, imuGyrNoise, imuAccBiasN, imuGyrBiasN and imuGravity of params.yaml.
 //!
-//! Continuous-time densities: their squares are the `accelerometerCovariance` and `gyroscopeCovariance` of GTSAM's preintegration, which
-//! divides by dt, and a bias may move by `imuAccBiasN √Δt` between key frames. Source: TixiaoShan/LIO-SAM, src/imuPreintegration.cpp
-//! (2023-04), the same on its branch ros2; include/utility.h for the names.
+//! Continuous-time densities. Their squares are the `accelerometerCovariance` and `gyroscopeCovariance` of GTSAM's preintegration, which divides by
+//! dt. Between key frames, a bias may change by `imuAccBiasN √Δt`. Source: TixiaoShan/LIO-SAM, src/imuPreintegration.cpp (2023-04), the same on its
+//! branch ros2; include/utility.h for the names.
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,7 @@ use mimu_recording::error::Result;
 use crate::worst_axis::{GravityOptions, WalkOptions, line};
 use crate::{Export, Sources, heading};
 
-/// What the person has decided about the file.
+/// Options of the file.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
@@ -29,7 +29,7 @@ pub struct Options {
 /// The keys of the inertial unit.
 ///
 /// # Errors
-/// The noise is missing; those of [`WalkOptions::densities`].
+/// The noise is missing, or an error of [`WalkOptions::densities`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.walks.calibrated(noise)?;

@@ -1,16 +1,16 @@
-//! An MCAP file for Foxglove: samples of a recording raw and compensated, and its poses on the sphere of gravity with what they err by.
+//! An MCAP file for Foxglove: raw and compensated samples of a recording, and its poses on the sphere of gravity with their residuals.
 //!
-//! Everything is JSON, which Foxglove plots and every reader of MCAP decodes. The alternative, sensor_msgs/Imu of ROS 2, has no place for
-//! raw readings and spends 216 of its 320 bytes on covariances that are the same in each message.
+//! All messages are JSON, which Foxglove plots and every MCAP reader decodes. The alternative, sensor_msgs/Imu of ROS 2, has no field for raw
+//! readings, and 216 of its 320 bytes are covariances that repeat in each message.
 //!
-//! | topic | schema | what |
+//! | topic | schema | contents |
 //! |---|---|---|
-//! | `/raw` | `mimu.Raw` | readings as they were recorded |
+//! | `/raw` | `mimu.Raw` | recorded readings |
 //! | `/compensated` | `mimu.Compensated` | the same sample as `mimu apply` writes it: rad/s and m/s² |
-//! | `/dwells` | `foxglove.SceneUpdate` | each dwell of the accelerometer: a point on the sphere, and its residual as an arrow |
+//! | `/dwells` | `foxglove.SceneUpdate` | each dwell of the accelerometer: a point on the sphere, with its residual as an arrow |
 //!
-//! A dwell's force is the mean of its compensated samples, in units of gravity. Its residual is that minus the known force, or, where only
-//! gravity is known, minus the force of that size in the same direction; arrows are enlarged by one factor, which is in the metadata.
+//! A dwell's force is the mean of its compensated samples, in units of gravity. Its residual is that mean minus the known force. If only gravity is
+//! known, it is that mean minus a force of this magnitude in the same direction. All arrows are enlarged by one factor, given in the metadata.
 
 mod scene;
 
@@ -34,7 +34,7 @@ use crate::remaining::{self, Places};
 use crate::{Export, Sources, heading};
 use scene::Dwells;
 
-/// What the person has decided about the file.
+/// Options of the file.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
@@ -49,7 +49,7 @@ pub struct Options {
 /// Bytes of the file.
 ///
 /// # Errors
-/// The calibration is missing; the recording cannot be read; those of `mimu apply`.
+/// The calibration is missing, the recording cannot be read, or an error of `mimu apply`.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, _) = from.calibration()?;
     let recording = Recording::open(&options.recording)?;
@@ -106,7 +106,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     Ok(export)
 }
 
-/// Topic, schema's name, and schema.
+/// Topic, name of the schema, and schema.
 type Topic = (&'static str, &'static str, fn() -> Value);
 
 const TOPICS: [Topic; 3] = [
@@ -120,7 +120,7 @@ const RAW: usize = 0;
 const COMPENSATED: usize = 1;
 const DWELLS: usize = 2;
 
-/// The file in memory: it appears whole or not at all.
+/// The file is built in memory, so that it is written complete or not at all.
 struct File {
     writer: Writer<Cursor<Vec<u8>>>,
     channels: [u16; 3],
@@ -185,13 +185,13 @@ fn refused(place: &str, error: &McapError) -> Error {
     Error::new(place, problem, "write fewer samples").about(Argument::Every)
 }
 
-/// Time since the stamps' zero, ns. MCAP has none before it.
+/// Time since the zero of the time stamps, ns. MCAP has no negative times.
 fn nanoseconds(t_s: f64) -> u64 {
-    // Saturates.
+    // The conversion saturates.
     (t_s * 1e9).round() as u64
 }
 
-/// As Foxglove has it.
+/// Time in Foxglove's representation.
 fn time(t_s: f64) -> Value {
     let ns = nanoseconds(t_s);
     json!({"sec": ns / 1_000_000_000, "nsec": ns % 1_000_000_000})
@@ -201,7 +201,7 @@ fn cell(batch: &Batch, channel: usize, row: usize) -> f64 {
     batch.raw[channel].get(row).copied().unwrap_or(f64::NAN)
 }
 
-/// A sample; what has no reading is null.
+/// A sample; a missing reading is null.
 fn sample(batch: &Batch, row: usize, t_s: f64, unit: Option<&str>) -> Value {
     let mut all = Map::new();
     all.insert("timestamp".into(), time(t_s));

@@ -1,26 +1,26 @@
-//! The inverse matrix as a misalignment times a sensitivity of each axis.
+//! The inverse matrix as a misalignment times the sensitivities of the axes.
 
 use mimu::quantity::{AXES, Sensor};
 use mimu_recording::error::{Error, Result};
 use nalgebra::{Matrix3, Vector3};
 
-/// Smallest share of a column that has to be on the diagonal, which is divided by.
+/// Smallest diagonal element relative to its column, which is divided by it.
 const LEAST_ALONG: f64 = 0.1;
 
 /// `C = T K`: T has ones on its diagonal, K is diagonal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Misalignment {
-    /// T.
+    /// The matrix T.
     pub matrix: Matrix3<f64>,
     /// Diagonal of K, SI per raw unit.
     pub sensitivity: Vector3<f64>,
 }
 
 impl Misalignment {
-    /// Of the matrix of an inverse model of `sensor`.
+    /// Factors of the matrix of an inverse model of `sensor`.
     ///
     /// # Errors
-    /// An axis of the readings that hardly sees its own axis of the body: T would hold a permutation.
+    /// An axis of the readings hardly measures the same axis of the body: T would contain a permutation.
     pub fn of(inverse: &Matrix3<f64>, sensor: Sensor) -> Result<Self> {
         let sensitivity = inverse.diagonal();
         for (i, axis) in AXES.iter().enumerate() {

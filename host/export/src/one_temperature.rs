@@ -1,8 +1,7 @@
-//! An offset and a factor of each axis, for autopilots, from a calibration that holds at one temperature.
+//! An offset and a factor for each axis, for autopilots, from a calibration at one temperature.
 //!
-//! Both autopilots compute `x_i = (v_i - offset_i) scale_i` of what the driver makes of a raw reading,
-//! `v_i = si_per_raw_i (u_i - zero_i)`. With `u = P x + b` and the cross terms of P left out, `offset_i = si_per_raw_i (b_i - zero_i)` and
-//! `scale_i = 1 / (si_per_raw_i P_ii)`.
+//! Both autopilots compute `x_i = (v_i - offset_i) scale_i` from the driver's value of a raw reading, `v_i = si_per_raw_i (u_i - zero_i)`. With `u =
+//! P x + b`, and without the cross terms of P, `offset_i = si_per_raw_i (b_i - zero_i)` and `scale_i = 1 / (si_per_raw_i P_ii)`.
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::Conversion;
@@ -15,22 +14,22 @@ use nalgebra::Vector3;
 use crate::remaining::{self, Places};
 use crate::{Export, parameters};
 
-/// Names of the axes in parameters.
+/// Names of the axes in parameter names.
 pub(crate) const LETTERS: [&str; 3] = ["X", "Y", "Z"];
 
-/// Of a triad.
+/// Offsets and factors of a triad.
 pub(crate) struct Offsets {
     pub sensor: Sensor,
-    /// SI.
+    /// Offset, SI.
     pub offset: Vector3<f64>,
-    /// SI of the input by SI of the reading.
+    /// Factor, SI of the input per SI of the reading.
     pub scale: Vector3<f64>,
 }
 
-/// Those of each calibrated sensor, for an autopilot without scale factors of a gyro; what they leave goes to `export`.
+/// Offsets of each calibrated triad. The autopilot has no scale factors for a gyro; the remaining errors are added to `export`.
 ///
 /// # Errors
-/// Those of [`Conversion::of`]; an effect that this build cannot evaluate.
+/// An error of [`Conversion::of`], or this build cannot evaluate an effect.
 pub(crate) fn offsets(
     calibration: &Calibration,
     options: &parameters::Options,
@@ -87,7 +86,7 @@ pub(crate) fn offsets(
     Ok(all)
 }
 
-/// Refuses a value that a parameter does not take.
+/// Refuses a value outside the parameter's range.
 ///
 /// # Errors
 /// It is outside `range`.

@@ -1,19 +1,18 @@
 //! Noise and intrinsics for OpenVINS: kalibr_imu_chain.yaml.
 //!
-//! Noise: the continuous-time densities that Kalibr has ([`crate::worst_axis`]).
+//! Noise: the same continuous-time densities as for Kalibr ([`crate::worst_axis`]).
 //!
-//! Intrinsics, the program's readings to the calibrated ones, SI to SI, in the body frame of the calibration:
+//! Intrinsics, from the program's readings to calibrated ones, SI to SI, in the body frame of the calibration:
 //!
 //! ```text
 //! a = R_IMUtoACCᵀ Ta⁻¹ (reading - b),   w = R_IMUtoGYROᵀ Tw⁻¹ (reading - b - Tg a)
 //! ```
 //!
-//! Ta and Tw are lower triangular in the model "kalibr", upper triangular in "rpng": OpenVINS keeps that half of their inverses only. Both
-//! rotations are used in both models, so the frame stays that of the calibration. Without a calibration the intrinsics are those of
-//! calibrated readings.
+//! Ta and Tw are lower triangular in the model "kalibr" and upper triangular in "rpng": OpenVINS keeps only that half of their inverses. It uses both
+//! rotations in both models, so the frame remains that of the calibration. Without a calibration, the intrinsics are those of calibrated readings.
 //!
-//! Source: rpng/open_vins, ov_msckf/src/core/VioManagerOptions.h and state/Propagator.cpp; config/rpng_sim/kalibr_imu_chain.yaml (2025-11).
-//! Of T_i_b, time_offset and update_rate nothing reads them; they are in its examples, and in Kalibr's result.
+//! Source: rpng/open_vins, ov_msckf/src/core/VioManagerOptions.h and state/Propagator.cpp; config/rpng_sim/kalibr_imu_chain.yaml (2025-11). OpenVINS
+//! does not read T_i_b, time_offset and update_rate, but its examples and Kalibr's result contain them.
 
 use std::fmt::Write as _;
 
@@ -36,7 +35,7 @@ pub enum Model {
     Rpng,
 }
 
-/// What the person has decided about the file.
+/// Options of the file.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
@@ -49,10 +48,10 @@ pub struct Options {
         arg(long, value_name = "TOPIC", default_value = "/imu0")
     )]
     pub rostopic: String,
-    /// What all files of noise have to be told.
+    /// Options common to all noise files.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub noise: NoiseOptions,
-    /// How the messages came about.
+    /// The driver's conversion.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub driver: driver::Options,
 }
@@ -60,7 +59,7 @@ pub struct Options {
 /// Text of `kalibr_imu_chain.yaml`.
 ///
 /// # Errors
-/// The noise is missing; those of [`crate::worst_axis::WalkOptions::densities`] and of [`Intrinsics::of`].
+/// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`] or [`Intrinsics::of`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let mut export = Export::new("openvins");
@@ -103,7 +102,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         }
     };
     let densities = options.noise.walks.densities(noise, &gain)?;
-    // OpenCV wants the version in the first line.
+    // OpenCV requires the version in the first line.
     let mut out = "%YAML:1.0\n\n".to_owned();
     out.push_str(&heading::comments("#", &comments));
     out.push_str("\nimu0:\n");

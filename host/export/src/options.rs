@@ -1,11 +1,11 @@
-//! Numbers in the options of formats.
+//! Parsers of numeric options.
 
 /// A number greater than 0.
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
     number(text, f64::MIN_POSITIVE)
 }
 
-/// A number.
+/// A finite number.
 pub(crate) fn finite(text: &str) -> Result<f64, String> {
     number(text, f64::MIN)
 }

@@ -1,9 +1,8 @@
 //! Noise for ORB-SLAM3: the keys IMU.* of its settings.
 //!
-//! Continuous-time densities: ORB-SLAM3 takes `NoiseGyro √Frequency` for the standard deviation of one sample, and `GyroWalk / √Frequency`
-//! for the step of a bias with each. Source: UZ-SLAMLab/ORB_SLAM3, src/Settings.cc, `readIMU`; src/Tracking.cc, `newParameterLoader`;
-//! src/ImuTypes.cc, `IntegrateNewMeasurement`. The reader of settings without `File.version` takes an integer for the frequency, and
-//! nothing but reals for the others.
+//! Continuous-time densities: ORB-SLAM3 uses `NoiseGyro √Frequency` as the standard deviation of one sample, and `GyroWalk / √Frequency` as the step
+//! of a bias per sample. Source: UZ-SLAMLab/ORB_SLAM3, src/Settings.cc, `readIMU`; src/Tracking.cc, `newParameterLoader`; src/ImuTypes.cc,
+//! `IntegrateNewMeasurement`. The reader of settings without `File.version` accepts an integer for the frequency, and only reals for the others.
 
 use std::fmt::Write as _;
 
@@ -12,13 +11,13 @@ use mimu_recording::error::Result;
 use crate::worst_axis::{NoiseOptions, line};
 use crate::{Export, Sources, heading};
 
-/// What the person has decided about the file.
+/// Options of the file.
 pub type Options = NoiseOptions;
 
 /// The keys of the inertial unit.
 ///
 /// # Errors
-/// The noise is missing; those of [`crate::worst_axis::WalkOptions::densities`].
+/// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.walks.calibrated(noise)?;

@@ -1,4 +1,4 @@
-//! Parameters of autopilots, and how files hold them.
+//! Parameters of autopilots, and their file layouts.
 
 use std::fmt::Write as _;
 
@@ -11,17 +11,17 @@ use crate::driver;
 /// A parameter of an autopilot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Parameter {
-    /// As the autopilot knows it.
+    /// Name in the autopilot.
     pub name: String,
     /// Value, in single precision unless whole.
     pub value: f64,
-    /// MAVLink's type of it: 2 is INT8, 6 INT32, 9 REAL32.
+    /// Its type in MAVLink: 2 is INT8, 6 INT32, 9 REAL32.
     #[serde(skip)]
     kind: u8,
 }
 
 impl Parameter {
-    /// In single precision.
+    /// A value in single precision.
     pub fn real(name: String, value: f64) -> Self {
         let value = f64::from(value as f32);
         Self {
@@ -31,7 +31,7 @@ impl Parameter {
         }
     }
 
-    /// A whole number of 8 bits.
+    /// An integer of 8 bits.
     pub fn int8(name: String, value: i8) -> Self {
         Self {
             name,
@@ -40,7 +40,7 @@ impl Parameter {
         }
     }
 
-    /// A whole number of 32 bits.
+    /// An integer of 32 bits.
     pub fn int32(name: String, value: i32) -> Self {
         Self {
             name,
@@ -49,7 +49,7 @@ impl Parameter {
         }
     }
 
-    /// The shortest decimals, without an exponent, that are this number in single precision.
+    /// The shortest decimal number without an exponent that equals the value in single precision.
     fn text(&self) -> String {
         match self.kind {
             9 => (self.value as f32).to_string(),
@@ -58,7 +58,7 @@ impl Parameter {
     }
 }
 
-/// What PX4 and ArduPilot both have to be told.
+/// Options common to PX4 and ArduPilot.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
@@ -74,23 +74,23 @@ pub struct Options {
     /// File for QGroundControl, five columns with tabs; without it NAME,VALUE for MAVProxy and Mission Planner
     #[cfg_attr(feature = "clap", arg(long))]
     pub qgc: bool,
-    /// How the driver converts.
+    /// The driver's conversion.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub driver: driver::Options,
 }
 
 impl Options {
-    /// How the drivers convert, as far as a person knows it.
+    /// Conversions of the drivers, as far as the user knows them.
     pub fn conversions(&self) -> PerSensor<KnownConversion> {
         self.driver.conversions()
     }
 
-    /// Device ids, as far as a person knows them. Autopilots keep them in signed parameters, bit by bit.
+    /// Device ids, as far as the user knows them. Autopilots store them bit by bit in signed parameters.
     pub fn ids(&self) -> PerSensor<Option<i32>> {
         PerSensor::from([self.gyro_id, self.accel_id]).map(|id| id.map(|id| id as i32))
     }
 
-    /// `parameters` below `comments`, in the layout of the file.
+    /// Comments and parameters in the layout of the file.
     pub fn text(&self, comments: &str, parameters: &[Parameter]) -> String {
         let mut out = comments.to_owned();
         for parameter in parameters {

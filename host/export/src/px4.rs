@@ -1,12 +1,12 @@
 //! Parameters of PX4.
 //!
-//! PX4 subtracts from each axis of the readings, before its own scale factors, a cubic of the temperature that its thermometer shows:
-//! `X0 + X1 d + X2 d² + X3 d³` with `d = T - TREF`, held outside TMIN to TMAX. Source: PX4 User Guide, "Thermal Calibration and
-//! Compensation"; parameter reference, TC_*.
+//! Before its own scale factors, PX4 subtracts a cubic of its thermometer's temperature from each axis of the readings: `X0 + X1 d + X2 d² + X3 d³`
+//! with `d = T - TREF`, where T is clamped to TMIN to TMAX. Source: PX4 User Guide, "Thermal Calibration and Compensation"; parameter reference,
+//! TC_*.
 //!
-//! A calibration at one temperature becomes CAL_ACCn_XOFF, CAL_ACCn_XSCALE and CAL_GYROn_XOFF, n from 0: PX4 computes
-//! `(data - thermal_offset - offset) * scale` of an accelerometer and `data - thermal_offset - offset` of a gyro, which has no scale there.
-//! Source: src/lib/sensor_calibration/Accelerometer.hpp and Gyroscope.hpp, `Correct`; src/modules/sensors/module.yaml.
+//! A calibration at one temperature becomes CAL_ACCn_XOFF, CAL_ACCn_XSCALE and CAL_GYROn_XOFF, n from 0. PX4 computes `(data - thermal_offset -
+//! offset) * scale` for an accelerometer and `data - thermal_offset - offset` for a gyro, which has no scale there. Source:
+//! src/lib/sensor_calibration/Accelerometer.hpp and Gyroscope.hpp, `Correct`; src/modules/sensors/module.yaml.
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::{BiasCubics, KnownConversion};
@@ -19,19 +19,19 @@ use crate::parameters::Parameter;
 use crate::remaining::Remaining;
 use crate::{Export, Sources, heading, parameters, remaining};
 
-/// What a person knows of the autopilot.
+/// Options of PX4's parameters.
 pub type Options = parameters::Options;
 
 const AXES_OF_THE_RECORDING: &str =
     "Axes are those of the recording; they have to be those of the sensor in the autopilot.";
 
-/// Scale that PX4 takes of an accelerometer.
+/// Range of PX4's scale factors of an accelerometer.
 const SCALES: [f64; 2] = [0.1, 3.0];
 
-/// Biases over temperature, or offsets and scale factors at one.
+/// Parameters for biases over temperature, or for offsets and scale factors at one temperature.
 ///
 /// # Errors
-/// The calibration is missing; those of [`BiasCubics::of`], [`BiasCubics::of_rest`] or of `Conversion::of`; a scale factor beyond what PX4 takes.
+/// The calibration is missing, a scale factor exceeds PX4's range, or an error of [`BiasCubics::of`], [`BiasCubics::of_rest`] or `Conversion::of`.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let mut export = Export::new("px4");
     let head = if let Some(biases) = from.biases {
@@ -74,8 +74,8 @@ fn loaded_by(options: &Options, export: &mut Export) {
     }
 }
 
-/// As PX4's own calibration over temperature, which is made at rest too: X0 of a gyro is its bias, that of an accelerometer is 0 at TREF.
-/// Source: src/modules/temperature_compensation/temperature_calibration/gyro.cpp and accel.cpp, `finish_sensor_instance`.
+/// Writes the same as PX4's own calibration over temperature, which is made at rest too: X0 of a gyro is its bias, X0 of an accelerometer is 0 at
+/// TREF. Source: src/modules/temperature_compensation/temperature_calibration/gyro.cpp and accel.cpp, `finish_sensor_instance`.
 fn at_rest(biases: &ThermalBiases, options: &Options, export: &mut Export) -> Result<()> {
     let n = options.imu - 1;
     let [from_c, to_c] = biases.range_c;
@@ -102,7 +102,7 @@ fn at_rest(biases: &ThermalBiases, options: &Options, export: &mut Export) -> Re
     Ok(())
 }
 
-/// The changes of each sensor's readings at rest as cubics; what they leave goes to `export`.
+/// Changes of each sensor's readings at rest as cubics. The remaining errors are added to `export`.
 pub(crate) fn cubics_at_rest(
     biases: &ThermalBiases,
     options: &parameters::Options,
@@ -137,7 +137,7 @@ fn each_sensor(
     Ok(())
 }
 
-/// `cubics` with their formula and what they leave.
+/// Adds `cubics` with their formula and remaining errors.
 fn add(cubics: BiasCubics, export: &mut Export) {
     if let Some(settled_c) = cubics.settled_c {
         export.notes.push(format!(
@@ -220,7 +220,7 @@ fn at_one_temperature(
     Ok(())
 }
 
-/// The biases of each sensor as cubics; what they leave goes to `export`.
+/// Biases of each sensor as cubics. The remaining errors are added to `export`.
 pub(crate) fn cubics(
     calibration: &Calibration,
     options: &parameters::Options,
@@ -239,7 +239,7 @@ pub(crate) fn cubics(
         temperature: true,
         effects: false,
     };
-    // Of what is judged in general, the effects alone: cubics have their own account of the rest.
+    // Of the general errors only those of the effects are added: the cubics report their own.
     let general = remaining::of(calibration, places)?;
     let ids: Vec<String> = calibration.effects().iter().map(|e| e.id()).collect();
     let of_effects = general.into_iter().filter(|r| ids.contains(&r.source));

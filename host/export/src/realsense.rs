@@ -1,11 +1,11 @@
-//! The calibration of the inertial unit in cameras of RealSense's D400 family: the 520 bytes of the EEPROM, or calibration.json.
+//! The calibration of the inertial unit in RealSense cameras of the D400 family: the 520 bytes of the EEPROM, or calibration.json.
 //!
-//! librealsense computes `output = sensitivity reading - bias`, SI to SI, in the frame of the depth sensor (x right, y down, z forward),
-//! so sensitivity = C and bias = -o. Matrices are by columns, floats and integers little endian, except for the version in each header. A
-//! header has the size of what follows and the CRC-32 of it; three of them are nested: EEPROM, calibration info, calibration table.
+//! librealsense computes `output = sensitivity reading - bias`, SI to SI, in the frame of the depth sensor (x right, y down, z forward). Therefore
+//! sensitivity = C and bias = -o. Matrices are by columns. Floats and integers are little endian, except for the version in each header. A header
+//! contains the size and the CRC-32 of what follows it. Three of them are nested: EEPROM, calibration info, calibration table.
 //!
-//! librealsense takes the bias of the gyro for deg/s, so that is what the bytes have. Intel's script writes the mean of readings in rad/s
-//! there, which is then 57 times too small. Its calibration.json has rad/s, as this one.
+//! librealsense reads the bias of the gyro in deg/s, and so the bytes are written. Intel's script writes the mean of readings in rad/s, which is then
+//! 57 times too small. calibration.json is in rad/s, both the script's and this one.
 //!
 //! Source: IntelRealSense/librealsense, src/ds/ds-private.h, `dm_v2_eeprom`; src/ds/ds-calib-parsers.cpp, `get_intrinsic`;
 //! src/proc/motion-transform.cpp, `correct_motion_helper`; tools/rs-imu-calibration/rs-imu-calibration.py, `get_eeprom` (2025-07).
@@ -20,13 +20,13 @@ use serde_json::json;
 use crate::remaining::{self, Places};
 use crate::{Export, Sources, driver, heading};
 
-/// Of the EEPROM.
+/// Size of the EEPROM.
 const BYTES: usize = 520;
-/// What is not used, as the script leaves it.
+/// Value of unused bytes, as in the script.
 const UNUSED: u8 = 0xff;
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// What is written.
+/// Layout of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Layout {
@@ -36,22 +36,22 @@ pub enum Layout {
     Json,
 }
 
-/// What the person has decided about the file.
+/// Options of the file.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
     /// What to write
     #[cfg_attr(feature = "clap", arg(long, value_enum, default_value = "eeprom"))]
     pub layout: Layout,
-    /// How the readings came about.
+    /// The driver's conversion.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub driver: driver::Options,
 }
 
-/// The bytes, or the text.
+/// The bytes or the text.
 ///
 /// # Errors
-/// The calibration is missing, or it lacks a triad; C is singular.
+/// The calibration or a triad of it is missing, or C is singular.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let of = |sensor| options.driver.readings(calibration, place, sensor);
@@ -93,7 +93,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
 }
 
 fn eeprom(accel: &Affine<f64>, gyro: &Affine<f64>) -> Vec<u8> {
-    // Not extrinsic, but intrinsic.
+    // Flags: intrinsic, not extrinsic.
     let mut table = vec![0, 1, 0, 0];
     table.extend([UNUSED; 48]);
     let in_degrees = gyro.offset.map(f64::to_degrees);
@@ -108,7 +108,7 @@ fn eeprom(accel: &Affine<f64>, gyro: &Affine<f64>) -> Vec<u8> {
     with_header([1, 1], 0x09, all)
 }
 
-/// Bytes of a header.
+/// Size of a header.
 const HEADER: usize = 16;
 
 fn with_header(version: [u8; 2], kind: u16, content: Vec<u8>) -> Vec<u8> {

@@ -1,6 +1,6 @@
-//! The errors that a format leaves because it has no place for a part of the calibration.
+//! The errors that remain because a format cannot store a part of the calibration.
 //!
-//! Each is given for an input of 100 deg/s or 1 g, or without input, over the temperatures of the calibration. An error that nobody has
+//! Each error is computed over the temperatures of the calibration, for inputs up to 100 deg/s or 1 g, or without input. An error that was never
 //! measured is unknown, not zero.
 
 use mimu::calibration::bias_cubic::BiasCubics;
@@ -16,9 +16,9 @@ use mimu_recording::error::Result;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-/// Temperatures at which curves are compared with one model.
+/// Number of temperatures at which curves are compared with one model.
 const TEMPERATURES: usize = 101;
-/// Inputs along an axis, from one end to the other, at which effects are evaluated. A prime: no step of it is one of a converter.
+/// Number of inputs along an axis at which effects are evaluated. It is prime, so that the spacing is no multiple of a converter's quantisation step.
 const INPUTS: usize = 97;
 /// Times since power-on at which effects are evaluated, s.
 const AFTER_S: [f64; 2] = [0.0, 3600.0];
@@ -41,7 +41,7 @@ pub struct Remaining {
     pub max: Option<f64>,
 }
 
-/// What of a calibration a format has a place for. Every format has one for the scale factors and biases at one temperature.
+/// Parts of a calibration that a format can store. Every format stores scale factors and biases at one temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Places {
     /// Misalignment and non-orthogonality.
@@ -76,7 +76,7 @@ impl Remaining {
         }
     }
 
-    /// Scale factors and cross terms of readings that a program takes as they are: `matrix` is from the input to them, SI to SI.
+    /// Scale factors and cross terms of readings that a program uses uncorrected; `matrix` maps the input to them, SI to SI.
     pub fn of_readings(sensor: Sensor, matrix: &Matrix3<f64>) -> Self {
         let errors: Vec<_> = inputs(sensor).map(|x| matrix * x - x).collect();
         Self::new(
@@ -87,7 +87,7 @@ impl Remaining {
         )
     }
 
-    /// The Earth's rate in the bias of a gyro that was found at rest, in an attitude that nobody knows.
+    /// The Earth's rate in the bias of a gyro that was calibrated at rest in an unknown attitude.
     pub fn of_earth_rate() -> Self {
         let rate = mimu::estimate::earth::RATE;
         Self {
@@ -95,13 +95,13 @@ impl Remaining {
             source: "Earth's rate in the bias".into(),
             condition: "in other attitudes than that of the recording".into(),
             unit: Sensor::Gyro.unit(),
-            // Counted as bias, it is off by what the unit has turned: by twice the rate where it points the other way.
+            // As part of the bias, it is wrong once the unit is turned: by twice the rate if the unit points the other way.
             rms: Some(rate * f64::sqrt(2.0 / 3.0)),
             max: Some(2.0 * rate),
         }
     }
 
-    /// In one line, in the units that people read.
+    /// One line, in readable units.
     pub fn line(&self) -> String {
         let readable = readable::parameter(self.unit);
         let (sensor, source, condition) = (self.sensor, &self.source, &self.condition);
@@ -116,7 +116,7 @@ impl Remaining {
     }
 }
 
-/// The errors that cubics of the biases leave.
+/// The errors of cubics of the biases.
 pub fn of_cubics(cubics: &BiasCubics) -> Vec<Remaining> {
     let each = cubics.remains.iter().map(|r| Remaining {
         sensor: cubics.sensor,
@@ -129,10 +129,11 @@ pub fn of_cubics(cubics: &BiasCubics) -> Vec<Remaining> {
     each.collect()
 }
 
-/// What `calibration` has and a format with these `places` does not hold, and how well the rest is known.
+/// The errors of a format with these `places`, and the uncertainty of the rest of `calibration`.
 ///
 /// # Errors
-/// An effect that this build cannot evaluate.
+///
+/// This build cannot evaluate an effect.
 pub fn of(calibration: &Calibration, places: Places) -> Result<Vec<Remaining>> {
     let mut all = Vec::new();
     for sensor in Sensor::BOTH {
@@ -177,7 +178,7 @@ fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> R
         return Remaining::unknown(sensor, SOURCE, "the calibration has no intervals");
     };
     let table = calibration.table(sensor);
-    // Intervals are wider than 1.96 sigma where few dwells were fitted: the file has both.
+    // With few dwells, intervals are wider than 1.96 sigma. The file gives both.
     let widened = table
         .and_then(|t| Some(t.interval_o?[0] / t.sigma_o?[0]))
         .filter(|k| k.is_finite());
@@ -197,14 +198,14 @@ fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> R
     Remaining::new(sensor, SOURCE, at_input(sensor), &half.collect::<Vec<_>>())
 }
 
-/// The format has no place for scale factors: a reading changes by `gain` with the input of its axis, and has to by 1.
+/// Error of a format without scale factors: a reading changes by `gain` with the input of its axis instead of by 1.
 pub fn scale_factors(sensor: Sensor, gain: &Vector3<f64>) -> Remaining {
     let errors = inputs(sensor).map(|x| gain.component_mul(&x) - x);
     let errors: Vec<_> = errors.collect();
     Remaining::new(sensor, "scale factors", at_input(sensor), &errors)
 }
 
-/// The format has only a factor and an offset of each axis: what the axes read of inputs across them stays.
+/// Error of a format with one factor and one offset for each axis: cross-axis sensitivity remains.
 fn cross_terms(sensor: Sensor, model: &Affine<f64>) -> Remaining {
     let Some(forward) = Forward::of(model) else {
         return Remaining::unknown(sensor, "cross terms", "C is singular");
@@ -274,7 +275,7 @@ fn over_temperature(
     all
 }
 
-/// Each effect by itself, as the device removes it.
+/// The error of each effect separately, as the device removes it.
 fn effects(calibration: &Calibration) -> Result<Vec<Remaining>> {
     if calibration.effects().is_empty() {
         return Ok(Vec::new());
@@ -343,13 +344,13 @@ fn of_effect(
                     let sample: Sample<f64> = Sample::from_fn(|s| {
                         let x = match s == moved {
                             true => Vector3::ith(axis, share * input(s)),
-                            // Gravity is there while the unit turns.
+                            // Gravity acts on the accelerometer also while the unit turns.
                             false if s == Sensor::Accel => Vector3::ith((axis + 1) % 3, input(s)),
                             false => Vector3::zeros(),
                         };
                         raw[s].matrix * x + raw[s].bias
                     });
-                    // No jump of the input: an angular acceleration is not among the conditions.
+                    // The conditions exclude angular acceleration, so the input must not appear to jump.
                     state.gap();
                     let with = full.apply(&mut state, &sample);
                     errors.push(with[sensor] - models.apply(&sample)[sensor]);

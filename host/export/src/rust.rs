@@ -1,10 +1,10 @@
-//! Source for programs with `mimu-core`: the numbers that a device stores, as constants that a person can read, and a function that makes a
-//! [`Compensator`](mimu_core::compensator::Compensator) of them.
+//! Rust source for programs with `mimu-core`: the stored numbers as readable constants, and a function that builds a
+//! [`Compensator`](mimu_core::compensator::Compensator) from them.
 //!
-//! The alternative, the stored bytes as a constant and [`mimu_core::stored::decode`], is what [`core`](crate::core) writes. Here nothing is
-//! decoded, so that neither the reader nor its checks are in the program, nodes and effects take the room that they need and not that of
-//! 16 and 8, and a change of a calibration shows as a change of its numbers. Every `f32` is the shortest decimal that is it, so that what
-//! is computed is the device's to the last bit.
+//! The alternative, the stored bytes as a constant and [`mimu_core::stored::decode`], is the format [`core`](crate::core). Here nothing is decoded.
+//! The program therefore contains neither the decoder nor its checks, nodes and effects take only the room they need instead of that of 16 and 8, and
+//! a change of the calibration is visible as a change of its numbers. Every `f32` is written as the shortest decimal number that equals it, so that
+//! results match the device's to the last bit.
 
 use std::fmt::Write as _;
 
@@ -23,7 +23,7 @@ use crate::{Export, Sources, heading};
 /// Text of the module.
 ///
 /// # Errors
-/// Those of [`Image::new`]: a triad is missing, readings are not in volts, or no device removes an effect.
+/// The errors of [`Image::new`]: a triad is missing, readings are not in volts, or an effect cannot be removed on a device.
 pub fn export(from: &Sources) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let image = Image::new(calibration, place)?;
@@ -142,7 +142,7 @@ impl Module<'_> {
 
     fn push_effects(&self, out: &mut String) {
         let temperatures: Vec<f64> = self.nodes.iter().map(|n| n.temp_c.into()).collect();
-        // As they are stored: of the C that the effects were found with.
+        // Effects use the C that they were fitted with, as in the stored calibration.
         let at = reference_node(&temperatures).unwrap_or_default();
         let found_with = self.nodes[at].model.as_ref();
         let directions =
@@ -168,7 +168,7 @@ impl Module<'_> {
     }
 }
 
-/// The call that makes an effect.
+/// The expression that constructs an effect.
 fn constructed(effect: &DeviceEffect<f32>) -> String {
     let coefficients = list(effect.coefficients());
     let sensor = format!("Sensor::{:?}", effect.sensor());

@@ -1,11 +1,12 @@
 //! Noise for VINS-Fusion and VINS-Mono: acc_n, gyr_n, acc_w, gyr_w and g_norm of their configuration.
 //!
-//! All four are of one sample at the rate of the messages. `IntegrationBase` adds `V Q Vᵀ` with every message, in which V has the factor dt
-//! for the white noise of both readings, half each, and for the steps of the biases. The variance of a bias thus grows by `dt² acc_w²` a
-//! message, which is `K² dt` for `acc_w = K √rate` (`K √dt`, which is sometimes recommended, leaves the bias hardly any freedom). A reading with the standard deviation `acc_n = N √rate` has white noise N.
+//! All four apply to one sample at the message rate. With every message, `IntegrationBase` adds `V Q Vᵀ`. V contains the factor dt for the white
+//! noise of both readings, half each, and for the steps of the biases. The variance of a bias therefore grows by `dt² acc_w²` per message, which is
+//! `K² dt` for `acc_w = K √rate`. (`K √dt`, which is sometimes recommended, leaves the bias hardly any freedom.) A reading with the standard
+//! deviation `acc_n = N √rate` has white noise N.
 //!
-//! The two readings of a step count as independent there, although each is in two steps: the covariance is then half of what readings of
-//! this noise make. That is within what people add for vibration, so the file has what the keys are named for, and says it.
+//! The two readings of a step count as independent, although each is used in two steps. The covariance is therefore half of the one that such
+//! readings cause. This is less than the margin usually added for vibration, so the file contains the values that the keys are named for, and a note.
 //!
 //! Source: HKUST-Aerial-Robotics/VINS-Fusion, vins_estimator/src/factor/integration_base.h, `midPointIntegration`;
 //! estimator/parameters.cpp (2021-07); VINS-Mono, the same files (2024-05).
@@ -15,11 +16,11 @@ use mimu_recording::error::Result;
 use crate::worst_axis::{GravityOptions, NoiseOptions, line};
 use crate::{Export, Sources, heading};
 
-/// What the person has decided about the file.
+/// Options of the file.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
-    /// What all files of noise have to be told.
+    /// Options common to all noise files.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub noise: NoiseOptions,
     /// Gravity.
@@ -30,7 +31,7 @@ pub struct Options {
 /// The keys of the inertial unit.
 ///
 /// # Errors
-/// The noise is missing; those of [`crate::worst_axis::WalkOptions::densities`].
+/// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.noise.walks.calibrated(noise)?;

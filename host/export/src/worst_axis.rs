@@ -1,12 +1,10 @@
 //! Noise of the worst axis, for programs that have one number for three axes.
 //!
-//! Kalibr and those that were made after it take continuous-time densities: white noise of `density/√dt` a sample, which is N, and a bias
-//! that walks by `random_walk √dt` a sample, which is K (Kalibr wiki, "IMU noise model"). Others take what one sample has, by the rate of
-//! the messages.
+//! Kalibr and similar programs take continuous-time densities (Kalibr wiki, "IMU noise model"). N is the density of white noise: `density/√dt` per
+//! sample. K is that of a bias random walk: `random_walk √dt` per sample. Other programs take values per sample, which depend on the message rate.
 //!
-//! A random walk that the record does not show on some axis is the one given by hand or, without one, the upper end of its interval there:
-//! an estimator that takes a bias for steadier than it is will not follow it, one that takes it for less steady only follows it less
-//! smoothly.
+//! If the record does not show a random walk on some axis, the value given by hand is used or, without one, the upper end of its interval. An
+//! estimator that believes a bias to be too steady cannot follow it; one that believes it to be too unsteady only follows it less smoothly.
 
 use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
 use mimu::quantity::{AXES, PerSensor, Sensor};
@@ -16,7 +14,7 @@ use mimu_recording::error::{Argument, Error, Result};
 
 use crate::{Sources, yaml};
 
-/// What a person decides about noise, whatever the program.
+/// Options of the random walks, the same for all programs.
 #[derive(Debug, Clone, Default)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct WalkOptions {
@@ -28,7 +26,7 @@ pub struct WalkOptions {
     pub accel_walk: Option<f64>,
 }
 
-/// The same, for programs that need the rate too.
+/// Options of programs that need the message rate too.
 #[derive(Debug, Clone, Default)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct NoiseOptions {
@@ -40,7 +38,7 @@ pub struct NoiseOptions {
     pub walks: WalkOptions,
 }
 
-/// Local gravity, for programs that take it beside the noise.
+/// Option of programs that take local gravity with the noise.
 #[derive(Debug, Clone, Default)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct GravityOptions {
@@ -49,33 +47,33 @@ pub struct GravityOptions {
     pub gravity: Option<f64>,
 }
 
-/// A coefficient of the worst axis.
+/// The largest coefficient of the three axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Worst {
-    /// SI.
+    /// Value, SI.
     pub value: f64,
-    /// Axis and interval, or where else it is from.
+    /// Axis and interval, or another origin.
     pub comment: String,
 }
 
 /// White noise and random walk of a triad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Densities {
-    /// N: rad/s/√Hz or m/s²/√Hz.
+    /// N, rad/s/√Hz or m/s²/√Hz.
     pub white: Worst,
-    /// K: rad/s²/√Hz or m/s³/√Hz.
+    /// K, rad/s²/√Hz or m/s³/√Hz.
     pub walk: Worst,
 }
 
 impl NoiseOptions {
-    /// Messages a second.
+    /// Messages per second.
     pub fn rate_hz(&self, noise: &NoiseFile) -> f64 {
         self.update_rate.unwrap_or(noise.sample_rate_hz)
     }
 }
 
 impl GravityOptions {
-    /// m/s², and where it is from.
+    /// Gravity, m/s², and its origin.
     pub fn gravity(&self, from: &Sources) -> (f64, &'static str) {
         let calibrated = from.calibration.and_then(|(c, _)| c.recording.gravity_mps2);
         match (self.gravity, calibrated) {
@@ -87,10 +85,10 @@ impl GravityOptions {
 }
 
 impl WalkOptions {
-    /// N and K of the worst axis of each sensor, times `gain` of the axis: 1 for noise of calibrated readings.
+    /// N and K of the worst axis of each sensor, times `gain` of the axis; 1 for noise of calibrated readings.
     ///
     /// # Errors
-    /// A sensor is missing or not in SI; N is missing on an axis; K is, and nothing bounds it.
+    /// A sensor is missing or not in SI, N is missing on an axis, or K is missing on an axis and has no upper bound.
     pub fn densities(
         &self,
         noise: &NoiseFile,
@@ -111,7 +109,7 @@ impl WalkOptions {
     /// [`Self::densities`] of calibrated readings.
     ///
     /// # Errors
-    /// The same.
+    /// The same as of [`Self::densities`].
     pub fn calibrated(&self, noise: &NoiseFile) -> Result<PerSensor<Densities>> {
         self.densities(noise, &PerSensor::both([1.0; 3]))
     }
@@ -124,13 +122,13 @@ impl WalkOptions {
     }
 }
 
-/// A line of YAML: a number that a program takes, its unit, and the density that it was made from.
+/// A line of YAML: the value that a program takes, its unit, and the density that it was computed from.
 pub fn line(indent: &str, key: &str, value: f64, unit: &str, from: &Worst) -> String {
     let value = yaml::scientific(value, 6);
     format!("{indent}{key}: {value}  # {unit}, {}\n", from.comment)
 }
 
-/// The largest coefficient of `term` among the axes of `sensor`, and what to say of it.
+/// The largest coefficient of `term` among the axes of `sensor`, with a comment.
 fn worst(
     file: &NoiseFile,
     sensor: Sensor,
@@ -181,7 +179,7 @@ fn worst(
     }
     let names: Vec<&str> = missing.iter().map(|(c, _)| c.name.as_str()).collect();
     if let Some(fallback) = fallback {
-        // The larger of the two: the axes that show it are no better for the others.
+        // Uses the larger of the two: axes with a visible walk do not limit that of the others.
         return match largest {
             Some((value, said)) if value >= fallback => {
                 found(value, format!("{said}; not seen on {}", names.join(", ")))

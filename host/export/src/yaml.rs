@@ -1,4 +1,4 @@
-//! Numbers and matrices in YAML that every reader takes for numbers.
+//! Numbers and matrices in YAML that every reader parses as numbers.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use nalgebra::SMatrix;
 
 /// A number to ten digits.
 ///
-/// PyYAML reads `1e-5` and `1.5e3` as strings: its numbers have a point, and the exponent a sign.
+/// PyYAML reads `1e-5` and `1.5e3` as strings: it requires a decimal point and a sign of the exponent.
 pub fn number(value: f64) -> String {
     let decimals = |digits: f64| format!("{value:.*}", digits.clamp(1.0, 17.0) as usize);
     match value.abs() {
@@ -16,7 +16,7 @@ pub fn number(value: f64) -> String {
     }
 }
 
-/// A number to `digits` behind the point, with an exponent.
+/// A number with `digits` decimals and an exponent.
 pub fn scientific(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$e}");
     match text.split_once('e') {
@@ -27,13 +27,13 @@ pub fn scientific(value: f64, digits: usize) -> String {
     }
 }
 
-/// `key` and a list of numbers in one line.
+/// `key` and a list of numbers on one line.
 pub fn list(out: &mut String, indent: &str, key: &str, values: impl IntoIterator<Item = f64>) {
     let values: Vec<String> = values.into_iter().map(number).collect();
     let _ = writeln!(out, "{indent}{key}: [{}]", values.join(", "));
 }
 
-/// `key` and a matrix as the list of its rows. What rounding has left of a zero is one.
+/// `key` and a matrix as the list of its rows. Rounding residue of a zero is written as 0.
 pub fn matrix<const N: usize>(
     out: &mut String,
     indent: &str,

@@ -1,19 +1,19 @@
-//! Whether the axes are those that their names say. An axis with the wrong sign and two that are exchanged fit perfectly: only the poses
-//! that were asked for show them, and the turns, which gyro and accelerometer have to agree on.
+//! Checks that the axes match their names. An axis with the wrong sign, or two exchanged axes, fit perfectly. Only the requested poses reveal them,
+//! and the turns, on which gyro and accelerometer have to agree.
 
 use mimu::fit::Fit;
 use mimu::quantity::{AXES, Sensor};
 use mimu::triad::directions;
 use nalgebra::{Matrix3, Vector3};
 
-/// Fewest poses that were asked for one after the other and came otherwise in the same way: two leave an axis open.
+/// Fewest poses to conclude this from: with two poses, one axis remains ambiguous.
 const FEWEST_POSES: usize = 3;
-/// Of these so many have to be others than was asked for: one may be a mistake.
+/// Fewest of them that have to differ from the requested pose: a single one may be a mistake.
 const FEWEST_OTHERS: usize = 2;
-/// Angle between axes of gyro and accelerometer of the same name that no package has, degrees.
+/// Angle between axes of the same name of gyro and accelerometer, degrees. In no package are they so far apart.
 const APART_DEG: f64 = 30.0;
 
-/// All ways to exchange axes and to give them signs; the fewest changes first. Row: what the axis of this name reads.
+/// All permutations and signs of axes, those with the fewest changes first. Each row says what the named axis reads.
 fn exchanges() -> Vec<Matrix3<f64>> {
     let orders = [
         [0, 1, 2],
@@ -53,8 +53,8 @@ fn words(sensor: Sensor, exchange: &Matrix3<f64>) -> String {
     each.collect::<Vec<_>>().join(", ")
 }
 
-/// What the accelerometer's axes read, where all poses came otherwise than they were `asked` for and in the same way. `shown`: directions that
-/// were asked for up, and that were up by the accelerometer.
+/// Says what the accelerometer's axes read, if all poses differ from the requested ones in the same way. `shown`: pairs of the direction requested up
+/// and the direction up by the accelerometer.
 pub fn mirrored(shown: &[[Vector3<f64>; 2]], limit_deg: f64) -> Option<String> {
     let is = |by: &Matrix3<f64>, [asked, seen]: &[Vector3<f64>; 2]| {
         (by * asked).angle(seen).to_degrees() <= limit_deg
@@ -76,11 +76,11 @@ pub fn mirrored(shown: &[[Vector3<f64>; 2]], limit_deg: f64) -> Option<String> {
     ))
 }
 
-/// How the axes of gyro and accelerometer lie to each other, where those of one name are far apart.
+/// Says how the axes of gyro and accelerometer are related, if axes of the same name are far apart.
 pub fn frames_apart(fit: &Fit) -> Option<String> {
     let axes = |sensor| directions(&fit.sensor(sensor)?.estimated.triad.inverse).map(|d| d.0);
     let (gyro, accel) = (axes(Sensor::Gyro)?, axes(Sensor::Accel)?);
-    // Row: the gyro's axis in those of the accelerometer.
+    // Rows: the gyro's axes in coordinates of the accelerometer's.
     let between = gyro * accel.transpose();
     let apart = |i: usize| between[(i, i)].clamp(-1.0, 1.0).acos().to_degrees();
     let most = (0..3).map(apart).fold(0.0, f64::max);
@@ -93,7 +93,7 @@ pub fn frames_apart(fit: &Fit) -> Option<String> {
         .reduce(|a, b| if near(&b) > near(&a) + 1e-9 { b } else { a })?;
     let mut causes = vec![words(Sensor::Gyro, &by)];
     if by.determinant() > 0.0 {
-        // Rates are turned the other way where the accelerometer is a mirror image.
+        // If the accelerometer is a mirror image, the sense of all rates is reversed.
         let accel = if changes(&-by) < changes(&by) {
             -by
         } else {
@@ -110,7 +110,7 @@ pub fn frames_apart(fit: &Fit) -> Option<String> {
     ))
 }
 
-/// What to do about it.
+/// Remedy for both errors.
 pub const REMEDY: &str =
     "check wiring, signs and the order of the columns, and start a new session in another folder";
 
@@ -127,7 +127,7 @@ mod tests {
 
     fn shown(seen: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> Vec<[Vector3<f64>; 2]> {
         let pair = |(k, asked): (usize, [f64; 3])| {
-            // Nobody holds a unit to better than some degrees.
+            // A person holds a unit to within a few degrees.
             let off = Vector3::new(0.1, -0.08, 0.05) * (k as f64 - 1.0);
             [
                 Vector3::from(asked).normalize(),

@@ -1,5 +1,4 @@
-//! The device's Kalman filters during the session: they get the input of each dwell while it lasts, and are restored if a dwell is
-//! discarded.
+//! The device's Kalman filters during the session: they receive the input of each dwell while it runs, and are restored if the dwell is discarded.
 
 use mimu::fit::Fit;
 use mimu::quantity::{AXES, PerSensor, Sensor};
@@ -13,17 +12,17 @@ use std::time::Duration;
 
 use crate::station::Station;
 
-/// Longest wait for an answer.
+/// Longest wait for an answer of the device.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Departure of the device's estimate from the PC's, in standard deviations of the PC's, beyond which they contradict each other. Both are
-/// made of the same dwells and not of the same samples, as the device begins when a dwell is recognised, half a second later: of short dwells
-/// they are nearly independent, and then the largest of 24 differences exceeds 6 once in a thousand sessions.
+/// Largest difference between the device's and the PC's estimate, in standard deviations of the PC's. Both use the same dwells, but not the same
+/// samples: the device begins half a second later, when a dwell is recognised. With short dwells they are almost independent; the largest of 24
+/// differences then exceeds 6 once in a thousand sessions.
 const MOST_APART: f64 = 6.0;
 
 /// `[b, P1, P2, P3]` of the sensors x, y, z of a triad, SI to raw: V, and V per rad/s or per m/s².
 type Rows = [[f64; 4]; 3];
 
-/// What the device's filters have estimated.
+/// Estimates of the device's filters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct ByDevice(PerSensor<Rows>);
@@ -32,14 +31,14 @@ pub struct ByDevice(PerSensor<Rows>);
 #[derive(Debug, Clone, Default)]
 pub struct DeviceBanks {
     runs: bool,
-    /// Whether they have used samples of a discarded dwell, and have to be restored first.
+    /// Whether they used samples of a discarded dwell, and have to be restored first.
     spoiled: bool,
     /// Why they lack a dwell.
     lack: Option<String>,
 }
 
 impl DeviceBanks {
-    /// Banks that have missed something already.
+    /// Banks that have missed dwells already.
     pub fn lacking(why: &str) -> Self {
         Self {
             lack: Some(why.into()),
@@ -47,7 +46,8 @@ impl DeviceBanks {
         }
     }
 
-    /// A dwell runs. `noise`: variances of single readings, V²; `input`: rates, rad/s, and specific forces, m/s²; `spans`: sizes of both.
+    /// Begins a dwell. `noise`: variances of single readings, V²; `input`: rates, rad/s, and specific forces, m/s²; `spans`: largest magnitudes of
+    /// both.
     pub fn begin(&mut self, station: &Station, noise: &[f64; 6], input: [f64; 6], spans: [f64; 2]) {
         if self.lack.is_some() {
             return;
@@ -79,12 +79,12 @@ impl DeviceBanks {
             }
             Ok(())
         });
-        // What has come half the way is taken back by the next dwell.
+        // If only one filter received its input, the next dwell restores both.
         (self.runs, self.spoiled) = (true, true);
         self.heed(told);
     }
 
-    /// The dwell is over, and counts.
+    /// Ends a dwell that is accepted.
     pub fn keep(&mut self, station: &Station) {
         if self.lack.is_some() {
             return;
@@ -107,7 +107,7 @@ impl DeviceBanks {
         self.heed(told);
     }
 
-    /// The dwell does not count.
+    /// Restores the filters after a discarded dwell.
     pub fn back(&mut self, station: &Station) {
         if self.lack.is_some() || !self.runs {
             return;
@@ -117,11 +117,11 @@ impl DeviceBanks {
                 .into_iter()
                 .try_for_each(|sensor| done(session, Request::KalmanBack { sensor }))
         });
-        // A line that is lost is found again, and then it is done.
+        // If the line is lost, they are restored once it is back.
         self.spoiled = told.is_err();
     }
 
-    /// A dwell that was taken in does not count any more, or the device has restarted.
+    /// Records that an accepted dwell was discarded, or that the device has restarted.
     pub fn lacks(&mut self, why: &str) {
         if self.runs {
             self.lack.get_or_insert_with(|| why.into());
@@ -134,7 +134,7 @@ impl DeviceBanks {
         }
     }
 
-    /// Ends them. The error gives the reason why they are not a calibration.
+    /// Ends the filters. The error says why their estimate cannot be the calibration.
     pub fn end(&mut self, station: &Station) -> std::result::Result<ByDevice, String> {
         if let Some(why) = &self.lack {
             return Err(why.clone());
@@ -179,10 +179,10 @@ impl ByDevice {
         }
     }
 
-    /// Puts the device's estimate in the place of the PC's, and says how far apart they are. How well it is known stays the PC's judgement:
-    /// the filters know of nothing but the white noise of the readings.
+    /// Replaces the PC's estimate by the device's, and says how far apart they are. The uncertainties remain the PC's: the filters only know the
+    /// white noise of the readings.
     ///
-    /// Errors: the two contradict each other.
+    /// Errors: the two estimates contradict each other.
     pub fn replace(&self, fitted: &mut Fit, unit: &str) -> Result<String> {
         let mut most = (0.0, String::new());
         for sensor in &mut fitted.sensors {

@@ -10,7 +10,7 @@ use mimu_recording::error::{Error, Result};
 
 use crate::source::{Chunk, Heard, Source, Unit};
 
-/// Silence after which the device is asked whether it is still there.
+/// Silence after which the device is asked to greet and stream again.
 const SILENCE: Duration = Duration::from_secs(2);
 
 /// The raw stream of a device.
@@ -20,12 +20,12 @@ pub struct DeviceSource {
     unit: Unit,
     streaming: bool,
     heard: Instant,
-    /// Tick of the sample that is numbered 0, and the tick that comes next.
+    /// Tick of the sample with number 0, and tick of the next sample.
     zero: i64,
     next: u64,
-    /// Whether what comes next begins a new count.
+    /// Whether the next sample begins a new count.
     anew: bool,
-    /// Time since power-on when it began to sample, s.
+    /// Time since power-on at the start of sampling, s.
     powered_for_s: Option<f64>,
 }
 
@@ -35,12 +35,12 @@ const RAW: Request<'_> = Request::Stream {
 };
 
 impl DeviceSource {
-    /// Opens the port, or the only one at which a device greets. `next`: the first tick that it may use.
+    /// Opens the port, or the only one where a device answers. `next`: the first tick that it may use.
     pub fn open(port: Option<&str>, next: u64) -> Result<Self> {
         Ok(Self::of(Session::open(port)?, next))
     }
 
-    /// Of an open session.
+    /// The source of an open session.
     pub fn of(session: Session, next: u64) -> Self {
         let who = session.who();
         let mut told = vec![format!(
@@ -79,7 +79,7 @@ impl DeviceSource {
     fn take(&mut self, samples: &Samples) -> Result<Heard> {
         self.heard = Instant::now();
         let number = i64::from(samples.head.first);
-        // A restarted count does not give the elapsed time; only that it was positive is assumed.
+        // After a restart of the count the elapsed time is unknown. It is only assumed to be positive.
         let back = self.zero + number < self.next as i64;
         if self.anew || back {
             self.zero = self.next as i64 + 1 - number;
@@ -136,7 +136,7 @@ impl Source for DeviceSource {
             }
             Some(_) => Ok(Heard::Nothing),
             None if self.heard.elapsed() > SILENCE => {
-                // It may have restarted, and its greeting been lost.
+                // It may have restarted, and its greeting may be lost.
                 self.session.hello()?;
                 self.streaming = false;
                 Ok(Heard::Nothing)

@@ -1,5 +1,5 @@
-//! What a session says: events that count, once each, and how it stands, many times a second. Both are plain data, so that a full
-//! screen, lines of text and JSON lines are views of the same.
+//! Output of a session: events, reported once each, and the state, reported many times a second. Both are plain data, so that the full screen, lines
+//! of text and JSON lines are views of the same.
 
 use std::fmt;
 
@@ -12,140 +12,140 @@ use crate::verdict::Judged;
 use crate::waiting::{Interruption, Waiting};
 use mimu_equipment::step::Step;
 
-/// Something that has happened.
+/// An event of a session.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum Event {
-    /// A unit greets.
+    /// A unit sent its greeting.
     Greeted {
-        /// Which.
+        /// Name of the unit.
         unit: String,
-        /// What it says of itself.
+        /// Its identity and state, in words.
         told: Vec<String>,
     },
-    /// A session is resumed.
+    /// A session was resumed.
     Resumed {
-        /// Dwells that there are already.
+        /// Dwells recorded before.
         dwells: usize,
     },
-    /// The sensors were deflected electrically.
+    /// A unit ran its self-test.
     SelfTested {
-        /// Which unit.
+        /// Name of the unit.
         unit: String,
-        /// Whether all answered as their data sheets state.
+        /// Whether all sensors responded as their data sheets require.
         passed: bool,
-        /// Which did not, and what moved.
+        /// Failed sensors, and what moved.
         words: String,
     },
-    /// A phase begins.
+    /// A phase began.
     Phase {
-        /// Which.
+        /// The phase.
         phase: Phase,
-        /// In a sentence.
+        /// Description in a sentence.
         words: String,
     },
-    /// What to do next.
+    /// The next dwell was requested.
     Step {
-        /// Which recording.
+        /// The recording.
         part: Part,
-        /// Dwells so far.
+        /// Dwells completed so far.
         done: usize,
-        /// Dwells as planned; more or fewer may come.
+        /// Planned dwells; more or fewer may follow.
         planned: usize,
-        /// What to do.
+        /// The requested dwell.
         step: Step,
-        /// In words.
+        /// The dwell in words.
         words: String,
     },
-    /// Why it waits now.
+    /// A unit waits.
     Waiting {
-        /// Which unit.
+        /// Name of the unit.
         unit: String,
-        /// Why.
+        /// The reason.
         why: Waiting,
     },
     /// A dwell was completed.
     Dwell {
-        /// Which unit.
+        /// Name of the unit.
         unit: String,
-        /// Which recording.
+        /// The recording.
         part: Part,
-        /// Its number.
+        /// Number of the dwell.
         number: i32,
-        /// What it was.
+        /// The dwell.
         step: Step,
-        /// In words.
+        /// The dwell in words.
         words: String,
     },
     /// A dwell was discarded.
     Thrown {
-        /// Which unit.
+        /// Name of the unit.
         unit: String,
-        /// Why.
+        /// The reason.
         why: Waiting,
     },
     /// A dwell is to be repeated.
     Redo {
-        /// Its number.
+        /// Number of the dwell.
         number: i32,
     },
     /// State of the calibration after a dwell.
     Progress {
-        /// Which unit.
+        /// Name of the unit.
         unit: String,
-        /// Beside the targets.
+        /// Half-widths and targets.
         progress: Progress,
     },
-    /// The line was lost or found, the device has restarted, another unit is there.
+    /// The line was lost or restored, the device restarted, or another unit is at the port.
     Interrupted {
-        /// Which unit.
+        /// Name of the unit.
         unit: String,
         /// What happened.
         why: Interruption,
     },
-    /// The calibration, judged by the verification.
+    /// The calibration was verified.
     Verified {
-        /// Which unit.
+        /// Name of the unit.
         unit: String,
         /// The figures.
         judged: Judged,
     },
     /// A calibration was stored, read back and compared.
     Stored {
-        /// Which unit.
+        /// Name of the unit.
         unit: String,
-        /// Its hash.
+        /// Hash of the calibration.
         hash: String,
-        /// What was checked.
+        /// The checks that were made.
         words: String,
     },
-    /// What still errs.
+    /// The remaining errors were diagnosed.
     Diagnosed {
-        /// Which unit.
+        /// Name of the unit.
         unit: String,
-        /// What it amounts to.
+        /// Verdict of the diagnosis.
         verdict: Verdict,
-        /// The effects, each with its strength.
+        /// The effects found, each with its magnitude.
         effects: Vec<String>,
-        /// The page.
+        /// File of the diagnosis page.
         page: String,
     },
-    /// Something that a person should know.
+    /// Information for the user.
     Note {
-        /// What.
+        /// The message.
         words: String,
     },
-    /// A question, to be answered by yes or no.
+    /// A yes/no question.
     Question {
         /// `power-cycled`, `store-effects`, `store-rough`, `go-on`.
         question: &'static str,
-        /// In a sentence.
+        /// The question in a sentence.
         words: String,
     },
 }
 
 impl Event {
-    /// The unit that it is about, if it is about one.
+    /// The unit concerned, if any.
     pub fn unit(&self) -> Option<&str> {
         match self {
             Self::Greeted { unit, .. }
@@ -168,28 +168,28 @@ impl Event {
     }
 }
 
-/// What a session does at a time.
+/// The present phase of a session.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Phase {
-    /// The units are opened.
+    /// Opening the units.
     #[default]
     Start,
-    /// The units come to rest and to a steady temperature.
+    /// Waiting for rest and a steady temperature.
     WarmUp,
-    /// Dwells that the calibration is made from.
+    /// Dwells for the calibration.
     Calibration,
-    /// Dwells that it is judged by.
+    /// Dwells for the verification.
     Verification,
-    /// The calibration goes into the device.
+    /// Storing the calibration on the device.
     Store,
-    /// What still errs is looked for.
+    /// Diagnosing the remaining errors.
     Diagnosis,
-    /// Dwells that the calibration with effects is judged by.
+    /// Dwells that verify the calibration with effects.
     Confirmation,
 }
 
 impl Phase {
-    /// The recording that its dwells are counted in.
+    /// The recording that its dwells belong to.
     pub fn part(self) -> Part {
         match self {
             Self::Verification => Part::Verification,
@@ -219,74 +219,74 @@ impl Serialize for Phase {
     }
 }
 
-/// How a unit stands.
+/// State of a unit.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct UnitStanding {
-    /// Which.
+    /// Name of the unit.
     pub unit: String,
-    /// Motion of gyro and accelerometer over what still counts as still.
+    /// Motion of gyro and accelerometer, relative to the limit of rest.
     pub motion: Option<[f64; 2]>,
-    /// What is allowed of it: 1, and more of the gyro while it turns.
+    /// Largest accepted motion: 1, and more for the gyro while the unit turns.
     pub motion_limits: [f64; 2],
-    /// Angle between up and the direction that is wanted up, degrees.
+    /// Angle between up and the requested direction, degrees.
     pub tilt_deg: Option<f64>,
-    /// What is allowed of it.
+    /// Largest accepted angle, degrees.
     pub tilt_limit_deg: f64,
-    /// Rate about the vertical, deg/s; `None` where no data sheet is known and there is no calibration yet.
+    /// Rate about the vertical, deg/s; `None` without a data sheet until there is a calibration.
     pub rate_dps: Option<f64>,
-    /// Departure from the rate that is wanted that is allowed, deg/s.
+    /// Largest accepted difference from the requested rate, deg/s.
     pub rate_limit_dps: f64,
-    /// °C.
+    /// Temperature, °C.
     pub temp_c: Option<f64>,
-    /// °C/min.
+    /// Rate of change of the temperature, °C/min.
     pub trend_c_per_min: Option<f64>,
-    /// What is allowed of it while it warms up, if that is waited for.
+    /// Limit of this rate during warm-up, if the session waits for it.
     pub trend_limit_c_per_min: Option<f64>,
-    /// Samples received, and lost since the beginning.
+    /// Samples received.
     pub samples: u64,
-    /// Samples that are missing.
+    /// Missing samples.
     pub lost: u64,
     /// Samples with a reading at the end of its range.
     pub clipped: u64,
-    /// Why it waits; `None` while a dwell runs.
+    /// Why no dwell runs; `None` while one runs.
     pub waiting: Option<Waiting>,
-    /// Seconds of the dwell that are left.
+    /// Remaining time of the dwell, s.
     pub left_s: Option<f64>,
 }
 
-/// How the session stands.
+/// State of the session.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Standing {
-    /// What is done now.
+    /// The present phase.
     pub phase: Phase,
-    /// The step.
+    /// The requested dwell.
     pub step: Option<Step>,
-    /// Dwells so far, and as planned.
+    /// Completed and planned dwells.
     pub dwells: [usize; 2],
-    /// Thrown away.
+    /// Discarded dwells.
     pub thrown: usize,
-    /// Time since the beginning, s, by the units' clock.
+    /// Time since the beginning by the units' clock, s.
     pub elapsed_s: f64,
-    /// Each unit.
+    /// State of each unit.
     pub units: Vec<UnitStanding>,
-    /// The calibration of each, as far as it is determined.
+    /// State of each calibration, as far as it is determined.
     pub progress: Vec<Progress>,
 }
 
-/// Request of a person since the last call.
+/// A request of the user since the last call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wish {
-    /// End the session; its data stay, and it can be resumed.
+    /// End the session. Its data are kept, and it can be resumed.
     Cancel,
     /// Repeat the last dwell.
     RedoLast,
     /// Repeat the dwell with this number.
     Redo(i32),
-    /// Another pose first; this one follows later.
+    /// Record another pose first; this one follows later.
     Skip,
 }
 
-/// A question that has to be answered by yes or no.
+/// A yes/no question.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Question {
     /// Whether the supply was turned off and on.
@@ -300,7 +300,7 @@ pub enum Question {
 }
 
 impl Question {
-    /// Its name in [`Event::Question`].
+    /// Name in [`Event::Question`].
     pub fn name(&self) -> &'static str {
         match self {
             Self::PowerCycled => "power-cycled",
@@ -310,7 +310,7 @@ impl Question {
         }
     }
 
-    /// As a sentence.
+    /// The question as a sentence.
     pub fn words(&self) -> String {
         match self {
             Self::PowerCycled => {
@@ -325,17 +325,17 @@ impl Question {
     }
 }
 
-/// Shows a session to a person, and receives their requests.
+/// Shows a session to the user, and receives requests.
 pub trait View {
-    /// Something has happened.
+    /// Reports an event.
     fn tell(&mut self, event: &Event);
 
-    /// Shows the present state; called many times per second.
+    /// Shows the present state; called many times a second.
     fn show(&mut self, standing: &Standing);
 
-    /// What is wanted.
+    /// The user's request since the last call.
     fn wish(&mut self) -> Option<Wish>;
 
-    /// Asks a question; `None` until it is answered.
+    /// Asks a question. Returns `None` until it is answered.
     fn ask(&mut self, question: &Question) -> Option<bool>;
 }

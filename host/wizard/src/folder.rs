@@ -1,16 +1,15 @@
-//! The folder of a session: settings, journal and recordings. A session that was killed at any instant resumes after its last dwell.
+//! The folder of a session: settings, journal and recordings. A session that is killed at any time resumes after its last dwell.
 //!
-//! | file | what |
+//! | file | contents |
 //! |---|---|
 //! | `session.json` | settings and unit |
-//! | `journal.jsonl` | a line for everything that was done and counts |
-//! | `calibration/`, `verification/`, `confirmation/` | the recordings, which the other commands read |
+//! | `journal.jsonl` | a line for each completed action |
+//! | `calibration/`, `verification/`, `confirmation/` | recordings that the other commands can read |
 //! | `calibration.toml` | the calibration |
-//! | `held-before.bin` | the calibration that the device stored before, as bytes |
-//! | `diagnosis.html`, `with-effects.toml` | what still errs, and the calibration with it |
+//! | `held-before.bin` | the calibration that the device stored before the session, in its encoding |
+//! | `diagnosis.html`, `with-effects.toml` | page about the remaining errors, and the calibration with effects |
 //!
-//! The samples of a dwell are handed to the disk before its line in the journal is written. A line that is cut, and samples behind the
-//! last line, do not count.
+//! The samples of a dwell are written to disk before its line in the journal. An incomplete line, and samples after the last line, are ignored.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Write as _;
@@ -28,20 +27,20 @@ use crate::bank::ByDevice;
 use crate::procedure::SessionConfig;
 use mimu_equipment::step::Step;
 
-/// Which recording.
+/// A recording of the session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Part {
-    /// What the calibration is made from.
+    /// For the calibration.
     Calibration,
-    /// What it is judged by.
+    /// For the verification.
     Verification,
-    /// What the calibration with effects is judged by.
+    /// For the verification of the calibration with effects.
     Confirmation,
 }
 
 impl Part {
-    /// Name of its directory.
+    /// Name of the recording's directory.
     pub fn name(self) -> &'static str {
         match self {
             Self::Calibration => "calibration",
@@ -57,92 +56,92 @@ impl Part {
 pub enum Entry {
     /// A dwell was completed.
     Dwell {
-        /// Of which recording.
+        /// The recording.
         part: Part,
-        /// Number in it.
+        /// Number in the recording.
         number: i32,
-        /// What it was.
+        /// The completed dwell.
         step: Step,
-        /// The direction that a person was asked for, where the unit was turned after that.
+        /// Requested direction up, if the user turned the unit after the request.
         #[serde(default)]
         asked: Option<[f64; 3]>,
         /// Time of its first sample, s.
         from_s: f64,
-        /// Rows of the recording after it.
+        /// Rows of the recording up to the end of the dwell.
         rows: u64,
-        /// Bytes of its samples after it.
+        /// Bytes of its samples up to the end of the dwell.
         bytes: u64,
         /// Mean temperature, °C, if known.
         temp_c: Option<f64>,
     },
-    /// A dwell was discarded while it lasted.
+    /// A running dwell was discarded.
     Thrown {
-        /// What it was to be.
+        /// The requested dwell.
         step: Step,
-        /// Why.
+        /// The reason.
         why: String,
     },
-    /// A dwell is to be repeated: the old one does not count.
+    /// A dwell is to be repeated; the previous one is discarded.
     Redo {
-        /// Of which recording.
+        /// The recording.
         part: Part,
-        /// Number.
+        /// Number of the dwell.
         number: i32,
     },
-    /// The device restarted, or the line was lost and found.
+    /// The device restarted, or the line was lost and restored.
     Interrupted {
-        /// What happened.
+        /// Description.
         why: String,
     },
-    /// A calibration was made from a recording and those before; made again it has the same date, and is the same to the last byte.
+    /// A calibration was made from a recording and earlier ones. If made again, it gets the same date and is identical byte by byte.
     Made {
-        /// The last of them.
+        /// The last of these recordings.
         part: Part,
-        /// When, RFC 3339.
+        /// Date, RFC 3339.
         created: String,
     },
     /// The calibration was verified.
     Verified {
-        /// Whether it passed.
+        /// Whether the verification passed.
         passed: bool,
     },
-    /// What still errs was looked for.
+    /// The remaining errors were diagnosed.
     Diagnosed {
-        /// What it amounts to.
+        /// Verdict of the diagnosis.
         verdict: Verdict,
-        /// The effects.
+        /// Ids of the effects found.
         effects: Vec<String>,
     },
     /// A calibration was stored on the device.
     Stored {
-        /// Its hash.
+        /// Hash of the calibration.
         hash: String,
-        /// Whether it has effects.
+        /// Ids of its effects.
         effects: Vec<String>,
     },
-    /// What the device's own filters have estimated of all dwells.
+    /// Estimates of the device's filters from all dwells.
     ByDevice(ByDevice),
-    /// All is done.
+    /// The session is complete.
     Done,
 }
 
-/// What a session is.
+/// Settings and unit of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Begun {
     /// `mimu-wizard-session/1`.
     pub format: String,
-    /// Of the unit.
+    /// Id of the unit.
     pub unit_id: String,
-    /// Samples a second.
+    /// Sample rate, Hz.
     pub rate_hz: f64,
-    /// What was asked.
+    /// Settings.
     pub asked: SessionConfig,
 }
 
 /// The folder of a session.
 #[derive(Debug)]
 pub struct Folder {
-    /// Where it is.
+    /// Path of the folder.
     pub path: PathBuf,
     journal: File,
     entries: Vec<Entry>,
@@ -152,7 +151,7 @@ const SESSION: &str = "session.json";
 const JOURNAL: &str = "journal.jsonl";
 
 impl Folder {
-    /// What the session in this folder is, if there is one.
+    /// Settings of the session in this folder, if there is one.
     pub fn begun(path: &Path) -> Result<Option<Begun>> {
         let file = path.join(SESSION);
         if !file.is_file() {
@@ -181,7 +180,7 @@ impl Folder {
         Self::open(path)
     }
 
-    /// Opens the folder of a session that was begun.
+    /// Opens the folder of an existing session.
     pub fn open(path: &Path) -> Result<Self> {
         let file = path.join(JOURNAL);
         let io = |e: std::io::Error| Error::io(&file, &e);
@@ -205,7 +204,7 @@ impl Folder {
             .truncate(false)
             .open(&file)
             .map_err(io)?;
-        // A line that was cut never happened.
+        // An incomplete line is removed.
         journal.set_len(whole as u64).map_err(io)?;
         drop(journal);
         let journal = OpenOptions::new().append(true).open(&file).map_err(io)?;
@@ -216,7 +215,7 @@ impl Folder {
         })
     }
 
-    /// Adds a line, and waits for the disk.
+    /// Appends an entry to the journal, and waits until it is on disk.
     pub fn add(&mut self, entry: Entry) -> Result<()> {
         let file = self.path.join(JOURNAL);
         let mut line = serde_json::to_string(&entry)
@@ -230,12 +229,12 @@ impl Folder {
         Ok(())
     }
 
-    /// What was done so far.
+    /// All entries so far.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
-    /// The dwells of a recording that count, with their numbers.
+    /// The valid dwells of a recording, with their numbers.
     pub fn dwells(&self, of: Part) -> Vec<(i32, Step)> {
         let mut all: Vec<(i32, Step)> = Vec::new();
         for entry in &self.entries {
@@ -250,7 +249,7 @@ impl Folder {
         all
     }
 
-    /// The poses of a recording that a person turned the unit to: what was asked for, and what came.
+    /// Poses of a recording that the user turned the unit to: requested and recorded direction up.
     pub fn shown(&self, of: Part) -> Vec<[Vector3<f64>; 2]> {
         let shown = self.entries.iter().filter_map(|entry| match entry {
             Entry::Dwell {
@@ -264,7 +263,7 @@ impl Folder {
         shown.collect()
     }
 
-    /// When the calibration from this recording was made first; `now` if that is now.
+    /// Date of the first calibration from this recording, or `now` if there is none.
     pub fn created(&mut self, of: Part, now: impl FnOnce() -> String) -> Result<String> {
         let before = self.entries.iter().find_map(|entry| match entry {
             Entry::Made { part, created } if *part == of => Some(created.clone()),
@@ -281,12 +280,12 @@ impl Folder {
         Ok(created)
     }
 
-    /// Whether all was done.
+    /// Whether the session is complete.
     pub fn is_done(&self) -> bool {
         self.entries.last() == Some(&Entry::Done)
     }
 
-    /// Numbers of the dwells that do not count.
+    /// Numbers of the discarded dwells.
     fn dropped(&self, of: Part) -> Vec<i32> {
         let redone = self.entries.iter().filter_map(|entry| match entry {
             Entry::Redo { part, number } if *part == of => Some(*number),
@@ -295,13 +294,13 @@ impl Folder {
         redone.collect()
     }
 
-    /// Dwells that were thrown away while they lasted.
+    /// Number of dwells that were discarded while they ran.
     pub fn thrown(&self) -> usize {
         let thrown = |e: &&Entry| matches!(e, Entry::Thrown { .. });
         self.entries.iter().filter(thrown).count()
     }
 
-    /// Temperatures of the first dwell and of the last, °C.
+    /// Temperatures of the first and the last dwell, °C.
     pub fn temperatures(&self) -> Option<[f64; 2]> {
         let mut all = self.entries.iter().filter_map(|entry| match entry {
             Entry::Dwell { temp_c, .. } => *temp_c,
@@ -311,13 +310,13 @@ impl Folder {
         Some([first, all.next_back().unwrap_or(first)])
     }
 
-    /// Path of a file or a recording in it.
+    /// Path of a file or a recording in the folder.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 }
 
-/// A recording of the session while it grows: on the disk, and in memory for the fits in between.
+/// A recording in progress: on disk, and in memory for the fits after each dwell.
 #[derive(Debug)]
 pub struct OpenRecording {
     part: Part,
@@ -328,7 +327,7 @@ pub struct OpenRecording {
 }
 
 impl OpenRecording {
-    /// Begins a recording, or goes on after the last dwell of the journal.
+    /// Begins a recording, or continues after the last dwell in the journal.
     pub fn begin(
         folder: &Folder,
         part: Part,
@@ -348,14 +347,14 @@ impl OpenRecording {
         let mut samples = Batch::default();
         let growing = match last {
             None => {
-                // What was there before the first dwell was ended is nothing.
+                // Samples from before the first complete dwell are discarded.
                 if directory.exists() {
                     fs::remove_dir_all(&directory).map_err(|e| Error::io(&directory, &e))?;
                 }
                 Growing::create(&directory, columns, &manifest)?
             }
             Some((rows, bytes)) => {
-                // When the power came was known when it was begun: the clock of the recording has gone on since, whatever the device has done.
+                // The power-on time was stored at the beginning. The recording's clock has continued since, whatever the device did.
                 manifest.power_on_s = Manifest::read(&directory.join(MANIFEST_FILE))?.power_on_s;
                 let growing = Growing::resume(&directory, columns, rows, bytes)?;
                 Recording::open(&directory)?.for_each_batch(
@@ -386,31 +385,31 @@ impl OpenRecording {
         Ok(taking)
     }
 
-    /// Takes rows in.
+    /// Appends rows.
     pub fn write(&mut self, rows: &Batch) -> Result<()> {
         self.growing.write(rows)?;
         append(&mut self.samples, rows);
         Ok(())
     }
 
-    /// Rows and bytes that the disk holds, for certain.
+    /// Rows and bytes that are on disk for certain.
     pub fn settled(&self) -> Result<(u64, u64)> {
         Ok((self.growing.rows(), self.growing.sync()?))
     }
 
-    /// The dwell of this number does not count any more.
+    /// Discards the dwell with this number.
     pub fn drop_dwell(&mut self, number: i32) {
         self.manifest.dropped_steps.push(number);
     }
 
-    /// So many samples are missing between those that came.
+    /// Records that samples are missing between received ones.
     pub fn missing(&mut self, samples: u64) {
         if let Some(recorded) = &mut self.manifest.recorded {
             recorded.missing += samples;
         }
     }
 
-    /// The device has restarted, at this time of the recording, s.
+    /// Records that the device restarted at this time of the recording, s.
     pub fn restarted(&mut self, t_s: f64, start: String) {
         if let Some(recorded) = &mut self.manifest.recorded {
             recorded.restarts.push(Restart { t_s, start });
@@ -427,7 +426,7 @@ impl OpenRecording {
         self.samples.t_s.last().copied()
     }
 
-    /// Ends it, so that the other commands read it.
+    /// Completes the recording, so that other commands can read it.
     pub fn finish(self, folder: &Folder) -> Result<PathBuf> {
         let format = SampleFormat::Csv;
         self.growing.finish(&self.manifest, format, None, |_| {})?;
@@ -435,7 +434,7 @@ impl OpenRecording {
     }
 }
 
-/// Puts rows behind others.
+/// Appends rows to others.
 pub fn append(to: &mut Batch, rows: &Batch) {
     to.t_s.extend(&rows.t_s);
     to.step.extend(&rows.step);

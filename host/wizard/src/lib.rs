@@ -1,29 +1,29 @@
-//! The wizard: from an uncalibrated board to a verified one. It says what to do, watches whether that was done, fits after every dwell,
-//! and stores only what kept its promise in poses that were not used.
+//! The wizard: turns an uncalibrated board into a verified one. It requests each dwell, checks that it was carried out, fits after every dwell, and
+//! stores a calibration only if poses that were not fitted confirm its accuracy.
 //!
-//! What turns and warms the unit is [`mimu_equipment`].
+//! [`mimu_equipment`] moves the unit and changes its temperature.
 //!
-//! | module | what it is |
+//! | module | contents |
 //! |---|---|
-//! | [`procedure`] | what is asked of a session; the steps to begin with, the next best one, those that verify |
-//! | [`source`], [`device`] | where samples come from |
-//! | [`text`], [`text_line`], [`regular`] | a board of another maker: its bytes, its lines, and their times as a regular rate |
-//! | [`text_port`], [`relay`] | its port: read by a thread, or held by a caller who relays the bytes |
-//! | [`station`] | a unit at the end of its line; a port with a separate thread, reopened when it has vanished |
-//! | [`turn`] | a session pauses where it has to wait, and its caller resumes it |
-//! | [`waiting`] | why no dwell runs |
-//! | [`watch`] | is the unit still, which way is up, how fast does it turn |
-//! | [`refit`] | the calibration so far, every parameter beside its target |
+//! | [`procedure`] | settings of a session; the first dwells, the most informative next one, and those for the verification |
+//! | [`source`], [`device`] | sources of samples |
+//! | [`text`], [`text_line`], [`regular`] | a board of another maker: its bytes, its lines, and samples at a regular rate from them |
+//! | [`text_port`], [`relay`] | its port: read by a thread, or by a caller who relays the bytes |
+//! | [`station`] | a unit and its line; a thread reads the port, and reopens it if it has vanished |
+//! | [`turn`] | a session pauses when it has to wait, and its caller resumes it |
+//! | [`waiting`] | reasons why no dwell runs |
+//! | [`watch`] | detects from the samples whether the unit is at rest, its pose and its rate |
+//! | [`refit`] | the calibration so far, each parameter with its target |
 //! | [`folder`] | the journal and the recordings, from which a killed session resumes |
-//! | [`unit_session`] | one of the units: its dwells, accepted or discarded |
-//! | [`axes`] | whether the axes are those that their names say |
-//! | [`bank`] | the device's own Kalman filters beside it |
+//! | [`unit_session`] | one of the units, with its accepted and discarded dwells |
+//! | [`axes`] | checks that the axes match their names |
+//! | [`bank`] | the device's own Kalman filters during the session |
 //! | [`event`] | events and questions of a session; views show them |
-//! | [`wizard`] | the next dwell, and the units that have completed it |
-//! | [`store`] | into the device, back, and over a loss of the supply |
-//! | [`verdict`] | whether a calibration keeps what it promises |
+//! | [`wizard`] | chooses the next dwell, and records which units have completed it |
+//! | [`store`] | stores a calibration on the device, reads it back, and checks that it survives a power cycle |
+//! | [`verdict`] | judges a calibration by poses that were not fitted |
 //! | [`resumed`] | settings that a resumed session keeps |
-//! | [`session`] | all of it, in order |
+//! | [`session`] | the whole session, in order |
 
 pub mod axes;
 pub mod bank;

@@ -1,5 +1,4 @@
-//! What is asked of a session, and which steps it takes: those to begin with, the next one by the information it brings, and those
-//! that verify.
+//! Settings of a session, and its dwells: the first ones, the next one by the information that it adds, and those for the verification.
 
 use mimu::plan::design::information::Inverse;
 use mimu::plan::design::model::{Model, Setting, Terms};
@@ -13,20 +12,20 @@ use serde::{Deserialize, Serialize};
 
 use mimu_equipment::step::Step;
 
-/// What carries the unit.
+/// The fixture that holds the unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fixture {
-    /// A turntable: attitudes and rates are known.
+    /// A rate table: attitudes and rates are known.
     Table,
-    /// A box with six faces, also held by its edges: only the size of gravity is known, and the turns between the poses.
+    /// A box with six faces, which can also be held by its edges. Only the magnitude of gravity is known, and the turns between the poses.
     Cube,
-    /// Hands: the same, in any attitude.
+    /// Hands: as with a cube, but in any attitude.
     Hands,
 }
 
 impl Fixture {
-    /// Whether attitudes and rates are known.
+    /// The reference that it provides.
     pub fn reference(self) -> Reference {
         match self {
             Self::Table => Reference::Table,
@@ -34,7 +33,7 @@ impl Fixture {
         }
     }
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Table => "table",
@@ -43,8 +42,8 @@ impl Fixture {
         }
     }
 
-    /// How far from a direction a pose may be and still be it, degrees. Without a calibration the null of an MMA7260QT may be off by 0.2 g,
-    /// which is 12 degrees, and its axes by some more; faces, edges and corners are 35 degrees apart at least.
+    /// Largest angle between a pose and the requested direction, degrees. Without a calibration the null of an MMA7260QT may be off by 0.2 g, which
+    /// is 12 degrees, and its axes by a few more. Faces, edges and corners are at least 35 degrees apart.
     pub fn tolerance_deg(self) -> f64 {
         match self {
             Self::Table | Self::Cube => 17.0,
@@ -56,45 +55,45 @@ impl Fixture {
 /// Settings of a session; stored in its folder, so that it resumes with the same ones.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SessionConfig {
-    /// Columns and unit of a board that writes lines of text.
+    /// Columns and unit of a board that writes text.
     #[serde(default)]
     pub text: Option<String>,
-    /// What carries the unit.
+    /// The fixture.
     pub fixture: Fixture,
     /// Local gravity, m/s².
     pub gravity_mps2: f64,
-    /// Degrees.
+    /// Latitude, degrees.
     pub latitude_deg: Option<f64>,
     /// Length of a dwell, s.
     pub dwell_s: f64,
     /// Largest rate of the table, deg/s.
     pub largest_rate_dps: f64,
-    /// Steps to begin with.
+    /// The first dwells.
     pub steps: Vec<Step>,
-    /// Whether the dwells continue until the targets are met, and end early once they are.
+    /// Whether dwells continue until the targets are met, and end early once they are.
     pub by_targets: bool,
-    /// Most dwells.
+    /// Largest number of dwells.
     pub most_dwells: usize,
-    /// Without a person: so long a step may take to come about, s.
+    /// Longest wait for a dwell to begin without a person, s.
     pub patience_s: f64,
-    /// Steps that verify.
+    /// Dwells for the verification.
     pub verification: Vec<Step>,
-    /// Largest change of temperature of a unit that has warmed up, °C/min; `None`: it is not waited for.
+    /// Largest rate of change of temperature after warm-up, °C/min; `None` if the session does not wait for it.
     pub warm_c_per_min: Option<f64>,
-    /// Largest change of temperature from the first dwell on, °C.
+    /// Largest change of temperature since the first dwell, °C.
     pub most_drift_c: f64,
-    /// Half-widths of the 95 % intervals that are wanted.
+    /// Targets: half-widths of 95 % intervals.
     pub targets: Targets,
-    /// How far the unit's axes may be turned on a table: half-width of the 95 % interval of each angle, degrees.
+    /// Misalignment of the unit on the table: half-width of the 95 % interval of each angle, degrees.
     #[serde(default)]
     pub mounting_deg: f64,
-    /// Whether the calibration is what the device's own Kalman filters estimate; on a table only.
+    /// Whether the device's own Kalman filters give the calibration; on a table only.
     #[serde(default)]
     pub by_device: bool,
 }
 
 impl SessionConfig {
-    /// What gravity is taken to be, and what that does: no reading shows that it is another.
+    /// States the assumed gravity, and the effect of an error in it: no reading would reveal one.
     pub fn gravity_words(&self) -> String {
         let normal = self.latitude_deg.map(normal_gravity);
         let source = match normal == Some(self.gravity_mps2) {
@@ -108,25 +107,25 @@ impl SessionConfig {
     }
 }
 
-/// Half-widths of 95 % intervals that are wanted.
+/// Targets: half-widths of 95 % intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Targets {
-    /// Of gyro biases, deg/s.
+    /// Gyro biases, deg/s.
     pub gyro_bias_dps: f64,
-    /// Of gyro scale factors, ppm.
+    /// Gyro scale factors, ppm.
     pub gyro_scale_ppm: f64,
-    /// Of the angles of gyro axes, µrad.
+    /// Angles of gyro axes, µrad.
     pub gyro_angle_urad: f64,
-    /// Of accelerometer biases, mg.
+    /// Accelerometer biases, mg.
     pub accel_bias_mg: f64,
-    /// Of accelerometer scale factors, ppm.
+    /// Accelerometer scale factors, ppm.
     pub accel_scale_ppm: f64,
-    /// Of the angles of accelerometer axes, µrad.
+    /// Angles of accelerometer axes, µrad.
     pub accel_angle_urad: f64,
 }
 
 impl Default for Targets {
-    /// What a quarter of an hour with analog MEMS sensors comes to.
+    /// Reachable in a quarter of an hour with analog MEMS sensors.
     fn default() -> Self {
         Self {
             gyro_bias_dps: 0.05,
@@ -156,12 +155,12 @@ fn directions() -> [Vec<Vector3<f64>>; 3] {
     all
 }
 
-/// Steps to begin with, in an order in which like does not follow like.
+/// The first dwells, ordered so that similar ones do not follow each other.
 pub fn first_steps(fixture: Fixture, dwell_s: f64, largest_rate_dps: f64, seed: u64) -> Vec<Step> {
     let [faces, edges, corners] = directions();
     let settings = match fixture {
-        // Full rates both ways on all faces determine the gyro; half of them on edges show what is not linear, and corners at rest what
-        // the accelerometer makes of two or three axes at once.
+        // Full rates in both directions on all faces determine the gyro. Half the rate on edges shows nonlinearity. Corners at rest show the
+        // accelerometer with two or three axes loaded at once.
         Fixture::Table => {
             let rate = largest_rate_dps.to_radians();
             let turning = |up: &Vector3<f64>, rate: f64| Setting { up: *up, rate };
@@ -180,14 +179,14 @@ pub fn first_steps(fixture: Fixture, dwell_s: f64, largest_rate_dps: f64, seed: 
     };
     let step = |s: Setting| Step {
         up: s.up.into(),
-        // Radians and back leave traces.
+        // Rounded, because the conversion to radians and back is not exact.
         rate_dps: (1e9 * s.rate.to_degrees()).round() / 1e9,
         dwell_s,
     };
     settings.into_iter().map(step).collect()
 }
 
-/// By hand the gyro lives on the turns between poses: each turn is to be a quarter and more, about axes that take their turns.
+/// By hand the turns between poses calibrate the gyro: each is to be a quarter turn or more, about alternating axes.
 fn chained(ups: &[Vector3<f64>]) -> Vec<Setting> {
     let mut left = ups.to_vec();
     let mut turned = Turned::default();
@@ -205,7 +204,7 @@ fn chained(ups: &[Vector3<f64>]) -> Vec<Setting> {
     chain.into_iter().map(Setting::at_rest).collect()
 }
 
-/// What turns have told of a gyro.
+/// Information from turns about a gyro.
 #[derive(Debug, Clone)]
 struct Turned(Matrix3<f64>);
 
@@ -219,7 +218,7 @@ impl Turned {
     fn vector(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
         let axis = from.cross(to);
         match axis.norm() {
-            // A half turn goes about any axis across: nothing that can be counted on.
+            // A half turn may be made about any perpendicular axis, so it is not counted on.
             size if size < 0.1 => Vector3::zeros(),
             size => axis / size * from.angle(to),
         }
@@ -240,7 +239,7 @@ impl Turned {
 /// Which sensors still miss a target: gyro, accelerometer.
 pub type Missed = [bool; 2];
 
-/// The step that brings most information beside `done`, for the sensors that need it.
+/// The dwell that adds the most information to `done`, for the sensors that need it.
 pub fn next_step(asked: &SessionConfig, done: &[Step], missed: Missed) -> Step {
     let candidates = match asked.fixture {
         Fixture::Table => {
@@ -292,21 +291,21 @@ pub fn next_step(asked: &SessionConfig, done: &[Step], missed: Missed) -> Step {
     let gain = |candidate: &Step| {
         let with = [had.as_slice(), &[setting(candidate)]].concat();
         let of = |(of_accel, reach): &(bool, Reach)| {
-            // A table that turns shows an accelerometer beside its axis another force than gravity.
+            // While a table turns, an accelerometer off its axis measures centripetal acceleration too.
             let tells = |s: &&Setting| !*of_accel || s.rate.abs() < AT_REST;
             let with: Vec<Setting> = with.iter().filter(tells).copied().collect();
             let rows = reach.rows(&with);
-            // A whisper of everything, so that what is not determined yet can be compared too.
+            // A little information about every parameter, so that determinants can be compared before all parameters are determined.
             let all = (0..rows.len()).map(|i| (i, 1.0));
             Inverse::of(&rows, all).map_or(-1e3, |i| i.log_det())
         };
         let mut gain: f64 = reaches.iter().map(of).sum();
         if let Some(last) = last.filter(|_| reference == Reference::Gravity) {
             gain += turned.gain(&last, &candidate.up()) * if missed[0] { 3.0 } else { 1.0 };
-            // The same pose again is no turn, and no other pose either.
+            // The same pose again is neither a turn nor a new pose.
             let near = last.angle(&candidate.up()).to_degrees() < 2.0 * SAME_POSE_DEG;
             gain -= if near { 100.0 } else { 0.0 };
-            // Another pose shows besides what the model lacks.
+            // A new pose also shows errors that the model lacks.
             let new = done
                 .iter()
                 .all(|d| d.up().angle(&candidate.up()).to_degrees() > SAME_POSE_DEG);
@@ -321,22 +320,22 @@ pub fn next_step(asked: &SessionConfig, done: &[Step], missed: Missed) -> Step {
     best.map_or(Step::at_rest(Vector3::z(), asked.dwell_s), |b| *b.1)
 }
 
-/// Rate below which a dwell on a table tells of the accelerometer, rad/s: see [`mimu::signal::dwell::Dwell::spins`].
+/// Rate below which a dwell on a table is used for the accelerometer, rad/s ([`mimu::signal::dwell::Dwell::spins`]).
 const AT_REST: f64 = 0.175;
-/// Bonus of a pose that was not recorded yet, in logarithms of the determinant: as much as one more dwell after ten.
+/// Bonus of a new pose in log-determinant: as much as one more dwell after ten.
 const NEW_POSE: f64 = 1.0;
 
-/// Nearer than this two poses by hand are one, degrees.
+/// Angle below which two poses by hand count as the same, degrees.
 pub const SAME_POSE_DEG: f64 = 12.0;
 
-/// Steps that verify: as far from all `used` directions as can be, and on a table at other rates.
+/// Dwells for the verification: as far as possible from all `used` directions, and on a table at other rates.
 pub fn verification(
     asked_of: Fixture,
     used: &[Step],
     dwell_s: f64,
     largest_rate_dps: f64,
 ) -> Vec<Step> {
-    // A spiral over the sphere: directions that no plan contains.
+    // A spiral over the sphere gives directions that no plan contains.
     let count = 200;
     let spiral = (0..count).map(|k| {
         let z = 1.0 - (2 * k + 1) as f64 / count as f64;
@@ -381,7 +380,7 @@ pub fn verification(
     }
     match asked_of {
         Fixture::Table => chosen,
-        // By hand turns of a quarter and more.
+        // By hand, turns of a quarter or more.
         _ => {
             let ups: Vec<Vector3<f64>> = chosen.iter().map(Step::up).collect();
             let order = chained(&ups);
@@ -454,7 +453,7 @@ mod tests {
     #[test]
     fn a_direction_that_was_missed_is_the_next() {
         let mut done = first_steps(Fixture::Hands, 3.0, 0.0, 1);
-        // Nothing has ever shown the side of -x.
+        // No pose so far has had the side of -x up.
         done.retain(|s| s.up[0] > -0.3);
         let asked = asked(Fixture::Hands);
         let next = next_step(&asked, &done, [false, true]);

@@ -1,4 +1,4 @@
-//! The calibration so far, and how far each parameter is from its target.
+//! The calibration so far, with each parameter's uncertainty and target.
 
 use mimu::fit::{Fit, Options, SensorFit, fit};
 use mimu::prepared::Prepared;
@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::procedure::{Missed, Targets};
 
-/// Parameters for which the worst of three counts.
+/// A kind of parameter. The worst of the three axes counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Parameter {
@@ -25,7 +25,7 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// As in JSON.
+    /// Name in JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bias => "bias",
@@ -35,27 +35,27 @@ impl Parameter {
     }
 }
 
-/// A parameter beside its target.
+/// Uncertainty and target of a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Aim {
-    /// Which.
+    /// The parameter.
     pub parameter: Parameter,
-    /// Axis of the worst.
+    /// The worst axis.
     pub axis: &'static str,
-    /// Half of its 95 % interval.
+    /// Half-width of its 95 % interval.
     pub half_width: f64,
-    /// What is wanted.
+    /// Target of the half-width.
     pub target: f64,
-    /// Of both.
+    /// Unit of both.
     pub unit: &'static str,
 }
 
-/// The parameters of a sensor beside their targets.
+/// Uncertainties and targets of a sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Aims {
-    /// Which.
+    /// The sensor.
     pub sensor: Sensor,
-    /// Biases, scale factors, angles.
+    /// Biases, scale factors and angles.
     pub aims: Vec<Aim>,
 }
 
@@ -69,14 +69,14 @@ impl Aims {
 /// State of the calibration after a dwell.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Progress {
-    /// By sensor, as far as they are determined.
+    /// The sensors, as far as they are determined.
     pub sensors: Vec<Aims>,
     /// Why there is no calibration yet.
     pub not_yet: Option<String>,
 }
 
 impl Progress {
-    /// Which sensors still miss a target.
+    /// Sensors that still miss a target.
     pub fn missed(&self) -> Missed {
         Sensor::BOTH.map(|sensor| {
             let found = self.sensors.iter().find(|s| s.sensor == sensor);
@@ -85,7 +85,7 @@ impl Progress {
     }
 }
 
-/// The calibration from the dwells so far. `holdout_blocks` as in [`Options`].
+/// Fits the dwells so far. `holdout_blocks` as in [`Options`].
 pub fn calibrate(manifest: &Manifest, samples: &Batch, holdout_blocks: usize) -> Result<Fit> {
     let options = Options {
         holdout_blocks,
@@ -95,10 +95,10 @@ pub fn calibrate(manifest: &Manifest, samples: &Batch, holdout_blocks: usize) ->
     fit(prepared.beside_axis(LEVER_ARM_M), options)
 }
 
-/// How far a board's sensors may be from the axes of a table, m, one standard deviation: 3 to 5 mm are usual.
+/// Assumed distance of a board's sensors from the axes of a table, m, one standard deviation: 3 to 5 mm are usual.
 pub const LEVER_ARM_M: f64 = 0.01;
 
-/// How far each parameter is from its target.
+/// Uncertainty and target of each parameter.
 pub fn progress(fitted: &Result<Fit>, targets: &Targets) -> Progress {
     match fitted {
         Ok(fitted) => Progress {
@@ -146,7 +146,8 @@ fn aims(fitted: &SensorFit, targets: &Targets) -> Aims {
     };
     let angles = [physical.misalignment, physical.non_orthogonality];
     let angles = angles.map(|a| each(a, [1.0; 3]));
-    // Seen from the body only turns tell the misalignment of a triad that nothing but gravity is known of: it has none by definition.
+    // If only gravity is known, only the turns determine the misalignment of a triad in the body frame: the triad whose frame defines the body has
+    // none.
     let angles = if angles[1].0 > angles[0].0 {
         angles[1]
     } else {

@@ -1,28 +1,27 @@
-//! Lines that come when they come, as samples at a regular rate.
+//! Converts lines that arrive irregularly into samples at a regular rate.
 //!
-//! A board samples at a steady rate, and its lines arrive late by what the USB and both systems make of it: some together, never one
-//! early. So the rate, and when a sample was taken, go by the lines that were delayed least. Where even the least delayed of the
-//! next half second is late by a period and more, lines are missing. With a clock of the board's own the same is done with its times,
-//! which have next to no delay.
+//! A board samples at a steady rate, but USB and both systems delay its lines. Some arrive together, but none arrives early. The rate and the
+//! sampling times are therefore taken from the least delayed lines. If even the least delayed line of the next half second is late by a period or
+//! more, lines are missing. If the board sends its own clock, its times are treated in the same way, with almost no delay.
 
 use std::collections::VecDeque;
 
-/// The rate is found from so many seconds: a least delay that varies by half a millisecond leaves 100 ppm of it, which is a twentieth
-/// of what a gyro's scale factor is wanted to by hand.
+/// Time from which the rate is found, s. If the least delay varies by half a millisecond, the rate is known to 100 ppm: a twentieth of the target of
+/// a gyro's scale factor by hand.
 const FOUND_S: f64 = 5.0;
-/// Parts of that, each with a line that is delayed least.
+/// Number of parts of this time; the least delayed line of each is used.
 const PARTS: usize = 10;
-/// Fewest lines for it.
+/// Fewest lines to find the rate.
 const FEWEST: usize = 4 * PARTS;
-/// So long is waited for a line that is delayed less; USB to serial converters keep bytes for 16 ms, and a busy computer for 200.
+/// Wait for a less delayed line, s. USB to serial converters buffer bytes for 16 ms, and a busy computer for 200.
 const WINDOW_S: f64 = 0.5;
-/// How fast a drift of the clocks against each other is followed, s.
+/// Time constant with which a drift between the clocks is followed, s.
 const SMOOTHED_S: f64 = 2.0;
-/// Part of a period that a line is late by where one is missing.
+/// Delay that shows that a line is missing, in periods.
 const LATE: f64 = 0.75;
-/// Least time that this is by the computer's clock, s: what its system may be late by for half a second.
+/// Least such delay by the computer's clock, s: a system may be late by this much for half a second.
 const JITTER_S: f64 = 2e-3;
-/// If the clock advances by more than this, s, or goes back, three lines in a row have to agree before it is believed.
+/// If the clock advances by more than this, s, or goes back, three consecutive lines have to agree before it is believed.
 const LEAP_S: f64 = 1.0;
 /// See [`LEAP_S`].
 const BELIEVED: usize = 3;
@@ -30,22 +29,22 @@ const BELIEVED: usize = 3;
 /// A line with its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timed {
-    /// When it came or, by the board's clock, when it was taken, s.
+    /// Time of arrival or, with a clock of the board, of sampling, s.
     pub t_s: f64,
     /// Gyro x, y, z, accelerometer x, y, z, raw.
     pub raw: [f64; 6],
-    /// °C, not a number where unknown.
+    /// Temperature, °C; NaN if unknown.
     pub temp_c: f64,
 }
 
-/// Samples with their ticks, from lines with their times.
+/// Assigns ticks to lines by their times.
 #[derive(Debug)]
 pub struct Regular {
     period_s: Option<f64>,
-    /// Whether times are those of the board's clock.
+    /// Whether times are by the board's clock.
     own_clock: bool,
     waiting: VecDeque<Timed>,
-    /// Tick of the next line if none is missing, and when that line is due if it is delayed least.
+    /// Tick of the next line if none is missing, and when it is due if it is delayed least.
     tick: u64,
     due_s: Option<f64>,
     last_s: Option<f64>,
@@ -54,7 +53,7 @@ pub struct Regular {
 }
 
 impl Regular {
-    /// With a rate that is known already, or that is to be found. `tick`: of the first sample.
+    /// With a known rate, or with one that is to be found. `tick`: tick of the first sample.
     pub fn new(rate_hz: Option<f64>, own_clock: bool, tick: u64) -> Self {
         Self {
             period_s: rate_hz.map(f64::recip),
@@ -68,18 +67,18 @@ impl Regular {
         }
     }
 
-    /// Samples a second, once that is known.
+    /// Sample rate, Hz, once it is known.
     pub fn rate_hz(&self) -> Option<f64> {
         self.period_s.map(f64::recip)
     }
 
-    /// Lines whose time cannot be, and that were left out.
+    /// Lines that were discarded because their time is impossible.
     pub fn garbled(&self) -> u64 {
         self.garbled
     }
 
-    /// Takes a line. Whether the board's clock has begun anew: then all before is to be taken out with [`Regular::rest`], and
-    /// [`Regular::begin_anew`] continues with the rest.
+    /// Takes a line. Returns true if the board's clock has restarted: then all earlier samples are to be taken with [`Regular::rest`], and
+    /// [`Regular::begin_anew`] continues with the later ones.
     pub fn take(&mut self, line: Timed) -> bool {
         let leaps = |last: f64, t: f64| self.own_clock && !(t > last && t <= last + LEAP_S);
         if self.last_s.is_some_and(|last| leaps(last, line.t_s)) {
@@ -107,7 +106,7 @@ impl Regular {
         false
     }
 
-    /// Continues after a restart of the board. Its duration is unknown; only that it was positive is assumed.
+    /// Continues after a restart of the board. Its duration is unknown; it is only assumed to be positive.
     pub fn begin_anew(&mut self) {
         self.waiting = self.odd.drain(..).collect();
         self.last_s = self.waiting.back().map(|l| l.t_s);
@@ -115,7 +114,7 @@ impl Regular {
         self.tick += 1;
     }
 
-    /// The next sample whose tick is certain; `now_s` on the clock of the lines, where that goes on without them.
+    /// The next sample with a certain tick. `now_s`: present time by the clock of the lines, if it is known without a line.
     pub fn certain(&mut self, now_s: Option<f64>) -> Option<(u64, Timed)> {
         let last = now_s.or(self.waiting.back().map(|l| l.t_s))?;
         let is = last - self.waiting.front()?.t_s >= WINDOW_S;
@@ -150,7 +149,7 @@ impl Regular {
             false => 0.0,
         };
         let late = late - missing * period;
-        // Nothing comes before it is sent: what is early shows that the others were late.
+        // No line arrives before it is sent. An early line shows that the others were late.
         let follow = if late < 0.0 {
             1.0
         } else {
@@ -163,7 +162,7 @@ impl Regular {
         Some((tick, first))
     }
 
-    /// Finds the rate, if there is enough to go by.
+    /// Finds the rate, if there are enough lines.
     fn find(&mut self) {
         let (Some(first), Some(last)) = (self.waiting.front(), self.waiting.back()) else {
             return;
@@ -181,11 +180,11 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Period of lines by their times, whatever their delays, and where some lines are missing.
+/// Period of lines from their times, despite delays and some missing lines.
 fn period(times: &[f64], own_clock: bool) -> f64 {
     let apart = times.len() / 5;
     let pairs = times.iter().zip(&times[apart..]);
-    // A gap is in a fifth of the pairs, and leaves the median alone.
+    // A gap lies within a fifth of the pairs, and does not change their median.
     let mut period = median(pairs.map(|(a, b)| (b - a) / apart as f64).collect());
     for _ in 0..3 {
         let late = |k: &usize| times[*k] - *k as f64 * period;
@@ -198,7 +197,7 @@ fn period(times: &[f64], own_clock: bool) -> f64 {
             .map(|p| late(&p[1]) - late(&p[0]))
             .collect();
         let usual = median(steps.clone());
-        // Both ends of a step are least delays, and half a period is nearer to one line that is missing than to none.
+        // Both ends of a step are least delays. From half a period on, a missing line is more likely than none.
         let limit = 0.5 * period + if own_clock { 0.0 } else { JITTER_S };
         let leaps = steps.iter().filter(|s| (*s - usual).abs() > limit);
         let missing: f64 = leaps.map(|s| ((s - usual) / period).round()).sum();
@@ -212,7 +211,7 @@ fn period(times: &[f64], own_clock: bool) -> f64 {
 mod tests {
     use super::*;
 
-    /// Numbers that look random, from 0 to 1, the same each time.
+    /// Repeatable pseudo-random numbers from 0 to 1.
     fn chance(k: usize, of: f64) -> f64 {
         (k as f64 * of + (k * k) as f64 * 0.414_213_56).fract()
     }
@@ -225,7 +224,7 @@ mod tests {
         }
     }
 
-    /// Samples 0, 1, 2, … at this rate arrive by these rules; which tick each has got, less that of the first.
+    /// Samples 0, 1, 2, … at this rate, lost and delayed by these functions. Returns the tick of each, minus that of the first.
     fn arrived(
         rate_hz: f64,
         count: usize,
@@ -254,7 +253,7 @@ mod tests {
 
     #[test]
     fn lines_that_the_usb_delivers_together_are_apart_again_at_their_rate() {
-        // Every 16 ms what has come, and some more by chance; 4 ms long the least.
+        // Lines arrive in bundles every 16 ms, with a random delay, at least 4 ms.
         let bundle = |k: usize, rate: f64| {
             let t = k as f64 / rate;
             let poll = (t / 0.016).ceil();
@@ -304,7 +303,7 @@ mod tests {
             40_000,
             |_| false,
             |k| {
-                // 200 ppm, which begin when the rate has been found.
+                // A drift of 200 ppm that begins after the rate was found.
                 let t = k as f64 / 200.0;
                 0.001 * chance(k, 0.618) + 2e-4 * (t - 10.0).max(0.0)
             },

@@ -1,5 +1,5 @@
-//! A board of another maker at a port that somebody else holds, as a page in a browser does: the bytes are relayed, with the times at which
-//! they came. Nothing here waits or starts a thread.
+//! A board of another maker at a port that the caller reads, such as a web page. The caller relays the bytes with their times of arrival. This module
+//! never waits or starts a thread.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, TryRecvError};
@@ -11,23 +11,23 @@ use crate::station::{Connect, Line, Station, StationEvent, other};
 use crate::text::{Text, TextBoard};
 use crate::turn::pause;
 
-/// What came over the port, or happened to it.
+/// Bytes or an event of the port.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Arrival {
-    /// It was opened.
+    /// The port was opened.
     Opened,
-    /// These bytes have come.
+    /// Bytes were received.
     Bytes(Vec<u8>),
-    /// It was closed or has vanished, and why.
+    /// The port was closed or has vanished, and why.
     Lost(String),
-    /// Nothing but time.
+    /// Only time has passed.
     Nothing,
 }
 
-/// An arrival with its time by one clock, s.
+/// An arrival with its time, s.
 pub type Stamped = (f64, Arrival);
 
-/// Connects the session with a board whose arrivals somebody sends. `rate_hz`: that of the session that goes on, if one does.
+/// Connects the session with a board whose arrivals are sent to `arrivals`. `rate_hz`: rate of the resumed session, if any.
 pub fn relayed(text: Text, rate_hz: Option<f64>, arrivals: Receiver<Stamped>) -> Connect {
     Box::new(move |next, wanted| {
         let mut line = RelayedText {
@@ -58,18 +58,18 @@ pub fn relayed(text: Text, rate_hz: Option<f64>, arrivals: Receiver<Stamped>) ->
     })
 }
 
-/// The lines that are relayed, as what a station has to say.
+/// Turns relayed lines into events of a station.
 struct RelayedText {
     text: Text,
     rate_hz: Option<f64>,
     next: u64,
     arrivals: Receiver<Stamped>,
-    /// `None` while the port is closed, or says nothing.
+    /// `None` while the port is closed or silent.
     board: Option<TextBoard>,
-    /// Whether the board that is there has been told of.
+    /// Whether the present board's greeting was reported.
     greeted: bool,
     ready: VecDeque<StationEvent>,
-    /// Why the line was lost, while it is: told once.
+    /// Why the line is lost; reported once.
     told: Option<String>,
 }
 
@@ -104,7 +104,7 @@ impl RelayedText {
                 self.board = Some(self.opened(at_s));
                 return;
             }
-            // A board that was silent speaks again.
+            // A board that was silent sends again.
             Arrival::Bytes(bytes) => {
                 if self.board.is_none() {
                     self.greeted = false;
@@ -127,7 +127,7 @@ impl RelayedText {
         TextBoard::new(&self.text, self.rate_hz, self.next, at_s)
     }
 
-    /// Takes what the board says now.
+    /// Processes what the board has sent.
     fn listen(&mut self, at_s: f64) -> Result<()> {
         let Some(board) = &mut self.board else {
             return Ok(());
@@ -157,7 +157,7 @@ impl RelayedText {
     fn lost(&mut self, why: Error) {
         self.board = None;
         let words = why.to_string();
-        // A port with the wrong bits a second says the same every five seconds.
+        // A port with the wrong baud rate causes the same error every five seconds.
         if self.told.as_ref() != Some(&words) {
             self.told = Some(words);
             self.ready.push_back(StationEvent::Lost(why));
@@ -185,7 +185,7 @@ mod tests {
         }
     }
 
-    /// Lines `from..to` of a board that writes 100 a second by its own clock, each stamped when it was written.
+    /// Lines `from..to` of a board that writes 100 per second by its own clock, each stamped when it was written.
     fn speak(to: &Sender<Stamped>, from: u32, until: u32) {
         for k in from..until {
             let line = format!("{},{k},0,4096,1,2,3\n", 10_000 * k);
@@ -194,7 +194,7 @@ mod tests {
         }
     }
 
-    /// All that a station says now, with the ticks and numbers of its samples.
+    /// All present events of a station, and its samples with ticks and numbers.
     fn all(station: &mut Station) -> (Vec<String>, Vec<(u64, f64)>) {
         let (mut said, mut samples) = (Vec::new(), Vec::new());
         while let Some(event) = station.news().unwrap() {
@@ -221,7 +221,7 @@ mod tests {
         let mut station = go_on(opening.as_mut()).unwrap().unwrap();
         assert!((station.unit.rate_hz - 100.0).abs() < 1e-6);
         let (_, first) = all(&mut station);
-        // The first line may be a half, and never counts.
+        // The first line may be incomplete, and is never used.
         assert_eq!(first[0], (51, 1.0));
         send.send((6.0, Arrival::Lost("the port has vanished".into())))
             .unwrap();

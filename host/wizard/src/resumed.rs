@@ -6,7 +6,7 @@ use mimu_recording::error::{Argument, Error, Result};
 
 use crate::procedure::SessionConfig;
 
-/// What dwells were made by: another value would leave those that there are wrong.
+/// Settings that determined the recorded dwells. With other values these dwells would be wrong.
 fn kept(asked: &SessionConfig) -> [(Argument, &'static str, String); 7] {
     let or_none = |given: Option<String>| given.unwrap_or_else(|| "none".into());
     let by = if asked.by_device { "device" } else { "pc" };
@@ -41,12 +41,12 @@ fn kept(asked: &SessionConfig) -> [(Argument, &'static str, String); 7] {
     ]
 }
 
-/// What goes on in the folder at `place`: as it was `begun`, with what `now` may say otherwise (when to end, what to wait for).
+/// Settings of the resumed session at `place`: those of `begun`, except for the settings that `now` may change (when to end, how long to wait).
 ///
-/// Errors: the dwells that there are were made by something else; each difference is named.
+/// Errors: the recorded dwells were made with other settings. Each difference is named.
 pub fn resumed(begun: &SessionConfig, now: &SessionConfig, place: &Path) -> Result<SessionConfig> {
     let failed = |e: serde_json::Error| Error::new(place.display(), e, "report this");
-    // Numbers as the file gives them.
+    // Written and read again, so that numbers are as in the file.
     let now: SessionConfig =
         serde_json::from_str(&serde_json::to_string(now).map_err(failed)?).map_err(failed)?;
     let both = kept(begun).into_iter().zip(kept(&now));

@@ -1,4 +1,4 @@
-//! A whole session: warmed up, dwells, calibration, verification, store, diagnosis, and the same again with what was found.
+//! A whole session: warm-up, dwells, calibration, verification, storing, diagnosis, and the same again with the effects found.
 
 use std::path::{Path, PathBuf};
 
@@ -23,18 +23,18 @@ use crate::verdict::{Judged, judge, prepared};
 use crate::wizard::{Ended, Wizard};
 use mimu_equipment::drive::Driver;
 
-/// A unit to calibrate: how to open it, and its folder.
+/// A unit to calibrate.
 pub struct UnitSpec {
-    /// Connects the session with it.
+    /// Connects the session with the unit.
     pub connect: Connect,
-    /// Its folder.
+    /// Folder of its session.
     pub folder: PathBuf,
 }
 
-/// Makes the page of a diagnosis.
+/// Writes the page of a diagnosis.
 pub type Page<'a> = &'a dyn Fn(&DiagnosisResult, &Path) -> Result<String>;
 
-/// What a session has come to, unit by unit: the result of `mimu wizard`.
+/// Result of `mimu wizard`, unit by unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     /// `mimu-wizard/1`.
@@ -43,41 +43,40 @@ pub struct Outcome {
     pub tool: &'static str,
     /// Whether it was ended early; the session can be resumed.
     pub cancelled: bool,
-    /// The units.
+    /// Results of the units.
     pub units: Vec<UnitOutcome>,
 }
 
-/// What has become of a unit.
+/// Result of a unit.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct UnitOutcome {
-    /// Its name.
+    /// Name of the unit.
     pub unit: String,
     /// Its folder.
     pub folder: String,
-    /// Dwells that the calibration was made from.
+    /// Dwells used for the calibration.
     pub dwells: usize,
-    /// Dwells that were thrown away while they lasted.
+    /// Dwells that were discarded while they ran.
     pub thrown: usize,
-    /// Time of the recordings, s.
+    /// Total time of the recordings, s.
     pub recorded_s: f64,
-    /// The affine calibration, in poses that were not used.
+    /// The affine calibration judged by the verification.
     pub verified: Option<Judged>,
     /// Verdict of the diagnosis.
     pub verdict: Option<Verdict>,
-    /// Effects that were found.
+    /// Ids of the effects found.
     pub effects: Vec<String>,
-    /// The calibration with the effects, in a third set of poses.
+    /// The calibration with effects, judged by a third set of poses.
     pub confirmed: Option<Judged>,
-    /// Calibration file that the device holds now, if one of this session is stored.
+    /// Calibration file that the device stores now, if it belongs to this session.
     pub stored: Option<String>,
-    /// The page.
+    /// File of the diagnosis page.
     pub page: Option<String>,
-    /// Why nothing was stored, and what else a person should know.
+    /// Why nothing was stored, and other information for the user.
     pub notes: Vec<String>,
 }
 
-/// Carries out a session; one that goes on is what it was begun with ([`resumed`]). It pauses where it has to wait
-/// ([`crate::turn`]).
+/// Carries out a session. A resumed session keeps its settings ([`resumed`]). The session pauses when it has to wait ([`crate::turn`]).
 pub async fn run(
     asked: SessionConfig,
     wanted: Vec<UnitSpec>,
@@ -127,7 +126,7 @@ pub async fn run(
         page,
     };
     let ended = session.carry_out().await;
-    // Whatever happens, stop the table.
+    // In every case, stop the table.
     let stopped = session.wizard.driver.stop();
     let ended = ended?;
     stopped?;
@@ -146,7 +145,7 @@ impl Outcome {
     }
 }
 
-/// What the session in a folder has come to, if it is finished: then nothing is done any more.
+/// Result of the session in a folder, if it is complete. Then there is nothing more to do.
 fn finished(path: &Path, now: &SessionConfig) -> Result<Option<UnitOutcome>> {
     let Some(begun) = Folder::begun(path)? else {
         return Ok(None);
@@ -186,21 +185,21 @@ struct OpenSession<'a> {
     page: Page<'a>,
 }
 
-/// The calibration of a unit without effects.
+/// The affine calibration of a unit.
 struct Plain {
     calibration: Calibration,
     fitted: Fit,
-    /// What it was judged by.
+    /// The verification recording.
     other: Prepared,
-    /// Why a person has to agree before it is stored.
+    /// Why the user has to agree before it is stored.
     rough: Option<String>,
 }
 
-/// The files of the calibrations.
+/// Files of the calibrations.
 const PLAIN: &str = "calibration.toml";
 const WITH_EFFECTS: &str = "with-effects.toml";
 
-/// Puts into the intervals how far the unit's axes may be turned on the table: 95 % of each angle within `half_width_deg`.
+/// Adds the misalignment on the table to the intervals: 95 % of each angle within `half_width_deg`.
 fn mounted(fitted: &mut Fit, half_width_deg: f64) {
     for sensor in &mut fitted.sensors {
         let triad = sensor.estimated.triad.clone();
@@ -335,7 +334,7 @@ impl OpenSession<'_> {
         Ok(ended)
     }
 
-    /// Replaces the fit by the estimate of the device's filters, if these have received all dwells.
+    /// Replaces the fit by the estimate of the device's filters, if they received all dwells.
     fn take_from_device(&mut self, k: usize, fitted: &mut Fit) -> Result<()> {
         let unit = &mut self.wizard.units[k];
         let name = unit.name();
@@ -378,7 +377,7 @@ impl OpenSession<'_> {
         Ok(())
     }
 
-    /// Judges a calibration by a recording, and tells.
+    /// Judges a calibration by a recording, and reports the result.
     fn judged(
         &mut self,
         k: usize,

@@ -1,75 +1,75 @@
-//! Where samples come from: a mimu device, or a board of another maker that writes lines of text.
+//! Sources of samples: a mimu device, or a board of another maker that writes lines of text.
 
 use mimu_core::compensation::Affine;
 use mimu_device::Session;
 use mimu_recording::RawUnit;
 use mimu_recording::error::Result;
 
-/// Who is at the port.
+/// The unit at a port.
 #[derive(Debug, Clone)]
 pub struct Unit {
-    /// What it is told apart by: the number of the microcontroller, or the name of the port.
+    /// Identifies the unit: the number of the microcontroller, or the name of the port.
     pub id: String,
-    /// What a person calls it.
+    /// Name for the user.
     pub name: String,
     /// Unit of its raw readings.
     pub raw_unit: RawUnit,
-    /// Samples a second.
+    /// Sample rate, Hz.
     pub rate_hz: f64,
-    /// Data-sheet model of gyro and accelerometer, raw to SI: good enough to find which side is up. `None`: estimated from gravity.
+    /// Model of gyro and accelerometer from the data sheets, raw to SI; accurate enough to find which side is up. `None`: estimated from gravity.
     pub nominal: Option<[Affine<f64>; 2]>,
-    /// Lines about itself: reset cause and stored calibration.
+    /// Its reset cause and stored calibration, in words.
     pub told: Vec<String>,
-    /// Whether it stores calibrations, tests itself and runs Kalman banks.
+    /// Whether it stores calibrations, and runs self-tests and Kalman banks.
     pub is_device: bool,
-    /// Why it started, if it was no power-on.
+    /// Last reset cause, unless it was a power-on.
     pub start: Option<String>,
 }
 
 /// Consecutive samples.
 #[derive(Debug, Clone)]
 pub struct Chunk {
-    /// Sample periods since the source began; never goes back.
+    /// Tick of the first sample: sample periods since the source began. Never decreases.
     pub tick: u64,
     /// Raw readings, gyro x, y, z, accelerometer x, y, z.
     pub values: Vec<[f64; 6]>,
-    /// °C, not a number where unknown.
+    /// Temperature, °C; NaN if unknown.
     pub temp_c: f64,
-    /// Whether one of the readings may be at the end of its range.
+    /// Whether one of the readings may be at a rail.
     pub saturated: bool,
     /// Whether a self-test deflected the sensors.
     pub self_test: bool,
-    /// Time of the power-on on the clock of the ticks, s; `None` if unknown.
+    /// Time of the power-on by the clock of the ticks, s; `None` if unknown.
     pub power_on_s: Option<f64>,
 }
 
-/// What a source has to say.
+/// An event of a source.
 #[derive(Debug)]
 pub enum Heard {
     /// Samples.
     Samples(Chunk),
-    /// The device has restarted, and why.
+    /// The device restarted, with its reset cause.
     Restarted(String),
-    /// Something that a person should know.
+    /// Information for the user.
     Note(String),
-    /// Nothing, for a little while.
+    /// Nothing came for a short while.
     Nothing,
 }
 
-/// Samples in order, from something that can vanish.
+/// Samples in order from a unit that may vanish.
 pub trait Source: Send {
-    /// Who it is.
+    /// The unit.
     fn unit(&self) -> &Unit;
 
-    /// What comes next; waits for a few milliseconds at most. An error: it is gone, and has to be opened anew.
+    /// The next event; waits at most a few milliseconds. After an error the source is gone, and has to be opened again.
     fn next(&mut self) -> Result<Heard>;
 
-    /// The session, where there is a mimu device. Whatever is asked of it, the stream begins again with the next [`Source::next`].
+    /// The session, if this is a mimu device. The stream restarts with the next [`Source::next`], whatever was requested.
     fn device(&mut self) -> Option<&mut Session>;
 
-    /// The same for short calls that do not disturb the stream: no sample is lost.
+    /// The session for short calls that do not interrupt the stream: no sample is lost.
     fn aside(&mut self) -> Option<&mut Session>;
 }
 
-/// Opens a source: at the beginning, and after it was gone. The tick is the first that it may use.
+/// Opens a source: at the beginning, and again after it was lost. The argument is the first tick that it may use.
 pub type Opener = Box<dyn FnMut(u64) -> Result<Box<dyn Source>> + Send>;

@@ -1,4 +1,4 @@
-//! A unit at the end of its line. At a port a separate thread receives its data, and reopens the port when it has vanished.
+//! A unit and its line. For a port, a separate thread receives the data, and reopens the port if it has vanished.
 
 use std::pin::Pin;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
@@ -10,19 +10,19 @@ use mimu_recording::error::{Argument, Error, Result};
 
 use crate::source::{Chunk, Heard, Opener, Source, Unit};
 
-/// Time between two tries to open a port again.
+/// Interval between attempts to reopen a port.
 const AGAIN: Duration = Duration::from_millis(300);
 
-/// What a station has to say.
+/// An event of a station.
 #[derive(Debug)]
 pub enum StationEvent {
     /// Samples.
     Samples(Chunk),
-    /// The device has restarted, and why.
+    /// The device restarted, with its reset cause.
     Restarted(String),
-    /// Something that a person should know.
+    /// Information for the user.
     Note(String),
-    /// The line is lost, and why.
+    /// The line was lost, and why.
     Lost(Error),
     /// Another unit is at the port.
     Other(Error),
@@ -30,24 +30,24 @@ pub enum StationEvent {
     Back(Box<Unit>),
 }
 
-/// Something to be done with the session of a mimu device, where there is one.
+/// A task for the session of a mimu device, if there is one.
 pub type Errand = Box<dyn FnOnce(&mut Option<Box<dyn Source>>) + Send>;
 
-/// The line to a unit, which never waits.
+/// The line to a unit. Its functions never wait.
 pub trait Line {
-    /// What has come; `None` if nothing has.
+    /// The next event; `None` if there is none.
     fn news(&mut self) -> Result<Option<StationEvent>>;
 
-    /// Has something done with the device; `false` where there is nobody to do it.
+    /// Passes a task to the device's thread; `false` if there is none.
     fn errand(&self, _: Errand) -> bool {
         false
     }
 }
 
-/// A station that is being opened.
+/// A station being opened.
 pub type Connecting = Pin<Box<dyn Future<Output = Result<Station>>>>;
 
-/// Connects a session with a unit: the first tick that it may use, and the id of the unit if no other will do.
+/// Connects a session with a unit. Arguments: the first tick that it may use, and the id of the required unit, if any.
 pub type Connect = Box<dyn FnOnce(u64, Option<String>) -> Connecting>;
 
 /// Connects a session with a unit at a port, and starts a thread for that port.
@@ -58,14 +58,14 @@ pub fn at_port(opener: Opener) -> Connect {
     })
 }
 
-/// A unit at the end of its line.
+/// A unit and its line.
 pub struct Station {
-    /// Who it is.
+    /// The unit.
     pub unit: Unit,
     line: Box<dyn Line>,
 }
 
-/// A port with its thread.
+/// A port and its thread.
 struct Threaded {
     news: Receiver<StationEvent>,
     errands: Option<Sender<Errand>>,
@@ -89,12 +89,12 @@ impl Line for Threaded {
 }
 
 impl Station {
-    /// Of a unit that has greeted over this line.
+    /// The station of a unit that was identified on this line.
     pub fn over(unit: Unit, line: Box<dyn Line>) -> Self {
         Self { unit, line }
     }
 
-    /// Opens a port. `next`: the first tick that it may use. `wanted`: only a unit with this id.
+    /// Opens a port. `next`: the first tick that it may use. `wanted`: id of the required unit.
     fn open(mut opener: Opener, next: u64, wanted: Option<&str>) -> Result<Self> {
         let source = opener(next)?;
         let unit = source.unit().clone();
@@ -117,7 +117,7 @@ impl Station {
         Ok(Self::over(unit, Box::new(line)))
     }
 
-    /// What has come; `None` if nothing has.
+    /// The next event; `None` if there is none.
     pub fn news(&mut self) -> Result<Option<StationEvent>> {
         let news = self.line.news()?;
         if let Some(StationEvent::Back(unit)) = &news {
@@ -126,7 +126,7 @@ impl Station {
         Ok(news)
     }
 
-    /// Does something with the session; what comes meanwhile is not samples. An error where there is no device, or it is gone.
+    /// Runs a task with the session. The samples meanwhile are lost. Fails if there is no device, or if it is gone.
     pub fn with<T: Send + 'static>(
         &self,
         errand: impl FnOnce(&mut Session) -> Result<T> + Send + 'static,
@@ -134,7 +134,7 @@ impl Station {
         self.of(|source| source.device(), errand)
     }
 
-    /// The same for short calls, by which no sample is lost.
+    /// Like [`Self::with`], for short calls that lose no sample.
     pub fn aside<T: Send + 'static>(
         &self,
         errand: impl FnOnce(&mut Session) -> Result<T> + Send + 'static,
@@ -183,7 +183,7 @@ fn broken() -> Error {
     )
 }
 
-/// Why a unit is not the one.
+/// Error if another unit than the required one is at the port.
 pub(crate) fn other(found: &str, wanted: &str) -> Error {
     Error::device(
         "port",

@@ -1,4 +1,4 @@
-//! A calibration into the device: stored, read back, kept over a loss of the supply, and computed with as the PC does.
+//! Stores a calibration on the device, reads it back, and checks that it survives a power cycle and that the device computes as the PC does.
 
 use std::time::{Duration, Instant};
 
@@ -11,16 +11,16 @@ use crate::folder::Entry;
 use crate::turn::rest;
 use crate::wizard::{Ended, Wizard};
 
-/// Longest wait for a device to come back with its supply.
+/// Longest wait for a device to return after a power cycle.
 const BACK: Duration = Duration::from_secs(60);
-/// Time between two greetings of one that comes back.
+/// Interval of the attempts meanwhile.
 const AGAIN: Duration = Duration::from_millis(200);
-/// Length of the comparison of the device's compensation with the PC's.
+/// Length of the comparison between the device's and the PC's compensation.
 const COMPARED: Duration = Duration::from_secs(1);
-/// Length of the raw stream that shows the number of samples since the start.
+/// Length of the raw stream that gives the number of samples since the start.
 const GLANCE: Duration = Duration::from_millis(50);
 
-/// For how long the device has had its supply, s; `None` if it started by anything but power-on since, or does not know.
+/// Time since the device's power-on, s; `None` if its last start had another cause, or if it does not know.
 fn powered(session: &mut Session) -> Result<Option<f64>> {
     let who = session.hello()?;
     let before_ms = who.powered_for_ms.filter(|_| who.start == Started::PowerOn);
@@ -37,7 +37,7 @@ fn powered(session: &mut Session) -> Result<Option<f64>> {
 }
 
 impl Wizard<'_> {
-    /// Has the sensors deflected electrically, and keeps a copy of what the device holds.
+    /// Runs the self-tests, and saves the calibrations that the devices store.
     pub async fn look_at_devices(&mut self) -> Result<Ended> {
         for k in 0..self.units.len() {
             let unit = &self.units[k];
@@ -55,7 +55,7 @@ impl Wizard<'_> {
                     mimu_recording::result_file::stage(&copy, bytes.as_slice())?.publish()?;
                 }
             }
-            // A resumed session has done this already.
+            // A resumed session has run its self-test already.
             if unit
                 .folder
                 .entries()
@@ -99,8 +99,8 @@ impl Wizard<'_> {
         Ok(Ended::Done)
     }
 
-    /// Stores a calibration on unit `k`, reads it back, turns the supply off and on, and compares what the device makes of its readings with
-    /// what the PC makes of the same. `place` is the file.
+    /// Stores a calibration on unit `k`, reads it back, power-cycles the unit, and compares the device's compensation with the PC's on the same
+    /// readings. `place` is the file.
     pub async fn store(
         &mut self,
         k: usize,
@@ -141,7 +141,7 @@ impl Wizard<'_> {
             }
             let now_s = self.units[k].station.with(powered)?;
             match (now_s, driven) {
-                // It has its supply for less long than before, or than since the question.
+                // It has had power for a shorter time than before, or than since the question.
                 (Some(now_s), _)
                     if on_s.is_none_or(|on_s| now_s < on_s)
                         || now_s < since.elapsed().as_secs_f64() =>
@@ -179,7 +179,7 @@ impl Wizard<'_> {
         Ok(Ended::Done)
     }
 
-    /// Waits until unit `k` greets with this calibration.
+    /// Waits until unit `k` reports this calibration in its greeting.
     async fn wait_for(&mut self, k: usize, hash: u64) -> Result<()> {
         let since = Instant::now();
         loop {

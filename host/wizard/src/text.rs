@@ -1,6 +1,5 @@
-//! A board of another maker that writes its readings as lines of text: the usual sketch for an Arduino, a Teensy or an ESP32, or what
-//! MotionCal reads. Bytes and the times at which they came go in, samples come out: who holds the port, and which clock it is, is the
-//! matter of [`crate::text_port`] and [`crate::relay`].
+//! A board of another maker that writes its readings as lines of text: the usual sketch for an Arduino, a Teensy or an ESP32, or the format of
+//! MotionCal. Converts bytes with their times of arrival into samples. Port and clock are handled by [`crate::text_port`] and [`crate::relay`].
 
 use std::collections::VecDeque;
 
@@ -15,36 +14,36 @@ use crate::text_line::{Columns, Lines, Reading};
 
 /// Longest wait for a line of numbers, s. A board that resets when its port is opened has started by then.
 pub(crate) const NOTHING_S: f64 = 5.0;
-/// Silence after which the port is opened again, s: one that was unplugged need not say so.
+/// Silence after which the port is opened again, s: a port may be unplugged without an error.
 const SILENCE_S: f64 = 5.0;
-/// So long the board's clock is compared with the computer's before its rate is believed, s: lines that waited in a buffer are then few
-/// beside those that came at their time.
+/// Time over which the board's clock is compared with the computer's before its rate is trusted, s. Lines that waited in a buffer are then few in
+/// comparison with punctual ones.
 const COMPARED_S: f64 = 2.0;
-/// Codes at which the converters of these sensors end: 16 bits, whatever the range that is set.
+/// Rails of these sensors' converters: 16 bits, whatever range is set.
 const ENDS: [f64; 2] = [-32768.0, 32767.0];
-/// Departure of the two that is worth a word: crystals and ceramic resonators are within 0.5 %.
+/// Difference between the clocks that is reported: crystals and ceramic resonators are within 0.5 %.
 const CLOCK_SHARE: f64 = 0.05;
-/// A factor between the two that no replay of a recording has, and that a wrong unit has: 1000 or a million.
+/// Ratio of the clocks that indicates a wrong unit, which gives 1000 or a million. No replay of a recording is so fast.
 const WRONG_UNIT: f64 = 100.0;
-/// Lines that are not data are told of when there are so many more by this factor.
+/// Lines without data are reported again when their number has grown by this factor.
 const TOLD_AGAIN: u64 = 10;
 
-/// How a board writes, and what its numbers are.
+/// A board's port, columns and units.
 #[derive(Debug, Clone)]
 pub struct Text {
     /// Path of the serial port, or `tcp://HOST:PORT`.
     pub port: String,
-    /// Bits a second; a line over USB or TCP takes no notice of it.
+    /// Bits per second; ignored for USB and TCP.
     pub baud: u32,
     /// Meaning of each place in a line.
     pub columns: Columns,
     /// Unit of the readings.
     pub raw_unit: RawUnit,
-    /// What the board is called; without it, as its port.
+    /// Name of the board; by default its port.
     pub name: Option<String>,
 }
 
-/// What comes from a board that writes lines, as samples.
+/// Converts lines of a board into samples.
 #[derive(Debug)]
 pub struct TextBoard {
     port: String,
@@ -53,22 +52,22 @@ pub struct TextBoard {
     unit: Unit,
     is_open: bool,
     patience_s: f64,
-    /// When a line of numbers came last, or the port was opened.
+    /// When the last line of numbers came, or when the port was opened.
     heard_s: f64,
-    /// Lines whose time cannot be that are among those refused.
+    /// Refused lines whose time is impossible.
     garbled: u64,
-    /// Times of lines by the board's clock and by the computer's, s, until the two are compared.
+    /// Times of lines by the board's clock and by the computer's, s, until the two have been compared.
     clocks: Vec<[f64; 2]>,
-    /// How many times as fast as the computer's the board's clock goes, once they are.
+    /// Rate of the board's clock relative to the computer's, once they have been compared.
     clock_factor: Option<f64>,
     ready: VecDeque<Heard>,
-    /// Number of lines that are not data at which they are told of next.
+    /// Number of lines without data at which they are reported next.
     tell_at: u64,
 }
 
 impl TextBoard {
-    /// At a port that was opened at `now_s`, as all times by one clock of the computer's. `rate_hz`: that of the session that goes on, if
-    /// one does; `next`: the first tick that it may use.
+    /// A board at a port that was opened at `now_s`; all times are by one clock of the computer. `rate_hz`: rate of the resumed session, if any;
+    /// `next`: the first tick that it may use.
     pub fn new(text: &Text, rate_hz: Option<f64>, next: u64, now_s: f64) -> Self {
         let name = text.name.clone().unwrap_or_else(|| text.port.clone());
         let unit = Unit {
@@ -97,19 +96,19 @@ impl TextBoard {
         }
     }
 
-    /// Waits so long for a line.
+    /// Sets the longest wait for a line.
     pub(crate) fn with_patience(self, patience_s: f64) -> Self {
         Self { patience_s, ..self }
     }
 
-    /// Who it is; the rate is known once it [is open](TextBoard::is_open).
+    /// The unit. Its rate is known once [`Self::is_open`] returns true.
     pub fn unit(&self) -> &Unit {
         &self.unit
     }
 
     /// Whether its rate is known and a line has come.
     ///
-    /// Errors: within 5 s no line is what was described, or its times cannot be.
+    /// Errors: within 5 s no line matched the description, or its times are impossible.
     pub fn is_open(&mut self, now_s: f64) -> Result<bool> {
         if self.is_open {
             return Ok(true);
@@ -133,7 +132,7 @@ impl TextBoard {
         })
     }
 
-    /// What is said of it once its rate is known.
+    /// Reports the board once its rate is known.
     fn greet(&mut self) -> Result<()> {
         let rate_hz = self.regular.rate_hz().unwrap_or(f64::NAN);
         self.unit.rate_hz = rate_hz;
@@ -161,16 +160,16 @@ impl TextBoard {
         Ok(())
     }
 
-    /// Compares the board's clock with the computer's, once enough of both has passed.
+    /// Compares the board's clock with the computer's after enough time.
     ///
-    /// Errors: one goes so much faster that the unit of the column is another.
+    /// Errors: their ratio shows that the clock column has another unit.
     fn check_clock(&mut self) -> Result<()> {
         let spent = self.clocks.last().zip(self.clocks.first());
         let spent_s = spent.map_or(0.0, |(last, first)| last[1] - first[1]);
         if self.clock_factor.is_some() || spent_s < COMPARED_S || self.clocks.len() < 8 {
             return Ok(());
         }
-        // A garbled time is in few of the pairs, and leaves the median alone.
+        // Few of the pairs contain a garbled time, so the median is unaffected.
         let later = &self.clocks[self.clocks.len() / 2..];
         let both = self.clocks.iter().zip(later);
         let mut factors: Vec<f64> = both.map(|(a, b)| (b[0] - a[0]) / (b[1] - a[1])).collect();
@@ -211,7 +210,7 @@ impl TextBoard {
             .about(Argument::Baud)
     }
 
-    /// Takes what came until `now_s`, nothing where only time has passed.
+    /// Takes the bytes received until `now_s`; empty if only time has passed.
     pub fn take(&mut self, bytes: &[u8], now_s: f64) {
         for reading in self.lines.take(bytes) {
             self.heard_s = now_s;
@@ -235,14 +234,14 @@ impl TextBoard {
         }
         self.lines.refuse(self.regular.garbled() - self.garbled);
         self.garbled = self.regular.garbled();
-        // On the computer's clock time advances without lines too.
+        // By the computer's clock, time advances without lines too.
         let now = (!self.lines.has_clock()).then_some(now_s);
         while let Some((tick, sample)) = self.regular.certain(now) {
             self.emit(tick, &sample);
         }
     }
 
-    /// Puts a sample behind those of the same chunk.
+    /// Appends a sample to the current chunk.
     fn emit(&mut self, tick: u64, sample: &Timed) {
         let counts = self.unit.raw_unit == RawUnit::Count;
         let saturated = counts && sample.raw.iter().any(|code| ENDS.contains(code));
@@ -263,9 +262,9 @@ impl TextBoard {
         }
     }
 
-    /// What is known of it at `now_s` and was not said yet.
+    /// The next event at `now_s` that was not reported yet.
     ///
-    /// Errors: it is silent.
+    /// Errors: the board is silent.
     pub fn next(&mut self, now_s: f64) -> Result<Heard> {
         if now_s - self.heard_s > SILENCE_S {
             return Err(Error::device(
@@ -283,12 +282,12 @@ impl TextBoard {
         Ok(self.ready().unwrap_or(Heard::Nothing))
     }
 
-    /// What was known already.
+    /// The next event that is known already.
     pub(crate) fn ready(&mut self) -> Option<Heard> {
         self.ready.pop_front()
     }
 
-    /// Lines that were not data.
+    /// Number of lines without data.
     #[cfg(test)]
     pub(crate) fn refused(&self) -> u64 {
         self.lines.refused()

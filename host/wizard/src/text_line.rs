@@ -1,34 +1,34 @@
-//! Lines of text as readings: the meaning of their numbers, and lines that are not data.
+//! Parses lines of text into readings, and recognises lines without data.
 //!
-//! Sketches write numbers with commas, semicolons, tabs or blanks between them, often a label in front (`a/g:`, `Accel: 1, 2, 3 Gyro: …`)
-//! or one for each number (`ax:1,ay:2`, the Arduino plotter's way), and words of greeting before. MotionCal's boards write `Raw:` with
-//! nine integers and, in turns with it, `Uni:` with nine of the same in SI.
+//! Sketches write numbers separated by commas, semicolons, tabs or spaces. Often there is a label in front (`a/g:`, `Accel: 1, 2, 3 Gyro: …`) or one
+//! for each number (`ax:1,ay:2`, as for the Arduino plotter), and a greeting comes first. MotionCal's boards alternately write `Raw:` with nine
+//! integers and `Uni:` with the same nine in SI.
 
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, Decimal};
 
-/// Longest line, bytes; a board that writes none of them as long as this with ten numbers.
+/// Longest line, bytes. No board writes a line as long as this with ten numbers.
 const LONGEST: usize = 400;
-/// Largest reading: counts have 32 bits at most, and a number that was garbled to more (`1.4e99`) would end the fit of all others.
+/// Largest reading: counts have at most 32 bits. One number garbled to more (`1.4e99`) would spoil the fit of all others.
 const LARGEST: f64 = BITS;
-/// So many lines that are not data are kept to be shown.
+/// Number of lines without data that are kept for display.
 const SHOWN: usize = 3;
 
 /// The columns of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
     names: String,
-    /// `None` is not needed.
+    /// `None`: a column to ignore.
     columns: Vec<Option<Column>>,
     /// Unit of the board's clock, if it has one.
     clock: Option<Decimal>,
 }
 
-/// What sketches call the raw columns of a recording.
+/// Names of the raw columns of a recording in sketches.
 const CHANNELS: [&str; 6] = ["gx", "gy", "gz", "ax", "ay", "az"];
-/// Units in which sketches write their clock, in `t_us`, `t_ms` and `t_s`.
+/// Units of the clock columns `t_us`, `t_ms` and `t_s`.
 const CLOCKS: [Decimal; 3] = [Decimal::Microsecond, Decimal::Millisecond, Decimal::Second];
-/// What sketches count in 32 bits.
+/// Range of counters with 32 bits.
 const BITS: f64 = 4_294_967_296.0;
 
 /// Length of a unit of time, s.
@@ -36,7 +36,7 @@ fn seconds(unit: Decimal) -> f64 {
     1.0 / unit.per_second() as f64
 }
 
-/// Time after which a clock in this unit begins anew, s.
+/// Time after which a clock in this unit wraps, s.
 fn wraps_s(unit: Decimal) -> f64 {
     match unit {
         Decimal::Second => f64::INFINITY,
@@ -45,10 +45,10 @@ fn wraps_s(unit: Decimal) -> f64 {
 }
 
 impl Columns {
-    /// From names with commas between them: `ax`, `ay`, `az`, `gx`, `gy`, `gz`, which a recording calls `accel_x` to `gyro_z`, at most one of
-    /// `t_us`, `t_ms` and `t_s`, `temp_c`, and `-` for what is not needed.
+    /// Parses names separated by commas: `ax`, `ay`, `az`, `gx`, `gy`, `gz` (or `accel_x` to `gyro_z` as in a recording), at most one of `t_us`,
+    /// `t_ms` and `t_s`, `temp_c`, and `-` for a column to ignore.
     ///
-    /// Errors: a name that there is not, or is there twice; a missing axis.
+    /// Errors: an unknown or repeated name, or a missing axis.
     pub fn parse(names: &str) -> Result<Self> {
         let refused = |problem: String| {
             let remedy = "name ax, ay, az, gx, gy and gz in the order of the line, also t_us, t_ms or t_s, temp_c, and `-` for what is not needed";
@@ -88,7 +88,7 @@ impl Columns {
         })
     }
 
-    /// `Raw:` of MotionCal: accelerometer, gyro, and a magnetometer, which is not needed.
+    /// `Raw:` of MotionCal: accelerometer, gyro, and a magnetometer, which is ignored.
     fn motion_cal() -> Self {
         let mut columns = [3, 4, 5, 0, 1, 2].map(|c| Some(Column::Raw(c))).to_vec();
         columns.extend([None; 3]);
@@ -105,29 +105,29 @@ impl Columns {
     }
 }
 
-/// The numbers of a line.
+/// The values of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// Gyro x, y, z, accelerometer x, y, z, raw.
     pub raw: [f64; 6],
-    /// °C, NaN if there is none.
+    /// Temperature, °C; NaN if there is none.
     pub temp_c: f64,
-    /// The board's clock, s, where there is one.
+    /// The board's clock, s, if there is one.
     pub t_s: Option<f64>,
 }
 
-/// Bytes in, readings out.
+/// Converts bytes into readings.
 #[derive(Debug)]
 pub struct Lines {
     columns: Columns,
     open: Vec<u8>,
-    /// What is before the first end of a line may be its second half.
+    /// Whether the start of the current line was received: text before the first line end may be the second half of a line.
     whole: bool,
-    /// Label before the first number of the lines that are data.
+    /// Label before the first number of the data lines.
     label: Option<String>,
     count: u64,
     refused: u64,
-    /// Lines of numbers with another label than those that are data.
+    /// Lines of numbers with another label than the data lines.
     others: u64,
     first_seen: Vec<String>,
     last_clock: Option<f64>,
@@ -135,7 +135,7 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Of lines with these columns, or of MotionCal.
+    /// For lines with these columns, or for MotionCal's.
     pub fn new(columns: Columns) -> Self {
         Self {
             columns,
@@ -151,7 +151,7 @@ impl Lines {
         }
     }
 
-    /// Takes bytes; the lines that end in them and are data.
+    /// Takes bytes. Returns the readings of the data lines that they complete.
     pub fn take(&mut self, bytes: &[u8]) -> Vec<Reading> {
         let mut readings = Vec::new();
         for byte in bytes {
@@ -167,7 +167,7 @@ impl Lines {
                         readings.extend(self.line(text.trim()));
                     }
                 }
-                // What is longer is no line of numbers, whatever follows.
+                // A longer line cannot be data, whatever follows.
                 _ if self.open.len() > LONGEST => {}
                 byte => self.open.push(*byte),
             }
@@ -225,7 +225,7 @@ impl Lines {
                 (Some(Column::Temperature), _) => reading.temp_c = *number,
                 (Some(Column::Time), Some(unit)) => {
                     let (t_s, wraps_s) = (number * seconds(unit), wraps_s(unit));
-                    // 32 bits of microseconds are full after 71 minutes. A clock that goes back elsewhere has been set to 0.
+                    // 32 bits of microseconds wrap after 71 minutes. A clock that goes back at another time was reset.
                     let near = 10.0;
                     let last = self.last_clock.unwrap_or(t_s);
                     if last > wraps_s - near && t_s < near {
@@ -240,17 +240,17 @@ impl Lines {
         Some(reading)
     }
 
-    /// Lines that were data.
+    /// Number of data lines.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Lines that were not, without the first, which may be a half.
+    /// Number of lines without data, except for the first, which may be incomplete.
     pub fn refused(&self) -> u64 {
         self.refused
     }
 
-    /// Lines that turned out not to be data by their time.
+    /// Counts lines that were found not to be data by their times.
     pub fn refuse(&mut self, count: u64) {
         self.refused += count;
         self.count -= count.min(self.count);
@@ -259,12 +259,12 @@ impl Lines {
         }
     }
 
-    /// The first lines that were not data.
+    /// The first lines without data.
     pub fn first_seen(&self) -> &[String] {
         &self.first_seen
     }
 
-    /// How many lines were not data, and the first of them; `None` if all were.
+    /// Number of lines without data, and the first of them; `None` if there are none.
     pub fn refused_in_words(&self) -> Option<String> {
         let first = self.first_seen.first()?;
         Some(format!(
@@ -289,7 +289,7 @@ impl Lines {
         self.columns.has_clock()
     }
 
-    /// What the clock column would be, if time by it were to go `factor` times more slowly.
+    /// Name of the clock column if its time ran `factor` times more slowly.
     pub fn clock_in_words(&self, factor: f64) -> String {
         let unit_s = self.columns.clock.map_or(f64::NAN, seconds) / factor;
         let near = |unit: &Decimal| (0.2..5.0).contains(&(seconds(*unit) / unit_s));
@@ -299,7 +299,7 @@ impl Lines {
         }
     }
 
-    /// What a line of data is.
+    /// Describes a data line.
     pub fn description(&self) -> String {
         format!(
             "{} numbers, {}",
@@ -309,7 +309,7 @@ impl Lines {
     }
 }
 
-/// The label in front and the numbers of a line; `None` if anything else is in it.
+/// The leading label and the numbers of a line; `None` if it contains anything else.
 pub fn numbers(text: &str) -> Option<(&str, Vec<f64>)> {
     let mut label = "";
     let mut numbers = Vec::new();

@@ -1,4 +1,4 @@
-//! The port of a board that writes lines of text, read by a thread that waits for what comes.
+//! The port of a board that writes lines of text, read by a thread that waits for bytes.
 
 use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
@@ -10,10 +10,10 @@ use mimu_recording::error::{Error, Result};
 use crate::source::{Heard, Source, Unit};
 use crate::text::{NOTHING_S, Text, TextBoard};
 
-/// Longest wait for the port: what comes together within it has one time of arrival.
+/// Longest wait of a read. All bytes of a read get the same time of arrival.
 const POLL: Duration = Duration::from_millis(5);
 
-/// Opens a board, and again when it was gone: the rate that was found first stays, as time is counted by it.
+/// Opens a board, and reopens it after it was lost. The rate found first is kept, because it defines the time.
 #[derive(Debug, Clone)]
 pub struct TextOpener {
     text: Text,
@@ -22,7 +22,7 @@ pub struct TextOpener {
 }
 
 impl TextOpener {
-    /// Of a board. `rate_hz`: that of the session that goes on, if one does.
+    /// For a board. `rate_hz`: rate of the resumed session, if any.
     pub fn new(text: Text, rate_hz: Option<f64>) -> Self {
         Self {
             text,
@@ -33,7 +33,7 @@ impl TextOpener {
 
     /// Opens it, and waits until its rate is known. `next`: the first tick that it may use.
     ///
-    /// Errors: the port does not open; within 5 s no line is what was described.
+    /// Errors: the port does not open, or within 5 s no line matches the description.
     pub fn open(&mut self, next: u64) -> Result<TextSource> {
         let board = TextBoard::new(&self.text, self.rate_hz, next, 0.0);
         let mut source = TextSource {
@@ -65,7 +65,7 @@ fn open(text: &Text) -> Result<Box<dyn Read + Send>> {
     Ok(Box::new(line))
 }
 
-/// The samples of a board that writes lines.
+/// Source of a board that writes lines.
 pub struct TextSource {
     input: Box<dyn Read + Send>,
     port: String,
@@ -81,7 +81,7 @@ impl TextSource {
     fn read(&mut self) -> Result<()> {
         let mut bytes = [0; 4096];
         let count = match self.input.read(&mut bytes) {
-            // A port that was pulled out, or a peer that has hung up, is at its end for ever.
+            // A port that was unplugged, or a peer that closed the connection, reports end of file.
             Ok(0) => return Err(self.gone()),
             Ok(count) => count,
             Err(e) => match e.kind() {
@@ -138,7 +138,7 @@ mod tests {
     fn board(columns: &str, writes: Vec<String>, stays: Duration) -> TextOpener {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = format!("tcp://{}", listener.local_addr().unwrap());
-        // One after the other, and hung up so long behind each.
+        // Writes the texts one after the other, and closes each connection after this time.
         std::thread::spawn(move || {
             for text in writes {
                 let mut line = listener.accept().unwrap().0;
@@ -159,7 +159,7 @@ mod tests {
         }
     }
 
-    /// Lines with a clock, which show their number as a reading; `odd` gives another one in the place of some.
+    /// Lines with a clock, whose readings are their numbers; `odd` replaces some of them.
     fn numbered(rate_hz: f64, count: usize, odd: impl Fn(usize) -> Option<String>) -> String {
         let mut text = String::from("cut\n");
         for k in 0..count {
@@ -172,7 +172,7 @@ mod tests {
         text
     }
 
-    /// All samples until the line is lost: tick and number; and what was noted.
+    /// All samples (tick and number) until the line is lost, and all notes.
     fn all(source: &mut TextSource) -> (Vec<(u64, usize)>, Vec<String>) {
         let (mut samples, mut notes) = (Vec::new(), Vec::new());
         while let Ok(heard) = source.next() {
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn a_port_that_comes_back_goes_on_behind_the_last_sample_at_the_same_rate() {
         let first = numbered(250.0, 2000, |_| None);
-        // The second time the rate would be found otherwise.
+        // By itself, the second connection would find another rate.
         let second = numbered(251.0, 2000, |_| None);
         let mut opener = board(CLOCKED, vec![first, second], Duration::ZERO);
         let mut source = opener.open(0).unwrap();
@@ -238,7 +238,7 @@ mod tests {
         assert!(samples.len() > 2300, "{}", samples.len());
     }
 
-    /// A board that writes ten lines in a tenth of a second, for three seconds.
+    /// A board that writes a hundred lines a second, for three seconds.
     fn paced(columns: &str, unit_s: f64) -> Result<TextSource> {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = format!("tcp://{}", listener.local_addr().unwrap());

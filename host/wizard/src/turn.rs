@@ -1,17 +1,17 @@
-//! A session that never blocks: where it has to wait it pauses, and whoever drives it goes on with it when something may have come.
+//! A session that never blocks: it pauses when it has to wait, and its driver resumes it when something may have arrived.
 //!
-//! What a session does is one story from the greeting to the last dwell, and it is written as one, as asynchronous functions. There is no
-//! runtime. A command waits a little and goes on ([`complete`]); a page goes on when the board or the person has said something.
+//! A session is one sequence from the greeting to the last dwell, so it is written as one, in asynchronous functions, without a runtime. A command
+//! waits a little and resumes ([`complete`]); a page resumes when the board or the user has sent something.
 
 use std::future::Future;
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
 
-/// Nothing has come: so long a command looks at nothing.
+/// Sleep of a command between two resumptions.
 const IDLE: Duration = Duration::from_millis(4);
 
-/// Pauses once: whoever drives the session goes on with it later.
+/// Pauses once, until the driver resumes the session.
 pub async fn pause() {
     let mut paused = false;
     std::future::poll_fn(move |_| match std::mem::replace(&mut paused, true) {
@@ -21,7 +21,7 @@ pub async fn pause() {
     .await;
 }
 
-/// Pauses for at least so long.
+/// Pauses for at least this time.
 pub async fn rest(time: Duration) {
     let since = Instant::now();
     while since.elapsed() < time {
@@ -29,9 +29,9 @@ pub async fn rest(time: Duration) {
     }
 }
 
-/// Goes on with a session until it pauses; what it has come to, if it has ended.
+/// Resumes a session until it pauses. Returns its result if it has ended.
 pub fn go_on<F: Future + ?Sized>(session: std::pin::Pin<&mut F>) -> Option<F::Output> {
-    // Nobody is woken: the driver of the session knows when something has come.
+    // No waker is needed: the driver knows when something has arrived.
     let mut context = Context::from_waker(Waker::noop());
     match session.poll(&mut context) {
         Poll::Ready(done) => Some(done),
@@ -39,7 +39,7 @@ pub fn go_on<F: Future + ?Sized>(session: std::pin::Pin<&mut F>) -> Option<F::Ou
     }
 }
 
-/// Drives a session to its end, and waits in this thread where it pauses.
+/// Drives a session to its end. This thread sleeps while the session pauses.
 pub fn complete<F: Future>(session: F) -> F::Output {
     let mut session = pin!(session);
     loop {

@@ -1,4 +1,4 @@
-//! One of the units of a session: what comes from it, and the dwells that are made of it.
+//! One of the units of a session: its samples, and its dwells.
 
 mod conditions;
 mod rows;
@@ -25,92 +25,92 @@ use crate::waiting::{Interruption, Waiting};
 use crate::watch::{Seen, Watch, force, guessed};
 use mimu_equipment::step::Step;
 
-/// Part of the second before that belongs to a dwell already: it was as still.
+/// A dwell includes this much of the second in which it was detected, s: the unit was at rest then too.
 const BEFORE_S: f64 = 0.5;
-/// A dwell that ends earlier than this has not begun, s.
+/// A dwell that ends earlier than this counts as not begun, s.
 const BEGUN_S: f64 = 0.5;
-/// So much of what has come is kept between two dwells, s: a turn takes seconds.
+/// Samples kept between two dwells, s: a turn takes seconds.
 const KEPT_S: f64 = 120.0;
 
-/// From this many targets on a half-width tells nothing of where up is: 20 mrad.
+/// Largest half-width, in multiples of its target, with which the calibration is used to find up: 20 mrad.
 const KNOWN: f64 = 20.0;
 
-/// Half-widths of the angles of axes from which on they are known well enough to say that they are another's, µrad (6 degrees).
+/// Largest half-width of the axes' angles with which axes of gyro and accelerometer can be compared, µrad (6 degrees).
 const AXES_KNOWN: f64 = 1e5;
 
-/// A fit that is refused so many times in a row, from so many dwells on, for another reason than that dwells lack, will not come about.
+/// If this many consecutive fits are refused for another reason than too few dwells, the session cannot succeed.
 const REFUSED: u32 = 4;
-/// See [`REFUSED`].
+/// Number of dwells from which [`REFUSED`] applies.
 const REFUSED_FROM: i32 = 10;
 
-/// A dwell that runs.
+/// The running dwell.
 #[derive(Debug, Clone, Copy)]
 struct Dwell {
     step: Step,
     from: u64,
-    /// Samples that are missing in it. It lasts so much longer: a fit counts what is there.
+    /// Missing samples. The dwell is extended by as many, because a fit counts the received ones.
     missing: u64,
 }
 
 impl Dwell {
-    /// Tick behind its last sample, at so many samples a second.
+    /// Tick after its last sample, at this rate.
     fn to(&self, rate_hz: f64) -> u64 {
         self.from + (self.step.dwell_s * rate_hz).round() as u64 + self.missing
     }
 }
 
-/// What a unit is looked at for.
+/// Inputs of one look at a unit.
 #[derive(Debug, Clone, Copy)]
 pub struct Round<'a> {
-    /// What is asked of the session.
+    /// Settings of the session.
     pub asked: &'a SessionConfig,
-    /// The step that is wanted now.
+    /// The requested dwell.
     pub step: Option<&'a Step>,
-    /// Those to come.
+    /// Dwells that follow.
     pub others: &'a [Step],
     /// Whether the table still moves.
     pub busy: bool,
-    /// Whether another pose may be recorded first, which only a person can do.
+    /// Whether another pose may be recorded first; only a person can do that.
     pub any_order: bool,
 }
 
-/// One of the units.
+/// One of the units of a session.
 pub struct UnitSession {
-    /// Its port.
+    /// The unit and its line.
     pub station: Station,
     /// Its folder.
     pub folder: Folder,
-    /// The recording that grows.
+    /// The recording in progress.
     pub taking: Option<OpenRecording>,
-    /// The calibration so far, beside the targets.
+    /// The calibration so far, with its targets.
     pub progress: Progress,
-    /// How it stands.
+    /// State of the unit.
     pub standing: UnitStanding,
-    /// Whether it has completed the step.
+    /// Whether it has completed the requested dwell.
     pub done: bool,
     watch: Watch,
-    /// Raw to SI: of the data sheet, or guessed, or of the calibration so far.
+    /// Model raw to SI: from the data sheet, estimated from gravity, or the calibration so far.
     nominal: Option<[Affine<f64>; 2]>,
     pending: Batch,
     next: Option<u64>,
-    /// When the power came, on the clock of the recordings, s.
+    /// Time of power-on by the clock of the recordings, s.
     power_on_s: Option<f64>,
     dwell: Option<Dwell>,
-    /// Whether it was turned since the step was asked for.
+    /// Whether it was turned since the dwell was requested.
     moved: bool,
-    /// Why the dwells so far will not become a calibration.
+    /// Why the dwells so far cannot give a calibration.
     hopeless: Option<Error>,
-    /// Samples that are missing since the last dwell, and what came of the turns so far.
+    /// Missing samples since the last dwell, and statistics of the turns so far.
     turn_missing: u64,
     turns: Turns,
-    /// Samples with a reading at the end of its range since the last dwell.
+    /// Samples at a rail since the last dwell.
     turn_clipped: u64,
-    /// Fits in a row that were refused, for another reason than that dwells lack.
+    /// Consecutive refused fits for another reason than too few dwells.
     refused: u32,
     seen: Option<Seen>,
     part: Part,
     number: i32,
-    /// The device's filters, if its estimate is to be the calibration.
+    /// The device's filters, if their estimate is to be the calibration.
     pub banks: Option<DeviceBanks>,
 }
 
@@ -178,7 +178,7 @@ impl UnitSession {
         }
         self.part = part;
         self.taking = Some(OpenRecording::begin(&self.folder, part, columns, manifest)?);
-        // Those that do not count keep their numbers.
+        // Discarded dwells keep their numbers.
         let had = self.folder.entries().iter().filter_map(|e| match e {
             Entry::Dwell {
                 part: of, number, ..
@@ -192,7 +192,7 @@ impl UnitSession {
                 DeviceBanks::lacking("the session was interrupted, so they lack the dwells before")
             }
         });
-        // What waits is of the time before.
+        // Waiting events are from before this recording.
         while self.station.news()?.is_some() {}
         (self.pending, self.dwell, self.next) = (Batch::default(), None, None);
         self.watch.interrupted();
@@ -211,11 +211,11 @@ impl UnitSession {
             Entry::Dwell { from_s, step, .. } => Some(from_s + step.dwell_s),
             _ => None,
         });
-        // More than a period behind, so that the gap is one.
+        // More than a period later, so that there is a visible gap.
         (last.fold(0.0, f64::max) * rate_hz) as u64 + (10.0 * rate_hz) as u64
     }
 
-    /// Takes what has come. What is to be told is added to `tell`; whether there was anything.
+    /// Processes all events. Adds reports to `tell`; returns whether there were events.
     pub fn listen(&mut self, round: &Round<'_>, tell: &mut Vec<Event>) -> Result<bool> {
         let mut some = false;
         while let Some(news) = self.station.news()? {
@@ -303,7 +303,7 @@ impl UnitSession {
                 rows.reference[c].push(f64::NAN);
             }
         }
-        // A turn does not last minutes: a longer pause of the person leaves a gap.
+        // A turn does not take minutes: a longer pause becomes a gap.
         if self.dwell.is_none() && rows.len() as f64 > 2.0 * KEPT_S * rate_hz {
             cut(rows, rows.len() - (KEPT_S * rate_hz) as usize);
         }
@@ -324,12 +324,12 @@ impl UnitSession {
         standing.trend_c_per_min = seen.trend;
         standing.tilt_deg = step.map(|s| up.angle(&s.up()).to_degrees());
         let rate = self.watch.rate(seen, &nominal[0]);
-        // What was guessed of a gyro has no scale.
+        // An estimated gyro model has no scale.
         let known = self.nominal.is_some();
         standing.rate_dps = known.then(|| rate.dot(&up.normalize()).to_degrees());
     }
 
-    /// Up by the last second, of length 1.
+    /// Unit vector upwards, from the last second.
     fn up(&self, seen: &Seen, asked: &SessionConfig) -> Vector3<f64> {
         let nominal = self
             .nominal
@@ -364,7 +364,7 @@ impl UnitSession {
             (Err(why), _) => {
                 self.throw(&why, tell)?;
                 if self.standing.waiting.as_ref() != Some(&why) {
-                    // What its numbers do, the standing shows.
+                    // Changes of its numbers are shown in the state only.
                     let told = self.standing.waiting.as_ref();
                     if !told.is_some_and(|told| told.is_like(&why)) {
                         tell.push(Event::Waiting {
@@ -403,7 +403,7 @@ impl UnitSession {
         Ok(())
     }
 
-    /// Tells the device's filters what they sense from now on.
+    /// Sends the present input to the device's filters.
     fn begin_banks(&mut self, step: &Step, asked: &SessionConfig) {
         let (Some(banks), Some(noise)) = (&mut self.banks, self.watch.noise()) else {
             return;
@@ -416,7 +416,7 @@ impl UnitSession {
         banks.begin(&self.station, &noise, input, spans);
     }
 
-    /// Throws the dwell that runs away.
+    /// Discards the running dwell.
     fn throw(&mut self, why: &Waiting, tell: &mut Vec<Event>) -> Result<()> {
         self.standing.left_s = None;
         let Some(dwell) = self.dwell.take() else {
@@ -522,7 +522,7 @@ impl UnitSession {
         Ok(())
     }
 
-    /// Ends the session if more dwells cannot help.
+    /// Ends the session if further dwells cannot help.
     fn check_hope(&self) -> Result<()> {
         match &self.hopeless {
             Some(error) => Err(error.clone()),
@@ -530,12 +530,12 @@ impl UnitSession {
         }
     }
 
-    /// Why the poses say that the accelerometer's axes are not those that their names say.
+    /// Why the poses show that the accelerometer's axes do not match their names.
     pub fn mirrored(&self, asked: &SessionConfig) -> Option<String> {
         axes::mirrored(&self.folder.shown(self.part), asked.fixture.tolerance_deg())
     }
 
-    /// A step is asked for.
+    /// A dwell was requested.
     pub fn asked_for(&mut self) {
         (self.done, self.moved, self.standing.waiting) = (false, false, None);
     }
@@ -556,7 +556,7 @@ impl UnitSession {
         Ok(())
     }
 
-    /// The calibration from what there is; its matrices tell up from now on.
+    /// Fits the recording so far. From now on up is found with its result.
     pub fn refit(&mut self, asked: &SessionConfig) -> Option<Fit> {
         let taking = self.taking.as_ref()?;
         let fitted = calibrate(taking.manifest(), &taking.samples, 0);
@@ -572,7 +572,7 @@ impl UnitSession {
             self.hopeless = Some(error.clone());
         }
         let fitted = fitted.ok()?;
-        // A calibration that is open by degrees tells up no better than a data sheet.
+        // A calibration that is uncertain by degrees does not find up better than a data sheet.
         let known = self
             .progress
             .sensors
@@ -589,7 +589,7 @@ impl UnitSession {
         Some(fitted)
     }
 
-    /// The dwell of this number does not count any more; what it was.
+    /// Discards the dwell with this number, and returns it.
     pub fn redo(&mut self, number: i32) -> Result<Option<Step>> {
         let had = self.folder.dwells(self.part);
         let Some((_, step)) = had.into_iter().find(|d| d.0 == number) else {
@@ -606,12 +606,12 @@ impl UnitSession {
         Ok(Some(step))
     }
 
-    /// Number of the last dwell that counts.
+    /// Number of the last valid dwell.
     pub fn last_number(&self) -> Option<i32> {
         self.folder.dwells(self.part).last().map(|d| d.0)
     }
 
-    /// Whether it has warmed up: °C/min beside the limit, `None` while it is not known.
+    /// Rate of change of the temperature, °C/min; `None` while it is unknown. Without a thermometer it is 0.
     pub fn trend(&self) -> Option<f64> {
         self.seen.and_then(|s| match s.temp_c.is_nan() {
             true => Some(0.0),
@@ -619,12 +619,12 @@ impl UnitSession {
         })
     }
 
-    /// What came so far may be of a table that turned.
+    /// Samples so far may be from a turning table.
     pub fn was_turning(&mut self) {
         self.watch.was_turning();
     }
 
-    /// Whether samples come and it is known how quiet the unit can be.
+    /// Whether samples arrive and the noise at rest is known.
     pub fn is_heard(&self) -> bool {
         self.watch.knows_rest()
     }

@@ -1,4 +1,4 @@
-//! Whether a calibration keeps what it promises, judged by dwells that it was not made from.
+//! Judges whether a calibration is as accurate as predicted, by dwells that were not used for it.
 
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::{SensorVerification, verify};
@@ -12,35 +12,35 @@ use mimu_recording::error::Result;
 use serde::Serialize;
 use std::path::Path;
 
-/// Errors beyond this many noise floors are worth a look.
+/// Errors up to this many noise floors count as noise.
 pub const CLEAN: f64 = 1.3;
-/// What was held out promises; twice of it and of the noise is no chance any more with six dwells and more.
+/// Largest ratio of the error to the prediction (held-out error and noise). With six or more dwells, more is no accident.
 const BROKEN: f64 = 2.0;
 
-/// A calibration that errs by more than this many noise floors, and leaves more than this share of what a data sheet leaves, is no
-/// calibration for good: what was held out of it errs as much, so that it cannot show it.
+/// An error of more than this many noise floors, and more than this fraction of the data sheet's error, is too large for a good calibration. The
+/// held-out error does not reveal it, because it is as large.
 const ROUGH: (f64, f64) = (5.0, 0.05);
 
-/// The figures of one sensor.
+/// Figures of one sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensorJudged {
-    /// Which.
+    /// The sensor.
     pub sensor: Sensor,
-    /// What they are about.
+    /// The error that the figures give.
     pub figure: Figure,
-    /// Of all of them.
+    /// Unit of all figures.
     pub unit: &'static str,
-    /// What a data sheet would leave: one scale factor and one bias for all axes.
+    /// Error with the data sheet's model: one scale factor and one bias for all axes.
     pub before: f64,
-    /// With the calibration, without its effects.
+    /// Error with the affine part of the calibration.
     pub affine: f64,
-    /// With the calibration.
+    /// Error with the calibration.
     pub after: f64,
-    /// What noise alone would leave.
+    /// Error from noise alone.
     pub floor: f64,
-    /// What was promised: held out of the dwells that it was made from.
+    /// Predicted error: held out of the fit of the calibration.
     pub promised: Option<f64>,
-    /// Dwells or turns.
+    /// Number of dwells or turns.
     pub count: usize,
 }
 
@@ -59,7 +59,7 @@ impl SensorJudged {
         }
     }
 
-    /// Why it must not be stored.
+    /// Why it must not be stored, if so.
     pub fn broken(&self) -> Option<String> {
         let promised = self.promised.unwrap_or(0.0).hypot(self.floor);
         if !(self.after < self.before) {
@@ -86,7 +86,7 @@ impl SensorJudged {
 }
 
 impl SensorJudged {
-    /// What a person has to agree to before it is stored: an error that the model lacks.
+    /// Why the user has to agree before it is stored: an error that the model lacks.
     fn rough(&self) -> Option<String> {
         let rough = self.after > ROUGH.0 * self.floor && self.after > ROUGH.1 * self.before;
         rough.then(|| {
@@ -104,14 +104,14 @@ impl SensorJudged {
     }
 }
 
-/// A calibration judged by the verification.
+/// Figures of a calibration from the verification.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judged {
-    /// By sensor.
+    /// Figures of each sensor.
     pub sensors: Vec<SensorJudged>,
     /// Why it must not be stored.
     pub broken: Vec<String>,
-    /// What a person should know.
+    /// Warnings for the user.
     pub warnings: Vec<Warning>,
 }
 
@@ -121,7 +121,7 @@ impl Judged {
         self.broken.is_empty() && !self.sensors.is_empty()
     }
 
-    /// Why a person has to agree before it is stored.
+    /// Why the user has to agree before it is stored, if so.
     pub fn rough(&self) -> Option<String> {
         let rough: Vec<String> = self
             .sensors
@@ -131,7 +131,7 @@ impl Judged {
         (!rough.is_empty()).then(|| rough.join(", "))
     }
 
-    /// Whether no sensor does worse than in `other`, and one does better.
+    /// Whether no sensor is worse than in `other`, and at least one is better.
     pub fn beats(&self, other: &Self) -> bool {
         let both = || self.sensors.iter().zip(&other.sensors);
         both().all(|(a, b)| a.sensor == b.sensor && a.after <= b.after)
@@ -144,18 +144,17 @@ impl Judged {
     }
 }
 
-/// The recording of a directory, ready.
+/// Reads and prepares the recording in a directory.
 pub fn prepared(directory: &Path) -> Result<Prepared> {
     Prepared::read(&Recording::open(directory)?, STILL_FACTOR, |_| {})
 }
 
-/// Judges a calibration by the recording of the verification; `promised` is the fit that it was made by. On a table the accelerometer is
-/// judged at rest.
+/// Judges a calibration by the verification recording; `promised` is the fit that gave it. On a table the accelerometer is judged at rest only.
 pub fn judge(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> Result<Judged> {
     judged(&by.clone().accel_at_rest(), calibration, promised)
 }
 
-/// The same by all dwells, where two calibrations are compared.
+/// Judges a calibration by all dwells, to compare two calibrations.
 pub fn judge_all(by: &Prepared, calibration: &Calibration) -> Result<Judged> {
     judged(by, calibration, None)
 }
@@ -212,7 +211,7 @@ mod tests {
 
     #[test]
     fn a_promise_as_large_as_the_error_does_not_make_a_calibration_good() {
-        // 17 mg, 28 times the noise, and as much was held out.
+        // 17 mg, 28 times the noise; the held-out error is the same.
         let cubic = judged(1.2e-4, 0.167, 0.167);
         assert!(cubic.passed() && cubic.rough().is_some_and(|why| why.starts_with("accel")));
         assert_eq!(judged(1.2e-4, 8e-3, 7e-3).rough(), None);

@@ -1,4 +1,4 @@
-//! Why no dwell runs, by kind: a session decides by the kind, and only readers get the sentence.
+//! Kinds of reasons why no dwell runs. The session decides by the kind; the sentence is only for the user.
 
 use std::fmt;
 use std::mem::discriminant;
@@ -11,43 +11,43 @@ use serde::{Serialize, Serializer};
 
 use mimu_equipment::step::words;
 
-/// Why a unit waits. JSON has the sentence.
+/// Why a unit waits. JSON contains the sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Waiting {
     /// The stream of samples was interrupted.
     Interrupted(Interruption),
-    /// It is not known yet how fast the temperature changes.
+    /// The rate of change of the temperature is not known yet.
     TrendUnknown,
     /// The temperature changes faster than the limit, both in °C/min.
     Warming(f64, f64),
     /// The table has not arrived.
     TableMoves,
-    /// A raw column, by its index, repeats one value.
+    /// A raw column, given by its index, repeats one value.
     Stuck(usize),
-    /// Samples that are missing, of so many in the last second.
+    /// Missing samples, and the expected number in the last second.
     SamplesLost(u64, f64),
-    /// A reading is at the end of its range.
+    /// A reading is at a rail.
     Saturated,
-    /// The gyro reads the pose and the accelerometer does not.
+    /// The gyro columns follow the pose, and the accelerometer columns do not.
     Exchanged,
-    /// A sensor is so many times noisier than rest allows.
+    /// A sensor is this many times noisier than accepted at rest.
     Moves(Sensor, f64),
-    /// Rate where none is wanted, deg/s.
+    /// Rate where rest was requested, deg/s.
     Turns(f64),
-    /// A sensor is so many times noisier than a steady rate allows.
+    /// A sensor is this many times noisier than accepted at a steady rate.
     Unsteady(Sensor, f64),
-    /// Rate about the vertical, and the one that is wanted, deg/s.
+    /// Rate about the vertical, and the requested one, deg/s.
     OtherRate(f64, f64),
-    /// What is up is not what was asked for: its direction, and degrees between the two.
+    /// Another direction than the requested one is up: the direction, and the angle to the requested one, degrees.
     WrongPose(Vector3<f64>, f64),
-    /// What is up was up in an earlier dwell: its direction, and the one that is wanted.
+    /// The direction up was recorded before: this direction, and the requested one.
     RepeatedPose(Vector3<f64>, Vector3<f64>),
 }
 
 impl Waiting {
     /// Whether `other` is the same reason with other numbers; it is then reported only once.
     pub fn is_like(&self, other: &Self) -> bool {
-        // In a person's hands a unit does both by turns, several times a second.
+        // In hands a unit alternates between the two several times a second.
         let in_hands = |why: &Self| matches!(why, Self::Moves(..) | Self::Turns(_));
         discriminant(self) == discriminant(other) || in_hands(self) && in_hands(other)
     }
@@ -105,12 +105,12 @@ impl Serialize for Waiting {
     }
 }
 
-/// What interrupts the stream of samples. JSON has the sentence.
+/// What interrupted the stream of samples. JSON contains the sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Interruption {
-    /// The device has restarted, for this reason.
+    /// The device restarted, with its reset cause.
     Restarted(String),
-    /// The port is gone.
+    /// The port has vanished.
     Lost(Error),
     /// Another unit is at the port.
     OtherUnit(Error),

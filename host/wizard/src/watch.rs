@@ -1,4 +1,4 @@
-//! The samples as they come, looked at a tenth of a second at a time: is the unit still, which way is up, how fast does it turn.
+//! Analyses the samples in blocks of a tenth of a second: whether the unit is at rest, its pose, and its rate.
 
 use std::collections::VecDeque;
 
@@ -11,18 +11,18 @@ use crate::source::Chunk;
 
 /// Length of a block, s.
 const BLOCK_S: f64 = 0.1;
-/// Over how long the change of temperature is taken, s: with a noise of 0.05 °C the slope is then good to 0.05 °C/min.
+/// Time over which the rate of change of temperature is fitted, s. With a noise of 0.05 °C the slope is accurate to 0.05 °C/min.
 const TREND_S: f64 = 60.0;
-/// Least of that, s, to say anything.
+/// Shortest time for this fit, s.
 const TREND_LEAST_S: f64 = 15.0;
-/// What the gyro is allowed beyond a still accelerometer by hand: see the stillness of recordings, where hands tremble in angle.
+/// Factor by which the gyro may exceed the limit of rest by hand, as in the detection of dwells in recordings: hands tremble in angle.
 const GYRO_TREMOR: f64 = 30.0;
 
-/// Squares of a change from one pose to another, over that of the reading at rest (and a hundred times its noise), that no gyro has which is
-/// held still; and over the noise, that every accelerometer has.
+/// Thresholds of the squared change of the mean reading between poses. The first is relative to the squared reading at rest, or to that of a hundred
+/// times its noise; a gyro at rest stays below. The second is relative to the noise; every accelerometer exceeds it.
 const EXCHANGED: (f64, f64) = (0.1, 100.0);
 
-/// Moments of the six channels.
+/// Means and squared deviations of the six channels.
 #[derive(Debug, Clone, Copy, Default)]
 struct Moments {
     count: f64,
@@ -54,13 +54,13 @@ impl Moments {
     }
 }
 
-/// What is known of the codes of a channel.
+/// Quantisation of a channel.
 #[derive(Debug, Clone, Copy, Default)]
 struct Codes {
     last: Option<f64>,
-    /// Smallest change so far; none where there was no change.
+    /// Smallest change so far; `None` if there was none.
     step: Option<f64>,
-    /// Whether the first second had one value: a step larger than the noise, or a broken wire.
+    /// Whether the first second had a single value: either the quantisation step exceeds the noise, or a wire is broken.
     constant: Option<bool>,
     /// Variance of the quietest second with more than one value.
     quietest: Option<f64>,
@@ -75,7 +75,7 @@ impl Codes {
         self.last = Some(value);
     }
 
-    /// Takes in the variance of a second.
+    /// Records the variance of a second.
     fn judge(&mut self, variance: f64) {
         self.constant.get_or_insert(variance == 0.0);
         if variance > 0.0 {
@@ -83,26 +83,26 @@ impl Codes {
         }
     }
 
-    /// Whether its step is larger than its noise, so that it may have one value for a second. A channel whose noise is half a step is constant for
-    /// a hundred samples once in 1e16 seconds.
+    /// Whether the quantisation step exceeds the noise so far that a second may have a single value. If the noise is half a step, a hundred equal
+    /// samples occur once in 1e16 seconds.
     fn is_coarse(&self) -> bool {
         let hides = |(step, variance): (f64, f64)| variance < step * step / 3.0;
         self.constant == Some(true) || self.step.zip(self.quietest).is_some_and(hides)
     }
 
-    /// Whether a second of one value is none of a coarse step. `moved`: the unit was turned since.
+    /// Whether a second with a single value is a fault and not a coarse step. `moved`: the unit was turned since the beginning.
     fn is_stuck(&self, moved: bool) -> bool {
         !self.is_coarse() || moved && self.step.is_none()
     }
 
-    /// Variance that a coarse step hides.
+    /// Variance hidden by a coarse quantisation step.
     fn hidden(&self) -> f64 {
         let step = self.step.filter(|_| self.is_coarse());
         step.map_or(0.0, |step| step * step / 12.0)
     }
 }
 
-/// A tenth of a second.
+/// Statistics of a tenth of a second.
 #[derive(Debug, Clone, Copy, Default)]
 struct Block {
     moments: Moments,
@@ -110,30 +110,30 @@ struct Block {
     missing: u64,
 }
 
-/// What the last second was like.
+/// Statistics of the last second.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen {
-    /// Tick after it.
+    /// Tick after its last sample.
     pub tick: u64,
-    /// Means, raw.
+    /// Mean raw readings.
     pub mean: [f64; 6],
-    /// Standard deviation of gyro and accelerometer over the most that counts as still; the worst axis.
+    /// Standard deviations of gyro and accelerometer, relative to the limit of rest; the worst axis.
     pub motion: [f64; 2],
-    /// Whether a reading may be at the end of its range.
+    /// Whether a reading may be at a rail.
     pub saturated: bool,
-    /// Samples that are missing in it.
+    /// Missing samples in this second.
     pub missing: u64,
-    /// °C.
+    /// Temperature, °C.
     pub temp_c: f64,
-    /// °C/min over the last minute, once there is enough of it.
+    /// Rate of change of the temperature over the last minute, °C/min, once there are enough samples.
     pub trend: Option<f64>,
-    /// The first channel that has one value only, and once had more or is turned.
+    /// The first channel with a single value that had more before, or that should have changed when the unit was turned.
     pub stuck: Option<usize>,
-    /// Whether the gyro's readings follow the pose and the accelerometer's do not, as if one were taken for the other.
+    /// Whether the gyro's readings follow the pose and the accelerometer's do not, as if the columns were exchanged.
     pub exchanged: bool,
 }
 
-/// The samples of one unit, condensed as they come.
+/// Analyses the samples of one unit while they arrive.
 #[derive(Debug)]
 pub struct Watch {
     rate_hz: f64,
@@ -142,22 +142,22 @@ pub struct Watch {
     open: Block,
     window: VecDeque<Block>,
     next: Option<u64>,
-    /// Variance of one sample in the quietest second so far, raw.
+    /// Variance of a sample in the quietest second so far, raw.
     floor: Option<[f64; 6]>,
-    /// Mean readings at rest, and the sum of the gyro's variances in that second, once two seconds in a row have agreed on it.
+    /// Mean readings at rest, and the sum of the gyro's variances in that second, once two successive seconds have agreed.
     rest: Option<([f64; 6], f64)>,
     codes: [Codes; 6],
-    /// Whether it has moved since it may be turned.
+    /// Whether the unit has moved since [`Self::begin`].
     moved: bool,
     /// The seconds that ended within the last one: means and variances of the gyro.
     before: VecDeque<[[f64; 3]; 2]>,
-    /// Whether the unit may be turned by now.
+    /// Whether [`Self::begin`] was called.
     begun: bool,
     temperatures: VecDeque<(u64, f64)>,
 }
 
 impl Watch {
-    /// Of a unit; `by_hand` allows the gyro the tremor of hands.
+    /// For a unit at this rate; `by_hand` allows the gyro the tremor of hands.
     pub fn new(rate_hz: f64, by_hand: bool) -> Self {
         Self {
             rate_hz,
@@ -181,11 +181,11 @@ impl Watch {
         self.floor
     }
 
-    /// Takes samples in; what the last second was like, if one is whole.
+    /// Adds samples. Returns the statistics of the last second, if it is complete.
     pub fn take(&mut self, chunk: &Chunk) -> Option<Seen> {
         let missing = chunk.tick.saturating_sub(self.next.unwrap_or(chunk.tick));
         self.next = Some(chunk.tick + chunk.values.len() as u64);
-        // After more than a tenth of a second without samples it is another second.
+        // After a gap of more than a tenth of a second, a new second begins.
         if missing as f64 > self.block_rows {
             (self.open, self.window) = (Block::default(), VecDeque::new());
         }
@@ -212,31 +212,31 @@ impl Watch {
         seen
     }
 
-    /// Forgets what it has seen of the last second: what comes next has nothing to do with it.
+    /// Discards the last second: later samples are unrelated to it.
     pub fn interrupted(&mut self) {
         (self.open, self.window) = (Block::default(), VecDeque::new());
         self.before.clear();
         self.temperatures.clear();
     }
 
-    /// Forgets what it knows of rest: the unit may have been turning.
+    /// Discards the reading and noise at rest: the unit may have been turning.
     pub fn was_turning(&mut self) {
         self.interrupted();
         (self.floor, self.rest) = (None, None);
     }
 
-    /// From now on the unit may be turned: what the gyro reads at rest is known.
+    /// From now on the unit may be turned: the gyro's reading at rest is known.
     pub fn begin(&mut self) {
         self.begun = true;
     }
 
-    /// Whether it knows yet how quiet the unit can be.
+    /// Whether the noise at rest is known.
     pub fn knows_rest(&self) -> bool {
         self.rest.is_some()
     }
 
-    /// Looks whether a second of the gyro (mean and variance of each axis) is rest: as that before it, which a table that slows down is not.
-    /// A table may report that it is at rest while samples of its motion still arrive.
+    /// Uses a second as rest if it agrees with the second before in mean and variance of each gyro axis. A table that slows down fails this. It may
+    /// report rest while samples of its motion still arrive.
     fn find_rest(&mut self, means: [f64; 6], variances: [f64; 6]) {
         let first = |of: [f64; 6]| [of[0], of[1], of[2]];
         let (mean, variance) = (first(means), first(variances));
@@ -269,7 +269,7 @@ impl Watch {
         }
     }
 
-    /// °C/min by a straight line.
+    /// Slope of a straight line, °C/min.
     fn trend(&self) -> Option<f64> {
         let (first, last) = (self.temperatures.front()?, self.temperatures.back()?);
         if ((last.0 - first.0) as f64) < TREND_LEAST_S * self.rate_hz {
@@ -303,10 +303,10 @@ impl Watch {
         }
         let (codes, moved) = (self.codes, self.moved);
         let stuck = (0..6).find(|&c| own[c] == 0.0 && codes[c].is_stuck(moved));
-        // A mean is known to no less than what a step hides.
+        // A coarse step hides at least this variance.
         let variance: [f64; 6] = std::array::from_fn(|c| own[c].max(codes[c].hidden()));
         if stuck.is_none() && !saturated {
-            // Before anything was to turn: a steady rate is as quiet as rest.
+            // Only before the unit may be turned: a steady rate is as quiet as rest.
             if !self.begun {
                 self.find_rest(all.mean, variance);
             }
@@ -322,7 +322,7 @@ impl Watch {
                 Sensor::Gyro if self.by_hand => GYRO_TREMOR * STILL_FACTOR,
                 _ => STILL_FACTOR,
             };
-            // Of a constant 0 / 0, which is still.
+            // A constant channel gives 0 / 0, which counts as rest.
             let ratio = |c: usize| (variance[c] / (allowed * floor[c])).sqrt();
             sensor.channels().map(ratio).fold(0.0, f64::max)
         });
@@ -352,13 +352,13 @@ impl Watch {
         }
     }
 
-    /// Rate of a second against that of rest, rad/s, by `gyro`, raw to SI.
+    /// Rate of a second relative to rest, rad/s; `gyro` is the model raw to SI.
     pub fn rate(&self, seen: &Seen, gyro: &Affine<f64>) -> Vector3<f64> {
         let rest = self.rest.map_or([0.0; 6], |r| r.0);
         gyro.matrix * Vector3::from_fn(|c, _| seen.mean[c] - rest[c])
     }
 
-    /// Standard deviation of one sample of the gyro at rest, by `gyro`, rad/s; the noisiest axis.
+    /// Standard deviation of one sample of the gyro at rest, rad/s; the noisiest axis. `gyro` is the model raw to SI.
     pub fn gyro_noise(&self, gyro: &Affine<f64>) -> f64 {
         let floor = self.floor.unwrap_or_default();
         let of = |i: usize| gyro.matrix.row(i).norm() * floor[i].sqrt();
@@ -366,13 +366,13 @@ impl Watch {
     }
 }
 
-/// Specific force by `accel`, raw to SI.
+/// Specific force; `accel` is the model raw to SI.
 pub fn force(seen: &Seen, accel: &Affine<f64>) -> Vector3<f64> {
     accel.apply(&Vector3::from_fn(|c, _| seen.mean[3 + c]))
 }
 
-/// What a board must be of which no data sheet is known: at rest its accelerometer reads gravity, by the size of `seen`; its gyro is
-/// taken to be in units of a thousandth of that which makes 1 rad/s, so that only directions mean anything.
+/// Model of a board without a data sheet. At rest its accelerometer reads gravity, which gives the scale. The gyro's scale is set to 1 rad/s per raw
+/// unit, so only its directions are meaningful.
 pub fn guessed(seen: &Seen, gravity_mps2: f64) -> [Affine<f64>; 2] {
     let size = Vector3::from_fn(|c, _| seen.mean[3 + c]).norm();
     let plain = |factor: f64| Affine {
@@ -464,7 +464,7 @@ mod tests {
         );
     }
 
-    /// A second and a half at rest of a board whose noise is less than its step, at `level`.
+    /// A second and a half at rest of a board with less noise than its step, at `level`.
     fn coarse(watch: &mut Watch, tick: u64, level: [f64; 6]) -> Option<Seen> {
         let mut one = chunk(tick, 150, 0.0, 0.0);
         one.values.fill(level);
@@ -479,7 +479,7 @@ mod tests {
         let seen = coarse(&mut watch, 150, [1.0, 2.0, 0.0, 3.0, 0.0, 250.0]).unwrap();
         assert!(watch.knows_rest() && seen.stuck.is_none(), "{seen:?}");
         watch.begin();
-        // Turned, and held again: all but gyro z, whose wire is broken, have changed.
+        // Turned and held again. All channels have changed except gyro z, whose wire is broken.
         for k in 0..10 {
             let turning = 20.0 * f64::from(k % 3);
             coarse(

@@ -14,47 +14,47 @@ use crate::waiting::Waiting;
 use mimu_equipment::drive::Driver;
 use mimu_equipment::step::Step;
 
-/// How often the standing is shown.
+/// Interval of showing the state.
 const SHOWN: Duration = Duration::from_millis(100);
-/// Longest wait for a unit to say anything, or for a table's interlock.
+/// Longest wait for a unit to send anything, or for a table's interlock.
 const SILENT: Duration = Duration::from_secs(30);
 
-/// Longest time with a wrong pose if no person turns the unit: it will not become the requested one.
+/// Longest time in a wrong pose if no person turns the unit: the pose will not change by itself.
 const WRONG: Duration = Duration::from_secs(10);
 
 /// How a phase ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ended {
-    /// As it was to.
+    /// As planned.
     Done,
-    /// By the person: the session can be resumed later.
+    /// Cancelled by the user; the session can be resumed later.
     Cancelled,
 }
 
 /// A session.
 pub struct Wizard<'a> {
-    /// What is asked.
+    /// Settings.
     pub asked: SessionConfig,
     /// The units, all on one fixture.
     pub units: Vec<UnitSession>,
-    /// What turns them.
+    /// Moves the units.
     pub driver: Box<dyn Driver + 'a>,
-    /// Who is told.
+    /// Receives events and the state.
     pub view: &'a mut dyn View,
-    /// The phase, for the standing.
+    /// The phase, for the state.
     pub phase: Phase,
     shown: Instant,
     queue: Vec<Step>,
-    /// Dwells in whose place a person held another pose: they follow after the others.
+    /// Requested dwells that the user replaced by another pose. They follow after the others.
     later: Vec<Step>,
     planned: usize,
     current: Option<Step>,
     zero_s: Option<u64>,
-    /// Whether the person knows that poses come otherwise than they are asked for.
+    /// Whether the user has confirmed that the poses differ from the requested ones.
     axes_agreed: bool,
 }
 
-/// How a step ended.
+/// How a dwell ended.
 enum Stepped {
     Had,
     Cancelled,
@@ -63,7 +63,7 @@ enum Stepped {
 }
 
 impl<'a> Wizard<'a> {
-    /// Of these units.
+    /// A session with these units.
     pub fn new(
         asked: SessionConfig,
         units: Vec<UnitSession>,
@@ -86,7 +86,7 @@ impl<'a> Wizard<'a> {
         }
     }
 
-    /// Tells of an event.
+    /// Reports an event.
     pub fn tell(&mut self, event: Event) {
         self.view.tell(&event);
     }
@@ -97,7 +97,7 @@ impl<'a> Wizard<'a> {
         self.tell(Event::Phase { phase, words });
     }
 
-    /// Listens to all units once, and shows how they stand. Whether a wish came.
+    /// Processes the events of all units once, and shows the state. Returns the user's request, if any.
     async fn round(&mut self, step: Option<&Step>, busy: bool) -> Result<Option<Wish>> {
         let mut tell = Vec::new();
         let round = Round {
@@ -141,7 +141,7 @@ impl<'a> Wizard<'a> {
         unit.folder.dwells(self.phase.part()).len()
     }
 
-    /// Waits until all units are heard and, where that is asked, warm.
+    /// Waits until all units send samples and, if requested, have warmed up.
     pub async fn warm_up(&mut self) -> Result<Ended> {
         let mut since = Instant::now();
         self.current = None;
@@ -194,7 +194,7 @@ impl<'a> Wizard<'a> {
         }
     }
 
-    /// Has the dwells of a recording: those planned that are not there yet and, for a calibration that goes by targets, more or fewer.
+    /// Records the dwells of a part: the planned ones that are missing and, for a calibration by targets, more or fewer.
     pub async fn dwells(&mut self, part: Part, steps: &[Step]) -> Result<Ended> {
         for unit in &mut self.units {
             let asked = self.asked.clone();
@@ -244,8 +244,8 @@ impl<'a> Wizard<'a> {
         }
     }
 
-    /// What is left where a person may have had another pose than the `step` that was asked for: that one is off the list then, and this
-    /// one comes later. Poses that all come otherwise in the same way end the session, unless the person knows better.
+    /// Updates the remaining dwells if the user may have recorded another pose than `step`: the recorded one is done, and `step` follows later. If
+    /// all poses differ in the same way, the session ends, unless the user confirms them.
     async fn goes_on(&mut self, part: Part, steps: &[Step], step: &Step) -> Result<Ended> {
         self.queue = self.left(part, steps);
         self.queue.sort_by_key(|s| self.later.contains(s));
@@ -280,9 +280,9 @@ impl<'a> Wizard<'a> {
         }
     }
 
-    /// The planned steps that no dwell of the journal is.
+    /// The planned dwells that are not in the journal.
     fn left(&self, part: Part, steps: &[Step]) -> Vec<Step> {
-        // Units that were not interrupted at the same dwell go on from the one that has fewest: the others have one more then.
+        // If the units were interrupted at different dwells, the one with the fewest decides. The others then get one dwell more.
         let had = self.units.iter().map(|u| u.folder.dwells(part));
         let had = had.min_by_key(Vec::len).unwrap_or_default();
         let mut left = steps.to_vec();
@@ -298,7 +298,7 @@ impl<'a> Wizard<'a> {
         left
     }
 
-    /// The next step; `None` if all are done.
+    /// The next dwell; `None` if all are done.
     fn choose(&mut self, part: Part) -> Option<Step> {
         let going_by_targets = part == Part::Calibration && self.asked.by_targets;
         if !going_by_targets {
@@ -309,7 +309,7 @@ impl<'a> Wizard<'a> {
             .units
             .first()
             .map_or(0, |u| u.folder.dwells(part).len());
-        // What is held out has to leave the rest determined: half as much again as what determines it.
+        // The rest must remain determined if a part is held out: half as many dwells again as that needs.
         if met && done >= least(self.asked.fixture) || done >= self.asked.most_dwells {
             return None;
         }
@@ -411,7 +411,7 @@ impl<'a> Wizard<'a> {
         Ok(step)
     }
 
-    /// Asks, and listens to the units meanwhile. `None`: it was cancelled.
+    /// Asks a question, and processes the units' events meanwhile. `None`: the session was cancelled.
     pub async fn ask(&mut self, question: &Question) -> Result<Option<bool>> {
         self.tell(Event::Question {
             question: question.name(),
@@ -427,7 +427,7 @@ impl<'a> Wizard<'a> {
         }
     }
 
-    /// Adds a line to the journal of each unit.
+    /// Adds an entry to the journal of each unit.
     pub fn journal(&mut self, entry: &Entry) -> Result<()> {
         for unit in &mut self.units {
             unit.folder.add(entry.clone())?;

@@ -1,4 +1,4 @@
-//! `mimu allan`: arguments and what follows from them.
+//! `mimu allan`: arguments and execution.
 
 use std::path::{Path, PathBuf};
 

@@ -14,7 +14,7 @@ pub struct CompletionsArgs {
 }
 
 pub fn run(args: &CompletionsArgs) -> Result<()> {
-    // Into memory first: the generator panics where the reader of a pipe is gone.
+    // Written to memory first: the generator panics if the reader of a pipe is gone.
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut examples::command(), "mimu", &mut script);
     show(&String::from_utf8_lossy(&script))

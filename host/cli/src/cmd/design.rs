@@ -1,4 +1,4 @@
-//! `mimu design`: arguments and what follows from them.
+//! `mimu design`: arguments and execution.
 
 mod effects;
 
@@ -161,7 +161,7 @@ pub fn number(text: &str, lowest: f64, highest: f64) -> std::result::Result<f64,
     }
 }
 
-/// White noise, or where the noise is stated.
+/// White noise, or the noise file.
 #[derive(Clone)]
 enum NoiseArg {
     Density(f64),
@@ -179,7 +179,7 @@ impl FromStr for NoiseArg {
     }
 }
 
-/// Length of a dwell where nothing is known of the unit: fang's, s.
+/// Default length of a dwell for an unknown unit: fang's, s.
 const DWELL_S: f64 = 20.0;
 
 impl DesignArgs {
@@ -210,7 +210,7 @@ impl DesignArgs {
         }
     }
 
-    /// Noise of the sensor; what is given by hand goes before the file.
+    /// Noise of the sensor. Values given as options override the file.
     fn noise(&self) -> Result<DwellNoise> {
         let stated = match &self.noise {
             Some(NoiseArg::File(path)) => {
@@ -239,13 +239,13 @@ impl DesignArgs {
             Some(NoiseArg::File(_)) => noise.useful_s(),
             _ => None,
         };
-        // Times are set on tables in tenths of a second.
+        // Tables are set to tenths of a second.
         self.dwell
             .or(useful.map(|s| ((10.0 * s).ceil() / 10.0).max(1.0)))
             .unwrap_or(DWELL_S)
     }
 
-    /// Order of a design, and of a published scheme if it is not to be as published.
+    /// Requested order of a design; `None`: the default, which for a published scheme is the published order.
     fn order(&self) -> Option<Order> {
         self.order.map(|order| match order {
             OrderArg::Shortest => Order::Shortest,
@@ -253,7 +253,7 @@ impl DesignArgs {
         })
     }
 
-    /// The problem, with full rates `span` for a gyro.
+    /// The problem; `span` are the full rates of a gyro.
     fn problem(&self, span: Vector3<f64>, rates: Rates) -> Result<Problem> {
         match (self.sensor(), self.reference) {
             (Sensor::Accel, reference) => {
@@ -275,7 +275,7 @@ impl DesignArgs {
         }
     }
 
-    /// The problem of designs at the rates that the table is to turn at.
+    /// The problem with the requested rates of the table.
     fn own_problem(&self) -> Result<Problem> {
         match (&self.rates, self.sensor()) {
             (Some(_), Sensor::Accel) => Err(Error::new(
@@ -291,7 +291,7 @@ impl DesignArgs {
         }
     }
 
-    /// Report of a design of one pass over `settings`, in the order asked for; without one, in the order given.
+    /// Reports a design of one pass over `settings`, in the requested order; by default in the given order.
     fn report(
         &self,
         problem: &Problem,
@@ -368,7 +368,7 @@ impl DesignArgs {
         Ok(design.within(session.time_s, &session.noise, &budget))
     }
 
-    /// The design that is asked for, of one.
+    /// The requested single design.
     fn designed(&self) -> Result<Design> {
         match (self.scheme, self.budget, self.n) {
             (Some(scheme), ..) => {
@@ -390,8 +390,7 @@ impl DesignArgs {
         }
     }
 
-    /// Every scheme for the sensor, each followed by the best design of as many dwells; and the schemes that are not
-    /// within the table's reach.
+    /// Every scheme for the sensor, each followed by the best design of as many dwells; and the schemes that exceed the table's reach.
     fn compare(&self) -> Result<Comparison> {
         let (mut reports, mut out_of_reach) = (Vec::new(), Vec::new());
         let mut done: Vec<(usize, Vector3<f64>)> = Vec::new();
@@ -417,10 +416,10 @@ impl DesignArgs {
     }
 }
 
-/// Largest rate without `--rates`, deg/s: the range of fang's gyros.
+/// Largest rate if `--rates` is not given, deg/s: the range of fang's gyros.
 const RATE_DPS: f64 = 300.0;
 
-/// What `mimu design` makes.
+/// Result of `mimu design`.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Designed {
@@ -433,7 +432,7 @@ pub enum Designed {
 }
 
 impl Designed {
-    /// The text that the command prints, in full or not.
+    /// The text that the command prints; in full if `verbose`.
     pub fn text(&self, verbose: bool) -> String {
         match self {
             Self::Design(design) => report::design_text(design, verbose),
@@ -444,7 +443,7 @@ impl Designed {
 }
 
 impl DesignArgs {
-    /// What these arguments ask for, and its plan as TOML.
+    /// The requested result, and its plan as TOML.
     pub(crate) fn made(&self) -> Result<(Designed, Option<String>)> {
         if let Some(ids) = &self.effects {
             let (next, plan) = effects::smallest_experiment(self, ids)?;

@@ -1,4 +1,4 @@
-//! `mimu device`: arguments and what follows from them.
+//! `mimu device`: arguments and execution.
 
 mod comparison;
 mod transfer;
@@ -108,13 +108,13 @@ pub fn duration(text: &str) -> std::result::Result<Duration, String> {
     };
     let number: f64 = text[..text.len() - unit.len()].parse().unwrap_or(f64::NAN);
     match number * factor {
-        // A year, beyond which nobody means it.
+        // At most a year; more is a mistake.
         seconds if (1e-3..=3.2e7).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
         _ => Err("write a time like 500ms, 10s, 2min or 1h".into()),
     }
 }
 
-/// Whether Ctrl-C, or a request to terminate, has come. The second one ends the program at once.
+/// Set by Ctrl-C or a request to terminate. The second one ends the program at once.
 pub fn interruption() -> Result<Arc<AtomicBool>> {
     let flag = Arc::new(AtomicBool::new(false));
     for signal in TERM_SIGNALS {
@@ -149,7 +149,7 @@ pub fn run(args: &DeviceArgs) -> Result<()> {
 
 fn info(args: &PlainArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
-    // The warning about versions is part of the result.
+    // The result contains the warning about versions.
     let session = Session::open(args.port.path.as_deref())?;
     let result = DeviceResult::new("info", session.port(), session.who());
     print(&args.json, &report::info_text(&result), &result, None)
@@ -165,7 +165,7 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     let stop = interruption()?;
     let rate_hz = f64::from(session.who().sample_rate_hz);
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-    // The summary takes the place of the samples.
+    // If JSON goes to standard output, it contains only the summary and no samples.
     let rows = !args.json.is_standard_output();
     let mut closed = false;
     if rows {
@@ -187,13 +187,13 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
                     "{number},{t_s},{},{},{},{},{},{},{},{}",
                     head.temp_c, head.flags, g.x, g.y, g.z, a.x, a.y, a.z
                 );
-                // A batch at a time, so that whoever reads is not behind.
+                // Flushed after every batch, so that the reader is up to date.
                 let new = head.first != last;
                 last = head.first;
                 closed = row
                     .and_then(|()| if new { out.flush() } else { Ok(()) })
                     .is_err();
-                // `mimu device stream | head` is no error.
+                // `mimu device stream | head` is not an error.
                 if closed {
                     stop.store(true, Ordering::Relaxed);
                 }

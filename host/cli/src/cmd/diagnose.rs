@@ -1,4 +1,4 @@
-//! `mimu diagnose`: arguments and what follows from them.
+//! `mimu diagnose`: arguments and execution.
 
 use std::path::PathBuf;
 

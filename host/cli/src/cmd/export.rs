@@ -27,14 +27,14 @@ pub struct ExportArgs {
     #[arg(long, value_name = "FILE", global = true)]
     noise: Option<PathBuf>,
     /// File to write
-    // Required, which clap does not allow of a global argument.
+    // Required, but clap does not allow that for a global argument.
     #[arg(short = 'o', long = "out", value_name = "FILE", global = true)]
     out: Option<PathBuf>,
     #[command(flatten)]
     json: JsonArgs,
 }
 
-/// What was written, and where.
+/// The written file and its contents.
 #[derive(Serialize)]
 struct ExportResult {
     #[serde(flatten)]

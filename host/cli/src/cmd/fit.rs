@@ -98,7 +98,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
         ));
     }
     let found = DwellResult::list(&prepared);
-    // Which dwells there are is the first that a person asks for then. The line with the error is the last.
+    // After a refusal the user first needs the list of dwells. The error line comes last.
     let problems = OfRecording::prepared(&prepared);
     let fitted = fit(prepared, options).inspect_err(|error| {
         refused(error, &problems, false, Some(&args.json));

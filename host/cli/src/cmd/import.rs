@@ -153,10 +153,10 @@ fn presets() -> impl TypedValueParser<Value = Preset> {
     PossibleValuesParser::new(names).try_map(|name| name.parse::<Preset>())
 }
 
-/// Sample rates below this are more likely a wrong unit of time.
+/// Sample rates below this more likely mean a wrong unit of time.
 const SLOW_HZ: f64 = 5.0;
 
-/// The files of `args` with their faces, where it names them: `+x=a.csv` among the files, `-x=b.csv` as an option.
+/// The files of `args` with their faces, if it names them: `+x=a.csv` among the files, `-x=b.csv` as an option.
 fn faces(args: &ImportArgs) -> Result<(Vec<PathBuf>, Vec<Face>)> {
     if !args.faces {
         return Ok((args.files.clone(), Vec::new()));
@@ -185,7 +185,7 @@ fn faces(args: &ImportArgs) -> Result<(Vec<PathBuf>, Vec<Face>)> {
             let remedy = format!("write it like {face}=FILE");
             return Err(Error::new(face, "no file is given for this face", remedy));
         }
-        // One recording for two faces is a slip of the keyboard, which a fit cannot tell from an axis without sensitivity.
+        // A file given for two faces is a typing error. A fit cannot distinguish it from an axis without sensitivity.
         if let Some((other, _)) = both[..k].iter().find(|(f, p)| p == path && f != face) {
             let problem = format!("it is given for the faces {other} and {face}");
             let remedy = "give the recording of each face";
@@ -203,7 +203,7 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
     print(&json, &report::import_text(&summary), &summary, None)
 }
 
-/// Makes the recording.
+/// Makes the recording, and prints nothing.
 pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
     let (files, faces) = faces(&args)?;
     let (gravity, assumed) = match (args.gravity, args.latitude) {

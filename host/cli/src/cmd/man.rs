@@ -24,14 +24,14 @@ pub fn run(args: &ManArgs) -> Result<()> {
     }
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
     let mut command = examples::command();
-    // Gives the subcommands the names that a person types.
+    // Names the subcommands as they are typed.
     command.build();
     let mut pages = Vec::new();
     add(&command, folder, &mut pages)?;
     pages.into_iter().try_for_each(Staged::publish)
 }
 
-/// The page of `command`, and those of its subcommands.
+/// Adds the page of `command` and those of its subcommands.
 fn add(command: &clap::Command, folder: &Path, pages: &mut Vec<Staged>) -> Result<()> {
     let name = command.get_display_name().unwrap_or(command.get_name());
     let path = folder.join(format!("{name}.1"));

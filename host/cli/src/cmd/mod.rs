@@ -1,4 +1,4 @@
-//! The subcommands, one a file: each a struct of arguments and a `run`.
+//! The subcommands, one per file: each has a struct of arguments and a function `run`.
 
 pub(crate) mod allan;
 pub(crate) mod apply;

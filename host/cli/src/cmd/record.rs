@@ -1,4 +1,4 @@
-//! `mimu record`: arguments and what follows from them.
+//! `mimu record`: arguments and execution.
 
 use std::io::{BufRead as _, IsTerminal as _};
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use crate::output::{check_outputs, print, progress};
 use mimu::quantity::normal_gravity;
 use mimu::warning::Warning;
 
-/// What every recording of a device has, whoever moves the unit.
+/// Options common to all recordings of a device, whoever moves the unit.
 #[derive(Args)]
 pub(crate) struct RecordingArgs {
     /// Longest wait for a port that has vanished (a pulled cable); 0: the recording ends at once
@@ -53,7 +53,7 @@ impl RecordingArgs {
         self.latitude.or(plan.and_then(|plan| plan.latitude_deg))
     }
 
-    /// Local gravity, m/s²: given, or that of the plan unless a latitude is given, or of the latitude.
+    /// Local gravity, m/s²: as given; from the latitude if that is given; otherwise from the plan.
     pub(crate) fn gravity_mps2(&self, plan: Option<&Plan>) -> f64 {
         let of_plan = match self.latitude {
             None => plan.and_then(|plan| plan.gravity_mps2),
@@ -209,13 +209,13 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     summary.broken_off.map_or(Ok(()), Err)
 }
 
-/// What is to be done in each dwell, as far as that is known.
+/// Instruction for each dwell, as far as known.
 fn titles(known: &Known) -> Vec<String> {
     let all = (0..).map_while(|step| known.title(step));
     all.map(str::to_owned).collect()
 }
 
-/// The line that a terminal shows.
+/// Progress line for a terminal.
 fn told(standing: &Standing, steps: bool, titles: &[String]) -> String {
     if standing.waiting {
         return "the port has vanished: waiting for it; Ctrl-C ends the recording".into();
@@ -239,7 +239,7 @@ fn told(standing: &Standing, steps: bool, titles: &[String]) -> String {
     )
 }
 
-/// Counts lines on standard input, each a mark.
+/// Counts lines on standard input; each is a mark.
 fn keyboard() -> Result<Arc<AtomicU32>> {
     let marks = Arc::new(AtomicU32::new(0));
     let counted = marks.clone();

@@ -1,4 +1,4 @@
-//! `mimu report`: arguments and what follows from them.
+//! `mimu report`: arguments and execution.
 
 use std::path::{Path, PathBuf};
 
@@ -42,7 +42,7 @@ pub struct ReportArgs {
     noise: NoiseArgs,
 }
 
-/// What a page is made from.
+/// Sources of a page.
 struct Inputs {
     recordings: Vec<PathBuf>,
     verify: Vec<PathBuf>,
@@ -50,7 +50,7 @@ struct Inputs {
 }
 
 impl Inputs {
-    /// Of the arguments; what a session consists of is in its folder.
+    /// Inputs from the arguments. A session lists its inputs in its folder.
     fn of(args: &ReportArgs) -> Result<Self> {
         let mut inputs = Self {
             recordings: Vec::new(),
@@ -113,7 +113,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let calibration = match (&inputs.calibration, &found) {
         (Some(path), _) => Calibration::read(path)?,
         (None, Some(found)) => found.calibration(&now)?,
-        // One of both is required.
+        // The arguments require one of the two.
         (None, None) => return Ok(()),
     };
     let mut verified = Vec::new();
@@ -153,7 +153,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     show(&format!("{verdict}page: {}\n", args.out.display()))
 }
 
-/// The diagnosis of the recordings; an effect that the first of the others contradicts is not accepted.
+/// The diagnosis of the recordings. An effect that the first verification recording contradicts is not accepted.
 fn found(
     recordings: &[(String, Prepared)],
     others: &[(String, Prepared)],

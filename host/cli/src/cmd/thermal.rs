@@ -126,7 +126,7 @@ impl EstimatorArg {
     }
 }
 
-/// What `-o` wrote of recordings at rest without a base.
+/// Description of the file that `-o` writes for recordings at rest without a base.
 const BIASES: &str =
     "biases over temperature, no calibration (for mimu export px4 and ardupilot; --base makes one)";
 

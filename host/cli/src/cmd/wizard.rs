@@ -1,4 +1,4 @@
-//! `mimu wizard`: arguments and what follows from them.
+//! `mimu wizard`: arguments and execution.
 
 #[cfg(not(target_family = "wasm"))]
 mod terminal;
@@ -104,7 +104,7 @@ pub(crate) struct WizardArgs {
     json: JsonArgs,
 }
 
-/// A board of another maker, which writes its readings as lines of text.
+/// Options for a board of another maker, which writes its readings as lines of text.
 #[derive(Args)]
 struct TextArgs {
     /// The board writes lines of text. Names of the numbers of a line in their order: ax, ay, az, gx, gy, gz; t_us, t_ms or t_s (the
@@ -132,13 +132,13 @@ fn raw_unit(text: &str) -> std::result::Result<RawUnit, String> {
 }
 
 impl TextArgs {
-    /// What the lines are, if there are any.
+    /// Columns and unit of a board that writes lines, if there is one.
     fn words(&self) -> Option<String> {
         let names = self.text.as_ref()?;
         Some(format!("{names} in {}", self.raw_unit))
     }
 
-    /// The board at this port, the `k`-th of several.
+    /// The board at this port; `k` is its index if there are several.
     fn board(&self, names: &str, port: &str, k: Option<usize>) -> Result<Text> {
         let numbered = |name: &String| k.map_or_else(|| name.clone(), |k| format!("{name}-{k}"));
         Ok(Text {
@@ -151,7 +151,7 @@ impl TextArgs {
     }
 }
 
-/// Samples a second of the session in this folder, if one was begun: one that goes on counts its time by them.
+/// Sample rate of the session in this folder, if one exists: a resumed session counts time with it.
 fn begun_rate_hz(folder: &Path) -> Option<f64> {
     let begun = Manifest::read(&folder.join("calibration").join("recording.toml"));
     begun.ok().map(|m| m.sample_rate_hz)
@@ -248,7 +248,7 @@ impl WizardArgs {
                 "give --gravity, or --latitude",
             ));
         };
-        // A session whose recordings cannot be read is refused before anybody turns the unit.
+        // Checked now, so that an invalid manifest is refused before anybody turns the unit.
         let mut manifest = Manifest::new(
             "unit",
             100.0,
@@ -279,7 +279,7 @@ impl WizardArgs {
     }
 }
 
-/// The steps of a plan.
+/// The dwells of a plan.
 fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Result<Vec<Step>> {
     let place = path.display().to_string();
     let mut steps = Vec::new();
@@ -317,7 +317,7 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
     Ok(steps)
 }
 
-/// Makes the page of what a session has found, which names the command that was typed.
+/// Writes the page of a session's diagnosis, with the command that was typed.
 fn page(command_line: &str) -> impl Fn(&DiagnosisResult, &Path) -> Result<String> {
     |found, folder| {
         let made = Made {
@@ -329,7 +329,7 @@ fn page(command_line: &str) -> impl Fn(&DiagnosisResult, &Path) -> Result<String
     }
 }
 
-/// Why a session that has ended is a failure: a calibration was not stored.
+/// Fails if a calibration was not stored.
 fn check_stored(outcome: &Outcome, folder: &Path) -> Result<()> {
     let unstored = outcome.units.iter().filter(|u| u.stored.is_none());
     let failed: Vec<String> = unstored.flat_map(|u| u.notes.clone()).collect();
@@ -343,8 +343,8 @@ fn check_stored(outcome: &Outcome, folder: &Path) -> Result<()> {
     }
 }
 
-/// A session by hand with one board that writes lines of text, at a port that the caller holds: `arrivals` is what comes over it.
-/// It is gone on with by [`mimu_wizard::turn`]; what it has come to, and why that is a failure if it is one.
+/// A session by hand with one board that writes lines of text, at a port that the caller reads; `arrivals` receives the bytes. The caller drives it
+/// with [`mimu_wizard::turn`], and gets its result and the reason if it failed.
 pub(crate) fn session(
     args: &WizardArgs,
     command_line: String,

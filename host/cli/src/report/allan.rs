@@ -1,4 +1,4 @@
-//! The noise of a unit at rest for people: coefficients, curve, and what is missing.
+//! The noise of a unit at rest as text: coefficients, curve, and missing coefficients.
 
 use std::fmt::Write as _;
 
@@ -146,7 +146,7 @@ fn sensor_text(
     reasons(out, channels);
 }
 
-/// What was set aside, and where N is from.
+/// Lines of the spectrum that were set aside, and the origin of N.
 fn lines_text(out: &mut String, channels: &[&ChannelResult]) {
     for channel in channels {
         let unit = &readable::noise(channel.unit)[0];
@@ -178,20 +178,20 @@ fn lines_text(out: &mut String, channels: &[&ChannelResult]) {
     }
 }
 
-/// To a tenth of the resolution.
+/// A frequency, to a tenth of the resolution.
 fn frequency(hz: f64, resolution_hz: f64) -> String {
     let places = (1.0 - resolution_hz.log10().floor()).clamp(0.0, 6.0);
     format!("{hz:.*}", places as usize)
 }
 
-/// One point of a curve: averaging time, deviation, ends of its interval, sigma of independent clusters.
+/// A point of a curve: averaging time, deviation, bounds of its interval, textbook sigma.
 type Point = [f64; 5];
 
-/// A time may be this far outside of a curve and still have a nearest point, as a logarithm.
+/// Largest distance of a time from the nearest end of a curve, as a logarithm.
 const OUTSIDE: f64 = 0.05;
 
-/// The point of a curve nearest to a time, if the curve reaches it. Averaging times are whole samples: at 180 Hz none is within 10 % of
-/// 0.1 s, and the nearest is the one to show.
+/// The point of a curve nearest to a time, if the curve extends so far. Averaging times are whole samples: at 180 Hz none is within 10 % of 0.1 s,
+/// and the nearest one is shown.
 fn near(time_s: f64, [tau, deviation, lower, upper, sigma]: [&[f64]; 5]) -> Option<Point> {
     let distance = |t: &f64| (t / time_s).ln();
     if distance(tau.first()?) > OUTSIDE || distance(tau.last()?) < -OUTSIDE {
@@ -202,7 +202,7 @@ fn near(time_s: f64, [tau, deviation, lower, upper, sigma]: [&[f64]; 5]) -> Opti
     Some([*t, deviation[i], lower[i], upper[i], sigma[i]])
 }
 
-/// The curve at one time a decade, with the bounds and beside them what fang (7) gives, which is one sigma.
+/// The curve at one time per decade, with its bounds and fang's one-sigma value (7) beside them.
 fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
     let unit = &readable::noise(channels[0].unit)[0];
     let _ = writeln!(
@@ -233,7 +233,7 @@ fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
         if let Some(time_s) = points.iter().flatten().next().map(|p| p[0]) {
             let label = format!("  {} s", significant(time_s));
             rows.push((label, points.into_iter().map(cell).collect()));
-            // Only where it is another number.
+            // Shown only if it differs.
             let without = channels.iter().map(|c| {
                 let quiet = c.adev_without_lines.as_ref()?;
                 let (i, _) = c.tau_s.iter().enumerate().find(|(_, t)| **t == time_s)?;
@@ -261,7 +261,7 @@ fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
     write_rows(out, &rows);
 }
 
-/// Why coefficients are missing, and where the model does not hold; the same sentence once.
+/// Why coefficients are missing, and where the model is invalid; each sentence once.
 fn reasons(out: &mut String, channels: &[&ChannelResult]) {
     let mut given: Vec<(String, Vec<&str>)> = Vec::new();
     let mut give = |name, text: String| match given.iter_mut().find(|(t, _)| *t == text) {

@@ -1,4 +1,4 @@
-//! Allan curves as SVG: gyros beside accelerometers, bounds as bands, fitted models, and where the coefficients are read.
+//! Allan curves as SVG: gyros and accelerometers side by side, with bounds as bands, fitted models and coefficients.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use mimu_allan::model::{FLOOR, Term};
 /// Width and height of one panel, pixels.
 const PANEL: (f64, f64) = (640.0, 520.0);
 
-/// Colours that stay apart for the colour-blind (Okabe and Ito).
+/// Colours that colour-blind people can distinguish (Okabe and Ito).
 const STYLE: &str = "text{font:14px sans-serif;fill:#000}.tick{font-size:13px}.name{font-size:15px}.heading{font-size:18px}\
 path{fill:none;stroke-width:2}.grid{stroke:#e1e1e1;stroke-width:1}.axis{stroke:#000;stroke-width:1}\
 .x{stroke:#e69f00}.y{stroke:#0072b2}.z{stroke:#009e73}\
@@ -53,7 +53,7 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
     let usual = &readable::noise(channels[0].unit)[0];
     let by = usual.factor;
     let x = ends(channels.iter().flat_map(|c| c.tau_s.iter().copied()), 1.1);
-    // Of the longest times only the curve and not the whole of the band has to be seen.
+    // At the longest times the curve has to be visible, but not all of the band.
     let y = ends(
         channels.iter().flat_map(|c| c.adev.iter().map(|d| d * by)),
         1.6,
@@ -82,7 +82,7 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
         each.map(|(t, d)| point(*t, *d)).collect()
     };
     let line = |class: &str, points: Vec<(f64, f64)>| frame.line(class, points.into_iter());
-    // Line and name of each entry of the key.
+    // Line style and name of each legend entry.
     let mut key: Vec<(String, String)> = Vec::new();
     let mut curves: Vec<Markup> = Vec::new();
     for (class, channel) in CLASSES.iter().zip(channels) {
@@ -125,15 +125,15 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
     }
 }
 
-/// Averaging time at which a sinusoid of frequency 1 bends an Allan deviation most: where `sin²(π τ)/(π τ)` is greatest.
+/// Averaging time at which a sinusoid of frequency 1 increases an Allan deviation most: the maximum of `sin²(π τ)/(π τ)`.
 const BENT_AT: f64 = 0.371;
-/// Width and height that the label of a frequency takes, pixels.
+/// Space for the label of a frequency: width and height, pixels.
 const LABEL: (f64, f64) = (54.0, 14.0);
-/// Distance of the middle of a letter from the edge of the frame, pixels.
+/// Distance of a letter's centre from the edge of the frame, pixels.
 const EDGE: f64 = 10.0;
 
-/// Where a line bends the curves: a wedge that points at the highest of them, and the frequency above; lines that several
-/// channels have are one.
+/// Marks where spectral lines affect the curves: a wedge at the highest curve, with the frequency above it. Lines that several channels share are
+/// marked once.
 fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
     let mut marks: Vec<(f64, f64)> = Vec::new();
     for channel in channels {
@@ -153,7 +153,7 @@ fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
             }
         }
     }
-    // Along the falling curve, the highest frequency first.
+    // From left to right along the falling curve: the highest frequency comes first.
     marks.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut labels: Vec<(f64, f64)> = Vec::new();
     let mut place = |(f, deviation): &(f64, f64)| {
@@ -161,7 +161,7 @@ fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
         let inside = frame.x.contains(&x) && frame.y.contains(&y);
         inside.then(|| {
             let (x, y) = (frame.at_x(x), frame.at_y(y) - 5.0);
-            // Beside the wedge, and inside the frame at its edges.
+            // Next to the wedge, but inside the frame.
             let left = (x + 6.0).min(frame.across.end - LABEL.0);
             let mut bottom = (y - 4.0).max(frame.down.start + LABEL.1);
             for (other, above) in &labels {
@@ -182,7 +182,7 @@ fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
     }
 }
 
-/// Where a coefficient is read: a circle for each channel, and one letter above the highest of them.
+/// Marks a coefficient: a circle for each channel, and one letter above the highest circle.
 fn marks(frame: &Frame, channels: &[&ChannelResult], term: Term, by: f64) -> Markup {
     let marks: Vec<(usize, f64, f64)> = models(channels)
         .filter_map(|(k, channel, model)| Some((k, read_at(channel, model, term)?)))
@@ -199,7 +199,7 @@ fn marks(frame: &Frame, channels: &[&ChannelResult], term: Term, by: f64) -> Mar
     }
 }
 
-/// At the lower left, where falling curves are not.
+/// The legend is at the lower left, where falling curves leave space.
 fn legend(frame: &Frame, key: &[(String, String)]) -> Markup {
     let letters = key.iter().map(|(_, name)| name.chars().count()).max();
     let (width, height) = (
@@ -217,7 +217,7 @@ fn legend(frame: &Frame, key: &[(String, String)]) -> Markup {
     }
 }
 
-/// The ends of positive values, with so much room as a factor.
+/// Range of positive values, extended by the factor `room`.
 fn ends(values: impl Iterator<Item = f64>, room: f64) -> Range<f64> {
     let (low, high) = values
         .filter(|v| v.is_finite() && *v > 0.0)
@@ -230,7 +230,7 @@ fn ends(values: impl Iterator<Item = f64>, room: f64) -> Range<f64> {
     }
 }
 
-/// The channels that have a model, with the channel's number.
+/// Channels with a model, and their indices.
 fn models<'a>(
     channels: &'a [&'a ChannelResult],
 ) -> impl Iterator<Item = (usize, &'a ChannelResult, &'a ModelResult)> {
@@ -238,8 +238,7 @@ fn models<'a>(
     channels.iter().enumerate().filter_map(with_model)
 }
 
-/// Averaging time at which a plot shows a coefficient, and the deviation there: N at 1 s, K at 3 s, and B where the model has come
-/// down to its floor.
+/// Averaging time and deviation at which the plot marks a coefficient: N at 1 s, K at 3 s, and B where the model reaches its floor.
 fn read_at(channel: &ChannelResult, model: &ModelResult, term: Term) -> Option<(f64, f64)> {
     let value = channel.get(term).ok()?.value;
     match term {
@@ -253,7 +252,7 @@ fn read_at(channel: &ChannelResult, model: &ModelResult, term: Term) -> Option<(
     }
 }
 
-/// Round numbers in the range as the places and labels of a logarithmic axis: powers of ten, and 2 and 5 times them where those are few.
+/// Round numbers in the range, with their labels, for a logarithmic axis: powers of ten, and their multiples by 2 and 5 if there are few.
 fn labelled(range: &Range<f64>) -> Vec<(f64, String)> {
     let (low, high) = (range.start, range.end);
     let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
@@ -263,7 +262,7 @@ fn labelled(range: &Range<f64>) -> Vec<(f64, String)> {
         &[1, 2, 5]
     };
     let all = decades.flat_map(|d| steps.iter().map(move |m| format!("{m}e{d}")));
-    // From text: powers of ten by multiplication are off by a rounding, which a label would show.
+    // Parsed from text: computed powers of ten have rounding errors that a label would show.
     let all = all.filter_map(|t| t.parse().ok());
     all.filter(|t| (low..=high).contains(t))
         .map(|t: f64| (t.log10(), label(t)))

@@ -1,4 +1,4 @@
-//! A compensated recording for people.
+//! A compensated recording as text.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! What `mimu compare` says.
+//! Result of `mimu compare` as text.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use mimu::calibration::comparison::{ComparedParameter, Comparison};
 use mimu::quantity::{p_value, plus_minus, significant};
 use mimu::readable;
 
-/// Two files side by side with their difference, or the spread of many.
+/// Two files side by side with their difference, or the range of several.
 pub fn compare_text(result: &Comparison, all: bool) -> String {
     let mut out = String::new();
     let changed = result.parameters.iter().filter(|p| p.changed).count();
@@ -77,7 +77,7 @@ fn row(p: &ComparedParameter, two: bool) -> String {
             let difference = (p.values[1] - p.values[0]) * by;
             let half = p.sigmas.as_ref().map(|s| 1.96 * s[0].hypot(s[1]) * by);
             let digits = |v: f64| match half {
-                // To the digit that the interval has.
+                // With as many digits as the interval.
                 Some(half) => plus_minus(v * by, half)
                     .split(' ')
                     .next()

@@ -1,4 +1,4 @@
-//! What the device computes beside what the PC computes, for people.
+//! Comparisons of the device's computation with the PC's, as text.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use super::device::printed;
 use mimu::quantity::{AXES, significant};
 use mimu_device::{Checked, DeviceResult, KalmanRun};
 
-/// Writing to a string does not fail.
+/// Writes a line to a string, which cannot fail.
 macro_rules! line {
     ($out:expr, $($of:tt)*) => { let _ = writeln!($out, $($of)*); };
 }

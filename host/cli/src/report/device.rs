@@ -1,4 +1,4 @@
-//! What the device says, and what was recorded from it, as text.
+//! Results of the device's commands and recordings from it, as text.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use mimu_device::{
     Contents, Counted, DeviceResult, Identity, LineCount, SelfTested, Streamed, Uploaded,
 };
 
-/// Writing to a string does not fail.
+/// Writes a line to a string, which cannot fail.
 macro_rules! line {
     ($out:expr, $($of:tt)*) => { let _ = writeln!($out, $($of)*); };
 }
@@ -218,7 +218,7 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
     out
 }
 
-/// Of which unit a calibration is, beside the one that holds it, and from when.
+/// The unit and date of a calibration. `held_by`: the unit that stores it.
 fn origin(of: Option<&str>, held_by: Option<&str>, created: Option<&str>) -> String {
     let unit = match (of, held_by) {
         (None, _) => "of an unknown unit".to_string(),
@@ -267,7 +267,7 @@ pub fn self_test_text(result: &DeviceResult<SelfTested>) -> String {
     out
 }
 
-/// In the order of the table of messages.
+/// In the order of the message's fields.
 fn counters(of: &Counters) -> [(&'static str, u32); 14] {
     [
         ("uptime_ms", of.uptime_ms),
@@ -316,7 +316,7 @@ fn line_text(out: &mut String, count: &LineCount) {
     }
 }
 
-/// Result of `mimu device stream`, beside the samples.
+/// Result of `mimu device stream`, without the samples.
 pub fn stream_text(result: &DeviceResult<Streamed>) -> String {
     let mut out = String::new();
     let found = &result.found;
@@ -347,7 +347,7 @@ pub fn stream_text(result: &DeviceResult<Streamed>) -> String {
     out
 }
 
-/// A unit of a file as it is printed.
+/// A unit in its printed form.
 pub(super) fn printed(unit: &str) -> String {
     unit.replace("^2", "²")
 }

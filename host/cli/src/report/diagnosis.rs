@@ -1,4 +1,4 @@
-//! What `mimu diagnose` says.
+//! Result of `mimu diagnose`.
 
 mod page;
 mod text;
@@ -12,13 +12,13 @@ use mimu::quantity::significant;
 use mimu::readable;
 use mimu::result::diagnosis::{DiagnosisResult, SensorDiagnosisResult};
 
-/// Errors of the reference over the noise floor from which on they, and not the noise, are what a clean unit is judged by.
+/// If the reference's errors exceed this many noise floors, they limit the judgement of a clean unit instead of the noise.
 const OPEN: f64 = 3.0;
 
-/// What the verdict means, as a sentence fragment.
+/// Meaning of the verdict, as a sentence fragment.
 fn meaning(d: &DiagnosisResult) -> &'static str {
     let open = |s: &SensorDiagnosisResult| s.reference_rms > OPEN * s.noise_floor;
-    // Reported below, and not judged.
+    // Reported below, not judged.
     let usual = d.leftover.iter().any(|l| l.usual);
     match d.verdict {
         Verdict::Clean if d.sensors.present().any(|(_, s)| open(s)) => {
@@ -44,7 +44,7 @@ fn meaning(d: &DiagnosisResult) -> &'static str {
     }
 }
 
-/// What a person should know of the error figures of a sensor, as sentence fragments. `with_share`: also the share that is explained.
+/// Remarks on the error figures of a sensor, as sentence fragments. `with_share` includes the fraction of the error that is explained.
 fn remarks(s: &SensorDiagnosisResult, with_share: bool) -> Vec<String> {
     let mut all = Vec::new();
     if !s.held_out_rms_after.is_finite() {

@@ -1,4 +1,4 @@
-//! A fit for people: fixed-width tables with units and intervals.
+//! A fit as text: fixed-width tables with units and intervals.
 
 use std::fmt::Write as _;
 
@@ -61,17 +61,17 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
     out
 }
 
-/// Error over that of noise alone from which on something else is in it.
+/// If the error exceeds this many noise floors, it contains more than noise.
 const BEYOND_NOISE: f64 = 2.0;
 
-/// Sensors whose error exceeds noise, with how many times.
+/// Sensors whose error exceeds the noise, with the ratio.
 fn beyond(fit: &FitResult) -> Vec<(Sensor, f64)> {
     let share = |s: &SensorFitResult| s.held_out_rms.unwrap_or(s.rms) / s.noise_floor;
     let all = fit.sensors.present().map(|(name, s)| (name, share(s)));
     all.filter(|(_, share)| *share > BEYOND_NOISE).collect()
 }
 
-/// What the fit amounts to.
+/// Summary of the fit's quality.
 fn verdict(fit: &FitResult) -> String {
     let names: Vec<&str> = fit.sensors.present().map(|(name, _)| name.name()).collect();
     let calibrated = format!("{} calibrated", names.join(" and "));
@@ -93,7 +93,7 @@ fn verdict(fit: &FitResult) -> String {
     format!("{calibrated}; {errors}")
 }
 
-/// What to do after the fit.
+/// Next step after the fit.
 fn next(fit: &FitResult) -> String {
     let judge = "judge it on another recording (mimu verify OTHER --calibration FILE)";
     if !fit.recording_problems.is_empty() {
@@ -159,7 +159,7 @@ fn errors_text(out: &mut String, fit: &FitResult) {
     }
 }
 
-/// Of what the errors are, and how many there are.
+/// Kind and number of the errors.
 fn used(sensor: &SensorFitResult) -> String {
     let n = sensor.residuals.len() as u64;
     match sensor.unit {
@@ -168,7 +168,7 @@ fn used(sensor: &SensorFitResult) -> String {
     }
 }
 
-/// How long the recording is, and what its dwells are.
+/// Length of the recording, and its dwells.
 fn recorded(out: &mut String, fit: &FitResult, verbose: bool) {
     let _ = writeln!(
         out,
@@ -207,7 +207,7 @@ fn recorded(out: &mut String, fit: &FitResult, verbose: bool) {
     }
 }
 
-/// Half of a 95 % interval in sigmas.
+/// Half-width of a 95 % interval in sigmas.
 const INTERVAL: f64 = 1.96;
 
 fn sensor_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorFitResult) {
@@ -302,7 +302,7 @@ fn parameters_text(
     sensor: &SensorFitResult,
     head: &str,
 ) {
-    // A triad's own axes are the frame where only a magnitude is known.
+    // If only a magnitude is known, the triad's own axes define the frame.
     let by_choice = match fit.reference {
         Reference::Table => false,
         Reference::Gravity => name == Sensor::Accel,
@@ -384,7 +384,7 @@ pub fn dwell_table(dwells: &[DwellResult]) -> String {
     out
 }
 
-/// Seconds, where they are known.
+/// Seconds, if they are known.
 fn known(seconds: f64) -> String {
     match seconds.is_nan() {
         true => "-".into(),

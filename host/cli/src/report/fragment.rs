@@ -1,5 +1,4 @@
-//! Results as a piece of HTML within another page, as a notebook shows them: the tables and plots of the pages, with their style for this
-//! piece only.
+//! Results as a piece of HTML within another page, for notebooks: the tables and plots of the pages, with a style that applies to this piece only.
 
 use std::fmt::Write as _;
 
@@ -52,10 +51,10 @@ pub fn of_fit(fit: &Fit, result: &FitResult, calibration: &Calibration) -> Strin
     })
 }
 
-/// A diagnosis, as its page has it.
+/// A diagnosis, as on its page.
 ///
 /// # Errors
-/// A model of it is singular, so that there is nothing to draw.
+/// A model of the diagnosis is singular, so that nothing can be drawn.
 pub fn of_diagnosis(result: &DiagnosisResult, made: &Made) -> Result<String> {
     Ok(fragment(&diagnosis::body(result, made)?))
 }
@@ -65,7 +64,7 @@ pub fn of_allan(result: &AllanResult) -> String {
     fragment(&html! {
         h1 { "Noise of " (result.device.as_deref().unwrap_or("a unit")) }
         @if let Some(noise) = result.noise_file(&now()) { (unit::noise::section(&noise)) }
-        // A drawing of its own, with a style of its own, which would hold for the whole page in another place than an image.
+        // As an image: the drawing has a style of its own, which would otherwise apply to the whole page.
         @if result.recordings.len() == 1 {
             img alt="Allan deviation with its fitted model" style="max-width:100%" src=(data_url(&allan_plot::svg(result))) {}
         }
@@ -73,7 +72,7 @@ pub fn of_allan(result: &AllanResult) -> String {
     })
 }
 
-/// A fit over temperature, as its page has it.
+/// A fit over temperature, as on its page.
 pub fn of_thermal(result: &ThermalResult, made: &Made) -> String {
     fragment(&thermal_page::body(result, made))
 }
@@ -83,7 +82,7 @@ pub fn of_text(text: &str) -> String {
     fragment(&html! { pre { (text) } })
 }
 
-/// A verification by the recording `name`.
+/// A verification with the recording `name`.
 pub fn of_verification(name: &str, verification: &Verification) -> String {
     let one = [(name.to_owned(), verification.clone())];
     fragment(&html! {
@@ -106,7 +105,7 @@ pub fn of_calibration(calibration: &Calibration) -> String {
     })
 }
 
-/// Terms and what is known of them.
+/// Terms and their descriptions.
 pub fn of_terms(title: &str, terms: &[(&str, String)]) -> String {
     fragment(&html! {
         h3 { (title) }
@@ -114,9 +113,9 @@ pub fn of_terms(title: &str, terms: &[(&str, String)]) -> String {
     })
 }
 
-/// `main` with the style of a page, which touches nothing beside it.
+/// `main` with the style of a page, limited to this piece.
 fn fragment(main: &Markup) -> String {
-    // A style sheet within a rule holds for the element of that rule and what is in it: a page's root and body are that element here.
+    // A nested style sheet applies to the element of the outer rule and its contents. This element takes the place of the page's root and body.
     let style = STYLE.replace(":root{", "&{").replace("\nbody{", "\n&{");
     let all = html! {
         div class="mimu" {
@@ -127,7 +126,7 @@ fn fragment(main: &Markup) -> String {
     all.into_string()
 }
 
-/// A drawing as the address of an image.
+/// A drawing as a data URL.
 fn data_url(svg: &str) -> String {
     let mut url = String::from("data:image/svg+xml,");
     for byte in svg.bytes() {
@@ -157,7 +156,7 @@ mod tests {
         );
         let open = style.matches('{').count();
         assert_eq!(open, style.matches('}').count());
-        // The outermost rule is closed by the last brace only.
+        // The outermost rule ends at the last brace.
         let mut depth = 0;
         for (i, c) in style.char_indices().skip(".mimu".len()) {
             depth += i32::from(c == '{') - i32::from(c == '}');

@@ -1,4 +1,4 @@
-//! An import for people.
+//! An import as text.
 
 use std::fmt::Write as _;
 
@@ -81,7 +81,7 @@ pub fn import_text(summary: &ImportSummary) -> String {
     out
 }
 
-/// What the time stamps of a file have shown.
+/// Findings about the time stamps of a file.
 fn time_text(time: &TimeSummary) -> String {
     let mut out = match (time.unit, time.recognised) {
         (Some(unit), true) => format!("time stamps assumed to be in {unit}"),

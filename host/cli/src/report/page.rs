@@ -1,16 +1,16 @@
-//! A page: one HTML file that needs nothing else, for a reviewer who wants to see it.
+//! A page: a single, self-contained HTML file.
 //!
-//! It is XML too, so that any parser reads it. A number in it is a `data` element whose value is that of the JSON.
+//! A page is valid XML too, so that any parser can read it. Each number is a `data` element with the value from the JSON.
 
 use maud::{Markup, PreEscaped, html};
 use mimu::quantity::{Sensor, significant};
 
 use super::svg::raised;
 
-/// How a page came about.
+/// Origin of a page.
 #[derive(Debug, Clone)]
 pub struct Made {
-    /// Recording, as it was given.
+    /// Recording, as given.
     pub recording: String,
     /// Command line.
     pub command: String,
@@ -19,7 +19,7 @@ pub struct Made {
 }
 
 pub(super) const STYLE: &str = include_str!("page/style.css");
-/// Elements without an end, closed as XML wants it.
+/// Elements without an end tag, closed as XML requires.
 const META: &str = r#"<meta charset="utf-8"/><meta name="viewport" content="width=device-width, initial-scale=1"/>"#;
 
 /// The page with this title.
@@ -38,7 +38,7 @@ pub fn page(title: &str, main: &Markup) -> String {
     page.into_string() + "\n"
 }
 
-/// A number for people, which holds that of the JSON.
+/// A number in readable form, with the value from the JSON.
 pub fn number(si: f64, factor: f64, unit: &str) -> Markup {
     html! {
         @if si.is_finite() {
@@ -47,7 +47,7 @@ pub fn number(si: f64, factor: f64, unit: &str) -> Markup {
     }
 }
 
-/// With a minus sign in place of a hyphen, and powers of ten as people write them.
+/// `text` with a minus sign instead of a hyphen, and powers of ten in superscript.
 pub fn written(text: &str) -> String {
     let text = match text.split_once('e') {
         Some((digits, power)) => format!("{digits}·10{}", raised(power)),
@@ -56,7 +56,7 @@ pub fn written(text: &str) -> String {
     text.replace('-', "−")
 }
 
-/// Names of sensors in sentences.
+/// Name of a sensor in a sentence.
 pub fn spoken(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Gyro => "gyro",

@@ -1,4 +1,4 @@
-//! What is wrong with recordings that a command refuses.
+//! Faults of recordings that a command refuses.
 
 use std::io::Write as _;
 
@@ -11,7 +11,7 @@ use super::text;
 use crate::arguments::JsonArgs;
 use crate::output::{coloured, show};
 
-/// What a command that refused its recordings writes to standard output, if its JSON goes there.
+/// JSON on standard output of a command that refused its recordings.
 #[derive(Serialize)]
 struct Refusal<'a> {
     format: &'static str,
@@ -19,7 +19,7 @@ struct Refusal<'a> {
     recording_problems: &'a [OfRecording],
 }
 
-/// The error line in its parts.
+/// The parts of the error line.
 #[derive(Serialize)]
 struct Refused<'a> {
     place: &'a str,
@@ -27,8 +27,8 @@ struct Refused<'a> {
     remedy: &'a str,
 }
 
-/// Lists what is wrong with the recordings that a command refused: to standard error, above the line with the error, and in JSON if that
-/// goes to standard output. A file of JSON is a result, and there is none.
+/// Lists the faults of the refused recordings: on standard error before the error line, and as JSON if JSON goes to standard output. A JSON file is
+/// not written, because there is no result.
 pub(crate) fn refused(
     error: &Error,
     problems: &[OfRecording],
@@ -38,7 +38,7 @@ pub(crate) fn refused(
     let mut out = String::new();
     text::problems(&mut out, problems, several, true);
     let mut to = AutoStream::auto(std::io::stderr().lock());
-    // Standard error that cannot be written shows no error line either.
+    // If standard error cannot be written, the error line cannot be shown either.
     let _ = to.write_all(coloured(&out).as_bytes());
     if json.is_some_and(|json| json.path.is_some() && json.file().is_none()) {
         let told = error.refused();

@@ -1,21 +1,21 @@
-//! Drawings as SVG whose colours are in a style sheet: a page is read in the dark and printed in the light. Not plotters, which writes its
-//! colours into every element.
+//! Drawings as SVG with colours from a style sheet, because a page is read in dark mode and printed on white. The crate plotters is not used: it
+//! writes colours into every element.
 
 use std::fmt::Write as _;
 use std::ops::Range;
 
 use maud::{Markup, html};
 
-/// Where points of a drawing go on the page.
+/// Maps values to pixels of a drawing.
 #[derive(Debug, Clone)]
 pub struct Frame {
     /// Left and right end, pixels.
     pub across: Range<f64>,
     /// Top and bottom, pixels.
     pub down: Range<f64>,
-    /// Values at the left and the right.
+    /// Values at the left and the right end.
     pub x: Range<f64>,
-    /// Values at the bottom and the top.
+    /// Values at the bottom and the top end.
     pub y: Range<f64>,
 }
 
@@ -32,7 +32,7 @@ impl Frame {
         self.down.end - share * (self.down.end - self.down.start)
     }
 
-    /// Grid, numbers and a heading; numbers on the left only `with_y`.
+    /// Grid, numbers and a heading. Numbers of the ordinate are shown only if `with_y`.
     pub fn axes(&self, heading: &str, with_y: bool) -> Markup {
         let (x, y) = (ticks(&self.x, 5), ticks(&self.y, 5));
         let zero = self.y.contains(&0.0).then(|| self.at_y(0.0));
@@ -44,7 +44,7 @@ impl Frame {
         }
     }
 
-    /// Grid, numbers and a heading: places on the axes, and what is written there.
+    /// Grid, numbers and a heading, at given places with given labels.
     pub fn grid(
         &self,
         heading: &str,
@@ -75,7 +75,7 @@ impl Frame {
         }
     }
 
-    /// Name of the abscissa, in the middle of this frame and `last`, which may be the same.
+    /// Name of the abscissa, centred between this frame and `last`, which may be the same.
     pub fn x_name(&self, name: &str, last: &Self) -> Markup {
         let (x, y) = (
             0.5 * (self.across.start + last.across.end),
@@ -84,7 +84,7 @@ impl Frame {
         html! { text class="name" x=(px(x)) y=(px(y)) text-anchor="middle" { (name) } }
     }
 
-    /// Name of the ordinate, upright beside the numbers.
+    /// Name of the ordinate, rotated, next to the numbers.
     pub fn y_name(&self, name: &str) -> Markup {
         let (x, y) = (12.0, 0.5 * (self.down.start + self.down.end));
         html! {
@@ -95,12 +95,12 @@ impl Frame {
 
     /// Round marks.
     pub fn dots(&self, class: &str, points: impl Iterator<Item = (f64, f64)>) -> Markup {
-        // A line of no length with round ends: a tenth of the size of circles.
+        // A line of zero length with round ends takes a tenth of the bytes of a circle.
         let d = self.path(points, |d, x, y| write!(d, "M{x:.1} {y:.1}h0"));
         html! { path class=(class) d=(d) {} }
     }
 
-    /// Open diamonds.
+    /// Unfilled diamonds.
     pub fn diamonds(&self, class: &str, points: impl Iterator<Item = (f64, f64)>) -> Markup {
         let d = self.path(points, |d, x, y| {
             write!(d, "M{x:.1} {:.1}l3.4 3.4l-3.4 3.4l-3.4 -3.4z", y - 3.4)
@@ -108,7 +108,7 @@ impl Frame {
         html! { path class=(class) d=(d) {} }
     }
 
-    /// Upright bars: abscissa, middle, half the length.
+    /// Vertical bars: abscissa, middle, half-length.
     pub fn bars(&self, class: &str, bars: impl Iterator<Item = (f64, f64, f64)>) -> Markup {
         let mut d = String::new();
         for (x, y, half) in bars.filter(|b| b.0.is_finite() && b.1.is_finite()) {
@@ -133,7 +133,7 @@ impl Frame {
         html! { path class=(class) d=(d) {} }
     }
 
-    /// The area between two lines: abscissa, lowest, highest.
+    /// The area between two lines: abscissa, lower and upper ordinate.
     pub fn band(&self, class: &str, points: &[(f64, f64, f64)]) -> Markup {
         let inside = |y: f64| y.clamp(self.y.start, self.y.end);
         let up = points.iter().map(|p| (p.0, inside(p.2)));
@@ -141,7 +141,7 @@ impl Frame {
         self.line(class, up.chain(back))
     }
 
-    /// Every other stretch between `ends`, shaded.
+    /// Shades every second segment between `ends`.
     pub fn stretches(&self, class: &str, ends: &[f64]) -> Markup {
         let (top, height) = (self.down.start, self.down.end - self.down.start);
         let after = ends.get(1..).unwrap_or_default();
@@ -154,7 +154,7 @@ impl Frame {
         }
     }
 
-    /// The spans between two abscissas each, shaded.
+    /// Shades the spans between pairs of abscissas.
     pub fn spans(&self, class: &str, spans: &[(f64, f64)]) -> Markup {
         let (top, height) = (self.down.start, self.down.end - self.down.start);
         html! {
@@ -199,23 +199,23 @@ impl Frame {
     }
 }
 
-/// Room of one figure: pixels, and around its frame for numbers and names.
+/// Size of a figure, and margins around its frame for numbers and names.
 #[derive(Debug, Clone, Copy)]
 pub struct Panel {
     /// Width and height.
     pub size: (f64, f64),
-    /// Left, right, top and bottom of the frame.
+    /// Margins at the left, right, top and bottom of the frame.
     pub room: [f64; 4],
 }
 
 impl Panel {
-    /// A figure with a single frame, of which two stand side by side on a wide page.
+    /// A figure with a single frame. Two fit side by side on a wide page.
     pub const ONE: Self = Self {
         size: (560.0, 232.0),
         room: [70.0, 8.0, 26.0, 40.0],
     };
 
-    /// The frame that fills it.
+    /// The frame inside the margins.
     pub fn frame(&self, x: Range<f64>, y: Range<f64>) -> Frame {
         let [left, right, top, bottom] = self.room;
         Frame {
@@ -226,7 +226,7 @@ impl Panel {
         }
     }
 
-    /// The whole of it; `label` is what it shows, for people who do not see it.
+    /// The complete drawing; `label` describes it for screen readers.
     pub fn drawing(&self, label: &str, inside: &Markup) -> Markup {
         html! {
             svg role="img" aria-label=(label) viewBox={ "0 0 " (px(self.size.0)) " " (px(self.size.1)) }
@@ -235,7 +235,7 @@ impl Panel {
     }
 }
 
-/// Powers of ten in the range, as the places and labels of a logarithmic axis; with 2 and 5 times them where these are few.
+/// Powers of ten in the range, with their labels, for a logarithmic axis; with their multiples by 2 and 5 if there are few.
 pub fn decades(range: &Range<f64>) -> Vec<(f64, String)> {
     let many = (range.end / range.start).log10() > 2.5;
     let factors: &[i32] = if many { &[1] } else { &[1, 2, 5] };
@@ -255,12 +255,12 @@ pub fn decades(range: &Range<f64>) -> Vec<(f64, String)> {
     each.collect()
 }
 
-/// Pixels to a tenth.
+/// Pixels, to a tenth.
 pub fn px(v: f64) -> String {
     format!("{v:.1}")
 }
 
-/// The range of `values` with a little room, and never empty.
+/// The range of `values` with a margin; never empty.
 pub fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = values
         .filter(|v| v.is_finite())
@@ -277,7 +277,7 @@ pub fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     low - room..high + room
 }
 
-/// Power of ten, of which an axis with these ends is best written in multiples: 0, or so that numbers have few digits.
+/// Power of ten for the numbers of an axis with these ends: 0, or such that the numbers have few digits.
 pub fn power_of_ten(ends: &Range<f64>) -> i32 {
     let most = ends.start.abs().max(ends.end.abs());
     if (0.02..2e4).contains(&most) || most == 0.0 {
@@ -286,7 +286,7 @@ pub fn power_of_ten(ends: &Range<f64>) -> i32 {
     3 * (most.log10() / 3.0).floor() as i32
 }
 
-/// `10⁻³ ` before the unit of an axis that is written in multiples of a power of ten.
+/// `10⁻³ ` before the unit of an axis with a power of ten.
 pub fn times_ten(power: i32) -> String {
     if power == 0 {
         return String::new();
@@ -294,7 +294,7 @@ pub fn times_ten(power: i32) -> String {
     format!("10{} ", raised(&power.to_string()))
 }
 
-/// Digits as exponents.
+/// Digits as superscripts.
 pub fn raised(text: &str) -> String {
     let one = |c: char| match c {
         '-' => '⁻',
@@ -309,7 +309,7 @@ pub fn raised(text: &str) -> String {
     text.chars().map(one).collect()
 }
 
-/// About so many round numbers in the range, and how they are written.
+/// About this many round numbers in the range, with their labels.
 fn ticks(range: &Range<f64>, about: usize) -> Vec<(f64, String)> {
     let width = range.end - range.start;
     let rough = width / about as f64;
@@ -324,7 +324,7 @@ fn ticks(range: &Range<f64>, about: usize) -> Vec<(f64, String)> {
     let decimals = (-step.log10()).ceil().clamp(0.0, 9.0) as usize;
     let label = |value: f64| {
         let text = format!("{value:.decimals$}");
-        // Of zero a sum of steps may leave the sign.
+        // A sum of steps may leave the sign of a zero.
         match text.trim_start_matches('-').trim_matches(['0', '.']) {
             "" => text.trim_start_matches('-').into(),
             _ => text.replace('-', "−"),

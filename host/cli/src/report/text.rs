@@ -1,14 +1,14 @@
-//! Lines and warnings, for all results that people read.
+//! Lines and warnings of all text results.
 
 use std::fmt::{Display, Write as _};
 
 use mimu::quantity::plural;
 use mimu::recording_problem::OfRecording;
 
-/// Width that text keeps to, characters.
+/// Width of text, characters.
 pub(crate) const COLUMNS: usize = 98;
 
-/// `head` and `text` in lines, the later ones below the beginning of the text, or a little in where the head is long.
+/// Wraps `head` and `text`. Further lines are indented to the beginning of the text, or only a little if the head is long.
 pub(super) fn wrap(out: &mut String, head: &str, text: &str) {
     let first = head.chars().count();
     let spaces = head.chars().take_while(|c| *c == ' ').count();
@@ -39,13 +39,13 @@ pub(crate) fn warn(out: &mut String, warnings: impl Iterator<Item = impl Display
     }
 }
 
-/// Lines that a summary has at most.
+/// Largest number of lines of a summary.
 pub(crate) const SUMMARY: usize = 25;
-/// Lines of a summary that what is wrong with the recording takes at most.
+/// Largest number of these lines for faults of the recording.
 const OF_PROBLEMS: usize = 7;
 
-/// What is wrong with a recording, or with `several`, a line each, which is not wrapped so that programs find it; without `verbose` only so
-/// many.
+/// Faults of a recording, or with `several` of recordings, one per line. They are not wrapped, so that programs can find them. Unless `verbose`, only
+/// the first few.
 pub(crate) fn problems(out: &mut String, problems: &[OfRecording], several: bool, verbose: bool) {
     if problems.is_empty() {
         return;
@@ -68,7 +68,7 @@ pub(crate) fn problems(out: &mut String, problems: &[OfRecording], several: bool
     }
 }
 
-/// The first of each kind, and how many more there are.
+/// The first of each kind, with the number of the others.
 pub(crate) fn kinds<'a, W: 'a>(
     warnings: impl Iterator<Item = &'a W>,
     is_like: impl Fn(&W, &W) -> bool,
@@ -83,7 +83,7 @@ pub(crate) fn kinds<'a, W: 'a>(
     kinds.into_iter()
 }
 
-/// `warning`, and that there are `more` of its kind.
+/// `warning`, and the number of others of its kind.
 pub(crate) fn counted(warning: String, more: usize) -> String {
     match more {
         0 => warning,
@@ -91,7 +91,7 @@ pub(crate) fn counted(warning: String, more: usize) -> String {
     }
 }
 
-/// As many warnings, a line each, as a summary that is to have `after` more lines has room for, and how many more there are.
+/// As many warnings as fit into a summary with `after` further lines, one per line, and the number of the others.
 pub(crate) fn warn_within(out: &mut String, warnings: impl Iterator<Item = String>, after: usize) {
     let warnings: Vec<String> = warnings.collect();
     let room = SUMMARY.saturating_sub(out.lines().count() + after);

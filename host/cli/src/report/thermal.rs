@@ -1,4 +1,4 @@
-//! A fit over temperature for people.
+//! A fit over temperature as text.
 
 use std::fmt::Write as _;
 
@@ -12,16 +12,16 @@ use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 use crate::hint;
 use crate::report::text::{warn, warn_within, wrap};
 
-/// Temperatures at which curves are shown.
+/// Number of temperatures at which curves are shown.
 pub(super) const SHOWN: usize = 5;
 
-/// What the verdict `one-way` means.
+/// Description of the verdict `one-way`.
 pub(super) const VERDICT_ONE_WAY: &str = "the temperature goes one way only: lag and slope cannot be distinguished, and the intervals allow for any lag. A whole cycle of heating and cooling distinguishes them.";
 
-/// What the verdict `misfit` means.
+/// Description of the verdict `misfit`.
 pub(super) const VERDICT_MISFIT: &str = "the remaining errors far exceed the noise: something other than temperature and lag changes the readings, and the intervals do not include it.";
 
-/// Temperatures side by side in a table of 100 columns.
+/// Number of temperatures per line in a table of 100 columns.
 const ACROSS: usize = 3;
 
 /// Result of `mimu thermal fit`: a summary, or with `verbose` everything.
@@ -60,13 +60,13 @@ fn summary(result: &ThermalResult) -> String {
         let _ = writeln!(out);
         curves_text(&mut out, name, result, false);
     }
-    // Below it one more line, and one with the file of the calibration.
+    // Two more lines follow: the next step, and the file of the calibration.
     warn_within(&mut out, result.warnings.iter().map(hint::of_thermal), 2);
     out += "next: --page shows all curves, --verify judges them on another recording; --verbose prints more\n";
     out
 }
 
-/// Errors of the sensors over those of noise.
+/// Errors of the sensors relative to the noise.
 fn over_noise(result: &ThermalResult) -> String {
     let ratio = |s: &SensorResult| Some(s.held_out_rms.or(s.rms)? / s.noise_floor?);
     let each = result.sensors.present();
@@ -84,7 +84,7 @@ fn over_noise(result: &ThermalResult) -> String {
 
 /// Errors and lags of both sensors in one table.
 fn errors_text(out: &mut String, result: &ThermalResult) {
-    // Held out of a verifying recording, whose biases are others since its power came.
+    // Held out of a verification recording, because the biases change with every power-on.
     let verified = result
         .sensors
         .present()
@@ -227,12 +227,13 @@ fn bins_text(out: &mut String, sensor: &SensorResult) {
     }
 }
 
-/// Whether a curve is one of `sensor`'s that people know: not of C and o.
+/// Whether a curve is a physical parameter of `sensor`, and not an element of C or o.
 pub(super) fn physical(curve: &CurveResult, sensor: Sensor) -> bool {
     curve.sensor == sensor && curve.of.0 != ParameterKind::Inverse
 }
 
-/// Physical parameters at some temperatures, scale factors and biases at three without `verbose`; JSON has the inverse model too, and more temperatures.
+/// Physical parameters at some temperatures. Unless `verbose`, only scale factors and biases at three. JSON contains more temperatures and the
+/// inverse model.
 fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult, verbose: bool) {
     let main = |c: &&CurveResult| {
         verbose
@@ -276,7 +277,7 @@ fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult, verbose: 
     }
 }
 
-/// Rows of a comparison that a summary has: scale factors and biases, and of C and o the one that differs by the most sigmas.
+/// Rows of a comparison. A summary contains scale factors, biases, and the elements of C and o that differ most in sigmas.
 fn compared(result: &Comparison, verbose: bool) -> Vec<&Difference> {
     let inverse = |c: &Difference| c.name.contains("_C_") || c.name.contains("_o_");
     let most = |sensor: &str| {

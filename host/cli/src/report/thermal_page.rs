@@ -20,7 +20,7 @@ pub fn thermal_page(result: &ThermalResult, made: &Made) -> String {
     page(&title, &body(result, made))
 }
 
-/// What is in the page.
+/// Contents of the page.
 pub(super) fn body(result: &ThermalResult, made: &Made) -> Markup {
     html! {
         (head(result, made))

@@ -1,4 +1,4 @@
-//! A procedure over temperature and what it determines, as text.
+//! A procedure over temperature and its predicted uncertainty, as text.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use mimu_thermal::plan::Planned;
 
 use super::text::wrap;
 
-/// For people: duration, sigmas by temperature, and what is inseparable.
+/// Duration, sigmas by temperature, and parameters that cannot be separated.
 pub fn thermal_plan_text(planned: &Planned) -> String {
     let [from, to] = planned.range_c;
     let mut out = format!(

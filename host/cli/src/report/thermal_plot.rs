@@ -1,5 +1,5 @@
-//! Curves over temperature as SVG: what each parameter changes by from the middle of the range, with its band, and below them the errors
-//! of the dwells: while the temperature rises and falls, over temperature, and over time.
+//! Curves over temperature as SVG: the change of each parameter from the middle of the range, with its band. Below them are the errors of the dwells:
+//! during heating and cooling, over temperature, and over time.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 /// Width and height of one panel, pixels.
 const PANEL: (f64, f64) = (400.0, 330.0);
 
-/// Colours that stay apart for the colour-blind (Okabe and Ito), as those of Allan curves.
+/// Colours that colour-blind people can distinguish (Okabe and Ito), the same as for Allan curves.
 const STYLE: &str = ".curves text{font:13px sans-serif;fill:#000;font-weight:400}.curves .tick{font-size:12px}\
 .curves .name{font-size:13px}.curves .heading{font-size:15px}.curves path{fill:none;stroke-width:2}\
 .curves .grid{stroke:#e1e1e1;stroke-width:1}.curves .zero{stroke:#888;stroke-width:1}\
@@ -25,16 +25,16 @@ const STYLE: &str = ".curves text{font:13px sans-serif;fill:#000;font-weight:400
 .curves .heating{stroke:#d55e00}.curves .cooling{stroke:#56b4e9}\
 .curves .dot{stroke-width:4;stroke-linecap:round;opacity:.6}.curves .begin{stroke:#888;stroke-width:1;stroke-dasharray:4 3}";
 
-/// Most marks of an axis: of more dwells neighbours are averaged.
+/// Largest number of marks of an axis. If there are more dwells, neighbours are averaged.
 const MARKS: usize = 200;
 
-/// Colours of the three numbers of a kind.
+/// Classes of the three parameters of a kind.
 const CLASSES: [&str; 3] = ["a", "b", "c"];
 
-/// A panel: what it shows, for people who do not see it, and the drawing.
+/// A panel: its description for screen readers, and the drawing.
 struct Drawn(String, Markup);
 
-/// For each sensor a row of curves and one of errors; a single one where there are only biases.
+/// For each sensor a row of curves and a row of errors; a single row if there are only biases.
 fn rows(result: &ThermalResult) -> Vec<Vec<Drawn>> {
     let mut rows = Vec::new();
     for (sensor, found) in result.sensors.present() {
@@ -85,14 +85,14 @@ pub fn svg(result: &ThermalResult) -> String {
     drawn.into_string() + "\n"
 }
 
-/// The same panels one by one, in the colours of the page.
+/// The same panels separately, in the colours of the page.
 pub fn panels(result: &ThermalResult) -> Markup {
     html! {
         @for Drawn(label, drawn) in rows(result).iter().flatten() { (panel(label, drawn)) }
     }
 }
 
-/// One panel in the colours of the page; `label` is what it shows, for people who do not see it.
+/// One panel in the colours of the page; `label` describes it for screen readers.
 pub(super) fn panel(label: &str, drawn: &Markup) -> Markup {
     html! {
         svg class="curves" role="img" aria-label=(label) viewBox={ "0 0 " (PANEL.0) " " (PANEL.1) }
@@ -109,25 +109,25 @@ fn frame([from, to]: [f64; 2], y: Range<f64>) -> Frame {
     }
 }
 
-/// A curve at one temperature, as a change from its middle.
+/// A point of a curve: the change from the middle of the range.
 pub(super) struct Point {
-    /// °C.
+    /// Temperature, °C.
     pub temp_c: f64,
     /// Change.
     pub value: f64,
-    /// Ends of its 95 % interval, where they are known.
+    /// Bounds of its 95 % interval, if known.
     pub interval: Option<[f64; 2]>,
 }
 
-/// The curves of one kind of parameter of a sensor, axis by axis, with their bands.
+/// Curves of one kind of parameter of a sensor, for each axis, with their bands.
 pub(super) struct Changes {
-    /// Sensor and kind.
+    /// Names of sensor and kind.
     pub heading: String,
     /// Unit of the changes.
     pub unit: String,
-    /// Ends of the abscissa, °C.
+    /// Range of the abscissa, °C.
     pub range_c: [f64; 2],
-    /// Name of each axis and its curve.
+    /// Name and curve of each axis.
     pub curves: Vec<(String, Vec<Point>)>,
 }
 
@@ -155,16 +155,16 @@ impl Changes {
     }
 }
 
-/// One kind of numbers of a sensor, if it has them.
+/// Curves of one kind of parameter of a sensor, if it has them.
 fn curves(result: &ThermalResult, sensor: Sensor, kind: ParameterKind) -> Option<Markup> {
-    // The bias of the accelerometer in one pose has gravity in it.
+    // In recordings with one pose the accelerometer's bias includes gravity.
     let ours = |of: ParameterKind| {
         of == kind || (of == ParameterKind::BiasAndGravity && kind == ParameterKind::Bias)
     };
     let found = result.curves.iter().filter(|c| c.sensor == sensor);
     let found: Vec<&CurveResult> = found.filter(|c| ours(c.of.0)).collect();
     let first = found.first()?;
-    // Scale factors are shown relative to themselves.
+    // Scale factors are shown as relative changes.
     let relative = kind == ParameterKind::Scale;
     let unit = readable::parameter(&first.unit);
     let curves = found
@@ -196,14 +196,14 @@ fn curves(result: &ThermalResult, sensor: Sensor, kind: ParameterKind) -> Option
     Some(changes.draw())
 }
 
-/// Errors of dwells by temperature, heating and cooling apart.
+/// Errors of dwells by temperature, separately for heating and cooling.
 fn errors(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Markup {
     let unit = readable::error(&found.unit);
     let points = |of: fn(&mimu_thermal::judge::Bin) -> Option<f64>| -> Vec<(f64, f64)> {
         let each = found.bins.iter();
         let [from, to] = result.range_c;
         each.filter_map(|b| {
-            // The middle of what the dies were at.
+            // The middle of the temperatures that the dies had in this bin.
             let middle = 0.5 * (b.from_c.max(from) + b.to_c.min(to));
             Some((middle, of(b)? * unit.factor))
         })
@@ -226,7 +226,7 @@ fn errors(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Marku
     }
 }
 
-/// Mean of neighbouring dwells, in the unit that is shown: hours from the beginning of the first recording, die's temperature, error.
+/// Mean of neighbouring dwells in the shown unit: hours since the beginning of the first recording, temperature of the die, errors.
 struct Mark {
     hours: f64,
     die_c: f64,
@@ -236,9 +236,9 @@ struct Mark {
 /// All marks of a sensor.
 struct Marks {
     all: Vec<Mark>,
-    /// Dwells that each is the mean of.
+    /// Number of dwells averaged in each mark.
     each: usize,
-    /// Where the second recording and those after it begin, hours.
+    /// Beginnings of the second and further recordings, hours.
     begins: Vec<f64>,
 }
 
@@ -278,7 +278,7 @@ impl Marks {
         }
     }
 
-    /// The three axes in `frame`.
+    /// Draws the three axes in `frame`.
     fn draw(&self, frame: &Frame, at: fn(&Mark) -> f64) -> Markup {
         let key: Vec<(&str, &str)> = CLASSES.into_iter().zip(AXES).collect();
         html! {

@@ -1,4 +1,4 @@
-//! A procedure over temperature that is carried out, as text.
+//! Progress and result of a procedure over temperature, as text.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use mimu_equipment::carry_out::{CarriedOut, Progress};
 
 use super::record_text;
 
-/// One line of how it stands.
+/// Progress in one line.
 pub fn thermal_progress(at: &Progress, has_chamber: bool) -> String {
     let chamber = match (has_chamber, at.chamber_c) {
         (true, Some(c)) => format!("chamber set to {:.1} °C, now at {c:.1} °C", at.planned_c),
@@ -33,7 +33,7 @@ pub fn thermal_progress(at: &Progress, has_chamber: bool) -> String {
     )
 }
 
-/// For people: what was had, what was set, and the recording.
+/// Completed dwells, chamber settings, and the recording.
 pub fn thermal_record_text(made: &CarriedOut) -> String {
     let mut out = record_text(&made.recorded);
     let _ = writeln!(

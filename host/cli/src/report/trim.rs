@@ -1,4 +1,4 @@
-//! A trim for people.
+//! A trim as text.
 
 use std::fmt::Write as _;
 
@@ -19,7 +19,7 @@ pub fn trim_text(result: &DeviceResult<Trimmed>) -> String {
         "{:<9}{:>26}{:>26}   means of {:.0} s and their standard deviations",
         "", "before", "after", found.averaged_s
     );
-    // rad/s as deg/s, and m/s² as mg.
+    // rad/s is shown as deg/s, m/s² as mg.
     let triads = [
         ("gyro", &found.triads.gyro, 1_f64.to_degrees(), "deg/s"),
         ("accel", &found.triads.accel, 1000.0 / 9.80665, "mg"),

@@ -1,4 +1,4 @@
-//! The page of a unit: everything that is known of it, in the order of a factory's certificate.
+//! The page of a unit: all results, in the order of a calibration certificate.
 
 pub(super) mod curves;
 pub(super) mod model;
@@ -17,19 +17,19 @@ use mimu_recording::error::Result;
 use super::diagnosis::Sections;
 use super::page::{Made, page};
 
-/// What is known of a unit.
+/// Contents of the page.
 pub struct UnitReport<'a> {
     /// The diagnosis of the recordings, if there are any.
     pub diagnosis: Option<&'a DiagnosisResult>,
-    /// The recordings, with their names.
+    /// The recordings with their names.
     pub recordings: &'a [(String, Prepared)],
     /// The calibration that the page shows.
     pub calibration: &'a Calibration,
-    /// Where that is from, if the page does not make it itself.
+    /// File of the calibration, unless it was made for this page.
     pub calibration_file: Option<&'a str>,
-    /// How it does on recordings that it was not made from, with their names.
+    /// Verifications by recordings that the calibration was not made from, with their names.
     pub verified: &'a [(String, Verification)],
-    /// Recordings that it could not be judged by, with the reason.
+    /// Recordings that could not be used for a verification, with the reason.
     pub not_judged: &'a [String],
     /// Noise at rest.
     pub noise: Option<&'a NoiseFile>,
@@ -38,7 +38,7 @@ pub struct UnitReport<'a> {
 /// The page of a unit.
 ///
 /// # Errors
-/// A model of the diagnosis is singular, so that there is nothing to draw.
+/// A model of the diagnosis is singular, so that nothing can be drawn.
 pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
     let found = unit.diagnosis.map(|d| Sections::new(d, made)).transpose()?;
     let found = found.as_ref();

@@ -1,4 +1,4 @@
-//! A verification for people.
+//! A verification as text.
 
 use std::fmt::Write as _;
 
@@ -73,7 +73,7 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
     out
 }
 
-/// What the calibration does to a sensor.
+/// Effect of the calibration on a sensor's error.
 fn verdict(s: &SensorVerification) -> String {
     let figure = readable::error(s.unit);
     let (other, what) = match s.rms_as_they_came {

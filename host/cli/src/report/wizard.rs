@@ -1,4 +1,4 @@
-//! Events and outcome of a session of the wizard, in words.
+//! Events and result of a session of the wizard, as text.
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,7 @@ use mimu_wizard::verdict::{Judged, SensorJudged};
 
 use crate::hint;
 
-/// An event as lines of text; none for what only a program wants.
+/// An event as lines of text; none for events that only programs need.
 pub fn wizard_lines(event: &Event) -> Vec<String> {
     match event {
         Event::Greeted { told, unit } => {
@@ -65,12 +65,12 @@ pub fn wizard_lines(event: &Event) -> Vec<String> {
             ]
         }
         Event::Note { words } => vec![format!("    {words}")],
-        // The view asks, and waits for the answer.
+        // The view asks the question and waits for the answer.
         Event::Question { .. } => Vec::new(),
     }
 }
 
-/// The half-widths of a calibration beside their targets, in one line.
+/// The half-widths of a calibration with their targets, in one line.
 pub(crate) fn progress_line(progress: &Progress) -> String {
     if progress.sensors.is_empty() {
         return match &progress.not_yet {
@@ -139,7 +139,7 @@ fn judged_line(of: &SensorJudged) -> String {
     text
 }
 
-/// What a session has come to.
+/// Result of a session.
 pub fn wizard_text(outcome: &Outcome) -> String {
     let mut text = String::new();
     if outcome.cancelled {

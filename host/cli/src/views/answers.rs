@@ -1,4 +1,4 @@
-//! What a person types while a session runs, and what was answered beforehand on the command line.
+//! Input of the user during a session, and answers given in advance on the command line.
 
 use std::collections::VecDeque;
 use std::io::BufRead as _;
@@ -9,21 +9,21 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use mimu_recording::error::{Error, Result};
 use mimu_wizard::event::{Question, Wish};
 
-/// What was answered beforehand: then nobody is asked.
+/// Answers given in advance: then the question is not asked.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Beforehand {
-    /// Effects that are found are stored, or not.
+    /// Whether to store effects that were found.
     pub store_effects: Option<bool>,
-    /// A calibration that errs by many times the noise is stored, or not.
+    /// Whether to store a calibration whose error is many times the noise.
     pub store_rough: Option<bool>,
-    /// What is wrong, as a failed self-test, is gone on from, or not.
+    /// Whether to continue despite a problem such as a failed self-test.
     pub go_on: Option<bool>,
-    /// The supply is turned off and on by hand, or not.
+    /// Whether the user switches the supply off and on.
     pub power_cycle: Option<bool>,
 }
 
 impl Beforehand {
-    /// The answer, if there is one.
+    /// The answer, if it was given.
     pub(crate) fn answer(&self, question: &Question) -> Option<bool> {
         match question {
             Question::PowerCycled => self.power_cycle,
@@ -39,7 +39,7 @@ pub(crate) struct Typed {
     lines: Receiver<String>,
     stop: Arc<AtomicBool>,
     wishes: VecDeque<Wish>,
-    /// Whether a question waits for its answer, and the answer once it is typed.
+    /// Whether a question is open, and its answer once it is typed.
     asked: bool,
     answer: Option<bool>,
     ended: bool,
@@ -70,7 +70,7 @@ impl Typed {
         })
     }
 
-    /// What is wanted, if anything.
+    /// The user's request, if any.
     pub(crate) fn wish(&mut self) -> Option<Wish> {
         if self.stop.load(Ordering::Relaxed) {
             return Some(Wish::Cancel);
@@ -79,7 +79,7 @@ impl Typed {
         self.wishes.pop_front()
     }
 
-    /// A question is asked: what was typed before is no answer to it.
+    /// Begins a question: earlier input does not answer it.
     pub(crate) fn begin_question(&mut self) {
         self.read();
         (self.asked, self.answer) = (true, None);
@@ -126,7 +126,7 @@ impl Typed {
         self.wishes.extend(wish);
     }
 
-    /// The answer to a question, once it is there. Where nobody can type any more it is no.
+    /// The answer to a question, once it is typed. At the end of standard input it is no.
     pub(crate) fn answer(&mut self) -> Option<bool> {
         let answer = self.answer.take().or(self.ended.then_some(false));
         self.asked &= answer.is_none();
@@ -156,7 +156,7 @@ mod tests {
         assert_eq!((typed.wish(), typed.answer()), (Some(Wish::Skip), None));
         say("yes");
         assert_eq!((typed.wish(), typed.answer()), (None, Some(true)));
-        // The next question begins anew.
+        // Each question begins without an answer.
         say("no");
         assert_eq!((typed.wish(), typed.answer()), (None, None));
         typed.begin_question();

@@ -1,4 +1,4 @@
-//! A session as lines of text: what happens, once each. For pipes, logs and small terminals.
+//! A session as lines of text, one for each event: for pipes, logs and small terminals.
 
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -9,21 +9,21 @@ use mimu_wizard::event::{Event, Question, Standing, View, Wish};
 use super::answers::{Beforehand, Typed};
 use crate::report;
 
-/// Characters of a unit's name that tell it from others.
+/// Number of final characters of a unit's name that identify it.
 const TAIL: usize = 6;
 
-/// Lines of text on one side, JSON lines on the other, either of them or both.
+/// Writes lines of text, JSON lines, or both.
 pub(crate) struct Lines {
-    /// Where the text goes, if anywhere.
+    /// Output of the text, if any.
     pub text: Option<Box<dyn Write>>,
-    /// Where the events go, if anywhere.
+    /// Output of the events, if any.
     pub events: Option<Box<dyn Write>>,
-    /// Whether a person turns the unit: then each step has a sketch.
+    /// Whether a person turns the unit, so that each dwell gets a sketch.
     pub sketches: bool,
     pub typed: Typed,
     pub beforehand: Beforehand,
     asked: Option<Question>,
-    /// Those that have greeted: with several, lines say which they are about.
+    /// Units that have sent a greeting. If there are several, lines name the unit.
     units: BTreeSet<String>,
 }
 
@@ -40,7 +40,7 @@ impl Lines {
         }
     }
 
-    /// What a line about one of several units begins with: the end of its name, as unit ids of one lot begin alike.
+    /// Prefix of a line about one of several units: the end of its name, because ids of one production lot have a common beginning.
     fn whose(&self, event: &Event) -> String {
         match event.unit().filter(|_| self.units.len() > 1) {
             Some(unit) => {
@@ -53,7 +53,7 @@ impl Lines {
 
     fn say(&mut self, text: &str) {
         if let Some(out) = &mut self.text {
-            // Whoever has closed the pipe does not want to hear more.
+            // A reader that closed the pipe needs no more lines.
             let _ = writeln!(out, "{text}").and_then(|()| out.flush());
         }
     }
@@ -62,7 +62,7 @@ impl Lines {
 /// An event as a line of JSON.
 pub(crate) fn write_event(out: &mut dyn Write, event: &Event) {
     if let Ok(line) = serde_json::to_string(event) {
-        // As in [`Lines::say`].
+        // A closed pipe is ignored, as in [`Lines::say`].
         let _ = writeln!(out, "{line}").and_then(|()| out.flush());
     }
 }

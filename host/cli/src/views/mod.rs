@@ -1,4 +1,4 @@
-//! How a session of the wizard is shown: as lines of text, as JSON lines, or on a full screen.
+//! Views of a wizard session: lines of text, JSON lines, or a full screen.
 
 pub(crate) mod answers;
 pub(crate) mod lines;

@@ -1,5 +1,4 @@
-//! What the full screen of a session shows: a function of how the session stands, what has happened and what is asked, and of the
-//! size of the terminal alone.
+//! Draws the full screen of a session, from its state, its events, the present question and the size of the terminal alone.
 
 mod shapes;
 mod table;
@@ -19,28 +18,28 @@ use shapes::{filled, framed, text, wrapped};
 use table::draw_table;
 use unit::{draw_unit, draw_units};
 
-/// Least columns and rows of a terminal.
+/// Smallest size of a terminal: columns and rows.
 pub(crate) const LEAST: [u16; 2] = [80, 24];
-/// Columns of what is to be done, and of one unit: half of the narrowest terminal.
+/// Columns of the instruction and of one unit: half of the narrowest terminal.
 const COLUMN: u16 = 40;
-/// Rows of one unit: as many as the sketch of a box and two lines need as well.
+/// Rows of one unit: also enough for the sketch of a box and two lines.
 const UNIT: u16 = 11;
-/// Rows of a table of parameters: six of them, their heads and a frame.
+/// Rows of a table of parameters: six of them, their headings and a frame.
 const TABLE: u16 = 9;
-/// Least rows of what has happened, where there is room.
+/// Fewest rows of the log, if there is space.
 const LOG: u16 = 8;
 
-/// All that the picture depends on.
+/// Everything that the picture shows.
 pub(crate) struct Shown<'a> {
-    /// How the session stands.
+    /// State of the session.
     pub standing: &'a Standing,
-    /// What has happened, the last thing last.
+    /// Past events; the last entry is the latest.
     pub log: &'a [String],
-    /// What is asked now.
+    /// The present question.
     pub question: Option<&'a str>,
 }
 
-/// Draws it.
+/// Draws the picture.
 pub(crate) fn draw(frame: &mut Frame, shown: &Shown) {
     let area = frame.area();
     if area.width < LEAST[0] || area.height < LEAST[1] {
@@ -72,7 +71,7 @@ pub(crate) fn draw(frame: &mut Frame, shown: &Shown) {
     }
 }
 
-/// Every unit with its parameters, beside what is to be done, and below what has happened.
+/// Every unit with its parameters, next to the instruction, and the log below.
 fn draw_wide(frame: &mut Frame, area: Rect, shown: &Shown, across: u16, rows: u16) {
     let standing = shown.standing;
     let [above, log] = Layout::vertical([
@@ -99,7 +98,7 @@ fn draw_wide(frame: &mut Frame, area: Rect, shown: &Shown, across: u16, rows: u1
     draw_log(frame, log, shown.log);
 }
 
-/// One unit whole, or several in short; the parameters of the one that is farthest from its targets.
+/// One unit in full, or several in short, and the parameters of the unit farthest from its targets.
 fn draw_narrow(frame: &mut Frame, area: Rect, shown: &Shown) {
     let standing = shown.standing;
     let [above, below] =
@@ -124,7 +123,7 @@ fn draw_narrow(frame: &mut Frame, area: Rect, shown: &Shown) {
     draw_log(frame, log, shown.log);
 }
 
-/// The largest half-width in targets.
+/// The largest half-width relative to its target.
 fn distance(progress: &Progress) -> f64 {
     let aims = progress.sensors.iter().flat_map(|s| &s.aims);
     let all = aims.map(|a| a.half_width / a.target);
@@ -192,7 +191,7 @@ fn draw_log(frame: &mut Frame, area: Rect, log: &[String]) {
     let inner = framed(frame, area, "events", false);
     let (wide, high) = (usize::from(inner.width), usize::from(inner.height));
     let mut lines: Vec<String> = Vec::new();
-    // Only what is seen is wrapped.
+    // Only visible entries are wrapped.
     for entry in log.iter().rev() {
         if lines.len() >= high {
             break;

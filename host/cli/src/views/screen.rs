@@ -1,4 +1,4 @@
-//! A session on the full screen of a terminal, which is given back as it was on every way out.
+//! A session on the full screen of a terminal, which is restored however the program ends.
 
 use std::io::{IsTerminal as _, Write};
 use std::sync::Arc;
@@ -18,12 +18,12 @@ use super::lines::write_event;
 use super::picture::{LEAST, Shown, draw};
 use crate::report;
 
-/// So much of what has happened is kept: more than any screen shows.
+/// Number of log entries kept: more than any screen shows.
 const KEPT: usize = 200;
-/// How long the keyboard is waited for before the end is looked for.
+/// Interval of checking for the end while waiting for a key.
 const POLL: Duration = Duration::from_millis(100);
 
-/// What a key means.
+/// Meaning of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Key {
     Cancel,
@@ -47,7 +47,7 @@ impl Key {
     }
 }
 
-/// The terminal in the state that a full screen needs, from its making to its end.
+/// The terminal in full-screen mode, from creation to drop.
 struct Taken {
     terminal: DefaultTerminal,
 }
@@ -65,7 +65,7 @@ pub(crate) struct Screen {
     keyboard: Option<JoinHandle<()>>,
     ended: Arc<AtomicBool>,
     stop: Arc<AtomicBool>,
-    /// Where the events go, if anywhere.
+    /// Output of the events, if any.
     events: Option<Box<dyn Write>>,
     beforehand: Beforehand,
     standing: Standing,
@@ -75,14 +75,14 @@ pub(crate) struct Screen {
 }
 
 impl Screen {
-    /// Whether this process is at a terminal that is large enough.
+    /// Whether standard input and output are a terminal that is large enough.
     pub(crate) fn fits() -> bool {
         let at_terminal = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
         let size = ratatui::crossterm::terminal::size();
         at_terminal && size.is_ok_and(|(w, h)| w >= LEAST[0] && h >= LEAST[1])
     }
 
-    /// Takes the terminal. `stop` is raised from outside to end the session.
+    /// Takes over the terminal. `stop` is set from outside to end the session.
     pub(crate) fn new(
         stop: Arc<AtomicBool>,
         beforehand: Beforehand,
@@ -91,7 +91,7 @@ impl Screen {
         let failed = |error: std::io::Error| {
             Error::new("terminal", error, "run it with --plain for lines of text")
         };
-        // Its hook gives the terminal back before a panic is told of, which would else be written to a screen that vanishes.
+        // ratatui's hook restores the terminal before a panic is reported. Otherwise the message would vanish with the screen.
         let taken = Taken {
             terminal: ratatui::try_init().map_err(failed)?,
         };
@@ -124,7 +124,7 @@ impl Screen {
             log: &self.log,
             question: question.as_deref(),
         };
-        // A terminal that was closed shows nothing to anybody, and the session's files hold what counts.
+        // A closed terminal shows nothing, but the session's files contain all results.
         let _ = self.taken.terminal.draw(|frame| draw(frame, &shown));
     }
 }
@@ -149,7 +149,7 @@ impl View for Screen {
         if let Event::Dwell { number, words, .. } = event {
             self.log.push(format!("dwell {number}: {words}"));
         }
-        // What is to be done and the half-widths have places of their own.
+        // The screen shows instructions and half-widths in other places.
         if !matches!(
             event,
             Event::Step { .. } | Event::Dwell { .. } | Event::Progress { .. }
@@ -162,7 +162,7 @@ impl View for Screen {
             let spare = self.log.len().saturating_sub(KEPT);
             self.log.drain(..spare);
         }
-        // Nothing is shown in between while a calibration is judged or stored.
+        // Drawn now, because nothing is drawn while a calibration is judged or stored.
         self.draw();
     }
 
@@ -180,7 +180,7 @@ impl View for Screen {
                 Key::Cancel => return Some(Wish::Cancel),
                 Key::Redo => return Some(Wish::RedoLast),
                 Key::Skip => return Some(Wish::Skip),
-                // An answer that was typed before the question is none.
+                // A key pressed before the question does not answer it.
                 Key::Yes | Key::No if self.question.is_none() => {}
                 Key::Yes | Key::No => self.answer = Some(key == Key::Yes),
             }
@@ -205,7 +205,7 @@ impl View for Screen {
     }
 }
 
-/// Takes keys until the end. The terminal sends no signal for Ctrl-C in the state that it is in, so that the end is asked for here.
+/// Reads keys until the end. In raw mode the terminal sends no signal for Ctrl-C, so the session is ended here.
 fn listen(tell: &Sender<Key>, end: &AtomicBool, stop: &AtomicBool) {
     while !end.load(Ordering::Relaxed) {
         match keys::poll(POLL) {

@@ -1,4 +1,4 @@
-//! The PC's side of the comparison.
+//! The PC's compensation, which the device's is compared with.
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::compensator::{Compensator, State};
@@ -15,26 +15,26 @@ use mimu::calibration::{Calibration, compensator};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
-/// Part of a reading that single precision may be off by at the turn of a bit: a reading, its product, and the sum with the code at
-/// reading 0, which is up to 64 weights where the reading is of one.
+/// Relative error of single precision at a bit's transition: of the reading, its product, and the sum with the code at reading 0. That code can be 64
+/// weights of the bit where the reading is one.
 const TURN: f64 = 64.0 * f32::EPSILON as f64;
 
-/// A compensator with the state of its stream.
+/// A compensator and its state in one stream.
 struct Running<T: RealField> {
     compensator: Compensator<T, NODES, ROOM>,
     state: State<T, ROOM>,
 }
 
-/// The PC's side, twice: as the device computes, and in double precision from the file.
+/// The PC's compensation twice: in single precision as on the device, and in double precision from the file.
 pub(super) struct HostReference {
     rate_hz: u32,
     single: Running<f32>,
     double: Running<f64>,
     on_curves: bool,
     dies: Option<PerSensor<die::State<f32>>>,
-    /// Number of the first sample of the batch before; time since power-on is counted by it, as on the device.
+    /// Number of the first sample of the previous batch. Time since power-on is counted from it, as on the device.
     followed: u32,
-    /// Of the sample that would come next.
+    /// Number of the sample that comes next.
     next: Option<u32>,
 }
 
@@ -84,7 +84,7 @@ impl HostReference {
         })
     }
 
-    /// Follows the device through a batch, and notes how far it is off.
+    /// Computes a batch as the device does, and records the differences.
     pub fn compare(&mut self, raw: &Samples, device: &Samples, found: &mut Checked) {
         let head = &raw.head;
         let first = self.next != Some(head.first);
@@ -98,7 +98,7 @@ impl HostReference {
         for (k, (raw, device)) in raw.values.iter().zip(&device.values).enumerate() {
             let single = self.single.apply(raw);
             let (double, bounds) = self.double(raw);
-            // The angular acceleration of a sample is its difference to the one before, which is not known of the first.
+            // The angular acceleration is the difference to the previous sample, which is missing for the first one.
             if first && k == 0 && self.single.compensator.effects.is_some() {
                 continue;
             }
@@ -113,8 +113,8 @@ impl HostReference {
         self.next = Some(head.first.wrapping_add(raw.values.len() as u32));
     }
 
-    /// Compares the temperatures of the dies that the device reports with those computed from its thermometer and lags. The first batch
-    /// gives the initial state.
+    /// Compares the temperatures of the dies that the device reports with those computed from its thermometer and lags. The first batch gives the
+    /// initial state.
     fn follow_dies(
         &mut self,
         head: &BatchHead,
@@ -153,13 +153,13 @@ impl HostReference {
         found.die_range_c = Some([low, high]);
     }
 
-    /// Follows time and temperature, at the temperatures of the dies that the device has used.
+    /// Advances time and temperature, with the temperatures of the dies that the device used.
     fn follow(&mut self, head: &BatchHead, dies_c: PerSensor<f32>) {
         let passed = head.first.wrapping_sub(self.followed);
         self.followed = head.first;
         let thermometer_c = head.thermometer_c();
         let Running { compensator, state } = &mut self.single;
-        // By the same operation as the firmware, which is what decides the last digit.
+        // Divides as the firmware does: the operation decides the last digit.
         let dt_s = passed as f32 / self.rate_hz as f32;
         compensator.follow_at(state, dt_s, thermometer_c, Some(dies_c));
         let Running { compensator, state } = &mut self.double;
@@ -168,8 +168,8 @@ impl HostReference {
         compensator.follow_at(state, dt_s, thermometer_c.map(f64::from), dies_c);
     }
 
-    /// Readings without errors by the code, in double precision. Within rounding of a turn either side is right, and a bit's error apart: the
-    /// one that single precision takes.
+    /// Removes the converter's nonlinearity in double precision. Within rounding of a bit's transition both sides are right, but they differ by the
+    /// bit's error. The side that single precision takes is used.
     fn without_code_errors(&self, raw: &Sample<f32>) -> Sample<f64> {
         let exact = raw.map(|u| u.map(f64::from));
         let (Some(stored), Some(file)) = (
@@ -195,10 +195,10 @@ impl HostReference {
         })
     }
 
-    /// In double precision, with what rounding can make of it.
+    /// The sample in double precision, and the largest error that rounding can cause in it.
     fn double(&mut self, raw: &Sample<f32>) -> (Sample<f64>, Sample<f64>) {
         let clean = self.without_code_errors(raw);
-        // On a curve each number is itself a sum of four terms.
+        // On a curve each coefficient is itself a sum of four terms.
         let times = if self.on_curves { 2.0 } else { 1.0 };
         let Running { compensator, state } = &mut self.double;
         let of = state.models().as_ref().zip(clean.as_ref());
@@ -221,9 +221,9 @@ impl<T: RealField + Copy> Running<T> {
     }
 }
 
-/// Most that single precision can make of `x = C u + o` for a reading, SI: C, o and the four operations of a sum of four terms each round
-/// by half a unit of the last place, ε/2, of what is not larger than the sum S of the sizes of the terms: 3 ε S for the affine part.
-/// As much again for effects, whose errors are small beside S.
+/// Largest error, SI, of `x = C u + o` in single precision. C, o and the four operations of a sum of four terms each round by half a unit of the last
+/// place, ε/2, of at most the sum S of the terms' magnitudes: 3 ε S for the affine part. The same again covers effects, whose errors are small beside
+/// S.
 pub fn rounding(model: &Affine<f64>, raw: &Vector3<f64>) -> Vector3<f64> {
     let sizes = model.matrix.abs() * raw.abs() + model.offset.abs();
     sizes * (6.0 * f64::from(f32::EPSILON))

@@ -1,34 +1,34 @@
-//! The device's sample numbers as ticks that never go back.
+//! Converts the device's sample numbers into ticks that never decrease.
 
 use std::time::Duration;
 
 use crate::identity::Started;
 
-/// Ticks of one sample period since the device began to sample: 64 bits, where its own numbers begin anew after 49 days; and over a
-/// restart, where they begin anew too.
+/// Counts ticks of one sample period since the device began to sample. Ticks have 64 bits: the device's numbers wrap after 49 days, and start again
+/// from 0 after a restart.
 #[derive(Debug)]
 pub(super) struct Clock {
     rate_hz: f64,
-    /// Tick and number of the sample that comes next if none is lost.
+    /// Tick and number of the next sample, if none is lost.
     next: Option<(u64, u32)>,
     restarted: Option<Option<Started>>,
-    /// The line was lost and is back; the reset cause that the device reports.
+    /// The line was lost and is back; the value is the reset cause that the device reports.
     reconnected: Option<Started>,
 }
 
-/// Silence that may pass before the first batch after the line is there again, beside the time that it was away, s.
+/// Silence allowed before the first batch after a reconnection, in addition to the time without a line, s.
 const DELAY_S: f64 = 1.0;
-/// Share by which the clocks of device and PC differ at most.
+/// Largest relative difference between the clocks of device and PC.
 const DRIFT: f64 = 0.01;
 
-/// Where a batch has arrived.
+/// Position of a received batch.
 #[derive(Debug, PartialEq)]
 pub(super) struct Arrival {
-    /// Of its first sample.
+    /// Tick of its first sample.
     pub tick: u64,
-    /// Samples that are missing before it.
+    /// Samples missing before it.
     pub missing: u64,
-    /// It is the first after a restart; the reset cause, if the device reported it.
+    /// Set if it is the first batch after a restart; the reset cause, if the device reported it.
     pub restart: Option<Option<Started>>,
 }
 
@@ -42,9 +42,9 @@ impl Clock {
         }
     }
 
-    /// The device has greeted: what comes next counts anew.
+    /// The device has sent a greeting: its numbers start again.
     pub fn restarted(&mut self, start: Option<Started>) {
-        // A greeting before the first sample breaks nothing.
+        // A greeting before the first sample interrupts nothing.
         if self.next.is_some() {
             self.restarted = Some(start);
         }
@@ -63,7 +63,7 @@ impl Clock {
         f64::from(number) <= away + room && (f64::from(ahead) - away).abs() > room
     }
 
-    /// A batch that begins with this number has arrived, so long after the one before.
+    /// Places a batch that begins with this number, received `silence` after the previous one.
     pub fn arrive(&mut self, number: u32, silence: Duration) -> Arrival {
         let Some((next, expected)) = self.next else {
             self.next = Some((u64::from(number), number));
@@ -83,7 +83,7 @@ impl Clock {
             told => told,
         };
         let (tick, missing) = match restart {
-            // Only the PC's clock knows how long it took. At least a tick, so that the gap is seen.
+            // Only the PC's clock knows how long the restart took. At least one tick, so that the gap is visible.
             Some(_) => (
                 next + ((silence.as_secs_f64() * self.rate_hz) as u64).max(1),
                 0,
@@ -98,7 +98,7 @@ impl Clock {
         }
     }
 
-    /// So many samples have been there since the arrival.
+    /// Advances by the samples of the batch.
     pub fn passed(&mut self, samples: usize) {
         if let Some((tick, number)) = &mut self.next {
             *tick += samples as u64;
@@ -106,19 +106,19 @@ impl Clock {
         }
     }
 
-    /// Tick of the sample that comes next.
+    /// Tick of the next sample.
     pub fn next(&self) -> u64 {
         self.next.map_or(0, |(tick, _)| tick)
     }
 
-    /// So many ticks.
+    /// Duration of so many ticks.
     pub fn length(&self, ticks: u64) -> Duration {
         let rate_hz = (self.rate_hz as u128).max(1);
         let nanoseconds = u128::from(ticks) * 1_000_000_000 / rate_hz;
         Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))
     }
 
-    /// A tick in seconds, to the last bit the nearest number to n/rate.
+    /// Time of a tick, s: the nearest floating-point number to n/rate.
     pub fn seconds(&self, tick: u64) -> f64 {
         tick as f64 / self.rate_hz
     }
@@ -165,12 +165,12 @@ mod tests {
             let arrival = clock.arrive(number, away);
             (arrival.tick, arrival.missing, arrival.restart.is_some())
         };
-        // It went on for 20 s, by its clock 20.1.
+        // The device continued for 20 s, 20.1 s by its own clock.
         assert_eq!(arrival(5_000, 25_100), (25_100, 20_100, false));
-        // It was without power and has been on for 15 s: its number is ahead of the old one, but from a new count.
+        // The device was without power, and has been on for 15 s. Its number exceeds the old one, but belongs to a new count.
         assert_eq!(arrival(5_000, 15_000), (25_000, 0, true));
         assert_eq!(arrival(60_000, 300), (80_000, 0, true));
-        // Time stood still for the device, as for an emulated one without a reader.
+        // The device's time stood still, as for an emulated device without a reader.
         assert_eq!(arrival(60_000, 60_040), (60_040, 40, false));
     }
 
@@ -185,7 +185,7 @@ mod tests {
         assert_eq!(arrival.restart, Some(Some(Started::Watchdog)));
         clock.passed(20);
         assert_eq!(clock.arrive(60, AT_ONCE).tick, 5740);
-        // The greeting was lost; the numbers tell.
+        // The greeting was lost, but the lower number shows the restart.
         let arrival = clock.arrive(20, AT_ONCE);
         assert_eq!((arrival.restart, arrival.missing), (Some(None), 0));
     }

@@ -1,4 +1,4 @@
-//! Inputs that are known while a recording is made: of a table beside it, or of the plan that it follows.
+//! Known inputs during a recording: from a table of inputs, or from the plan that is followed.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -7,7 +7,7 @@ use mimu_recording::{Batch, Inputs};
 
 use mimu::plan::Planned;
 
-/// What is known of each dwell.
+/// Known inputs of the dwells.
 #[derive(Debug)]
 pub struct Known {
     source: Source,
@@ -23,13 +23,13 @@ enum Source {
 }
 
 impl Known {
-    /// Of a table as `mimu import --inputs` takes it: by the number of the dwell, or by its place in the table where rows have labels.
+    /// From a table as for `mimu import --inputs`. Rows are found by the number of the dwell, or by their position if they have labels.
     pub fn of_table(inputs: Inputs) -> Self {
         let labels = inputs.labels();
         Self::of(Source::Table(inputs), labels)
     }
 
-    /// Of the dwells of a plan.
+    /// From the dwells of a plan.
     pub fn of_plan(dwells: Vec<Planned>) -> Self {
         Self::of(Source::Plan(dwells), Vec::new())
     }
@@ -42,7 +42,7 @@ impl Known {
         }
     }
 
-    /// Which of the `ref_` columns it fills; none by hand.
+    /// Which `ref_` columns it fills; none for a plan by hand.
     pub fn columns(&self) -> [bool; 6] {
         match &self.source {
             Source::Table(inputs) => inputs.columns,
@@ -59,7 +59,7 @@ impl Known {
         &self.labels
     }
 
-    /// How many dwells there are to be, where that is planned.
+    /// Number of planned dwells, if there is a plan.
     pub fn planned(&self) -> Option<usize> {
         match &self.source {
             Source::Table(_) => None,
@@ -67,7 +67,7 @@ impl Known {
         }
     }
 
-    /// What is to be done in a dwell, if that is known.
+    /// Instruction for a dwell, if there is one.
     pub fn title(&self, step: i32) -> Option<&str> {
         let at = usize::try_from(step).ok()?;
         match &self.source {
@@ -76,14 +76,13 @@ impl Known {
         }
     }
 
-    /// Input of a sample of a dwell, deg/s and m/s², not a number where it is unknown; counts the sample. The mean rate of a turn is
-    /// known at the end only.
+    /// Input of the next sample of a dwell, deg/s and m/s²; NaN if unknown. Counts the sample. The mean rate of a turn is known only at its end.
     pub(super) fn next(&mut self, step: i32) -> [f64; 6] {
         *self.samples.entry(step).or_default() += 1;
         self.input(step, f64::NAN)
     }
 
-    /// Input of a dwell of this length.
+    /// Input of a dwell with this length.
     fn input(&mut self, step: i32, duration_s: f64) -> [f64; 6] {
         const UNKNOWN: [f64; 6] = [f64::NAN; 6];
         let Ok(at) = usize::try_from(step) else {
@@ -99,7 +98,7 @@ impl Known {
         known.unwrap_or(UNKNOWN)
     }
 
-    /// Whether a rate was not known before the end of its dwell.
+    /// Whether some rates are known only at the end of their dwell.
     pub(super) fn has_turns(&self) -> bool {
         match &self.source {
             Source::Table(inputs) => inputs.has_turns,
@@ -107,7 +106,7 @@ impl Known {
         }
     }
 
-    /// Whether a dwell is a turn of a plan, which is of no use unless all of it was recorded.
+    /// Whether a dwell is a planned turn. A turn is usable only if all of it was recorded.
     pub(super) fn is_turn(&self, step: i32) -> bool {
         let at = usize::try_from(step).ok();
         match &self.source {
@@ -118,7 +117,7 @@ impl Known {
         }
     }
 
-    /// Writes the inputs of whole dwells into rows, at the rate of the samples: n samples span n periods.
+    /// Writes the inputs of complete dwells into rows. n samples span n periods of the sample rate.
     pub(super) fn complete(&mut self, batch: &mut Batch, rate_hz: f64) {
         let columns = self.columns();
         let mut inputs: BTreeMap<i32, [f64; 6]> = BTreeMap::new();
@@ -146,7 +145,7 @@ impl Known {
         }
     }
 
-    /// One sentence for what no sample belongs to, if there is any.
+    /// A sentence about planned inputs without samples, if there are any.
     pub(super) fn unused(&self) -> Option<String> {
         match &self.source {
             Source::Table(inputs) => inputs.unused(),

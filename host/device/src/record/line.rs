@@ -1,4 +1,4 @@
-//! A line that is lost while a recording is made, and comes back.
+//! Handles a line that is lost during a recording and comes back.
 
 use std::time::{Duration, Instant};
 
@@ -8,15 +8,15 @@ use crate::heard::LineCount;
 use crate::port::ports;
 use crate::session::Session;
 
-/// Time between two looks for the port.
+/// Interval of the search for the port.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// What was heard on the line since the recording began, over all of its sessions.
+/// Counts of the line since the recording began, over all sessions.
 #[derive(Debug, Default)]
 pub(super) struct Heard {
-    /// On lines before this one.
+    /// Counts of earlier sessions.
     earlier: LineCount,
-    /// Heard on this one before it was recorded.
+    /// Counts of this session before the recording.
     before: LineCount,
 }
 
@@ -30,20 +30,20 @@ impl From<LineCount> for Heard {
 }
 
 impl Heard {
-    /// All, if that on the present line is `count`.
+    /// Total counts; `count` is the present session's.
     pub fn total(&self, count: LineCount) -> LineCount {
         self.earlier.and(&count.since(&self.before))
     }
 
-    /// The line on which this was heard is gone; on the new one `before` was heard so far.
+    /// Starts a new session: the lost one ends with `count`, and the new one has received `before` so far.
     pub fn lost(&mut self, count: LineCount, before: LineCount) {
         self.earlier = self.total(count);
         self.before = before;
     }
 }
 
-/// Waits for the port of a lost session, or another one at which the same unit is now, until `go_on` is false or the time is over. `None`:
-/// it is not to go on. `lost` is the error that the session ended with.
+/// Waits until the unit answers again at the port of the lost session or at another one. Ends when `go_on` returns false (`None`) or the time is
+/// over; `lost` is the error that ended the session.
 pub(super) fn wait_for(
     port: &str,
     unit_id: &str,
@@ -58,7 +58,7 @@ pub(super) fn wait_for(
             return Ok(None);
         }
         std::thread::sleep(PAUSE);
-        // Plugged in again, a board may be given another name.
+        // A board that is plugged in again may get another name.
         let others = ports().of_boards.into_iter().filter(|name| name != port);
         for name in std::iter::once(port.to_owned()).chain(others) {
             match Session::open(Some(&name)) {

@@ -1,7 +1,7 @@
 //! Recording a device: its raw stream into a directory that can be read at any time.
 //!
-//! Times are the device's own: sample n of its 1 kHz is at n/1000 s since it began to sample, so that a sample that is missing is a
-//! gap in `t_s` and never moves the ones after it. So is the time without a line, after a cable was pulled and is back.
+//! Times are the device's own: sample n of its 1 kHz is at n/1000 s since it began to sample. A missing sample is therefore a gap in `t_s`, and does
+//! not move later ones. The same holds for the time without a line when a cable is pulled.
 
 mod clock;
 mod known;
@@ -40,45 +40,45 @@ use run::Run;
 pub struct RecordOptions {
     /// Directory of the new recording.
     pub directory: PathBuf,
-    /// Length in the device's time; without it until it is ended.
+    /// Length in the device's time. Without it, the recording runs until it is ended.
     pub duration: Option<Duration>,
     /// Where dwells begin and end.
     pub steps: Steps,
-    /// How long to wait for a port that has vanished; with zero the recording ends.
+    /// How long to wait for a port that has vanished. With zero the recording ends at once.
     pub reconnect: Duration,
-    /// Whether it ends when the device loses its power: what comes then is of another power-on.
+    /// Whether it ends when the device loses its power, because later samples belong to another power-on.
     pub one_power_on: bool,
-    /// Whether every dwell has an input that is known: the reference is a table then.
+    /// Whether every dwell has a known input. The reference is then a table.
     pub table: bool,
     /// Name of the unit; without it, the number of its microcontroller.
     pub device: Option<String>,
     /// Local gravity, m/s².
     pub gravity_mps2: f64,
-    /// Degrees.
+    /// Latitude, degrees.
     pub latitude_deg: Option<f64>,
-    /// Format in the end. While it is received, it is CSV.
+    /// Final format. During the recording the samples are CSV.
     pub format: SampleFormat,
 }
 
-/// What the person at the keyboard wants, since the last time that was asked.
+/// Requests of the person at the keyboard since the last query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Wish {
     /// End the recording.
     pub end: bool,
-    /// Times that a dwell was to begin, or the running one to end.
+    /// How many times a dwell was to begin, or the running one to end.
     pub marks: u32,
-    /// A dwell that does not count.
+    /// A dwell to discard.
     pub drop: Option<i32>,
 }
 
-/// How a recording stands.
+/// State of a recording.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Standing {
     /// Samples written.
     pub samples: u64,
-    /// Samples missing between them, restarts left out.
+    /// Samples missing between them, without those of restarts.
     pub missing: u64,
-    /// Stretches of missing samples.
+    /// Number of gaps.
     pub gaps: u64,
     /// Time of the first sample, s.
     pub first_s: Option<f64>,
@@ -86,7 +86,7 @@ pub struct Standing {
     pub last_s: Option<f64>,
     /// Dwells begun.
     pub dwells: u32,
-    /// Dwell that runs.
+    /// The running dwell.
     #[serde(skip)]
     pub step: Option<i32>,
     /// Restarts of the device.
@@ -95,29 +95,29 @@ pub struct Standing {
     pub resumed: u32,
     /// Times that the port vanished and came back.
     pub reconnected: u32,
-    /// The port has vanished, and is waited for.
+    /// The port has vanished, and is awaited.
     #[serde(skip)]
     pub waiting: bool,
-    /// Dwells that do not count: turns that were not recorded as a whole, and what is found to be another input.
+    /// Discarded dwells: incomplete turns, and dwells whose input differs from the planned one.
     pub dropped: Vec<i32>,
-    /// The recording is over and is about to be written; the unit may be at rest.
+    /// The recording has ended and is about to be written. The unit need not move any more.
     #[serde(skip)]
     pub ended: bool,
-    /// Mean of the last readings: gyro, accelerometer.
+    /// Mean of the last batch: gyro, accelerometer.
     #[serde(skip)]
     pub raw: [f64; 6],
-    /// °C, the last.
+    /// The last temperature, °C.
     pub temp_c: f64,
     /// Faults that the device flags.
     #[serde(flatten)]
     pub flagged: Flagged,
-    /// What was heard on the line.
+    /// Counts of what was received on the line.
     pub line: LineCount,
-    /// What a person should know beside all that.
+    /// Further warnings.
     pub warnings: Vec<String>,
 }
 
-/// A recording that was ended: the result of `mimu record`.
+/// A completed recording: the result of `mimu record`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordSummary {
     /// `mimu-record/1`.
@@ -126,12 +126,12 @@ pub struct RecordSummary {
     pub tool: &'static str,
     /// Port of the device.
     pub port: String,
-    /// Directory.
+    /// Directory of the recording.
     pub recording: String,
-    /// How it stood in the end.
+    /// Its final state.
     #[serde(flatten)]
     pub standing: Standing,
-    /// Why it ended before it was to: the recording is whole up to there.
+    /// Why it ended early. It is complete up to that point.
     #[serde(serialize_with = "as_words")]
     pub broken_off: Option<Error>,
 }
@@ -140,10 +140,10 @@ fn as_words<S: Serializer>(of: &Option<Error>, to: S) -> std::result::Result<S::
     of.as_ref().map(Error::to_string).serialize(to)
 }
 
-/// Records; the inputs of the dwells are those of `known`, if they are. `look` is shown how it stands, some times a second, and says what is wanted; `finishing` hears the share that is done of
-/// turning the samples into Parquet.
+/// Records. `known` gives the inputs of the dwells, if they are known. `look` is shown the state several times a second, and returns the person's
+/// requests; `finishing` gets the fraction done of the conversion to Parquet.
 ///
-/// An error means that no recording was made. One that was broken off is a [`RecordSummary`], with its reason.
+/// An error means that no recording was made. If a recording was broken off, the [`RecordSummary`] contains the reason.
 pub fn record(
     session: &mut Session,
     options: &RecordOptions,
@@ -178,8 +178,8 @@ pub fn record(
     if let Some(known) = &known {
         manifest.step_labels = known.labels().to_vec();
     }
-    // Its clock begins with every start, after a reset too: the die is warm then, and a warm-up counted from there would be another with
-    // every reset. The device knows for how long it has had its power, unless it has lost that in the reset.
+    // The clock restarts after every reset, but the die stays warm: counted from a reset, each warm-up would look different. The device knows how
+    // long it has had power, unless it lost that in the reset.
     let by_power = who.start == Started::PowerOn;
     manifest.power_on_s = who.powered_for_ms.map(|ms| -f64::from(ms) / 1000.0);
     manifest.recorded = Some(Recorded {
@@ -235,7 +235,7 @@ pub fn record(
         .filter(|known| known.has_turns())
         .map(|known| |batch: &mut Batch| known.complete(batch, rate_hz));
     let complete = complete.as_mut().map(|c| c as &mut dyn FnMut(&mut Batch));
-    // A device that is gone needs not be told.
+    // A device that is gone cannot be stopped.
     let _ = ended
         .is_ok()
         .then(|| session.done(Request::Stop, "to stop streaming"));
@@ -261,7 +261,7 @@ pub fn record(
     }
 }
 
-/// `error`, with where to find what was received.
+/// `error`, with the place of the samples received so far.
 fn kept(error: Error, samples: u64, directory: &Path) -> Error {
     let kept = format!(" ({samples} samples are kept in {})", directory.display());
     error.map(|e| e.problem += &kept)

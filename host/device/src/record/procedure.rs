@@ -1,31 +1,31 @@
-//! A plan over temperature in time: what the chamber is to be at, and when each round begins.
+//! A plan over temperature in time: the chamber's temperatures, and when each round begins.
 
 use mimu::plan::chamber;
 use mimu::plan::{Plan, Planned};
 use mimu_recording::error::{Error, Result};
 
-/// Longest procedure, s: a plan that asks for more has a wrong unit in it.
+/// Longest procedure, s. A longer plan probably has a wrong unit.
 const LONGEST_S: f64 = 48.0 * 3600.0;
 
-/// All rounds of a plan, with their chamber.
+/// All rounds of a plan, and the chamber's temperatures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Procedure {
     /// Dwells and turns of all rounds.
     pub dwells: Vec<Planned>,
-    /// So many of them are a round.
+    /// Number of dwells and turns in a round.
     pub per_round: usize,
-    /// Rounds.
+    /// Number of rounds.
     pub rounds: usize,
-    /// Temperature of the chamber: s and °C, linear between, held outside.
+    /// Temperature of the chamber, s and °C: interpolated linearly, constant before the first and after the last point.
     pub chamber_c: Vec<[f64; 2]>,
     /// Time before the first round, s.
     pub lead_in_s: f64,
-    /// From the beginning of a round to that of the next, s; if `None`, each round follows at once.
+    /// Interval between the starts of successive rounds, s. If `None`, each round follows at once.
     pub round_s: Option<f64>,
 }
 
 impl Procedure {
-    /// The dwells of a plan with the temperatures of the chamber, and when each is due; `place` is its path.
+    /// The dwells of a plan, the chamber's temperatures and when each round is due; `place` is the plan's path.
     pub fn of(plan: &Plan, gravity_mps2: f64, place: &str) -> Result<Self> {
         let dwells = plan.dwells(gravity_mps2, place)?;
         let rounds = plan.rounds as usize;
@@ -72,7 +72,7 @@ impl Procedure {
         Ok(self)
     }
 
-    /// What the chamber is to be at, °C.
+    /// Planned temperature of the chamber, °C.
     pub fn temp_c(&self, t_s: f64) -> f64 {
         chamber::temp_c(&self.chamber_c, t_s)
     }
@@ -84,14 +84,14 @@ impl Procedure {
         [all.clone().fold(low, f64::min), all.fold(high, f64::max)]
     }
 
-    /// Steepest of its ramps, K/min.
+    /// Steepest ramp, K/min.
     pub fn steepest_c_per_min(&self) -> f64 {
         let each = self.chamber_c.windows(2);
         let slopes = each.map(|w| (w[1][1] - w[0][1]).abs() / (w[1][0] - w[0][0]) * 60.0);
         slopes.fold(0.0, f64::max)
     }
 
-    /// When a dwell may begin at the earliest, s: the first of a round waits for it.
+    /// Earliest start of a dwell, s: the first dwell of a round waits for it.
     pub fn due_s(&self, dwell: usize) -> f64 {
         match self.round_s {
             Some(round_s) => self.lead_in_s + (dwell / self.per_round) as f64 * round_s,
@@ -99,7 +99,7 @@ impl Procedure {
         }
     }
 
-    /// Whether one pose at rest is all that there is.
+    /// Whether all dwells have one pose, at rest.
     pub fn is_at_rest(&self) -> bool {
         let first = &self.dwells[0];
         let same = |d: &Planned| d.turn.is_none() && d.rate_dps == 0.0 && d.up == first.up;

@@ -1,9 +1,9 @@
-//! Readings of single precision as decimal numbers.
+//! Writes single-precision readings as short decimal numbers.
 
-/// The shortest decimal number that is this one in single precision: as `f32` it is what the device has sent, and it is off by less than
-/// half of the last place of that, where all the digits of the same `f32` in double precision take twice the room.
+/// The shortest decimal number that equals `value` in single precision: read as `f32` it is exactly what the device sent. All digits of the same
+/// `f32` in double precision would take twice the space.
 pub fn shortest(value: f32) -> f64 {
-    // What the standard library writes of an `f32` is the shortest that reads back as it.
+    // The standard library writes the shortest decimal number that reads back as the same `f32`.
     value.to_string().parse().unwrap_or(f64::from(value))
 }
 

@@ -1,4 +1,4 @@
-//! A recording while it is received.
+//! A recording in progress.
 
 use std::time::{Duration, Instant};
 
@@ -17,10 +17,10 @@ use crate::heard::{Event, Samples};
 use crate::identity::Started;
 use crate::session::Session;
 
-/// Silence after which the device is asked whether it is still there.
+/// Silence after which the device is asked to greet and stream again.
 const SILENCE: Duration = Duration::from_secs(2);
 
-/// What is received, and how it stands.
+/// State of a recording in progress.
 pub(super) struct Run {
     pub growing: Growing,
     pub clock: Clock,
@@ -31,13 +31,13 @@ pub(super) struct Run {
     pub begun: Option<u64>,
     pub heard: Instant,
     pub unit_id: String,
-    /// Starts of the device since it has power.
+    /// Starts of the device since its last power failure.
     pub starts: u32,
     pub line: line::Heard,
     pub one_power_on: bool,
 }
 
-/// What the device is asked for.
+/// Request for the raw stream.
 const RAW: Request<'_> = Request::Stream {
     raw: true,
     compensated: false,
@@ -72,7 +72,7 @@ impl Run {
         }
     }
 
-    /// Shows how it stands, and takes the marks.
+    /// Reports the state, and applies the person's requests. Returns whether the recording is to end.
     pub fn asks_to_end(&mut self, look: &mut impl FnMut(&Standing) -> Wish) -> bool {
         let wish = look(&self.standing);
         for _ in 0..wish.marks {
@@ -87,7 +87,7 @@ impl Run {
         dropped.extend(step.filter(|step| !dropped.contains(step)));
     }
 
-    /// A turn that was not recorded to its end has another angle.
+    /// Discards a turn that was not recorded to its end: its angle is unknown.
     pub fn drop_open_turn(&mut self) {
         self.drop_step(self.steps.running().filter(|step| self.is_turn(*step)));
     }
@@ -96,7 +96,7 @@ impl Run {
         self.known.as_ref().is_some_and(|known| known.is_turn(step))
     }
 
-    /// Takes in what comes next; whether it was the last that was wanted.
+    /// Processes the next event. Returns whether the recording is complete.
     fn hear(&mut self, session: &mut Session, wanted: Option<u64>) -> Result<bool> {
         match session.event()? {
             Some(Event::Raw(batch)) => {
@@ -118,7 +118,7 @@ impl Run {
             }
             Some(_) => {}
             None if self.heard.elapsed() > SILENCE => {
-                // It may have restarted, and its greeting been lost.
+                // It may have restarted, and its greeting may be lost.
                 session.hello()?;
                 session.done(RAW, "to stream")?;
                 self.standing.resumed += 1;
@@ -177,7 +177,7 @@ impl Run {
         if (arrival.missing > 0 || arrival.restart.is_some())
             && let Some(step) = self.steps.at(self.clock.length(first - begun))
         {
-            // Nobody knows how far it turned meanwhile.
+            // A turn with a gap has an unknown angle.
             self.drop_step(Some(step).filter(|step| self.is_turn(*step)));
         }
         if let Some(start) = arrival.restart {
@@ -244,7 +244,7 @@ impl Run {
     }
 }
 
-/// Whether a start is one for which the power came, or may have.
+/// Whether power may have been lost before a start.
 fn lost_power(start: &Option<Started>) -> bool {
     matches!(
         start,

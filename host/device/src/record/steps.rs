@@ -2,25 +2,25 @@
 
 use std::time::Duration;
 
-/// How samples get their step.
+/// How dwells are numbered while samples arrive.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Steps {
-    /// Not at all: the dwells are detected in the samples later on.
+    /// Not during the recording: dwells are detected in the samples later.
     Detected,
-    /// So long a dwell, then so long in transit, again and again from the first sample on.
+    /// Alternately a dwell and a transit of these lengths, from the first sample on.
     Every(Duration, Duration),
-    /// By marks: each begins a dwell, or ends the one that runs.
+    /// By marks: each begins a dwell, or ends the running one.
     Marks(Marks),
-    /// By a plan: when each dwell begins and ends, from the first sample on; no two overlap.
+    /// By a plan: begin and end of each dwell, counted from the first sample. No two overlap.
     Planned(Vec<[Duration; 2]>),
 }
 
-/// Marks so far.
+/// Dwells marked so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Marks {
     begun: i32,
     dwells: bool,
-    /// There are to be so many.
+    /// Planned number of dwells.
     most: Option<i32>,
 }
 
@@ -30,7 +30,7 @@ impl Steps {
         Self::Marks(Marks::default())
     }
 
-    /// The same, so many dwells.
+    /// By marks, for a planned number of dwells.
     pub fn marks_for(dwells: usize) -> Self {
         Self::Marks(Marks {
             most: i32::try_from(dwells).ok(),
@@ -38,7 +38,7 @@ impl Steps {
         })
     }
 
-    /// Dwells of these lengths, so long in transit in between.
+    /// Dwells of these lengths, with a transit after each.
     pub fn planned(lead_in: Duration, lengths: &[Duration], transit: Duration) -> Self {
         let mut begin = lead_in;
         let each = lengths.iter().map(|length| {
@@ -49,7 +49,7 @@ impl Steps {
         Self::Planned(each.collect())
     }
 
-    /// When the last dwell ends, if that is planned.
+    /// End of the last dwell, if there is a plan.
     pub(super) fn end(&self) -> Option<Duration> {
         match self {
             Self::Planned(dwells) => dwells.last().map(|d| d[1]),
@@ -57,12 +57,12 @@ impl Steps {
         }
     }
 
-    /// Whether the last of the dwells has ended, of marks whose number is known.
+    /// Whether the last planned dwell was ended by a mark.
     pub(super) fn is_done(&self) -> bool {
         matches!(self, Self::Marks(marks) if !marks.dwells && marks.most == Some(marks.begun))
     }
 
-    /// The dwell that runs by marks: one that has not ended.
+    /// The dwell begun by a mark and not yet ended.
     pub(super) fn running(&self) -> Option<i32> {
         match self {
             Self::Marks(marks) if marks.dwells => Some(marks.begun - 1),
@@ -70,7 +70,7 @@ impl Steps {
         }
     }
 
-    /// Begins a dwell, or ends it.
+    /// Begins or ends a dwell.
     pub(super) fn mark(&mut self) {
         if let Self::Marks(marks) = self {
             marks.dwells = !marks.dwells;
@@ -78,12 +78,12 @@ impl Steps {
         }
     }
 
-    /// Step of a sample so long after the first, -1 in transit; `None`: samples have none.
+    /// Number of the dwell at `since` the first sample, -1 in transit; `None` if dwells are not numbered.
     pub(super) fn at(&self, since: Duration) -> Option<i32> {
         match self {
             Self::Detected => None,
             Self::Every(dwell, transit) => {
-                // Whole nanoseconds: a quotient of floats can put the first sample of a dwell into the transit before it.
+                // Counted in whole nanoseconds: with a quotient of floats, the first sample of a dwell could fall into the transit before it.
                 let cycle = (*dwell + *transit).as_nanos().max(1);
                 let (step, within) = (since.as_nanos() / cycle, since.as_nanos() % cycle);
                 let step = i32::try_from(step).unwrap_or(i32::MAX);

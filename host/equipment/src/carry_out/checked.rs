@@ -1,5 +1,5 @@
-//! Whether the unit undergoes what the table was told: a tilt axis that turns the other way, or an interlock that was open for an instant,
-//! would make known inputs of false ones.
+//! Checks that the unit moves as the table was commanded. A tilt axis with the wrong sign, or an interlock that opened for a moment, would make the
+//! known inputs wrong.
 
 use mimu::plan::Planned;
 use mimu_device::nominal;
@@ -9,30 +9,30 @@ use nalgebra::Vector3;
 
 use crate::step::words;
 
-/// Angle between what is up and what was planned that is no other pose, degrees. Wrong axes are off by 90 or more; biases of a unit
-/// that nobody has calibrated yet, at the ends of its temperatures, by 20 at most.
+/// Angle between measured and planned vertical above which the pose is a different one, degrees. Wrong axes cause 90 or more; the biases of an
+/// uncalibrated unit at the ends of its temperature range cause 20 at most.
 const SAME_POSE_DEG: f64 = 30.0;
-/// As in the wizard: sensitivities differ from the data sheet's by some per cent, and nulls move.
+/// As in the wizard: sensitivities differ from the data sheet's by a few per cent, and nulls shift.
 const RATE_SHARE: f64 = 0.2;
 const RATE_DPS: f64 = 2.0;
 /// Time over which readings are averaged, s.
 const WINDOW_S: f64 = 1.0;
 
-/// Readings of the dwell that runs, by the data sheet.
+/// Readings of the running dwell, converted by the data sheet.
 #[derive(Debug, Default)]
 pub(super) struct Checked {
     dwell: Option<usize>,
     since_s: f64,
-    /// Samples so far when the last readings came.
+    /// Number of samples at the last update.
     samples: u64,
     sum: [f64; 6],
     batches: f64,
-    /// The gyro at rest, raw, in the last dwell that was at rest.
+    /// Mean raw gyro reading in the last dwell at rest.
     at_rest: Option<Vector3<f64>>,
 }
 
 impl Checked {
-    /// Takes in the last readings; the dwell that is none of the plan, and why. `running` is the one from now on.
+    /// Adds the last readings; `running` is the running dwell. Returns a dwell that does not match the plan, and the reason.
     pub fn look(
         &mut self,
         running: Option<usize>,

@@ -1,5 +1,5 @@
-//! Table and chamber in a thread of their own: a table that takes seconds to answer must not keep the samples waiting, of which a port
-//! holds some tenths of a second.
+//! Table and chamber in a separate thread. A table that takes seconds to answer must not delay reading the samples: a port buffers only some tenths
+//! of a second.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -12,39 +12,39 @@ use super::needs::Equipped;
 use crate::drive::Driver;
 use crate::step::Step;
 
-/// Time between two questions whether the table still moves.
+/// Interval of the check whether the table still moves.
 const BUSY: Duration = Duration::from_millis(100);
-/// Time between two checks of the interlock: a table that it has stopped must not count as turning.
+/// Interval of the interlock check: a table that the interlock stopped must not count as turning.
 const HELD: Duration = Duration::from_millis(500);
-/// Time between two looks at the temperature in the chamber.
+/// Interval of reading the chamber's temperature.
 const READ: Duration = Duration::from_secs(2);
 
-/// What is to be done.
+/// A command to table or chamber.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Order {
-    /// A pose, at rest or at a rate.
+    /// Move to a pose, at rest or at a rate.
     Go(Step),
-    /// A turn by an angle.
+    /// Turn by an angle.
     Turn(Turn),
-    /// Stops it where it is.
+    /// Stop the table where it is.
     Halt,
-    /// A temperature of the chamber, °C.
+    /// Set the temperature of the chamber, °C.
     Set(f64),
 }
 
 enum EquipmentEvent {
-    /// So many motions are done with.
+    /// Number of completed motions.
     Done(usize),
     Chamber(f64),
     Failed(Error),
 }
 
-/// Table and chamber, at rest when this is dropped.
+/// Table and chamber, brought to rest when this is dropped.
 pub(super) struct Equipment {
     orders: Option<Sender<Order>>,
     news: Receiver<EquipmentEvent>,
     thread: Option<JoinHandle<Vec<Error>>>,
-    /// Motions that were ordered, and are done with.
+    /// Numbers of ordered and of completed motions.
     motions: [usize; 2],
     chamber_c: Option<f64>,
 }
@@ -65,7 +65,7 @@ impl Equipment {
         };
         let work = move || {
             if let Err(error) = hands.work(&to_do) {
-                // Nobody hears it only where the recording has ended too.
+                // The receiver is gone only if the recording has ended too.
                 let _ = hands.tell.send(EquipmentEvent::Failed(error));
             }
             hands.rest()
@@ -101,17 +101,17 @@ impl Equipment {
         None
     }
 
-    /// Whether all that was ordered of the table is done, and it moves no more or steadily.
+    /// Whether all ordered motions are complete, so that the table is at rest or turns steadily.
     pub fn is_done(&self) -> bool {
         self.motions[0] == self.motions[1]
     }
 
-    /// Temperature in the chamber, °C, where it can be asked.
+    /// Temperature in the chamber, °C, if it can be read.
     pub fn chamber_c(&self) -> Option<f64> {
         self.chamber_c
     }
 
-    /// Table at rest, chamber at its temperature of rest; what of that could not be done.
+    /// Stops the table and sets the chamber to its rest temperature. Returns what failed.
     pub fn rest(mut self) -> Vec<Error> {
         self.end()
     }
@@ -149,7 +149,7 @@ struct Hands {
 }
 
 impl Hands {
-    /// Carries out orders until there are no more.
+    /// Carries out orders until the channel closes.
     fn work(&mut self, to_do: &Receiver<Order>) -> Result<()> {
         loop {
             match to_do.recv_timeout(BUSY) {
@@ -207,7 +207,7 @@ impl Hands {
         Ok(())
     }
 
-    /// Each separately: a table that does not answer must not leave the chamber hot.
+    /// Brings table and chamber to rest separately: a table that does not answer must not leave the chamber hot.
     fn rest(&mut self) -> Vec<Error> {
         let (table, chamber) = (self.equipped.table, self.equipped.chamber);
         let rest_c = self.equipped.rest_c();

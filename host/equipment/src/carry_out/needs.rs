@@ -1,22 +1,23 @@
-//! What a procedure needs, and whether the drivers have it: everything is refused here, before anything moves.
+//! Checks that the drivers can carry out a procedure. Everything is refused here, before anything moves.
 
 use mimu_device::record::Procedure;
 use mimu_recording::error::{Argument, Error, Result};
 
 use crate::drive::{Abilities, Driver};
 
-/// Drivers that have all that a procedure needs.
+/// Drivers that can carry out the procedure.
 pub struct Equipped {
     pub(super) drivers: Vec<Box<dyn Driver>>,
-    /// Which of them moves the unit, and which warms it.
+    /// Indices of the driver that moves the unit and of the one with the chamber.
     pub(super) table: Option<usize>,
     pub(super) chamber: Option<usize>,
-    /// Temperature in the chamber, °C, where it can be asked.
+    /// Temperature in the chamber, °C, if it can be read.
     pub(super) chamber_c: Option<f64>,
 }
 
 impl Equipped {
-    /// Refuses a procedure that these drivers cannot carry out; `place` is its plan. Without drivers a person warms a unit that lies still.
+    /// Refuses a procedure that these drivers cannot carry out; `place` is its plan. Without drivers a person changes the temperature of a unit at
+    /// rest.
     pub fn new(
         procedure: &Procedure,
         place: &str,
@@ -71,7 +72,7 @@ impl Equipped {
         })
     }
 
-    /// Whether a table moves the unit, so that its input is known.
+    /// Whether a table moves the unit, so that the input is known.
     pub fn has_table(&self) -> bool {
         self.table.is_some()
     }
@@ -81,14 +82,14 @@ impl Equipped {
         self.chamber.is_some()
     }
 
-    /// What its chamber is left at, °C.
+    /// Rest temperature of the chamber, °C.
     pub(super) fn rest_c(&self) -> Option<f64> {
         let chamber = self.drivers[self.chamber?].abilities().chamber;
         chamber.map(|c| c.rest_c)
     }
 }
 
-/// The one that has something; two would both be right.
+/// The only driver with this ability; with two the choice would be ambiguous.
 fn only(
     abilities: &[Abilities],
     has: impl Fn(&Abilities) -> bool,

@@ -1,32 +1,32 @@
-//! How a procedure stands, for a person.
+//! The progress of a procedure, for a person.
 
 use mimu::plan::Planned;
 use mimu_device::record::{Procedure, Standing};
 
 use super::sequence::Sequence;
 
-/// How it stands.
+/// Progress of a procedure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
-    /// Time since the procedure began, s; `None` while the chamber is on its way to the first temperature.
+    /// Time since the procedure began, s; `None` until the chamber has reached the first temperature.
     pub since_s: Option<f64>,
-    /// Round that runs, from 1, and rounds.
+    /// Running round, counted from 1, and number of rounds.
     pub round: [usize; 2],
-    /// Dwells and turns completed as planned.
+    /// Completed and planned dwells and turns.
     pub dwells: [usize; 2],
-    /// Time that is left, at the pace so far, s.
+    /// Remaining time at the pace so far, s.
     pub left_s: f64,
-    /// What the chamber is to be at, °C.
+    /// Planned temperature of the chamber, °C.
     pub planned_c: f64,
     /// Its present temperature, °C, if it can be read.
     pub chamber_c: Option<f64>,
     /// The unit's thermometer, °C.
     pub temp_c: f64,
-    /// Samples that are missing.
+    /// Missing samples.
     pub missing: u64,
-    /// Turns that were not recorded as a whole.
+    /// Turns that were recorded only in part.
     pub dropped: usize,
-    /// The port has vanished, and is waited for.
+    /// The port has vanished, and is awaited.
     pub line_lost: bool,
 }
 
@@ -55,7 +55,8 @@ impl Progress {
     }
 }
 
-/// Time until the last dwell is over, s: rounds that begin by the clock are known, and others take as long for each dwell as those before.
+/// Time until the end of the last dwell, s. If rounds begin at fixed times, it is known. Otherwise each dwell is expected to take as long in
+/// proportion as those before.
 fn left_s(procedure: &Procedure, done: usize, since_s: f64) -> f64 {
     let length =
         |dwells: &[Planned]| -> f64 { dwells.iter().map(|d| d.length.as_secs_f64()).sum() };
@@ -69,7 +70,7 @@ fn left_s(procedure: &Procedure, done: usize, since_s: f64) -> f64 {
         had_s if had_s > 0.0 => ((since_s - procedure.lead_in_s) / had_s).max(1.0),
         _ => 1.0,
     };
-    // Of the dwell that runs a part may be over; for one that lasts all day that is all there is to tell.
+    // The running dwell counts in full, because its elapsed part is unknown here. With a single dwell the elapsed part is known.
     match procedure.dwells.len() {
         1 => (procedure.lead_in_s + length(to_come) - since_s).max(0.0),
         _ => lead_in_s + pace * length(to_come),

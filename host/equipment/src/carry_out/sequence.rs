@@ -1,7 +1,7 @@
-//! What comes next, and when: dwells and turns as marks in the recording, motions and temperatures as orders.
+//! The sequence of a procedure: marks of dwells and turns in the recording, orders for motions and temperatures.
 //!
-//! All times are the device's. A dwell begins when the table has arrived, and a turn is from rest to rest, so that a table that is slower
-//! than the plan makes the procedure longer and no input wrong.
+//! All times are the device's. A dwell begins when the table has arrived, and a turn lasts from rest to rest. A table slower than the plan therefore
+//! makes the procedure longer, and no input wrong.
 
 use std::time::Instant;
 
@@ -11,29 +11,29 @@ use mimu_device::record::{Procedure, Standing};
 use super::equipment::Order;
 use crate::step::Step;
 
-/// Time between two temperatures that the chamber is set to, s: at 5 K/min they are less apart than a chamber holds.
+/// Interval between two settings of the chamber, s: at 5 K/min, successive temperatures differ by less than a chamber's control error.
 const SET_EVERY_S: f64 = 5.0;
-/// Change that is worth telling it, K.
+/// Least change of temperature that is sent to the chamber, K.
 const SET_LEAST_C: f64 = 0.005;
-/// How near to the first temperature of the plan the chamber has to be at the beginning, K.
+/// Largest deviation of the chamber from the plan's first temperature when the plan begins, K.
 const NEAR_C: f64 = 1.0;
-/// Time, s, during which older samples still arrive after the table reports that it is done: a batch, the line and a busy PC.
+/// Time, s, during which older samples may still arrive after the table reports completion: a batch, the line and a busy PC.
 const ON_THE_WAY_S: f64 = 0.5;
 
-/// How it stands.
+/// State of recording and equipment.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seen {
-    /// By [`Sequence::clock`], s.
+    /// Time by [`Sequence::clock`], s.
     pub now_s: f64,
-    /// No samples come: no dwell begins or ends, and the chamber continues.
+    /// No samples arrive: no dwell begins or ends, but the chamber continues.
     pub line_lost: bool,
-    /// The table is done with all that was ordered.
+    /// The table has completed all orders.
     pub arrived: bool,
-    /// °C, if the chamber can be asked.
+    /// Temperature of the chamber, °C, if it can be read.
     pub chamber_c: Option<f64>,
 }
 
-/// What is to be done about it.
+/// Actions that follow.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Does {
     /// Dwells that end or begin with the next sample.
@@ -43,13 +43,13 @@ pub(super) struct Does {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
-    /// The table goes to its first pose, and the chamber to its first temperature.
+    /// The table moves to its first pose, and the chamber to its first temperature.
     Approach,
     /// The dwell is not yet due.
     Due,
-    /// The table is on its way.
+    /// The table moves to the dwell's pose.
     Moving,
-    /// It has arrived, and samples from before are on their way.
+    /// It has arrived, but samples from before may still arrive.
     Arrived {
         until_s: f64,
     },
@@ -57,30 +57,30 @@ enum Phase {
         until_s: f64,
     },
     Turn,
-    /// It has turned, as [`Phase::Arrived`].
+    /// The turn is complete, but as in [`Phase::Arrived`].
     Turned {
         until_s: f64,
     },
     Done,
 }
 
-/// A procedure on its way.
+/// A procedure being carried out.
 #[derive(Debug)]
 pub(super) struct Sequence<'a> {
     procedure: &'a Procedure,
     has_table: bool,
     has_chamber: bool,
     phase: Phase,
-    /// Dwell that runs, or is next.
+    /// Index of the running or the next dwell.
     at: usize,
-    /// What the table was brought to: up, and rate, deg/s.
+    /// Last state ordered of the table: up, and rate, deg/s.
     stands: Option<([f64; 3], f64)>,
-    /// When the procedure began.
+    /// When the procedure began, s.
     zero_s: Option<f64>,
-    /// The last temperature that was told, and when.
+    /// The last temperature that was set, and when.
     set: Option<(f64, f64)>,
     set_points: usize,
-    /// The last sample, and when it was heard.
+    /// Time of the last sample, and when it was received.
     heard: (f64, Instant),
 }
 
@@ -100,7 +100,7 @@ impl<'a> Sequence<'a> {
         }
     }
 
-    /// The device's time, s: of the last sample and, where none comes, as long after it as has passed here.
+    /// The device's time, s: that of the last sample and, if the line is lost, the time that has passed here since.
     pub fn clock(&mut self, standing: &Standing) -> f64 {
         let last_s = standing.last_s.unwrap_or_default();
         if last_s != self.heard.0 {
@@ -112,7 +112,7 @@ impl<'a> Sequence<'a> {
         }
     }
 
-    /// The dwell or turn that runs.
+    /// The running dwell or turn.
     pub fn running(&self) -> Option<usize> {
         let runs = matches!(
             self.phase,
@@ -121,7 +121,7 @@ impl<'a> Sequence<'a> {
         runs.then_some(self.at)
     }
 
-    /// Dwells and turns that were had.
+    /// Number of completed dwells and turns.
     pub fn done(&self) -> usize {
         self.at
     }
@@ -130,7 +130,7 @@ impl<'a> Sequence<'a> {
         self.set_points
     }
 
-    /// Time since the procedure began, s; `None` while the chamber is on its way to the first temperature.
+    /// Time since the procedure began, s; `None` until the chamber has reached the first temperature.
     pub fn since_s(&self) -> Option<f64> {
         self.zero_s.map(|zero_s| self.heard.0 - zero_s)
     }
@@ -138,13 +138,13 @@ impl<'a> Sequence<'a> {
     pub fn look(&mut self, seen: &Seen) -> Does {
         let mut does = Does::default();
         self.lead(seen, &mut does);
-        // A dwell that ends is followed at once by what needs no motion; a motion that was just ordered has not been done.
+        // Phases that need no motion follow at once. After an order to the table, its completion is awaited.
         let moves = |order: &Order| !matches!(order, Order::Set(_));
         while !seen.line_lost && !does.orders.iter().any(moves) && self.advance(seen, &mut does) {}
         does
     }
 
-    /// Leads the chamber along its temperatures.
+    /// Sets the chamber to its planned temperature.
     fn lead(&mut self, seen: &Seen, does: &mut Does) {
         if !self.has_chamber || self.set.is_some_and(|s| seen.now_s < s.1 + SET_EVERY_S) {
             return;
@@ -160,7 +160,7 @@ impl<'a> Sequence<'a> {
         self.set_points += 1;
     }
 
-    /// One phase on; whether there is more to be done now.
+    /// Advances by one phase. Returns whether there is more to do now.
     fn advance(&mut self, seen: &Seen, does: &mut Does) -> bool {
         let now_s = seen.now_s;
         match self.phase {
@@ -171,7 +171,7 @@ impl<'a> Sequence<'a> {
                     return false;
                 };
                 if self.since(now_s) < self.procedure.due_s(self.at).max(ON_THE_WAY_S) {
-                    // A table turns no longer than it is asked to.
+                    // The table turns only during dwells.
                     if let Some((up, rate)) = self.stands
                         && rate != 0.0
                     {
@@ -209,7 +209,7 @@ impl<'a> Sequence<'a> {
         true
     }
 
-    /// The first pose and the first temperature, before which the plan does not begin.
+    /// Approaches the first pose and the first temperature. The plan begins once both are reached.
     fn approach(&mut self, seen: &Seen, does: &mut Does) -> bool {
         let first = &self.procedure.dwells[0];
         if self.has_table && self.stands.is_none() {
@@ -233,7 +233,7 @@ impl<'a> Sequence<'a> {
         now_s - self.zero_s.unwrap_or(now_s)
     }
 
-    /// What brings the table to where a dwell or a turn begins, if it is not there.
+    /// The motion to the pose or rate of a dwell or a turn, unless the table is there already.
     fn motion_to(&mut self, dwell: &Planned) -> Option<Order> {
         if !self.has_table {
             return None;

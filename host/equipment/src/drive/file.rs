@@ -1,4 +1,4 @@
-//! How a table or a chamber is spoken to: the file `mimu-driver/1`.
+//! The driver file `mimu-driver/1`: connection and commands of a table or a chamber.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use super::{ChamberLimits, Limits};
 
-/// The file.
+/// Contents of a driver file.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct DriverFile {
@@ -45,7 +45,7 @@ fn usual_timeout() -> f64 {
     5.0
 }
 
-/// Something to ask, and the answer that means yes.
+/// A query, and the answer that means yes.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Question {
@@ -53,7 +53,7 @@ pub(super) struct Question {
     pub answer: String,
 }
 
-/// Lines to say one after the other, what each is answered with (nothing is waited for without it), and a pause after them.
+/// Lines to send in order, the answer expected to each (none is awaited if it is absent), and a pause after them.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Command {
@@ -63,7 +63,7 @@ pub(super) struct Command {
     pub pause_s: f64,
 }
 
-/// A turn by an angle, for each axis that can: tables number their axes as they like.
+/// Turns by an angle, for each axis that has a command: tables number their axes differently.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Turns {
@@ -89,25 +89,25 @@ pub(super) struct Power {
     pub on: Command,
 }
 
-/// A chamber, alone or beside a table.
+/// Commands and limits of a chamber, alone or with a table.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Chamber {
-    /// With `{temp_c}`.
+    /// Sets the temperature; contains `{temp_c}`.
     pub set: Command,
-    /// Is answered by a line whose first number is the temperature in it, °C.
+    /// Query for the temperature: the first number in the answer, °C.
     pub read: Option<String>,
-    /// Lowest and highest temperature that it may be set to, °C.
+    /// Lowest and highest temperature that may be set, °C.
     from_c: f64,
     to_c: f64,
     /// Largest ramp, K/min.
     c_per_min: Option<f64>,
-    /// What it is left at, °C.
+    /// Rest temperature, °C.
     #[serde(default = "room")]
     rest_c: f64,
 }
 
-/// Temperature at which a chamber is left: nothing in it freezes, condenses or burns a hand.
+/// Default rest temperature of a chamber: nothing in it freezes or condenses, or is too hot to touch.
 fn room() -> f64 {
     25.0
 }

@@ -1,4 +1,4 @@
-//! A line of text to a table or a chamber, over TCP or a serial port.
+//! A text connection to a table or a chamber, over TCP or a serial port.
 
 use std::io::{BufRead as _, BufReader, Write};
 use std::net::TcpStream;
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use mimu_recording::error::{Error, Result};
 
-/// Says lines and hears lines.
+/// Sends lines and reads lines.
 pub(super) struct Line {
     read: BufReader<Box<dyn std::io::Read + Send>>,
     write: Box<dyn Write + Send>,

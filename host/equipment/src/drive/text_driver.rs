@@ -1,4 +1,4 @@
-//! A table or a chamber that takes lines of text.
+//! A table or a chamber with text commands.
 
 use std::path::Path;
 use std::time::Duration;
@@ -12,12 +12,12 @@ use super::line::Line;
 use super::{Abilities, Driver};
 use crate::step::Step;
 
-/// A table or a chamber, or both, that take lines of text over TCP or a serial port.
+/// A table or a chamber, or both, with text commands over TCP or a serial port.
 pub struct TextDriver {
     place: String,
     file: DriverFile,
     line: Line,
-    /// Turns only after the tilt has ended: a table that gets a rate earlier would turn about another axis.
+    /// Step whose rate is set once the tilt has ended. A table that got the rate earlier would turn about another axis.
     then: Option<Step>,
 }
 
@@ -44,7 +44,7 @@ impl TextDriver {
         })
     }
 
-    /// The same, of one that moves the unit.
+    /// Like [`Self::open`], but refuses a driver that cannot move the unit.
     pub fn open_table(path: &Path) -> Result<Self> {
         let driver = Self::open(path)?;
         match driver.file.to_pose {
@@ -103,14 +103,14 @@ impl TextDriver {
     }
 }
 
-/// Angles of a table that turns the body about z first and tilts it then: with these, `up` points up.
+/// Angles of a table that turns the body about z first and then tilts it, so that `up` points up.
 fn angles(up: &Vector3<f64>) -> (f64, f64) {
     let across = up.x.hypot(up.y);
     let inner = if across < 1e-9 { 0.0 } else { up.x.atan2(up.y) };
     (across.atan2(up.z).to_degrees(), inner.to_degrees())
 }
 
-/// What a command may ask for.
+/// Values for the placeholders of a command.
 fn values(step: &Step) -> [(&'static str, f64); 6] {
     let (middle, inner) = angles(&step.up());
     let [x, y, z] = step.up;

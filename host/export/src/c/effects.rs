@@ -1,4 +1,4 @@
-//! Effects in the header: their regressors as expressions in C.
+//! Effects in the header: their regressors as C expressions.
 
 mod removal;
 
@@ -15,13 +15,13 @@ use super::number;
 
 /// The effects of a calibration.
 pub(super) struct Effects {
-    /// Ids of those that are in the header.
+    /// Ids of the effects in the header.
     pub written: Vec<String>,
-    /// And of those that are not.
+    /// Ids of the effects that are left out.
     pub left_out: Vec<String>,
-    /// Lags of the temperatures that they need, s.
+    /// Lags of the temperatures that the effects need, s.
     pub lags_s: Vec<f64>,
-    /// Sums of the three axes.
+    /// Summed error of each of the three axes.
     errors: PerSensor<[Vec<String>; 3]>,
     codes: PerSensor<[Option<usize>; 3]>,
     converters: Vec<DeviceEffect<f64>>,
@@ -77,7 +77,7 @@ impl Effects {
         Ok(all)
     }
 
-    /// Whether nothing is removed from compensated samples.
+    /// Whether no effect applies to compensated samples.
     pub fn is_empty(&self) -> bool {
         Sensor::BOTH
             .into_iter()
@@ -88,7 +88,7 @@ impl Effects {
         self.errors[sensor].iter().all(Vec::is_empty)
     }
 
-    /// Whether some follow temperature or time.
+    /// Whether some effects depend on temperature or time.
     pub fn is_slow(&self) -> bool {
         self.quantities.iter().any(|q| q.is_slow())
     }
@@ -162,7 +162,7 @@ impl Effects {
         })
     }
 
-    /// A quantity as a function of errors has it; `None` where a stream of samples does not have it.
+    /// A quantity as the error functions name it; `None` if a stream of samples does not contain it.
     fn quantity(&mut self, of: Quantity, parameter: f64, axis: usize) -> Option<String> {
         Some(match of {
             Quantity::Rate(i) => format!("rate[{i}]"),
@@ -184,7 +184,7 @@ impl Effects {
         })
     }
 
-    /// Number of the temperature behind this lag, s.
+    /// Index of the temperature with this lag, s.
     fn lag(&mut self, lag_s: f64) -> usize {
         let known = self.lags_s.iter().position(|known| *known == lag_s);
         known.unwrap_or_else(|| {

@@ -32,8 +32,7 @@ impl Header<'_> {
         self.effects.functions(prefix, out);
     }
 
-    /// Sensors with curves, and how the lag of their dies is followed: time constant of the filter, s, and what the filtered reading minus the
-    /// reading is multiplied by.
+    /// Sensors with curves, and the filter of their dies' lag: its time constant, s, and the factor of the filtered minus the unfiltered temperature.
     fn dies(&self) -> Vec<(Sensor, f64, f64)> {
         let of = |sensor: Sensor| {
             let lag_s = self.lags_s()[sensor];
@@ -167,7 +166,7 @@ impl Header<'_> {
     }
 }
 
-/// As [`mimu_core::table::Table`] has it.
+/// Same as [`mimu_core::table::Table`].
 const MODEL_AT: &str = "\
 // C by rows and o at this temperature of the dies, degrees Celsius.
 static inline void PREFIX_model_at(const float nodes[][2][12], float die_c, float model[12])
@@ -192,7 +191,7 @@ static inline void PREFIX_model_at(const float nodes[][2][12], float die_c, floa
 
 ";
 
-/// As [`mimu_core::die`] has it.
+/// Same as [`mimu_core::die`].
 const LAGGED: &str = "\
 // Filtered temperature minus temperature after dt, in which the temperature rose by step: exact for a ramp.
 static inline float PREFIX_lagged(float behind, float dt, float step, float lag_s)
@@ -206,7 +205,7 @@ static inline float PREFIX_lagged(float behind, float dt, float step, float lag_
 
 ";
 
-/// As `mimu_core::effects` has it: nine bits from the highest, in units of the weight of bit 0.
+/// Same as in `mimu_core::effects`: nine bits from the highest, in units of the weight of bit 0.
 const CODE: &str = "\
 // Error of a reading by the bits of its code, raw.
 static inline float PREFIX_code_error(float u, float weight, float zero, const float errors[9])

@@ -1,4 +1,4 @@
-//! Dwells of the accelerometer as a scene of Foxglove: points on the sphere of gravity, and arrows of what they err by.
+//! The accelerometer's dwells as a scene of Foxglove: points on the sphere of gravity, and arrows for their residuals.
 
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -7,12 +7,12 @@ use serde_json::{Value, json};
 
 use super::time;
 
-/// Length of the longest arrow where the sphere has radius 1.
+/// Length of the longest arrow, relative to the sphere's radius.
 const LONGEST: f64 = 0.5;
 
 /// Sums of compensated samples over dwells.
 pub(super) struct Dwells {
-    /// First row, row behind the last, sum of the forces, and how many.
+    /// First row, row after the last, sum of the forces, and their number.
     sums: Vec<(u64, u64, Vector3<f64>, u32)>,
     reached: usize,
 }
@@ -27,7 +27,7 @@ impl Dwells {
         }
     }
 
-    /// Adds the force of a row, m/s²; rows come in order.
+    /// Adds the force of a row, m/s². Rows must come in order.
     pub fn add(&mut self, row: u64, force: impl IntoIterator<Item = f64>) {
         while self.sums.get(self.reached).is_some_and(|s| s.1 <= row) {
             self.reached += 1;
@@ -43,7 +43,7 @@ impl Dwells {
         }
     }
 
-    /// The sphere and each dwell, with their times, s; what to say of it.
+    /// The sphere and each dwell with their times, s, and a note.
     pub fn scenes(&self, prepared: &Prepared) -> (Vec<(f64, Value)>, Option<String>) {
         let gravity = prepared.manifest.gravity_mps2;
         let dwells = prepared.dwells.list.iter().zip(&self.sums);
@@ -116,10 +116,10 @@ fn ball(at: &Vector3<f64>, diameter: f64, [r, g, b, a]: [f64; 4]) -> Value {
     })
 }
 
-/// From `at` along `vector`, which an arrow without rotation has along x.
+/// An arrow from `at` along `vector`. An unrotated arrow points along x.
 fn arrow(at: &Vector3<f64>, vector: &Vector3<f64>) -> Value {
     let turned = UnitQuaternion::rotation_between(&Vector3::x(), vector);
-    // Between opposites there are many.
+    // Between opposite vectors there are many rotations.
     let turned = turned.unwrap_or_else(|| {
         UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI)
     });
@@ -139,13 +139,13 @@ fn pose(at: &Vector3<f64>, turned: &UnitQuaternion<f64>) -> Value {
     })
 }
 
-/// Of a time, as Foxglove has it.
+/// Schema of a time in Foxglove.
 pub(super) fn time_schema() -> Value {
     json!({"type": "object", "title": "time", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}})
 }
 
-/// Of `foxglove.SceneUpdate`, as far as it is written here. Source: Foxglove documentation, "SceneUpdate", "SceneEntity", "ArrowPrimitive",
-/// "SpherePrimitive".
+/// Schema of `foxglove.SceneUpdate`, limited to the fields that are written here. Source: Foxglove documentation, "SceneUpdate", "SceneEntity",
+/// "ArrowPrimitive", "SpherePrimitive".
 pub(super) fn schema() -> Value {
     let object = |properties: Value| json!({"type": "object", "properties": properties});
     let number = || json!({"type": "number"});

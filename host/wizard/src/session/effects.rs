@@ -1,4 +1,4 @@
-//! What still errs, and the calibration with it: found, offered, judged in a third set of poses, stored.
+//! Diagnoses the remaining errors, and offers, verifies and stores the calibration with effects.
 
 use mimu::calibration::Calibration;
 use mimu::diagnose::{Recordings, diagnose};
@@ -19,7 +19,7 @@ use crate::verdict::{judge_all, prepared};
 use crate::wizard::Ended;
 use mimu_equipment::step::Step;
 
-/// What the diagnosis of a unit has brought.
+/// Calibration with effects from the diagnosis of a unit.
 pub(super) struct Found {
     calibration: Calibration,
     fitted: Fit,
@@ -27,7 +27,7 @@ pub(super) struct Found {
 }
 
 impl OpenSession<'_> {
-    /// What still errs, and the calibration with it, if that is anything that can be stored.
+    /// Diagnoses the remaining errors. Returns the calibration with effects if it can be stored.
     pub(super) fn diagnose(&mut self, k: usize, plain: &Plain) -> Result<Option<Found>> {
         let other = &plain.other;
         let name = self.wizard.units[k].name();
@@ -42,7 +42,7 @@ impl OpenSession<'_> {
                 ..Options::default()
             },
         );
-        // What is stored is judged already: a recording that cannot be diagnosed does not undo it.
+        // The stored calibration is verified already. A recording that cannot be diagnosed does not invalidate it.
         let mut diagnosis = match diagnosed {
             Ok(diagnosis) => diagnosis,
             Err(why) => {
@@ -55,7 +55,7 @@ impl OpenSession<'_> {
         let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
         let of_unit = accepted.filter(|a| a.of_unit);
         let found: Vec<FittedEffect> = of_unit.map(|a| a.effect.clone()).collect();
-        // On a table a sensor without effects is unchanged: only the earlier fit includes the lever arm of a board beside the axis.
+        // On a table, a sensor without effects keeps the earlier fit: only that fit includes the lever arm of a board off the table's axis.
         let mut fitted = diagnosis.after.clone();
         if other.manifest.reference == Reference::Table {
             mounted(&mut fitted, self.wizard.asked.mounting_deg);
@@ -114,7 +114,7 @@ impl OpenSession<'_> {
         }))
     }
 
-    /// The calibrations with effects: offered, judged in a third set of poses, and stored.
+    /// Offers the calibrations with effects, verifies them with a third set of poses, and stores them.
     pub(super) async fn with_effects(
         &mut self,
         plain: &[Plain],
@@ -160,7 +160,7 @@ impl OpenSession<'_> {
             if !judged.passed() {
                 continue;
             }
-            // By all dwells: an effect may be one of those in which the table turns.
+            // Judged by all dwells: an effect may act only while the table turns.
             let [with, without] =
                 [&found.calibration, &plain.calibration].map(|c| judge_all(&by, c));
             if !with?.beats(&without?) {

@@ -1,5 +1,4 @@
-//! Conditions of a dwell: samples come, the unit is as still or as steady as it can be, and its pose and rate are those of
-//! a step.
+//! Conditions of a dwell: samples arrive, the unit is at rest or turns steadily, and pose and rate are those of the requested dwell.
 
 use mimu::quantity::{Sensor, significant};
 use mimu_recording::RawUnit;
@@ -13,20 +12,20 @@ use crate::waiting::Waiting;
 use crate::watch::Seen;
 use mimu_equipment::step::Step;
 
-/// Share of the samples of a second that may be missing where only means matter, and where turns are integrated as well.
+/// Largest fraction of missing samples in a second: if only means are used, and if turns are integrated too.
 const LOST_SHARE: [f64; 2] = [0.5, 0.1];
-/// Departure of a rate that still is the one that is wanted: sensitivities differ from the data sheet's by some per cent.
+/// Accepted relative difference from the requested rate: sensitivities differ from the data sheet's by a few per cent.
 const RATE_SHARE: f64 = 0.2;
-/// The same of any rate, deg/s: noise and what the null has moved by.
+/// Accepted difference at any rate, deg/s: noise and drift of the null.
 const RATE_DPS: f64 = 2.0;
 
-/// Readings in SI whose size at rest is off gravity by more than this factor are in another unit.
+/// If the magnitude of SI readings at rest differs from gravity by more than this factor, they are in another unit.
 const NEAR: f64 = 1.6;
-/// So many turns in a row, and more than half of all, without their samples are no chance: the gyro is not calibrated so.
+/// If this many consecutive turns, and more than half of all, lack samples, this is no accident: the gyro cannot be calibrated this way.
 const LOST_IN_A_ROW: u32 = 4;
 
 impl UnitSession {
-    /// Why no dwell can run now.
+    /// Why no dwell can run now, if so.
     pub(super) fn waits(
         &self,
         seen: &Seen,
@@ -64,7 +63,7 @@ impl UnitSession {
         None
     }
 
-    /// Why its rate differs from the requested one.
+    /// Reports a rate that differs from the requested one.
     pub(super) fn turns_otherwise(&self, seen: &Seen, step: &Step) -> Option<Waiting> {
         let nominal = self.nominal.as_ref()?;
         let rate = self.watch.rate(seen, &nominal[0]);
@@ -75,7 +74,7 @@ impl UnitSession {
         })
     }
 
-    /// The step that this pose is: the one that is wanted or, where a person turns the unit and no dwell runs yet, one of those to come.
+    /// The dwell that matches this pose: the requested one or, if a person turns the unit and no dwell runs yet, one of the others to come.
     pub(super) fn pose(
         &self,
         up: &Vector3<f64>,
@@ -87,14 +86,14 @@ impl UnitSession {
         let off = |s: &Step| up.angle(&s.up()).to_degrees();
         let limit = asked.fixture.tolerance_deg();
         let by_hand = asked.fixture != Fixture::Table;
-        // By hand a pose is what it is, and only has to be another than those before.
+        // By hand the pose is recorded as it is. It only has to differ from earlier ones.
         let as_it_is = |s: &Step| match by_hand {
             true => Step::at_rest(*up, s.dwell_s),
             false => *s,
         };
         let had = self.folder.dwells(self.part);
         let near = |d: &Step| off(d) < SAME_POSE_DEG;
-        // The last pose is no turn; one before it may be asked for again.
+        // The same pose twice in a row is no turn. An earlier pose may be requested again.
         let same = by_hand && had.last().is_some_and(|d| near(&d.1));
         let again = same || by_hand && off(step) > limit && had.iter().any(|d| near(&d.1));
         if off(step) <= limit && !again {
@@ -141,8 +140,7 @@ impl UnitSession {
         Err(Error::device(self.name(), problem, remedy).about(Argument::RawUnit))
     }
 
-    /// Counts turns with missing samples, which do not calibrate the gyro; `missing`: number of missing samples in the turn before the
-    /// completed dwell.
+    /// Counts turns with missing samples, which cannot calibrate the gyro. `missing`: missing samples in the turn before the completed dwell.
     pub(super) fn count_turn(&mut self, missing: u64, tell: &mut Vec<Event>) -> Result<()> {
         let lost = missing > 0;
         self.turns = self.turns.with(lost);
@@ -171,7 +169,7 @@ impl UnitSession {
         Err(Error::device(self.name(), problem, remedy).about(Argument::Baud))
     }
 
-    /// Tells of readings at the end of their range in the turn to the dwell that was had: a turn is integrated from all of them.
+    /// Reports samples at a rail in the turn before the completed dwell: all samples of a turn are integrated.
     pub(super) fn tell_clipped(&self, clipped: u64, tell: &mut Vec<Event>) {
         if clipped > 0 {
             let words = format!(
@@ -187,11 +185,11 @@ impl UnitSession {
     }
 }
 
-/// Turns between dwells by hand.
+/// Statistics of the turns between dwells by hand.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Turns {
     all: u32,
-    /// In which samples are missing.
+    /// Turns with missing samples.
     lost: u32,
     in_a_row: u32,
 }
@@ -206,12 +204,12 @@ impl Turns {
     }
 }
 
-/// Motion of gyro and accelerometer that is allowed at a rate: a table's own unsteadiness is no movement of the unit on it.
+/// Accepted motion of gyro and accelerometer at a rate. The unsteadiness of a table's rate does not count as motion.
 pub(super) fn motion_limits(rate_dps: f64) -> [f64; 2] {
     [if rate_dps != 0.0 { 5.0 } else { 1.0 }, 1.0]
 }
 
-/// Departure from a rate that is allowed, deg/s.
+/// Accepted difference from a rate, deg/s.
 pub(super) fn rate_limit_dps(rate_dps: f64) -> f64 {
     RATE_SHARE * rate_dps.abs() + RATE_DPS
 }

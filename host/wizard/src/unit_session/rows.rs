@@ -1,4 +1,4 @@
-//! Rows of a recording between two dwells, and the known inputs of those of a dwell.
+//! Rows of a recording between two dwells, and the known inputs of a dwell.
 
 use mimu::estimate::earth::Earth;
 use mimu_recording::Batch;
@@ -6,10 +6,10 @@ use mimu_recording::Batch;
 use crate::procedure::SessionConfig;
 use mimu_equipment::step::Step;
 
-/// Known inputs of a step on a table: rates, deg/s, and specific forces, m/s².
+/// Known inputs of a dwell on a table: rates, deg/s, and specific forces, m/s².
 pub(super) fn known(step: &Step, asked: &SessionConfig) -> [f64; 6] {
     let up = step.up();
-    // Of the Earth's rate the table's heading leaves open all but what is along the vertical.
+    // The heading of the table is unknown, so only the vertical component of the Earth's rate is known.
     let earth = asked
         .latitude_deg
         .map(|_| Earth::at(asked.latitude_deg).rate(&up));
@@ -18,7 +18,7 @@ pub(super) fn known(step: &Step, asked: &SessionConfig) -> [f64; 6] {
     [rate.x, rate.y, rate.z, force.x, force.y, force.z]
 }
 
-/// Without the first rows.
+/// Removes the first rows.
 pub(super) fn cut(rows: &mut Batch, first: usize) {
     rows.t_s.drain(..first);
     rows.step.drain(..first);
@@ -29,7 +29,7 @@ pub(super) fn cut(rows: &mut Batch, first: usize) {
     }
 }
 
-/// Without the rows from this one on.
+/// Removes the rows from index `to` on.
 pub(super) fn shorten(rows: &mut Batch, to: usize) {
     rows.t_s.truncate(to);
     rows.step.truncate(to);

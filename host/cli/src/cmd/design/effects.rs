@@ -19,10 +19,10 @@ use mimu_recording::error::{Error, Result};
 use super::{DesignArgs, NoiseArg};
 use crate::reading::read;
 
-/// Sample rate where no recording says another, Hz.
+/// Default sample rate without a recording, Hz.
 const SAMPLE_RATE_HZ: f64 = 1000.0;
 
-/// Temperatures as on the command line.
+/// Parses the chamber's temperatures.
 pub(super) fn chamber(text: &str) -> std::result::Result<[f64; 3], String> {
     let list: Vec<f64> = text
         .split(',')
@@ -66,7 +66,7 @@ fn targets(ids: &[String]) -> Result<Vec<Target>> {
 }
 
 impl DesignArgs {
-    /// The unit and its fixture, where no recording says them.
+    /// The unit and its fixture from the options, if there is no recording.
     fn setup(&self) -> Setup {
         let fixture = self.fixture();
         let motion = self.motion();
@@ -93,7 +93,7 @@ impl DesignArgs {
         }
     }
 
-    /// Noise of gyro and accelerometer, where it is given here.
+    /// Noise of gyro and accelerometer from the options, if given.
     fn given_noise(&self, targets: &[Target]) -> Result<Option<[DwellNoise; 2]>> {
         match &self.noise {
             None => Ok(None),
@@ -127,7 +127,7 @@ impl DesignArgs {
     }
 }
 
-/// A recording of the unit, fitted.
+/// Fit of a recording of the unit.
 fn after(path: &Path, args: &DesignArgs) -> Result<Fit> {
     let outputs = [args.output.as_deref(), args.json.file()];
     let prepared = read(path, STILL_FACTOR.into(), &outputs, &[])?;

@@ -1,4 +1,4 @@
-//! `mimu device check` and `mimu device kalman`: what the device computes against what the PC computes.
+//! `mimu device check` and `mimu device kalman`: compare the device's computation with the PC's.
 
 use std::io::{BufRead as _, IsTerminal as _};
 use std::path::PathBuf;
@@ -119,7 +119,7 @@ pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
                 "apply {}, {}, {} {unit}, then press Enter: ",
                 input[0], input[1], input[2]
             );
-            // At the end of the input nobody is there to wait for.
+            // At the end of standard input there is nobody to wait for.
             let _ = std::io::stdin().lock().read_line(&mut String::new());
         }
         Ok(())

@@ -29,7 +29,7 @@ pub struct TrimArgs {
     json: JsonArgs,
 }
 
-/// `+z`, `-x` and the like.
+/// Parses `+z`, `-x` and similar.
 fn up(text: &str) -> std::result::Result<[f64; 3], String> {
     let (sign, axis) = match text.as_bytes() {
         [b'+', axis] | [axis] => (1.0, *axis),

@@ -1,4 +1,4 @@
-//! `mimu thermal plan`: arguments and what follows from them.
+//! `mimu thermal plan`: arguments and execution.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `mimu thermal record`: arguments and what follows from them.
+//! `mimu thermal record`: arguments and execution.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -19,7 +19,7 @@ use crate::cmd::record::RecordingArgs;
 use crate::output::{check_outputs, print, progress};
 use crate::report;
 
-/// Time of the procedure between two lines of progress within a round, s.
+/// Interval of progress lines within a round, s, by the procedure's time.
 const LINE_S: f64 = 60.0;
 
 #[derive(Args)]
@@ -94,7 +94,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<()> {
     }
 }
 
-/// Says what nobody but a person does.
+/// Prints the instructions for the person.
 fn begin(procedure: &Procedure, equipped: &Equipped) {
     let first = &procedure.dwells[0];
     if !equipped.has_table()
@@ -113,7 +113,7 @@ fn begin(procedure: &Procedure, equipped: &Equipped) {
     }
 }
 
-/// A line for each round, and for each minute; on a terminal also how it stands at this instant.
+/// Prints a line for each round and each minute. A terminal also shows the present state.
 struct Lines {
     has_chamber: bool,
     spinner: ProgressBar,

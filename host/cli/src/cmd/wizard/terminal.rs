@@ -1,4 +1,4 @@
-//! `mimu wizard` at a terminal: ports with their threads, tables, keyboard and screen.
+//! `mimu wizard` at a terminal: ports with their threads, driven tables, keyboard and screen.
 
 use std::io::{IsTerminal as _, Write};
 use std::path::Path;
@@ -26,7 +26,7 @@ use crate::views::answers::{Beforehand, Typed};
 use crate::views::lines::Lines;
 use crate::views::screen::Screen;
 
-/// Opens a board that writes lines of text, once for each time that it is called.
+/// Opens a board that writes lines of text, again at each call.
 fn opener(text: Text, folder: &Path) -> Opener {
     let mut opener = TextOpener::new(text, begun_rate_hz(folder));
     Box::new(move |next| {
@@ -36,11 +36,11 @@ fn opener(text: Text, folder: &Path) -> Opener {
 }
 
 impl WizardArgs {
-    /// The units: each with its port and its folder.
+    /// The units with their ports and folders.
     fn wanted(&self) -> Result<Vec<UnitSpec>> {
         let ports: Vec<Option<String>> = match (self.ports.as_slice(), &self.text.text) {
             ([], None) => vec![None],
-            // Who writes lines of text cannot be asked who it is.
+            // A board that writes lines of text cannot be identified, so the user has to name its port.
             ([], Some(_)) => {
                 let mimu_device::Ports {
                     of_boards, others, ..
@@ -75,13 +75,13 @@ impl WizardArgs {
     }
 }
 
-/// Longest that a session may take to end once that is asked for.
+/// Longest time for a session to end after the request.
 const ENDS: Duration = Duration::from_millis(900);
-/// The same where it leads a table, which it stops before it ends.
+/// Longest time if the session drives a table, which it stops first.
 const TABLE_STOPS: Duration = Duration::from_secs(15);
 
-/// Ends the program where the session does not hear that it is to end: a port that says nothing and a diagnosis take half a minute. What
-/// counts is on the disk, and a device that is cut off while it stores keeps a whole calibration.
+/// Ends the program if the session does not react to the request: it may wait for a silent port or a diagnosis for half a minute. All completed work
+/// is on disk, and a device that is interrupted while storing keeps a complete calibration.
 fn end_in_time(stop: Arc<AtomicBool>, ends: Duration, on_screen: bool) -> Result<()> {
     let watch = move || {
         while !stop.load(Ordering::Relaxed) {
@@ -156,7 +156,7 @@ pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
     };
     let page = super::page(command_line);
     let outcome = complete(carry_out(asked, wanted, driver, view.as_mut(), &page));
-    // The terminal is given back before anything is printed to it.
+    // The terminal is restored before anything is printed to it.
     drop(view);
     let outcome = outcome?;
     print(&args.json, &report::wizard_text(&outcome), &outcome, None)?;

@@ -9,7 +9,7 @@ use mimu::quantity::{minutes, plural, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::design::{Comparison, Design, Noticed, Spent, Way};
 
-/// Dwells listed: as many as the longest design.
+/// Largest number of dwells listed: that of the longest design.
 pub(super) const LISTED: usize = 200;
 
 /// Result of `mimu design`: a summary, or with `verbose` everything.
@@ -105,11 +105,11 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
     out
 }
 
-/// Dwells side by side, and their rows, in a summary.
+/// Columns and rows of dwells in a summary.
 const ACROSS: usize = 3;
 const ROWS: usize = 8;
 
-/// What a person needs of a design: how good it is, how long it takes, its dwells and what they determine.
+/// Summary of a design: its quality, duration, dwells, and the parameters that they determine.
 fn summary(out: &mut String, report: &Design) {
     let mut line = |name: &str, text: String| {
         let _ = writeln!(out, "  {name:<22}{text}");
@@ -146,7 +146,7 @@ fn summary(out: &mut String, report: &Design) {
     let cell = |k: usize| {
         let [x, y, z] = report.positions[k].map(|c| round(c, 1e3));
         let rate = report.rates_dps.as_ref().and_then(|rates| rates.get(k));
-        // Three cells with a rate and their gaps are just a hundred columns.
+        // Three cells with a rate and their gaps fill exactly a hundred columns.
         let rate = rate.map_or(String::new(), |r| format!("{:>7.1}", round(*r, 10.0)));
         format!("{:>3}:{x:>7.3}{y:>7.3}{z:>7.3}{rate}", k + 1)
     };
@@ -165,7 +165,7 @@ fn summary(out: &mut String, report: &Design) {
     );
 }
 
-/// Text in lines beside a name.
+/// Wrapped text next to a name.
 pub(super) fn wrapped(out: &mut String, name: &str, text: &str) {
     wrap(out, &format!("  {name:<22}"), text);
 }
@@ -190,7 +190,7 @@ fn sigma(report: &Design) -> String {
     }
 }
 
-/// Order of the dwells, and what it costs.
+/// Order of the dwells, and its cost in time.
 fn order(report: &Design) -> String {
     let name = match report.order {
         "shortest" => {
@@ -206,7 +206,7 @@ fn order(report: &Design) -> String {
     }
 }
 
-/// What is noticed and what is not, as lines.
+/// Effects that the design reveals or cannot reveal, one line each.
 fn noticed(report: &Design) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();
     for notice in &report.notices {
@@ -264,7 +264,7 @@ fn settings(out: &mut String, report: &Design) {
     }
 }
 
-/// Intervals of the parameters, in so many rows at most.
+/// Intervals of the parameters, in at most `most` rows.
 fn parameters(out: &mut String, report: &Design, most: usize) {
     let cells: Vec<String> = report
         .sigma_per_parameter
@@ -277,7 +277,7 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
         })
         .collect();
     let width = 2 + cells.iter().map(|c| c.chars().count()).max().unwrap_or(0);
-    // A column for each sensor where they fit.
+    // One column for each sensor if they fit.
     let across = if 3 * width <= COLUMNS {
         3
     } else {
@@ -309,7 +309,7 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
     }
 }
 
-/// How a budget is spent, and what else was looked at.
+/// Use of a budget, and the alternatives that were considered.
 fn spent(out: &mut String, by_noise: bool, budget: &Spent) {
     let best = &budget.best;
     let moving = best.moves_s / budget.time_s;
@@ -359,7 +359,7 @@ fn spent(out: &mut String, by_noise: bool, budget: &Spent) {
     }
 }
 
-/// Result of `mimu design --compare`: one design a line.
+/// Result of `mimu design --compare`: one line per design.
 pub fn comparison_text(comparison: &Comparison) -> String {
     let mut out = String::new();
     if let Some(first) = comparison.designs.first() {

@@ -22,24 +22,24 @@ use crate::hint;
 use crate::report::page::{Made, number, page, spoken};
 use tables::chance;
 
-/// One sensor's figures and what is drawn of them.
+/// One sensor's figures and drawings.
 struct Shown<'a> {
     name: Sensor,
     figures: &'a SensorDiagnosisResult,
     picture: &'a Picture,
 }
 
-/// The parts of a page that a diagnosis has something to say in.
+/// The sections of a page about a diagnosis.
 pub struct Sections<'a> {
     d: &'a DiagnosisResult,
     shown: Vec<Shown<'a>>,
 }
 
 impl<'a> Sections<'a> {
-    /// Of a diagnosis.
+    /// The sections of a diagnosis.
     ///
     /// # Errors
-    /// A model of it is singular, so that there is nothing to draw.
+    /// A model of the diagnosis is singular, so that nothing can be drawn.
     pub fn new(d: &'a DiagnosisResult, made: &Made) -> Result<Self> {
         let shown = d.sensors.present().map(|(name, figures)| {
             let picture = figures.picture.as_ref()?;
@@ -60,18 +60,18 @@ impl<'a> Sections<'a> {
         Ok(Self { d, shown })
     }
 
-    /// What is drawn of the accelerometer.
+    /// The accelerometer's data for drawings.
     pub fn accel(&self) -> Option<&Picture> {
         let accel = self.shown.iter().find(|s| s.name == Sensor::Accel);
         accel.map(|s| s.picture)
     }
 
-    /// The verdict, in a sentence for each sensor, after what is wrong with the recording.
+    /// Faults of the recording, then the verdict, in a sentence for each sensor.
     pub fn verdict(&self) -> Markup {
         first(self.d)
     }
 
-    /// Error before and after, on the recording and on a second one.
+    /// Errors before and after, on the recording and on a second one.
     pub fn errors(&self) -> Markup {
         html! {
             (tables::errors(&self.shown))
@@ -87,7 +87,7 @@ impl<'a> Sections<'a> {
         }
     }
 
-    /// What nothing explains, if there is anything.
+    /// Unexplained residuals, if there are any.
     pub fn leftover(&self) -> Markup {
         html! {
             @if !self.d.leftover.is_empty() {
@@ -106,7 +106,7 @@ impl<'a> Sections<'a> {
         html! { @for s in &self.shown { (sensor(self.d, s)) } }
     }
 
-    /// What was tried and not accepted, and what this recording could not show.
+    /// Effects that were not accepted, and those that this recording could not show.
     pub fn tried(&self) -> Markup {
         html! {
             h2 { "Tried and rejected" }
@@ -123,7 +123,7 @@ impl<'a> Sections<'a> {
         recorded(self.d)
     }
 
-    /// How it is decided.
+    /// Description of the method.
     pub fn method(&self) -> Markup {
         method()
     }
@@ -135,7 +135,7 @@ pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
     Ok(page(&title, &body(d, made)?))
 }
 
-/// What is in the page.
+/// Contents of the page.
 ///
 /// # Errors
 /// See [`Sections::new`].
@@ -154,7 +154,7 @@ pub fn body(d: &DiagnosisResult, made: &Made) -> Result<Markup> {
     })
 }
 
-/// What is wrong with the recording, and the verdict.
+/// Faults of the recording, and the verdict.
 fn first(d: &DiagnosisResult) -> Markup {
     html! {
         @if !d.recording_problems.is_empty() {
@@ -234,7 +234,7 @@ fn verdict(d: &DiagnosisResult) -> Markup {
     }
 }
 
-/// What the marks of the figures mean.
+/// A mark of the figures, for the legend.
 fn key(class: &str, d: &str) -> Markup {
     html! { svg class="key" viewBox="0 0 24 12" xmlns="http://www.w3.org/2000/svg" { path class=(class) d=(d) {} } }
 }
@@ -291,7 +291,7 @@ fn sensor(d: &DiagnosisResult, s: &Shown) -> Markup {
     }
 }
 
-/// With a capital.
+/// `text` with a capital letter.
 fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
@@ -341,7 +341,7 @@ fn effect(d: &DiagnosisResult, s: &Shown, one: &Accepted, panels: &[Panel]) -> M
     }
 }
 
-/// What the next recording has to distinguish.
+/// Effects that the next recording has to distinguish.
 fn confused(d: &DiagnosisResult) -> Markup {
     html! {
         @if !d.confused.is_empty() {

@@ -1,4 +1,4 @@
-//! The diagnosis for people.
+//! The diagnosis as text.
 
 mod effect;
 mod experiments;
@@ -19,19 +19,19 @@ use mimu::readable;
 use mimu::result::diagnosis::{DiagnosisResult, SecondResult, SensorDiagnosisResult};
 use mimu::warning::Warning;
 
-/// Why its figures are not those of `mimu fit`.
+/// Why the figures differ from those of `mimu fit`.
 const FIGURES: &str = "The figures before differ slightly from those of `mimu fit`, because residuals are weighted by the variance components of this diagnosis.";
-/// What is reported of residuals that the biases of usual sensors leave.
+/// Remark on residuals that can come from the biases of usual sensors.
 pub(super) const USUAL: &str = "usual biases wander by up to four times the noise of a dwell; --noise (from `mimu allan` of the unit at rest) shows whether this one does";
-/// Residuals of a sensor that the summary lists.
+/// Largest number of residuals of a sensor in the summary.
 const LISTED: usize = 3;
 
-/// How much of a diagnosis is printed.
+/// Detail of the printed diagnosis.
 #[derive(Debug, Clone, Copy)]
 pub struct Detail {
-    /// Everything, with the reason of each effect that was not accepted.
+    /// Everything, including why effects were not accepted.
     pub all: bool,
-    /// The experiments that would show or distinguish more.
+    /// Experiments that would show or distinguish more.
     pub next: bool,
 }
 
@@ -74,7 +74,7 @@ pub fn diagnosis_text(d: &DiagnosisResult, detail: Detail) -> String {
     out
 }
 
-/// An error figure of `s`; a dash where there are as many parameters as residuals, and only rounding is left.
+/// An error figure of `s`; a dash if there are as many parameters as residuals, because then only rounding remains.
 fn shown(s: &SensorDiagnosisResult, value: f64) -> String {
     match value.is_finite() && s.says_anything() {
         true => readable::error(s.unit).write(value),
@@ -130,7 +130,7 @@ fn errors(out: &mut String, d: &DiagnosisResult) {
             figure(s.rms_after),
             figure(s.held_out_rms_before),
             figure(s.held_out_rms_after),
-            // Known from the noise alone, even where the residuals say nothing.
+            // The noise floor is known even if the residuals are not informative.
             significant(s.noise_floor * unit.factor),
         );
         let found = seconds.iter().flatten().find(|(of, ..)| *of == name);
@@ -209,7 +209,7 @@ fn sensor(
     }
 }
 
-/// What remains beyond the noise. Without `all` residuals that correlate with the same quantity are together, and the first few listed.
+/// Residuals beyond the noise. Unless `all`, those that correlate with the same quantity are grouped, and only the first few are listed.
 fn residuals(out: &mut String, d: &DiagnosisResult, name: Sensor, all: bool) {
     let mut groups: Vec<Vec<&Leftover>> = Vec::new();
     for l in d.leftover.iter().filter(|l| l.sensor == name) {
@@ -247,7 +247,7 @@ pub(super) fn converter(c: &WrittenConverter) -> String {
     )
 }
 
-/// By how much a score is worse or, beside what was found since, better.
+/// Difference in score: worse or, compared with later effects, better.
 pub(super) fn by(worse: f64) -> String {
     match worse >= 0.0 {
         true => format!("worse by {worse:.1}"),
@@ -255,7 +255,7 @@ pub(super) fn by(worse: f64) -> String {
     }
 }
 
-/// How an unlisted alternative model does in the place of an effect; `worse` in score.
+/// Quality of an unlisted alternative model instead of the effect; `worse` in score.
 pub(super) fn by_score(worse: f64) -> String {
     let how = if worse > 0.0 {
         "nearly as well"
@@ -265,7 +265,7 @@ pub(super) fn by_score(worse: f64) -> String {
     format!("{how}, {} in score", by(worse))
 }
 
-/// One line for all that the recordings could not show or distinguish.
+/// One line about everything that the recordings could not show or distinguish.
 fn open(out: &mut String, d: &DiagnosisResult) {
     let unseen = d.not_excited.len();
     let pairs = d.confused.len() + d.undecided.len();
@@ -287,7 +287,7 @@ fn open(out: &mut String, d: &DiagnosisResult) {
     let _ = writeln!(out, "{what}");
 }
 
-/// Warnings. Without `all` the first of each kind, and how many there are.
+/// Warnings. Unless `all`, only the first of each kind with their number.
 fn warnings(out: &mut String, warnings: &[Warning], all: bool) {
     let others = warnings.iter().filter(|w| !w.is_of_recording());
     for (warning, more) in kinds(others, |one, other| !all && one.is_like(other)) {
@@ -295,7 +295,7 @@ fn warnings(out: &mut String, warnings: &[Warning], all: bool) {
     }
 }
 
-/// What the plan of the next experiment does not show, by the reason.
+/// Effects that the plan of the next experiment does not show, by the reason.
 pub fn not_in_plan_text(d: &DiagnosisResult) -> String {
     let mut out = String::new();
     let mut reasons: Vec<NotShown> = d.not_in_plan.iter().map(|n| n.reason).collect();

@@ -11,10 +11,10 @@ use crate::report::page::{number, spoken};
 use crate::report::thermal_plot::{Changes, Point, panel};
 
 const POINTS: usize = 81;
-/// Half of a 95 % interval over the standard deviation: curves are estimated from so many rows that their errors are Gaussian.
+/// Half-width of a 95 % interval in standard deviations. Curves are estimated from so many rows that their errors are Gaussian.
 const NORMAL_95: f64 = 1.959_964;
 
-/// Scale factors and biases over temperature, and what is known of the dies.
+/// Scale factors and biases over temperature, and the lags of the dies.
 pub fn section(calibration: &Calibration) -> Markup {
     let (Some(over), Some(curves)) = (&calibration.temperature, calibration.curves()) else {
         return html! {};
@@ -55,7 +55,7 @@ pub fn section(calibration: &Calibration) -> Markup {
     }
 }
 
-/// Scale factors, relative to themselves, or biases, in SI by the scale factors of the middle.
+/// Relative scale factors, or biases in SI, converted by the scale factors in the middle of the range.
 fn drawn(
     calibration: &Calibration,
     curves: &Curves,
@@ -76,7 +76,7 @@ fn drawn(
     let unit = readable::parameter(sensor.unit());
     let curve = |axis: usize| {
         let gain = |m: &Forward| m.matrix.row(axis).norm();
-        // Value and what a raw unit of it counts.
+        // The plotted value, and the factor to its unit.
         let (of, factor): (&dyn Fn(&Forward) -> f64, f64) = match kind {
             ParameterKind::Scale => (&gain, 1e6 / gain(middle)),
             _ => (&|m: &Forward| m.bias[axis], unit.factor / gain(middle)),
@@ -108,7 +108,7 @@ fn drawn(
     )
 }
 
-/// Standard deviation, raw, on a straight line between the nodes beside `temp_c`.
+/// Standard deviation, raw, interpolated linearly between the nodes next to `temp_c`.
 fn sigma(
     over: &OverTemperature,
     sensor: Sensor,

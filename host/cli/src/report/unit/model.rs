@@ -1,4 +1,4 @@
-//! Tables of a calibration: scale factors, biases, alignment, and the matrix that a program applies.
+//! Tables of a calibration: scale factors, biases, alignment, and the inverse model.
 
 use maud::{Markup, html};
 use mimu::calibration::verify::Verification;
@@ -9,7 +9,7 @@ use mimu_recording::RawUnit;
 
 use crate::report::page::{number, spoken, written};
 
-/// Both sensors' tables.
+/// Tables of both sensors.
 pub fn section(calibration: &Calibration) -> Markup {
     html! {
         @for sensor in Sensor::BOTH {
@@ -22,7 +22,7 @@ pub fn section(calibration: &Calibration) -> Markup {
     }
 }
 
-/// Halves of 95 % intervals over standard deviations.
+/// Half-width of the 95 % intervals in standard deviations.
 fn widening(table: &TriadTable) -> f64 {
     let ratio = |table: &TriadTable| Some(table.interval_o?[0] / table.sigma_o?[0]);
     ratio(table).filter(|r| r.is_finite()).unwrap_or(1.96)
@@ -32,7 +32,7 @@ fn value(si: f64, half: Option<f64>, factor: f64) -> Markup {
     html! {
         data value=(si) {
             @match half {
-                // What defines the frame is known exactly.
+                // Parameters that define the frame are known exactly.
                 Some(0.0) => { (number(si, factor, "")) " (fixed)" }
                 Some(half) => (written(&plus_minus(si * factor, half * factor))),
                 None => (written(&mimu::quantity::significant(si * factor))),
@@ -83,7 +83,7 @@ fn physical(table: &TriadTable) -> Markup {
     }
 }
 
-/// As many as a device has.
+/// The digits of single precision, as on a device.
 fn digits(value: f64) -> String {
     match value == 0.0 {
         true => "0".into(),

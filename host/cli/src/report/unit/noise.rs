@@ -1,4 +1,4 @@
-//! Noise at rest: the coefficients, and the Allan deviation that they describe.
+//! Noise at rest: the coefficients, and the Allan deviation of their model.
 
 use maud::{Markup, html};
 use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
@@ -9,7 +9,7 @@ use mimu_allan::model::{FLOOR, Term};
 use crate::report::page::{number, spoken};
 use crate::report::svg::{Frame, Panel, decades};
 
-/// Points of a curve.
+/// Number of points of a curve.
 const POINTS: usize = 60;
 const CLASSES: [&str; 3] = ["axis-x", "axis-y", "axis-z"];
 
@@ -54,7 +54,7 @@ fn coefficients(sensor: Sensor, channels: &[&NoiseChannel], confidence: f64) -> 
                                     (number(c.value, unit.factor, "")) " (" (number(c.lower, unit.factor, "")) " to "
                                     (number(c.upper, unit.factor, "")) ")"
                                 },
-                                // What would show it is in the noise file.
+                                // The noise file says how to determine it.
                                 Err(why) => td { span class="dim" { (why.split(';').next().unwrap_or(why)) } },
                             }
                         }
@@ -65,7 +65,7 @@ fn coefficients(sensor: Sensor, channels: &[&NoiseChannel], confidence: f64) -> 
     }
 }
 
-/// Unit of a column, behind a comma; all channels of a sensor have the same.
+/// Unit of a column, after a comma. All channels of a sensor have the same.
 fn unit_of(channels: &[&NoiseChannel], term: Term) -> String {
     let known = channels.iter().find_map(|c| c.get(term).ok());
     known.map_or_else(String::new, |c| {

@@ -1,4 +1,4 @@
-//! The poses of the dwells on a sphere, and how far each is off.
+//! The poses of the dwells on a sphere, with their residuals.
 
 use maud::{Markup, html};
 use mimu::calibration::Calibration;
@@ -10,9 +10,9 @@ use nalgebra::Vector3;
 
 use crate::report::svg::{Panel, px};
 
-/// Residual over noise from which on a pose is marked.
+/// Residual from which a pose is marked, in noise sigmas.
 const FAR: f64 = 2.5;
-/// Radius of a hemisphere and distance of their centres, pixels.
+/// Radius of a hemisphere, and distance of the centres, pixels.
 const RADIUS: f64 = 92.0;
 const APART: f64 = 250.0;
 
@@ -36,7 +36,7 @@ pub fn figure(prepared: &Prepared, calibration: &Calibration, accel: Option<&Pic
     let centres = [145.0, 145.0 + APART];
     let place = |(up, _): &(Vector3<f64>, f64)| {
         let below = usize::from(up.z < 0.0);
-        // Equal areas: a lack of poses looks as large as it is.
+        // Equal-area projection: an area without poses appears in its true proportion.
         let distance = (1.0 - up.z.abs()).max(0.0).sqrt();
         let across = up.xy().norm().max(1e-9);
         let x = centres[below] + RADIUS * distance * up.x / across;
@@ -75,7 +75,7 @@ pub fn figure(prepared: &Prepared, calibration: &Calibration, accel: Option<&Pic
     }
 }
 
-/// Largest residual of a dwell over its noise, with all effects.
+/// Largest residual of a dwell with all effects, relative to its noise.
 fn residual(dwell: &Dwell, accel: Option<&Picture>) -> f64 {
     let middle_s = dwell.start_s + 0.5 * dwell.duration_s;
     let tracks = accel.into_iter().flat_map(|p| &p.tracks);

@@ -7,12 +7,12 @@ use mimu::quantity::{AXES, Sensor};
 use crate::report::page::spoken;
 use crate::report::svg::{Panel, range};
 
-/// Most points of a curve: of more blocks, the smallest and the largest of neighbours are drawn.
+/// Largest number of points of a curve. If there are more blocks, the minima and maxima of neighbours are drawn.
 const POINTS: usize = 600;
 const CLASSES: [&str; 3] = ["axis-x", "axis-y", "axis-z"];
 const MINUTE_S: f64 = 60.0;
 
-/// Both sensors.
+/// Raw readings of both sensors.
 pub fn figure(prepared: &Prepared) -> Markup {
     let unit = prepared.manifest.raw_unit;
     let used = |sensor| {

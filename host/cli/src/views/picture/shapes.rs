@@ -1,4 +1,4 @@
-//! Frames, bars and lines of text, of which the picture is made.
+//! Frames, bars and lines of text of the picture.
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -6,7 +6,7 @@ use ratatui::style::{Color, Style, Stylize as _};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Paragraph};
 
-/// A frame with a title; what is inside.
+/// Draws a frame with a title, and returns the area inside.
 pub(super) fn framed(frame: &mut Frame, area: Rect, title: &str, waits: bool) -> Rect {
     let title = clipped(title, usize::from(area.width).saturating_sub(4));
     let mut block = Block::bordered().title(format!(" {title} ").bold());
@@ -18,7 +18,7 @@ pub(super) fn framed(frame: &mut Frame, area: Rect, title: &str, waits: bool) ->
     inner
 }
 
-/// Met or not in a word; its colour says the same once more.
+/// A word for met or not; the colour only repeats it.
 pub(super) fn sign(met: bool, words: [&'static str; 2]) -> Span<'static> {
     match met {
         true => Span::raw(words[0]).green(),
@@ -26,7 +26,7 @@ pub(super) fn sign(met: bool, words: [&'static str; 2]) -> Span<'static> {
     }
 }
 
-/// A bar of so many cells.
+/// A bar of this many cells.
 pub(super) fn filled(share: f64, cells: usize) -> String {
     let full = (share.clamp(0.0, 1.0) * cells as f64).round() as usize;
     format!("{}{}", "█".repeat(full), "·".repeat(cells - full))
@@ -45,7 +45,7 @@ pub(super) fn grouped(number: u64) -> String {
     text
 }
 
-/// At most so many characters.
+/// `text`, shortened to this many characters.
 pub(super) fn clipped(text: &str, wide: usize) -> String {
     match text.chars().count() <= wide {
         true => text.into(),
@@ -57,7 +57,7 @@ pub(super) fn clipped(text: &str, wide: usize) -> String {
     }
 }
 
-/// Lines of at most so many characters, broken at blanks where there are any; all but the first are indented.
+/// Lines of at most this many characters, broken at spaces if there are any. All but the first are indented.
 pub(super) fn wrapped(text: &str, wide: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     let mut length = 0;
@@ -90,7 +90,7 @@ pub(super) fn wrapped(text: &str, wide: usize) -> Vec<String> {
     lines
 }
 
-/// Lines as they are.
+/// Lines without wrapping.
 pub(super) fn text(lines: Vec<String>) -> Paragraph<'static> {
     Paragraph::new(lines.into_iter().map(Line::raw).collect::<Vec<_>>())
 }

@@ -1,4 +1,4 @@
-//! The parameters of a unit beside what is wanted of them.
+//! The uncertainties of a unit's parameters, with their targets.
 
 use mimu::quantity::significant;
 use mimu_wizard::refit::{Aim, Progress};
@@ -10,7 +10,7 @@ use ratatui::widgets::Paragraph;
 
 use super::shapes::{framed, sign, text, wrapped};
 
-/// The worst half-width of each kind; `unit` names it where there are several.
+/// The largest half-width of each kind; `unit` is the unit's name if there are several.
 pub(super) fn draw_table(
     frame: &mut Frame,
     area: Rect,
@@ -61,7 +61,7 @@ fn short(value: f64) -> String {
     }
 }
 
-/// A target as it was given.
+/// A target as given.
 fn significant_or_whole(value: f64) -> String {
     format!("{value}").chars().take(6).collect()
 }

@@ -1,4 +1,4 @@
-//! The whole screen as text, beside files of what it is to be. `MIMU_WRITE=1` writes the files anew: look at them then.
+//! Compares the whole screen with files of its text. `MIMU_WRITE=1` rewrites the files; check them afterwards.
 
 mod svg;
 

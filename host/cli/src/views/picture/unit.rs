@@ -1,4 +1,4 @@
-//! How a unit stands: each figure beside its limit, why it waits, and how much of a dwell is left.
+//! State of a unit: each figure with its limit, the reason why it waits, and the remaining time of a dwell.
 
 use mimu_wizard::event::{Phase, Standing, UnitStanding};
 use ratatui::Frame;
@@ -11,10 +11,10 @@ use crate::hint;
 
 use super::shapes::{clipped, filled, framed, grouped, sign, wrapped};
 
-/// Cells of a bar; its middle is the limit.
+/// Cells of a bar. The limit is in the middle.
 const BAR: usize = 15;
 
-/// One unit with all that is known of it.
+/// One unit in full.
 pub(super) fn draw_unit(frame: &mut Frame, area: Rect, unit: &UnitStanding, standing: &Standing) {
     let waits = unit.waiting.is_some();
     let inner = framed(frame, area, &unit.unit, waits);
@@ -61,7 +61,7 @@ pub(super) fn draw_unit(frame: &mut Frame, area: Rect, unit: &UnitStanding, stan
     frame.render_widget(Paragraph::new(lines), inner);
 }
 
-/// Several units where there is no room for each: two lines of each, those that wait first.
+/// Several units without space for each: two lines per unit, waiting ones first.
 pub(super) fn draw_units(frame: &mut Frame, area: Rect, units: &[UnitStanding]) {
     let inner = framed(frame, area, &format!("{} units", units.len()), false);
     let wide = usize::from(inner.width);
@@ -119,7 +119,7 @@ fn bar_line(sensor: &str, value: f64, limit: f64, words: [&'static str; 2]) -> L
     ])
 }
 
-/// Three digits, and no more than four characters.
+/// Three digits, at most four characters.
 fn capped(value: f64) -> String {
     match value {
         v if v < 9.995 => format!("{v:.2}"),

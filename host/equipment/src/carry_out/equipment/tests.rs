@@ -6,7 +6,7 @@ use mimu_device::record::Procedure;
 use super::*;
 use crate::drive::{Abilities, ChamberLimits, Limits};
 
-/// A table and a chamber that keep what they are told.
+/// A table and a chamber that record their commands.
 #[derive(Clone)]
 struct Scripted {
     told: Arc<Mutex<Vec<String>>>,
@@ -205,7 +205,7 @@ fn what_the_drivers_lack_is_said_before_anything_moves() {
         let line = equipped(&plan, &[&all]).err().unwrap().to_string();
         assert!(line.contains(words), "{line}");
     }
-    // Two files, each with its part; or a person who warms a unit that lies still.
+    // Two files, one for the table and one for the chamber; or a person who changes the temperature of a unit at rest.
     assert!(equipped(&warm(&moves), &[&table, &chamber]).is_ok());
     assert!(equipped(&warm(REST), &[&chamber]).is_ok());
     assert!(equipped(&warm(REST), &[]).is_ok());

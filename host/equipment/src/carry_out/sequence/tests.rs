@@ -11,7 +11,7 @@ fn procedure(body: &str) -> Procedure {
     Procedure::of(&plan, 9.8, "plan.toml").unwrap()
 }
 
-/// What a table and a chamber that take `busy_s` for every motion are told, with the time, and when each dwell begins and ends.
+/// Orders to a table and a chamber, with their times, and when each dwell begins and ends. Every motion takes `busy_s`.
 fn carried_out(procedure: &Procedure, busy_s: f64) -> (Vec<(f64, Order)>, Vec<f64>) {
     let mut sequence = Sequence::new(procedure, true, true);
     let (mut orders, mut marks) = (Vec::new(), Vec::new());
@@ -52,7 +52,7 @@ fn a_dwell_begins_once_the_table_has_arrived_and_its_last_samples_are_here() {
     );
     let (orders, marks) = carried_out(&plan, 3.0);
     let close = |a: f64, b: f64| assert!((a - b).abs() < 0.05, "{a} {b}");
-    // 3 s to the first pose, then the lead-in; 3 s to the second and half a second until what was on its way has come.
+    // 3 s to the first pose, then the lead-in; 3 s to the second pose, and half a second for samples that may still arrive.
     for (mark, wanted) in marks.iter().zip([8.0, 18.0, 21.5, 25.5]) {
         close(*mark, wanted);
     }
@@ -73,7 +73,7 @@ fn the_chamber_is_led_along_its_temperatures() {
             _ => None,
         })
         .collect();
-    // Every 5 s of the ramp, and no more where nothing changes.
+    // Every 5 s during the ramp, and none while the temperature is constant.
     assert_eq!(sets.len(), 13, "{sets:?}");
     for (t, c) in sets {
         assert!((c - (20.0 + t / 6.0).min(30.0)).abs() < 0.02, "{t} {c}");
@@ -89,14 +89,14 @@ fn a_turn_is_marked_from_rest_to_rest_and_where_it_ends_nothing_moves() {
     );
     let (orders, marks) = carried_out(&plan, 4.0);
     let told = motions(&orders);
-    // To the first pose, and then turns only: each of them ends where the next dwell is.
+    // One motion to the first pose, then turns only: each ends where the next dwell is.
     assert_eq!(told.len(), 5, "{told:?}");
     for (order, deg) in told[1..].iter().zip([90.0, -90.0, 90.0, -90.0]) {
         assert!(
             matches!(order, Order::Turn(t) if t.angle_deg == deg && t.axis == TableAxis::Middle)
         );
     }
-    // A turn lasts until the table is done, and as long as samples are on their way.
+    // A turn lasts until the table has completed it, and half a second for samples that may still arrive.
     for (k, pair) in marks.chunks(2).enumerate() {
         let wanted = if k % 2 == 0 { 2.0 } else { 4.5 };
         assert!((pair[1] - pair[0] - wanted).abs() < 0.05, "{k}: {pair:?}");
@@ -116,7 +116,7 @@ fn a_round_waits_for_its_time_with_the_table_at_rest() {
         told.as_slice(),
         [Order::Go(_), Order::Go(_), Order::Halt, Order::Go(_)]
     ));
-    // At rest after 1 s the plan begins; the first round is due at once, the second 30 s later.
+    // The plan begins after 1 s at rest. The first round is due at once, the second 30 s later.
     assert!((marks[2] - marks[0] - 30.0).abs() < 0.6, "{marks:?}");
 }
 

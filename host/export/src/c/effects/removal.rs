@@ -1,4 +1,4 @@
-//! The text that removes effects: constants, what is remembered, and functions.
+//! Writes the code that removes effects: constants, state and functions.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use super::super::{list, number};
 use super::Effects;
 
 impl Effects {
-    /// Directions of the sensors, and the errors of converters.
+    /// Sensitive directions of the sensors, and the converters' nonlinearity.
     pub fn constants(&self, prefix: &str, out: &mut String) {
         for sensor in Sensor::BOTH.into_iter().filter(|s| !self.is_none_of(*s)) {
             let Some(directions) = &self.directions[sensor] else {
@@ -41,7 +41,7 @@ impl Effects {
         }
     }
 
-    /// `u`, the reading of `sensor` without the errors of its converters; `None` if there are none.
+    /// `u`, the reading of `sensor` without converter nonlinearity; `None` if none is known.
     pub fn without_code_errors(&self, prefix: &str, sensor: Sensor) -> Option<String> {
         let codes = &self.codes[sensor];
         codes.iter().flatten().next()?;
@@ -206,7 +206,7 @@ impl Effects {
     }
 }
 
-/// Name of the input of a sensor.
+/// Name of a sensor's input.
 fn input(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Gyro => "rate",

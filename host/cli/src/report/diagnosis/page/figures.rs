@@ -1,4 +1,4 @@
-//! The figures: residuals in time, effects against what they depend on, what is left against noise.
+//! The figures: residuals over time, effects against the quantities that they depend on, and remaining residuals against noise.
 
 use std::ops::Range;
 
@@ -12,16 +12,16 @@ use mimu::quantity::Sensor;
 
 /// Width and height of a figure, pixels.
 const SIZE: (f64, f64) = (560.0, 232.0);
-/// Room for the numbers and the name of the ordinate.
+/// Space for the numbers and the name of the ordinate.
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 8.0;
 const TOP: f64 = 26.0;
 const BOTTOM: f64 = 40.0;
-/// Between two drawings with one ordinate.
+/// Space between two drawings with a common ordinate.
 const GAP: f64 = 18.0;
 const MINUTE_S: f64 = 60.0;
 
-/// Factor and unit in which a person reads residuals.
+/// Factor and unit in which residuals are shown.
 pub fn unit(kind: ResidualKind, sensor: Sensor) -> (f64, &'static str) {
     match kind {
         ResidualKind::Angle => Figure::Direction.readable(sensor),
@@ -42,10 +42,10 @@ fn frames<const N: usize>(x: &Range<f64>, y: &Range<f64>) -> [Frame; N] {
     })
 }
 
-/// Rows from which on marks are drawn smaller.
+/// From this number of rows on, marks are smaller.
 const MANY: usize = 60;
 
-/// `rows` is how many marks there are.
+/// `rows` is the number of marks.
 fn drawing(label: &str, rows: usize, inside: &Markup) -> Markup {
     html! {
         svg class=[(rows > MANY).then_some("many")] role="img" aria-label=(label) viewBox={ "0 0 " (px(SIZE.0)) " " (px(SIZE.1)) }
@@ -53,7 +53,7 @@ fn drawing(label: &str, rows: usize, inside: &Markup) -> Markup {
     }
 }
 
-/// Ordinates of a drawing in the unit that a person reads, as multiples of a power of ten.
+/// Ordinate of a drawing in the shown unit, with a power of ten.
 struct Ordinate {
     by: f64,
     name: String,
@@ -61,7 +61,7 @@ struct Ordinate {
 }
 
 impl Ordinate {
-    /// Of `values`, SI, and zero.
+    /// Ordinate for `values` in SI, including zero.
     fn new(
         kind: ResidualKind,
         sensor: Sensor,
@@ -80,7 +80,7 @@ impl Ordinate {
     }
 }
 
-/// Residuals of a track in time, before and after; `after` where there are effects.
+/// Residuals of a track over time, before and after; `after` if there are effects.
 pub fn in_time(sensor: Sensor, track: &Track, blocks_s: &[f64], after: bool) -> Markup {
     let samples = &track.samples;
     let shown = if after { 2 } else { 1 };
@@ -123,7 +123,7 @@ pub fn in_time(sensor: Sensor, track: &Track, blocks_s: &[f64], after: bool) -> 
     )
 }
 
-/// Name of a track, of an axis with the sensor: `gyro x`, `gyro x at rest`, `turns, first direction`.
+/// Title of a track, with the sensor for an axis: `gyro x`, `gyro x at rest`, `turns, first direction`.
 fn title(sensor: Sensor, track: &Track) -> String {
     match track.group {
         Observable::Axis(_) | Observable::AtRest(_) => format!("{sensor} {}", track.name),
@@ -131,7 +131,7 @@ fn title(sensor: Sensor, track: &Track) -> String {
     }
 }
 
-/// An effect against what it depends on, left in and taken out.
+/// An effect against the quantity that it depends on, before and after its removal.
 pub fn against(sensor: Sensor, panel: &Panel) -> Markup {
     let (points, curve) = (&panel.points, &panel.curve);
     let values = points
@@ -165,7 +165,7 @@ pub fn against(sensor: Sensor, panel: &Panel) -> Markup {
     let ends = ends.start * scale..ends.end * scale;
     let name = match power {
         0 => name,
-        // The unit stands behind the last comma.
+        // The unit follows the last comma.
         power => match name.rsplit_once(", ") {
             Some((name, unit)) => format!("{name}, {}{unit}", times_ten(power)),
             None => name,
@@ -201,7 +201,7 @@ pub fn against(sensor: Sensor, panel: &Panel) -> Markup {
     )
 }
 
-/// Residuals in sigmas of the known noise against what noise alone would give.
+/// Quantiles of the residuals, in sigmas of the known noise, against those of noise alone.
 pub fn quantiles(picture: &Picture, after: bool) -> Markup {
     const X: &str = "normal quantile, σ";
     const Y: &str = "residual, σ";
@@ -209,7 +209,7 @@ pub fn quantiles(picture: &Picture, after: bool) -> Markup {
     let shown = if after { 2 } else { 1 };
     let x = range(all.iter().map(|q| q.normal));
     let last = shown - 1;
-    // Before an effect is taken out a row may be hundreds of sigmas off; after, the line of noise has to be seen.
+    // Before an effect is removed, a row may be hundreds of sigmas off. Afterwards the line of noise has to be visible.
     let y = |k: usize| range(all.iter().flat_map(|q| [q.found[k], q.band[0], q.band[1]]));
     let one = |frame: &Frame, k: usize, heading: &str| {
         let of = |q: &Quantile| (q.normal, q.found[k]);

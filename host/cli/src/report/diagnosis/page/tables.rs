@@ -1,4 +1,4 @@
-//! The tables: errors before and after, coefficients, what was tried.
+//! The tables: errors before and after, coefficients, rejected effects.
 
 use maud::{Markup, PreEscaped, html};
 
@@ -15,7 +15,7 @@ use mimu::result::diagnosis::{DiagnosisResult, SecondResult, SensorDiagnosisResu
 /// A line break that is HTML and XML.
 const BR: PreEscaped<&str> = PreEscaped("<br/>");
 
-/// An error figure: none where there are as many parameters as residuals, and only rounding is left.
+/// An error figure; none if there are as many parameters as residuals, because then only rounding remains.
 pub fn figure_of(s: &SensorDiagnosisResult, si: f64) -> Markup {
     let figure = readable::error(s.unit);
     match s.says_anything() {
@@ -24,12 +24,12 @@ pub fn figure_of(s: &SensorDiagnosisResult, si: f64) -> Markup {
     }
 }
 
-/// Probability of chance.
+/// A p value.
 pub fn chance(p: f64) -> Markup {
     html! { data value=(p) { (written(&p_value(p))) } }
 }
 
-/// Errors before and after, of all sensors, in sample and held out.
+/// Errors before and after, for all sensors, in sample and held out.
 pub(super) fn errors(sensors: &[Shown]) -> Markup {
     html! {
         div class="scroll" { table {
@@ -97,7 +97,7 @@ pub fn coefficients(one: &Accepted) -> Markup {
     }
 }
 
-/// Candidates, and unlisted alternative models, that would do nearly as well in the place of an effect.
+/// Candidates and unlisted alternative models that fit almost as well as an effect.
 pub(super) fn alternatives(d: &DiagnosisResult, s: &Shown, one: &Accepted) -> Markup {
     let undecided = || d.undecided.iter().filter(|u| u.id == one.effect.id());
     html! {
@@ -129,7 +129,7 @@ fn strength(left: &Leftover) -> Markup {
     number(left.strength, figure.factor, &figure.unit)
 }
 
-/// What is left, of all sensors.
+/// Remaining residuals of all sensors.
 pub fn leftover(d: &DiagnosisResult) -> Markup {
     html! {
         div class="scroll" { table {
@@ -145,10 +145,10 @@ pub fn leftover(d: &DiagnosisResult) -> Markup {
     }
 }
 
-/// What is left of a sensor, in words: where, and the largest; what it goes with stands in the table.
+/// Remaining residuals of a sensor in words: where they are, and the largest. The table shows what they correlate with.
 pub fn leftover_words(d: &DiagnosisResult, sensor: Sensor) -> Markup {
     let all: Vec<&Leftover> = d.unexplained().filter(|l| l.sensor == sensor).collect();
-    // Turns are in another unit than the rest.
+    // Turns have another unit than the other residuals.
     let of_unit = |turns: bool| -> Vec<&Leftover> {
         let ours = all.iter().copied();
         ours.filter(|l| (l.figure() == Figure::Direction) == turns)
@@ -167,7 +167,7 @@ pub fn leftover_words(d: &DiagnosisResult, sensor: Sensor) -> Markup {
     }
 }
 
-/// Before and after on a recording that nothing was fitted to.
+/// Errors before and after, on a recording that was not fitted.
 pub fn second(both: &SecondResult) -> Markup {
     html! {
         div class="scroll" { table {
@@ -189,7 +189,7 @@ pub fn second(both: &SecondResult) -> Markup {
     }
 }
 
-/// What was tried and not accepted.
+/// Effects that were tried and not accepted.
 pub fn rejected(d: &DiagnosisResult) -> Markup {
     html! {
         @if d.rejected.is_empty() {
@@ -205,7 +205,7 @@ pub fn rejected(d: &DiagnosisResult) -> Markup {
     }
 }
 
-/// What the experiment could not show, by the experiment that would.
+/// Effects that the recording could not show, by the experiment that would show them.
 pub fn not_excited(d: &DiagnosisResult) -> Markup {
     let by_experiment = by_experiment(d);
     html! {

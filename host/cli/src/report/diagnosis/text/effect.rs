@@ -1,4 +1,4 @@
-//! An accepted effect: what it does to the error, its coefficients, and what may be in its place.
+//! An accepted effect: its influence on the error, its coefficients, and its alternatives.
 
 use std::fmt::Write as _;
 
@@ -10,12 +10,12 @@ use mimu::quantity::{p_value, plus_minus, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::diagnosis::{DiagnosisResult, SensorDiagnosisResult};
 
-/// Alternatives that are listed.
+/// Largest number of alternatives listed.
 const SHOWN: usize = 3;
-/// Coefficients of one unit that go on one line whatever they are called: an axis each.
+/// Largest number of coefficients with one unit on a line, whatever their names: one for each axis.
 const AXES: usize = 3;
 
-/// `all`: each coefficient on a line of its own.
+/// `all`: each coefficient on a separate line.
 pub(super) fn effect(
     out: &mut String,
     d: &DiagnosisResult,
@@ -53,12 +53,12 @@ pub(super) fn effect(
     }
 }
 
-/// `0.549 deg without it, 0.136 deg with it; p < 1e-6`, and the same at rest and on the second recording.
+/// `0.549 deg without it, 0.136 deg with it; p < 1e-6`, and the same for rest and for the second recording.
 fn errors(s: &SensorDiagnosisResult, a: &Accepted) -> String {
     let both = |[without, with]: [String; 2]| format!("{without} without it, {with} with it");
     let mut text = both([a.held_out_rms_before, a.held_out_rms_after].map(|v| shown(s, v)));
     if let (Some(before), Some(after)) = (a.held_out_at_rest_before, a.held_out_at_rest_after) {
-        // Of a gyro without a table, whose other figures are angles after a turn.
+        // For a gyro without a table. Its other figures are angles after a turn.
         let rate = readable::error("rad/s");
         text += &format!("; at rest {}", both([before, after].map(|v| rate.write(v))));
     }
@@ -76,12 +76,12 @@ fn errors(s: &SensorDiagnosisResult, a: &Accepted) -> String {
 /// Value with its 95 % interval, and unit.
 fn coefficient(c: &WrittenCoefficient) -> (String, String) {
     let Readable { factor, unit } = readable::coefficient(&c.unit);
-    // Twice the standard deviation: with dwells by the dozen Student's factor is within a tenth of it.
+    // Twice the standard deviation: with dozens of dwells, Student's factor is within a tenth of it.
     let value = plus_minus(c.value * factor, 2.0 * c.sigma.unwrap_or_default() * factor);
     (value, unit.into_owned())
 }
 
-/// Coefficients in rows: up to three of one unit on a line, a matrix row by row, others as many as a line holds.
+/// Coefficients in rows: up to three with one unit on a line, a matrix by rows, others as many as fit on a line.
 fn compact(out: &mut String, coefficients: &[WrittenCoefficient]) {
     for of_unit in coefficients.chunk_by(|a, b| a.unit == b.unit) {
         let first = |c: &WrittenCoefficient| c.name.chars().next();
@@ -110,7 +110,7 @@ fn compact(out: &mut String, coefficients: &[WrittenCoefficient]) {
     }
 }
 
-/// Candidates that would do nearly as well, on one line.
+/// Candidates that fit almost as well, on one line.
 fn alternatives(out: &mut String, a: &Accepted) {
     let listed = a.chosen.alternatives.iter().take(SHOWN);
     let mut words: Vec<String> = listed

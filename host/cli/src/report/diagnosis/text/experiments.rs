@@ -1,4 +1,4 @@
-//! The experiments that show what the recordings could not show, and distinguish what they could not distinguish.
+//! Experiments for the effects that the recordings could not show or distinguish.
 
 use std::fmt::Write as _;
 
@@ -24,7 +24,7 @@ pub(super) fn experiments(out: &mut String, d: &DiagnosisResult) {
     }
 }
 
-/// Effects that were not excited, by recipe. Of one recipe the largest size shows them all.
+/// Effects that were not excited, by recipe. The largest size in a recipe shows all of them.
 fn by_recipe(d: &DiagnosisResult) -> Vec<(&NotExcited, Vec<&str>)> {
     let mut all: Vec<(&NotExcited, Vec<&str>)> = Vec::new();
     for n in &d.not_excited {
@@ -46,7 +46,7 @@ fn by_recipe(d: &DiagnosisResult) -> Vec<(&NotExcited, Vec<&str>)> {
     all
 }
 
-/// Effects that were not excited, by the exact words of the experiment that would show them.
+/// Effects that were not excited, by the exact text of the experiment that would show them.
 pub(in crate::report::diagnosis) fn by_experiment(d: &DiagnosisResult) -> Vec<(&str, Vec<&str>)> {
     let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
     for n in &d.not_excited {

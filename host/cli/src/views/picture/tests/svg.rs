@@ -1,4 +1,4 @@
-//! A screen as an SVG: every run of characters of one style at its place, frames and bars as lines and rectangles.
+//! A screen as an SVG: runs of characters with one style as text, frames and bars as lines and rectangles.
 
 use std::fmt::Write as _;
 
@@ -20,7 +20,7 @@ fn ink(cell: &Cell) -> &'static str {
     }
 }
 
-/// Ends of the lines of a character that frames are made of, from its middle: left, right, up, down.
+/// Which arms a frame character has from its middle: left, right, up, down.
 fn arms(symbol: &str) -> Option<[bool; 4]> {
     let arms = match symbol {
         "─" => "lr",
