@@ -261,7 +261,7 @@ impl<'a> Search<'a> {
         self.rows.y.len() as f64 - columns as f64
     }
 
-    /// Probability of chance, after the search, of a drop of the deviance by `drop` for `p` more columns of `candidate`.
+    /// Probability by chance of a drop in deviance of `drop` for `p` more columns of `candidate`, corrected for the number of tests.
     ///
     /// By F: if the noise is estimated from the rows, the drop is exactly `n ln(1 + p F/dof)`. If the noise is known and F's `dof` is large, it
     /// is chi-square.
