@@ -136,7 +136,8 @@ impl Decision {
             .then(|| 1.0 - after.max(0.0) / before)
     }
 
-    /// Marks effects that depend on the time since power-on as specific to the recording: its device had started otherwise, by `start`.
+    /// Marks effects that depend on the time since power-on as specific to the recording, because its device had started by `start` instead
+    /// of a power-on.
     pub(super) fn without_power_on(&mut self, start: &str) {
         let by_time = |a: &&mut Accepted| a.chosen.candidate.goes_by_time();
         let mut ids = Vec::new();

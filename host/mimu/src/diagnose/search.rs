@@ -194,8 +194,8 @@ impl<'a> Search<'a> {
         self.by_dwell.conditions_without(&left)
     }
 
-    /// Adds the [siblings](Candidate::siblings) of the coefficients of each chosen effect, as far as the rows would show them at the size of data
-    /// sheets beside all others.
+    /// Adds the [siblings](Candidate::siblings) of each chosen effect's coefficients, if the rows would show them at data-sheet size beside all
+    /// others.
     pub fn complete(&self, chosen: &mut [Chosen], now: &mut Fitted) {
         for k in 0..chosen.len() {
             let before = chosen[k].clone();

@@ -1,4 +1,4 @@
-//! An effect against what it depends on.
+//! Plots of an effect against the quantity that it depends on.
 //!
 //! Component plus residual instead of an added-variable plot, which shows two residuals against each other, not against a rate or a
 //! temperature. As in the added-variable plot, the part of the component that the affine calibration absorbs is subtracted: its mean,

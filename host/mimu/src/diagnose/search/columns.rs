@@ -1,4 +1,4 @@
-//! Columns of models: what they span, and what is new in them.
+//! Columns of models: their basis, and those that are independent of others.
 
 use nalgebra::DMatrix;
 
