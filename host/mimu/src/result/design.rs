@@ -87,7 +87,7 @@ pub struct Design {
     pub dwell_sigma: Quantity,
     /// Noise that this follows from; `None` if it was given.
     pub noise: Option<DwellNoise>,
-    /// `published`, `shortest` or `lot`.
+    /// `published`, `shortest` or `randomised`.
     pub order: &'static str,
     /// Whether the unit had to be turned over for the table to reach the scheme's poses: see [`Fixture::holding`].
     pub turned_over: bool,
