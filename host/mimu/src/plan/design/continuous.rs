@@ -1,7 +1,7 @@
 //! Continuous (approximate) D-optimal designs: weights on points, without regard to whole numbers of dwells.
 //!
-//! By the equivalence theorem of Kiefer and Wolfowitz (1960) weights are optimal if and only if the variance function `Σ
-//! f' M⁻¹ f` nowhere exceeds the number of parameters p. Moreover `ln det M* - ln det M <= p ln(max/p)`, which bounds
+//! By the equivalence theorem of Kiefer and Wolfowitz (1960) weights are optimal if and only if the variance function
+//! `Σ f' M⁻¹ f` nowhere exceeds the number of parameters p. Moreover `ln det M* - ln det M <= p ln(max/p)`, which bounds
 //! the distance to the optimum. Weights are moved between pairs of points, each move the best of its pair (vertex
 //! exchange of Böhning, Metrika 33, 1986; pairs as in the randomized exchange of Harman, Filová and Richtárik, JASA 115,
 //! 2020). Then Newton's method moves all at once, as in Yang, Biedermann and Tang (JASA 108, 2013).
@@ -199,10 +199,10 @@ fn exchange_weights(rows: &Rows, weights: &mut [f64]) -> Option<Inverse> {
 
 /// Newton's step for all weights at once on the points that carry any.
 ///
-/// With `g` the variance function and `H` the squares of `f_i' M⁻¹ f_j`, summed over the blocks, it is `δ = H⁻¹ (g -
-/// ν)`, with ν such that the sum of the weights stays 1. `ln det` is self-concordant, so that a step of `δ/(1 + λ)`, `λ²
-/// = δ'Hδ`, never lowers it. The step ends where the first weight becomes zero. Returns whether the weights have
-/// settled.
+/// With `g` the variance function and `H` the squares of `f_i' M⁻¹ f_j`, summed over the blocks, it is
+/// `δ = H⁻¹ (g - ν)`, with ν such that the sum of the weights stays 1. `ln det` is self-concordant, so that a step of
+/// `δ/(1 + λ)`, `λ² = δ'Hδ`, never lowers it. The step ends where the first weight becomes zero. Returns whether the
+/// weights have settled.
 ///
 /// Exchanges of pairs find the points, but converge slowly where these are close together. For the magnitude of gravity
 /// on a two-axis table they were still 8e-5 above the bound after 2000 rounds; with these steps they were below 1e-8

@@ -1,8 +1,8 @@
 //! What a design would notice if the model were too small.
 //!
-//! A term Z that the model F lacks shows in the residual only by its part outside the columns of F, `(I - H)
-//! Z`, H the hat matrix. If that part is zero, the term is aliased: the fit is as good as ever, but the
-//! parameters are wrong.
+//! A term Z that the model F lacks shows in the residual only by its part outside the columns of F,
+//! `(I - H) Z`, H the hat matrix. If that part is zero, the term is aliased: the fit is as good as ever, but
+//! the parameters are wrong.
 
 use nalgebra::{DMatrix, DVector};
 
