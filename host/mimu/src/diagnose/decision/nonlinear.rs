@@ -1,7 +1,7 @@
 //! Nonlinear parameters of the accepted effects, such as a lag or a time constant: refined together, each with an interval, and their part
 //! in the uncertainty of the coefficients.
 //!
-//! The search finds a parameter in steps of 2 %, which is enough to compare candidates. A good recording determines a lag to 1 %, so that
+//! The search finds a parameter in steps of 4 %, which is enough to compare candidates. A good recording determines a lag to 1 %, so that
 //! an interval about the last step would miss the truth. Hence Gauss-Newton steps from there.
 
 use nalgebra::{DMatrix, DVector};
