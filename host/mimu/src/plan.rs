@@ -24,12 +24,12 @@ pub use turn::{TableAxis, Turn};
 
 /// `format` of a plan.
 const FORMAT: &str = "mimu-plan/1";
-/// A plan of more is a mistake in it.
+/// Most dwells of a plan; more are taken for a mistake.
 const MOST_DWELLS: usize = 100_000;
-/// Directions whose cosine is as near to 1 are the same: a hundredth of a degree.
+/// Directions are the same if their cosine is as near to 1 as this: a hundredth of a degree.
 const PARALLEL: f64 = 1.5e-8;
 
-/// A plan. What only the bench needs is read and left alone.
+/// A plan. Keys that only the bench needs are read and ignored.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
@@ -43,7 +43,7 @@ pub struct Plan {
     carrier: Carrier,
     #[serde(skip_serializing_if = "Option::is_none")]
     steps: Option<bool>,
-    /// Degrees.
+    /// Latitude, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub latitude_deg: Option<f64>,
     /// Local gravity, m/s².
@@ -55,13 +55,13 @@ pub struct Plan {
     /// Time before the first dwell, s.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub lead_in_s: f64,
-    /// So often all steps are done.
+    /// Number of rounds, each through all entries.
     #[serde(default = "once", skip_serializing_if = "is_once")]
     pub rounds: u32,
     /// From the beginning of a round to that of the next, s; without it they follow each other.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub round_s: Option<f64>,
-    /// What is done in a round.
+    /// Entries of a round.
     pub step: Vec<Step>,
 }
 
@@ -136,7 +136,7 @@ impl Step {
         Self::dwell(Some(setting.up), setting.rate.to_degrees(), dwell_s)
     }
 
-    /// The same so many times without a move between them.
+    /// The same, repeated so many times without a move between them.
     pub fn repeated(self, repeat: u32) -> Self {
         Self { repeat, ..self }
     }
@@ -156,23 +156,23 @@ impl Step {
 /// A dwell of a plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
-    /// Rate, deg/s, and specific force, m/s², of the body, in the order of the `ref_` columns. Not a number by hand, where nobody knows
-    /// them well enough.
+    /// Rate, deg/s, and specific force, m/s², of the body, in the order of the `ref_` columns. NaN by hand, where they are not known well
+    /// enough.
     pub input: [f64; 6],
-    /// How long.
+    /// Length.
     pub length: Duration,
-    /// What is to be done, for the person who does it.
+    /// Instruction for the person who carries it out.
     pub title: String,
     /// Direction in the body frame that points up, of length 1; `None` where the bench chooses the pose.
     pub up: Option<[f64; 3]>,
-    /// Rate about it, deg/s.
+    /// Rate about that direction, deg/s.
     pub rate_dps: f64,
-    /// A turn by an angle in place of a dwell. Of its input only the mean is known, and only once it is over.
+    /// A turn by an angle instead of a dwell. Only the mean of its input is known, and only after its end.
     pub turn: Option<Turn>,
 }
 
 impl Planned {
-    /// Its input, if it has taken this long.
+    /// Its mean input, if it took so long.
     pub fn input_over(&self, duration_s: f64) -> [f64; 6] {
         let mut input = self.input;
         if let Some(turn) = &self.turn {
@@ -185,7 +185,7 @@ impl Planned {
 }
 
 impl Plan {
-    /// A plan for what carries the unit.
+    /// A plan for a fixture.
     pub fn new(fixture: Fixture, sample_rate_hz: f64, step: Vec<Step>) -> Self {
         Self {
             format: FORMAT.into(),
@@ -262,7 +262,8 @@ impl Plan {
         Duration::try_from_secs_f64(self.lead_in_s).unwrap_or_default()
     }
 
-    /// Whether only a program that moves the table can carry it out: turns are as long as the table takes, and rounds begin by the clock.
+    /// Whether only a program that moves the table can carry it out: it has turns, whose length depends on the table, or rounds that
+    /// begin by the clock.
     pub fn is_procedure(&self) -> bool {
         self.round_s.is_some() || self.step.iter().any(|step| step.turn_axis.is_some())
     }
@@ -304,7 +305,7 @@ fn unknown(up: Option<[f64; 3]>, title: String, length: Duration) -> Planned {
 }
 
 impl Step {
-    /// It as a dwell; `stands` is where the step before has left a table, and then where this one leaves it.
+    /// The entry as a dwell. `stands` is the pose in which the entry before left the table, and then that in which this one leaves it.
     fn planned(
         &self,
         carrier: Carrier,
@@ -337,7 +338,7 @@ impl Step {
         let force = up * gravity_mps2;
         let mut input = [0.0; 6];
         for (cell, value) in input.iter_mut().zip(rate.iter().chain(force.iter())) {
-            // Minus zero puzzles.
+            // Without a minus zero, which would puzzle a reader.
             *cell = *value + 0.0;
         }
         Ok(Planned {
@@ -371,7 +372,7 @@ impl Step {
         Ok(())
     }
 
-    /// Direction that points up in it; `None` by hand, where any will do.
+    /// Direction that points up; `None` by hand, if any pose will do.
     fn pose(
         &self,
         carrier: Carrier,

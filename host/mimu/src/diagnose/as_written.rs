@@ -1,7 +1,7 @@
 //! Whether the calibration file with the effects found errs less on the other recordings of the unit than the file without them.
 //!
-//! Rows of another recording are fitted with biases, and where nothing else is known with a matrix, of their own. What a fit absorbs there
-//! a file does not: an effect of which the affine part is wrong by a hundred times passes the one and not the other.
+//! The rows of another recording are fitted with separate biases and, if none is given, a separate matrix. These absorb errors that the
+//! file does not correct: an effect whose affine part is wrong by a factor of a hundred passes that test, and fails this one.
 
 use super::decision::{Accepted, Decision};
 use super::rejected::{ErrorRms, Reason, Rejected};
@@ -13,13 +13,14 @@ use crate::fit::Fit;
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
 
-/// Ratio of the errors with the effects and without from which on the file is worse: below it they differ by the noise of the recording.
+/// Ratio of the error with the effects to that without them, above which the file is worse. Smaller differences are noise of the
+/// recording.
 const WORSE: f64 = 1.02;
 
-/// What the file with effects is judged by.
+/// Data to judge the file with effects.
 pub(super) struct AsWritten<'a> {
     pub sensor: Sensor,
-    /// The fit of the first recording without the effects of this sensor.
+    /// The fit of the first recording before effects of this sensor are removed.
     pub before: &'a Fit,
     /// The other recordings, likewise.
     pub others: &'a [Prepared],
@@ -40,8 +41,8 @@ impl AsWritten<'_> {
         Some((sensor.figure, sensor.rms))
     }
 
-    /// The effect that makes the file worse for another recording, and the reason; `after` is the fit of the first without the effects of
-    /// `decision`.
+    /// If the file errs more on another recording with the effects, the effect that causes this, with the reason. `after` is the fit of
+    /// the first recording without the effects of `decision`.
     pub fn worst(&self, after: &Fit, decision: &Decision) -> Option<Rejected> {
         let lasting: Vec<&Accepted> = decision.accepted.iter().filter(|a| a.of_unit).collect();
         let effects = |of: &[&Accepted]| -> Vec<FittedEffect> {

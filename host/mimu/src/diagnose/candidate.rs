@@ -1,4 +1,4 @@
-//! What is tried in the rows of a sensor, and its columns there.
+//! Candidates for the rows of a sensor, and their columns.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,14 +8,14 @@ use crate::effects::converter::{self, Converter};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
 
-/// Step of the logarithm of a parameter for a central difference, whose error is a millionth of the derivative: far above rounding.
+/// Step of a central difference in the logarithm of a parameter. The error is a millionth of the derivative, far above rounding.
 const STEP: f64 = 1e-3;
 
-/// Bits of a code, from the first down, that are tried together at first: of more the sum is nearly the reading, as all of them add up to it.
+/// Number of leading bits of a code that are tried together at first. The sum of more bits is nearly the reading, which all of them add up to.
 const FIRST_BITS: usize = 4;
 
 impl Candidate {
-    /// An effect in `rows`; `None` where it goes by codes that the steps of the readings would have to say, and they have none.
+    /// An effect in `rows`; `None` if it depends on a converter's codes and the readings have no quantisation step.
     pub fn effect_in(effect: &'static Effect, rows: &Rows) -> Option<Self> {
         let candidate = Self::new(rows.sensor, CandidateKind::Effect(effect));
         if !candidate.reads_code() {
@@ -26,14 +26,13 @@ impl Candidate {
         Some(candidate.behind_one(Converter::of(weight, 0.0)))
     }
 
-    /// The candidates that it is tried as. The search goes on from the best of these, and adds or drops [offered](Self::offered)
-    /// coefficients.
+    /// The candidates that it is tried as. The search starts from the best of these, and adds or drops [offered](Self::offered) coefficients.
     ///
-    /// Of the bits of a code each by itself, and the first few together. Of other effects the coefficients that are [excited](Self::excited),
-    /// all that the rows can tell, and each alone; with the coefficients that are specific to the recording, and without. A thermal effect is tried
-    /// with and without the thermometer's self-heating.
+    /// A code is tried with each bit alone, and with the first few together. Another effect is tried with the coefficients that are
+    /// [excited](Self::excited), with all that the rows determine, and with each alone; each time with and without the coefficients that are
+    /// specific to the recording. A thermal effect is tried with and without the thermometer's self-heating.
     pub fn variants(mut self, rows: &Rows) -> Vec<Self> {
-        // Bits that would not be seen at the size of data sheets are offered where none would be: among many nothings one is always near.
+        // Bits that would not be seen at data-sheet size are offered only if no bit would be: among many of these, one always fits by chance.
         if self.reads_code() && !self.excited.is_empty() {
             self.active.clone_from(&self.excited);
         }
@@ -78,8 +77,8 @@ impl Candidate {
         all
     }
 
-    /// It with one of its offered coefficients added, or dropped with those that rest on it; `None` where that leaves nothing, or adds one
-    /// that rests on another.
+    /// The candidate with one of its offered coefficients added, or dropped with those that depend on it. `None` if none would be left, or if the
+    /// added one depends on one that is not active.
     pub fn toggled(&self, coefficient: usize) -> Option<Self> {
         let mut active = self.active.clone();
         match active.binary_search(&coefficient) {
@@ -88,7 +87,7 @@ impl Candidate {
                 active.retain(|k| self.rests_on(*k) != Some(coefficient));
             }
             Err(at) => {
-                // `variants` adds the coefficients that are specific to the recording, all of them together.
+                // Only `variants` adds the coefficients that are specific to the recording, all of them together.
                 if self.of_recording().contains(&coefficient) {
                     return None;
                 }
@@ -105,8 +104,8 @@ impl Candidate {
         })
     }
 
-    /// How many choices of coefficients its own is one of: of bits any, and of other coefficients any number of the offered is as likely, and
-    /// of one number any choice.
+    /// Number of choices of coefficients that this one is the best of. For bits, all choices are equally likely. For other effects, all numbers of
+    /// coefficients are equally likely, and all choices of the same number.
     pub fn choices_of_coefficients(&self) -> f64 {
         let (n, k) = (self.offered.len(), self.active.len());
         if n < 2 {
@@ -127,7 +126,7 @@ impl Candidate {
         self.columns_at(rows, &rows.conditions(self.followed(parameter)), parameter)
     }
 
-    /// Derivative of what it adds to `rows` with coefficients of `values` by the natural logarithm of its nonlinear parameter, unit of the
+    /// Derivative of its contribution to `rows`, with the coefficients `values`, by the natural logarithm of its nonlinear parameter; unit of the
     /// rows.
     pub fn slope(&self, rows: &Rows, parameter: f64, values: &DVector<f64>) -> DVector<f64> {
         let step = STEP.exp();
@@ -135,7 +134,7 @@ impl Candidate {
         (up - down) * values / (2.0 * STEP)
     }
 
-    /// Columns of a term or a jump as an error of each of `axes`; `None` of an effect.
+    /// Columns of a term or a jump as an error of each of `axes`; `None` for an effect.
     pub fn columns_by_axis(&self, rows: &Rows, axes: &[usize]) -> Option<DMatrix<f64>> {
         match &self.kind {
             CandidateKind::Term(_, product) => Some(rows.term(product, axes)),
@@ -144,7 +143,7 @@ impl Candidate {
         }
     }
 
-    /// It with all of the coefficients that its search chooses from.
+    /// The candidate with all of the coefficients that the search chooses from.
     pub fn with_all_offered(&self) -> Self {
         Self {
             active: self.offered.clone(),
@@ -152,8 +151,8 @@ impl Candidate {
         }
     }
 
-    /// Its columns out of those [with all that are offered](Self::with_all_offered): the share of the time that a bit is set takes an
-    /// error function for each conditions, and a search over choices of bits asks for the same ones again and again.
+    /// Its columns out of those [with all that are offered](Self::with_all_offered). A bit's share of the time takes an error function for each of
+    /// the conditions, and a search over choices of bits needs the same columns again and again.
     pub fn columns_of(&self, all_offered: &DMatrix<f64>) -> DMatrix<f64> {
         let places = self.active.iter();
         let places: Vec<usize> = places
@@ -162,7 +161,7 @@ impl Candidate {
         all_offered.select_columns(&places)
     }
 
-    /// Its columns in `rows` at other conditions than theirs.
+    /// Its columns in `rows` at other conditions.
     pub fn columns_at(
         &self,
         rows: &Rows,
@@ -175,9 +174,9 @@ impl Candidate {
         self.by_coefficient(all)
     }
 
-    /// Columns of a code in `rows` [by dwell](Rows::by_dwell) at the conditions of [`Rows::conditions_without`]; `slots` are its
-    /// [columns by slot](Self::columns_by_slot) there. How often a bit is set takes an error function for each of the conditions, of which the
-    /// turns have many thousands, and they stay.
+    /// Columns of a code in `rows` [by dwell](Rows::by_dwell) at the conditions of [`Rows::conditions_without`]. `slots` are its [columns by
+    /// slot](Self::columns_by_slot) there. Those of turns are kept: a bit's share of the time takes an error function for each of their many
+    /// thousands of conditions.
     pub fn columns_without(
         &self,
         rows: &Rows,

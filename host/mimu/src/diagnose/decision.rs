@@ -45,9 +45,10 @@ pub use nonlinear::Nonlinear;
 pub use second::Second;
 pub use undecided::Undecided;
 
-/// One dwell that has more than this share in what an effect rests on decides it alone.
+/// If one dwell has more than this share of the information about an effect, it decides the effect alone.
 pub const LEVERAGE: f64 = 0.7;
-/// Probability of chance that an effect may have without the dwell that speaks most for it: else one outlier would have made it.
+/// Largest probability by chance that an effect may have without the dwell with most evidence for it; above it, one outlier could have caused
+/// the effect.
 const SURVIVES: f64 = 0.01;
 
 /// An accepted effect, and why.
@@ -59,8 +60,8 @@ pub struct Accepted {
     /// How it was found.
     #[serde(flatten)]
     pub chosen: Chosen,
-    /// Whether it is an error of the unit, which a calibration holds. A drift is specific to the session, and so is all that depends on the
-    /// time since power-on where nobody knows when that was. What a true input explains as well may be that: of 32 units whose
+    /// Whether it is an error of the unit, so that a calibration stores it. A drift is specific to the session, and so is an effect of the
+    /// time since power-on if that time is unknown. An effect that may be a true input instead is not stored either: of 32 units whose
     /// sessions on a table were diagnosed together, 6 had Earth rate in their files as g-sensitivity, and 2 of these erred more on another
     /// session, by up to a fifth.
     pub of_unit: bool,
@@ -76,14 +77,13 @@ pub struct Accepted {
     pub held_out_at_rest_after: Option<f64>,
     /// How it was held out.
     pub held_out: Split,
-    /// What it does to the second recording, if there is one that can be judged by.
+    /// Its test on the second recording, if there is one that it can be judged by.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second: Option<Second>,
-    /// Covariance of its coefficients, whatever its nonlinear parameter is.
+    /// Covariance of its coefficients, which allows for the uncertainty of its nonlinear parameter.
     #[serde(skip)]
     pub covariance: DMatrix<f64>,
-    /// The same for the nonlinear parameter found: coefficient and parameter err together, and this is what a curve drawn for one value
-    /// of the parameter is uncertain by.
+    /// The same at the nonlinear parameter found: the uncertainty of a curve that is drawn for this one value.
     #[serde(skip)]
     pub conditional: DMatrix<f64>,
 }
@@ -93,15 +93,15 @@ pub struct Accepted {
 pub struct Decision {
     /// Accepted effects.
     pub accepted: Vec<Accepted>,
-    /// Effects that were found and not accepted, with the reason; and the best of those that were not found.
+    /// Effects that were found and not accepted, and named effects that were not chosen; each with the reason.
     pub rejected: Vec<Rejected>,
     /// Effects that the experiment could not show.
     pub not_excited: Vec<&'static Effect>,
-    /// Structure that is left.
+    /// Residual structure.
     pub leftover: Vec<Leftover>,
     /// The affine model, and that with the accepted effects.
     pub models: [Model; 2],
-    /// What the nonlinear parameters of the accepted effects leave open.
+    /// Nonlinear parameters of the accepted effects, and their part in the uncertainty.
     pub nonlinear: Nonlinear,
     /// Root mean square of the judged rows before and after, in sample.
     pub rms: [f64; 2],
@@ -109,26 +109,26 @@ pub struct Decision {
     pub held_out_rms: [f64; 2],
     /// How they were held out.
     pub split: Split,
-    /// The last, with every fourth dwell held out instead: a block of time may hold a range of temperature to itself, and is then
-    /// extrapolated to; between dwells that were seen nothing is.
+    /// The latter, with every fourth dwell held out instead. A block of time may be the only one with some range of temperatures, to which
+    /// the rest then extrapolates; between the dwells of the rest nothing is extrapolated.
     pub interleaved_rms: f64,
-    /// What noise alone would leave.
+    /// Error that noise alone would cause.
     pub noise_floor: f64,
-    /// What errors of the reference may add to it: of the accelerometer, whose directions the turns are judged by.
+    /// Error that the reference may add: that of the accelerometer, whose directions judge the turns.
     pub reference_rms: f64,
     /// Accepted effects whose physics the rows do not decide.
     pub undecided: Vec<Undecided>,
-    /// What a person should know of the accepted effects.
+    /// Notes on the accepted effects for the user.
     pub notes: Vec<Note>,
-    /// Rows, and affine parameters that they had to determine first: what is left between them is all that can be judged by.
+    /// Number of rows, and of affine parameters that they determine first. A judgement can only use their difference.
     pub rows: [usize; 2],
-    /// Probability of chance that the rows before scatter as they do, by the known noise alone.
+    /// Probability by chance that the rows scatter as they do without effects, by the known noise alone.
     pub omnibus_p: f64,
 }
 
 impl Decision {
-    /// Share of the held-out mean square beyond noise and errors of the reference that the accepted effects take out. `None` without
-    /// effects, or where nothing is beyond.
+    /// Share of the held-out mean square beyond noise and errors of the reference that the accepted effects remove. `None` without effects,
+    /// or if nothing exceeds the noise.
     pub fn explained(&self) -> Option<f64> {
         let known = self.noise_floor.powi(2) + self.reference_rms.powi(2);
         let [before, after] = self.held_out_rms.map(|rms| rms * rms - known);
@@ -136,7 +136,8 @@ impl Decision {
             .then(|| 1.0 - after.max(0.0) / before)
     }
 
-    /// Takes the effects that go by the time since power-on for those of the recording alone, whose device had started otherwise: by `start`.
+    /// Marks effects that depend on the time since power-on as specific to the recording, because its device had started by `start` instead
+    /// of a power-on.
     pub(super) fn without_power_on(&mut self, start: &str) {
         let by_time = |a: &&mut Accepted| a.chosen.candidate.goes_by_time();
         let mut ids = Vec::new();
@@ -153,15 +154,15 @@ impl Decision {
         }
     }
 
-    /// What is left that no usual sensor does.
+    /// Residual structure beyond that of usual sensors.
     pub fn unexplained(&self) -> impl Iterator<Item = &Leftover> {
         self.leftover.iter().filter(|l| !l.usual)
     }
 }
 
-/// Decides on the rows of one sensor; `dwell_ends` are the times between dwells, where a bias may have jumped: index of the
-/// recording and s. `unseen` are the rows of a second recording, which nothing is found in: what it contradicts is not accepted.
-/// `without` are effects that are not tried, each with the reason; `accept` are ids of terms that are taken without a second recording.
+/// Decides on the rows of one sensor. `dwell_ends` are the times between dwells, where a bias may have jumped: index of the recording and s.
+/// `unseen` are the rows of a second recording, in which no effects are sought; an effect that it contradicts is not accepted. `without` are
+/// effects that are not tried, each with the reason. `accept` are ids of terms that need no second recording.
 pub fn decide(
     rows: &Rows,
     dwell_ends: &[(usize, f64)],
@@ -197,28 +198,29 @@ pub fn decide(
             _ => kept.push(one),
         }
     }
-    // Jumps are told of and not fitted.
+    // Jumps are reported, not fitted.
     if !jumps.is_empty() {
         with = search.fit(&kept)?;
     }
     let judge = Acceptance::new(&search, unseen, &null);
     let usual = judge.usual;
     let mut suggested = Vec::new();
-    // Ids that failed, in order: what failed beside another that failed later is tried once more without it.
+    // Ids that failed, in order. An effect that failed beside another that failed later is tried once more without the latter.
     let mut failures: Vec<String> = Vec::new();
-    // Ids that passed: beside suggestions, which take up what would otherwise hide an effect from dwells that are held out.
+    // Ids that passed. They are not judged again once suggestions are removed: what these explained would then hide an effect from held-out
+    // dwells.
     let mut passed: Vec<String> = Vec::new();
     loop {
         let ids =
             |all: &[Chosen]| -> Vec<String> { all.iter().map(|c| c.candidate.id()).collect() };
         let mut failed_any = false;
-        // Judged is what would be written.
+        // Effects are judged with the coefficients that would be stored.
         search.complete(&mut kept, &mut with);
-        // What does not hold out goes, the one with the smallest drop in deviance first.
+        // Effects that are not accepted are removed, the last in the list first.
         while let Some(failed) = judge.first_to_fail(&kept, &with, &passed)? {
             failed_any = true;
             let candidate = kept.remove(failed.at).candidate;
-            // More dwells may prove it: it is asked for in the next experiment.
+            // More dwells may prove it, so the next experiment asks for it.
             if let CandidateKind::Effect(effect) = &candidate.kind
                 && failed.too_few_dwells
                 && !not_excited.iter().any(|n| n.id == effect.id)
@@ -237,8 +239,8 @@ pub fn decide(
         }
         suggested.extend(set_aside);
         with = search.fit(&kept)?;
-        // What a suggestion or a rejected effect had explained, another effect with a name may explain as well. An accelerometer's warm-up of
-        // p < 1e-6 was reported as not significant, since what had taken its place in the search was rejected afterwards.
+        // What a suggestion or a rejected effect had explained, a named effect may explain as well. An accelerometer's warm-up of p < 1e-6
+        // was reported as not significant, because the effect that had replaced it in the search was rejected afterwards.
         let more = search.beside(kept.clone(), |c| {
             let id = c.id();
             let times = failures.iter().filter(|f| **f == id).count();
@@ -311,7 +313,7 @@ pub fn decide(
         });
         from += count;
     }
-    // Beside the jumps that were found: every slow effect would seem to explain a little of them.
+    // Beside the jumps that were found: otherwise every slow effect would seem to explain a little of them.
     let with_jumps: Vec<Chosen> = kept.iter().chain(&jumps).cloned().collect();
     let all = match jumps.is_empty() {
         true => with.clone(),
@@ -356,7 +358,7 @@ pub fn decide(
         rejected.push(rejection(&one.candidate, reason));
     }
     let of_readings = of_readings(&search, model, last, split);
-    // What scatters beside them.
+    // Scatter beside these functions of the readings.
     let whole = of_readings
         .iter()
         .fold(model.clone(), |m, r| beside(&m, &r.columns));
@@ -402,7 +404,7 @@ pub fn decide(
     })
 }
 
-/// Why a named effect that is significant is not among the `kept`: it lost to others. `None` where it is not significant.
+/// Why a named effect that is significant is not among the `kept`. `None` if it is not significant.
 fn passed_over(one: &Chosen, kept: &[Chosen], superfluous: &[String]) -> Option<Passed> {
     let listed = kept.iter().filter(|k| k.candidate.is_listed()).count();
     match one.p {
@@ -439,7 +441,7 @@ fn shares(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>>
     all
 }
 
-/// What a person should know of the chosen.
+/// Notes on the chosen effects for the user.
 fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
     let mut notes = Vec::new();
     let inputs = chosen.iter().filter(|c| !c.candidate.is_error());
@@ -486,7 +488,8 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
             notes.push(Note::new(found, format!("it needs {}", effect.needs)));
         }
     }
-    // Its level part goes by the heading, and on a table that shows one heading in each attitude by products of the force.
+    // The horizontal part of Earth rate depends on the heading. On a table with one heading in each attitude it looks like products of the
+    // force.
     let only_force = |p: &Product| p.parts().all(|(q, _)| matches!(q, Quantity::Force(_)));
     let level = chosen
         .iter()

@@ -1,18 +1,18 @@
-//! What is wrong when a calibrated unit still errs: the effect behind the residual, found, added and proved on data that was
-//! not used for it, or the statement that nothing explains it.
+//! Finds out why a calibrated unit still errs. The effect behind the residual is found, added to the model, and proved on data that was
+//! not used to find it; or the diagnosis reports that nothing explains the residual.
 //!
-//! | module        | what                                                                            |
-//! |---------------|---------------------------------------------------------------------------------|
-//! | `as_written`  | whether the file with the effects errs less on other recordings                  |
-//! | `candidate`   | what is tried of the [effects](crate::effects), and its columns                  |
-//! | [`rows`]      | what the affine model leaves of dwells and turns, as one linear problem          |
-//! | [`variance`]    | how that scatters: known noise, more of it, a bias that walks                    |
-//! | [`search`]    | which effects the rows ask for                                                   |
-//! | [`note`]      | what a person should know of the accepted ones                                   |
-//! | [`decision`]  | accepted effects, and residual errors                                            |
-//! | `passes`      | all of this again with the affine model that strong effects leave                |
-//! | [`uncertainty`] | what the coefficients of effects leave open of what stands on them               |
-//! | [`picture`]   | what of it can be drawn                                                          |
+//! | module          | what                                                                             |
+//! |-----------------|----------------------------------------------------------------------------------|
+//! | `as_written`    | whether the calibration file with the effects errs less on other recordings      |
+//! | `candidate`     | which coefficients of an [effect](crate::effects) are tried, and their columns   |
+//! | [`rows`]        | residuals of dwells and turns after the affine model, as one linear problem      |
+//! | [`variance`]    | variance of the residuals: known noise, extra white variance, rate random walk   |
+//! | [`search`]      | search for the effects that explain the residuals                                |
+//! | [`note`]        | notes on accepted effects for the user                                           |
+//! | [`decision`]    | accepted effects, and residual errors                                            |
+//! | `passes`        | repeats the search with the affine model fitted beside strong effects            |
+//! | [`uncertainty`] | uncertainty that effects add to the calibration and to the forces of a gyro's turns |
+//! | [`picture`]     | data for the plots                                                               |
 
 mod as_written;
 mod candidate;
@@ -47,17 +47,17 @@ use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
-/// What a diagnosis says.
+/// Result of a diagnosis in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// Noise explains what the affine model leaves.
+    /// Noise explains the residuals of the affine model.
     Clean,
-    /// The effects found explain it.
+    /// The effects found explain the residuals.
     Explained,
-    /// Something is left that nothing explains, or a law that is on no list explains it as well as the effect found.
+    /// A residual has no explanation, or an unlisted alternative model explains it as well as the effect found.
     Unexplained,
-    /// Nothing was found, and a sensor had too little to judge it by: see [`Diagnosis::untestable`].
+    /// No effect was found, and a sensor has too little data to judge it: see [`Diagnosis::untestable`].
     Untestable,
 }
 
@@ -76,13 +76,13 @@ impl Verdict {
 /// Why a recording cannot show whether a sensor errs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Untestable {
-    /// So few residuals for so many affine parameters.
+    /// Too few residuals: their number, and the number of affine parameters.
     Residuals(usize, usize),
-    /// No part of the recording can be held out: the rest does not determine the calibration.
+    /// Whichever part is held out, the rest of the recording does not determine the calibration.
     NothingHeldOut,
-    /// Condition of the fit: the poses leave some sums of parameters all but open.
+    /// The poses hardly determine some combinations of parameters: the condition of the fit.
     Condition(f64),
-    /// Errors of the accelerometer's directions of gravity, by which the turns are judged, over the noise of the turns.
+    /// The directions of gravity that judge the turns are too uncertain: their error over the noise of the turns.
     Reference(f64),
 }
 
@@ -109,13 +109,13 @@ impl std::fmt::Display for Untestable {
     }
 }
 
-/// Fewest residuals beyond the affine parameters that can show anything.
+/// A judgement needs at least this many residuals more than affine parameters.
 const FEWEST: usize = 3;
-/// Errors of the reference over the noise from which on they hide what a turn could show: 1.1 in a published session of 38 poses by hand.
+/// Ratio of the reference's error to the noise above which turns cannot show an effect. A published session of 38 poses by hand has 1.1.
 const HIDDEN: f64 = 10.0;
 
 impl SensorDiagnosis {
-    /// Why the recording cannot show whether the sensor errs, if so; `fit` is the one before.
+    /// Why the recording cannot show whether the sensor errs; `None` if it can. `fit` is the affine fit without effects.
     fn untestable(&self, fit: &Fit, matrix_given: bool) -> Option<Untestable> {
         let decision = &self.decision;
         let [rows, parameters] = decision.rows;
@@ -138,48 +138,48 @@ impl SensorDiagnosis {
 /// What was found on one sensor.
 #[derive(Debug, Clone)]
 pub struct SensorDiagnosis {
-    /// Which.
+    /// Sensor.
     pub sensor: Sensor,
-    /// What the affine model leaves of it, the effects of the other sensor taken out.
+    /// Its residuals after the affine model. Those of the gyro are without the effects of the accelerometer.
     pub rows: Rows,
-    /// What its rows led to.
+    /// Decision on these rows.
     pub decision: Decision,
-    /// What of it is drawn; `None` where a model of it is singular.
+    /// Data for its plots; `None` if a model is singular.
     pub picture: Option<Picture>,
 }
 
 /// What was found in a recording.
 #[derive(Debug, Clone)]
 pub struct Diagnosis {
-    /// The affine fit before.
+    /// The affine fit before effects were sought.
     pub before: Fit,
-    /// The affine fit of the readings without the effects.
+    /// The affine fit of the readings after removal of the effects.
     pub after: Fit,
-    /// Gyro, then accelerometer, as far as there are any.
+    /// Gyro, then accelerometer, if recorded.
     pub sensors: Vec<SensorDiagnosis>,
-    /// The effects, as they are taken out.
+    /// Accepted effects of all sensors.
     pub effects: Vec<FittedEffect>,
-    /// What it amounts to.
+    /// Verdict.
     pub verdict: Verdict,
     /// Sensors that the recordings cannot judge, with the reason.
     pub untestable: Vec<(Sensor, Untestable)>,
-    /// The recordings that effects were found in, the first first.
+    /// The recordings in which effects were sought, in the order given.
     pub sources: Vec<Source>,
-    /// What is wrong with these and with the one that effects are judged by; of the later ones without a fit.
+    /// Problems of these recordings and of the one that judges the effects. Those of later recordings are found without a fit.
     pub problems: Vec<OfRecording>,
 }
 
-/// A recording, with its index.
+/// A recording, identified by its file and samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Source {
     /// Its file of samples.
     #[serde(rename = "samples")]
     pub place: String,
-    /// Samples.
+    /// Number of samples.
     pub rows: u64,
-    /// Between samples, s.
+    /// Time between samples, s.
     pub period_s: f64,
-    /// Of the samples.
+    /// SHA-256 of the samples file.
     pub sha256: String,
 }
 
@@ -195,18 +195,18 @@ impl From<&Prepared> for Source {
     }
 }
 
-/// What a diagnosis is made from.
+/// Recordings and calibration that a diagnosis uses.
 #[derive(Debug, Clone)]
 pub struct Recordings<'a> {
     /// The recording that the calibration is made from.
     pub first: Prepared,
-    /// More recordings of the same unit: effects are found in all of them together; each has separate biases.
+    /// More recordings of the same unit. Effects are sought in all of them together; each has separate biases.
     pub more: Vec<Prepared>,
-    /// One that nothing is found in, and that effects are judged by.
+    /// A recording in which no effects are sought: it judges those found in the others.
     pub second: Option<Prepared>,
-    /// The calibration of the unit, where the first recording cannot make one: its matrices are kept, and its effects taken out.
+    /// A calibration of the unit, if the first recording cannot determine one. Its matrices are kept, and its effects are removed.
     pub given: Option<&'a Calibration>,
-    /// Ids of terms without known physics that are taken though no second recording confirms them.
+    /// Ids of products to accept without confirmation by a second recording.
     pub accept: Vec<String>,
 }
 
@@ -227,7 +227,7 @@ impl Recordings<'_> {
         self.more.iter().chain(&self.second)
     }
 
-    /// Refuses recordings that cannot be of one unit.
+    /// Refuses recordings that differ in unit or raw unit, or that a diagnosis cannot use.
     fn check(&self) -> Result<()> {
         let all = || std::iter::once(&self.first).chain(self.later());
         if let Some(turned) = all().find(|r| r.manifest.reference == Reference::TurntableRate) {
@@ -298,9 +298,9 @@ impl Recordings<'_> {
     }
 }
 
-/// Whether nothing but the biases can be found: matrices for the gyro and the accelerometer, raw to SI.
+/// Fixed calibrations of gyro and accelerometer, raw to SI, if only the biases are to be fitted; else `None`.
 ///
-/// They are those of the given calibration. Without one, readings in SI of a unit that was never turned are what they say.
+/// They come from the given calibration. Without one, readings in SI of a unit that was never turned get the identity.
 fn matrices(recordings: &Recordings) -> Option<[Option<Affine<f64>>; 2]> {
     if let Some(given) = recordings.given {
         return Some(Sensor::BOTH.map(|s| given.inverse(s)));
@@ -320,7 +320,7 @@ fn matrices(recordings: &Recordings) -> Option<[Option<Affine<f64>>; 2]> {
     (first.manifest.raw_unit == RawUnit::Si && never_turned).then_some([Some(unit); 2])
 }
 
-/// The warning of the fit that its model has no temperature in it is true of the sensors only that no thermal effect was accepted of.
+/// Restricts the warning that the model of the fit has no temperature to the sensors without an accepted thermal effect.
 fn with_temperature(now: &mut Fit, sensors: &[SensorDiagnosis]) {
     let thermal = |s: &&SensorDiagnosis| {
         let mut accepted = s.decision.accepted.iter();
@@ -341,7 +341,7 @@ fn with_temperature(now: &mut Fit, sensors: &[SensorDiagnosis]) {
 
 /// Diagnoses a unit.
 ///
-/// The accelerometer comes first: without a table it is what the gyro is judged by.
+/// The accelerometer comes first: without a table, its directions of gravity judge the gyro.
 pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
     recordings.check()?;
     let place = recordings.first.place.clone();
@@ -388,7 +388,7 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
     let mut effects: Vec<FittedEffect> = Vec::new();
     let mut sensors = Vec::new();
     let mut forces: Option<ForceErrors> = None;
-    // What the coefficients of effects leave open of the calibration without them.
+    // Uncertainty that the coefficients of effects add to the calibration.
     let mut open: Vec<(Sensor, Part)> = Vec::new();
     let by_gravity = recordings.first.manifest.reference == Reference::Gravity;
     for sensor in [Sensor::Accel, Sensor::Gyro] {

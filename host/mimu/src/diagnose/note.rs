@@ -1,10 +1,10 @@
-//! What a person should know of accepted effects.
+//! Notes on accepted effects for the user.
 
 use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-/// What a person should know of an accepted effect. JSON has both parts in a line.
+/// A note on an accepted effect for the user. In JSON it is one string.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Note {
     /// What was found.

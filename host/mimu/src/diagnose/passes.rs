@@ -1,10 +1,10 @@
-//! The passes over the rows of a sensor: made with the affine model of the recording as it is, and again with the one beside the effects
-//! that were found.
+//! The passes over the rows of a sensor: first with the affine model of the readings as recorded, then with the one beside the effects that
+//! were found.
 //!
-//! A strong effect bends the affine model that its own columns are made with. With an accelerometer quadratic of 5 % at 1 g on a table that
-//! shows some attitudes more often than their opposites, the affine model alone errs by 1 % of scale and 0.3 degrees, and the
-//! quadratic came out 1 % small with `accel_cross_axis_product` beside it. By hand, where products of two axes can do all that a quadratic
-//! does to the magnitude of gravity, and more, the products took its place: of three units one was diagnosed wrongly, and two were refused.
+//! A strong effect distorts the affine model that its own columns are made with. Consider an accelerometer quadratic of 5 % at 1 g, on a table
+//! that shows some attitudes more often than their opposites: the affine model alone errs by 1 % of scale and 0.3 degrees, and the quadratic
+//! came out 1 % too small with `accel_cross_axis_product` beside it. By hand, products of two axes can change the magnitude of gravity like a
+//! quadratic, and took its place: of three units one was diagnosed wrongly, and two were refused.
 
 use mimu_core::compensation::Affine;
 use nalgebra::Matrix3;
@@ -21,14 +21,15 @@ use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 
-/// How often the rows of a sensor are made at most.
+/// Most times that the rows of a sensor are made.
 const PASSES: usize = 3;
-/// Error of an effect's columns by the affine model, over the noise, from which on they are made again.
+/// Error of the effects by the affine model, over the noise, above which the rows are made again.
 const BENT: f64 = 0.1;
-/// Coefficients of an effect beyond which a simpler one may have been what bent the affine model: one for each axis is as simple as can be.
+/// An effect with more coefficients than this is complex: a simpler one may have distorted the affine model. The simplest effects have one
+/// coefficient for each axis.
 const SIMPLE: usize = 3;
 
-/// Times between the dwells, s since the recording began, and which recording.
+/// Index of each recording, and the times between its dwells, s since it began.
 fn dwell_ends(recordings: &[&Prepared]) -> Vec<(usize, f64)> {
     let mut all = Vec::new();
     for (session, prepared) in recordings.iter().enumerate() {
@@ -59,49 +60,50 @@ fn later_session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) 
     session(prepared, own)
 }
 
-/// What was accepted.
+/// Accepted effects.
 fn effects_of(decision: &Decision) -> Vec<FittedEffect> {
     decision.accepted.iter().map(|a| a.effect.clone()).collect()
 }
 
-/// What of it is taken out before the calibration. What may be a true input as well stays in: no file holds it, and its mean over the poses
-/// is then a part of the bias, as in a calibration without effects.
+/// The accepted effects that are removed before the calibration. One that may be a true input instead stays in: no file stores it, and its
+/// mean over the poses is then part of the bias, as in a calibration without effects.
 fn removed_of(decision: &Decision) -> Vec<FittedEffect> {
     let accepted = decision.accepted.iter();
     let certain = accepted.filter(|a| a.chosen.or_true_input().is_none());
     certain.map(|a| a.effect.clone()).collect()
 }
 
-/// By what share one affine model differs from another in scale and direction.
+/// Relative difference of two affine models in scale and direction.
 fn bent(was: &Affine<f64>, is: &Affine<f64>) -> f64 {
     let inverse = was.matrix.try_inverse().unwrap_or_else(Matrix3::zeros);
     (is.matrix * inverse - Matrix3::identity()).amax()
 }
 
-/// What the effects take out of the rows, in sample, unit of the rows.
+/// Rms of the part of the rows that the effects explain in sample, unit of the rows.
 fn explained_rms(decision: &Decision) -> f64 {
     let [before, after] = decision.rms.map(|rms| rms * rms);
     (before - after).max(0.0).sqrt()
 }
 
-/// What the rows of a sensor led to, made with one affine model.
+/// Result of the rows of a sensor, made with one affine model.
 pub(super) struct Pass {
     pub rows: Rows,
     pub decision: Decision,
-    /// What was accepted.
+    /// Accepted effects.
     pub found: Vec<FittedEffect>,
-    /// The fit without it, and the later recordings; `None` where nothing was.
+    /// The fit of the first recording without the effects, and the later recordings without them; `None` if none was accepted.
     pub after: Option<Result<(Fit, Vec<Prepared>)>>,
 }
 
 impl Pass {
-    /// Whether `other` is no better: by the held-out error, or because readings without what it found cannot be calibrated.
+    /// Whether `other` is no better: by the held-out error, or because its readings without the effects cannot be calibrated.
     fn stands_before(&self, other: &Self) -> bool {
         let held_out = |pass: &Self| pass.decision.held_out_rms[1];
         !matches!(other.after, Some(Ok(_))) || !(held_out(other) <= held_out(self))
     }
 
-    /// What its readings err by as a function of their own input, where rows are not linear in them: on a table the input is known.
+    /// Effects of the sensor's own input, about which rows are linearised if they are not linear in the readings. On a table the input is
+    /// known, so there are none.
     fn about(&self) -> Vec<FittedEffect> {
         match self.rows.figure {
             RowFigure::Input | RowFigure::Rest => Vec::new(),
@@ -112,8 +114,8 @@ impl Pass {
         }
     }
 
-    /// Whether `other` has the same effects, and readings without them can be calibrated. Made about what this one found, its figures are
-    /// nearer to what the calibration does, and need not be lower.
+    /// Whether `other` has the same effects, and readings without them can be calibrated. If it is linearised about the effects found here,
+    /// its figures are closer to those of the calibration, and need not be lower.
     fn has_effects_of(&self, other: &Self) -> bool {
         let ids = |pass: &Self| -> Vec<String> {
             let mut ids: Vec<String> = pass.found.iter().map(|e| e.candidate.id()).collect();
@@ -129,16 +131,16 @@ impl Pass {
     }
 }
 
-/// What a sensor's effects are sought in.
+/// Recordings and settings for the effects of one sensor.
 pub(super) struct Passes<'a> {
     pub sensor: Sensor,
     /// The first recording, without the effects of the other sensor.
     pub now: &'a Fit,
     /// The later ones.
     pub later: &'a [Prepared],
-    /// How many of all recordings effects are found in; by the others they are judged.
+    /// Number of recordings in which effects are sought; the others judge the effects.
     pub found_in: usize,
-    /// How the forces may err that turns are judged by.
+    /// Errors of the forces that turns are judged by.
     pub forces: Option<&'a ForceErrors>,
     pub free: FreeParameters<'a>,
     /// See [`super::Recordings::accept`].
@@ -156,7 +158,7 @@ impl Passes<'_> {
         )
     }
 
-    /// What the rows lead to, without effects with which the calibration file would err more on another recording.
+    /// The best pass without effects that make the calibration file err more on another recording.
     pub fn best(&self) -> Result<Pass> {
         let judge = AsWritten {
             sensor: self.sensor,
@@ -186,8 +188,8 @@ impl Passes<'_> {
         }
     }
 
-    /// The same with some effects not tried, each with the reason. Where the others bent the affine model, or cannot be taken out, each
-    /// effect of many coefficients is left away for once, and what predicts best is taken.
+    /// The same with some effects not tried, each with the reason. If the accepted effects distorted the affine model, or cannot be removed,
+    /// each complex one is left out in turn, and the pass that predicts best is taken.
     fn best_without(&self, without: &[Rejected]) -> Result<Pass> {
         let (mut best, strong) = self.settled(without)?;
         let complex = best.decision.accepted.iter();
@@ -205,7 +207,8 @@ impl Passes<'_> {
         Ok(best)
     }
 
-    /// Passes until the affine model stays; and whether the first one bent it, or led to readings that cannot be calibrated.
+    /// Repeats passes until the affine model stays. The flag says whether the first pass distorted it, or led to readings that cannot be
+    /// calibrated.
     fn settled(&self, without: &[Rejected]) -> Result<(Pass, bool)> {
         let sensor = self.sensor;
         let fits = Sensor::BOTH.map(|s| self.now.sensor(s));
@@ -234,7 +237,7 @@ impl Passes<'_> {
         Ok((pass, strong))
     }
 
-    /// The rows of `sessions`, linear about their readings without `effects`.
+    /// The rows of `sessions`, linearised about their readings without `effects`.
     fn rows(
         &self,
         sessions: &[Session],
@@ -260,8 +263,8 @@ impl Passes<'_> {
         Some(rows.about(effects, &as_read).unwrap_or(as_read))
     }
 
-    /// One pass, with `models` of gyro and accelerometer, linear about readings without the effects `about`; effects `without`, each with
-    /// the reason, are not tried.
+    /// One pass with `models` of gyro and accelerometer, linearised about readings without the effects `about`. The effects `without`, each
+    /// with the reason, are not tried.
     fn pass(
         &self,
         models: [Option<Affine<f64>>; 2],
@@ -306,8 +309,8 @@ impl Passes<'_> {
         let mut decision = decide(without)?;
         let mut found = effects_of(&decision);
         let mut after = (!found.is_empty()).then(|| clean(&removed_of(&decision)));
-        // Bits of a code that are nearly one another's sum, and coefficients of a size that no sensor has, can lead the readings away: such an
-        // effect is no explanation, and no reason to refuse the recording either.
+        // Readings may be useless after removal of bits that are nearly sums of each other, or of coefficients far larger than any sensor's.
+        // Such an effect explains nothing, and the recording need not be refused for it.
         let mut without = without.to_vec();
         while let Some(Err(error)) = after {
             let accepted = decision.accepted.iter().map(|a| &a.chosen);

@@ -1,5 +1,5 @@
-//! What a diagnosis looks like: residuals before and after against time and against what an effect depends on, with the
-//! effect as it was fitted, and how what is left compares with noise. Computed here, drawn elsewhere.
+//! Data for the plots of a diagnosis: residuals before and after against time, and against the quantity that an effect
+//! depends on, with the fitted effect; and the remaining residuals compared with noise. They are drawn elsewhere.
 
 mod abscissa;
 mod against;
@@ -18,7 +18,7 @@ use crate::fit::Split;
 use crate::observable::Observable;
 use crate::quantity::Sensor;
 
-/// What residuals are of.
+/// Quantity of residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum ResidualKind {
     /// Angle by which gravity is missed after a turn, rad.
@@ -43,17 +43,17 @@ pub struct Sample {
 /// Residuals of one kind in order of time.
 #[derive(Debug, Clone, Serialize)]
 pub struct Track {
-    /// Of what: an axis, a direction across gravity.
+    /// Axis, or direction across gravity.
     pub name: String,
-    /// What they are of.
+    /// Quantity of the residuals.
     pub kind: ResidualKind,
-    /// Rows of it.
+    /// Its rows.
     pub samples: Vec<Sample>,
     #[serde(skip)]
     rows: Vec<usize>,
     #[serde(skip)]
     axis: Option<usize>,
-    /// What they are of, whatever the recording.
+    /// Observable, without the recording.
     #[serde(skip)]
     pub group: Observable,
 }
@@ -61,7 +61,7 @@ pub struct Track {
 /// Error figures of a model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Step {
-    /// What the model has more than the one before.
+    /// What the model adds to the one before.
     pub adds: String,
     /// Root mean square in sample.
     pub rms: f64,
@@ -72,11 +72,11 @@ pub struct Step {
 /// Residuals in units of the known noise, in ascending order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quantile {
-    /// What noise alone would be expected to give here.
+    /// Expected value if there is only noise.
     pub normal: f64,
-    /// The middle 95 % of that, for each separately.
+    /// 95 % interval of that, for each separately.
     pub band: [f64; 2],
-    /// What it is before and after.
+    /// Residuals before and after.
     pub found: [f64; 2],
 }
 
@@ -87,11 +87,11 @@ pub struct Omnibus {
     pub chi2: f64,
     /// Degrees of freedom.
     pub dof: usize,
-    /// Probability of chance.
+    /// Probability by chance.
     pub p: f64,
 }
 
-/// What is drawn of one sensor.
+/// Data for the plots of one sensor.
 #[derive(Debug, Clone, Serialize)]
 pub struct Picture {
     /// Sensor.
@@ -149,7 +149,7 @@ impl Picture {
             let adds = kept[n - 1].candidate.id();
             steps.push(match n == kept.len() {
                 true => step(adds, last),
-                // The decision is on all of them together; what the first ones do by themselves is fitted for the table.
+                // The decision is on all effects together. For the table, the first ones are also fitted alone.
                 false => {
                     let tested = search.fit(&kept[..n])?;
                     step(
@@ -232,7 +232,7 @@ fn tracks(rows: &Rows, sample: impl Fn(usize, f64) -> Sample) -> Vec<Track> {
     all
 }
 
-/// Times between the blocks that are held out; none of several recordings, whose times lie over each other.
+/// Times between the blocks that are held out; empty for several recordings, whose times overlap.
 fn blocks(rows: &Rows) -> Vec<f64> {
     if rows.strata.iter().any(|s| s.session > 0) {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! Effects that were tried and not accepted, with the reason by kind; only readers get the sentence.
+//! Effects that were tried and not accepted. The reason is a type; only its display is a sentence.
 
 use std::fmt;
 
@@ -13,30 +13,31 @@ use crate::quantity::{Figure, Sensor, p_value, significant};
 pub struct Rejected {
     /// Public id.
     pub id: String,
-    /// Whose readings would err.
+    /// Sensor whose readings would err.
     pub sensor: Sensor,
     /// Why not.
     pub reason: Reason,
 }
 
-/// Why an effect is not accepted. JSON has the sentence. Pairs are without it and with it.
+/// Why an effect is not accepted. JSON has the sentence. The first figure of a pair is without the effect, the second with it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reason {
-    /// It rests on one dwell, to this share.
+    /// One dwell contains this share of its information.
     OneDwell(f64),
     /// The held-out error does not go down.
     HeldOut([ErrorRms; 2]),
     /// The error of the second recording does not go down: chi-squares, and rms.
     SecondRecording([f64; 2], [ErrorRms; 2]),
-    /// Parts that were held out whose error goes down, and those whose error goes up.
+    /// Number of held-out parts whose error goes down, and number of those whose error goes up.
     Parts(usize, usize),
-    /// Without a block the rest does not determine it.
+    /// The data without one block do not determine it.
     UndeterminedWithoutBlock,
-    /// The residual is so many times the noise, so that it fits the noise.
+    /// It fits the noise: the residual in units of the noise.
     FitsNoise([f64; 2]),
-    /// The probability of chance without one dwell and those in its pose.
+    /// One dwell and those in its pose contain the evidence: the probability by chance without them.
     LostWithDwell(f64),
-    /// The probability of chance of one that holds out, but has no known physics, and that no second recording and no person confirms.
+    /// It lowers the held-out error, but has no known physics, and neither a second recording nor the user confirms it: the
+    /// probability by chance.
     Suggestion(f64),
     /// It was not chosen in the search.
     NotChosen(NotChosen),
@@ -51,9 +52,9 @@ pub enum Reason {
 /// An effect that the search did not choose, or gave up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NotChosen {
-    /// Probability of chance, beside those that were chosen.
+    /// Probability by chance beside the chosen effects.
     pub p: f64,
-    /// Why not, though it is significant now; `None` where it is not.
+    /// Why it was not chosen although it is significant now; `None` if it is not.
     pub why: Option<Passed>,
     /// Errors in sample and held out, where both are known.
     pub errors: Option<[[ErrorRms; 2]; 2]>,
@@ -64,7 +65,7 @@ pub struct NotChosen {
 pub enum Passed {
     /// Others explained the same, and it was given up.
     GivenUp,
-    /// So many effects were found before it, and no more are sought.
+    /// So many effects were found before it, and the search stops there.
     Enough(usize),
     /// It was not significant beside what was sought at first.
     NotAtFirst,
@@ -73,9 +74,9 @@ pub enum Passed {
 /// An error of a sensor, rms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorRms {
-    /// What it is about.
+    /// Quantity.
     pub figure: Figure,
-    /// Whose.
+    /// Sensor.
     pub sensor: Sensor,
     /// Value, unit of the figure.
     pub rms: f64,

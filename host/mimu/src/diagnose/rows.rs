@@ -1,16 +1,15 @@
-//! What is left of recordings after the affine model, as the rows of one linear problem: residuals, what the affine
-//! parameters could still do to them, and what an effect would.
+//! Residuals of recordings after the affine model, as the rows of one linear problem: the residuals, their derivatives by the affine parameters, and
+//! the columns of effects.
 //!
 //! | reference, sensor | one row is                                                     | unit   |
 //! |-------------------|----------------------------------------------------------------|--------|
-//! | table             | a dwell and sensor axis: reading less prediction, over the scale factor | SI |
-//! |                   | where an input moves within a dwell: its [contrasts](crate::prepared::Prepared::within_dwells) | SI |
-//! | gravity, accel    | a dwell: magnitude of the force minus gravity                        | m/s²   |
+//! | table             | a dwell and sensor axis: reading minus prediction, over the scale factor | SI |
+//! |                   | if an input moves within a dwell: a [contrast](crate::prepared::Prepared::within_dwells) | SI |
+//! | gravity, accel    | a dwell: magnitude of the force minus gravity                  | m/s²   |
 //! | gravity, gyro     | a turn and direction across gravity: prediction error of gravity | rad  |
 //! |                   | a dwell and axis: rate at rest                                 | rad/s  |
 //!
-//! Of several recordings the matrix is one, the biases are each session's own: a bias is another after every power-on, and an
-//! effect must not be made of that.
+//! Several recordings share one matrix, but each has separate biases: a bias changes at every power-on, which must not be mistaken for an effect.
 
 mod build;
 mod forces;
@@ -39,12 +38,12 @@ use crate::quantity;
 use crate::quantity::Sensor;
 use crate::triad::Covariance;
 
-/// Rows that share their noise.
+/// Rows with common variance components.
 #[derive(Debug, Clone)]
 pub struct Stratum {
-    /// What its rows are of.
+    /// Quantity of its rows.
     pub name: StratumName,
-    /// Axis, where all of its rows are of one.
+    /// Axis, if all of its rows belong to one.
     pub axis: Option<usize>,
     /// Index of its recording.
     pub session: usize,
@@ -52,20 +51,20 @@ pub struct Stratum {
     pub rows: Range<usize>,
     /// Known covariance, unit of the rows squared.
     pub known: DMatrix<f64>,
-    /// What of the variance of each row is no noise of it, but an error that the reference may have; `None`: nothing.
+    /// Part of each row's variance that comes from errors of the reference instead of noise; `None` if there is none.
     pub by_reference: Option<DVector<f64>>,
-    /// What a given matrix leaves open, which is no noise and common to all rows: this times its transpose is their covariance beside the
-    /// known one, unit of the rows squared. `None`: nothing.
+    /// Factor of the covariance that the uncertainty of a given matrix adds to all rows: this times its transpose, unit of the rows squared. `None`
+    /// if there is none, or if it is negligible.
     pub open: Option<DMatrix<f64>>,
-    /// Covariance of a random walk with K = 1 unit/√s between the rows; `None` where rows are no means of dwells.
+    /// Covariance of a random walk with K = 1 unit/√s between the rows; `None` if the rows are not dwell means.
     pub random_walk: Option<DMatrix<f64>>,
-    /// Whether the known covariance holds what the bias wanders.
+    /// Whether the known covariance includes the wander of the bias.
     pub wander_known: bool,
-    /// Whether its rows are no means of dwells, but of how the reading follows an input that moves within them.
+    /// Whether its rows show how the reading follows an input that moves within a dwell, instead of dwell means.
     pub within: bool,
 }
 
-/// What the error figures of some rows are about.
+/// Quantity that error figures are about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowFigure {
     /// Error of a known input, SI.
@@ -88,17 +87,16 @@ impl From<RowFigure> for quantity::Figure {
     }
 }
 
-/// Which affine parameters the recordings have to determine themselves.
+/// Affine parameters that the recordings themselves determine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FreeParameters<'a> {
     /// Matrix and biases.
     Affine,
-    /// The biases. The matrix is known, to within the covariance of its inverse affine model: C by rows, then o, of which the latter is
-    /// not looked at.
+    /// The biases. The matrix is given, with the covariance of its inverse affine model: C by rows, then o, whose part is not used.
     Bias(Option<&'a Covariance>),
 }
 
-/// A recording with the calibration that its residuals are of.
+/// A recording with the calibration that defines its residuals.
 #[derive(Debug, Clone, Copy)]
 pub struct Session<'a> {
     /// The recording.
@@ -107,7 +105,7 @@ pub struct Session<'a> {
     pub gyro: Option<Affine<f64>>,
     /// Accelerometer, raw to m/s².
     pub accel: Option<Affine<f64>>,
-    /// How its forces may err, where they are what the gyro is judged by.
+    /// Errors of its forces, if these judge the gyro.
     pub forces: Option<&'a ForceErrors>,
 }
 
@@ -121,12 +119,12 @@ impl Session<'_> {
     }
 }
 
-/// The conditions that a row is made of.
+/// A row: a weighted sum of the sensor's errors under several conditions.
 #[derive(Debug, Clone)]
 struct Row {
     /// Indices of its conditions.
     conditions: Range<usize>,
-    /// What an error of each axis of the sensor (SI) at a conditions adds to the row: one for all, or one each.
+    /// What an error of each axis of the sensor (SI) adds to the row, for each of its conditions.
     weights: Vec<Vector3<f64>>,
     /// Index of the dwell, or of the dwells that a turn begins and ends in; counted through all recordings.
     dwells: [usize; 2],
@@ -141,44 +139,44 @@ pub struct Rows {
     pub sensor: Sensor,
     /// Residuals.
     pub y: DVector<f64>,
-    /// Derivatives by the parameters of the affine model, scaled to columns of one size.
+    /// Derivatives by the parameters of the affine model, as columns of length 1.
     pub nuisance: DMatrix<f64>,
-    /// What a unit of each of the first of these, which are of the first recording, adds to its inverse affine model: C by rows, then o.
+    /// What one unit of each of the first recording's columns, which come first, adds to its inverse affine model: C by rows, then o.
     pub parameters: DMatrix<f64>,
-    /// What an error of C, by rows, does to each row beside the biases.
+    /// Derivatives of the rows by the elements of C, by rows, without the part that a bias absorbs.
     by_matrix: DMatrix<f64>,
     /// Strata, which cover the rows in order.
     pub strata: Vec<Stratum>,
     /// What the error figures are about.
     pub figure: RowFigure,
-    /// How many of the rows, from the first on, the error figures are about, and how many of these make one dwell or turn.
+    /// Number of rows, from the first on, that the error figures include; and how many of these count as one dwell or turn.
     pub judged: (usize, usize),
-    /// Step that the readings of the three axes alike are multiples of, raw, in all recordings; `None` where they are not.
+    /// Quantisation step of the readings, raw, if it is the same on all axes and in all recordings; else `None`.
     pub step: Option<f64>,
     rows: Vec<Row>,
     conditions: Vec<Conditions>,
-    /// Recording and block of each conditions.
+    /// Recording and block of each of the conditions.
     block: Vec<(usize, usize)>,
     /// Of each recording: time of each block, s, and its temperature, °C above the reference.
     temperature: Vec<Vec<(f64, f64)>>,
     /// The same without the thermometer's self-heating, if there is any.
     without_self_heating: Vec<Option<Vec<(f64, f64)>>>,
-    /// Number of the first dwell of each recording, and that of all dwells.
+    /// Index of the first dwell of each recording, then the number of all dwells.
     first: Vec<usize>,
-    /// What its terms are made of, once a column of one was asked for.
+    /// Quantities of the terms, computed when first needed.
     quantities: OnceLock<Quantities>,
 }
 
-/// Rank correlation from which on temperature and time are one. A ramp up and half of the way back has 0.5.
+/// Rank correlation above which temperature and time are not distinguished. A ramp up and half of the way back has 0.5.
 const ONE_WAY: f64 = 0.95;
 
-/// Share of the variance by noise below which it does not matter what a given matrix leaves open.
+/// Share of the noise variance below which the uncertainty of a given matrix is neglected.
 const NEGLIGIBLE: f64 = 1e-4;
 
 impl Rows {
     /// The rows of `sensor` in all of `sessions`, whose calibrations share one matrix.
     ///
-    /// Figures are about recordings of the kind of the first. `None` if the first has no rows, or its calibration is singular.
+    /// The error figures include the recordings of the same kind as the first. `None` if the first has no rows, or its calibration is singular.
     pub fn of(sessions: &[Session], sensor: Sensor, free: FreeParameters) -> Option<Self> {
         let parts: Vec<_> = sessions
             .iter()
@@ -192,15 +190,15 @@ impl Rows {
         Some(rows)
     }
 
-    /// These rows, of readings that `effects` were taken out of, with what they do put back in; `as_read` are the same rows of the readings
-    /// themselves, or `None` if they are not.
+    /// Adds what `effects` contribute to these rows, which are of readings without them. `as_read` are the rows of the recorded readings; `None` if
+    /// the two differ in dwells or conditions.
     ///
-    /// The size of a force and the angle of a turn are not linear in the errors of the readings, and effects not in the input that they
-    /// are evaluated at. An accelerometer cubic of 3 % at 1 g came out 14 % too large, 21 standard deviations, where all of this was
-    /// linear about the readings. About readings without the effect, what is neglected is as small as what they still err by.
+    /// The magnitude of a force and the angle of a turn are not linear in the errors of the readings, nor are effects linear in the input. Linearised
+    /// about the recorded readings, an accelerometer's cubic term of 3 % at 1 g came out 14 %, or 21 standard deviations, too large. About readings
+    /// without the effect, the neglected part is as small as their remaining error.
     pub fn about(mut self, effects: &[FittedEffect], as_read: &Self) -> Option<Self> {
         let pairs = self.conditions.iter_mut().zip(&as_read.conditions);
-        // What a converter does goes by what it put out.
+        // The error of a converter depends on the code that it put out.
         pairs.for_each(|(clean, read)| clean.reading = read.reading);
         let alike = |a: &Row, b: &Row| a.dwells == b.dwells && a.conditions == b.conditions;
         let same = self.rows.len() == as_read.rows.len()
@@ -216,10 +214,10 @@ impl Rows {
         same.then_some(self)
     }
 
-    /// Takes a given matrix for known to within the `covariance` of C by rows only.
+    /// Adds the uncertainty of a given matrix: the `covariance` of C by rows.
     ///
-    /// What several recordings have in common is not in the covariance, which is that of each stratum by itself. An error that shows alike
-    /// in n of them is therefore given n times its variance, which their mean has 1/n of.
+    /// The strata are treated as independent, but all n recordings share this error. It is given n times its variance, because the mean of n
+    /// independent errors has 1/n of it.
     fn leave_open(&mut self, covariance: SMatrix<f64, 9, 9>) {
         let mut sessions: Vec<usize> = self.strata.iter().map(|s| s.session).collect();
         sessions.sort_unstable();
@@ -234,23 +232,23 @@ impl Rows {
                 .row_iter()
                 .map(|r| r.norm_squared())
                 .fold(0.0, f64::max);
-            // At one input an error of the matrix is a bias.
+            // If the input is constant, a bias absorbs an error of the matrix.
             stratum.open = (most > NEGLIGIBLE * stratum.known.diagonal().min()).then_some(open);
         }
     }
 
-    /// Three rows for each pose of a recording: the error of the force that its accelerometer says.
+    /// Three rows for each pose of a recording: the error of the force that its accelerometer measures.
     pub(super) fn forces(session: &Session) -> Option<Self> {
         join::join(Sensor::Accel, vec![(0, build::forces(session)?)], 1)
     }
 
-    /// Dwells that row `row` is about, counted through all recordings.
+    /// Dwells of row `row`, counted through all recordings: a turn begins in the first and ends in the second; otherwise both are the same.
     pub fn dwells(&self, row: usize) -> [usize; 2] {
         self.rows[row].dwells
     }
 
-    /// For each dwell the first that is in the same pose of the same recording, by the direction of gravity: all of these err alike if the unit
-    /// stood badly, and are one witness. On a table, whose input is known, and where there is one pose only, each dwell is its own.
+    /// For each dwell the first dwell in the same pose of the same recording, by the direction of gravity. If the unit was placed badly, all of these
+    /// err alike, so they count as one witness. Each dwell is a separate witness on a table, whose input is known, and if there is only one pose.
     pub fn witnesses(&self) -> Vec<usize> {
         if self.figure == RowFigure::Input {
             return (0..self.dwell_count()).collect();
@@ -270,7 +268,7 @@ impl Rows {
         }
     }
 
-    /// Rows among the judged that are not of a whole dwell, but of how the reading follows an input that moves within it.
+    /// Number of judged rows that show how the reading follows an input that moves within a dwell.
     pub fn judged_within(&self) -> usize {
         let within = self
             .strata
@@ -284,14 +282,15 @@ impl Rows {
         self.first.last().copied().unwrap_or(0)
     }
 
-    /// Place of a dwell in its recording, and how many this has.
+    /// Index of a dwell in its recording, and the number of dwells there.
     pub fn place(&self, dwell: usize) -> (usize, usize) {
         let after = self.first.partition_point(|f| *f <= dwell);
         let [from, to] = [after.saturating_sub(1), after].map(|i| self.first[i]);
         (dwell - from, to - from)
     }
 
-    /// Mean of a quantity over the conditions of row `row`, by their lengths; `conditions` are all, as [`Self::conditions`] gives them.
+    /// Mean of a quantity over the conditions of row `row`, weighted by their durations. `conditions` are those of all rows, as [`Self::conditions`]
+    /// gives them.
     pub fn mean(
         &self,
         row: usize,
@@ -303,7 +302,8 @@ impl Rows {
         of_row.iter().map(|m| value(m) * m.duration_s / total).sum()
     }
 
-    /// The same rows with one conditions for each dwell whose input stands, whose reading scatters as its samples do: for what depends on the reading alone.
+    /// The same rows, for functions of the reading alone. Each dwell with constant input has one set of conditions, whose reading scatters as the
+    /// samples do.
     pub fn by_dwell(&self) -> Self {
         let mut out = self.clone();
         out.quantities = OnceLock::new();
@@ -338,8 +338,8 @@ impl Rows {
         out
     }
 
-    /// The conditions of rows [by dwell](Self::by_dwell), each reading without what `residuals` say of it: the dwell's noise, which
-    /// is in the row as well and would make any function of the reading seem to explain it, and the error that is sought.
+    /// The conditions of rows [by dwell](Self::by_dwell), with `residuals` subtracted from the readings. A residual contains the noise of the dwell,
+    /// which is in the row too: any function of the noisy reading would seem to explain it. It also contains the error that is sought.
     pub fn conditions_without(&self, residuals: &DVector<f64>) -> Vec<Conditions> {
         let mut conditions = self.conditions.clone();
         for (row, residual) in self.rows.iter().zip(residuals.iter()) {
@@ -353,7 +353,7 @@ impl Rows {
         conditions
     }
 
-    /// Lowest and highest reading of its axes, raw, averaged over a conditions.
+    /// Lowest and highest reading of any axis, raw, each a mean under one set of conditions.
     pub fn reading_range(&self) -> (f64, f64) {
         let all = self.conditions.iter().flat_map(|m| m.reading.mean.iter());
         all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
@@ -361,7 +361,7 @@ impl Rows {
         })
     }
 
-    /// The conditions, with the temperature that an effect goes by.
+    /// The conditions, with the temperature that an effect follows.
     pub fn conditions(&self, followed: Option<Followed>) -> Cow<'_, [Conditions]> {
         let Some(followed) = followed else {
             return Cow::Borrowed(&self.conditions);
@@ -393,8 +393,8 @@ impl Rows {
         self.without_self_heating.iter().any(Option::is_some)
     }
 
-    /// Rank correlation of temperature and time where they go together in all recordings, so that what follows one follows the
-    /// other; `None` where the temperature comes back.
+    /// Rank correlation of temperature and time, if it is so strong in all recordings that their effects look alike; `None` if the temperature
+    /// returns.
     pub fn one_way(&self) -> Option<f64> {
         let correlations: Vec<f64> = self
             .temperature
@@ -409,7 +409,7 @@ impl Rows {
         (least.is_finite() && alike && least.abs() > ONE_WAY).then_some(least)
     }
 
-    /// Columns of some regressors, each the error of one axis: `values` writes those of a conditions.
+    /// Columns of some regressors, each an error of one axis. `values` writes the regressors under one set of conditions.
     pub fn columns(
         &self,
         conditions: &[Conditions],
@@ -435,7 +435,8 @@ impl Rows {
         columns
     }
 
-    /// `columns` of some regressors at other conditions: those of [Self::conditions_without], which differ where a row has one only.
+    /// `columns` of some regressors, updated to the conditions of [Self::conditions_without]. These differ only in rows with a single set of
+    /// conditions.
     pub fn columns_without(
         &self,
         mut columns: DMatrix<f64>,

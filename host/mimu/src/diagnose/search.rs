@@ -1,8 +1,8 @@
-//! Which effects the rows ask for: one after the other, each tested again beside the others.
+//! Search for the effects that explain the rows: one after the other, each tested again beside the others.
 //!
-//! A candidate is screened by the share of the scatter that it explains, with the noise of the model so far; the best are then
-//! fitted with noise of their own, and judged by the likelihood ratio, as a probability after the whole search. The noise of
-//! a model that lacks an effect is too large, and a test that keeps it would miss what makes it so.
+//! A candidate is screened by the share of the scatter that it explains, with the noise of the model so far. The best are then fitted with
+//! separately estimated noise, and judged by the likelihood ratio, as a probability that allows for the number of tests. The noise of a model
+//! that lacks an effect is too large, so a test with that noise would miss the effect.
 
 mod chosen;
 mod columns;
@@ -27,21 +27,21 @@ use screen::Screened;
 
 /// Probability that a clean sensor is found to have an effect of the library.
 pub const FALSE_LISTED: f64 = 1.5e-3;
-/// That it is found to have a term found from the data, or a jump.
+/// The same for a term found from the data, or a jump.
 pub const FALSE_FOUND: f64 = 1e-3;
-/// Products and jumps that are fitted with noise of their own.
+/// Number of products and jumps that are fitted with separately estimated noise.
 const FINALISTS: usize = 8;
-/// Most effects of one sensor, and most terms and jumps found from the data. Counted apart: over a wide range of temperatures the cubes of three
-/// axes took three of five places, were not accepted, and kept out a lag that halved what was left.
+/// Most effects of one sensor, and most terms and jumps found from the data. They are counted separately: over a wide range of temperatures the
+/// cubes of three axes took three of five places, were not accepted, and kept out a lag that halved the residual.
 pub const MOST: usize = 5;
 
-/// What a search led to.
+/// Result of a search.
 pub struct Found {
-    /// What the rows ask for.
+    /// Effects that explain the rows.
     pub chosen: Vec<Chosen>,
-    /// The model with it.
+    /// The fit with these.
     pub fit: Fitted,
-    /// Ids of what was chosen, and made superfluous by others.
+    /// Ids of effects that were chosen at first, and made superfluous by others.
     pub superfluous: Vec<String>,
 }
 
@@ -59,19 +59,19 @@ pub struct Search<'a> {
     pub rows: &'a Rows,
     /// The same by dwells, for functions of the reading.
     by_dwell: Rows,
-    /// Their scatter.
+    /// Model of their variance.
     pub variance: VarianceModel<'a>,
-    /// Basis of what the affine parameters can do.
+    /// Basis of the columns of the affine parameters.
     pub basis: DMatrix<f64>,
     candidates: Vec<Candidate>,
-    /// Columns of each for each parameter that is screened; none of those that are another beside other effects.
+    /// Columns of each candidate at each parameter that is screened; empty for codes, whose columns depend on the effects beside them.
     screened: Vec<Vec<Columns>>,
     /// Codes with all of their bits, and their columns by slot in the rows by dwells.
     codes: Vec<(Candidate, DMatrix<f64>)>,
     tests: [f64; 2],
 }
 
-/// Probability that chance makes F with these degrees of freedom as large.
+/// Probability by chance of an F this large, with these degrees of freedom.
 fn exceeds(f: f64, p: f64, dof: f64) -> f64 {
     match FisherSnedecor::new(p, dof) {
         Ok(d) if f.is_finite() && f > 0.0 => d.sf(f),
@@ -84,7 +84,7 @@ impl<'a> Search<'a> {
     pub fn new(rows: &'a Rows, candidates: Vec<Candidate>) -> Self {
         let count = |listed: bool| -> f64 {
             let ours = candidates.iter().enumerate().filter(|(i, c)| {
-                // Variants of one follow each other.
+                // Variants of one candidate follow each other.
                 c.is_listed() == listed && !(*i > 0 && candidates[i - 1].is_variant_of(c))
             });
             ours.map(|(_, c)| c.tests()).sum::<f64>().max(1.0)
@@ -151,19 +151,19 @@ impl<'a> Search<'a> {
         &self.by_dwell
     }
 
-    /// Moments by dwell, without what `fitted` of `model` does not explain of their readings.
+    /// Conditions by dwell, with the residuals of `model` fitted as `fitted` subtracted from the readings.
     pub(super) fn freed(&self, model: &DMatrix<f64>, fitted: &Fitted) -> Vec<Conditions> {
         let left = &self.rows.y - model * &fitted.coefficients;
         self.by_dwell.conditions_without(&left)
     }
 
-    /// Columns of all bits that are offered of a code, at the conditions of [`Rows::conditions_without`]; `None` of what is no code.
+    /// Columns of all offered bits of a code, at the conditions of [`Rows::conditions_without`]; `None` if it is not a code.
     pub(super) fn bits(&self, code: &Candidate, conditions: &[Conditions]) -> Option<DMatrix<f64>> {
         let (all, slots) = self.codes.iter().find(|(c, _)| c.is_variant_of(code))?;
         Some(all.columns_without(&self.by_dwell, slots, conditions))
     }
 
-    /// Takes the bits of a code again from the readings without the errors of what has been added since: those move the readings too.
+    /// Computes the columns of codes again, from readings without the errors of the effects added since.
     fn read_again(&self, chosen: &mut [Chosen], now: &mut Fitted) {
         for k in 0..chosen.len() {
             if !chosen[k].candidate.reads_code() || chosen.len() == 1 {
@@ -178,13 +178,13 @@ impl<'a> Search<'a> {
             let before = std::mem::replace(&mut chosen[k].columns, columns);
             match self.fit(chosen) {
                 Some(fit) => *now = fit,
-                // At these readings two bits turn together.
+                // The fit is singular if two bits change together at these readings.
                 None => chosen[k].columns = before,
             }
         }
     }
 
-    /// Moments by dwell whose readings are free from noise and from the error of chosen effect `k`.
+    /// Conditions by dwell whose readings are free from noise and from the error of chosen effect `k`.
     fn conditions_beside(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Vec<Conditions> {
         let before = chosen[..k].iter().map(|c| c.columns.ncols()).sum::<usize>();
         let first = self.basis.ncols() + before;
@@ -194,8 +194,8 @@ impl<'a> Search<'a> {
         self.by_dwell.conditions_without(&left)
     }
 
-    /// Adds the [siblings](Candidate::siblings) of the coefficients of each chosen effect, as far as the rows would show them at the size of data
-    /// sheets beside all others.
+    /// Adds the [siblings](Candidate::siblings) of each chosen effect's coefficients, if the rows would show them at data-sheet size beside all
+    /// others.
     pub fn complete(&self, chosen: &mut [Chosen], now: &mut Fitted) {
         for k in 0..chosen.len() {
             let before = chosen[k].clone();
@@ -256,21 +256,21 @@ impl<'a> Search<'a> {
         )
     }
 
-    /// Degrees of freedom that a model leaves.
+    /// Residual degrees of freedom of a model with so many columns.
     fn dof(&self, columns: usize) -> f64 {
         self.rows.y.len() as f64 - columns as f64
     }
 
-    /// Probability of chance, after the search, of a drop of the deviance by `drop` for `p` more columns of `candidate`.
+    /// Probability by chance of a drop in deviance of `drop` for `p` more columns of `candidate`, corrected for the number of tests.
     ///
-    /// By F: where the size of the noise is found from the rows, `n ln(1 + p F/dof)` is the drop, exactly; where it is known
-    /// and F's `dof` is large, it is chi-square.
+    /// By F: if the noise is estimated from the rows, the drop is exactly `n ln(1 + p F/dof)`. If the noise is known and F's `dof` is large, it
+    /// is chi-square.
     pub(super) fn chance(&self, drop: f64, p: usize, columns: usize, candidate: &Candidate) -> f64 {
         let tests = self.tests[usize::from(!candidate.is_listed())] * candidate.choices;
         (self.exceeds_by_chance(drop, p, columns) * tests).min(1.0)
     }
 
-    /// The same of one test.
+    /// The same for a single test.
     pub(super) fn exceeds_by_chance(&self, drop: f64, p: usize, columns: usize) -> f64 {
         let n = self.rows.y.len() as f64;
         let dof = self.dof(columns + p);
@@ -303,7 +303,7 @@ impl<'a> Search<'a> {
                 let at = |c: &&Columns| c.parameter == screened.parameter;
                 let first = self.screened[screened.index].iter().find(at)?;
                 let (parameter, with) = beside_these.parameter(candidate, first)?;
-                // By all of its coefficients an effect is one test, whatever choice of them follows.
+                // With all of its coefficients an effect is one test, whichever of them are chosen afterwards.
                 let whole = chance(candidate, &with);
                 let before = candidate.active.len();
                 let (candidate, with) = beside_these.coefficients(candidate, parameter, with)?;
@@ -356,7 +356,7 @@ impl<'a> Search<'a> {
         judged
     }
 
-    /// By how much the score is less with `law` in the place of `one` beside `rest`; negative where it is better.
+    /// How much lower the score is with `law` in place of `one` beside `rest`; negative if it is higher.
     pub fn worse_with(&self, law: &'static Effect, one: &Chosen, rest: &[Chosen]) -> Option<f64> {
         let null = self.fit(rest)?;
         let beside_these = Beside {
@@ -379,19 +379,19 @@ impl<'a> Search<'a> {
     }
 }
 
-/// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
+/// An effect is not excited if its coefficient at data-sheet size would be fewer sigmas than this.
 pub(super) const EXCITED: f64 = 3.0;
 
-/// A coefficient of this many times the size of data sheets is the largest that is looked for: what would not be seen even at that size is
-/// not determined. In a temperature that is constant to a millikelvin, or at rates that are rounding, any coefficient fits.
+/// Largest coefficient that is sought, in data-sheet sizes. A coefficient that would not be seen even at that size is not determined: if the
+/// temperature is constant to a millikelvin, or the rates are only rounding, any coefficient fits.
 pub(super) const LARGEST: f64 = 1e4;
 
-/// Part of a column that the others of its effect have to leave of it. At rest in gravity the squares of the force add up to a constant but
-/// for some 1e-4, by which the magnitude of a measured force scatters; at 1e-2 the line and the bend of a thermal bias over a narrow range
-/// of temperatures would be one.
+/// Part of a column that must be independent of the other columns of its effect. At rest the squares of the force add up to a constant to within
+/// some 1e-4, the scatter of the measured magnitude. At 1e-2 the linear and the quadratic part of a thermal bias over a narrow range of
+/// temperatures would not be distinguished.
 pub(super) const SEPARATE: f64 = 1e-3;
 
-/// Score within which two candidates are told to be confused: odds of one to four hundred.
+/// Difference in score below which two candidates are reported as confused: odds of one to four hundred.
 pub(super) const CONFUSED: f64 = 12.0;
 
 impl Candidate {
@@ -432,7 +432,7 @@ impl Candidate {
         }
     }
 
-    /// How many independent tests it counts for, beside the choices that it is the best of.
+    /// Number of independent tests that it counts as, apart from the choice among its variants.
     fn tests(&self) -> f64 {
         match self.kind {
             CandidateKind::Effect(_) if self.parameter().is_some() => 4.0,

@@ -1,5 +1,4 @@
-//! What the coefficients of effects leave open of everything that stands on them: the affine parameters beside them, and the forces that a
-//! gyro is judged by.
+//! Uncertainty that the coefficients of effects add to the affine parameters beside them, and to the forces that a gyro is judged by.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -20,8 +19,9 @@ const RANK: f64 = 1e-9;
 
 /// What the coefficients of the accepted effects add to the covariance of the inverse affine model of the first recording.
 ///
-/// A calibration of readings without an effect takes its coefficients as known. Left out, the intervals of an accelerometer with a
-/// quadratic or cubic term, which by hand is nearly a scale factor, held the truth in 84 to 86 % of the cases for 95 %.
+/// A calibration of readings without an effect takes its coefficients as known. Without the part added here, the 95 % intervals of an
+/// accelerometer with a quadratic or cubic term, which by hand is nearly a scale factor, contained the truth in only 84 to 86 % of the
+/// cases.
 pub fn of_affine(rows: &Rows, decision: &Decision) -> Option<Part> {
     let model = decision.models.last()?;
     let effects: usize = decision
@@ -48,13 +48,13 @@ pub fn of_affine(rows: &Rows, decision: &Decision) -> Option<Part> {
     })
 }
 
-/// How the forces of an accelerometer may err that was calibrated by gravity's size alone.
+/// Errors of the forces of an accelerometer that was calibrated by the magnitude of gravity alone.
 ///
-/// Errors of parameters are common to all poses, and so are those of its nonlinearity, which the size shows in part only: of
-/// `f_y f_z` read by x, `f_z f_x` by y and `f_x f_y` by z the sizes show the sum. What they do not show is as large as
-/// data sheets say, and no more is known of it; a gyro is not told to have what it could do.
+/// All poses share the errors of the parameters and of the nonlinearity, of which the magnitude shows only a part: of `f_y f_z` read by x,
+/// `f_z f_x` by y and `f_x f_y` by z it shows the sum. The rest is taken to have data-sheet size. So a gyro is not reported to have an
+/// effect that the rest could cause.
 ///
-/// Of the recording of `session`, the first of those of the rows `sizes` of its accelerometer, and what was decided on them.
+/// `session` is the first recording, `sizes` are the rows of its accelerometer (and of later ones), and `decision` is the one on these.
 pub fn of_forces(session: &Session, sizes: &Rows, decision: &Decision) -> Option<ForceErrors> {
     let rows = Rows::forces(session)?;
     let n = rows.y.len() / 3;
@@ -64,7 +64,7 @@ pub fn of_forces(session: &Session, sizes: &Rows, decision: &Decision) -> Option
     }
     let model = decision.models.last()?;
     let variances = VarianceModel::new(sizes, false).variances(&model.fitted.components);
-    // A prior of 1/sigma² for each column; none for what the sizes were asked for.
+    // A prior of 1/sigma² for each column; 0 for those that the magnitudes determine.
     let mut columns = rows.nuisance.clone();
     let mut precision = vec![0.0; columns.ncols()];
     let mut add = |candidate: &Candidate, parameter: f64, prior: &dyn Fn(usize) -> f64| {
@@ -125,8 +125,8 @@ pub fn of_forces(session: &Session, sizes: &Rows, decision: &Decision) -> Option
     })
 }
 
-/// How the forces of an accelerometer may err whose inverse model is known to within `covariance`, C by rows and then o: its matrix is
-/// given, and its biases are those of the recording.
+/// Errors of the forces of an accelerometer whose matrix is given, and whose biases are those of the recording. `covariance` is that of
+/// its inverse model, C by rows and then o.
 pub fn of_given_forces(prepared: &Prepared, covariance: &Covariance) -> ForceErrors {
     let poses = prepared.observations(Sensor::Accel);
     let mut by = DMatrix::zeros(3 * poses.len(), 12);
@@ -144,7 +144,7 @@ pub fn of_given_forces(prepared: &Prepared, covariance: &Covariance) -> ForceErr
     }
 }
 
-/// Whether an effect is an error of an accelerometer that goes by the force alone.
+/// Whether an effect is an error of an accelerometer that depends on the force alone.
 fn is_of_force(effect: &Effect) -> bool {
     let force = |q: &Quantity| matches!(q, Quantity::Input | Quantity::Force(_));
     let mut all = effect.coefficients.iter();

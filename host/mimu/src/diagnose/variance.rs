@@ -1,7 +1,6 @@
-//! How the rows scatter: known noise, scatter beside it, and a bias that walks, each estimated where it is not known.
+//! Variance of the rows: known noise, extra white variance, and a rate random walk. What is not known is estimated.
 //!
-//! A drift of the bias and a random walk of it are told apart by nothing else than that one is a straight line. So where the random walk is not
-//! known, it is in the null hypothesis.
+//! A drift of the bias differs from a random walk only in being a straight line. So a random walk that is not known is part of the null hypothesis.
 
 mod factor;
 
@@ -13,10 +12,10 @@ use factor::{Axes, Factor, Separable};
 
 pub use factor::{DecorrelatedChoice, Whitener};
 
-/// Variances of each stratum beside the known ones.
+/// Variance components of each stratum beside the known covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Components {
-    /// Of each row by itself, unit of the rows squared.
+    /// Extra white variance of each row, unit of the rows squared.
     pub extra_white: Vec<f64>,
     /// K² of a random walk, unit²/s.
     pub random_walk: Vec<f64>,
@@ -27,13 +26,13 @@ pub struct Components {
 pub struct Fitted {
     /// Components.
     pub components: Components,
-    /// -2 ln of the likelihood but for a constant: what models are compared by.
+    /// -2 ln of the likelihood, up to a constant. Models are compared by it.
     pub deviance: f64,
-    /// The same of the restricted likelihood: what the components of one model are best estimated by.
+    /// The same of the restricted likelihood, which estimates the components of one model best.
     pub restricted: f64,
     /// Coefficients of the columns.
     pub coefficients: DVector<f64>,
-    /// Their covariance for the components.
+    /// Their covariance at these components.
     pub covariance: DMatrix<f64>,
     /// Sum of the squares of the decorrelated residuals.
     pub chi2: f64,
@@ -42,37 +41,37 @@ pub struct Fitted {
 /// Which likelihood.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LikelihoodKind {
-    /// The likelihood itself, for tests: of two models the drop is then a function of F where the noise has one size.
+    /// The likelihood itself, for tests: if the noise has one level, the drop between two models is a function of F.
     Likelihood,
-    /// The restricted one, for the noise of one model: it knows what the coefficients have taken up.
+    /// The restricted one, for the noise of one model: it allows for what the coefficients absorb.
     Restricted,
 }
 
 /// What a stratum adds to the normal equations.
 struct Share {
-    /// Of columns and residual.
+    /// Normal matrix of columns and residual.
     normal: DMatrix<f64>,
     log_determinant: f64,
 }
 
-/// Rows, with what takes long to find out about them.
+/// Rows, with quantities that are slow to compute.
 pub struct VarianceModel<'a> {
     rows: &'a Rows,
-    /// Axes in which the rows of a stratum are independent whatever its extra white variance, as long as there is no random walk: its own where one is
-    /// sought.
+    /// Axes in which the rows of a stratum without a random walk are independent, whatever the extra white variance. Where a random walk is sought,
+    /// only the rows' own axes serve; `None` if the rows are not independent in these.
     axes: Vec<Option<Axes>>,
-    /// What a given matrix leaves open of each, in these axes.
+    /// Factor of the covariance by the uncertainty of a given matrix, in these axes.
     open: Vec<Option<DMatrix<f64>>>,
-    /// The random walk that is sought of each, where it has a factor of few terms.
+    /// The random walk that is sought in each stratum, if its covariance is separable.
     separable: Vec<Option<Separable>>,
     /// Typical variance of a row, and of a unit random walk, by stratum.
     typical: Vec<(f64, f64)>,
-    /// Whether a random walk is sought where the wander is known as well.
+    /// Whether a random walk is sought even if the wander is known.
     all_random_walks: bool,
 }
 
 impl<'a> VarianceModel<'a> {
-    /// Of `rows`. Where the wander is known, a random walk beside it is only sought if `all_random_walks`: it would take up every slow effect.
+    /// Of `rows`. If the wander is known, a random walk beside it is sought only with `all_random_walks`: it would absorb every slow effect.
     pub fn new(rows: &'a Rows, all_random_walks: bool) -> Self {
         let mean = |m: &DMatrix<f64>| m.diagonal().mean().max(1e-30);
         let mut variance = Self {
@@ -123,7 +122,7 @@ impl<'a> VarianceModel<'a> {
         stratum.random_walk.is_some() && (self.all_random_walks || !stratum.wander_known)
     }
 
-    /// `matrix`, a row for each of the rows, in the axes in which rows are independent, where there are such.
+    /// `matrix`, a row for each of the rows, rotated to the axes in which rows are independent, where there are such.
     pub fn rotate(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let mut out = matrix.clone();
         for (stratum, axes) in self.rows.strata.iter().zip(&self.axes) {
@@ -135,7 +134,7 @@ impl<'a> VarianceModel<'a> {
         out
     }
 
-    /// Nothing beside the known noise.
+    /// Zero components: the known noise alone.
     pub fn none(&self) -> Components {
         let zeros = vec![0.0; self.rows.strata.len()];
         Components {
@@ -173,7 +172,7 @@ impl<'a> VarianceModel<'a> {
         }
     }
 
-    /// The same without what a given matrix leaves open.
+    /// The same without the uncertainty of a given matrix.
     fn factor_of_noise(&self, s: usize, extra_white: f64, random_walk: f64) -> Option<Factor> {
         let stratum = &self.rows.strata[s];
         let floor = 1e-12 * self.typical[s].0;
@@ -197,7 +196,7 @@ impl<'a> VarianceModel<'a> {
         Cholesky::new(v).map(Factor::Full)
     }
 
-    /// What decorrelates all rows.
+    /// Decorrelates all rows.
     pub fn whitener(&self, at: &Components) -> Option<Whitener<'_>> {
         let factors = (0..self.rows.strata.len())
             .map(|s| self.factor(s, at.extra_white[s], at.random_walk[s]));
@@ -207,7 +206,7 @@ impl<'a> VarianceModel<'a> {
         })
     }
 
-    /// What decorrelates some of the rows, given in ascending order, by themselves.
+    /// Decorrelates the rows `kept`, given in ascending order, without the others.
     pub fn kept(&self, at: &Components, kept: &[usize]) -> Option<DecorrelatedChoice> {
         let mut parts = Vec::new();
         for (s, stratum) in self.rows.strata.iter().enumerate() {
@@ -271,7 +270,7 @@ impl<'a> VarianceModel<'a> {
                 chi2: y2,
             });
         }
-        // Columns of very different units.
+        // Scaled, because the units of columns differ widely.
         let scale = DVector::from_fn(p, |i, _| normal[(i, i)].sqrt().max(f64::MIN_POSITIVE));
         let scaled = DMatrix::from_fn(p, p, |i, j| normal[(i, j)] / (scale[i] * scale[j]));
         let right = DVector::from_fn(p, |i, _| normal[(i, p)] / scale[i]);
@@ -313,7 +312,7 @@ impl<'a> VarianceModel<'a> {
         self.solve(&shares?, at)
     }
 
-    /// The model with `columns`, with the components that make its likelihood largest, from `start` on; `by` says which.
+    /// The model with `columns` at the components that maximise the likelihood `by`, searched from `start` on.
     pub fn fit(
         &self,
         columns: &DMatrix<f64>,
@@ -350,7 +349,7 @@ impl<'a> VarianceModel<'a> {
                         0 => (value, at.random_walk[s]),
                         _ => (at.extra_white[s], value),
                     };
-                    // Decorrelating a stratum takes nearly all of the time, and one value asks nothing of another.
+                    // In parallel: decorrelating a stratum takes nearly all of the time, and the values do not depend on each other.
                     let tried: Vec<((f64, f64), Option<Share>)> = steps
                         .into_par_iter()
                         .map(|value| {
@@ -386,7 +385,7 @@ impl<'a> VarianceModel<'a> {
     }
 }
 
-/// Rounds over the components.
+/// Most rounds over the components.
 const SWEEPS: usize = 12;
-/// Deviance below which another round is not worth it.
+/// Drop in deviance below which the rounds end.
 const SETTLED: f64 = 0.02;

@@ -1,6 +1,6 @@
 //! The course of a chamber in a plan: corners of time, s, and temperature, °C.
 
-/// Temperature at a time: straight between the corners, held outside; not a number where there are none.
+/// Temperature at a time: linear between the corners, constant outside; NaN without corners.
 pub fn temp_c(corners: &[[f64; 2]], t_s: f64) -> f64 {
     let after = corners.partition_point(|p| p[0] <= t_s);
     let before = after.checked_sub(1).map(|k| corners[k]);

@@ -1,13 +1,13 @@
-//! The next experiment: a short recipe for what a recording could not show, of the smallest size that does.
+//! The next experiment: the first recipe, in its smallest size, that shows what a recording could not show.
 //!
 //! | module         | what                                                                                |
 //! |----------------|-------------------------------------------------------------------------------------|
-//! | [`recipe`]     | the table of recipes, their sizes, and what a unit undergoes when one is carried out |
+//! | [`recipe`]     | the table of recipes, their sizes, and the conditions of a unit in each             |
 //! | [`prediction`] | the sigma that an experiment gives each coefficient of an effect                    |
 //! | [`words`]      | an experiment in a sentence, and as a plan                                          |
 //!
-//! It stands above [`crate::plan::design`] and [`crate::diagnose`], which do not know each other. Regressors, typical sizes and ranges of
-//! nonlinear parameters are those of the effects: one that is new there is known here.
+//! It uses [`crate::plan::design`] and [`crate::diagnose`], which do not use each other. Regressors, typical sizes and ranges of
+//! nonlinear parameters are those of the effects, so a new effect needs no change here.
 
 pub mod prediction;
 pub mod recipe;
@@ -35,29 +35,29 @@ use recipe::{Course, Experiment, RECIPES, Recipe};
 
 /// Length of a dwell of the next experiment, s.
 pub const DWELL_S: f64 = 10.0;
-/// Range of rates where the recording did not go beyond it, deg/s: that of most gyros.
+/// Largest rate, deg/s, unless the recording has a larger one: the range of most gyros.
 pub const RATE_DPS: f64 = 300.0;
-/// Rate at which a table changes the attitude, rad/s. What the course of a session is planned with: on a slower table it takes
-/// longer than the chamber does, and ends where that has ended; on a faster one it would break off.
+/// Rate at which a table changes the attitude, rad/s, in the planned course of a session. On a slower table the dwells take longer than
+/// the course of the chamber, and end at its last temperature. On a faster one they would end before it.
 pub const SLEW: f64 = std::f64::consts::PI / 3.0;
-/// Temperatures of a chamber: where it begins and ends, and two others, °C. That of the recording is the unit's, which its own
-/// power warms by some ten degrees.
+/// Temperatures of a chamber: where it begins and ends, and two others, °C. The recorded temperature is the unit's, which its own power
+/// warms by some ten degrees.
 pub const CHAMBER_C: [f64; 3] = [25.0, 45.0, 5.0];
 /// Alternatives of an effect that experiments are designed for.
 const ALTERNATIVES: usize = 3;
 
-/// Two candidates that the recording does not tell apart.
+/// Two candidates that the recording does not distinguish.
 #[derive(Debug, Clone, Serialize)]
 pub struct Confused {
-    /// That which was accepted, and the other.
+    /// The accepted one, and the other.
     pub ids: [String; 2],
-    /// How much worse the other is, in score.
+    /// How much lower the score of the other is.
     pub difference: f64,
-    /// What tells them apart, in words.
+    /// Experiment that distinguishes them, in words.
     pub experiment: String,
 }
 
-/// Something open that a plan for this kind of recording does not show.
+/// An open question that a plan for this kind of recording does not answer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotInPlan {
     /// Effect, or two with `or` between them.
@@ -69,7 +69,7 @@ pub struct NotInPlan {
 /// Why a plan does not show something. JSON has the sentence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum NotShown {
-    /// Nothing of the table of recipes determines it.
+    /// No recipe determines it.
     NoRecipe,
     /// It can be shown, but not with what this recording was made with.
     Turntable,
@@ -90,28 +90,29 @@ impl Serialize for NotShown {
     }
 }
 
-/// An effect whose typical size the recording would not have shown, with what would: that it was not found means nothing.
+/// An effect that the recording would not have shown at its typical size, and an experiment that would. That it was not found means
+/// nothing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotExcited {
     /// Public id.
     pub id: &'static str,
-    /// Whose readings would err.
+    /// Sensor whose readings would err.
     pub sensor: Sensor,
-    /// What would show it, in words.
+    /// Experiment that would show it, in words.
     pub experiment: String,
-    /// The recipe behind the words; `None` where no recipe shows the effect as well as wanted, so that the words are about it alone.
+    /// The recipe behind the words. `None` if no recipe shows the effect as well as wanted; the words are then for this effect alone.
     #[serde(skip)]
     pub recipe: Option<SizedRecipe>,
 }
 
-/// A recipe of one size. Of two that differ in nothing but the size, the larger also shows what the smaller shows.
+/// A recipe of one size. If two differ only in size, the larger also shows what the smaller shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SizedRecipe {
     /// The recipe.
     pub recipe: Recipe,
-    /// What carries the unit.
+    /// Fixture.
     pub fixture: Fixture,
-    /// Its size, a step of the ladder [`Course::sizes`].
+    /// Its size, one of [`Course::sizes`].
     pub size: f64,
 }
 
@@ -120,20 +121,20 @@ pub struct SizedRecipe {
 pub struct Next {
     /// Effects that the recording could not show.
     pub not_excited: Vec<NotExcited>,
-    /// Candidates that it could not tell apart.
+    /// Candidates that it could not distinguish.
     pub confused: Vec<Confused>,
-    /// What of it this kind of recording can show, for one experiment together.
+    /// Those of both that this kind of recording can show, for one experiment together.
     pub targets: Vec<Target>,
-    /// What of it this kind of recording cannot show.
+    /// Those that this kind of recording cannot show.
     pub not_in_plan: Vec<NotInPlan>,
 }
 
-/// A unit, and what an experiment with it can be made with.
+/// A unit, and the equipment of an experiment with it.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// What will be known of the input.
     pub reference: Reference,
-    /// What carries the unit.
+    /// Fixture.
     pub fixture: Fixture,
     /// Sensors of the unit: each recording has to calibrate them all.
     pub sensors: Vec<Sensor>,
@@ -152,7 +153,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// The unit of a fitted recording: its noise, sensors and rates; without a `fixture` on what it was recorded on.
+    /// The unit of a fitted recording: its noise, sensors and rates. Without a `fixture`, the one that it was recorded on.
     pub fn of(fit: &Fit, fixture: Option<Fixture>) -> Self {
         let prepared = &fit.prepared;
         let fixture = fixture.unwrap_or(match prepared.manifest.reference {
@@ -204,12 +205,12 @@ impl Setup {
 pub struct Answer {
     /// The experiment.
     pub experiment: Experiment,
-    /// Of each target, in their order.
+    /// Prediction for each target, in their order.
     pub predictions: Vec<Prediction>,
 }
 
 impl Answer {
-    /// Sigma over the wanted one of the target that is seen worst.
+    /// Sigma over the wanted sigma, of the target that is seen worst.
     fn worst(&self) -> f64 {
         let each = self.predictions.iter().map(|p| p.share / p.wanted);
         each.fold(0.0, f64::max)
@@ -221,7 +222,7 @@ impl Answer {
     }
 }
 
-/// The first recipe, and the smallest of its sizes, at which all targets are seen as wanted; the best of all if they never are.
+/// The first recipe that shows all targets as well as wanted, in its smallest size that does. If none does, the one that shows them best.
 /// `None` if no recipe determines all of them.
 pub fn smallest(setup: &Setup, targets: &[Target]) -> Option<Answer> {
     let slow = targets.iter().any(Target::is_slow);
@@ -260,7 +261,7 @@ pub fn smallest(setup: &Setup, targets: &[Target]) -> Option<Answer> {
     best
 }
 
-/// Noise of a sensor by the means of the dwells of a recording, as if it were white.
+/// Noise of a sensor from the dwell means of a recording, as if it were white.
 fn noise(fit: &Fit, sensor: Sensor) -> DwellNoise {
     let Some(fitted) = fit.sensor(sensor) else {
         return DwellNoise::fang(sensor);
@@ -327,7 +328,7 @@ pub fn next(diagnosis: &Diagnosis) -> Next {
     }
 }
 
-/// `target`, if a recording of the same kind shows it; else that the plan lacks it, and why.
+/// `target`, if a recording of the same kind shows it; otherwise the reason why the plan lacks it.
 fn planned(
     id: &str,
     shown: Option<&Recommended>,
@@ -342,10 +343,10 @@ fn planned(
     Err(NotInPlan { id, reason })
 }
 
-/// What shows a target.
+/// An experiment that shows a target.
 struct Recommended {
     words: String,
-    /// Whether a recording of the same kind shows it: what cannot be shown by hand may be on a table.
+    /// Whether a recording of the same kind shows it. A table may show what cannot be shown by hand.
     same_kind: bool,
     recipe: Option<SizedRecipe>,
 }
@@ -379,7 +380,7 @@ fn recommended(diagnosis: &Diagnosis, setup: &Setup, target: &Target) -> Option<
     })
 }
 
-/// An accepted effect, with the coefficients found, and another that would do nearly as well.
+/// An accepted effect, with the coefficients found, and another that would explain the rows nearly as well.
 struct Pair<'a> {
     found: &'a FittedEffect,
     other: &'a Alternative,
@@ -403,7 +404,7 @@ impl Pair<'_> {
     ) -> (Confused, Result<Target, NotInPlan>) {
         let Self { found, other } = self;
         let candidate = &found.candidate;
-        // A jump is of one recording only.
+        // A jump belongs to one recording.
         let jump = matches!(other.kind, CandidateKind::Jump { .. });
         let target = (!jump).then(|| Target {
             candidate: candidate.clone(),
@@ -417,7 +418,7 @@ impl Pair<'_> {
         let ids = [candidate.id(), other.id.clone()];
         let planned = planned(&ids.join(" or "), shown.as_ref(), target);
         let experiment = shown.map(|s| s.words).unwrap_or_else(|| {
-            // Of the two, what no dwell is planned for.
+            // No plan distinguishes the two, so the experiment is what one of the effects needs.
             let words = match (&candidate.kind, &other.kind) {
                 (_, CandidateKind::Effect(effect)) => effect.needs,
                 (CandidateKind::Effect(found), CandidateKind::Term(..)) => found.needs,

@@ -80,7 +80,8 @@ fn a_turn_ends_where_the_step_after_it_stays_and_rounds_go_on_from_there() {
     assert_eq!(all.len(), 6);
     assert_eq!([&all[0], &all[2]], [&all[3], &all[5]]);
     assert_eq!(all[1].length, Duration::from_secs(9));
-    // The angle over the time that it took; which way gravity went meanwhile is not stated.
+    // The mean rate is the angle over the time that the turn took; the force during a turn is not
+    // given.
     assert_eq!(all[1].input_over(10.0)[..3], [-9.0, 0.0, 0.0]);
     assert!(all[1].input[3..].iter().all(|f| f.is_nan()));
     assert_eq!(all[2].input, [0.0, 0.0, 0.0, 0.0, -9.8, 0.0]);

@@ -16,7 +16,7 @@ pub enum TableAxis {
 }
 
 impl TableAxis {
-    /// As in a plan.
+    /// Name as in a plan.
     pub fn name(self) -> &'static str {
         match self {
             Self::Outer => "outer",
@@ -41,7 +41,7 @@ pub struct Turn {
     pub to_up: [f64; 3],
     /// Middle and inner angle of the table where it ends, degrees.
     pub to_deg: [f64; 2],
-    /// The angle about the axes of the body, degrees: over the time that it takes, its mean rate.
+    /// The angle about each axis of the body, degrees. Over the duration of the turn it is the mean rate.
     pub about_deg: [f64; 3],
 }
 
@@ -53,7 +53,7 @@ pub(super) struct Angles {
 }
 
 impl Angles {
-    /// With `up`, of length 1, upwards: the middle angle from 0 to 180 degrees.
+    /// Angles at which `up`, of length 1, points upwards; the middle one is from 0 to 180 degrees.
     pub fn of(up: &Vector3<f64>) -> Self {
         let across = up.x.hypot(up.y);
         Self {
@@ -65,11 +65,11 @@ impl Angles {
     pub fn up(self) -> Vector3<f64> {
         let (sm, cm) = self.middle.sin_cos();
         let (si, ci) = self.inner.sin_cos();
-        // A face that points up is to be that face, and not a rounding error beside it.
+        // Rounded, so that a face that points up is exactly that face.
         Vector3::new(sm * si, sm * ci, cm).map(|c| (c * 1e12).round() / 1e12 + 0.0)
     }
 
-    /// Turns one axis; the turn, and where it ends.
+    /// Turns one axis. Returns the turn, and the angles after it.
     pub fn turn(self, axis: TableAxis, angle_deg: f64, rate_dps: f64) -> (Turn, Self) {
         let angle = angle_deg.to_radians();
         let mut to = self;

@@ -25,21 +25,21 @@ pub struct AllanResult {
     pub tool: &'static str,
     /// Unit under test.
     pub device: Option<String>,
-    /// Deviation that the curves are of: Allan, modified Allan or Hadamard.
+    /// Kind of deviation: Allan, modified Allan or Hadamard.
     pub kind: Option<&'static str>,
-    /// Probability of all intervals.
+    /// Probability of each interval.
     pub confidence: Option<f64>,
-    /// Samples a second, of a single recording.
+    /// Samples a second; absent for several recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sample_rate_hz: Option<f64>,
-    /// Times of the first and the last sample, s, of a single recording.
+    /// Times of the first and the last sample, s; absent for several recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub span_s: Option<[f64; 2]>,
     /// What was used of each recording.
     pub recordings: Vec<RecordingResult>,
     /// Their channels, recording by recording.
     pub channels: Vec<ChannelResult>,
-    /// What a person should know; of several recordings with their names.
+    /// Warnings; for several recordings each begins with the name of its recording.
     pub warnings: Vec<String>,
 }
 
@@ -54,7 +54,7 @@ pub struct RecordingResult {
     pub sample_rate_hz: f64,
     /// Times of the first and the last sample, s.
     pub span_s: [f64; 2],
-    /// What a person should know.
+    /// Warnings.
     pub warnings: Vec<String>,
 }
 
@@ -69,15 +69,15 @@ pub struct ChannelResult {
     pub temp_c: Option<f64>,
     /// rad/s, m/s^2, or the raw unit.
     pub unit: &'static str,
-    /// Unit of the readings, where a calibration made [`Self::unit`] of it.
+    /// Unit of the readings, if a calibration converted them to [`Self::unit`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raw_unit: Option<&'static str>,
-    /// Scale factor that did, [`Self::raw_unit`] per [`Self::unit`].
+    /// Scale factor of that conversion, [`Self::raw_unit`] per [`Self::unit`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale_factor: Option<f64>,
-    /// Samples that it was computed from; none of a channel that is the same throughout, as [`Self::reasons`] say.
+    /// Number of samples used; 0 for a channel that is constant throughout, as [`Self::reasons`] say.
     pub samples: usize,
-    /// Samples of these that were disturbed for a short time, and are masked.
+    /// Number of these that were disturbed for a short time, and are masked.
     pub masked_samples: usize,
     /// Averaging times, s.
     pub tau_s: Vec<f64>,
@@ -95,9 +95,9 @@ pub struct ChannelResult {
     pub sigma_independent: Vec<f64>,
     /// The noise model; null where the record is too short for one.
     pub model: Option<ModelResult>,
-    /// Averaging time from which on none is better by more than 5 %, s; null where longer was still better.
+    /// Averaging time beyond which the deviation is at most 5 % lower, s; null if a longer one was still better.
     pub useful_average_s: Option<f64>,
-    /// Quantization; null with its reason in [`Self::reasons`], as of the others.
+    /// Quantization. If it is null, [`Self::reasons`] say why; so with the others.
     pub q: Option<FileCoefficient>,
     /// White noise.
     pub n: Option<FileCoefficient>,
@@ -107,40 +107,41 @@ pub struct ChannelResult {
     pub k: Option<FileCoefficient>,
     /// Rate ramp.
     pub r: Option<FileCoefficient>,
-    /// By its letter, why a coefficient is not there.
+    /// Reason why a coefficient is absent, by its letter.
     pub reasons: BTreeMap<String, String>,
-    /// By its letter, the upper end of the interval of one that is not there; null where nothing tells it.
+    /// Upper end of the interval of an absent coefficient, by its letter; null if it is unknown.
     pub at_most: BTreeMap<String, Option<f64>>,
     /// Lowest and highest frequency that was searched for lines, Hz; null for a record too short for a spectrum.
     pub searched_hz: Option<[f64; 2]>,
-    /// Lines and bumps of the spectrum, by frequency: the coefficients are of the noise without them.
+    /// Lines and bumps of the spectrum, by frequency. The coefficients describe the noise without them.
     pub lines: Vec<LineResult>,
     /// Deviations without them, at [`Self::tau_s`]; absent where there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adev_without_lines: Option<Vec<f64>>,
-    /// Band in which the spectrum is white, Hz, where N was read from it and not from the curve; null elsewhere.
+    /// Band in which the spectrum is white, Hz, if N was read from the spectrum; null if it was read from the curve.
     pub n_band_hz: Option<[f64; 2]>,
-    /// Hadamard deviation, where a drift asks for it; absent elsewhere.
+    /// Hadamard deviation; absent unless there is a drift that requires it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hadamard: Option<HadamardResult>,
 }
 
-/// What stands above the floor of a spectrum and is no noise of the sensor: the building, a fan, the mains.
+/// A peak above the floor of a spectrum that is not noise of the sensor: from the building, a fan, the mains.
 #[derive(Debug, Clone, Serialize)]
 pub struct LineResult {
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Band that holds the middle half of its power, Hz; null for a steady sinusoid, narrower than the record can tell.
+    /// Band with the middle half of its power, Hz; null for a steady sinusoid, which is narrower than the record
+    /// resolves.
     pub width_hz: Option<f64>,
-    /// Effective value, [`ChannelResult::unit`]; of a bump, within [`Self::band_hz`].
+    /// Rms, [`ChannelResult::unit`]; that of a bump within [`Self::band_hz`].
     pub rms: f64,
-    /// Ends of the interval of it.
+    /// Ends of the interval of the rms.
     pub rms_interval: [f64; 2],
     /// Its highest density over that of the floor.
     pub above_floor: f64,
-    /// Noise bandwidth of the spectrum in which it stands so high, Hz.
+    /// Noise bandwidth of the spectrum in which it has this density, Hz.
     pub resolution_hz: f64,
-    /// Band within which it was set aside, Hz.
+    /// Band that was excluded for it, Hz.
     pub band_hz: [f64; 2],
 }
 
@@ -217,9 +218,9 @@ impl AllanResult {
         self.channels.iter().filter(ours).collect()
     }
 
-    /// The noise file for the commands that rest on it; `None` without a recording.
+    /// The noise file that other commands read; `None` without a recording.
     pub fn noise_file(&self, created: &str) -> Option<NoiseFile> {
-        // A channel without noise is not distinguished from one that was not recorded.
+        // A constant channel is treated as one that was not recorded.
         let alive = self.channels.iter().filter(|c| c.samples > 0);
         let lengths = self.recordings.iter().map(|r| r.span_s[1] - r.span_s[0]);
         Some(NoiseFile {
@@ -293,7 +294,7 @@ impl ChannelResult {
         }
     }
 
-    /// The sensor that it is of.
+    /// Sensor of the channel.
     pub fn sensor(&self) -> Sensor {
         match self.name.starts_with(Sensor::Gyro.name()) {
             true => Sensor::Gyro,

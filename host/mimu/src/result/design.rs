@@ -19,10 +19,10 @@ use mimu_recording::Reference;
 /// Sample rate of the recording that a plan asks for, Hz.
 const SAMPLE_RATE_HZ: f64 = 1000.0;
 
-/// What a design is judged under.
+/// Conditions under which a design is judged.
 #[derive(Debug, Clone)]
 pub struct Conditions {
-    /// What it is: `best of 9 dwells found (seed 1)`, `scheme fang-nine`.
+    /// Title, such as `best of 9 dwells found (seed 1)` or `scheme fang-nine`.
     pub title: String,
     /// Length of a dwell, s.
     pub dwell_s: f64,
@@ -51,35 +51,35 @@ pub struct Design {
     pub reference: Reference,
     /// `affine`, and other terms.
     pub model: String,
-    /// What carries the unit, as on the command line.
+    /// Fixture, as on the command line.
     pub table: &'static str,
-    /// Direction in the body frame that points up, a dwell each, in order.
+    /// Direction in the body frame that points up, for each dwell in order.
     pub positions: Vec<[f64; 3]>,
     /// Rate about the vertical in each dwell of a gyro, deg/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rates_dps: Option<Vec<f64>>,
-    /// Against the continuous optimum over the reach: 1 is the best possible, 0 singular.
+    /// D-efficiency against the continuous optimum over the reach: 1 is the best possible, 0 is singular.
     pub d_efficiency: f64,
     /// `det(F'F/n)`, fang (22).
     pub determinant: f64,
-    /// Sensors whose determinants that is the product of: 1 where all have the same regressors.
+    /// Number of sensors in this product of determinants: 1 if all sensors have the same regressors.
     pub regressions: usize,
-    /// What no design exceeds.
+    /// Optimum, which no design exceeds.
     pub optimum: Best,
     /// Largest over smallest singular value of F; infinite, null in JSON, if singular.
     pub condition: f64,
-    /// Of all parameters of the triad.
+    /// Sigma of each parameter of the triad.
     pub sigma_per_parameter: Vec<ParameterSigma>,
     /// Geometric mean of the semi-axes of the parameters' one-sigma ellipsoid, normalised: SI unit of the sensor at full input. Infinite
     /// if singular.
     pub mean_sigma: f64,
-    /// The same over the full input, the geometric mean of the axes'.
+    /// The same, over the geometric mean of the axes' full inputs.
     pub mean_sigma_of_full_scale: f64,
     /// Names of the parameters that it does not determine.
     pub undetermined: Vec<String>,
     /// Residual degrees of freedom.
     pub dof: Freedom,
-    /// What it would notice of the terms that the model lacks.
+    /// How well it would notice the terms that the model lacks.
     pub notices: Vec<Noticed>,
     /// Length of a dwell, s.
     pub dwell_s: f64,
@@ -87,7 +87,7 @@ pub struct Design {
     pub dwell_sigma: Quantity,
     /// Noise that this follows from; `None` if it was given.
     pub noise: Option<DwellNoise>,
-    /// `published`, `shortest` or `lot`.
+    /// `published`, `shortest` or `randomised`.
     pub order: &'static str,
     /// Whether the unit had to be turned over for the table to reach the scheme's poses: see [`Fixture::holding`].
     pub turned_over: bool,
@@ -99,12 +99,12 @@ pub struct Design {
     pub time_s: f64,
     /// Name of the published scheme that it is.
     pub scheme: Option<&'static str>,
-    /// What had to be assumed of that.
+    /// Assumptions about this scheme.
     pub assumed: Option<&'static str>,
-    /// fang's filters for x, y and z with four positions each, where that is what was judged.
+    /// fang's filters for x, y and z with four positions each, if fang's scheme was judged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub filters: Option<[Filter; 3]>,
-    /// What was looked at to spend a budget.
+    /// Ways to spend a budget.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub budget: Option<Spent>,
     #[serde(skip)]
@@ -118,16 +118,16 @@ pub struct Design {
 pub struct Best {
     /// `det(F'F/n)` of it.
     pub determinant: f64,
-    /// By how much the equivalence theorem is missed: the proof of how near it is.
+    /// Excess over the bound of the equivalence theorem: it limits the distance to the optimum.
     pub excess: f64,
 }
 
 /// A value and its unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quantity {
-    /// In that unit.
+    /// Value in that unit.
     pub value: f64,
-    /// SI.
+    /// SI unit.
     pub unit: &'static str,
 }
 
@@ -138,46 +138,46 @@ pub struct ParameterSigma {
     pub name: String,
     /// Sigma, SI; infinite, null in JSON, if it is not determined.
     pub value: f64,
-    /// Of it; "1" for a ratio.
+    /// Unit of that; "1" for a ratio.
     pub unit: &'static str,
     /// Half of the 95 % interval if the noise is known, SI.
     pub half_width_95: f64,
     /// The same in the unit of data sheets.
     pub data_sheet: DataSheet,
-    /// Sigma over what it were if all the other parameters were known.
+    /// Sigma over that if all the other parameters were known.
     pub inflation: f64,
 }
 
-/// Half of a 95 % interval in the unit of data sheets, which shares of full scale have only beside a full scale.
+/// Half of a 95 % interval in the unit of data sheets. Shares of full scale refer to the full input of the design.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DataSheet {
-    /// In that unit.
+    /// Half width in that unit.
     pub half_width_95: f64,
     /// mg, deg/s, ppm, µrad, ppm FS, (deg/s)/g.
     pub unit: Cow<'static, str>,
 }
 
-/// Degrees of freedom of a regression that the parameters leave.
+/// Residual degrees of freedom of a regression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Freedom {
-    /// By different inputs: these notice a wrong model.
+    /// From different inputs: these reveal a wrong model.
     pub lack_of_fit: usize,
-    /// By repeated inputs: these tell the noise, whatever the model.
+    /// From repeated inputs: these show the noise, whatever the model.
     pub repetition: usize,
 }
 
-/// What it would notice of a term that the model lacks.
+/// How well the design would notice a term that the model lacks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Noticed {
     /// Name of the term.
     pub term: &'static str,
-    /// Parameters that it has.
+    /// Number of its parameters.
     pub parameters: usize,
     /// How many directions among them leave a trace in the residuals.
     pub noticed: usize,
     /// Smallest size that is noticed 9 times in 10, of the parameter that is noticed worst; `None`: aliased with the model.
     pub smallest: Option<f64>,
-    /// Of that: ppm FS or (deg/s)/g.
+    /// Unit of that: ppm FS or (deg/s)/g.
     pub unit: &'static str,
 }
 
@@ -192,7 +192,7 @@ pub struct Filter {
     pub mean_sigma: f64,
 }
 
-/// How a budget is spent, and what else was looked at.
+/// How a budget is spent, and the alternatives.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spent {
     /// The budget, s.
@@ -220,7 +220,7 @@ pub struct Way {
     pub mean_sigma: f64,
 }
 
-/// Shares in the variance of a dwell mean, of 1.
+/// Shares in the variance of a dwell mean; their sum is 1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Shares {
     /// White noise.
@@ -244,7 +244,7 @@ impl From<&Spending> for Way {
 }
 
 impl Design {
-    /// Of what was judged.
+    /// The result of `judgement`.
     pub fn new(problem: &Problem, judgement: Judgement, conditions: Conditions) -> Self {
         let model = &problem.reach.model;
         let sigma = judgement.sigma;
@@ -295,7 +295,7 @@ impl Design {
             condition: judgement.condition,
             sigma_per_parameter: parameters.collect(),
             mean_sigma: judgement.mean_sigma,
-            // Geometric mean of the spans: for the range of each axis alike.
+            // Geometric mean of the spans, in which the ranges of all axes count alike.
             mean_sigma_of_full_scale: judgement.mean_sigma / model.span.product().cbrt(),
             undetermined: judgement.undetermined(),
             dof: Freedom {
@@ -323,7 +323,7 @@ impl Design {
         }
     }
 
-    /// The same as a published scheme, the unit turned over for it or not.
+    /// The same, marked as a published scheme. `turned_over`: the unit has to be turned over for it.
     pub fn of_scheme(mut self, problem: &Problem, scheme: Scheme, turned_over: bool) -> Self {
         let model = &problem.reach.model;
         let as_published = model.terms.is_empty() && model.reference == Reference::Table;
@@ -344,7 +344,7 @@ impl Design {
         self
     }
 
-    /// The same as the best way to spend a budget, with noise as given.
+    /// The same, marked as the best way to spend a budget with this noise.
     pub fn within(mut self, time_s: f64, noise: &DwellNoise, budget: &Budget) -> Self {
         let [white, instability, walk] = noise.shares(budget.best.dwell_s);
         self.budget = Some(Spent {
@@ -406,7 +406,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Of these.
+    /// The comparison of `designs`.
     pub fn new(designs: Vec<Design>, out_of_reach: &[Scheme]) -> Self {
         Self {
             format: "mimu-design-comparison/1",

@@ -30,9 +30,9 @@ pub struct DiagnosisResult {
     pub reference: Reference,
     /// Local gravity, m/s².
     pub gravity_mps2: f64,
-    /// Recordings that effects were found in, the first first.
+    /// Recordings in which effects were sought, in the order given.
     pub recordings: Vec<Source>,
-    /// What it amounts to.
+    /// Verdict.
     pub verdict: Verdict,
     /// Sensors that the recordings cannot judge.
     pub untestable: Vec<UntestableResult>,
@@ -42,9 +42,9 @@ pub struct DiagnosisResult {
     pub rejected: Vec<Rejected>,
     /// Effects that the recordings could not show.
     pub not_excited: Vec<NotExcited>,
-    /// Candidates that the recordings do not tell apart.
+    /// Candidates that the recordings do not distinguish.
     pub confused: Vec<Confused>,
-    /// What of `not_excited` and `confused` the plan of the next experiment does not show.
+    /// Entries of `not_excited` and `confused` that the plan of the next experiment does not show.
     pub not_in_plan: Vec<NotInPlan>,
     /// Error figures.
     #[serde(serialize_with = "present")]
@@ -53,18 +53,18 @@ pub struct DiagnosisResult {
     pub undecided: Vec<Undecided>,
     /// Scatter beyond the known noise that nothing explains.
     pub leftover: Vec<Leftover>,
-    /// What of the samples was left out.
+    /// Samples that were left out.
     pub left_out: LeftOutResult,
-    /// What is wrong with the recordings, one for each kind; most are among the warnings too.
+    /// Problems of the recordings, one for each kind; most are among the warnings too.
     pub recording_problems: Vec<OfRecording>,
-    /// What a person should know.
+    /// Warnings.
     pub warnings: Vec<Warning>,
-    /// The calibration before and after on a recording that nothing was fitted to.
+    /// The calibration without and with the effects, verified on a recording that nothing was fitted to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second: Option<SecondResult>,
 }
 
-/// What of the samples was left out.
+/// Samples that were left out.
 #[derive(Debug, Clone, Serialize)]
 pub struct LeftOutResult {
     /// Gaps.
@@ -79,7 +79,7 @@ pub struct LeftOutResult {
     pub clipped_samples: u64,
 }
 
-/// The calibration before and after on another recording.
+/// The calibration without and with the effects, verified on another recording.
 #[derive(Debug, Clone, Serialize)]
 pub struct SecondResult {
     /// Its name.
@@ -111,29 +111,30 @@ pub struct SensorDiagnosisResult {
     pub held_out: Split,
     /// With effects, every fourth dwell held out.
     pub interleaved_rms_after: f64,
-    /// What noise alone would leave.
+    /// Error that noise alone would cause.
     pub noise_floor: f64,
-    /// What errors of the accelerometer, whose directions of gravity the turns are judged by, may add to that.
+    /// Error that the accelerometer may add, whose directions of gravity judge the turns.
     pub reference_rms: f64,
-    /// Share of the held-out mean square beyond these two that the effects take out; null without effects, or where nothing is beyond.
+    /// Share of the held-out mean square beyond these two that the effects remove; null without effects, or if nothing exceeds these
+    /// two.
     pub explained: Option<f64>,
-    /// What a person should know of the accepted effects.
+    /// Notes on the accepted effects for the user.
     pub notes: Vec<Note>,
     /// Residuals that the model is fitted to.
     pub rows: usize,
     /// Affine parameters that they determine first.
     pub affine_parameters: usize,
-    /// Probability of chance that the residuals before scatter as they do, by the known noise alone.
+    /// Probability by chance that the residuals scatter as they do without effects, by the known noise alone.
     pub omnibus_chance: f64,
-    /// Dwells or turns that the figures are over.
+    /// Number of dwells or turns that the figures include.
     pub judged: usize,
-    /// Dwells that were used.
+    /// Number of dwells that were used.
     pub dwells_used: usize,
-    /// Of so many.
+    /// Number of all dwells.
     pub dwells: usize,
-    /// Why the others were not, as a remark.
+    /// Why the others were not used, as a remark.
     pub not_used: String,
-    /// What is drawn; `None` where a model of it is singular.
+    /// Data for its plots; `None` if a model is singular.
     pub picture: Option<Picture>,
 }
 
@@ -156,7 +157,7 @@ impl From<&(Sensor, Untestable)> for UntestableResult {
 }
 
 impl SensorDiagnosisResult {
-    /// Whether there are more residuals than affine parameters: else only rounding is left.
+    /// Whether there are more residuals than affine parameters; otherwise the residuals are rounding.
     pub fn says_anything(&self) -> bool {
         self.rows > self.affine_parameters
     }
@@ -235,7 +236,7 @@ impl DiagnosisResult {
             || self.recording_problems.iter().any(other)
     }
 
-    /// Left over beyond what usual sensors do by themselves.
+    /// Residual structure beyond that of usual sensors.
     pub fn unexplained(&self) -> impl Iterator<Item = &Leftover> {
         self.leftover.iter().filter(|l| !l.usual)
     }

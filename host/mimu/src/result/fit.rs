@@ -37,7 +37,7 @@ pub struct FitResult {
     pub gravity_mps2: f64,
     /// Estimator where the input is known.
     pub method: &'static str,
-    /// Whether it was a table of means, one row for each pose, and no samples.
+    /// Whether it was a table of means, one row for each pose, instead of samples.
     pub means: bool,
     /// Samples, or rows of the table of means.
     pub rows: u64,
@@ -45,24 +45,24 @@ pub struct FitResult {
     pub period_s: f64,
     /// Times without samples.
     pub gaps: Gaps,
-    /// Samples whose time stamp repeats that before.
+    /// Samples whose time stamp repeats the one before.
     pub duplicates: u64,
     /// Contiguous blocks that were left out in turn.
     pub holdout_blocks: usize,
     /// Its triads.
     #[serde(serialize_with = "present")]
     pub sensors: PerSensor<Option<SensorFitResult>>,
-    /// How the dwells were found; null where the `step` column says.
+    /// How the dwells were detected; null if the `step` column gives them.
     pub detection: Option<Detection>,
     /// All dwells, used or not.
     pub dwells: Vec<DwellResult>,
-    /// What errs by far more than the others predict, and was left out.
+    /// Dwells and turns that were left out because they err by far more than the others predict.
     pub left_out: Vec<LeftOutResult>,
-    /// What that changes: every parameter fitted with everything, and as fitted.
+    /// How that changes every parameter: fitted with everything, and as fitted.
     pub left_out_changes: Vec<Change>,
-    /// What is wrong with the recording, one for each kind; most are among the warnings too.
+    /// Problems of the recording, one for each kind; most are among the warnings too.
     pub recording_problems: Vec<OfRecording>,
-    /// What a person should know.
+    /// Warnings.
     pub warnings: Vec<Warning>,
 }
 
@@ -78,7 +78,7 @@ pub struct Gaps {
 /// A dwell, or a turn, that was left out because it errs by far more than the others predict.
 #[derive(Debug, Clone, Serialize)]
 pub struct LeftOutResult {
-    /// Of which sensor.
+    /// Sensor.
     pub sensor: Sensor,
     /// Step of the dwell, or of that in which the turn begins.
     pub from_step: i32,
@@ -136,25 +136,26 @@ pub struct SensorFitResult {
     pub held_out_rms: Option<f64>,
     /// What noise alone would give, in [`Self::unit`]; null where the noise is not known.
     pub noise_floor: f64,
-    /// The error of the readings as they came, in [`Self::unit`]; absent where they are not in SI.
+    /// Error of the readings before calibration, in [`Self::unit`]; absent if they are not in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub as_they_came_rms: Option<f64>,
     /// SI unit of the figures.
     pub unit: &'static str,
-    /// What they are about.
+    /// Quantity of the figures.
     pub figure: Figure,
     /// Dwells used.
     pub dwells: usize,
     /// Condition of the experiment.
     pub condition: f64,
-    /// By how much the readings of x, y, z are behind the reference, s, taken out of the fit; absent where no input moves within a dwell.
+    /// Delay of the readings of x, y, z behind the reference, s, corrected in the fit; absent if no input moves within a dwell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<Triple>,
     /// The physical quantities to first order in the angles, fang (14): for comparison with what others publish.
     pub small_angle: SmallAngle,
     /// By group of observations, whether noise explains their residuals.
     pub scatter: BTreeMap<String, ScatterResult>,
-    /// How the dwells were held out: contiguous `blocks`, or `interleaved` where one of these leaves the rest undetermined.
+    /// How the dwells were held out: contiguous `blocks`, or `interleaved` if the rest without one of these does not determine the
+    /// calibration.
     pub held_out: Split,
     /// Parts that were held out in turn.
     pub held_out_parts: usize,
@@ -162,7 +163,7 @@ pub struct SensorFitResult {
     pub not_held_out: Vec<Warning>,
     /// One for every dwell or turn that was used, and those within the dwells whose input moves.
     pub residuals: Vec<ResidualResult>,
-    /// Compensated gyro dwell means without a table, rad/s; absent with one.
+    /// Rms of the compensated gyro dwell means without a table, rad/s; absent with one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_rms: Option<f64>,
     /// The same held out; null if none were held out.
@@ -173,7 +174,7 @@ pub struct SensorFitResult {
 /// A parameter with its uncertainty.
 #[derive(Debug, Clone, Serialize)]
 pub struct Parameter {
-    /// Which.
+    /// The parameter.
     #[serde(skip)]
     pub of: TriadParameter,
     /// Name.
@@ -215,15 +216,15 @@ pub struct SmallAngle {
 /// Whether noise explains residuals.
 #[derive(Debug, Clone, Serialize)]
 pub struct ScatterResult {
-    /// Sum of squares over what noise gives each.
+    /// Sum of the squared residuals over their noise variances.
     pub chi2: f64,
     /// Degrees of freedom.
     pub dof: f64,
-    /// Standard deviation of what is there beside noise, in [`Self::unit`].
+    /// Standard deviation of the scatter beyond noise, in [`Self::unit`].
     pub excess_sigma: f64,
     /// Its unit: SI, or the raw unit.
     pub unit: String,
-    /// Whether noise does not explain them; what is there beside it is then in the intervals.
+    /// Whether noise does not explain them. The intervals then include the scatter beyond noise.
     pub significant: bool,
 }
 
@@ -232,14 +233,14 @@ pub struct ScatterResult {
 pub struct ResidualResult {
     /// Dwell, or that which the turn ends in.
     pub step: i32,
-    /// Whether it is not of the mean of the dwell, but of how the reading follows an input that moves within it; absent where not.
+    /// Whether it shows how the reading follows an input that moves within the dwell, instead of the dwell mean; absent if not.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub within: bool,
-    /// Residual, SI; of a magnitude the first.
+    /// Residual, SI; that of a magnitude is the first element.
     pub value: [f64; 3],
-    /// The same by a fit that has not used it; null if there is none.
+    /// The same by a fit without this row; null if there is none.
     pub held_out: Option<[f64; 3]>,
-    /// Standard deviation that noise alone gives it, SI.
+    /// Standard deviation by noise alone, SI.
     pub floor: f64,
 }
 

@@ -1,6 +1,6 @@
-//! What a command found, as one type each: its JSON is that type, and text and page are views of it.
+//! Result of each command, as one type. JSON is that type; text and HTML page are views of it.
 //!
-//! SI throughout; what is not a number is null in JSON.
+//! SI throughout; NaN and infinity are null in JSON.
 
 pub mod allan;
 pub mod design;

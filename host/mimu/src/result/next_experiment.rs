@@ -9,25 +9,25 @@ use crate::plan::round;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 
-/// An experiment that shows effects: the result of `mimu design --effects`, `mimu-design/1`. It is judged by what it shows of them, and has
-/// no D-efficiency.
+/// An experiment that shows effects: the result of `mimu design --effects`, `mimu-design/1`. It is judged by what it shows of the effects,
+/// instead of by D-efficiency.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NextExperiment {
     /// `mimu-design/1`.
     pub format: &'static str,
     /// This program and its version.
     pub tool: &'static str,
-    /// `to show gyro_g_sensitivity`.
+    /// Title, such as `to show gyro_g_sensitivity`.
     pub title: String,
     /// What to do, in the order of doing it.
     pub experiment: String,
     /// What will be known of the input.
     pub reference: Reference,
-    /// What carries the unit, as on the command line.
+    /// Fixture, as on the command line.
     pub table: &'static str,
     /// What it will show.
     pub effects: Vec<Shown>,
-    /// Direction in the body frame that points up, a dwell each, in order.
+    /// Direction in the body frame that points up, for each dwell in order.
     pub positions: Vec<[f64; 3]>,
     /// Rate about the vertical in each dwell, deg/s.
     pub rates_dps: Vec<f64>,
@@ -37,9 +37,9 @@ pub struct NextExperiment {
     pub chamber_c: Vec<(f64, f64)>,
     /// Whether the unit is switched on as the recording begins.
     pub cold_start: bool,
-    /// None: null in JSON, where all designs have it.
+    /// Always null in JSON: every result of `mimu-design/1` has this key.
     pub d_efficiency: (),
-    /// Of each coefficient of the effects.
+    /// Sigma of each coefficient of the effects.
     pub sigma_per_parameter: Vec<CoefficientSigma>,
     /// Length of a dwell, s.
     pub dwell_s: f64,
@@ -58,9 +58,9 @@ pub struct Shown {
     pub id: String,
     /// Typical size over sigma of the coefficient that is seen worst, or of the whole effect beside its rivals.
     pub sigmas: f64,
-    /// What is enough of that.
+    /// Wanted value of that.
     pub wanted: f64,
-    /// Whether it is.
+    /// Whether it is reached.
     pub settled: bool,
 }
 
@@ -71,23 +71,23 @@ pub struct CoefficientSigma {
     pub name: String,
     /// Sigma.
     pub value: f64,
-    /// Of it, SI.
+    /// SI unit of that.
     pub unit: String,
 }
 
 /// Sigma of a dwell mean.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DwellSigma {
-    /// Of this sensor.
+    /// Sensor.
     pub sensor: Sensor,
-    /// SI.
+    /// Sigma, SI.
     pub value: f64,
     /// rad/s or m/s^2.
     pub unit: &'static str,
 }
 
 impl NextExperiment {
-    /// Of an answer, with what it is made with.
+    /// The result of `answer` for `setup`.
     pub fn new(setup: &Setup, answer: &Answer) -> Self {
         let experiment = &answer.experiment;
         let settings = experiment.settings.iter();

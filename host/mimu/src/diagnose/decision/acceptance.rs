@@ -1,4 +1,5 @@
-//! What is accepted of what was found: it has to hold out, in a second recording too where there is one, and not rest on one dwell.
+//! Accepts effects that were found. An effect has to lower the held-out error, also that of a second recording if there is one, and must not
+//! depend on one dwell.
 
 use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -13,17 +14,17 @@ use crate::diagnose::variance::Fitted;
 use crate::effects::fitted::FittedEffect;
 use crate::fit::Split;
 
-/// Mean square of the residual over that of the noise below which a model fits the noise, ...
+/// A model fits the noise if the mean square of its residual, over that of the noise, is below this ...
 const BELOW_NOISE: f64 = 0.25;
-/// ... where chance makes it so small with less than this probability.
+/// ... and if it is so small by chance with less than this probability.
 const FITS_NOISE: f64 = 1e-4;
 
-/// What the chosen of one sensor are judged by.
+/// Data to judge the chosen effects of one sensor.
 pub(super) struct Acceptance<'a> {
     search: &'a Search<'a>,
     rows: &'a Rows,
     unseen: Option<&'a Rows>,
-    /// How dwells are held out, where that of a block leaves a calibration.
+    /// How dwells are held out: in blocks, or interleaved if the rest without a block determines no calibration.
     pub usual: Split,
 }
 
@@ -46,7 +47,7 @@ impl<'a> Acceptance<'a> {
             unseen,
             usual: Split::Blocks,
         };
-        // All rates in one block of time, and without it there is no calibration.
+        // If one block contains all rates, there is no calibration without it.
         if all.held_rms(&[], null, Split::Blocks).is_none() {
             all.usual = Split::Interleaved;
         }
@@ -76,8 +77,8 @@ impl<'a> Acceptance<'a> {
         (dwell, split)
     }
 
-    /// Largest share of one dwell in each of the `kept`, and one way of holding out for all: where a warm-up is seen in one block only, a
-    /// model that has not seen that block misses it by so much that nothing else in the model would show.
+    /// Largest share of one dwell in each of the `kept`, and one way of holding out for all. If only one block shows a warm-up, a model fitted
+    /// without this block misses it by so much that no other effect would show.
     pub fn common(&self, kept: &[Chosen], with: &Fitted) -> (Vec<f64>, Split) {
         let each = (0..kept.len()).map(|i| {
             let mut rest = kept.to_vec();
@@ -92,7 +93,7 @@ impl<'a> Acceptance<'a> {
         (shares, split)
     }
 
-    /// What each of the `kept`, with these coefficients, does to the second recording. Of what is specific to a session that says nothing.
+    /// Test of each of the `kept`, with these coefficients, on the second recording; `None` if it is specific to a session.
     pub fn elsewhere(&self, kept: &[Chosen], values: &[DVector<f64>]) -> Vec<Option<Second>> {
         let each = kept.iter().zip(values);
         let given: Vec<FittedEffect> = each
@@ -114,7 +115,7 @@ impl<'a> Acceptance<'a> {
         each.collect()
     }
 
-    /// The last of the `kept` that is not accepted, but for those with an id of the `passed`; the outer `None` where a model is singular.
+    /// The last of the `kept` that is not accepted, except those with an id of the `passed`; the outer `None` if a model is singular.
     pub fn first_to_fail(
         &self,
         kept: &[Chosen],
@@ -183,7 +184,7 @@ impl<'a> Acceptance<'a> {
             .then_some(Reason::UndeterminedWithoutBlock)
     }
 
-    /// Why the second of the `models` fits noise: what it leaves is far less than the known noise, and what the first leaves is not.
+    /// Why the second of the `models` fits noise: its residual is far below the known noise, and that of the first is not.
     fn below_noise(&self, models: [&[Chosen]; 2]) -> Option<Reason> {
         let variance = &self.search.variance;
         let [without, with] = models.map(|chosen| {
@@ -200,7 +201,7 @@ impl<'a> Acceptance<'a> {
         fits.then(|| Reason::FitsNoise([before, after].map(f64::sqrt)))
     }
 
-    /// Why `one`, which the second of the `models` has and the first has not, is no more significant without the dwell that speaks most for it.
+    /// Why `one`, which only the second of the `models` has, is not significant without the dwell with most evidence for it.
     fn lost_with_a_dwell(
         &self,
         models: [&[Chosen]; 2],

@@ -1,4 +1,4 @@
-//! Holding dwells out, and what an effect rests on.
+//! Holding dwells out, and the dwells that an effect depends on.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,23 +10,23 @@ use crate::fit::Split;
 /// Contiguous blocks that are left out in turn.
 const BLOCKS: usize = 4;
 
-/// Root mean square of the judged rows; of `judged.1` rows a dwell or turn.
+/// Root mean square of the judged rows, of which `judged.1` count as one dwell or turn.
 pub(in crate::diagnose) fn rms(rows: &Rows, residuals: &DVector<f64>) -> f64 {
     let (count, together) = rows.judged;
     (residuals.rows(0, count).norm_squared() / (count / together) as f64).sqrt()
 }
 
-/// Part that a dwell is in; of several recordings each block is a stretch of every one.
+/// Part that a dwell belongs to. With several recordings, each block contains a segment of every one.
 pub(in crate::diagnose) fn part(split: Split, rows: &Rows, dwell: usize) -> usize {
     let (place, of) = rows.place(dwell);
     split.part(place, of, BLOCKS)
 }
 
-/// By how many times its own variance what the rest leaves open may be: a row is then not held out, but extrapolated to.
+/// Largest variance of the predictions of a block, over the variance of its rows. Above it the rest extrapolates to the block.
 const OPEN: f64 = 100.0;
 
-/// Held-out residuals of the judged rows: each by a model that has not seen its block. `None` where what is left of the
-/// experiment does not determine the model.
+/// Held-out residuals: each row against the model fitted without its block. `None` if the rest of the experiment does not determine the
+/// model.
 pub(in crate::diagnose) fn held_out(
     search: &Search,
     model: &DMatrix<f64>,
@@ -36,14 +36,14 @@ pub(in crate::diagnose) fn held_out(
     let rows = search.rows;
     let parts_of = |r: usize| rows.dwells(r).map(|d| part(split, rows, d));
     let mut out = DVector::zeros(rows.y.len());
-    // Columns of one size: a temperature far from the reference, squared, is no reason to be taken for undetermined.
+    // Columns of length 1: a model must not seem undetermined because it has the square of a temperature far from the reference.
     let model = unit_columns(model);
     let variances = search.variance.variances(&at.components);
     for block in 0..BLOCKS {
         let kept: Vec<usize> = (0..rows.y.len())
             .filter(|r| !parts_of(*r).contains(&block))
             .collect();
-        // One dwell, or as many as there are parameters: there is nothing to hold out.
+        // With no more rows than parameters there is nothing to hold out.
         if kept.len() <= model.ncols() {
             return None;
         }
@@ -59,7 +59,7 @@ pub(in crate::diagnose) fn held_out(
         let by_parameters = svd.v_t.as_ref()?.transpose()
             * DMatrix::from_diagonal(&svd.singular_values.map(|s| 1.0 / s));
         let (mut open, mut own) = (0.0, 0.0);
-        // A turn into the block is of it; one out of it is of the next, and is judged there.
+        // A turn belongs to the block in which it ends.
         for r in (0..rows.y.len()).filter(|r| parts_of(*r)[1] == block) {
             out[r] = rows.y[r] - (model.row(r) * &solution)[(0, 0)];
             if r < rows.judged.0 {
@@ -83,8 +83,8 @@ pub(super) fn rms_at_rest(rows: &Rows, residuals: &DVector<f64>) -> Option<f64> 
 
 /// Sums of the squares of held-out `residuals` over the variances of their rows, by the parts that were left out.
 ///
-/// Over all rows, and not the judged ones alone: those of a gyro by gravity are turns, and a drift that took its scatter at rest from 0.0477
-/// to 0.0047 deg/s was rejected, as no turn showed it.
+/// Over all rows, not only the judged ones: for a gyro judged by gravity these are turns, and a drift that lowered its scatter at rest from
+/// 0.0477 to 0.0047 deg/s was rejected because no turn showed it.
 pub(super) fn held_out_by_part(
     rows: &Rows,
     split: Split,
@@ -98,8 +98,8 @@ pub(super) fn held_out_by_part(
     sums
 }
 
-/// In how many parts an effect of `coefficients` makes the held-out error less, and in how many it makes it more than coefficients of
-/// nothing would by their noise; `sums` are those of [`held_out_by_part`] without it and with it.
+/// Number of parts in which an effect of so many `coefficients` lowers the held-out error, and number of those in which it raises the error
+/// by more than the noise of needless coefficients would. `sums` are those of [`held_out_by_part`] without it and with it.
 pub(super) fn parts_helped(sums: [&[f64; BLOCKS]; 2], coefficients: usize) -> [usize; 2] {
     let by_noise = 2.0 * coefficients as f64;
     let each = || sums[0].iter().zip(sums[1]);
@@ -111,11 +111,11 @@ pub(super) fn parts_helped(sums: [&[f64; BLOCKS]; 2], coefficients: usize) -> [u
     ]
 }
 
-/// Dwells of which each is left out to see whether an effect survives: those that its drop in deviance owes most to.
+/// Number of dwells that are left out, one at a time, to test an effect: those with the largest part in its drop in deviance.
 const LEFT_OUT: usize = 3;
 
-/// Largest probability of chance of `one`, after the whole search, when any one dwell is left out, with all others in its pose and the turns
-/// that touch them; `without` and `with` are the models without it and with it, and how `with` was fitted.
+/// Largest probability by chance of `one`, corrected for the number of tests, when any one dwell is left out, with all others in its pose
+/// and the turns that begin or end there. `without` and `with` are the models without it and with it; `fitted` is the fit of the latter.
 pub(super) fn chance_without_a_dwell(
     search: &Search,
     one: &Chosen,
@@ -162,7 +162,7 @@ pub(super) fn chance_without_a_dwell(
             (&y - &q * q.tr_mul(&y)).norm_squared()
         };
         let [a, b] = [chi2(without), chi2(with)];
-        // Where the noise is known, the one; where it is found from the rows, the other.
+        // The former if the noise is known, the latter if it is estimated from the rows.
         let drop = (a - b).min(kept.len() as f64 * (a / b).ln());
         Some(search.chance(drop, one.columns.ncols(), without.ncols(), &one.candidate))
     };
@@ -173,7 +173,7 @@ pub(super) fn chance_without_a_dwell(
         .reduce(f64::max)
 }
 
-/// Largest shares of one dwell, and of one block of time, in what the columns of an effect rest on.
+/// Largest shares of one dwell, and of one block of time, in the information about the coefficients of an effect.
 pub(super) fn leverage(rows: &Rows, others: &DMatrix<f64>, columns: &DMatrix<f64>) -> [f64; 2] {
     let q = others.clone().qr().q();
     let z = columns - &q * q.tr_mul(columns);

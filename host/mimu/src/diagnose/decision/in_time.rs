@@ -1,7 +1,7 @@
-//! Effects of time and temperature that do as well as an accepted one.
+//! Effects of time and temperature that explain the rows as well as an accepted one.
 //!
-//! The search lists with an effect the finalists that would have done nearly as well when it was found. What is found later, and the refined
-//! parameters, change how well the others do.
+//! The search lists, with an effect, the finalists that were nearly as good when it was found. Effects that are found later, and refined
+//! parameters, change their scores.
 
 use nalgebra::DMatrix;
 
@@ -12,8 +12,8 @@ use crate::effects;
 use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 
-/// Adds to the alternatives of each of the kept effects that move a bias with time or temperature the others that do so and whose score is
-/// nearly as good. `with` is the fit of all.
+/// For each kept effect that moves a bias with time or temperature, adds the other such effects with a nearly equal score to its
+/// alternatives. `with` is the fit of all.
 pub(super) fn others_in_time(search: &Search, kept: &mut [Chosen], with: &Fitted) {
     for i in 0..kept.len() {
         if !kept[i].candidate.is_slow_bias() {
@@ -40,8 +40,8 @@ pub(super) fn others_in_time(search: &Search, kept: &mut [Chosen], with: &Fitted
     }
 }
 
-/// By how much the score is less with `rival`, on the same axes, in the place of kept effect `i`; `None` where it is of another kind, is not
-/// determined, or would have to be far beyond data sheets.
+/// How much lower the score is with `rival`, on the same axes, in place of kept effect `i`. `None` if it does not move a bias with time or
+/// temperature, is not determined, or would have to be far beyond data sheets.
 fn worse_with(
     search: &Search,
     kept: &[Chosen],

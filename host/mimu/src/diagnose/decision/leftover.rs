@@ -1,4 +1,4 @@
-//! Structure that nothing explains.
+//! Residual structure that nothing explains.
 
 use std::fmt;
 
@@ -14,28 +14,28 @@ use crate::observable::{Observable, StratumName};
 use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::triad::directions;
 
-/// A bias that wanders by this many times the noise of a dwell mean is no usual one, and the verdict says so even where nobody has
-/// recorded how far it may: sensors of the usual kind wander by up to three in half an hour. A random walk is not all of it: they flicker as
-/// well, so that clean units scatter more than their samples do.
+/// A bias that wanders by more than this many times the noise of a dwell mean is unusual, and the verdict reports it even if the wander of
+/// this unit was not recorded. Usual sensors wander by up to three times the noise in half an hour, not only by a random walk but also by
+/// flicker, so that dwells of clean units scatter more than their samples.
 const WANDERS: f64 = 4.0;
-/// Probability that the rows of a clean sensor scatter so much that structure is told of.
+/// Probability that structure is reported for a clean sensor.
 pub const FALSE_LEFTOVER: f64 = 1e-3;
 
-/// Structure that is left: scatter beyond the known noise that nothing explains.
+/// Residual structure: scatter beyond the known noise that nothing explains.
 #[derive(Debug, Clone)]
 pub struct Leftover {
-    /// Whose.
+    /// Sensor.
     pub sensor: Sensor,
     /// Stratum.
     pub stratum: StratumName,
-    /// Axis, if it is of one.
+    /// Axis, if it belongs to one.
     pub axis: Option<usize>,
     /// What it correlates with.
     pub against: Against,
     /// Root mean square beyond the noise, in [`Self::unit`].
     pub strength: f64,
-    /// Whether the biases of usual sensors do as much by themselves, and nobody has recorded what this one does at rest: told, but no
-    /// verdict rests on it.
+    /// Whether the biases of usual sensors wander as much, and the wander of this unit at rest was not recorded. It is then reported, not
+    /// judged.
     pub usual: bool,
 }
 
@@ -85,7 +85,7 @@ impl Serialize for Leftover {
 }
 
 impl Leftover {
-    /// What the residuals are.
+    /// Quantity of the residuals.
     pub fn figure(&self) -> Figure {
         match self.stratum.0 {
             Observable::Turns => Figure::Direction,
@@ -98,7 +98,7 @@ impl Leftover {
         self.figure().unit(self.sensor)
     }
 
-    /// What a term that is not taken would take out of the rows.
+    /// A suggested term as residual structure; `change` is how it changes the fitted rows.
     pub(super) fn suggested(term: &Candidate, rows: &Rows, change: &DVector<f64>) -> Self {
         let axis = term.axes().first().copied();
         let ours = rows.strata.iter().find(|s| s.axis == axis);
@@ -115,7 +115,7 @@ impl Leftover {
     }
 }
 
-/// Scatter beyond the known noise, stratum by stratum, and what it goes with.
+/// Scatter beyond the known noise, stratum by stratum, and what it correlates with.
 pub(super) fn leftover(
     search: &Search,
     model: &DMatrix<f64>,
@@ -141,8 +141,8 @@ pub(super) fn leftover(
         let jump = jumps
             .iter()
             .find(|j| j.candidate.axes().first().copied() == stratum.axis);
-        // Without the components of this stratum: does the known noise do? A bias wanders, and while nobody has recorded
-        // by how much, that it does is no news.
+        // Without the components of this stratum: is the known noise enough? A random walk stays if the wander was not recorded, because
+        // every bias wanders.
         let mut bare = last.components.clone();
         bare.extra_white[s] = 0.0;
         if stratum.wander_known {
@@ -152,7 +152,7 @@ pub(super) fn leftover(
             continue;
         };
         let worse = bare.deviance - last.deviance;
-        // Two components at the edge of what they can be: chi-square of two degrees of freedom is on the safe side.
+        // Both components are at their bound under the null hypothesis, so chi-square of two degrees of freedom is conservative.
         let p = (-0.5 * worse).exp() * rows.strata.len() as f64;
         let floor = stratum.known.diagonal().mean().sqrt();
         let far = strength > WANDERS * floor;
@@ -176,7 +176,7 @@ pub(super) fn leftover(
     left
 }
 
-/// Noise beyond what a record at rest said of a channel: what has made it is in no model, and hides whatever is smaller.
+/// Noise of a channel beyond that recorded at rest. Its cause is in no model, and it hides smaller effects.
 pub(in crate::diagnose) fn noisier(session: &Session, sensor: Sensor) -> Vec<Leftover> {
     let scale = session.model(sensor).and_then(|m| directions(&m));
     let Some((_, scale, _)) = scale else {

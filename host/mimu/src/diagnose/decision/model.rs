@@ -1,4 +1,4 @@
-//! A model of the rows as it was fitted: kept, so that what is drawn is what was decided on.
+//! A fitted model of the rows, kept so that plots show what was decided on.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,7 +12,7 @@ use crate::fit::Split;
 pub struct Model {
     /// Columns of the affine parameters, then of the effects; SI, a row for each residual.
     pub columns: DMatrix<f64>,
-    /// Coefficients with the noise that they are estimated by.
+    /// Coefficients, and the noise that they are estimated with.
     pub fitted: Fitted,
     /// In-sample residuals, SI.
     pub residuals: DVector<f64>,
@@ -21,8 +21,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// With the chosen effects, of which `tested` is the fit that the search compared by. The affine model alone is held out by the noise of
-    /// `tested`, as it has no effect whose search had to be paid for.
+    /// With the chosen effects; `tested` is their fit in the search. The affine model alone is held out with the noise of `tested`: it has
+    /// no effects whose search that noise has to allow for.
     pub(in crate::diagnose) fn of(
         search: &Search,
         chosen: &[Chosen],

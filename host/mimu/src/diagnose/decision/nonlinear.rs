@@ -1,8 +1,8 @@
-//! Nonlinear parameters of the accepted effects, as a lag or a time constant: refined together, each with an interval, and what they leave
-//! open of the coefficients.
+//! Nonlinear parameters of the accepted effects, such as a lag or a time constant: refined together, each with an interval, and their part
+//! in the uncertainty of the coefficients.
 //!
-//! The search walks to a parameter in steps of 2 %, which is enough to compare candidates. A lag of a good recording is known to 1 %, so
-//! that an interval about the last step would miss the truth; hence Gauss and Newton's steps from there.
+//! The search finds a parameter in steps of 4 %, which is enough to compare candidates. A good recording determines a lag to 1 %, so that
+//! an interval about the last step would miss the truth. Hence Gauss-Newton steps from there.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,16 +12,16 @@ use crate::diagnose::variance::{Components, Fitted};
 use crate::effects::fitted::Interval;
 use crate::triad::half_width_95;
 
-/// Steps of the refinement: each halves an error of some per cent many times over.
+/// Most steps of the refinement: each reduces an error of some per cent by far more than half.
 const STEPS: usize = 8;
-/// Drop in deviance below which another step is not worth it: a hundredth of a sigma.
+/// Drop in deviance below which the steps end: a hundredth of a sigma.
 const SETTLED: f64 = 1e-4;
 /// Longest step of the logarithm of a parameter: beyond a factor of 1.35 the columns are no longer near their tangent.
 const LONGEST: f64 = 0.3;
-/// Halvings of the stretch in which an end of an interval lies, of two sigmas at most.
+/// Bisections of the segment in which an end of an interval lies, usually two sigmas long.
 const HALVINGS: usize = 10;
 
-/// What the nonlinear parameters of the accepted effects leave open.
+/// Nonlinear parameters of the accepted effects, and their part in the uncertainty.
 #[derive(Debug, Clone)]
 pub struct Nonlinear {
     /// Interval of the parameter of each accepted effect; `None` of one that has no parameter.
@@ -29,11 +29,11 @@ pub struct Nonlinear {
     /// Derivatives of the rows by the natural logarithm of each parameter, unit of the rows.
     pub slopes: DMatrix<f64>,
     /// Covariance of the coefficients of the accepted effects, one effect after the other, and then of these logarithms. That of a
-    /// coefficient is marginal: a lag of another length would have had another coefficient.
+    /// coefficient allows for the uncertainty of the parameter: another lag would give another coefficient.
     pub covariance: DMatrix<f64>,
 }
 
-/// Places of those with a nonlinear parameter.
+/// Indices of the effects with a nonlinear parameter.
 fn with_parameter(kept: &[Chosen]) -> Vec<usize> {
     let has = |k: &usize| kept[*k].candidate.parameter().is_some();
     (0..kept.len()).filter(has).collect()
@@ -55,7 +55,7 @@ fn slopes(search: &Search, kept: &[Chosen], which: &[usize], fitted: &Fitted) ->
     out
 }
 
-/// `one` at another value of its parameter, within what is looked at.
+/// `one` at another value of its parameter, clamped to the range that is searched.
 fn at(search: &Search, one: &Chosen, parameter: f64) -> Chosen {
     let (from, to) = one
         .candidate
@@ -69,8 +69,8 @@ fn at(search: &Search, one: &Chosen, parameter: f64) -> Chosen {
     }
 }
 
-/// Moves the nonlinear parameters of the kept to where the rows are most likely, all together, with the noise of `with`. What cannot be
-/// made better stays.
+/// Moves the nonlinear parameters of the kept effects, all together, to the maximum of the likelihood, with the noise of `with`. If
+/// nothing improves, they stay.
 pub(super) fn refine(search: &Search, kept: &mut Vec<Chosen>, with: &mut Fitted) {
     let which = with_parameter(kept);
     if which.is_empty() {
@@ -129,7 +129,7 @@ impl Nonlinear {
             false => search.variance.fit_at(&tangent, components),
         };
         let Some(joint) = joint else {
-            // Without a parameter, or with one that the coefficients make up for wholly: any value does.
+            // There is no parameter, or the coefficients compensate for it wholly, so that any value fits.
             let open = |k: usize| {
                 which.contains(&k).then_some(Interval {
                     lower: None,
@@ -152,8 +152,8 @@ impl Nonlinear {
             .view((first, first), (size, size))
             .into_owned();
         for (i, k) in which.iter().enumerate() {
-            // No value outside of what is looked at: the variance of a uniform distribution over it is the most that a parameter can have,
-            // where it is nearly determined by nothing.
+            // A parameter stays within the range that is searched. If the rows hardly determine it, its variance is at most that of a
+            // uniform distribution over this range.
             let Some(p) = kept[*k].candidate.parameter() else {
                 continue;
             };
@@ -176,8 +176,8 @@ impl Nonlinear {
     }
 }
 
-/// Interval of the parameter of the kept effect `k` by the profile of the likelihood: all coefficients are found again at each value, and
-/// the other parameters along their `slopes`. `sigma` is that of its logarithm, about.
+/// Interval of the parameter of the kept effect `k` by the profile of the likelihood: at each value all coefficients are fitted again, and
+/// the other parameters along their `slopes`. `sigma` is approximately that of its logarithm.
 fn profile(
     search: &Search,
     kept: &[Chosen],

@@ -1,10 +1,10 @@
 //! Whether the residual of an axis is a function of the axis's own reading.
 //!
-//! A converter that is not linear, codes that never come, an amplifier that rests or no longer follows: each leaves a function of the
-//! reading that no smooth law makes. Which of them it is, dwell means do not say, so that the answer is a line of what is left and no
-//! effect. The function is taken as constant between places that divide the range of the readings evenly, and tested beside a smooth
-//! one: what is said has to be too large for chance, has to predict dwells that it has not seen, and has to do better than the same
-//! function of the readings of the other axes, as which a quantity that nobody recorded may look as well.
+//! A nonlinear converter, missing codes, or an amplifier that sticks or no longer follows: each leaves a function of the reading that no
+//! smooth law makes. Dwell means do not show which of these it is, so it is reported as a residual instead of an effect. The function is
+//! taken as constant between places that divide the range of the readings evenly, and tested beside a smooth one. To be reported, it has
+//! to be too large for chance, and has to predict held-out dwells. It also has to do better than the same function of the readings of
+//! another axis, because an unrecorded quantity may look like either.
 
 use nalgebra::DMatrix;
 
@@ -17,18 +17,18 @@ use crate::effects::quantity::Conditions;
 use crate::fit::Split;
 use crate::observable::{Observable, StratumName};
 
-/// Pieces that the range of the readings is divided into.
+/// Numbers of segments that the range of the readings is divided into.
 const PIECES: [usize; 3] = [4, 16, 64];
-/// Order of the smooth function: that of the effects that have a name.
+/// Order of the smooth function: that of the named effects.
 const SMOOTH: i32 = 3;
-/// Functions that are tried: axes and divisions.
+/// Number of functions that are tried: axes times divisions.
 const TRIED: f64 = (3 * PIECES.len()) as f64;
 
-/// A function of its reading that is left of an axis.
+/// A residual of an axis that is a function of the axis's own reading.
 pub(super) struct OfReading {
     /// The report about it.
     pub left: Leftover,
-    /// Columns that take it up, the smooth ones included.
+    /// Columns that absorb it, the smooth ones included.
     pub columns: DMatrix<f64>,
 }
 
@@ -58,7 +58,7 @@ impl<'a> Readings<'a> {
         }
     }
 
-    /// Columns of errors of `axis` by functions of what axis `read` reads, as a share of its range.
+    /// Columns of errors of `axis` that are functions of the reading of axis `read`, as a share of its range.
     fn columns(
         &self,
         axis: usize,
@@ -90,7 +90,7 @@ impl<'a> Readings<'a> {
     }
 }
 
-/// The functions of their own reading that are left of the axes beside `model`, whose fit is `last`.
+/// The residuals beside `model`, whose fit is `last`, that are functions of the axis's own reading.
 pub(super) fn of_readings(
     search: &Search,
     model: &DMatrix<f64>,
@@ -176,9 +176,9 @@ fn of_axis(
     })
 }
 
-/// By how much the score is less with steps at some readings in the place of a smooth nonlinearity, `one` of the chosen, and of all
-/// errors by the code; negative where it is better. Codes that never come, and bits of converters with another zero, are such steps, and
-/// look like a smooth nonlinearity where few inputs were shown.
+/// How much lower the score is with steps at some readings in place of a smooth nonlinearity, `one` of the chosen, and of all converter
+/// nonlinearities; negative if it is higher. Missing codes, and bits of converters with another zero, are such steps. With few different
+/// inputs they look like a smooth nonlinearity.
 pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -> Option<f64> {
     const PLACES: usize = PIECES[2];
     let (group, rest): (Vec<_>, Vec<_>) = chosen
@@ -203,7 +203,7 @@ pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -
     let (mut left, white) = (across(whitener.whiten(&y)), whitener.whiten(&steps));
     let sizes: Vec<f64> = white.column_iter().map(|c| c.norm()).collect();
     let mut white = across(white);
-    // A place is searched as well, as the nonlinear parameter of an effect is, but among so many.
+    // The place of a step is searched too, like the nonlinear parameter of an effect, but among so many places.
     let price = COEFFICIENT + 2.0 * (PLACES as f64).ln();
     let mut taken: Vec<usize> = Vec::new();
     while taken.len() < columns {

@@ -1,4 +1,4 @@
-//! What effects do to a recording that they were not found in.
+//! Tests effects on a recording that they were not found in.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -9,10 +9,11 @@ use crate::diagnose::search::{Search, basis, beside};
 use crate::diagnose::variance::LikelihoodKind;
 use crate::effects::fitted::FittedEffect;
 
-/// An effect that should change the residuals of a recording by fewer sigmas than this is neither borne out nor contradicted by it.
+/// If an effect should change the residuals of a recording by fewer sigmas than this, the recording neither confirms nor
+/// contradicts it.
 const SHOWS: f64 = 3.0;
 
-/// One effect in another recording, with coefficients that this had no part in; the other effects are taken out.
+/// One effect on another recording, with coefficients that were found without it. The other effects are removed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Second {
     /// Root mean square of the judged rows without it.
@@ -23,20 +24,20 @@ pub struct Second {
     pub chi2_before: f64,
     /// With it.
     pub chi2_after: f64,
-    /// By how many sigmas it should change the residuals: the length of what the affine parameters cannot do.
+    /// Expected change of the residuals in sigmas: the length of the part of the effect that the affine parameters cannot absorb.
     pub expected_sigmas: f64,
-    /// Whether that is enough for the recording to say anything of it.
+    /// Whether that is enough for the recording to judge the effect.
     pub shows: bool,
 }
 
 impl Second {
-    /// Whether the recording speaks against the effect.
+    /// Whether the recording contradicts the effect.
     pub fn contradicts(&self) -> bool {
         self.shows && !(self.chi2_after < self.chi2_before)
     }
 }
 
-/// Each of `effects` in `rows`. The affine parameters are the recording's own: what is judged is the effect alone.
+/// Tests each of `effects` on `rows`. The affine parameters are fitted to this recording, so that only the effect is judged.
 pub(super) fn second(rows: &Rows, effects: &[FittedEffect]) -> Option<Vec<Second>> {
     let search = Search::new(rows, Vec::new());
     let columns: Vec<DMatrix<f64>> = effects
@@ -57,7 +58,7 @@ pub(super) fn second(rows: &Rows, effects: &[FittedEffect]) -> Option<Vec<Second
         .zip(effects)
         .map(|(c, e)| c * DVector::from_column_slice(&e.values))
         .collect();
-    // What the affine parameters leave of some residuals, as they are and decorrelated.
+    // Residuals of a fit of the affine parameters alone, and the length of the decorrelated ones.
     let left = |y: &DVector<f64>| {
         let y = DMatrix::from_column_slice(y.len(), 1, y.as_slice());
         let decorrelated = whitener.whiten(&y);
@@ -68,7 +69,8 @@ pub(super) fn second(rows: &Rows, effects: &[FittedEffect]) -> Option<Vec<Second
     };
     let mut all = Vec::new();
     for (i, error) in errors.iter().enumerate() {
-        // One that the recording says nothing of, for want of a temperature or a channel, says nothing of the others either.
+        // An effect that this recording cannot evaluate, for lack of a temperature or a channel, must not affect the judgement of
+        // the others.
         let finite = |e: &DVector<f64>| e.iter().all(|v| v.is_finite());
         let others = errors.iter().enumerate();
         let others = others.filter(|(j, e)| *j != i && finite(e));

@@ -1,7 +1,7 @@
-//! Accepted effects that another of the list does as well as under the inputs of the recording.
+//! Accepted effects that another listed effect explains as well at the inputs of the recording.
 //!
-//! The score of a whole effect pays for all of its coefficients: in one pose a bias that follows the temperature, with six of them, lost to a
-//! scale factor with one by 20 in score, and the report named one of the two alone. Here the part of one axis is put to the test.
+//! The score of a whole effect includes the cost of all its coefficients. In one pose a thermal bias with six coefficients scored 20 less
+//! than a thermal scale factor with one, and the report named only one of the two. Here the parts of each axis are compared separately.
 
 use nalgebra::DMatrix;
 
@@ -14,25 +14,25 @@ use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::quantity::AXES;
 
-/// A coefficient of this many times the size of data sheets is no explanation: at rest a gyro reads the Earth's rate, and the scale factor
-/// that would do to that what 0.1 deg/s/K do to the bias is a million times too large.
+/// A coefficient beyond this many times the data-sheet size is not plausible. A gyro at rest reads Earth rate, and a scale factor that
+/// changes it as 0.1 deg/s/K change the bias is a million times too large.
 pub(super) const PLAUSIBLE: f64 = 10.0;
 
-/// A part of an accepted effect that the rows do not tell from another effect.
+/// A part of an accepted effect that the rows do not distinguish from another effect.
 struct Part {
     axis: usize,
-    /// By how much the score is less with the other effect in its place.
+    /// How much lower the score is with the other effect in its place.
     worse: f64,
 }
 
-/// Lists with each of the kept effects the one that is the same at a constant input, where the rows do not tell them apart; and notes that
-/// say so. `with` is the fit of all.
+/// For each kept effect, puts the one that is the same at a constant input first among its alternatives, if the rows do not distinguish the
+/// two; returns notes about these. `with` is the fit of all.
 pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> Vec<Note> {
     let mut notes = Vec::new();
     for i in 0..kept.len() {
         let id = kept[i].candidate.id();
         let rival = one_at_a_constant_input(&id).and_then(effects::by_id);
-        // Both of them: the rows do tell them apart.
+        // If both are kept, the rows distinguish them.
         let beside_it = |r: &&Effect| kept.iter().all(|k| k.candidate.id() != r.id);
         let Some(rival) = rival.filter(beside_it) else {
             continue;
@@ -58,8 +58,8 @@ pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> V
     notes
 }
 
-/// The coefficients of one axis of kept effect `i` against those of `rival` that do best in their place; `None` where the rows do not ask for
-/// them, and where they tell the two apart.
+/// Compares the coefficients of one axis of kept effect `i` with those of `rival` that fit best in their place. `None` if the rows do not
+/// need them, or if they distinguish the two.
 fn part(
     search: &Search,
     kept: &[Chosen],
@@ -85,7 +85,7 @@ fn part(
     if count == 0 || without - whole < CONFUSED {
         return None;
     }
-    // Those of the rival that follow the same temperature; coefficients of it one after the other, the best first.
+    // The rival follows the same temperature. Its coefficients are added one after the other, the best first.
     let mut candidate = Candidate::new(search.rows.sensor, CandidateKind::Effect(rival));
     candidate.without_self_heating = kept[i].candidate.without_self_heating;
     let all = candidate.columns(search.rows, 0.0);

@@ -1,4 +1,4 @@
-//! What is tried on a sensor.
+//! Candidates that are tried on a sensor.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -10,13 +10,13 @@ use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::regressor::{Product, Regressor};
 
-/// Share of what a product could be at most below which it is made of rounding.
+/// Share of its upper bound below which a product is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Everything that is tried on a sensor, and the effects that its experiment would not show at the size of data sheets.
+/// All candidates of a sensor, and the effects that its experiment would not show at data-sheet size.
 ///
-/// An effect is tried wherever its columns are no sums of the affine ones: a real fault may be ten thousand times the size of data sheets,
-/// and the rivals of an effect that is not tried take its place. An even drift of twice the noise was a warm-up in 13 of 16 units.
+/// An effect is tried if its columns are independent of the affine ones. A real fault may have ten thousand times the data-sheet size, and
+/// if an effect is not tried, its rivals take its place: a steady drift of twice the noise was found as a warm-up in 13 of 16 units.
 pub(super) fn candidates(
     rows: &Rows,
     dwell_ends: &[(usize, f64)],
@@ -33,7 +33,7 @@ pub(super) fn candidates(
     let across = |columns: &DMatrix<f64>| {
         let white = whitener.whiten(columns);
         let z = &white - &q * q.tr_mul(&white);
-        // Of what the affine parameters span rounding leaves a little.
+        // Rounding leaves a little of columns that the affine parameters span.
         DVector::from_fn(z.ncols(), |k, _| {
             let (left, all) = (z.column(k).norm(), white.column(k).norm());
             if left > 1e-6 * all { left } else { 0.0 }
@@ -82,8 +82,8 @@ pub(super) fn candidates(
             let term = |axis| Candidate::new(sensor, CandidateKind::Term(axis, product));
             let columns = rows.term(&product, &[0, 1, 2]);
             let seen = across(&columns);
-            // A table that turns about one axis at a time has rates about the others of rounding's size: with a coefficient of
-            // 5e12 their product passed for an effect.
+            // If a table turns about one axis at a time, the rates about the others are rounding: with a coefficient of 5e12 their product
+            // passed for an effect.
             let rounding = ROUNDING * rows.largest(&product);
             let seen = |axis: &usize| {
                 let column = columns.column(*axis);
@@ -107,8 +107,8 @@ pub(super) fn candidates(
     (all, not_excited)
 }
 
-/// Keeps those of the active coefficients whose columns, decorrelated beside the affine parameters, are no sums of the ones before: at
-/// rest in gravity the squares of the force along three axes add up to a constant, which is a bias.
+/// Keeps the active coefficients whose columns, decorrelated beside the affine parameters, are independent of the ones before. At rest the
+/// squares of the force along three axes add up to a constant, which is a bias.
 fn separate(candidate: &mut Candidate, columns: &DMatrix<f64>) {
     let mut spanned: Vec<DVector<f64>> = Vec::new();
     let mut kept = Vec::new();

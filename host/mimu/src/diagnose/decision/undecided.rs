@@ -7,25 +7,25 @@ use crate::diagnose::search::{Chosen, Search};
 use crate::effects::alternatives::alternatives;
 use crate::quantity::Sensor;
 
-/// An accepted effect whose physics the recordings do not decide: a law on no list explains the rows as well.
+/// An accepted effect whose physics the recordings do not decide: an unlisted alternative model explains the rows as well.
 #[derive(Debug, Clone, Serialize)]
 pub struct Undecided {
     /// Public id of the effect.
     pub id: String,
-    /// Whose readings err.
+    /// Sensor whose readings err.
     pub sensor: Sensor,
     /// The unlisted alternative model.
     pub law: &'static str,
-    /// By how much the law is worse, in score, the deviance with what coefficients cost; negative where it is better.
+    /// How much lower the score of the law is: drop in deviance minus the cost of coefficients. Negative if it is higher.
     pub difference: f64,
-    /// What would tell them apart.
+    /// Experiment that would distinguish them.
     pub experiment: &'static str,
 }
 
-/// Score by which an effect has to be better than a law that is on no list, for the verdict to name it: odds of one to twenty.
+/// Lead in score over an unlisted alternative model that an effect needs for the verdict to name it: odds of one to twenty.
 const DECIDED: f64 = 6.0;
 
-/// Which of the kept effects a law that is on no list does as well as.
+/// The kept effects that do not explain the rows better than an unlisted alternative model.
 pub(super) fn undecided(search: &Search, kept: &[Chosen]) -> Vec<Undecided> {
     let sensor = search.rows.sensor;
     let mut all = Vec::new();

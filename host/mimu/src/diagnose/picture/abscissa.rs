@@ -1,4 +1,4 @@
-//! What an effect is drawn against: what its regressors are functions of.
+//! Abscissa of an effect's plot: what its regressors are functions of.
 
 use serde::Serialize;
 
@@ -22,7 +22,7 @@ pub enum Dependence {
 pub struct Abscissa {
     /// Name.
     pub name: String,
-    /// Unit that a person reads it in.
+    /// Unit for display.
     pub unit: String,
     /// From SI to this unit: `factor * x + offset`.
     pub factor: f64,
@@ -46,7 +46,7 @@ pub fn dependence(candidate: &Candidate, slot: usize) -> Dependence {
     }
 }
 
-/// What a person reads on the abscissa of coefficient `k` of the active ones of `candidate`, in the error of `axis`.
+/// Name and unit of the abscissa of coefficient `k` of the active ones of `candidate`, in the error of `axis`.
 pub fn abscissa(on: &Dependence, candidate: &Candidate, k: usize, axis: usize) -> Abscissa {
     let sensor = candidate.sensor;
     let plain = |name: String, unit: String, factor: f64| Abscissa {
@@ -95,7 +95,7 @@ pub fn abscissa(on: &Dependence, candidate: &Candidate, k: usize, axis: usize) -
                 (CandidateKind::Term(_, product), _) => product.name(),
                 (_, true) => format!("regressor of {coefficient}"),
                 _ => {
-                    // Of many the axes are too long to tell.
+                    // With many quantities, their axes make the name too long.
                     let of_axes = fields.len() <= 2;
                     let mut names: Vec<String> = Vec::new();
                     for field in fields {

@@ -1,9 +1,9 @@
-//! An effect against what it depends on.
+//! Plots of an effect against the quantity that it depends on.
 //!
-//! Component plus residual instead of an added-variable plot: two residuals against each other do not show a rate or a
-//! temperature. What the affine calibration takes up of the component is taken out of it all the same, as the added-variable
-//! plot does: its mean, and its best straight line where the variable is one that the calibration is linear in. Otherwise a
-//! cubic would be drawn with the scale factor that it was never seen to have.
+//! Component plus residual instead of an added-variable plot, which shows two residuals against each other, not against a rate or a
+//! temperature. As in the added-variable plot, the part of the component that the affine calibration absorbs is subtracted: its mean,
+//! and its best straight line if the calibration is linear in the variable. Otherwise a cubic would be drawn with a scale factor that
+//! the recording does not show.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -19,16 +19,16 @@ use crate::quantity::AXES;
 
 /// Points of a curve.
 const POINTS: usize = 81;
-/// Of one with steps.
+/// Points of a curve with steps.
 const POINTS_OF_STEPS: usize = 801;
 
-/// What a panel has on its abscissa.
+/// Abscissa of a panel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Against {
     /// What the effect depends on.
     Variable(Abscissa),
-    /// What the effect does to the row, beside the affine calibration: where a row is a whole turn, or the magnitude of gravity, it is
-    /// no function of one quantity.
+    /// The effect's contribution to the row beside the affine calibration. A row that is a whole turn, or the magnitude of gravity, is
+    /// not a function of one quantity.
     Fitted,
 }
 
@@ -41,11 +41,11 @@ pub struct At {
     pub sigma: f64,
     /// Residual plus the fitted effect.
     pub partial: f64,
-    /// What the model that has not seen the row says that this is; not a number where there is none.
+    /// Prediction of that by the model fitted without the row; NaN if there is none.
     pub predicted: f64,
-    /// What is left, in sample.
+    /// Residual, in sample.
     pub after: f64,
-    /// What is left, held out.
+    /// Residual, held out.
     pub held_out: f64,
 }
 
@@ -65,7 +65,7 @@ pub struct Curve {
 pub struct Panel {
     /// Axis, and coefficients.
     pub title: String,
-    /// What the ordinate is of.
+    /// Quantity of the ordinate.
     pub kind: ResidualKind,
     /// Abscissa.
     pub against: Against,
@@ -79,12 +79,12 @@ pub struct Panel {
 struct Group {
     axis: usize,
     on: Dependence,
-    /// Places among the regressors, and among the coefficients: one of all axes has three regressors.
+    /// Indices of the regressors, and of the coefficients: a coefficient of all axes has three regressors.
     slots: Vec<usize>,
     members: Vec<usize>,
 }
 
-/// Coefficients that depend on one quantity and are of one axis belong together: line and bend of a thermal bias.
+/// Groups the coefficients of one axis that depend on the same quantity, such as the linear and quadratic parts of a thermal bias.
 fn groups(one: &Accepted) -> Vec<Group> {
     let candidate = &one.chosen.candidate;
     if candidate.reads_code() {
@@ -154,7 +154,7 @@ pub(super) fn panels(
         .ok()?;
     let across = columns - basis * share;
     for track in tracks.iter().filter(|t| t.axis.is_none()) {
-        // Rows of another axis are no points of a line.
+        // Rows of another axis are not drawn.
         let mut ours = track.rows.iter();
         if ours.any(|r| columns.row(*r).amax() > 0.0) {
             panels.push(whole(one, &across, track));
@@ -207,7 +207,7 @@ fn points(track: &Track, at: impl Fn(usize) -> (f64, f64)) -> Vec<At> {
     track.samples.iter().enumerate().map(of).collect()
 }
 
-/// `None` where the recording does not move the variable.
+/// `None` if the variable is constant in the recording.
 fn variable(
     rows: &Rows,
     search: &Search,
@@ -261,7 +261,7 @@ fn variable(
     ))
 }
 
-/// Errors by the code of the axis of `track`, against what it reads. `None` where it has none.
+/// Converter nonlinearity of the axis of `track` against its reading. `None` if there is none.
 fn coded(rows: &Rows, one: &Accepted, track: &Track) -> Option<Panel> {
     let axis = track.axis?;
     let candidate = &one.chosen.candidate;
@@ -288,7 +288,7 @@ fn coded(rows: &Rows, one: &Accepted, track: &Track) -> Option<Panel> {
         track,
         members: &members,
         x: of_rows(&|at| at.reading.mean[axis]),
-        // What it reads is linear in the input.
+        // The reading is linear in the input.
         sloped: true,
         points: POINTS_OF_STEPS,
     };
@@ -308,9 +308,9 @@ struct Drawn<'a> {
     track: &'a Track,
     /// Indices of the coefficients.
     members: &'a [usize],
-    /// Of each row of the track.
+    /// Abscissa of each row of the track.
     x: Vec<f64>,
-    /// Whether the affine calibration can do a straight line in x.
+    /// Whether the affine calibration can absorb a straight line in x.
     sloped: bool,
     /// Points of the curve.
     points: usize,
@@ -373,7 +373,7 @@ fn ends(x: &[f64]) -> (f64, f64) {
         })
 }
 
-/// Whether the affine calibration can do a straight line in `x`, the values of the rows of `track`.
+/// Whether the affine calibration can absorb a straight line in `x`, the values of the rows of `track`.
 fn affine_in(search: &Search, x: &[f64], track: &Track) -> bool {
     let mean = x.iter().sum::<f64>() / x.len() as f64;
     let mut column = DVector::zeros(search.rows.y.len());
@@ -381,6 +381,6 @@ fn affine_in(search: &Search, x: &[f64], track: &Track) -> bool {
         column[*r] = x - mean;
     }
     let left = &column - &search.basis * search.basis.tr_mul(&column);
-    // Hundredths: the input is known by the dwell, and the reading is of the sensor's own direction.
+    // Within 1 %: the input is known for each dwell only, and the reading is along the sensor's own direction.
     left.norm() < 0.01 * column.norm()
 }

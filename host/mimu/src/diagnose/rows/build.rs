@@ -14,9 +14,9 @@ use crate::quantity::Sensor;
 use crate::triad::directions;
 use mimu_recording::Reference;
 
-/// The rows of one recording, not yet beside those of others.
+/// The rows of one recording, not yet joined with those of others.
 pub(super) struct Part {
-    /// Reference of the recording: of one kind, the parameters of the matrix are the same.
+    /// Reference of the recording. Recordings with the same reference share the parameters of the matrix.
     pub reference: Reference,
     /// Residuals.
     pub y: Vec<f64>,
@@ -45,7 +45,8 @@ pub(super) struct Part {
 pub(super) struct Builder<'a> {
     pub prepared: &'a Prepared,
     pub sensor: Sensor,
-    /// Whether the recording has the other sensor too: the table may know its input, but no device could remove what goes by it.
+    /// Whether the recording has the other sensor too. A table may know that input, but without the sensor no device could
+    /// remove an effect that depends on it.
     pub other_measured: bool,
     pub t0_s: f64,
     pub middle_s: f64,
@@ -84,7 +85,7 @@ pub(super) fn forces(session: &Session) -> Option<Part> {
     Builder::of(session, Sensor::Accel)?.forces(&inverse)
 }
 
-/// The step of several channels, if they have one in common: their mean, to within what rounding in a text file leaves.
+/// Common quantisation step of several channels: their mean, if they agree to within the rounding of a text file.
 pub(super) fn common_step(steps: &[Option<f64>]) -> Option<f64> {
     let steps: Vec<f64> = steps.iter().copied().collect::<Option<_>>()?;
     let mean = steps.iter().sum::<f64>() / steps.len() as f64;
@@ -152,7 +153,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The conditions of a dwell, block by block: what is known of the input, or rest under `force`.
+    /// The conditions of a dwell, block by block: the input that the table gives, or rest under `force`.
     pub(super) fn dwell(&mut self, index: usize, force: Vector3<f64>) -> Range<usize> {
         let prepared = self.prepared;
         let first = self.conditions.len();
@@ -164,7 +165,7 @@ impl Builder<'_> {
                 Reference::Table => (known(0).map(f64::to_radians), known(3)),
                 Reference::Gravity | Reference::TurntableRate => (Vector3::zeros(), force),
             };
-            // A rate table's list of rates may leave the force out: at a constant rate the accelerometer has it.
+            // The list of a rate table may lack the force. At a constant rate the accelerometer measures it.
             let given = if given.iter().all(|f| f.is_finite()) {
                 given
             } else {
@@ -186,7 +187,7 @@ impl Builder<'_> {
         first..self.conditions.len()
     }
 
-    /// Mean over dwell `index` of an error of axis `axis` weighted by `by`.
+    /// Adds a row: the mean over dwell `index` of the axes' errors, weighted by `by`.
     pub(super) fn mean_row(&mut self, index: usize, conditions: &Range<usize>, by: Vector3<f64>) {
         let total: f64 = self.conditions[conditions.clone()]
             .iter()

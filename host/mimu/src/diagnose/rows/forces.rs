@@ -1,10 +1,10 @@
-//! The forces that a gyro is judged by, and how they may err.
+//! Errors of the forces that a gyro is judged by.
 
 use nalgebra::{DMatrix, Vector3};
 
 use crate::estimate::turn::Turn;
 
-/// Errors of the forces of an accelerometer that are common to all of its poses, or to several.
+/// Errors of an accelerometer's forces that several or all of its poses share.
 #[derive(Debug, Clone)]
 pub struct ForceErrors {
     /// Index of each dwell, ascending.
@@ -14,7 +14,8 @@ pub struct ForceErrors {
 }
 
 impl ForceErrors {
-    /// Covariance of components of direction errors, each of a turn, with what it owes to the force before and after it.
+    /// Covariance of turns' direction errors. Each component comes with its turn, and its derivatives by the force
+    /// before and after.
     pub fn of_turns(&self, components: &[(&Turn, [Vector3<f64>; 2])]) -> DMatrix<f64> {
         let mut by = DMatrix::zeros(components.len(), self.covariance.nrows());
         for (row, (turn, ends)) in components.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Rows of a unit that only gravity's size is known of.
+//! Rows of a recording whose only known input is the magnitude of gravity.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ use crate::observable::{Observable, StratumName};
 use crate::prepared::si_covariance;
 use crate::quantity::Sensor;
 
-/// What the affine parameters of an accelerometer do to its forces.
+/// Derivatives of an accelerometer's forces by its affine parameters.
 struct Shapes {
     /// Three rows for each observation.
     errors: DMatrix<f64>,
@@ -26,7 +26,7 @@ struct Shapes {
     by_matrix: DMatrix<f64>,
 }
 
-/// The nine parameters that gravity's size determines: C lower triangular, about the mean reading, then o.
+/// The nine parameters that the magnitude of gravity determines: C lower triangular, about the mean reading, then o.
 fn lower_affine(observations: &[Observation]) -> Shapes {
     let lower = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
     let n = observations.len();
@@ -60,7 +60,7 @@ fn lower_affine(observations: &[Observation]) -> Shapes {
 }
 
 impl Builder<'_> {
-    /// Errors along the sensors as errors in the body frame: inverse of the sensitive directions.
+    /// Matrix from errors along the sensitive axes to errors in the body frame: inverse of the sensitive directions.
     fn to_body(&self) -> Option<Matrix3<f64>> {
         self.direction.try_inverse()
     }
@@ -112,8 +112,8 @@ impl Builder<'_> {
         self.finish(y, nuisance, vec![6, 7, 8], strata, (RowFigure::Size, n, 1))
     }
 
-    /// Three rows for each pose: the error of the force, of which [`Self::sizes`] see the part along it. What they cannot see goes into
-    /// the directions that a gyro is judged by.
+    /// Three rows for each pose: the error of the force as a vector. [`Self::sizes`] contain only its part along the force. The rest
+    /// enters the directions that judge a gyro.
     pub(super) fn forces(mut self, inverse: &Affine<f64>) -> Option<Part> {
         let observations = self.prepared.observations(Sensor::Accel);
         let n = 3 * observations.len();
@@ -238,8 +238,8 @@ impl Builder<'_> {
         }
         let random_walk = (n > 0).then(|| self.random_walk(&dwells));
         let wander = prepared.noise.wander(Sensor::Gyro, &prepared.dwells.list);
-        // The reading that rest should have, and not that of each dwell: its noise is what the row is about, and a matrix of
-        // zeros would explain it wholly, with `rate_x` of coefficient -1 beside for the turns.
+        // The mean reading of all dwells at rest instead of each dwell's own, whose noise is in the row too. With the latter, a matrix
+        // of zeros would explain that noise wholly, and `rate_x` with coefficient -1 would correct the turns for it.
         let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n.max(1) as f64;
         let turn_variances: Vec<f64> = turns
             .iter()
@@ -321,12 +321,12 @@ impl Builder<'_> {
             0 => (RowFigure::Rest, 3 * n, 1),
             m => (RowFigure::Direction, m, 2),
         };
-        // What is constant of an error of C is a bias.
+        // A bias absorbs the constant part of an error of C.
         let mut by_matrix = nuisance.columns(0, 9).into_owned();
         for (k, mut column) in by_matrix.column_iter_mut().enumerate() {
             column -= nuisance.column(9 + k / 3) * at_rest[k % 3];
         }
-        // Where the Earth's rate points is of the recording, as the biases are.
+        // The direction of Earth rate belongs to the recording, as the biases do.
         let own = 9..nuisance.ncols();
         let nuisance = (nuisance, DMatrix::identity(12, own.end), by_matrix);
         self.finish(y, nuisance, own.collect(), strata, figure)

@@ -1,4 +1,4 @@
-//! The rows of several recordings beside each other.
+//! Joins the rows of several recordings.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +8,7 @@ use crate::effects::temperature::without_self_heating;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 
-/// Columns of size 1, those of zero left.
+/// Columns scaled to length 1; zero columns stay zero.
 fn scaled(mut nuisance: DMatrix<f64>) -> DMatrix<f64> {
     for mut column in nuisance.column_iter_mut() {
         let norm = column.norm();
@@ -19,8 +19,8 @@ fn scaled(mut nuisance: DMatrix<f64>) -> DMatrix<f64> {
     nuisance
 }
 
-/// For each part the place of its nuisance columns among those of all, and how many there are: the matrix shared by all
-/// recordings of one kind, biases each for itself.
+/// For each part the places of its nuisance columns among those of all, and how many there are. Recordings with the same
+/// reference share the columns of the matrix; each has separate columns for its biases.
 fn places(parts: &[(usize, Part)]) -> (Vec<Vec<usize>>, usize) {
     let mut shared: Vec<(Reference, Vec<usize>)> = Vec::new();
     let mut count = 0;
@@ -51,14 +51,15 @@ fn places(parts: &[(usize, Part)]) -> (Vec<Vec<usize>>, usize) {
     (all, count)
 }
 
-/// One problem of `parts`, each with the number of its recording out of `sessions`. `None` if the first recording is missing.
+/// One problem of `parts`, each with the index of its recording, out of `sessions` recordings. `None` if the first recording
+/// is missing.
 pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -> Option<Rows> {
     let (0, head) = parts.first()? else {
         return None;
     };
     let (figure, together) = (head.figure, head.judged.1);
     let (places, columns) = places(&parts);
-    // The judged rows stand first, and a stratum is judged whole.
+    // The judged rows come first. A stratum is judged as a whole or not at all.
     let judged_rows = |part: &Part| match part.figure == figure {
         true => part.judged.0,
         false => 0,
@@ -130,7 +131,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         }
         strata.push(stratum);
     }
-    // Those of the first recording stand first.
+    // The columns of the first recording come first.
     let mut parameters = head.parameters.clone();
     for (column, place) in head.parameters.column_iter().zip(&places[0]) {
         let size = nuisance.column(*place).norm();

@@ -13,7 +13,7 @@ use crate::quantity::Sensor;
 use crate::signal::contrast::Contrast;
 use crate::triad::Forward;
 
-/// Derivatives by the parameters: bias and matrix row of each axis, then the delay of each where an input moves.
+/// First derivative by a delay, of one for each axis if an input moves. Before it are those by bias and matrix row of each axis.
 const DELAYS: usize = 12;
 
 impl Builder<'_> {
@@ -58,14 +58,14 @@ impl Builder<'_> {
             .collect();
         let centre = readings.iter().sum::<Vector3<f64>>() / n as f64;
         let mut strata = Vec::new();
-        // Rows of the nuisance: what an observation owes to the parameters of `axis`.
+        // Writes a row of the nuisance: derivatives of an observation by the parameters of `axis`.
         let mut owes =
             |row: usize, o: &Observation, axis: usize, bias: f64, reading: Vector3<f64>| {
                 nuisance[(row, 4 * axis)] = bias;
                 for k in 0..3 {
                     nuisance[(row, 4 * axis + 1 + k)] = o.input[k];
                 }
-                // Of u = P x + b the derivative by C is -P dC (u - b), and what is constant of it a bias.
+                // For u = P x + b the derivative by C is -P dC (u - b). A bias absorbs its constant part.
                 for (r, c) in (0..3).flat_map(|r| (0..3).map(move |c| (r, c))) {
                     by_matrix[(row, 3 * r + c)] =
                         forward.matrix[(axis, r)] * reading[c] / scale[axis];
@@ -101,7 +101,8 @@ impl Builder<'_> {
                 within: false,
             });
         }
-        // A bias that wanders as fast as the input is in the known variance, and slower it is in no contrast: nothing is shared with the means.
+        // A bias that wanders as fast as the input is in the known variance, and a slower one cancels in a contrast. So contrasts share no
+        // noise with the means.
         for axis in 0..if within.is_empty() { 0 } else { 3 } {
             let from = y.len();
             for (contrast, o) in &within {
@@ -116,7 +117,7 @@ impl Builder<'_> {
             let known = DVector::from_iterator(within.len(), variances);
             strata.push(Stratum {
                 name: StratumName(Observable::Within(axis), None),
-                // A row is no function of one quantity, and is not drawn as one.
+                // A row is not a function of one quantity, so it is not drawn against one.
                 axis: None,
                 session: 0,
                 rows: from..y.len(),
@@ -130,14 +131,14 @@ impl Builder<'_> {
         }
         let figure = (RowFigure::Input, count, 1);
         let parameters = by_forward(inverse, &scale).resize_horizontally(columns, 0.0);
-        // A delay is the session's own, as a bias is: the clocks are.
+        // A delay belongs to the session, as a bias does, because the clocks do.
         let biases = [0, 4, 8].into_iter().chain(DELAYS..columns).collect();
         self.finish(y, (nuisance, parameters, by_matrix), biases, strata, figure)
     }
 
-    /// Gives the conditions of a dwell in which an input moves what the reference says of them: the angular acceleration, and the reading. The
-    /// measured one of a block has noise that is in the contrasts as well, and bits of it seemed to explain that: two of three clean gyros
-    /// had an error by the code.
+    /// Sets the angular acceleration and the reading of a dwell with a moving input to those that the reference predicts. The measured reading
+    /// of a block has noise that is in the contrasts as well, and bits of its code seemed to explain that: two of three clean gyros seemed to
+    /// have converter nonlinearity.
     fn follow(&mut self, dwell: usize, conditions: &Range<usize>, forward: &Forward) {
         let prepared = self.prepared;
         let list = &prepared.dwells.list[dwell];
@@ -160,7 +161,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The sum over a dwell that `contrast` is, of an error of `axis`.
+    /// Adds the row of `contrast`: a weighted sum over a dwell of an error of `axis`.
     fn contrast_row(&mut self, contrast: &Contrast, conditions: &Range<usize>, axis: usize) {
         let weights = contrast.weights.iter();
         self.rows.push(Row {
@@ -172,7 +173,7 @@ impl Builder<'_> {
     }
 }
 
-/// What a bias and a row of the forward model, in SI along each axis, add to the inverse one: C by rows, then o.
+/// What the bias and the matrix row of each axis of the forward model, in SI, add to the inverse model: C by rows, then o.
 fn by_forward(inverse: &Affine<f64>, scale: &Vector3<f64>) -> DMatrix<f64> {
     let (c, o) = (&inverse.matrix, &inverse.offset);
     let mut out = DMatrix::zeros(12, 12);

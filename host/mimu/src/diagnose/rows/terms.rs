@@ -1,5 +1,5 @@
-//! Columns of terms and jumps. All terms are products of the same nine quantities, which are laid out one after the other here: made from the
-//! conditions one by one they took a third of the time of a diagnosis by hand, whose turns are of some ten thousand pieces.
+//! Columns of terms and jumps. All terms are products of the same nine quantities, which are stored here as arrays. Computing them from the
+//! conditions for each term took a third of the time of a diagnosis by hand, whose turns have some ten thousand segments.
 
 use nalgebra::DMatrix;
 
@@ -13,7 +13,7 @@ use crate::effects::temperature::Followed;
 pub(super) struct Quantities {
     /// Of each of [`Quantity::OF_TERMS`].
     values: [Vec<f64>; 9],
-    /// Largest size of each that is a number.
+    /// Largest finite magnitude of each.
     largest: [f64; 9],
     /// Time of each of the conditions, s since its recording began.
     t_s: Vec<f64>,
@@ -26,7 +26,7 @@ impl Quantities {
             without_self_heating: false,
         };
         let conditions = rows.conditions(Some(behind));
-        // No quantity of terms is another on another axis.
+        // None of these quantities depends on the axis.
         let of = |q: Quantity| conditions.iter().map(|at| q.of(at, 0)).collect();
         let values: [Vec<f64>; 9] = Quantity::OF_TERMS.map(of);
         let largest = values.each_ref().map(|all| {
@@ -65,7 +65,7 @@ impl Rows {
         self.weighted(axes, &values)
     }
 
-    /// Largest value that the term could have: all of its quantities at their largest together.
+    /// Upper bound of the term: the product of the largest magnitudes of its quantities.
     pub fn largest(&self, product: &Product) -> f64 {
         let largest = &self.quantities().largest;
         parts(product)
@@ -80,13 +80,13 @@ impl Rows {
         self.weighted(axes, &since.collect::<Vec<_>>())
     }
 
-    /// What an error of `values`, one for each of the conditions, of each of `axes` does to the rows.
+    /// Columns of an error of each of `axes` with `values`, one for each of the conditions.
     fn weighted(&self, axes: &[usize], values: &[f64]) -> DMatrix<f64> {
         let mut columns = DMatrix::zeros(self.rows.len(), axes.len());
         for (r, row) in self.rows.iter().enumerate() {
             for (value, weight) in values[row.conditions.clone()].iter().zip(&row.weights) {
                 for (k, axis) in axes.iter().enumerate() {
-                    // What is not known may be weighted by nothing.
+                    // An unknown value (NaN) may have weight 0.
                     if weight[*axis] != 0.0 {
                         columns[(r, k)] += weight[*axis] * value;
                     }

@@ -1,4 +1,4 @@
-//! Candidates as parts of a model, and how good each is.
+//! Candidates as parts of a model, and their scores.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -9,30 +9,30 @@ use crate::effects::effect::Effect;
 /// A candidate as part of a model.
 #[derive(Debug, Clone, Serialize)]
 pub struct Chosen {
-    /// Which.
+    /// The candidate.
     #[serde(skip)]
     pub candidate: Candidate,
-    /// Value of its nonlinear constant, 0 if it has none.
+    /// Value of its nonlinear parameter, 0 if it has none.
     #[serde(skip)]
     pub parameter: f64,
     /// Its columns.
     #[serde(skip)]
     pub columns: DMatrix<f64>,
-    /// Probability of chance, after the whole search.
+    /// Probability by chance, corrected for the number of tests.
     #[serde(rename = "chance")]
     pub p: f64,
     /// By how much the deviance grows without it.
     #[serde(skip)]
     pub drop: f64,
-    /// By how much the sizes of its coefficients speak against it, in units of the deviance.
+    /// Penalty for implausible sizes of its coefficients, in units of the deviance.
     #[serde(skip)]
     pub unlikely: f64,
-    /// Others that would do nearly as well in its place.
+    /// Other candidates that would explain the rows nearly as well in its place.
     pub alternatives: Vec<Alternative>,
 }
 
 impl Chosen {
-    /// The true input, such as Earth rate, that would do nearly as well in its place.
+    /// The true input, such as Earth rate, that would explain the rows nearly as well in its place.
     pub fn or_true_input(&self) -> Option<&'static Effect> {
         let alternatives = self.alternatives.iter();
         let effects = alternatives.filter_map(|a| match a.kind {
@@ -44,7 +44,7 @@ impl Chosen {
     }
 }
 
-/// A candidate that would do nearly as well in the place of another.
+/// A candidate that would explain the rows nearly as well in the place of another.
 #[derive(Debug, Clone, Serialize)]
 pub struct Alternative {
     /// Public id.
@@ -52,12 +52,12 @@ pub struct Alternative {
     /// What it is.
     #[serde(skip)]
     pub kind: CandidateKind,
-    /// By how much its score is worse.
+    /// How much lower its score is.
     pub score_worse_by: f64,
 }
 
 impl Alternative {
-    /// A candidate whose score is worse by `score_worse_by`.
+    /// A candidate whose score is lower by `score_worse_by`.
     pub fn of(candidate: &Candidate, score_worse_by: f64) -> Self {
         Self {
             id: candidate.id(),
@@ -77,12 +77,12 @@ impl From<(&'static Effect, f64)> for Alternative {
     }
 }
 
-/// How good a candidate is among others with more or fewer coefficients: the drop of the deviance less what each coefficient
-/// costs (Akaike's two, doubled, as for each there are several candidates), and what speaks against their sizes. Of products that are the
-/// same in this recording the shortest is told.
+/// Score of a candidate: the drop in deviance, minus a cost for each coefficient (Akaike's two, doubled, because each is one of several
+/// candidates), minus the penalty for implausible sizes. Products also cost their order: of those that are equal in this recording, the
+/// shortest wins.
 ///
-/// A nonlinear parameter costs two coefficients. It has a limit, as a time constant that is infinite is a straight line, and should be
-/// told from it by two sigmas.
+/// A nonlinear parameter costs two coefficients. It has a limit: an infinite time constant, for example, is a straight line. The effect
+/// should differ from that limit by two sigmas.
 pub(super) fn score(c: &Chosen) -> f64 {
     let coefficients = c.columns.ncols() as f64 + if c.parameter > 0.0 { 2.0 } else { 0.0 };
     let order = match &c.candidate.kind {
@@ -95,8 +95,8 @@ pub(super) fn score(c: &Chosen) -> f64 {
 /// What a coefficient costs.
 pub const COEFFICIENT: f64 = 4.0;
 
-/// The same of a candidate. Where no bit of a code would be seen at the size of data sheets, the search is among up to 36, and the best of
-/// so many nothings is worth 7.
+/// The same for a candidate. If no bit of a code would be seen at data-sheet size, the search is among up to 36 bits, and the best of so
+/// many needless ones lowers the deviance by 7.
 pub(super) fn price(candidate: &Candidate) -> f64 {
     match candidate.reads_code() && candidate.excited.is_empty() {
         true => COEFFICIENT + 2.0 * (candidate.offered.len().max(1) as f64).ln(),

@@ -1,8 +1,8 @@
-//! Columns of models: what they span, and what is new in them.
+//! Columns of models: their basis, and those that are independent of others.
 
 use nalgebra::DMatrix;
 
-/// Columns that span what `columns` do.
+/// Orthonormal basis of the space that `columns` span.
 pub fn basis(columns: &DMatrix<f64>) -> DMatrix<f64> {
     let svd = columns.clone().svd(true, false);
     let largest = svd.singular_values.max();
@@ -13,7 +13,7 @@ pub fn basis(columns: &DMatrix<f64>) -> DMatrix<f64> {
         .map_or_else(|| columns.clone(), |u| u.select_columns(&kept))
 }
 
-/// `matrix` with more columns behind.
+/// `matrix` with the columns of `more` appended.
 pub fn beside(matrix: &DMatrix<f64>, more: &DMatrix<f64>) -> DMatrix<f64> {
     let (p, q) = (matrix.ncols(), more.ncols());
     let mut all = matrix.clone().resize_horizontally(p + q, 0.0);
@@ -21,16 +21,17 @@ pub fn beside(matrix: &DMatrix<f64>, more: &DMatrix<f64>) -> DMatrix<f64> {
     all
 }
 
-/// Part of a column beyond which it is no sum of others, rounding aside.
+/// Part of a column of length 1 that must be independent of the others; less is rounding.
 const OF_ITS_OWN: f64 = 1e-6;
 
-/// Those of `columns`, at size 1, that are no sums of `model` and of those before them.
+/// Those of `columns`, scaled to length 1, that are linearly independent of `model` and of those
+/// before them.
 pub fn independent_of(columns: &DMatrix<f64>, model: &DMatrix<f64>) -> DMatrix<f64> {
     let columns = unit_columns(columns);
     let mut spanned = basis(&unit_columns(model));
     let mut kept = Vec::new();
     for (k, column) in columns.column_iter().enumerate() {
-        // Twice, as once leaves rounding in the direction of what was taken away.
+        // Twice, because once leaves rounding in the direction of the basis.
         let once = column - &spanned * spanned.tr_mul(&column);
         let left = &once - &spanned * spanned.tr_mul(&once);
         if left.norm() > OF_ITS_OWN {
@@ -45,7 +46,7 @@ pub fn independent_of(columns: &DMatrix<f64>, model: &DMatrix<f64>) -> DMatrix<f
     columns.select_columns(&kept)
 }
 
-/// Columns of size 1.
+/// Columns scaled to length 1.
 pub fn unit_columns(columns: &DMatrix<f64>) -> DMatrix<f64> {
     let mut columns = columns.clone();
     for mut column in columns.column_iter_mut() {

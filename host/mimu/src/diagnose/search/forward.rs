@@ -5,23 +5,23 @@ use super::{CONFUSED, FALSE_FOUND, FALSE_LISTED, Found, MOST, Search};
 use crate::diagnose::variance::Fitted;
 use crate::effects::candidate::Candidate;
 
-/// Score by which an effect has to be better to take the place of one that was chosen before it, and how often at most.
+/// Lead in score that an effect needs to replace one that was chosen before it, and the largest number of such exchanges.
 const EXCHANGED: f64 = 1.0;
 const EXCHANGES: usize = 4;
 
-/// Score by which a term found from the data has to be better than an effect with a name.
+/// Lead in score that a term found from the data needs over a named effect.
 const PREFERENCE: f64 = 12.0;
 
 impl Search<'_> {
-    /// The effects that the rows ask for.
+    /// Searches all candidates for the effects that explain the rows.
     ///
-    /// A named effect goes before a term found from the data unless the term is better by 12 in score: with two thousand terms
-    /// some product is always near an effect.
+    /// A named effect is preferred to a term found from the data unless the score of the term is higher by 12: among two thousand terms,
+    /// some product always resembles an effect.
     pub fn run(&self) -> Option<Found> {
         self.beside(Vec::new(), |_| true)
     }
 
-    /// The same beside what is chosen already, of the candidates that `may` be tried.
+    /// The same beside effects that are chosen already, with the candidates that `may` be tried.
     pub fn beside(
         &self,
         mut chosen: Vec<Chosen>,
@@ -30,7 +30,7 @@ impl Search<'_> {
         let mut now = self.fit(&chosen)?;
         let given = chosen.len();
         let mut exchanges = 0;
-        // What others have made superfluous does not come back: two that make each other superfluous would take turns for ever.
+        // An effect that others made superfluous is not tried again: two that make each other superfluous would alternate for ever.
         let mut gone: Vec<String> = Vec::new();
         loop {
             let full = [true, false].map(|listed| {
@@ -82,7 +82,7 @@ impl Search<'_> {
             chosen.push(best);
             let before: Vec<String> = chosen.iter().map(|c| c.candidate.id()).collect();
             let Some(fit) = self.fit(&chosen) else {
-                // Beside the others it is determined by some noise and not by other.
+                // Whether the rows determine it beside the others depends on the noise estimate; with this one they do not.
                 gone.extend(chosen.pop().map(|c| c.candidate.id()));
                 continue;
             };
@@ -99,11 +99,11 @@ impl Search<'_> {
         })
     }
 
-    /// Puts a named effect in the place of one of the chosen, from the `first` on, where that makes the score of the whole better; says
-    /// whether it did.
+    /// Replaces one of the chosen, from the `first` on, by a named effect if that raises the score of the whole model. Returns whether
+    /// it did.
     ///
-    /// One after the other, the first effect takes what belongs to others: a bias over temperature that lags was a bias, a warm-up and a
-    /// drift, and the lag was not significant beside them.
+    /// In a stepwise search the first effect takes the share of others: a lagging thermal bias was found as a thermal bias, a warm-up
+    /// and a drift, beside which the lag was not significant.
     fn exchange(
         &self,
         chosen: &mut Vec<Chosen>,
@@ -143,7 +143,7 @@ impl Search<'_> {
         Some(true)
     }
 
-    /// Tests each of the chosen again beside the others: what they have made superfluous goes.
+    /// Tests each of the chosen again beside the others, and removes those that the others made superfluous.
     fn again(&self, chosen: &mut Vec<Chosen>, now: &mut Fitted) -> Option<()> {
         let mut i = 0;
         while i < chosen.len() && chosen.len() > 1 {
@@ -161,7 +161,8 @@ impl Search<'_> {
         Some(())
     }
 
-    /// Of chosen effect `k` beside the others: the drop in deviance, its chance after the whole search, and the fit without it.
+    /// For chosen effect `k` beside the others: the drop in deviance, its probability by chance corrected for the number of tests, and
+    /// the fit without it.
     fn without(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Option<(f64, f64, Fitted)> {
         let mut rest = chosen.to_vec();
         let one = rest.remove(k);

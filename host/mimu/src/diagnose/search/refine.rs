@@ -1,4 +1,4 @@
-//! A candidate beside a model, with what is not linear in it: a nonlinear constant, or the choice of bits.
+//! Fits a candidate beside a model, and refines its nonlinear parameter or its choice of coefficients.
 
 use nalgebra::DMatrix;
 
@@ -14,16 +14,16 @@ pub(super) struct Beside<'a> {
     pub null: &'a Fitted,
 }
 
-/// Share of the scale factor that the bits of a code may add up to.
+/// Largest share of the scale factor that the bits of a code may add up to.
 ///
-/// All bits together are the reading, which the scale factor is the coefficient of: a fit that takes the reading away with nine bits leaves a
-/// unit that reads nothing, whatever its input, and no residual. Bits of data sheets have 2e-4.
+/// All bits together are the reading, whose coefficient is the scale factor. A fit that removes the reading with nine bits has no residual,
+/// but leaves a unit whose readings do not depend on the input. The errors of bits in data sheets add up to 2e-4.
 const OF_SCALE: f64 = 0.1;
 
-/// A candidate beside it.
+/// A candidate, fitted beside the model.
 #[derive(Clone)]
 pub(super) struct With {
-    /// By how much the deviance is less.
+    /// Drop in deviance.
     pub drop: f64,
     pub columns: DMatrix<f64>,
     /// Coefficients of the columns.
@@ -50,19 +50,19 @@ impl Beside<'_> {
         })
     }
 
-    /// With the best value of its nonlinear parameter, if it has one: a walk uphill from its columns at the `first` with ever smaller
-    /// steps.
+    /// The fit at the best value of its nonlinear parameter, if it has one: a hill climb from its columns at the `first` value, with ever
+    /// smaller steps.
     pub fn parameter(&self, candidate: &Candidate, first: &Columns) -> Option<(f64, With)> {
         let at_first = self.fit(first.plain.clone(), &self.null.components)?;
         self.climb(candidate, (first.parameter, at_first), |columns| columns)
     }
 
-    /// The same from where the walk of a candidate with other coefficients ended.
+    /// The same, from the result for a candidate with other coefficients.
     pub fn parameter_from(&self, candidate: &Candidate, start: (f64, With)) -> Option<(f64, With)> {
         self.climb(candidate, start, |columns| columns)
     }
 
-    /// The same of a law that is to do what the model does not yet: what of it is in the model already is no fault of it, and costs nothing.
+    /// The same for an unlisted alternative model. Only its part that the model does not contain yet is fitted, and has a cost.
     pub fn law(&self, law: &Candidate, first: f64) -> Option<(f64, With)> {
         let part = |columns: DMatrix<f64>| independent_of(&columns, &self.model);
         let columns = part(law.columns(self.search.rows, first));
@@ -104,7 +104,7 @@ impl Beside<'_> {
         Some(best)
     }
 
-    /// A code with the best choice of bits, from its columns at the readings without what the model does not explain of them.
+    /// A code with the best choice of bits. Its columns are those at the readings with the residuals of the model subtracted.
     pub fn bits(&self, from: &Candidate) -> Option<(Candidate, With)> {
         let conditions = self.search.freed(&self.model, self.null);
         let all = self.search.bits(from, &conditions)?;
@@ -113,7 +113,7 @@ impl Beside<'_> {
         (found.0.share_of_scale(&found.1.values) < OF_SCALE).then_some(found)
     }
 
-    /// Another effect with the best choice of its coefficients at a value of its nonlinear parameter, from `start` on.
+    /// An effect other than a code with the best choice of its coefficients at a value of its nonlinear parameter, from `start` on.
     pub fn coefficients(
         &self,
         from: &Candidate,
@@ -127,7 +127,7 @@ impl Beside<'_> {
         self.choice(from, &all.columns(self.search.rows, parameter), start)
     }
 
-    /// With the best choice of coefficients, of which `all` are the columns: one is added or dropped as long as that makes the score better.
+    /// The best choice of coefficients, whose columns are `all`: one is added or dropped as long as that raises the score.
     fn choice(
         &self,
         from: &Candidate,
@@ -135,7 +135,7 @@ impl Beside<'_> {
         start: With,
     ) -> Option<(Candidate, With)> {
         let mut best = (from.clone(), start);
-        // The fewer rows are left, the more a coefficient of nothing takes out of them (Akaike's correction for few rows).
+        // With few residual rows, a needless coefficient explains more of them (Akaike's correction for few rows).
         let (rows, model) = (self.search.rows.y.len() as f64, self.model.ncols() as f64);
         let cost = |c: &Candidate| {
             let count = c.active.len() as f64;
@@ -148,7 +148,7 @@ impl Beside<'_> {
                 if columns.iter().any(|v| !v.is_finite()) {
                     return None;
                 }
-                // By the noise so far: by its own it could only be better.
+                // With the noise so far: a separate estimate could only raise the score.
                 let both = beside(&self.model, &unit_columns(&columns));
                 let fitted = self.search.variance.fit_at(&both, &best.1.components)?;
                 let score = -fitted.deviance - cost(&other);

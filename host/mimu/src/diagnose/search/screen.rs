@@ -1,4 +1,4 @@
-//! All candidates at first sight: by how much of the scatter each explains, with the noise of the model so far.
+//! Screens all candidates by the share of the scatter that each explains, with the noise of the model so far.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -7,23 +7,24 @@ use super::{COEFFICIENT, Chosen, Search, exceeds};
 use crate::diagnose::variance::Fitted;
 use crate::effects::candidate::Candidate;
 
-/// A candidate as it looked at first sight.
+/// A screened candidate.
 pub(super) struct Screened {
     pub index: usize,
     pub parameter: f64,
-    /// Probability of chance.
+    /// Probability by chance.
     pub p: f64,
-    /// Drop of the deviance less what its coefficients cost.
+    /// Drop in deviance minus the cost of its coefficients.
     pub gain: f64,
 }
 
-/// What the rows would still show of `columns` beside `others`, decorrelated.
+/// Part of `columns` outside the orthonormal columns `others`; both are decorrelated.
 fn across(others: &DMatrix<f64>, columns: &DMatrix<f64>) -> DMatrix<f64> {
     columns - others * others.tr_mul(columns)
 }
 
 impl Search<'_> {
-    /// Screens all candidates beside the chosen ones; the most promising first. Of the variants of one the best.
+    /// Screens all candidates beside the chosen ones; the most promising first. Of the variants of a named effect only
+    /// the best is returned.
     pub(super) fn screen(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Screened> {
         let Some(whitener) = self.variance.whitener(&null.components) else {
             return Vec::new();
@@ -35,7 +36,7 @@ impl Search<'_> {
         let total = left.norm_squared();
         let freed = self.freed(&self.model(chosen), null);
         let taken = |c: &Candidate| chosen.iter().any(|k| k.candidate.is_variant_of(c));
-        // Of each code once for all of its variants.
+        // Once for each code, for all of its variants.
         let of_code = |c: &'_ (Candidate, _)| Some((c.0.clone(), self.bits(&c.0, &freed)?));
         let codes: Vec<(Candidate, DMatrix<f64>)> = self.codes.iter().filter_map(of_code).collect();
         let mut found: Vec<Screened> = (0..self.candidates.len())
@@ -67,7 +68,8 @@ impl Search<'_> {
                 best
             })
             .collect();
-        // By chance and not by gain: with a dozen rows six coefficients gain more than the three that are significant.
+        // Sorted by probability instead of gain: with a dozen rows six coefficients gain more than the three that are
+        // significant.
         found.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.gain.total_cmp(&a.gain)));
         let mut seen: Vec<usize> = Vec::new();
         found.retain(|s| {
@@ -93,7 +95,7 @@ impl Search<'_> {
         let mut z = across(others, white);
         for (mut column, raw) in z.column_iter_mut().zip(&raw) {
             let norm = column.norm();
-            // What rounding leaves of a column that the others span.
+            // The others span the column, and only rounding is left of it.
             if !(norm > 1e-7 * raw) || !norm.is_finite() {
                 return None;
             }

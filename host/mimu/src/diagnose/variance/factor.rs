@@ -4,18 +4,18 @@ use nalgebra::{Cholesky, DMatrix, DMatrixViewMut, DVector, Dyn, Matrix2, Symmetr
 
 use super::VarianceModel;
 
-/// Axes in which rows are independent: the eigenvectors of their known covariance, and those of it and any extra white variance too.
+/// Axes in which rows are independent: the eigenvectors of their known covariance. Extra white variance does not change them.
 ///
-/// Found once; each extra white variance that is tried then costs a division for each row, where a Cholesky factor costs a third of n³.
+/// Computed once. Each extra white variance that is tried then takes one division for each row; a Cholesky factor would take a third of n³.
 pub(super) struct Axes {
-    /// Rows times this are independent; `None` where they are as they stand.
+    /// Rotation that makes the rows independent; `None` if they already are.
     rotate: Option<DMatrix<f64>>,
     /// Their known variances.
     variances: DVector<f64>,
 }
 
 impl Axes {
-    /// The rows' own axes, where they are independent.
+    /// The rows' own axes, if the rows are independent in these.
     pub(super) fn as_they_stand(known: &DMatrix<f64>) -> Option<Self> {
         let variances = known.diagonal();
         let independent = (known - DMatrix::from_diagonal(&variances)).amax() == 0.0;
@@ -47,17 +47,16 @@ impl Axes {
         Factor::Diagonal(self.variances.map(|v| (v.max(floor) + extra_white).sqrt()))
     }
 
-    /// The variances of the rows, where they are independent as they stand.
+    /// The variances of the rows, if these are independent without a rotation.
     pub(super) fn standing(&self) -> Option<&DVector<f64>> {
         self.rotate.is_none().then_some(&self.variances)
     }
 }
 
-/// A covariance whose element of rows i < j is u_i + v_j, as that of a random walk minus its mean is: beside independent noise it has
-/// a factor of n terms (Foreman-Mackey et al. 2017, AJ 154:220, with two terms that do not decay).
+/// A covariance with the element u_i + v_j for rows i < j, such as that of a random walk minus its mean. With independent noise added, its
+/// factor has n terms (Foreman-Mackey et al. 2017, AJ 154:220, with two terms that do not decay).
 ///
-/// Where a random walk is sought its size is not known, and each that is tried took a Cholesky factor: six tenths of the time of a diagnosis
-/// of 150 dwells.
+/// Each size of a random walk that was tried took a Cholesky factor: six tenths of the time of a diagnosis of 150 dwells.
 pub(super) struct Separable {
     /// u and v of each row.
     sums: Vec<[f64; 2]>,
@@ -70,7 +69,7 @@ impl Separable {
     pub(super) fn of(covariance: &DMatrix<f64>) -> Option<Self> {
         let n = covariance.nrows();
         let last = n.checked_sub(1)?;
-        // One of the two has a constant free: u of the first row is 0.
+        // A constant may be moved from u to v, so u of the first row is set to 0.
         let v = |j: usize| if j == 0 { 0.0 } else { covariance[(0, j)] };
         let u = |i: usize| match i {
             0 => 0.0,
@@ -90,7 +89,7 @@ impl Separable {
         })
     }
 
-    /// Factor of it, times `size`, beside independent noise of these variances; `None` if the sum is not positive.
+    /// Factor of `size` times this covariance plus independent noise of the variances `beside`; `None` if the sum is not positive.
     pub(super) fn factor(&self, size: f64, beside: &DVector<f64>) -> Option<Factor> {
         let mut steps = Vec::with_capacity(self.sums.len());
         let mut s = Matrix2::zeros();
@@ -115,9 +114,9 @@ impl Separable {
 
 /// A row of the factor of a [`Separable`] covariance.
 pub(super) struct Step {
-    /// What of the rows before it is in it.
+    /// Weights of the rows before in this one.
     later: Vector2<f64>,
-    /// What of it is in the rows behind.
+    /// Weights of this row in the later ones.
     gain: Vector2<f64>,
     /// Its standard deviation given the rows before.
     sigma: f64,
@@ -127,17 +126,17 @@ pub(super) struct Step {
 pub(super) enum Factor {
     /// Of rotated rows.
     Diagonal(DVector<f64>),
-    /// Of rows that are independent but for a random walk, as they are.
+    /// Of rows that are independent except for a random walk, not rotated.
     Steps(Vec<Step>),
-    /// Of rows as they are.
+    /// Of rows that are not rotated.
     Full(Cholesky<f64, Dyn>),
-    /// Of noise with another factor, and of few errors that all rows have in common.
+    /// Of noise with another factor, and of a few errors that are common to all rows.
     Common {
         /// Of the noise.
         noise: Box<Factor>,
-        /// Directions of the errors among rows without correlated noise, at size 1 and orthogonal.
+        /// Orthonormal directions of these errors among the decorrelated rows.
         directions: DMatrix<f64>,
-        /// Their variances beside the noise's 1.
+        /// Their variances in units of the noise variance.
         variances: DVector<f64>,
     },
 }
@@ -145,8 +144,8 @@ pub(super) enum Factor {
 impl Factor {
     /// The factor of this covariance plus `open` times its transpose; `None` if it contains NaN.
     ///
-    /// Without correlated noise the sum is 1 + w wᵀ, whose inverse root differs from 1 along the directions of w only: an n by n factor of
-    /// each size of the noise that is tried took minutes of 500 dwells.
+    /// Among decorrelated rows the sum is 1 + w wᵀ, whose inverse root differs from 1 along the directions of w only. An n by n factor for
+    /// each level of the noise that is tried took minutes for 500 dwells.
     pub(super) fn beside(self, open: &DMatrix<f64>) -> Option<Self> {
         let mut white = open.clone();
         self.whiten(&mut white);

@@ -1,4 +1,4 @@
-//! Most out of so many minutes: how many dwells, how long, and how often the whole again.
+//! The best use of a limited time: how many dwells, how long, and how many passes.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -46,7 +46,7 @@ impl DwellNoise {
         }
     }
 
-    /// Of the worst axis of `sensor` in a noise file: of each coefficient the largest, over all temperatures.
+    /// The largest of each coefficient over all axes of `sensor` in a noise file, and over all temperatures.
     ///
     /// Errors: the file lacks the sensor, or is of raw readings without a scale factor.
     pub fn stated(file: &NoiseFile, sensor: Sensor) -> Result<Self> {
@@ -80,8 +80,8 @@ impl DwellNoise {
         Ok(worst)
     }
 
-    /// Dwell from which on a longer one is not worth it, s: its sigma is within 5 % of the least that any has. That is fang's
-    /// argument (section 3) for 20 s. `None` where white noise is all.
+    /// Dwell beyond which a longer one is not worth it, s: its sigma is within 5 % of the smallest possible. That is fang's
+    /// argument (section 3) for 20 s. `None` if all noise is white.
     pub fn useful_s(&self) -> Option<f64> {
         let AllanModel {
             white,
@@ -152,7 +152,7 @@ impl Spending {
     }
 }
 
-/// The ways looked at.
+/// The ways that were compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
     /// The one with the smallest mean sigma.
@@ -168,7 +168,7 @@ const PASSES: usize = 50;
 /// Shortest dwell, s: a controller and a settling filter allow no shorter ones.
 const SHORTEST_S: f64 = 1.0;
 
-/// What a session may take, and what it is made with.
+/// Time and equipment of a session.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Session {
     /// Time for all dwells and moves, s.
@@ -182,8 +182,8 @@ pub struct Session {
 }
 
 impl Session {
-    /// The number of dwells in a pass, the number of passes and the length of a dwell that make the parameters' mean
-    /// sigma smallest. `seed` is that of the searches and of the lots, which each pass draws anew.
+    /// The number of dwells in a pass, the number of passes and the length of a dwell that make the parameters' mean sigma
+    /// smallest. `seed` is that of the searches and of the randomised orders, which differ between passes.
     pub fn spend(&self, problem: &Problem, seed: u64) -> Result<Budget> {
         let widths = problem.reach.widths();
         let least = widths.iter().max().copied().unwrap_or(0);
@@ -212,7 +212,8 @@ impl Session {
         }
     }
 
-    /// So many passes over settings whose mean sigma is `unit` for a sigma of 1; `None` if there is no time for them.
+    /// So many passes over the settings; `unit` is their mean sigma if a dwell has a sigma of 1. `None` if there is no time
+    /// for them.
     fn passes(
         &self,
         shortest: &[Setting],
@@ -220,7 +221,7 @@ impl Session {
         unit: f64,
         seed: u64,
     ) -> Option<Spending> {
-        // Not there and back: two dwells in a row at the same setting share the drift.
+        // All passes go the same way: on a way back, two dwells in a row at the same setting would share the drift.
         let there = shortest.repeat(passes);
         let shortest_moves_s = self.motion.moves_s(&there);
         let settings = match self.order {

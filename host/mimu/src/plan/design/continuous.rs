@@ -1,11 +1,10 @@
 //! Continuous (approximate) D-optimal designs: weights on points, without regard to whole numbers of dwells.
 //!
-//! By the equivalence theorem of Kiefer and Wolfowitz (1960) weights are optimal if and only if the variance
-//! function `Σ f' M⁻¹ f` is nowhere above the number of parameters p, and `ln det M* - ln det M <= p
-//! ln(max/p)`: how near one is to the optimum is known without knowing it. Weights are moved between pairs of
-//! points, each move the best of its pair (vertex exchange of Böhning, Metrika 33, 1986; pairs as in the
-//! randomized exchange of Harman, Filová and Richtárik, JASA 115, 2020), and then all at once by Newton's method, as
-//! Yang, Biedermann and Tang (JASA 108, 2013) do.
+//! By the equivalence theorem of Kiefer and Wolfowitz (1960) weights are optimal if and only if the variance function
+//! `Σ f' M⁻¹ f` nowhere exceeds the number of parameters p. Moreover `ln det M* - ln det M <= p ln(max/p)`, which bounds
+//! the distance to the optimum. Weights are moved between pairs of points, each move the best of its pair (vertex
+//! exchange of Böhning, Metrika 33, 1986; pairs as in the randomized exchange of Harman, Filová and Richtárik, JASA 115,
+//! 2020). Then Newton's method moves all at once, as in Yang, Biedermann and Tang (JASA 108, 2013).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -22,39 +21,39 @@ pub struct Optimum<P> {
     pub weights: Vec<f64>,
     /// Logarithm of `det M`.
     pub log_det: f64,
-    /// Largest variance function over the region, over p, less 1: zero at the optimum.
+    /// Maximum of the variance function over the region, divided by p, minus 1: zero at the optimum.
     pub excess: f64,
     /// Number of parameters p.
     pub parameters: usize,
 }
 
 impl<P> Optimum<P> {
-    /// D-efficiency of a design of `n` points with `log_det` of `F'F`: `(det(F'F/n) / det M*)^(1/p)`. The
-    /// share of dwells that the optimum would need for the same determinant.
+    /// D-efficiency of a design of `n` points with `log_det` of `F'F`: `(det(F'F/n) / det M*)^(1/p)`. The optimum would
+    /// need this share of the dwells for the same determinant.
     pub fn efficiency(&self, log_det: f64, n: usize) -> f64 {
         let p = self.parameters as f64;
         (((log_det - self.log_det) / p).exp()) / n as f64
     }
 }
 
-/// Bound that has to hold over the region, relative to p.
+/// Largest excess that is allowed over the region.
 pub const TOLERANCE: f64 = 1e-6;
-/// Bound aimed at on the candidates. Tighter, so that an exact design that attains the optimum has an
+/// Largest excess aimed at on the candidates. It is smaller, so that an exact design that attains the optimum has an
 /// efficiency of 1 to eight digits.
 const ON_CANDIDATES: f64 = 1e-8;
 /// Rounds of exchanges on one list of candidates.
 const ROUNDS: usize = 200;
 /// Newton's steps after each round of pairs, at most: each may drop a point.
 const NEWTON: usize = 200;
-/// Decrement at which they end: a half of its square is what is left of `ln det`.
+/// Newton's decrement at which they end: half of its square is the remaining distance in `ln det`.
 const SETTLED: f64 = 1e-9;
-/// Times that maxima between the candidates are added to them.
+/// Most times that maxima between the candidates are added to them.
 const ADDITIONS: usize = 20;
-/// Difference of regressors within which two maxima are one.
+/// Difference of regressors below which two maxima are the same.
 const SAME: f64 = 1e-3;
 /// Weight below which a point is dropped.
 const NOTHING: f64 = 1e-12;
-/// Most points looked at on each side of a round's pairs.
+/// Most points on each side of a round's pairs.
 const PAIRS: usize = 60;
 
 /// The optimum over a region, starting from `candidates` that cover it.
@@ -200,12 +199,14 @@ fn exchange_weights(rows: &Rows, weights: &mut [f64]) -> Option<Inverse> {
 
 /// Newton's step for all weights at once on the points that carry any.
 ///
-/// With `g` the variance function and `H` the squares of `f_i' M⁻¹ f_j`, summed over the blocks, it is `δ = H⁻¹
-/// (g - ν)`, ν such that the sum stays 1. `ln det` is self-concordant, so that a step of `δ/(1 + λ)`, `λ² =
-/// δ'Hδ`, never leads down; it ends at the first weight that it brings to nothing. True: settled.
+/// With `g` the variance function and `H` the squares of `f_i' M⁻¹ f_j`, summed over the blocks, it is
+/// `δ = H⁻¹ (g - ν)`, with ν such that the sum of the weights stays 1. `ln det` is self-concordant, so that a step of
+/// `δ/(1 + λ)`, `λ² = δ'Hδ`, never lowers it. The step ends where the first weight becomes zero. Returns whether the
+/// weights have settled.
 ///
-/// Pairs find the points and then crawl where these are close together: for the magnitude of gravity on a two-axis table
-/// they were still 8e-5 above the bound after 2000 rounds, and with these steps below 1e-8 after one.
+/// Exchanges of pairs find the points, but converge slowly where these are close together. For the magnitude of gravity
+/// on a two-axis table they were still 8e-5 above the bound after 2000 rounds; with these steps they were below 1e-8
+/// after one.
 fn newton_step(rows: &Rows, inverse: &Inverse, weights: &mut [f64]) -> Option<bool> {
     let carrying: Vec<usize> = (0..rows.len()).filter(|i| weights[*i] > 0.0).collect();
     let k = carrying.len();
@@ -223,7 +224,7 @@ fn newton_step(rows: &Rows, inverse: &Inverse, weights: &mut [f64]) -> Option<bo
             }
         }
     }
-    // More points than moments: H is singular, and g has nothing along what it does not see.
+    // H is singular if there are more points than moments; g then has no part in its null space.
     let damping = 1e-10 * curvature.trace();
     let damped = &curvature + DMatrix::from_diagonal_element(k, k, damping);
     let solver = damped.cholesky()?;
@@ -268,7 +269,7 @@ fn best_move(rows: &Rows, inverse: &Inverse, to: usize, from: usize, most: f64) 
         let each = curve.iter();
         each.map(|(linear, square)| {
             let factor = 1.0 + a * linear - a * a * square;
-            // Singular there; rounding must not turn the sign.
+            // The design is singular there; rounding must not change the sign.
             match factor > 1e-12 {
                 true => (linear - 2.0 * a * square) / factor,
                 false => f64::NEG_INFINITY,

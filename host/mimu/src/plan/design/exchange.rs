@@ -20,9 +20,9 @@ pub struct Found {
 
 /// Gain in the determinant below which an exchange is rounding.
 const GAIN: f64 = 1e-9;
-/// Passes over the design after which a start is taken as it stands.
+/// Most passes over the design from one start.
 const PASSES: usize = 100;
-/// Candidates looked at for each point of a random start. More make the starts good and alike.
+/// Candidates drawn for each point of a random start. More would make the starts better, but alike.
 const DRAWS: usize = 8;
 
 /// Best designs of `n` points found, the best first, each once.
@@ -71,7 +71,7 @@ fn improve(rows: &Rows, mut points: Vec<usize>) -> Option<Found> {
     let blocks = rows.widths().len();
     let inverse = |points: &[usize]| Inverse::of(rows, points.iter().map(|&i| (i, 1.0)));
     for _ in 0..PASSES {
-        // Anew in each pass: updates add up rounding.
+        // Computed again in each pass, because updates accumulate rounding.
         let mut inverse = inverse(&points)?;
         let mut variances: Vec<Vec<f64>> = (0..blocks)
             .map(|b| {
@@ -119,7 +119,8 @@ fn improve(rows: &Rows, mut points: Vec<usize>) -> Option<Found> {
     Some(Found { points, log_det })
 }
 
-/// Random numbers for starts and lots: SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), the same on every machine.
+/// Random numbers for starts and randomised orders: SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), the same on
+/// every machine.
 pub(super) struct SplitMix(pub(super) u64);
 
 impl SplitMix {

@@ -4,8 +4,8 @@ use nalgebra::DMatrix;
 
 /// Regressor rows of points at which one could measure.
 ///
-/// A row consists of one or more blocks with separate parameters: a sensor's square of its own input is
-/// no other sensor's regressor, and one dwell serves all three. The information matrix is then block
+/// A row consists of one or more blocks with separate parameters: the square of a sensor's own input is a
+/// regressor of that sensor only, and one dwell serves all three. The information matrix is then block
 /// diagonal, and its determinant the product over the blocks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rows {
@@ -66,8 +66,8 @@ impl Rows {
     }
 }
 
-/// Smallest share of a regressor's size that the other regressors may leave unexplained: below, the design is
-/// singular. Square of the 1e5 at which an estimator refuses
+/// Smallest share of a squared regressor that the other regressors may leave unexplained; below it the design
+/// is singular. It is the inverse square of the condition 1e5 at which an estimator refuses
 /// ([`crate::estimate::least_squares::UNDETERMINED`]).
 const SINGULAR: f64 = 1e-10;
 
@@ -108,7 +108,7 @@ impl Inverse {
         Some(Self { blocks, log_det })
     }
 
-    /// Of a millionth of the unit matrix: what a random design starts from, as nothing is known yet.
+    /// Of a millionth of the unit matrix, which a random design starts from.
     pub(super) fn ridge(widths: &[usize]) -> Self {
         let diagonal = |&p: &usize| DMatrix::from_diagonal_element(p, p, 1e6);
         Self {

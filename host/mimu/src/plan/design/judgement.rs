@@ -14,16 +14,15 @@ pub const HALF_95: f64 = 1.959_963_984_540_054;
 pub struct Determined {
     /// The parameter.
     pub parameter: Parameter,
-    /// Its sigma, normalised: times [`Parameter::si`] in SI, times [`Parameter::shown`] for people. Infinite
-    /// if undetermined.
+    /// Its sigma, normalised: times [`Parameter::si`] in SI, times [`Parameter::shown`] in the unit for
+    /// display. Infinite if undetermined.
     pub sigma: f64,
     /// That over the sigma if all the other parameters were known: 1 if orthogonal to them. Its square is the
     /// variance inflation factor.
     pub inflation: f64,
 }
 
-/// Inflation from which on a parameter is all but unobservable: 99 % of its regressor is explained by the
-/// others.
+/// Inflation above which a parameter is hardly observable: the others explain 99 % of its regressor.
 pub const WEAK: f64 = 10.0;
 
 /// A design, judged.
@@ -34,9 +33,9 @@ pub struct Judgement {
     /// `det(F'F/n)`, fang (22), of one sensor where all three have the same regressors, else the product over
     /// them.
     pub determinant: f64,
-    /// Against the continuous optimum over the reach: 1 is the best possible, 0 singular.
+    /// D-efficiency against the continuous optimum over the reach: 1 is the best possible, 0 is singular.
     pub d_efficiency: f64,
-    /// Sigma of a dwell mean, SI, that the parameters' sigmas are for.
+    /// Sigma of a dwell mean, SI, from which the sigmas of the parameters follow.
     pub sigma: f64,
     /// All parameters of the triad.
     pub parameters: Vec<Determined>,
@@ -45,18 +44,19 @@ pub struct Judgement {
     pub mean_sigma: f64,
     /// Largest over smallest singular value of F; infinite if singular.
     pub condition: f64,
-    /// Degrees of freedom of a regression left by different inputs: these notice a wrong model.
+    /// Residual degrees of freedom of a regression from different inputs: these reveal a wrong model.
     pub lack_of_fit_dof: usize,
-    /// Degrees of freedom of a regression left by repeated inputs: these tell the noise, whatever the model.
+    /// Residual degrees of freedom of a regression from repeated inputs: these show the noise, whatever the
+    /// model.
     pub repetition_dof: usize,
-    /// What it would notice of the terms that the model lacks.
+    /// How well it would notice the terms that the model lacks.
     pub notices: Vec<Notice>,
 }
 
 impl Problem {
     /// Judges `settings`, one dwell each, whose means have the sigma `sigma` (SI unit of the sensor).
     ///
-    /// They need not be within reach: the efficiency is against what is.
+    /// They need not be within reach; the efficiency is against the optimum within reach.
     pub fn judge(&self, settings: &[Setting], sigma: f64) -> Judgement {
         let model = &self.reach.model;
         let n = settings.len();

@@ -1,8 +1,8 @@
 //! What a design would notice if the model were too small.
 //!
-//! A term Z that the model F lacks shows in the residual only by its part outside the columns of F, `(I - H)
-//! Z`, H the hat matrix. Where that is nothing the term is aliased: the fit is as good as ever, and the
-//! parameters are wrong.
+//! A term Z that the model F lacks shows in the residual only by its part outside the columns of F,
+//! `(I - H) Z`, H the hat matrix. If that part is zero, the term is aliased: the fit is as good as ever, but
+//! the parameters are wrong.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,13 +19,13 @@ pub(crate) const ALIASED: f64 = 1e-9;
 pub struct Notice {
     /// The term.
     pub term: Term,
-    /// Parameters that it has in all regressions.
+    /// Number of its parameters in all regressions.
     pub parameters: usize,
     /// How many directions among them leave a trace in the residuals.
     pub noticed: usize,
-    /// Smallest size noticed, over the full input, of the parameter that is noticed worst among those that
-    /// leave a trace, each alone, for unit variance of a dwell mean over the full input squared: times sigma
-    /// over full input it is a ratio. `None` if none does.
+    /// Smallest size that is noticed, of the parameter that is noticed worst among those that leave a trace,
+    /// each alone. It is a share of the full input, for a dwell mean whose sigma is the full input: times
+    /// sigma over full input it is a ratio. `None` if none leaves a trace.
     pub size: Option<f64>,
 }
 
@@ -109,7 +109,7 @@ fn columns(settings: &[Setting], regressors: impl Fn(&Setting, &mut Vec<f64>)) -
     DMatrix::from_row_slice(settings.len(), width, &rows)
 }
 
-/// Part of `column` outside an orthonormal basis. Twice: once leaves the rounding of the first projection.
+/// Part of `column` outside an orthonormal basis. Projected twice: the first projection leaves rounding.
 pub(crate) fn outside(basis: &[DVector<f64>], mut column: DVector<f64>) -> DVector<f64> {
     for _ in 0..2 {
         for unit in basis {

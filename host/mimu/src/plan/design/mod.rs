@@ -7,12 +7,12 @@
 //! | [`exchange`], [`refinement`]  | exact designs of n dwells: on candidates, then between them              |
 //! | [`continuous`]                | the optimum that no n dwells can beat, with a proof of how near it is    |
 //! | [`judgement`], [`lack_of_fit`] | what a set of settings determines, how well, and what it would notice   |
-//! | [`tour`], [`budget`]          | order and time of a sequence; most out of so many minutes                |
+//! | [`tour`], [`budget`]          | order and time of a sequence; best use of a limited time                 |
 //! | [`schemes`]                   | published schemes                                                        |
 //! | [`problem`]                   | a model, what it can be measured with, and the best designs of it        |
 //!
-//! The criterion is fang (22), `det(F'F/n)`, of the parameters of all three sensors together. The gyro by hand,
-//! whose known input are the turns between dwells, is no design of dwells and not treated here.
+//! The criterion is fang (22), `det(F'F/n)`, of the parameters of all three sensors together. The gyro by hand is
+//! not treated here: its known inputs are the turns between dwells, not the dwells.
 //!
 //! ```
 //! use mimu::plan::design::{Problem, model::{Model, Terms}, reach::Fixture, schemes::Scheme};

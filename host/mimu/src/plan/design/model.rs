@@ -10,11 +10,11 @@ use crate::quantity::{AXES, Sensor};
 use crate::readable;
 use mimu_recording::Reference;
 
-/// Standard gravity, m/s²: size of the specific force at rest. Where a table stands it differs by parts in a
-/// thousand, which no design notices.
+/// Standard gravity, m/s²: magnitude of the specific force at rest. Local gravity differs by parts in a
+/// thousand, which changes no design.
 pub const GRAVITY: f64 = 9.80665;
 
-/// What one dwell measures at: an attitude and, on a turntable, a rate about the vertical.
+/// Input of one dwell: an attitude and, on a turntable, a rate about the vertical.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// Direction in the body frame that points up, of length 1. Specific force at rest is along it.
@@ -108,9 +108,9 @@ pub struct Parameter {
     pub unit: &'static str,
     /// Parameter in SI over its normalised value, which is in the sensor's SI unit at full input.
     pub si: f64,
-    /// Unit in which a person reads it.
+    /// Unit for display.
     pub shown_unit: Cow<'static, str>,
-    /// That over the normalised value.
+    /// Parameter in that unit over its normalised value.
     pub shown: f64,
 }
 
@@ -151,7 +151,7 @@ impl Model {
         }
     }
 
-    /// Whether a gyro's reading depends on which way is up, and not on the rate alone.
+    /// Whether a gyro's reading depends on the direction of gravity as well as on the rate.
     pub fn feels_force(&self) -> bool {
         self.terms.contains(&Term::GSensitivity)
     }
@@ -196,7 +196,7 @@ impl Model {
         let x = self.input(setting);
         match self.reference {
             Reference::Table => row.extend([1.0, x.x, x.y, x.z]),
-            // The error of the size is up' (dC u + do), C lower triangular.
+            // The error of the magnitude is up' (dC u + do), C lower triangular.
             Reference::Gravity | Reference::TurntableRate => {
                 row.extend(LOWER.map(|(i, j)| x[i] * x[j]));
                 row.extend([x.x, x.y, x.z]);

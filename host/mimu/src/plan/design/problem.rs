@@ -26,16 +26,16 @@ pub struct Problem {
     rows: Rows,
 }
 
-/// Random starts of a search. In 17 problems (5 to 40 dwells; affine, cubic, gravity's size) 200 found
-/// nothing that 10 had not.
+/// Random starts of a search. In 17 problems (5 to 40 dwells; affine, cubic, magnitude of gravity) 200 found
+/// nothing that 10 had not found.
 const STARTS: usize = 20;
 /// Best designs of a search that are refined between the candidates.
 const REFINED: usize = 10;
 /// Difference of `ln det` within which designs are equally good.
 const EQUAL: f64 = 1e-6;
 
-/// Distance of inputs, over the full input, below which they are the same one: 0.6 degrees. What a model
-/// lacks shows between inputs that are farther apart.
+/// Inputs are the same below this distance, over the full input: 0.6 degrees. Only inputs farther apart show
+/// what a model lacks.
 const DIFFERENT: f64 = 0.01;
 
 impl Problem {
@@ -95,8 +95,8 @@ impl Problem {
 
     /// Best design found of `n` dwells, in no particular order; determinate for a `seed`.
     ///
-    /// Among equally good ones, one on different faces, which people and fixtures hold; else that which would
-    /// notice most of the terms that the model lacks ([`lack_of_fit::potential`]).
+    /// Of equally good designs, one on different faces is taken, which people and fixtures can hold; else the
+    /// one that would notice most of the terms that the model lacks ([`lack_of_fit::potential`]).
     pub fn best(&self, n: usize, seed: u64) -> Result<Vec<Setting>> {
         let plain = self.reach.plain();
         let faces: Vec<Setting> = plain
@@ -159,7 +159,7 @@ impl Problem {
         inverse.map_or(f64::NEG_INFINITY, |i| i.log_det())
     }
 
-    /// The settings without those that are the same input to the model again.
+    /// The settings without repetitions of the same input to the model.
     pub(super) fn distinct(&self, settings: &[Setting]) -> Vec<Setting> {
         let mut distinct: Vec<Setting> = Vec::new();
         for s in settings {
@@ -178,7 +178,7 @@ impl Problem {
     }
 }
 
-/// Parameters that no settings within reach tell apart.
+/// The error if no settings within reach distinguish some parameters.
 fn undetermined(reach: &Reach, rows: &Rows) -> Error {
     let mut names = Vec::new();
     for block in 0..rows.widths().len() {

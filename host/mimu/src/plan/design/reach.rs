@@ -9,7 +9,7 @@ use super::model::{Model, Setting};
 use super::refinement::Region;
 use crate::quantity::Sensor;
 
-/// What carries the unit.
+/// Fixture: what holds the unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fixture {
     /// Three-axis turntable: every attitude, and a rate about the vertical.
@@ -46,8 +46,9 @@ impl Fixture {
         }
     }
 
-    /// The settings as this fixture holds them: as they are, or on a two-axis table the unit turned over by a half turn
-    /// about x where only that brings all of them within reach. The flag says whether it was. `None` if neither does.
+    /// The settings as this fixture holds them. On a two-axis table the unit is turned over by a half turn about x if
+    /// only that brings all of them within reach; the flag says whether it was. `None` if they are not within reach
+    /// either way.
     pub fn holding(self, settings: &[Setting]) -> Option<(Vec<Setting>, bool)> {
         let reached = |settings: &[Setting]| settings.iter().all(|s| self.reaches(&s.up));
         if reached(settings) {
@@ -64,8 +65,8 @@ impl Fixture {
     /// Directions `step` (rad) away from `up`, or less at the end of its reach, along two axes.
     fn around(self, up: &Vector3<f64>, step: f64) -> [Vector3<f64>; 4] {
         if self == Self::TwoAxis {
-            // By its own axes: what is best on such a table are whole rings about z, and across them a search only
-            // creeps along.
+            // Along the axes of the table: its maxima are whole rings about z, and a search across them only creeps
+            // along.
             let (tilt, turn) = (up.z.clamp(-1.0, 1.0).acos(), up.y.atan2(up.x));
             let at = |tilt: f64, turn: f64| {
                 let tilt = tilt.min(TILT_DEG.to_radians());
@@ -94,7 +95,7 @@ fn lowest() -> f64 {
 pub enum Rates {
     /// Any rate up to the largest.
     Any,
-    /// These and no others, above 0 and at most 1; always also rest.
+    /// Only these, above 0 and at most 1, and rest.
     Levels(Vec<f64>),
 }
 
@@ -140,7 +141,7 @@ impl FromStr for RateList {
 pub struct Reach {
     /// Model.
     pub model: Model,
-    /// What carries the unit.
+    /// Fixture.
     pub fixture: Fixture,
     /// Rates, for gyros.
     pub rates: Rates,
@@ -211,7 +212,7 @@ impl Reach {
         all
     }
 
-    /// Largest rate with `up` upwards, rad/s: that whose input has the size 1.
+    /// Largest rate with `up` upwards, rad/s: its input, over the full input, has length 1.
     fn largest_rate(&self, up: &Vector3<f64>) -> f64 {
         1.0 / up.component_div(&self.model.span).norm()
     }
@@ -223,8 +224,8 @@ fn upper(up: &Vector3<f64>) -> bool {
     first.is_some_and(|c| c > 0.0)
 }
 
-/// Directions 5 degrees apart at the lowest tilt of the two-axis table, which weigh most, and which no grid over the
-/// sphere has.
+/// Directions 5 degrees apart at the lowest tilt of the two-axis table. They have most weight, and a grid over the
+/// sphere lacks them.
 fn lowest_ring() -> [Vector3<f64>; 72] {
     let r = (1.0 - lowest() * lowest()).sqrt();
     std::array::from_fn(|i| {

@@ -35,10 +35,10 @@ pub trait Region: Sync {
 const STEPS: [f64; 2] = [0.1, 1e-7];
 /// Gain in a logarithm of a determinant below which it is rounding.
 const GAIN: f64 = 1e-13;
-/// Gain that a move of a climb must bring, over the square of its length. Any gain at all let it creep along a ridge
-/// for ever: where a table has an axis of symmetry, maxima are whole rings.
+/// Least gain of a move in a climb, over the square of its length. Without it a climb crept along a ridge for ever:
+/// if a table has an axis of symmetry, maxima are whole rings.
 const SUFFICIENT: f64 = 1e-2;
-/// Most moves and halvings of a climb. Where it ends by that, what is left to climb is a ridge all but level.
+/// Most moves and halvings of a climb. If it ends by this, only a nearly level ridge is left to climb.
 const MOVES: usize = 300;
 /// Most sweeps over a design.
 const SWEEPS: usize = 400;
@@ -46,7 +46,7 @@ const SWEEPS: usize = 400;
 /// Climbs from `point` to the next maximum of `value`: a pattern search, whose step halves where no neighbour
 /// is better.
 ///
-/// Derivatives would be faster and need every term twice; at these sizes the search takes microseconds.
+/// Derivatives would be faster, but would need every term twice; at these sizes the search takes microseconds.
 pub(super) fn climb<R: Region>(
     region: &R,
     point: &R::Point,

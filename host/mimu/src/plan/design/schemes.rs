@@ -69,7 +69,7 @@ impl Scheme {
         }
     }
 
-    /// Full rate along x, y, z, rad/s: what the rates of the scheme are shares of.
+    /// Full rate along x, y, z, rad/s: the rates of the scheme are shares of it.
     pub fn rate_span(self) -> Vector3<f64> {
         let dps = match self {
             // Its z gyro has twelve times the range of the others.
@@ -79,7 +79,7 @@ impl Scheme {
         dps.map(f64::to_radians)
     }
 
-    /// What had to be assumed.
+    /// Assumptions that the published text requires.
     pub fn assumed(self) -> Option<&'static str> {
         match self {
             Self::Niu8 => Some(
@@ -109,8 +109,8 @@ impl Scheme {
                 let z = plane(|c, s| Vector3::new(0.0, -s, -c));
                 [x, y, z].concat()
             }
-            // Quarter turns about: y, z, x, z, y, z, x, z. Of the 24 cycles that fit the words (a test goes through
-            // all there are) one of the eight with two turns each about x and y; the poses are those of all.
+            // Quarter turns about y, z, x, z, y, z, x, z. A test enumerates all cycles: 24 fit the text, and all
+            // have these poses. This is one of the eight with two turns each about x and y.
             (Self::Niu8, Sensor::Accel) => {
                 let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
                 vec![-z, x, y, -z, -z, -x, -y, -z]
@@ -141,8 +141,8 @@ impl Scheme {
 /// Indices into fang, Table 2, of the positions that the filters for x, y and z are given, fang (26)-(28).
 pub const FANG_FILTERS: [[usize; 4]; 3] = [[0, 1, 2, 3], [4, 5, 2, 6], [7, 8, 6, 3]];
 
-/// A rate along `direction`, with the axis upwards that makes the unit point as little down as can be: -x is
-/// the opposite rate with x upwards.
+/// A rate along `direction`, with the axis upwards that makes the unit point down least: -x is the opposite rate
+/// with x upwards.
 fn about(direction: Vector3<f64>, rate_dps: f64) -> Setting {
     let rate = rate_dps.to_radians();
     let down = direction.sum() < 0.0;

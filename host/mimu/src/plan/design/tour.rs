@@ -1,4 +1,4 @@
-//! Time of a sequence of dwells, and in which order they come.
+//! Time and order of a sequence of dwells.
 
 use super::exchange::SplitMix;
 use super::model::Setting;
@@ -6,11 +6,12 @@ use super::reach::Fixture;
 
 /// Order of the dwells of a design.
 ///
-/// Sensors wander. What neighbouring dwells share of that goes into the parameters that the difference of their
-/// inputs determines, and no residual tells. In a randomised order it is scatter like any other.
+/// Biases wander, and neighbouring dwells share most of this error. If their inputs are similar, the error goes into the
+/// parameters that depend on the difference between such groups, and no residual shows it. In a randomised order it is
+/// scatter like any other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// The one with the shortest moves found: like beside like.
+    /// The one with the shortest moves found, in which similar settings are neighbours.
     Shortest,
     /// Randomised.
     Randomised,
@@ -36,7 +37,7 @@ pub fn randomised(settings: &[Setting], seed: u64) -> Vec<Setting> {
     drawn
 }
 
-/// How fast one gets from a dwell to the next.
+/// Speed of the moves between dwells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Rate at which the attitude is changed, rad/s.
@@ -59,8 +60,8 @@ impl Motion {
         }
     }
 
-    /// Time from the dwell at `a` to that at `b`, s. The attitude is changed at rest: turning about two axes at once, the
-    /// table would not hold a rate about the vertical.
+    /// Time from the dwell at `a` to that at `b`, s. The attitude is changed at rest: a table that turns about two axes
+    /// at once would not keep the rate about the vertical.
     pub fn between(&self, a: &Setting, b: &Setting) -> f64 {
         let angle = a.up.angle(&b.up);
         let speed = if angle < 1e-6 {
@@ -112,14 +113,14 @@ impl Motion {
         tour
     }
 
-    /// Turns stretches of the sequence around while that shortens it. Times are the same both ways.
+    /// Reverses segments of the sequence while that shortens it. Times are the same both ways.
     fn two_opt(&self, mut tour: Vec<Setting>) -> Vec<Setting> {
         let n = tour.len();
         loop {
             let mut shortened = false;
             for i in 0..n {
                 for j in i + 1..n {
-                    // The ends are free: a stretch at one of them has one edge to exchange.
+                    // The ends are free: a segment at one of them has one edge to exchange.
                     let time = |a: Option<&Setting>, b: Option<&Setting>| match (a, b) {
                         (Some(a), Some(b)) => self.between(a, b),
                         (None, Some(s)) => s.rate.abs() / self.acceleration,

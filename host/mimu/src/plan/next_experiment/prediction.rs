@@ -14,11 +14,12 @@ use crate::quantity::Sensor;
 use crate::readable::STANDARD_GRAVITY;
 use mimu_recording::Reference;
 
-/// Sigmas at which a coefficient of its typical size is to be seen. A diagnosis tests from 3 on; at 5 it finds the effect in 98 of
-/// 100 recordings even if only one coefficient differs from nothing: 5 - 2 sigmas of it are the 3 that chance makes once in 400.
+/// Sigmas at which a coefficient of its typical size is to be seen. A diagnosis tests from 3 on, which chance exceeds once in 400. At 5
+/// it finds the effect in 98 of 100 recordings even if only one coefficient differs from zero, because its estimate then rarely falls
+/// below 5 - 2 sigmas.
 pub const SEEN: f64 = 5.0;
-/// Root of the deviance by which one of two effects is to be better. A diagnosis calls two confused below 12; the difference
-/// scatters by twice its root, and 36 is two of these above 12: 36 - 2 · 2 · 6.
+/// Square root of the deviance by which one of two effects is to be better. A diagnosis calls two confused below a difference of 12. The
+/// standard deviation of the difference is twice its square root, and 36 is two of these above 12: 36 - 2 · 2 · 6.
 pub const APART: f64 = 6.0;
 
 /// What an experiment is to show.
@@ -28,7 +29,7 @@ pub struct Target {
     pub candidate: Candidate,
     /// Sizes of its active coefficients, SI: those of data sheets, or those that were found.
     pub sizes: Vec<f64>,
-    /// Whether each coefficient is to be seen; or the effect, as found, to be told from `rivals`.
+    /// Whether each coefficient is to be seen; otherwise the effect, as found, is to be distinguished from `rivals`.
     pub each: bool,
     /// Effects that it must not be mistaken for, one at a time.
     pub rivals: Vec<Candidate>,
@@ -56,11 +57,11 @@ impl Prediction {
 }
 
 impl Target {
-    /// A listed effect, each coefficient at its typical size, beside the affine parameters and any one of the other listed effects
-    /// of the sensor that depend on time or temperature if it does, and on neither if it does not.
+    /// A listed effect, each coefficient at its typical size, beside the affine parameters and any one rival. Rivals are the other listed
+    /// effects of the sensor: those of time or temperature if it depends on these, else those that depend on neither.
     ///
-    /// The rate of the Earth, which is no error, is nobody's rival and has none: at rest it is a g-sensitivity to the last digit, and
-    /// what tells them apart is the latitude.
+    /// Earth rate, which is not an error, is no rival and has none: at rest it equals a g-sensitivity, and only another latitude
+    /// distinguishes them.
     pub fn listed(effect: &'static Effect) -> Self {
         let candidate =
             apart_from_bias(Candidate::new(effect.sensor, CandidateKind::Effect(effect)));
@@ -82,7 +83,7 @@ impl Target {
         }
     }
 
-    /// Whether it depends on time or temperature, so that it is shown by their course only.
+    /// Whether it depends on time or temperature, so that only their course shows it.
     pub fn is_slow(&self) -> bool {
         self.candidate.is_slow() || (!self.each && self.rivals.iter().any(Candidate::is_slow))
     }
@@ -122,7 +123,7 @@ impl Target {
             } else {
                 whole
             },
-            // Rounding of the inverse.
+            // Allows for rounding of the inverse.
             wanted: (1.0 + 1e-9) / wanted,
             coefficients: match self.each {
                 true => names.map(|((name, unit), s)| (name, unit, *s)).collect(),
@@ -132,8 +133,8 @@ impl Target {
     }
 }
 
-/// It without the coefficients that no attitude, rate, temperature or time tells from a bias and from the coefficients before: in gravity
-/// the squares of the force along three axes add up to a constant.
+/// The candidate without the coefficients that no attitude, rate, temperature or time distinguishes from a bias and from the coefficients
+/// before: in gravity the squares of the force along three axes add up to a constant.
 fn apart_from_bias(mut candidate: Candidate) -> Candidate {
     if candidate.reads_code() {
         return candidate;
@@ -180,7 +181,7 @@ fn apart_from_bias(mut candidate: Candidate) -> Candidate {
             let share = unit.dot(&left);
             left - unit * share
         });
-        // What rounding leaves; a column of zeros needs another state than these, and is not judged here.
+        // Less is rounding. A column of zeros needs other conditions than these, and is not judged here.
         if left.norm() > 1e-9 * column.norm() || column.norm() == 0.0 {
             kept[coefficient] = true;
             spanned[axis].extend(left.try_normalize(0.0));
@@ -191,7 +192,7 @@ fn apart_from_bias(mut candidate: Candidate) -> Candidate {
     candidate
 }
 
-/// States at which coefficients are distinguished: more than any axis has coefficients.
+/// Number of states at which coefficients are distinguished: more than any axis has coefficients.
 const STATES: usize = 64;
 
 /// Values of its nonlinear parameter that an experiment has to be good for: the quarters of its range, in the logarithm.
@@ -214,8 +215,8 @@ struct Problem {
     calibrates: bool,
 }
 
-/// The problems of a sensor. With a known input each axis is one, with its bias and its row of the matrix; where gravity's
-/// magnitude alone is known, the three axes of an accelerometer are one, and a gyro shows its bias at rest.
+/// The problems of a sensor. With a known input there is one for each axis, with its bias and its row of the matrix. If only the
+/// magnitude of gravity is known, the three axes of an accelerometer are one problem, and a gyro shows its biases at rest.
 fn problems(setup: &Setup, sensor: Sensor, states: &[Conditions]) -> Vec<Problem> {
     let input = |at: &Conditions| match sensor {
         Sensor::Gyro => at.rate,
@@ -293,7 +294,7 @@ impl Columns {
                     columns[*coefficient][i] += p.measured[i][*axis] * values[slot] / sigma;
                 }
             }
-            // Of a converter's codes no dwell can be planned: they are no numbers here, and count as not excited.
+            // No dwell can be planned for a converter's codes: their columns are NaN here, and count as not excited.
             for column in &mut columns {
                 if !column.iter().all(|v| v.is_finite()) {
                     column.fill(0.0);
@@ -327,8 +328,8 @@ impl Columns {
         }
     }
 
-    /// Sigma of each coefficient beside the affine parameters and, if there is one, a rival, as far as this is seen itself;
-    /// infinite where it is not determined.
+    /// Sigma of each coefficient beside the affine parameters and a rival, if there is one, as far as the rival is seen itself; infinite
+    /// if it is not determined.
     fn sigmas(&self, rival: Option<&Self>) -> Vec<f64> {
         let count = self.problems[0].coefficients.len();
         let mut information = vec![0.0; count];

@@ -11,7 +11,7 @@ use crate::plan::design::tour::randomised;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 
-/// Attitudes and rates, as far as the fixture reaches them. Each also calibrates the unit, or is not used.
+/// Attitudes and rates, as far as the fixture reaches them. A recipe is used only if it also calibrates the unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Inputs {
     /// Rest with each axis up and down; the largest rate in both directions about each axis.
@@ -22,14 +22,14 @@ pub enum Inputs {
     Edges,
 }
 
-/// Course of an experiment. Its one size has a short ladder.
+/// Course of an experiment. It has one size, from a short list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Course {
     /// Each state so many times, in a randomised order.
     Dwells,
     /// A cold start, and then the states again and again for so many minutes.
     ColdStart,
-    /// The same while a chamber goes to both ends and back, over such a share of its range.
+    /// The same while a chamber goes to both ends and back, over a share of its range.
     Chamber,
 }
 
@@ -46,8 +46,8 @@ const fn recipe(inputs: Inputs, course: Course) -> Recipe {
     Recipe { inputs, course }
 }
 
-/// All recipes, the least laborious first. None is bound to an effect: which one shows it follows from its regressors, so an effect
-/// that is new in the library has its recipe already.
+/// All recipes, the least laborious first. None belongs to an effect: the regressors of an effect decide which recipe shows it, so
+/// a new effect needs no new recipe.
 pub const RECIPES: [Recipe; 7] = [
     recipe(Inputs::Faces, Course::Dwells),
     recipe(Inputs::Rates, Course::Dwells),
@@ -58,11 +58,11 @@ pub const RECIPES: [Recipe; 7] = [
     recipe(Inputs::Edges, Course::Chamber),
 ];
 
-/// Speed at which a chamber warms and cools, °C/s: 2 °C a minute, which any does.
+/// Speed at which a chamber warms and cools, °C/s: 2 °C a minute, which any chamber can do.
 pub const RAMP: f64 = 2.0 / 60.0;
 /// Time that the chamber stays at each temperature, s: a board of some ten grams follows within five minutes.
 pub const SOAK_S: f64 = 300.0;
-/// Time constant by which a board follows its chamber, s: rig and paper boards have two to seven minutes.
+/// Time constant with which a board follows its chamber, s: boards of the rig and of papers have two to seven minutes.
 const BOARD_LAG_S: f64 = 300.0;
 /// Most times that a person puts the unit down in a session.
 const BY_HAND: f64 = 24.0;
@@ -70,9 +70,9 @@ const BY_HAND: f64 = 24.0;
 const STEP_S: f64 = 5.0;
 
 impl Course {
-    /// The ladder of sizes, ascending: how often each state comes; minutes; share of the chamber's range.
+    /// The sizes, ascending: how often each state comes; minutes; share of the chamber's range.
     ///
-    /// At least two dwells: a diagnosis holds blocks of time out.
+    /// At least two dwells in each state, because a diagnosis holds blocks of time out.
     pub fn sizes(self) -> &'static [f64] {
         match self {
             Self::Dwells => &[2.0, 4.0, 8.0, 16.0],
@@ -97,7 +97,8 @@ impl Inputs {
         if !setup.turns() || !useful {
             return all;
         }
-        // A rate about the opposite direction is the opposite rate: one of each pair, whose first component is positive.
+        // A rate about the opposite direction is the opposite rate. Of each pair, the direction is kept whose first nonzero
+        // component is positive.
         let first = |up: &Vector3<f64>| up.iter().copied().find(|c| *c != 0.0);
         for up in ups.iter().filter(|up| first(up) > Some(0.0)) {
             let on_axis = up.amax() > 1.0 - 1e-9;
@@ -113,7 +114,7 @@ impl Inputs {
         all
     }
 
-    /// Attitudes at rest of a fixture that reaches all of them.
+    /// Number of attitudes at rest, on a fixture that reaches all of them.
     pub fn attitudes(self) -> usize {
         match self {
             Self::Faces | Self::Rates => 6,
@@ -131,7 +132,7 @@ impl Inputs {
     }
 }
 
-/// Directions with so many components of one size, the others zero: faces of the cube, or its edges.
+/// Directions with so many components of one magnitude, the others zero: faces of the cube, or its edges.
 fn axes_and_edges(components: usize) -> Vec<Vector3<f64>> {
     let steps = [0.0, 1.0, -1.0];
     let mut ups: Vec<Vector3<f64>> = Vec::new();
@@ -149,7 +150,7 @@ fn axes_and_edges(components: usize) -> Vec<Vector3<f64>> {
 pub struct Experiment {
     /// Its recipe.
     pub recipe: Recipe,
-    /// Size on the recipe's ladder.
+    /// One of the sizes of the recipe's course.
     pub size: f64,
     /// Attitudes and rates in order.
     pub settings: Vec<Setting>,
@@ -182,10 +183,10 @@ impl Experiment {
         };
         let passes = match recipe.course {
             Course::Dwells => size as u64,
-            // As many as the time allows: dwells cost nothing while one waits.
+            // As many as the time allows: more dwells do not make the session longer.
             _ => u64::MAX,
         };
-        // By hand a unit lies for minutes between two moves of a session.
+        // By hand a unit stays in a pose for minutes before it is moved.
         let hold = match (setup.fixture, length_s.is_finite()) {
             (Fixture::Hand, true) => (length_s / BY_HAND / setup.dwell_s).ceil().max(1.0) as usize,
             _ => 1,
@@ -229,8 +230,8 @@ impl Experiment {
         out
     }
 
-    /// What `sensor` undergoes on each dwell, as a diagnosis would see it; the temperature that an effect follows late is
-    /// behind `lag_s`.
+    /// Conditions of `sensor` in each dwell, as a diagnosis would see them. The lagged temperature follows with the time constant
+    /// `lag_s`.
     pub fn states(&self, sensor: Sensor, lag_s: Option<f64>) -> Vec<Conditions> {
         let late = match lag_s {
             Some(lag_s) => behind(&self.board, lag_s),
@@ -257,7 +258,7 @@ impl Experiment {
                 rate,
                 force,
                 angular_acceleration: Vector3::zeros(),
-                // Of a perfect triad: what a real one adds is of second order.
+                // For a perfect triad: the difference of a real one is of second order.
                 sensed: match sensor {
                     Sensor::Gyro => rate,
                     Sensor::Accel => force,
@@ -294,13 +295,13 @@ fn profile([first, second, third]: [f64; 3], share: f64) -> Vec<(f64, f64)> {
     profile
 }
 
-/// A track behind a first-order lag.
+/// A track after a first-order lag.
 fn behind(track: &[(f64, f64)], lag_s: f64) -> Vec<(f64, f64)> {
     let times = track.iter().map(|p| p.0);
     times.zip(lagged(track, lag_s)).collect()
 }
 
-/// Value of a track of straight pieces at a time.
+/// Value of a piecewise linear track at a time.
 fn at(track: &[(f64, f64)], t_s: f64) -> f64 {
     let after = track.partition_point(|p| p.0 <= t_s);
     match (after.checked_sub(1).map(|i| track[i]), track.get(after)) {

@@ -12,7 +12,7 @@ impl Answer {
         let minutes = (done.time_s / 60.0).ceil();
         let states = done.recipe.inputs.settings(setup).len();
         let dwell_s = shown(done.dwell_s);
-        // By hand a unit is left where it lies for several dwells, which are one step of the plan.
+        // By hand the unit stays in a pose for several dwells, which are one entry of the plan.
         let each = match done.hold {
             1 => format!("{dwell_s} s a dwell"),
             n => format!("hold each for {n} dwells of {dwell_s} s, then turn by hand to the next"),
@@ -47,7 +47,7 @@ impl Answer {
         words
     }
 
-    /// The experiment as `mimu-plan/1`, with what it is for in front.
+    /// The experiment as `mimu-plan/1`, with its purpose in a comment in front.
     pub fn plan(&self, setup: &Setup, device: Option<&str>, sample_rate_hz: f64) -> String {
         let mut about = self.words(setup);
         for p in &self.predictions {
@@ -58,7 +58,7 @@ impl Answer {
             );
         }
         let done = &self.experiment;
-        // The same setting several times in a row is one step: the unit is left where it is.
+        // Equal settings in a row are one entry: the unit stays where it is.
         let same = done.settings.chunk_by(|a, b| a == b);
         let steps = same.map(|s| Step::of(&s[0], done.dwell_s).repeated(s.len() as u32));
         let mut plan = Plan::new(setup.fixture, sample_rate_hz, steps.collect());
