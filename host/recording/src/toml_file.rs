@@ -1,4 +1,4 @@
-//! Files of TOML: what is wrong with one, by file, line and key.
+//! TOML files, with errors that name file, line and key.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
 
-/// Reads a file that must be UTF-8, and says in which line it is not.
+/// Reads a file that must be UTF-8; the error names the line that is not.
 pub fn read_text(path: &Path) -> Result<String> {
     let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
     String::from_utf8(bytes).map_err(|error| {
@@ -19,8 +19,8 @@ pub fn read_text(path: &Path) -> Result<String> {
     })
 }
 
-/// Parses the text of the file `place`. What is wrong is in the words of serde and of the parser, which name the keys and values that
-/// are possible. `again`: what makes the file anew, if a program wrote it.
+/// Parses the text of the file `place`. The messages are those of serde and the parser, which name the possible keys and values. `again`: how to make
+/// the file again, if a program wrote it.
 pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &str, again: Option<&str>) -> Result<T> {
     toml::from_str(text).map_err(|error| {
         let message = error.message().trim().replace('\n', ", ");
@@ -33,7 +33,7 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &str, again: Option<&s
             (None, true) => "add the key".to_owned(),
             (None, false) => "correct the line".to_owned(),
         };
-        // A key that is missing at the top has the whole file for its place.
+        // For a missing key at the top, the place is the whole file.
         let start = error.span().map(|span| span.start.min(text.len()));
         let whole = missing && start == Some(0);
         let place = match start.and_then(|start| text.get(..start)) {
@@ -49,7 +49,7 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &str, again: Option<&s
     })
 }
 
-/// Number of the line that what follows `before` is in.
+/// Number of the line that follows the text `before`.
 fn line_after(before: &[u8]) -> usize {
     1 + before.iter().filter(|&&byte| byte == b'\n').count()
 }
