@@ -149,7 +149,7 @@ class SchemeComparison(Result):
 
     #: Schemes, each followed by the best design.
     designs: list[dict[str, Any]]
-    #: Names of the schemes that the table cannot hold.
+    #: Names of the schemes that the table cannot carry out.
     out_of_reach: list[str]
 
     def __init__(self, native: _mimu.Design) -> None:

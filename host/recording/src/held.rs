@@ -10,7 +10,7 @@ const SHARE: f64 = 0.1;
 /// Least mean number of axes, out of three, that change with a new reading. If rows repeat by chance, because the noise is below the quantisation
 /// step, a tenth of all rows repeats only if fewer than two axes change in the others.
 const CHANGED: f64 = 2.5;
-/// Least share of the rows in holds whose length is within two rows of the mean.
+/// Least share of the held rows in runs whose length is within two rows of the mean.
 const ALIKE: f64 = 0.9;
 
 /// Watches the readings of a sensor, row by row.

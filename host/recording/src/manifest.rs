@@ -196,8 +196,8 @@ fn is_unknown(number: &f64) -> bool {
 }
 
 impl Manifest {
-    /// Why the device had started, if it was not by a power-on and `power_on_s` is not given. The time since power-on is then unknown; in particular,
-    /// it did not begin at the first sample.
+    /// Why the device had started, if it was not by a power-on and `power_on_s` is not given. The time since power-on is then unknown: it did not
+    /// begin at the first sample.
     pub fn start_without_power_on(&self) -> Option<&str> {
         let start = self.recorded.as_ref()?.start.as_deref()?;
         self.power_on_s.is_none().then_some(start)

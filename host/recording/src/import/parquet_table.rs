@@ -65,7 +65,7 @@ impl Source {
         self.values.clear();
         self.texts.clear();
         self.wholes.clear();
-        // The decoders have panicked on damaged files before; a damaged file is no bug of ours.
+        // The decoders panic on some damaged files; this becomes an error about the file.
         let decode = std::panic::AssertUnwindSafe(|| match self.leaf.is_text() {
             true => self.cursor.read_text(count, &mut self.texts),
             false if self.role == Some(Role::Column(Column::Time)) => {
