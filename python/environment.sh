@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the package with the profile of the tests, so that the crates that these have compiled are used, and installs it with what tests it
-# into the environment target/python, whose folder is printed.
+# Builds the package with the profile of the tests, to reuse the crates that these have compiled. Installs it with its test requirements into the
+# environment target/python, and prints this folder.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 venv=${CARGO_TARGET_DIR:-$here/../target}/python

@@ -22,7 +22,7 @@ cp "$target/wasm32-wasip1/page/mimu-web.wasm" "$out/mimu.wasm"
 cd "$out"
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$here/../Cargo.toml" | head -1)
 sed -i "s/MIMU_VERSION/$version/" index.html
-# What a browser keeps goes by the content of all files: another byte is another set of files.
+# The browser's cache is named by the hash of all files: if any byte changes, all files are loaded again.
 files=$(find . -type f ! -name sw.js | sed 's|^\./||' | LC_ALL=C sort)
 hash=$(echo "$files" | xargs sha256sum | sha256sum | cut -c1-16)
 list=$(echo "$files" | sed 's/.*/"&",/' | tr -d '\n')

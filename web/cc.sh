@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The compiler of C for the target of the page. `cc` names the target as Rust does, which the compiler does not know.
+# The C compiler for the target of the page. The crate `cc` passes Rust's name of the target, which the compiler does not know.
 arguments=()
 for argument in "$@"; do
     case $argument in --target=*) ;; *) arguments+=("$argument") ;; esac

@@ -22,7 +22,7 @@ LAG_S = 25.0
 
 @dataclass(frozen=True)
 class Session:
-    """What a data logger has of it, in counts, and the truth."""
+    """What a data logger records, in counts, and the truth."""
 
     t: Array
     gyro: Array
@@ -34,7 +34,7 @@ class Session:
     die_c: Array
 
     def keywords(self) -> dict[str, object]:
-        """What ``mimu.Recording`` takes."""
+        """Arguments of ``mimu.Recording``."""
         names = ("t", "gyro", "accel", "temp", "step", "ref_rate_dps", "ref_force_mps2")
         known = {"unit": "count", "gravity": GRAVITY, "reference": "table", "device": "chamber"}
         return {**{name: getattr(self, name) for name in names}, **known}
@@ -75,7 +75,7 @@ def session(seed: int = 1) -> Session:
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     turning = np.where(np.arange(dwells) % 2 == 0, 0.0, random.choice([-60.0, 60.0], size=dwells))
     held = t - number * (DWELL_S + MOVE_S) < DWELL_S
-    # During a move the input is somewhere between that of two dwells, and nobody knows it.
+    # During a move the input is between those of the two dwells, and unknown.
     blend = np.clip((t - number * (DWELL_S + MOVE_S) - DWELL_S) / MOVE_S, 0.0, 1.0)[:, None]
     after = np.minimum(number + 1, dwells - 1)
     force = GRAVITY * ((1 - blend) * up[number] + blend * up[after])

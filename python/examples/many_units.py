@@ -5,7 +5,7 @@
     python many_units.py ask results.parquet
 
 A recording is a folder with recording.toml and samples.parquet. Folders above it with names like ``line=B`` become columns. A recording
-that is refused keeps its row, with the reason and the place. A second run fits only what is new or has changed, so that it also goes on
+that is refused keeps its row, with the reason and the place. A second run fits only what is new or has changed, so it also continues
 after Ctrl-C.
 """
 
@@ -48,7 +48,7 @@ def column(name: str, unit: str) -> str:
 
 def calibrated(folder: str) -> Row:
     """The row of one recording; this runs on a worker."""
-    # A worker has one core to itself, and a fit would start a thread for each core of the machine. It is read at the first fit.
+    # A worker has one core to itself, and a fit would start a thread for each core of the machine. The first fit reads this.
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
     import mimu
 
@@ -116,7 +116,7 @@ def recordings(root: Path) -> dict[str, Row]:
 def table(data: list[Row]) -> pa.Table:
     """One table of rows that have different columns."""
     names = dict.fromkeys([*TYPES, *(name for row in data for name in row)])
-    # What comes from the name of a folder is text, as the first row shows.
+    # Values from the names of folders are text.
     text = {name for row in data for name, value in row.items() if isinstance(value, str)}
     types = {name: TYPES.get(name, pa.string() if name in text else pa.float64()) for name in names}
     ordered = sorted(data, key=lambda row: row["recording"])
@@ -163,7 +163,7 @@ def calibrate_all(client: Client, root: Path, path: Path, calibrate: Callable[[s
                 saved = time.monotonic()
                 print(f"{number} of {len(todo)}", file=sys.stderr, flush=True)
     finally:
-        # After Ctrl-C too: what is there need not be computed again.
+        # Also after Ctrl-C, so that finished rows are not computed again.
         if done:
             save(list(done.values()), path)
         took = time.monotonic() - begun
@@ -171,7 +171,7 @@ def calibrate_all(client: Client, root: Path, path: Path, calibrate: Callable[[s
         print(f"{path}: {len(done)} of {len(known)} recordings, {refused} refused; {len(known) - len(todo)} of them from before", flush=True)
     if todo:
         after = client.run(used)
-        # Of a worker that was started again, all that it has used.
+        # For a restarted worker, all that it has used counts.
         processor_s = sum(now[0] - before.get(worker, (0.0, 0.0))[0] for worker, now in after.items())
         memory = max(memory_mb for _, memory_mb in after.values())
         print(f"{len(todo)} in {took:.1f} s, {len(todo) / took:.1f} a second, by {len(after)} workers with {sum(client.nthreads().values())} threads")
@@ -244,7 +244,7 @@ def main(arguments: list[str] | None = None) -> None:
         with Client(given.scheduler) as client:
             calibrate_all(client, given.recordings, given.results)
         return
-    # A terminal sends Ctrl-C to the workers too. They take over that it is ignored, and are ended in good order by this process.
+    # A terminal sends Ctrl-C to the workers too. They inherit that it is ignored, so that this process ends them in good order.
     on_ctrl_c = signal.signal(signal.SIGINT, signal.SIG_IGN)
     with LocalCluster(n_workers=given.workers, threads_per_worker=given.threads, dashboard_address=":0") as cluster, Client(cluster) as client:
         signal.signal(signal.SIGINT, on_ctrl_c)

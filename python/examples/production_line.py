@@ -27,11 +27,11 @@ LINES = "ABC"
 BATCHES = ("2026-08", "2026-09", "2026-10", "2026-11")
 #: Standard deviation of the biases of gyros, counts.
 SCATTER_COUNT = 8.0
-#: Counts that the bias of line B's gyro z rises by from one serial number to the next.
+#: Rise of the bias of line B's gyro z from one serial number to the next, counts.
 DRIFT_COUNT = 0.5
-#: deg/s per g of the gyros that are glued badly.
+#: g-sensitivity of badly glued gyros, deg/s per g.
 G_SENSITIVITY_DPS_PER_G = 0.3
-#: Every so many-th recording is broken, each time in the next way.
+#: One recording in this many is broken, each time in the next way.
 BROKEN = 16
 
 PLAN = """\

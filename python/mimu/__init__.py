@@ -7,7 +7,7 @@
     fit.accel.C, fit.accel.sigma, fit.held_out
     rate, force = fit.apply(gyro, accel)                               # rad/s, m/s²
 
-Readings are in V, counts or SI (``unit``). Results are SI but where a name says otherwise (``_dps``, ``_c``). Errors are
+Readings are in V, counts or SI (``unit``). Results are in SI unless a name says otherwise (``_dps``, ``_c``). Errors are
 :class:`mimu.Error`. Ctrl-C interrupts every call. The wheel brings the command ``mimu`` as well.
 """
 

@@ -42,9 +42,9 @@ class Channel:
     k: NoiseCoefficient | None
     q: NoiseCoefficient | None
     r: NoiseCoefficient | None
-    #: By the letter of a coefficient, why it is not there.
+    #: By the letter of a coefficient, why it is missing.
     reasons: dict[str, str]
-    #: Averaging time from which on none is better by more than 5 %.
+    #: Averaging time beyond which none is better by more than 5 %.
     useful_average_s: float | None
 
 
@@ -54,7 +54,7 @@ class Allan(Result):
     _native: _mimu.Allan
 
     channels: list[Channel]
-    #: What a person should know.
+    #: Warnings, one sentence each.
     warnings: list[str]
     device: str
 
@@ -74,7 +74,7 @@ class Allan(Result):
 
     @property
     def noise(self) -> Noise:
-        """What :func:`mimu.fit` and others take as ``noise``."""
+        """The argument ``noise`` of :func:`mimu.fit` and others."""
         return self._native.noise()
 
     def to_toml(self) -> str:
@@ -104,8 +104,8 @@ def allan(
 ) -> Allan:
     """Allan deviation and noise model of a unit at rest, as ``mimu allan`` computes them.
 
-    Several recordings are of one unit, each at its own temperature. ``from_s`` and ``to_s``, or a ``step``, choose a stretch. With a
-    ``calibration`` readings in V or counts become SI.
+    Several recordings must belong to one unit, each at another temperature. ``from_s`` and ``to_s``, or a ``step``, choose a segment. With a
+    ``calibration``, readings in V or counts become SI.
     """
     return Allan(
         _mimu.allan(

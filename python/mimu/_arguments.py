@@ -8,7 +8,7 @@ from typing import Any
 
 
 def arguments(options: Mapping[str, Any]) -> list[str]:
-    """``rate_hz=50`` as ``--rate-hz=50``; lists are repeated, of a mapping each item is ``KEY=VALUE``; None and False are left out."""
+    """``rate_hz=50`` as ``--rate-hz=50``. A list repeats the option, a mapping repeats it with ``KEY=VALUE``; None and False are left out."""
     out: list[str] = []
     for key, value in options.items():
         flag = f"-{key}" if len(key) == 1 else "--" + key.rstrip("_").replace("_", "-")

@@ -10,7 +10,7 @@ from mimu import _mimu
 
 def main() -> int:
     """Runs the command with the arguments of the process."""
-    # Python's handler only takes a note for the interpreter, which does not run meanwhile.
+    # Python's handler only sets a flag for the interpreter, which does not run during the call.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     return _mimu.run(sys.argv)
 

@@ -23,7 +23,7 @@ class ParameterSigma:
     """How well a parameter is determined."""
 
     name: str
-    #: Standard deviation, and half of the 95 % interval, in ``unit``; infinite ones are not a number.
+    #: Standard deviation, and half of the 95 % interval, in ``unit``; NaN if infinite.
     value: float
     half_width_95: float
     #: SI; "1" for a ratio.
@@ -31,14 +31,14 @@ class ParameterSigma:
 
 
 class Design(Result):
-    """Which attitudes, and how well they determine the parameters."""
+    """The attitudes, and how well they determine the parameters."""
 
     _native: _mimu.Design
 
     title: str
     #: Direction in the body frame that points up, a row for each dwell, in order.
     positions: Array
-    #: Rate about the vertical in each dwell, deg/s; None of an accelerometer.
+    #: Rate about the vertical in each dwell, deg/s; None for an accelerometer.
     rates_dps: Array | None
     #: 1 is the best possible, 0 singular.
     d_efficiency: float
@@ -74,12 +74,12 @@ class Design(Result):
 
 @dataclass(frozen=True)
 class Shown:
-    """What an experiment shows of an effect."""
+    """How clearly an experiment shows an effect."""
 
     id: str
-    #: Typical size over the sigma of the coefficient that is determined worst, or of the whole effect beside its rivals.
+    #: Typical size over the sigma of the worst determined coefficient, or of the whole effect beside its rivals.
     sigmas: float
-    #: What is enough of that, and whether it is reached.
+    #: The required ``sigmas``, and whether they are reached.
     wanted: float
     settled: bool
 
@@ -108,7 +108,7 @@ class NextExperiment(Result):
     #: Rate about the vertical in each dwell, deg/s, and when it begins.
     rates_dps: Array
     begin_s: Array
-    #: Chamber, times in s and degrees Celsius in rows; empty where it does not matter.
+    #: Chamber, times in s and degrees Celsius in rows; empty if it does not matter.
     chamber_c: Array
     #: Whether the unit is switched on as the recording begins.
     cold_start: bool
@@ -143,13 +143,13 @@ class NextExperiment(Result):
 
 
 class SchemeComparison(Result):
-    """Published schemes beside the best designs of as many dwells."""
+    """Published schemes, compared with the best designs of as many dwells."""
 
     _native: _mimu.Design
 
     #: Schemes, each followed by the best design.
     designs: list[dict[str, Any]]
-    #: Names of the schemes that the table cannot hold.
+    #: Names of the schemes that the table cannot carry out.
     out_of_reach: list[str]
 
     def __init__(self, native: _mimu.Design) -> None:
@@ -227,7 +227,7 @@ def next_experiment(
         table=table, dwell=dwell, rates=rates, slew=slew, settle=settle, noise=noise, seed=seed,
     )
     with tempfile.TemporaryDirectory(prefix="mimu-") as folder:
-        # The command reads a recording from disk, and arrays are on none.
+        # The command reads recordings from disk, so arrays are saved first.
         if isinstance(after, Recording):
             after = after.directory or after.save(os.path.join(folder, "after"))
         return NextExperiment(_mimu.design(arguments({**options, "after": after})))
@@ -249,7 +249,7 @@ def compare_schemes(
     walk: float | None = None,
     seed: int | None = None,
 ) -> SchemeComparison:
-    """All published schemes beside the best designs of as many dwells, as ``mimu design --compare``. Options as of :func:`mimu.design`."""
+    """All published schemes and the best designs of as many dwells, as ``mimu design --compare``. The options are those of :func:`mimu.design`."""
     options = dict(
         compare=True, sensor=sensor, reference=reference, model=model, table=table, dwell=dwell, order=order, slew=slew, settle=settle,
         sigma=sigma, noise=noise, instability=instability, walk=walk, seed=seed,

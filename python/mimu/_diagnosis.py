@@ -52,7 +52,7 @@ class NotExcited:
 
 @dataclass(frozen=True)
 class Leftover:
-    """Scatter beyond the known noise that nothing explains."""
+    """An error beyond the known noise that no effect explains."""
 
     sensor: str
     axis: str
@@ -74,7 +74,7 @@ class SensorDiagnosis:
 
 
 class Diagnosis(Result):
-    """What is behind the residual of a unit."""
+    """The effects behind the residual of a unit."""
 
     _native: _mimu.Diagnosis
 
@@ -85,7 +85,7 @@ class Diagnosis(Result):
     not_excited: list[NotExcited]
     leftover: list[Leftover]
     sensors: dict[str, SensorDiagnosis]
-    #: What a person should know.
+    #: Warnings, one sentence each.
     warnings: list[str]
     device: str
 
@@ -135,9 +135,10 @@ def diagnose(
 ) -> Diagnosis:
     """Finds the effect behind the residual of a unit, as ``mimu diagnose`` does.
 
-    ``recordings``: one, or more of the same unit; the calibration is that of the first. ``verify`` is one other recording, also as a list of one, which
-    nothing is found in: an effect that it contradicts is not accepted; judge by further ones with :func:`mimu.verify`. ``calibration`` keeps its matrices, for a unit that is never turned. ``accept``
-    takes terms by name that nothing but these recordings speaks for. The others are those of :func:`mimu.fit`.
+    ``recordings``: one, or more of the same unit; the calibration is that of the first. ``verify`` is one other recording, or a list of one, in
+    which no effect is searched: an effect that it contradicts is not accepted. Judge by further recordings with :func:`mimu.verify`. The matrices
+    of ``calibration`` are kept, for a unit that is never turned. ``accept`` names terms to accept on the evidence of these recordings alone. The
+    other arguments are those of :func:`mimu.fit`.
     """
     others = [] if verify is None else several(verify)
     if len(others) > 1:

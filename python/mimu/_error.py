@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class Error(ValueError):
-    """Data, a file or a setting that is not what it has to be: one line that says where, what is wrong, and what to do.
+    """Something that mimu refuses, in one line: where, what is wrong, and what to do.
 
     ``kind`` is ``"io"`` (the operating system refused a file), ``"undetermined"`` (the experiment does not determine
     what was asked for), ``"device"`` or ``"invalid"``. ``place``, ``problem`` and ``remedy`` are the parts of the line.
@@ -35,5 +35,5 @@ class Error(ValueError):
         self.column = column
 
     def __reduce__(self) -> tuple[object, ...]:
-        # Without it, another process would be sent the message alone.
+        # Without this, another process would receive only the message.
         return (type(self), self.args, self.__dict__)

@@ -26,7 +26,7 @@ def load_noise(path: Path) -> Noise:
 
 @dataclass(frozen=True)
 class SensorVerification:
-    """Errors of one triad, root mean square but for ``max``."""
+    """Errors of one triad, root mean square except for ``max``."""
 
     #: With one scale factor and bias for all axes, and no misalignment.
     rms_raw: float
@@ -38,7 +38,7 @@ class SensorVerification:
     figure: str
     #: Dwells or turns judged.
     count: int
-    #: Of gyros whose input is not known: errors at rest, rad/s.
+    #: For gyros with unknown input: errors at rest, rad/s.
     static_rms: float | None
 
 
@@ -48,7 +48,7 @@ class Verification(Result):
     _native: _mimu.Verification
 
     sensors: dict[str, SensorVerification]
-    #: What a person should know.
+    #: Warnings, one sentence each.
     warnings: list[str]
 
     def __init__(self, native: _mimu.Verification) -> None:
@@ -89,7 +89,7 @@ class Export:
     content: bytes
     #: What the program computes with it.
     formulas: list[str]
-    #: What a person has to know or to do.
+    #: What the user must know or do.
     notes: list[str]
 
     def __init__(self, native: _mimu.Export) -> None:

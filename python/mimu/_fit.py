@@ -28,7 +28,7 @@ class Parameter:
     #: Ends of the 95 % interval.
     lower: float
     upper: float
-    #: Of all four.
+    #: Unit of these four.
     unit: str
 
 
@@ -54,14 +54,14 @@ class Dwell:
 class Figures:
     """Errors of a sensor, root mean square."""
 
-    #: On what the fit has not seen; None where nothing was held out.
+    #: On data held out of the fit; None if nothing was held out.
     held_out_rms: float | None
-    #: On what it was fitted to.
+    #: On the fitted data.
     rms: float
     #: What noise alone would give.
     noise_floor: float
     unit: str
-    #: What they are errors of.
+    #: The quantity whose errors these are.
     figure: str
 
 
@@ -82,21 +82,21 @@ class SensorFit:
     held_out_rms: float | None
     rms: float
     noise_floor: float
-    #: Of the three errors.
+    #: Unit of the three errors.
     unit: str
-    #: What they are errors of.
+    #: The quantity whose errors these are.
     figure: str
     #: Dwells used.
     dwells: int
-    #: Condition of the experiment.
+    #: Condition number of the experiment.
     condition: float
-    #: Of gyros whose input is not known: errors at rest, rad/s.
+    #: For gyros with unknown input: errors at rest, rad/s.
     static_rms: float | None
     static_held_out_rms: float | None
 
     @staticmethod
     def _of(data: dict[str, Any]) -> SensorFit:
-        # The twelve of C, by rows, and o come first.
+        # The first twelve parameters are C, by rows, and o.
         value, sigma = (np.array([p[key] for p in data["parameters"][:12]], dtype=float) for key in ("value", "sigma"))
         own = {
             "C": value[:9].reshape(3, 3), "o": value[9:], "sigma": sigma[:9].reshape(3, 3), "sigma_o": sigma[9:],
@@ -106,18 +106,18 @@ class SensorFit:
 
 
 class Fit(Result):
-    """A calibration of a recording, judged on what it has not seen."""
+    """A calibration of a recording, judged on data held out of the fit."""
 
     _native: _mimu.Fit
 
-    #: The triads; None where the recording has no such sensor.
+    #: The triads; None if the recording has no such sensor.
     gyro: SensorFit | None
     accel: SensorFit | None
     #: By sensor, the errors. Quote ``held_out_rms``.
     held_out: dict[str, Figures]
     #: All dwells, used or not.
     dwells: list[Dwell]
-    #: What a person should know.
+    #: Warnings, one sentence each.
     warnings: list[str]
     device: str
 
@@ -133,11 +133,11 @@ class Fit(Result):
 
     @property
     def calibration(self) -> Calibration:
-        """The calibration that it gives, to apply, to save and to export."""
+        """The calibration, to apply, save or export."""
         return self._native.calibration()
 
     def apply(self, gyro: Any = None, accel: Any = None) -> tuple[Array | None, Array | None]:
-        """Readings compensated: rad/s and m/s², a row for each sample; a :class:`mimu.Recording` may take the place of both."""
+        """Compensated readings in rad/s and m/s², a row for each sample. A :class:`mimu.Recording` may replace both arguments."""
         return self.calibration.apply(gyro, accel)
 
     def to_toml(self) -> str:
@@ -167,9 +167,10 @@ def fit(
     """Calibrates the gyro and the accelerometer of a recording, as ``mimu fit`` does.
 
     ``holdout`` blocks of time are left out in turn, and the error on them is reported; 0 for none. ``method`` chooses the estimator
-    where the input is known. ``only`` calibrates one sensor. ``still`` is the largest variance of a dwell, times that of the quietest
-    times; ``steps="given"`` takes the dwells of the step column as they are, ``"found"`` looks for them. ``keep`` fits with dwells that the
-    others contradict: ``"all"``, or their numbers. ``noise`` is that of the unit at rest, from :func:`mimu.allan` or :func:`mimu.load`.
+    if the input is known. ``only`` calibrates one sensor. ``still`` is the largest variance of a dwell, as a multiple of that of the quietest
+    times; ``steps="given"`` takes the dwells of the step column as they are, ``"found"`` searches for them. ``keep`` uses dwells that the
+    others contradict: ``"all"``, or their numbers. ``noise`` is that of the unit at rest: ``mimu.allan(...).noise``, or from
+    :func:`mimu.load_noise`.
     """
     return Fit(
         _mimu.fit(recording, holdout=holdout, method=method, only=only, still=still, steps=steps, keep=_keep(keep), noise=noise)

@@ -59,10 +59,11 @@ def read(
     ``"gyro_x=wx,t_s=time"`` by the names of the header. ``raw_unit`` is ``"V"``, ``"count"`` or ``"SI"``; ``gravity`` is in m/s²,
     ``latitude`` in degrees, ``rate_hz`` in samples a second, ``step_gap`` in seconds. ``scale``, ``offset``, ``zero`` and
     ``twos_complement`` are by column or sensor: ``scale={"gyro": 0.0174533}``. ``faces`` maps the axis that was up to a file:
-    ``{"+x": "a.csv", "-x": "b.csv", ...}``. On a turntable of known rates ``rate_dps="200,270"`` and ``rate_error="0.3%"``. ``skip_broken=True`` leaves out up to 1 % of rows that cannot be read.
+    ``{"+x": "a.csv", "-x": "b.csv", ...}``. For a turntable with known rates, give ``rate_dps="200,270"`` and ``rate_error="0.3%"``.
+    ``skip_broken=True`` leaves out up to 1 % of rows that cannot be read.
 
-    The recording is kept in a temporary folder, and removed with it, or written to ``output``. Its ``imported`` and ``warnings`` are what
-    the import found.
+    The recording is written to ``output``, or to a temporary folder that is removed with it. Its ``imported`` and ``warnings`` are the results
+    of the import.
     """
     if len(files) == 1 and os.path.isdir(files[0]) and os.path.exists(os.path.join(files[0], "recording.toml")):
         return _mimu.open(files[0])

@@ -29,11 +29,11 @@ class Result:
         self._json = native.json()
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything that was found: the JSON that the command writes. What is not a number is None."""
+        """The whole result: the JSON that the command writes. NaN becomes None."""
         return cast(dict[str, Any], json.loads(self._json))
 
     def _repr_html_(self) -> str:
-        """Tables and plots for a notebook: a piece of HTML that needs nothing else."""
+        """Tables and plots for a notebook, as self-contained HTML."""
         return self._native.html()
 
 
@@ -45,7 +45,7 @@ def typed(cls: type[T], data: Any) -> T:
 def _value(hint: Any, data: Any) -> Any:
     origin, args = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
-        # Of the unions here one side is None.
+        # One side of each union here is None.
         (inner,) = (a for a in args if a is not type(None))
         return None if data is None else _value(inner, data)
     if origin is np.ndarray:

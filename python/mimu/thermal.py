@@ -19,7 +19,7 @@ class Curve:
 
     name: str
     sensor: str
-    #: Of value and bounds.
+    #: Unit of value and bounds.
     unit: str
     temp_c: Array
     value: Array
@@ -40,12 +40,12 @@ class Lag:
 class SensorThermal:
     """Figures of one triad."""
 
-    #: Of the errors.
+    #: Unit of the errors.
     unit: str
     rms: float | None
     held_out_rms: float | None
     noise_floor: float | None
-    #: None with its reason.
+    #: None if it is unknown, with the reason in ``lag_reason``.
     lag_s: Lag | None
     lag_reason: str | None
 
@@ -62,7 +62,7 @@ class ThermalFit(Result):
     sensors: dict[str, SensorThermal]
     #: By sensor and parameter: ``gyro_bias_x``, ``accel_C_xx``.
     curves: dict[str, Curve]
-    #: What a person should know.
+    #: Warnings, one sentence each.
     warnings: list[str]
     device: str
 
@@ -107,9 +107,9 @@ def fit(
 ) -> ThermalFit:
     """Estimates all parameters over temperature, as ``mimu thermal fit`` does.
 
-    ``recordings``: of one unit, one for each time that the power came. ``verify`` are only judged by. ``lag_s`` is the lag of the dies where
-    it is known. ``range_c`` are temperatures that the curves have to cover. ``base`` is the calibration at one temperature that the biases
-    of recordings at rest are added to; ``at_rest`` says that the unit lay still throughout.
+    ``recordings`` belong to one unit, one for each power-on. Recordings in ``verify`` only judge the result. ``lag_s`` is the lag of the dies,
+    if it is known. ``range_c`` are the temperatures that the curves must cover. ``base`` is the calibration at one temperature, to which
+    recordings at rest add the change of the biases; ``at_rest``: the unit lay still throughout.
     """
     return ThermalFit(
         _mimu.thermal_fit(

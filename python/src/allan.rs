@@ -15,7 +15,7 @@ use crate::noise::Noise;
 use crate::recording::{Recording, sources};
 use crate::work::{computed, json};
 
-/// Noise by recordings of a unit at rest.
+/// Noise from recordings of a unit at rest.
 #[pyclass(frozen, module = "mimu._mimu")]
 pub(crate) struct Allan {
     result: AllanResult,

@@ -33,7 +33,7 @@ type MatrixAndOffset<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>
 #[pyclass(frozen, module = "mimu")]
 pub(crate) struct Calibration {
     pub(crate) model: Arc<Model>,
-    /// File that it is from, or the name of what made it.
+    /// Its file, or the name of the result that it comes from.
     pub(crate) name: String,
 }
 
@@ -61,7 +61,7 @@ impl Calibration {
             .collect()
     }
 
-    /// Lowest and highest temperature that it is for, degrees Celsius; None where they are not known.
+    /// Lowest and highest temperature that it is for, degrees Celsius; None if they are unknown.
     #[getter]
     fn range_c(&self) -> Option<[f64; 2]> {
         self.model.limits()
@@ -93,10 +93,10 @@ impl Calibration {
         Ok((matrix.into_pyarray(py), offset))
     }
 
-    /// Gyro and accelerometer compensated: rad/s and m/s², a row for each sample.
+    /// Compensated readings of gyro and accelerometer in rad/s and m/s², a row for each sample.
     ///
-    /// Of arrays it is C u + o of each row. Of a recording it is what `mimu apply` writes: with effects and curves over temperature, and not
-    /// a number where a sensor has no reading or is at its rail.
+    /// For arrays this is C u + o of each row. For a recording it is what `mimu apply` writes: with effects and curves over temperature, and NaN
+    /// where a sensor has no reading or is at its rail.
     #[pyo3(signature = (gyro=None, accel=None))]
     fn apply<'py>(
         &self,
@@ -113,7 +113,7 @@ impl Calibration {
         }
     }
 
-    /// Everything that it holds, as `mimu export json` writes it.
+    /// The whole calibration, as `mimu export json` writes it.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let from = Sources {
             calibration: Some((&self.model, &self.name)),
@@ -247,7 +247,7 @@ fn compensated(model: &Affine<f64>, readings: &ArrayView2<f64>) -> Array2<f64> {
     done
 }
 
-/// Rows of three, of the sensors that there are.
+/// Rows of three, for the sensors with readings.
 fn shaped(clean: PerSensor<Vec<f64>>) -> Result<[Option<Array2<f64>>; 2]> {
     let PerSensor { gyro, accel } = clean;
     let one = |values: Vec<f64>| {

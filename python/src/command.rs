@@ -1,4 +1,4 @@
-//! The command `mimu`, as the wheel brings it.
+//! The command `mimu` of the wheel.
 
 use std::ffi::OsString;
 

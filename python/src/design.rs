@@ -28,7 +28,7 @@ impl Design {
         self.made.text(false)
     }
 
-    /// The text within a page.
+    /// The text as HTML.
     fn html(&self) -> String {
         fragment::of_text(&self.made.text(true))
     }

@@ -38,7 +38,7 @@ impl Diagnosis {
         report::diagnosis_text(&self.done.result, detail)
     }
 
-    /// The page, as a piece of one.
+    /// The content of the page, as a fragment of HTML.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         let result = &self.done.result;
         let places: Vec<&str> = result.recordings.iter().map(|r| r.place.as_str()).collect();

@@ -1,4 +1,4 @@
-//! Errors as Python has them: `mimu.Error` with the parts of the line that the command prints.
+//! Errors in Python: `mimu.Error` with the parts of the line that the command prints.
 
 use mimu_cli::called::Refusal;
 use mimu_recording::error::Error;
@@ -6,7 +6,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Where an error is, as `PLACE` of its line has it: `FILE, row 7, column gyro_x`.
+/// Place of an error, read from `PLACE` of its line: `FILE, row 7, column gyro_x`.
 #[derive(Default)]
 struct Place<'a> {
     file: Option<&'a str>,
@@ -24,7 +24,7 @@ impl<'a> Place<'a> {
         for part in parts {
             match part.split_once(' ') {
                 Some(("row", number)) => found.row = number.parse().ok(),
-                // Rows without the header, where the others are lines of an editor.
+                // Counted without the header, unlike rows that are lines of an editor.
                 Some(("data", number)) => {
                     found.row = number.strip_prefix("row ").and_then(|n| n.parse().ok());
                 }
@@ -37,7 +37,7 @@ impl<'a> Place<'a> {
     }
 }
 
-/// The exception of a refusal of the library.
+/// The exception for an error of the library.
 pub(crate) fn raised(py: Python<'_>, error: &Error) -> PyErr {
     let made = || -> PyResult<PyErr> {
         let refused = error.refused();
@@ -66,7 +66,7 @@ fn kind(error: &Error) -> &'static str {
     }
 }
 
-/// The exception of a call that did nothing.
+/// The exception for a refused call.
 pub(crate) fn refused(py: Python<'_>, refusal: &Refusal) -> PyErr {
     match refusal {
         Refusal::Data(error) => raised(py, error),

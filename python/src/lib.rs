@@ -1,7 +1,7 @@
 //! The extension module of the Python package `mimu`.
 //!
-//! What is here converts: arrays and options in, results out. Everything that is computed is in the libraries, and what a result consists
-//! of is in the package's Python files, as the JSON of the command has it.
+//! This module only converts: arrays and options in, results out. The libraries compute. The package's Python files define the contents of a result,
+//! which are those of the command's JSON.
 //!
 //! | module | what |
 //! |---|---|
@@ -9,8 +9,8 @@
 //! | [`preparation`] | how its dwells are found, and its noise |
 //! | [`fit`], [`diagnosis`], [`allan`], [`thermal`], [`design`], [`verification`] | one result each |
 //! | [`calibration`], [`noise`], [`export`] | the files |
-//! | [`error`] | errors as Python has them |
-//! | [`work`] | work that others can run beside, and Ctrl-C interrupts |
+//! | [`error`] | errors in Python |
+//! | [`work`] | work during which other threads run, and which Ctrl-C interrupts |
 //! | [`command`] | the command itself |
 
 mod allan;

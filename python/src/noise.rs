@@ -23,7 +23,7 @@ impl Noise {
         &self.file.device
     }
 
-    /// Everything that the noise file holds.
+    /// The contents of the noise file.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         loaded(py, &json(self.file.as_ref())?)
     }

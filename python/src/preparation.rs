@@ -1,4 +1,4 @@
-//! How the dwells of a recording are found, which of them are kept whatever they are, and its noise.
+//! How the dwells of a recording are found, which of them are always kept, and its noise.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 
 use crate::noise::Noise;
 
-/// How recordings are made ready for estimation.
+/// How recordings are prepared for estimation.
 #[derive(Clone)]
 pub(crate) struct Preparation {
     pub(crate) still_factor: f64,
@@ -29,10 +29,10 @@ pub(crate) enum KeptSteps {
 }
 
 impl Preparation {
-    /// By the options that Python was given.
+    /// From the options given in Python.
     ///
     /// # Errors
-    /// A word that is none of those that there are.
+    /// A word is unknown.
     pub(crate) fn of(
         still: Option<f64>,
         steps: Option<&str>,
@@ -69,7 +69,7 @@ impl Preparation {
         }
     }
 
-    /// `prepared` with its noise, and with what may not be left out.
+    /// `prepared` with its noise, and with the dwells that must be kept.
     pub(crate) fn complete(&self, prepared: Prepared) -> Result<Prepared> {
         let mut prepared = match &self.noise {
             Some(file) => prepared.with_noise(file)?,

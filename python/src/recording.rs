@@ -26,7 +26,7 @@ use crate::error::{raised, refused};
 use crate::preparation::Preparation;
 use crate::work::{computed, done, json, loaded};
 
-/// Gravity where nobody says it, m/s².
+/// Gravity if it is not given, m/s².
 const STANDARD_GRAVITY: f64 = 9.80665;
 
 /// A recording of a unit.
@@ -34,7 +34,7 @@ const STANDARD_GRAVITY: f64 = 9.80665;
 pub(crate) struct Recording {
     pub(crate) source: Source,
     arrays: Option<Arc<Arrays>>,
-    /// What the import has done, as JSON.
+    /// Result of the import, as JSON.
     imported: Option<String>,
     warnings: Vec<String>,
     /// Kept as long as the recording is used.
@@ -56,7 +56,7 @@ impl Source {
         })
     }
 
-    /// The recording made ready for estimation.
+    /// The recording, prepared for estimation.
     pub(crate) fn prepared(&self, by: &Preparation) -> Result<Prepared> {
         let prepared = match self {
             Self::Samples(recording) => Prepared::read(recording, by.finding(), |_| {})?,
@@ -68,7 +68,7 @@ impl Source {
     /// The samples.
     ///
     /// # Errors
-    /// There are means only.
+    /// There are only means.
     pub(crate) fn samples(&self) -> Result<&Arc<mimu_recording::Recording>> {
         match self {
             Self::Samples(recording) => Ok(recording),
@@ -88,7 +88,7 @@ impl Source {
     }
 }
 
-/// The arrays of a recording, as Python has them.
+/// The Python arrays of a recording.
 #[derive(Debug)]
 struct Arrays {
     t: Py<PyArray1<f64>>,
@@ -117,7 +117,7 @@ impl InMemory for Arrays {
         }
     }
 
-    /// Under the interpreter's lock, so that Python cannot write into an array meanwhile: for a piece of 65,536 rows at a time.
+    /// Holds the interpreter's lock, so that Python cannot write into an array meanwhile; for 65,536 rows at a time.
     fn append(&self, column: Column, rows: Range<usize>, values: &mut Vec<f64>) -> Result<()> {
         let changed = || {
             let problem = "the array was resized, or is being written to";
@@ -167,7 +167,7 @@ impl InMemory for Arrays {
     }
 }
 
-/// `value` as an array of doubles, the same one where it is one already.
+/// `value` as an array of doubles; the same array if it is one already.
 fn doubles<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let py = value.py();
     let kwargs = [("dtype", "float64")].into_py_dict(py)?;
@@ -221,7 +221,7 @@ pub(crate) fn triad<'py>(
     }
 }
 
-/// A unit of readings, or what is known of the input, by its name.
+/// A unit of readings, or a reference, by its name.
 fn parsed<T: std::str::FromStr<Err = Error>>(py: Python<'_>, name: &str) -> PyResult<T> {
     name.parse().map_err(|error| raised(py, &error))
 }
@@ -331,7 +331,7 @@ impl Recording {
         self.column(py, Column::Temperature, |arrays| &arrays.temp)
     }
 
-    /// Number of the dwell of each sample, -1 in transit; None where the dwells are found by stillness.
+    /// Number of the dwell of each sample, -1 in transit; None if the dwells are found by stillness.
     #[getter]
     fn step<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
         self.column(py, Column::Step, |arrays| &arrays.step)
@@ -379,13 +379,13 @@ impl Recording {
         self.source.manifest().sample_rate_hz
     }
 
-    /// Whether it holds the means of poses, and no samples.
+    /// Whether it contains means of poses instead of samples.
     #[getter]
     fn means(&self) -> bool {
         matches!(self.source, Source::Means(_))
     }
 
-    /// Folder of a recording on disk; None of arrays, and of a file that was read without an output.
+    /// Folder of a recording on disk; None for arrays, and for a file that was read without an output.
     #[getter]
     fn directory(&self) -> Option<PathBuf> {
         match &self.source {
@@ -396,20 +396,20 @@ impl Recording {
         }
     }
 
-    /// What a person should know of how it was made.
+    /// Warnings about how it was made.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
     }
 
-    /// What was found in the files that it was read from, as `mimu import --json` writes it; None of others.
+    /// Result of the import of its files, as `mimu import --json` writes it; None if it was not imported.
     #[getter]
     fn imported<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let json = self.imported.as_deref();
         json.map(|json| loaded(py, json)).transpose()
     }
 
-    /// Writes it as a folder that the command reads, or another program: recording.toml beside samples.parquet or samples.csv.
+    /// Writes it as a folder that the command and other programs read: recording.toml beside samples.parquet or samples.csv.
     #[pyo3(signature = (directory, *, format="parquet", replace=false))]
     fn save(
         &self,
@@ -516,7 +516,7 @@ impl Recording {
         }
         let samples = self.source.samples().map_err(|error| raised(py, &error))?;
         let columns = [0, 1, 2].map(|axis| column(first + axis));
-        // A known input may be known of some axes.
+        // The input may be known for some axes only.
         if !columns.iter().any(|column| samples.columns.has(*column)) {
             return Ok(None);
         }
@@ -537,7 +537,7 @@ impl Recording {
     }
 }
 
-/// Local gravity, m/s², and what is to be said of it where nobody gave it.
+/// Local gravity, m/s², and a warning if it was not given or does not fit the latitude.
 fn gravity_at(
     given: Option<f64>,
     latitude: Option<f64>,
@@ -572,7 +572,7 @@ pub(crate) fn open(py: Python<'_>, directory: PathBuf) -> PyResult<Recording> {
     })
 }
 
-/// Imports files by the arguments of `mimu import`, to `output` or to a temporary folder that goes with the recording.
+/// Imports files by the arguments of `mimu import`, to `output` or to a temporary folder that is removed with the recording.
 #[pyfunction]
 #[pyo3(signature = (arguments, output=None))]
 pub(crate) fn read(
@@ -590,7 +590,7 @@ pub(crate) fn read(
             }
         };
         let to = ["-o".into(), directory.clone().into_os_string()];
-        // Before the files, which may be all that follows `--`.
+        // Placed before the files, because everything after `--` is a file.
         let summary = called::import(to.into_iter().chain(arguments).collect())?;
         Ok((Source::open(&directory)?, summary, folder))
     };
@@ -604,7 +604,7 @@ pub(crate) fn read(
     })
 }
 
-/// Refuses what is not a recording, by the name of the argument.
+/// Sources of `recordings`. Refuses an empty list, by the name of the argument.
 pub(crate) fn sources(recordings: &[PyRef<'_, Recording>], name: &str) -> PyResult<Vec<Source>> {
     if recordings.is_empty() {
         return Err(PyTypeError::new_err(format!(

@@ -40,7 +40,7 @@ impl ThermalFit {
         report::thermal_text(&self.result, false)
     }
 
-    /// The page, as a piece of one.
+    /// The content of the page, as a fragment of HTML.
     fn html(&self) -> String {
         let places = self.result.recordings.iter().map(|r| r.samples.as_str());
         let made = Made {

@@ -10,7 +10,7 @@ use crate::preparation::Preparation;
 use crate::recording::Recording;
 use crate::work::{computed, json};
 
-/// What a calibration does to a recording.
+/// Errors of a calibration on another recording.
 #[pyclass(frozen, module = "mimu._mimu")]
 pub(crate) struct Verification {
     verified: Verified,

@@ -1,4 +1,4 @@
-//! Work on a thread of its own, so that Ctrl-C is heard and other Python threads run meanwhile.
+//! Work on a separate thread, so that Ctrl-C works and other Python threads run meanwhile.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -11,16 +11,16 @@ use pyo3::prelude::*;
 
 use crate::error::raised;
 
-/// How often signals are looked at.
+/// Interval between checks for signals.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// As the main thread has: matrices of fixed size are on the stack.
+/// Stack size as of the main thread: matrices of fixed size are on the stack.
 const STACK: usize = 8 << 20;
 
-/// Runs `work` on a thread of its own and waits for it.
+/// Runs `work` on a separate thread and waits for it.
 ///
-/// After Ctrl-C the caller goes on at once with `KeyboardInterrupt`. The thread cannot be stopped from outside: it runs to the end of what
-/// it computes and drops the result. It writes no file but a temporary one, so that nothing is left half done.
+/// After Ctrl-C, `KeyboardInterrupt` is raised at once. The thread cannot be stopped from outside: it finishes its computation and drops the result.
+/// It writes only to temporary files, so that nothing is left half done.
 pub(crate) fn done<T, E>(
     py: Python<'_>,
     work: impl FnOnce() -> Result<T, E> + Send + 'static,
@@ -33,7 +33,7 @@ where
     let (sender, receiver) = sync_channel(1);
     let body = move || {
         let outcome = catch_unwind(AssertUnwindSafe(work));
-        // Nobody waits any more after Ctrl-C.
+        // After Ctrl-C nobody waits for it.
         let _ = sender.send(outcome);
     };
     thread::Builder::new()
@@ -67,13 +67,13 @@ pub(crate) fn computed<T: Send + 'static>(
     done(py, work, raised)
 }
 
-/// JSON of a result, as the command writes it but for its line breaks.
+/// JSON of a result, as the command writes it except for its line breaks.
 pub(crate) fn json(result: &impl serde::Serialize) -> PyResult<String> {
     serde_json::to_string(result)
         .map_err(|error| PyRuntimeError::new_err(format!("the result cannot be written: {error}")))
 }
 
-/// JSON as Python has it.
+/// JSON as Python objects.
 pub(crate) fn loaded<'py>(py: Python<'py>, json: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("json")?.call_method1("loads", (json,))
 }

@@ -30,7 +30,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """The command ``mimu`` that the wheel has brought."""
+    """The command ``mimu`` of the wheel."""
     program = Path(sys.executable).with_name("mimu")
     given = [program, *map(str, arguments)]
     return subprocess.run(given, cwd=cwd, capture_output=True, text=True, timeout=600, check=False)
@@ -98,7 +98,7 @@ def at_rest() -> mimu.Recording:
 
 @pytest.fixture(scope="session")
 def data() -> Path:
-    """The public recordings, where they are at hand."""
+    """The public recordings, if they are available."""
     path = Path(os.environ.get("MIMU_DATA", ROOT / ".." / "shared" / "data"))
     if not (path / "imu_tk_xsens" / "xsens_acc.mat").is_file():
         pytest.skip("no public recordings at hand: set MIMU_DATA (docs/recordings.md says where to get them)")

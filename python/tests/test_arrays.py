@@ -38,7 +38,7 @@ def test_any_layout_is_read_as_the_same_numbers(arrays: mimu.Recording) -> None:
 
 
 def test_a_fit_copies_no_array_whole(chamber: ModuleType) -> None:
-    # numpy's own memory is traced, and that of the compiled part is not: what is looked for is a copy that Python is made to hold.
+    # numpy's memory is traced, that of the compiled part is not. The test searches for a copy that Python holds.
     rec = mimu.Recording(**chamber.session().keywords())
     tracemalloc.start()
     mimu.fit(rec)
@@ -67,7 +67,7 @@ def test_the_truth_of_a_unit_in_a_chamber_is_found(chamber: ModuleType) -> None:
         curve = fit.curves[f"gyro_bias_{name}"]
         truth = chamber.gyro_bias(curve.temp_c)[:, axis]
         half = 0.5 * (curve.upper - curve.lower)
-        # 33 temperatures of a smooth curve, which err together: three intervals hold each of them.
+        # At 33 temperatures of a smooth curve the errors are correlated: three intervals contain each of them.
         assert np.all(np.abs(curve.value - truth) < 3 * half), name
     clean = fit.calibration.apply(mimu.Recording(**session.keywords()))
     for values, known in zip(clean, (np.radians(session.ref_rate_dps), session.ref_force_mps2), strict=True):

@@ -1,4 +1,4 @@
-"""What is refused, and what of it a program can read."""
+"""Refusals, and the parts of them that a program can read."""
 
 from __future__ import annotations
 

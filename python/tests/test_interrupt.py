@@ -43,7 +43,7 @@ def test_ctrl_c_interrupts_long_work_within_a_moment() -> None:
     process.kill()
     process.wait()
     assert said[0] == "interrupted", said
-    # The clock is that of the machine. A signal is looked for twenty times a second, and the thread that works on takes a core.
+    # Both clocks are that of the machine. Signals are checked twenty times a second, but the working thread takes a core.
     assert float(said[1]) - asked < 5.0
 
 

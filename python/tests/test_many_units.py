@@ -26,21 +26,21 @@ UNITS = 96
 
 @pytest.fixture(scope="module")
 def many() -> ModuleType:
-    """The example; a worker imports it by the path that it takes over from this process."""
+    """The example; a worker imports it by the path that it inherits from this process."""
     sys.path.insert(0, str(EXAMPLES))
     return importlib.import_module("many_units")
 
 
 @pytest.fixture(scope="module")
 def line() -> ModuleType:
-    """What the units are."""
+    """The units and their faults."""
     return example("production_line")
 
 
 @pytest.fixture(scope="module")
 def recordings(line: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Recordings of the bench."""
-    # With the package beside it, whose features it then shares: nothing is compiled twice.
+    # Built together with the package, to share its features: nothing is compiled twice.
     built = ["cargo", "build", "--locked", "-q", "-p", "mimu-rig", "-p", "mimu-python", "--bin", "mimu-rig"]
     subprocess.run(built, cwd=ROOT, check=True)
     root = tmp_path_factory.mktemp("line") / "recordings"

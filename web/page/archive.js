@@ -1,8 +1,8 @@
-// A session's folder as one file, and back: a ZIP archive, which every system opens. Written without compression: what is kept is read again
-// by a command or by this page.
+// A session's folder as a ZIP archive, which every system opens, and back. Written without compression, because a command or this page reads it
+// again.
 
 const LOCAL = 0x04034b50, CENTRAL = 0x02014b50, END = 0x06054b50, STORED = 0, DEFLATED = 8, UTF8 = 1 << 11;
-/** The first day that the format knows: what is kept has its times inside. */
+/** The first day of the format: the files contain their own times. */
 const DATE = (1 << 5) | 1;
 
 const TABLE = Uint32Array.from({ length: 256 }, (_, n) => {
@@ -22,7 +22,7 @@ export function zip(files) {
   let at = 0, size = 0;
   for (const [path, bytes] of files) {
     const name = new TextEncoder().encode(path);
-    // What both headers say of a file: version, flags, method, time, date, check, sizes, length of the name.
+    // Fields of a file that both headers contain: version, flags, method, time, date, check, sizes, length of the name.
     const said = new DataView(new ArrayBuffer(26));
     [[0, 20], [2, UTF8], [4, STORED], [8, DATE], [22, name.length]].forEach(([where, value]) => said.setUint16(where, value, true));
     [[10, crc32(bytes)], [14, bytes.length], [18, bytes.length]].forEach(([where, value]) => said.setUint32(where, value, true));
@@ -53,10 +53,10 @@ async function inflated(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** The files of an archive, as a map from paths to bytes; `null` if it is none that can be read. */
+/** The files of an archive, as a map from paths to bytes; `null` if it cannot be read. */
 export async function unzip(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  // The end has a comment of any length behind it.
+  // A comment of any length follows the end record.
   let end = bytes.length - 22;
   while (end >= 0 && view.getUint32(end, true) !== END) end--;
   if (end < 0) return null;

@@ -1,5 +1,5 @@
-// A session with a board at a serial port: what it writes, what to do next, how far it is, and the journal. The program leads the session;
-// here are the port, the prompts and the person's answers.
+// A session with a board at a serial port: what it writes, what to do next, how far it is, and the journal. The program conducts the session; this
+// file handles the port, the prompts and the person's answers.
 
 import { unzip, zip } from "./archive.js";
 import { cut } from "./fields.js";
@@ -9,27 +9,27 @@ import * as session from "./session.js";
 
 const $ = (id) => document.getElementById(id);
 
-/** Field that an argument of `mimu wizard` is set by. */
+/** Field that sets an argument of `mimu wizard`. */
 const FIELDS = {
   "--gravity": "board-gravity", "--latitude": "board-latitude", "--baud": "baud", "--text": "line-columns", "--raw-unit": "board-unit",
   "--device": "board-name", "--fixture": "board-fixture", "--dwell": "board-dwell",
 };
 
-/** What a number of a line may be, as `--text` calls it. */
+/** Roles of the numbers in a line, as in `--text`. */
 const COLUMNS = [
   ["-", "not used"], ["t_us", "time, µs"], ["t_ms", "time, ms"], ["t_s", "time, s"],
   ...["gyro", "accel"].flatMap((sensor) => ["x", "y", "z"].map((axis) => [sensor[0] + axis, `${sensor} ${axis}`])),
   ["temp_c", "temperature, °C"],
 ];
 
-// Of what the board writes before it is looked at: so many seconds, and no longer than this for the first byte.
+// Seconds of the board's output that are collected before it is shown, and the longest wait for the first byte.
 const LOOK_S = 2.5, SILENT_S = 5;
-// How often the program is told that time has passed, ms.
+// Interval at which the program is told the time, ms.
 const TICK = 100;
 const FOLDER = "session";
 
 const port = new Port(heard, lost);
-/** `stage`: nothing is connected, the lines are looked at, a session runs, or it has been ended. */
+/** `stage`: `none` (not connected, or ended), `look` (the lines are examined) or `session`. */
 const board = { stage: "none", text: "", first: null, queue: [], hearing: false, goesOn: false, saved: true, guessed: [], motionCal: false };
 let page;
 
@@ -45,7 +45,7 @@ function made(name, properties, ...children) {
   return element;
 }
 
-/** Bytes as the characters of their numbers: garbled bytes come through unchanged. */
+/** Bytes as the characters with these codes, so that garbled bytes stay unchanged. */
 function characters(bytes) {
   let text = "";
   for (let at = 0; at < bytes.length; at += 8192) text += String.fromCharCode(...bytes.subarray(at, at + 8192));
@@ -79,14 +79,14 @@ async function connect() {
   await look();
 }
 
-/** Names of the numbers as `--text` takes them. MotionCal's lines are known by their label, of which the names say nothing. */
+/** Names of the numbers for `--text`. MotionCal's lines are recognised by their label, which the names do not contain. */
 function columnNames() {
   const columns = [...document.querySelectorAll("#line-columns select")].map((select) => select.value);
   const asked = columns.join() === board.guessed.join() && (board.motionCal ? "ax,ay,az,gx,gy,gz" : null);
   return asked || columns.join();
 }
 
-/** Opens the port, and shows what the board writes and what it is taken for. */
+/** Opens the port, and shows what the board writes and the guessed roles. */
 async function look() {
   await port.close();
   Object.assign(board, { stage: "look", text: "", first: null, last: null });
@@ -150,7 +150,7 @@ function wizardArguments() {
 
 async function begin() {
   if (!port.isOpen) await port.open(Number($("baud").value));
-  // A session that has no dwell yet, or is finished, is not gone on with.
+  // A session without a dwell, or a finished one, is not resumed.
   if (!board.goesOn) await program().ask("unpack", { name: FOLDER, files: new Map() });
   const warnings = await program().begin(...wizardArguments());
   Object.assign(board, { stage: "session", queue: [] });
@@ -165,7 +165,7 @@ async function begin() {
   tell({ opened: now() });
 }
 
-/** Tells the program something. What comes while it computes waits, with its time. */
+/** Sends a line to the program. Lines that come while it computes are queued with their times. */
 function tell(line) {
   board.queue.push(line);
   pump();
@@ -183,7 +183,7 @@ async function pump() {
 
 setInterval(() => board.stage === "session" && tell({ time: now() }), TICK);
 
-/** What the program says. */
+/** Handles a message of the program. */
 function said(message) {
   if (message.standing) return session.stand(message.standing);
   if (message.question) return ask(message.question);
@@ -223,7 +223,7 @@ async function ended({ outcome, text, refused }) {
   if (done) await result();
 }
 
-/** Hands the recordings of the session to the page, to be fitted and exported as those of a file are. */
+/** Hands the recordings of the session to the page, to be fitted and exported like those of a file. */
 async function result() {
   const files = await program().read(FOLDER);
   if (files?.has("calibration/samples.csv")) await page.done(files, $("board-name").value.trim());
@@ -231,7 +231,7 @@ async function result() {
 
 async function reconnect() {
   const baud = Number($("baud").value);
-  // The port that was there before needs no question, if it is the same.
+  // The same port as before can be opened without asking.
   await port.open(baud).catch(async () => {
     await port.choose();
     await port.open(baud);
@@ -282,7 +282,7 @@ export async function loadJournal(file) {
   }, "board-form");
 }
 
-/** Begins to offer boards. `to`: what the page does for all of its parts. */
+/** Sets up the part for boards. `to`: functions of the page for all of its parts. */
 export function offerBoards(to) {
   page = to;
   $("no-serial").hidden = Port.exists;

@@ -1,6 +1,6 @@
-// What can be taken away, and how `mimu export` is asked for it.
+// The formats that can be exported, with the arguments of `mimu export`.
 
-/** `of`: what the format cannot do without. */
+/** `of`: what the format requires. */
 export const FORMATS = [
   { name: "C header", file: "mimu.h", args: ["c"], of: "calibration" },
   { name: "Rust with mimu-core", file: "calibration.rs", args: ["rust"], of: "calibration" },

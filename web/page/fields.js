@@ -1,4 +1,4 @@
-// From what is chosen in the form to the arguments of `mimu import`.
+// From the form to the arguments of `mimu import`.
 
 const ROLES = [
   ["-", "not used"],
@@ -11,13 +11,13 @@ const ROLES = [
   ...["x", "y", "z"].map((axis) => [`ref_force_${axis}_mps2`, `known specific force ${axis}, m/s²`]),
 ];
 
-/** Factors to SI; what is not here is for the fit to find. */
+/** Factors to SI; for other units the fit finds the factor. */
 const TO_SI = {
   accel: { "m/s²": 1, g: 9.80665, mg: 0.00980665 },
   gyro: { "rad/s": 1, "deg/s": Math.PI / 180, "mdeg/s": Math.PI / 180000 },
 };
 
-/** Field that an argument of the command is set by. */
+/** Field that sets an argument of the command. */
 export const FIELD_OF = {
   "--columns": "files", "--rate-hz": "rate", "--time-unit": "time-unit", "--gravity": "gravity", "--latitude": "latitude", "--topic": "topic",
   "--raw-unit": "accel-unit", "--reference": "reference", "--skip-broken": "broken", "--instance": "more-import", "--where": "more-import",
@@ -33,7 +33,7 @@ function made(name, properties, ...children) {
   return element;
 }
 
-/** Shows the columns of `looked`, the answer of `columns`, each with the role that it was taken for. */
+/** Shows the columns of `looked`, the answer of `columns`, each with its guessed role. */
 export function show(looked) {
   const lists = looked.files.map((file, k) => {
     const columns = file.roles.map((role, at) => {
@@ -94,15 +94,15 @@ function chosen() {
   return [...document.querySelectorAll("#files .file")].map((file) => [...file.querySelectorAll("select")].map((select) => select.value));
 }
 
-/** Cut at blanks, as a shell does; quotes keep them. */
+/** Splits at blanks, as a shell does; quotes keep blanks. */
 export function cut(text) {
   return [...text.matchAll(/"([^"]*)"|'([^']*)'|(\S+)/g)].map((m) => m[1] ?? m[2] ?? m[3]);
 }
 
-/** What several files are: joined, a pose each, or recordings of their own. */
+/** How several files belong together: joined, one pose each, or separate recordings. */
 export const several = (looked) => (looked.files.length > 1 ? field("several").value : "");
 
-/** For each recording that the files of `looked` make, the arguments of `mimu import` up to where it goes. */
+/** The arguments of `mimu import` without its output, for each recording that the files of `looked` make. */
 export function imports(looked, names) {
   const roles = chosen();
   const alone = ["joint", "verify"].includes(several(looked));
@@ -111,7 +111,7 @@ export function imports(looked, names) {
   return names.map((name, k) => importArguments({ ...looked, files: [looked.files[k]] }, [name], [roles[k]], device, alone));
 }
 
-/** Of these files; `alone`, one of those that were dropped together, whose preset may be of all of them. */
+/** The arguments for these files. `alone`: a single one of several files, whose preset may belong to all of them together. */
 function importArguments(looked, names, roles, device, alone = false) {
   const args = ["import", ...names];
   const add = (flag, value) => value && args.push(flag, value);

@@ -1,9 +1,8 @@
 // Files and folders of the program, and what it reads from its standard input.
 //
-// A file that was dropped stays where it is: it is read in pieces, so that a log of a gigabyte takes no memory. What the program writes is
-// bytes in memory.
+// A dropped file stays on the disk and is read in pieces, so that a log of a gigabyte takes no memory. Files that the program writes are in memory.
 
-// Bytes of a dropped file that are read at a time: a read of the browser takes a fifth of a millisecond whatever its length.
+// Bytes of a dropped file that are read at a time: a read of the browser takes a fifth of a millisecond, whatever its length.
 const PIECE = 1 << 20;
 
 let inodes = 0;
@@ -43,7 +42,7 @@ export class MemoryFile {
   }
 }
 
-/** A file of the person's disk: read only. `heard` is told how far it has been read. */
+/** A file on the person's disk: read only. `heard` receives the share that has been read. */
 export class DroppedFile {
   constructor(file, heard = () => {}) {
     this.inode = ++inodes;
@@ -76,7 +75,7 @@ export class Folder {
     this.entries = new Map();
   }
 
-  /** The folder that `path` ends in, with the last name; `null` if a folder on the way is missing. */
+  /** The folder of `path` and the last name in it; `null` if a folder on the way is missing. */
   parent(path) {
     const names = path.split("/").filter((name) => name !== "" && name !== ".");
     let folder = this;
@@ -103,7 +102,7 @@ export class Folder {
   }
 }
 
-/** Bytes that the program reads from its standard input; at their end it goes on without. */
+/** Bytes that the program reads from its standard input; a read at their end returns nothing. */
 export class Input {
   constructor() {
     this.waiting = [];

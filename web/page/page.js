@@ -9,8 +9,8 @@ import { sphere } from "./sphere.js";
 const $ = (id) => document.getElementById(id);
 
 /**
- * The files that were dropped last, what was found in them, or the session with a board that came after them; and what was computed of these
- * and of those before: the text of each file.
+ * The files that were dropped last and what was found in them, or a later session with a board; and the results from these and earlier ones, as
+ * the text of each file.
  */
 const state = { files: [], looked: null, session: null, recordings: ["rec"], program: null, calibration: null, noise: null, from: {}, example: false };
 
@@ -20,7 +20,7 @@ function made(name, properties, ...children) {
   return element;
 }
 
-/** Text in which the arguments of the command lead to the field that sets them. */
+/** Text in which each argument of the command links to the field that sets it. */
 function withFields(text, fields = FIELD_OF) {
   return text.split(/(--[a-z-]+)/).map((part) => {
     const id = fields[part];
@@ -36,7 +36,7 @@ function withFields(text, fields = FIELD_OF) {
   });
 }
 
-/** Shows the line of a refusal where the person is looking, below `place`; an empty one takes it away. */
+/** Shows the line of a refusal below `place`, where the person is looking; an empty line removes it. */
 function refuse(line, place = $("drop").parentElement, fields = FIELD_OF) {
   place.after($("error"));
   $("error").replaceChildren(...withFields(line, fields));
@@ -58,7 +58,7 @@ async function program() {
   return state.program;
 }
 
-/** Names under which the files stand in the folder: no two alike, none that reads like an argument. */
+/** Names of the files in the folder: all different, and none that looks like an argument. */
 function named(files) {
   const taken = new Set();
   return [...files].map((file) => {
@@ -69,7 +69,7 @@ function named(files) {
   });
 }
 
-/** What may fail runs in here: its line is shown, and the page goes on. */
+/** Does `work`. If it fails, its line is shown, and the page continues. */
 async function guarded(work, place, fields) {
   refuse("", place, fields);
   try {
@@ -86,7 +86,7 @@ async function open(files) {
   if (files.length === 1 && /\.zip$/i.test(files[0].name)) return loadJournal(files[0]);
   cancel();
   Object.assign(state, { files: named(files), session: null, recordings: ["rec"] });
-  // Where the example was recorded says nothing of where this was.
+  // The gravity of the example does not apply to other files.
   if (state.example) $("gravity").value = "";
   state.example = false;
   $("result").hidden = $("work").hidden = true;
@@ -162,12 +162,12 @@ async function calibrate(mimu) {
 }
 
 /**
- * Fits the first recording, and diagnoses it: `verify`, later recordings of the unit as arguments; `others`, those that effects are looked for
- * in as well. `name`: what the recording is called.
+ * Fits the first recording and diagnoses it. `verify`: arguments with later recordings of the unit; `others`: recordings in which effects are
+ * searched too; `name`: the name of the recording.
  */
 async function fitted(mimu, name, more, verify = [], others = []) {
   const [rec] = state.recordings;
-  // The readings are shown even if they cannot be fitted: there one sees why.
+  // The readings are shown even if they cannot be fitted, because they show why.
   const fit = await step("Calibration", () => mimu.run("fit", rec, "-o", "cal.toml", "--json", "fit.json", ...more)).catch(refusal);
   const shown = fit instanceof Refused ? [] : ["cal.toml"];
   const view = await step("Readings and poses", () => mimu.run("view", rec, ...shown)).catch((why) => {
@@ -220,7 +220,7 @@ async function noise(mimu) {
   await keep(mimu, ["allan.json", "allan.svg"]);
 }
 
-/** What the command prints, to be opened. */
+/** What the command prints, folded. */
 function printed(command, done) {
   const text = made("div", { className: "scroll", tabIndex: 0 }, made("pre", { textContent: done.stdout }));
   return made("details", {}, made("summary", { textContent: `What ${command} prints` }), text);
@@ -229,12 +229,12 @@ function printed(command, done) {
 /** Options of `mimu fit` that `mimu report` has as well. */
 const OF_REPORT = ["--still", "--steps", "--keep"];
 
-/** Those of the arguments `more` that are one of `options`, with their values. */
+/** The arguments in `more` that are among `options`, with their values. */
 function optionsOf(more, options) {
   return more.filter((argument, k) => options.includes(argument.split("=")[0]) || (options.includes(more[k - 1]) && !argument.startsWith("-")));
 }
 
-/** A refusal as a result; another error goes on. */
+/** Returns a refusal as a result; throws any other error. */
 function refusal(error) {
   if (error instanceof Refused) return error;
   throw error;
@@ -250,7 +250,7 @@ function warn(warnings) {
 
 function picture(view) {
   $("pictures").hidden = false;
-  // The program's own drawing; it escapes what it is handed.
+  // The program's own drawing, which escapes its inputs.
   $("trace").innerHTML = view.trace;
   $("poses-part").hidden = view.poses.length === 0;
   if (view.poses.length === 0) return;
@@ -293,7 +293,7 @@ function save(name, bytes) {
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
 }
 
-/** Offers the files that were made of this recording, and the formats that can be made of what is known of the unit. */
+/** Offers the files made from this recording, and the formats for which the results suffice. */
 async function keep(mimu, files) {
   const ours = { "calibration.toml": state.calibration, "noise.toml": state.noise };
   for (const [name, text] of Object.entries(ours)) if (text) await mimu.write(name, text);

@@ -2,9 +2,9 @@
 
 import { element } from "./sphere.js";
 
-// Half of the edges along x, y and z: flat, as a board is.
+// Half the edges along x, y and z: flat, like a board.
 const HALF = [1, 1, 0.55];
-// From where it is seen, degrees to the right of the front and above: by how many faces are upwards, so that all of those are seen.
+// Direction of view, degrees to the right of the front and above, by the number of faces that point upwards, so that all of those are visible.
 const ASIDE = [32, 45, 0], ABOVE = [24, 50, 54];
 const SCALE = 46, MIDDLE = [110, 112];
 
@@ -15,10 +15,10 @@ const sum = (a, b) => a.map((v, k) => v + b[k]);
 const unit = (a) => scaled(a, 1 / Math.hypot(...a));
 const axis = (k, sign = 1) => [0, 1, 2].map((i) => (i === k ? sign : 0));
 
-/** Up, front and right in the body frame: that which points up, and of what is left the face that lies most in front. */
+/** Up, front and right in the body frame: the given direction is up, and the face that leans most to the front is in front. */
 function frame(up) {
   const order = [0, 1, 2].sort((a, b) => Math.abs(up[b]) - Math.abs(up[a]));
-  // If a face is up, it hides no other face: then the next axis is in front, as in the sketch of the command.
+  // If a face points straight up, no other leans to the front: then the next axis is in front, as in the sketch of the command.
   const second = Math.abs(up[order[1]]) > 0.3 ? order[1] : (order[0] + 1) % 3;
   const towards = axis(second, up[second] < -0.3 ? -1 : 1);
   const front = unit(sum(towards, scaled(up, -dot(towards, up))));

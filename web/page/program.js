@@ -1,6 +1,6 @@
 // The program in its worker, as promises.
 
-/** The program has refused: its one line. */
+/** A refusal of the program, with its one line. */
 export class Refused extends Error {}
 
 /** The person has cancelled. */
@@ -11,12 +11,12 @@ const lineOf = ({ stderr }) => stderr.trim().split("\n").at(-1).replace(/^mimu: 
 
 let compiled;
 
-/** Compiles the program once; workers that follow one another share it. */
+/** Compiles the program once; successive workers share it. */
 export function load() {
   compiled ??= (async () => {
     const response = await fetch("mimu.wasm");
     if (!response.ok) throw new Refused(`mimu.wasm: the server answers ${response.status}; put all files of the page in one folder`);
-    // Servers that do not know the type of the file cannot stream it.
+    // Without the right content type, the file cannot be compiled while it streams.
     const streams = response.headers.get("content-type")?.startsWith("application/wasm");
     return streams ? WebAssembly.compileStreaming(response) : WebAssembly.compile(await response.arrayBuffer());
   })();
@@ -24,7 +24,7 @@ export function load() {
   return compiled;
 }
 
-/** One worker, with files of its own. */
+/** One worker, with its own files. */
 export class Program {
   constructor(onProgress = () => {}, onSaid = () => {}) {
     this.waiting = new Map();
@@ -65,7 +65,7 @@ export class Program {
     return this.ask("read", { name });
   }
 
-  /** Runs `mimu` with these arguments; its output, or `Refused` with its line. */
+  /** Runs `mimu` with these arguments. Returns its output, or throws `Refused` with its line. */
   async run(...args) {
     await this.ready;
     const done = await this.ask("run", { args });
@@ -73,7 +73,7 @@ export class Program {
     return done;
   }
 
-  /** Begins a session with a board by these arguments of `mimu wizard`; its warnings, or `Refused` with its line. */
+  /** Begins a session with a board by these arguments of `mimu wizard`. Returns its warnings, or throws `Refused` with its line. */
   async begin(...args) {
     await this.ready;
     const begun = await this.ask("begin", { args });
@@ -81,7 +81,7 @@ export class Program {
     return begun.stderr.split("\n");
   }
 
-  /** Has the session hear these lines; whether it has ended. */
+  /** Sends these lines to the session. Returns whether it has ended. */
   hear(lines) {
     return this.ask("hear", { lines });
   }
@@ -95,7 +95,7 @@ export class Program {
     return JSON.parse(await this.text(name));
   }
 
-  /** Ends the worker, whatever it is at. */
+  /** Ends the worker, whatever it is doing. */
   end(why = new Cancelled("cancelled")) {
     this.ended = why;
     this.worker.terminate();

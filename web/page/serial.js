@@ -1,18 +1,18 @@
-// A serial port of the browser: what comes over it, with the times at which it came, and what happens to it in words that say what to do.
+// A serial port of the browser: what it receives, with the times of arrival, and its errors with remedies.
 
 import { Refused } from "./program.js";
 
 export const NO_SERIAL =
   "this browser has no serial ports (Web Serial): open this page in Chrome, Edge or Opera on a computer, over https or from localhost; or run mimu wizard --text; or save the lines of the board to a file and drop it here";
 
-/** Seconds by the clock that all arrivals are stamped by. */
+/** Seconds on the clock that stamps all arrivals. */
 export const now = () => performance.now() / 1000;
 
-/** What the errors that a line goes on behind are called: a byte was lost, and the stream has to be opened again. */
+/** Names of passing errors: a byte was lost, and the stream must be opened again. */
 const PASSING = ["BreakError", "BufferOverrunError", "FramingError", "ParityError"];
 
 export class Port {
-  /** `heard(at, bytes)` and `lost(at, why)` are told what comes. */
+  /** `heard(at, bytes)` and `lost(at, why)` are called with what comes. */
   constructor(heard, lost) {
     Object.assign(this, { heard, lost, port: null, reading: null });
   }
@@ -21,7 +21,7 @@ export class Port {
     return "serial" in navigator;
   }
 
-  /** Has the person choose a port. */
+  /** Lets the person choose a port. */
   async choose() {
     try {
       this.port = await navigator.serial.requestPort();
@@ -63,7 +63,7 @@ export class Port {
     if (!this.closing) this.lost(now(), "the port has vanished");
   }
 
-  /** Hands on what comes until the stream ends; an error is thrown on. */
+  /** Passes on what comes until the stream ends; throws its errors. */
   async read() {
     for (;;) {
       const { value, done } = await this.reader.read();

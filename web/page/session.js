@@ -1,4 +1,4 @@
-// How a session stands, as the page shows it: what to do next, how far it is, what has been heard and what has happened.
+// The state of a session as the page shows it: what to do next, how far it is, what was received and what has happened.
 
 import { pose } from "./pose.js";
 import { now } from "./serial.js";
@@ -75,7 +75,7 @@ const events = {
   progress: ({ progress }) => aims(progress),
 };
 
-/** The poses of this part by the journal, and the one that comes next. */
+/** Shows the poses of this part from the journal, and the next one. */
 async function poses() {
   const text = await shown.journal();
   const had = new Map();
@@ -104,7 +104,7 @@ function aims({ sensors, not_yet: why }) {
   $("not-yet").textContent = rows.length ? "" : `Not determined yet: ${why ?? "more poses are needed"}`;
 }
 
-/** How the unit stands: what it waits for, and what has been heard of it. */
+/** Shows the state of the unit: what it waits for, and what was received from it. */
 export function stand({ units: [unit], phase, step }) {
   if (!unit) return;
   const running = unit.left_s !== null && step;
@@ -129,7 +129,7 @@ export function stand({ units: [unit], phase, step }) {
   };
   const lines = Object.entries(rows).filter(([, text]) => text);
   const terms = [...$("heard").querySelectorAll("dd")];
-  // Elements that stay can be selected and read aloud.
+  // Elements that are kept can be selected and read aloud.
   if (terms.length === lines.length) lines.forEach(([, text], k) => terms[k].textContent !== text && (terms[k].textContent = text));
   else $("heard").replaceChildren(...lines.flatMap(([name, text]) => [made("dt", { textContent: name }), made("dd", { textContent: text })]));
 }

@@ -22,7 +22,7 @@ function place([x, y, z]) {
 export function sphere({ poses, map, cell, next }) {
   const label = `${poses.length} poses on the sphere of directions` + (next ? `; most would be added by ${next.words}` : "");
   const svg = element("svg", { viewBox: "0 0 448 236", role: "img", "aria-label": label, class: "sphere-of-poses" });
-  // From the least to the most: what is even has no shade.
+  // Scaled from the least to the largest gain, so that an even map has no shade.
   const gains = map.map((at) => at[3]);
   const least = Math.min(...gains), range = Math.max(Math.max(...gains) - least, 1e-12);
   const clip = element("clipPath", { id: "hemispheres" });

@@ -1,4 +1,4 @@
-// Keeps the files of the page, so that it works without a network. The build writes which files there are, and the hash of their content.
+// Keeps the files of the page, so that it works without a network. The build inserts the list of files and the hash of their content.
 
 const CACHE = "mimu-" + "HASH";
 const FILES = ["FILES"];

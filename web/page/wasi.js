@@ -1,5 +1,5 @@
-// The file system, the clock and the standard streams that the program asks of its system (WASI preview 1), in memory. Only one directory is
-// handed over, the root.
+// The file system, the clock and the standard streams that the program expects from its system (WASI preview 1), in memory. The only directory that
+// it is given is the root.
 
 import { Folder, MemoryFile } from "./files.js";
 
@@ -25,8 +25,8 @@ export function run(module, root, args) {
 }
 
 /**
- * Makes an instance of the program: what it exports is called by the function that this returns, which answers as `run`. Lines of the
- * standard output go to `said` at once, if that is given.
+ * Makes an instance of the program. Returns a function that calls one of its exports by name and answers like `run`. If `said` is given, it
+ * receives the lines of the standard output at once.
  */
 export function start(module, root, args, input, said) {
   let memory;
@@ -276,7 +276,7 @@ export function start(module, root, args, input, said) {
           return OK;
         });
       }),
-    // Hard links are how a temporary file is made permanent without overwriting.
+    // A hard link makes a temporary file permanent without overwriting.
     path_link: (fd, _, at, length, to, toAt, toLength) =>
       below(fd, at, length, (__, ___, node) => {
         if (!node) return NOENT;

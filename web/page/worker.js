@@ -3,12 +3,12 @@
 import { DroppedFile, Folder, Input, MemoryFile } from "./files.js";
 import { run, start } from "./wasi.js";
 
-// Of what is told while a file is read, ms.
+// Least time between two reports of progress, ms.
 const EVERY = 100;
 
 const root = new Folder();
 let module;
-/** The session with a board that is open: the program that leads it, and what it has to hear. */
+/** The open session with a board: the program that conducts it, and its input. */
 let session = null;
 
 const tell = (() => {
@@ -21,7 +21,7 @@ const tell = (() => {
   };
 })();
 
-/** What a trap says in the place of an error: the program has no way back from it. */
+/** The message of a trap, from which the program cannot recover. */
 function broken(trap) {
   const panic = /panicked at [^\n]*\n([^\n]*)/.exec(trap.stderr ?? "");
   const memory = /memory allocation of (\d+) bytes failed/.exec(trap.stderr ?? "");
@@ -34,7 +34,7 @@ const answers = {
   module(message) {
     module = message.module;
   },
-  /** Puts dropped files in the folder, in the place of what was there. */
+  /** Puts dropped files in the folder, which is emptied first. */
   files({ files }) {
     root.entries.clear();
     for (const { name, file } of files) root.entries.set(name, new DroppedFile(file, (share) => tell(name, share)));
@@ -50,7 +50,7 @@ const answers = {
       return { status: 1, stdout: "", stderr: `mimu: ${broken(trap)}`, ms: performance.now() - begun };
     }
   },
-  /** Begins a session with a board by the arguments of `mimu wizard`, or goes on with the one in the folder. */
+  /** Begins a session with a board by the arguments of `mimu wizard`, or resumes the one in the folder. */
   begin({ args }) {
     const input = new Input();
     const said = (line) => postMessage({ said: JSON.parse(line) });
@@ -59,7 +59,7 @@ const answers = {
     session = begun.status === 0 ? { call, input } : null;
     return begun;
   },
-  /** Has the session hear these lines. Whether it has ended. */
+  /** Sends these lines to the session. Returns whether it has ended. */
   hear({ lines }) {
     if (!session) return true;
     session.input.push(lines.map((line) => JSON.stringify(line) + "\n").join(""));
@@ -71,7 +71,7 @@ const answers = {
     session = null;
     return true;
   },
-  /** Puts files in folders, in the place of the folder `name`. */
+  /** Puts files into the folder `name`, which is replaced. */
   unpack({ name, files }) {
     root.entries.delete(name);
     for (const [path, bytes] of files) {
@@ -84,7 +84,7 @@ const answers = {
       folder.entries.set(names.at(-1), new MemoryFile(bytes));
     }
   },
-  /** The content of a file that the program wrote; of a folder, all of its files by their paths. */
+  /** The content of a file that the program wrote; for a folder, all of its files by their paths. */
   read({ name }) {
     const found = root.find(name);
     if (found instanceof MemoryFile) return found.content().slice();

@@ -1,4 +1,4 @@
-//! What a board writes, as the page shows it before a session begins: the numbers of its lines, and what each is taken for.
+//! The output of a board, as the page shows it before a session begins: the numbers of its lines, and their guessed roles.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::columns::{Guess, guess};
 
-/// Lines that are looked at, the last ones: before them a board greets.
+/// Last lines that are examined; earlier ones may be a greeting.
 const LOOKED_AT: usize = 200;
 /// Lines that are shown.
 const SHOWN: usize = 3;
@@ -18,11 +18,11 @@ const SHOWN: usize = 3;
 pub struct Lines {
     /// The last ones as they came.
     shown: Vec<String>,
-    /// What the line calls its numbers, if it does.
+    /// Names of the numbers in the line, if it has any.
     names: Vec<String>,
     /// The numbers of the last lines.
     rows: Vec<Vec<f64>>,
-    /// What `mimu wizard --text` would be told of each number.
+    /// Role of each number for `mimu wizard --text`.
     columns: Vec<&'static str>,
     /// Whether the roles follow from the readings alone.
     by_readings: bool,
@@ -30,7 +30,7 @@ pub struct Lines {
     si: bool,
 }
 
-/// The label of each number of a line, where each has one (`ax:1,ay:2`).
+/// The label of each number of a line, if each has one (`ax:1,ay:2`).
 fn labels(line: &str) -> Vec<String> {
     let words = line.split([',', ';', '\t', ' ']).filter(|w| !w.is_empty());
     let labels: Option<Vec<String>> = words
@@ -39,7 +39,7 @@ fn labels(line: &str) -> Vec<String> {
     labels.unwrap_or_default()
 }
 
-/// The unit of a clock by how far it goes in a second: a replay may be tens of times as fast as the board was.
+/// The unit of a clock, from its progress in a second. A replay may be tens of times faster than the board was.
 fn clock(per_second: f64) -> &'static str {
     match per_second.log10() {
         e if e < 2.0 => "t_s",
@@ -48,7 +48,7 @@ fn clock(per_second: f64) -> &'static str {
     }
 }
 
-/// What the lines in `file`, which came within `seconds`, are.
+/// Interprets the lines in `file`, which came within `seconds`.
 pub fn of(file: &Path, seconds: f64) -> Result<Lines> {
     let bytes = std::fs::read(file).map_err(|error| Error::io(file, &error))?;
     Ok(look(&String::from_utf8_lossy(&bytes), seconds))
@@ -56,7 +56,7 @@ pub fn of(file: &Path, seconds: f64) -> Result<Lines> {
 
 fn look(text: &str, seconds: f64) -> Lines {
     let mut lines: Vec<&str> = text.split(['\n', '\r']).map(str::trim).collect();
-    // The last one has not ended, and the first may be a half.
+    // The last line is incomplete, and the first may be cut.
     lines.pop();
     lines.retain(|line| !line.is_empty());
     let all = lines.len();
@@ -76,7 +76,7 @@ fn look(text: &str, seconds: f64) -> Lines {
         .filter_map(|line| numbers(line).map(|(label, numbers)| (*line, label, numbers)))
         .filter(|(_, _, numbers)| numbers.len() > 5)
         .collect();
-    // MotionCal's boards write the same in SI in turns.
+    // MotionCal's boards also write the same readings in SI, in alternate lines.
     let raw = read.iter().any(|(_, label, _)| *label == "Raw");
     let of_data = |(_, label, _): &&(&str, &str, Vec<f64>)| !raw || *label == "Raw";
     let Some((line, _, first)) = read.iter().rev().find(of_data) else {

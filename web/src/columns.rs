@@ -1,12 +1,12 @@
-//! What the columns of a dropped file are taken for. The person corrects it in the page.
+//! Guesses the roles of the columns of a dropped file. The user corrects them in the page.
 //!
-//! Names decide, by the words in which loggers write them. Where there are none, the first column that only grows is the time, and of two
-//! triads the one that reads more is the accelerometer's, as gravity is large beside the rate of a unit at rest. That may be wrong of readings
-//! with a large bias, so the page asks to check it.
+//! Names decide, by the words that loggers use. Without names, the first column that only grows is the time. Of two triads, the one with larger
+//! readings is the accelerometer, because gravity is large compared with the rate of a unit at rest. This may be wrong for readings with a large
+//! bias, so the page asks to check it.
 
 use serde::Serialize;
 
-/// Units in which a triad may be written, with the factor to SI; none where it is for the fit to find.
+/// Units in which a triad or the time may be written, with the spellings in the names of columns.
 const GYRO_UNITS: [(&str, &[&str]); 3] = [
     (
         "deg/s",
@@ -33,13 +33,13 @@ const TIME_UNITS: [(&str, &[&str]); 4] = [
 /// A guess for one file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Guess {
-    /// Role of each column, `-` where it is not used.
+    /// Role of each column, `-` if it is not used.
     pub roles: Vec<&'static str>,
-    /// Unit of the gyro and of the accelerometer, if their names or sizes say it.
+    /// Unit of the gyro, if the names of its columns contain it.
     pub gyro_unit: Option<&'static str>,
-    /// See [`Self::gyro_unit`].
+    /// Unit of the accelerometer, by the names of its columns or the magnitude of its readings.
     pub accel_unit: Option<&'static str>,
-    /// Unit of the time stamps, if the name of their column says it.
+    /// Unit of the time stamps, if the name of their column contains it.
     pub time_unit: Option<&'static str>,
     /// Whether the roles follow from the readings alone.
     pub by_readings: bool,
@@ -48,7 +48,7 @@ pub struct Guess {
 const GYRO: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 const ACCEL: [&str; 3] = ["accel_x", "accel_y", "accel_z"];
 
-/// What a name says.
+/// Meaning of a column's name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meaning {
     Time,
@@ -84,7 +84,7 @@ fn meaning(name: &str) -> Meaning {
     let words = words(name);
     let all = words.concat();
     let has = |parts: &[&str]| parts.iter().any(|part| all.contains(part));
-    // `gx`, `accelX`, `Gyr_Y`, `angular_velocity.z`, `gyrox rad/s`: a word of its own, or the end of the sensor's.
+    // `gx`, `accelX`, `Gyr_Y`, `angular_velocity.z`, `gyrox rad/s`: a separate word, or the end of the sensor's.
     let axis = || {
         let of_word = |word: &String| {
             let bare = word.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -128,14 +128,14 @@ fn unit(names: &[&String], units: &[(&'static str, &[&str])]) -> Option<&'static
         .map(|(unit, _)| *unit)
 }
 
-/// What the columns of the file called `file` with these names and first rows are.
+/// Guesses the columns of the file called `file` from these names and first rows.
 pub fn guess(file: &str, names: &[String], rows: &[Vec<f64>]) -> Guess {
     let width = rows.first().map_or(names.len(), Vec::len);
     let mut guess = match names.is_empty() {
         true => by_readings(file, width, rows),
         false => by_names(names),
     };
-    // Codes of a thermometer are no °C, and are worth less than nothing.
+    // Codes of a thermometer are not in °C, and are worse than no temperature.
     let implausible = |at: usize| {
         let values = rows.iter().filter_map(|row| row.get(at));
         let mut finite = values.filter(|t| t.is_finite());
@@ -182,7 +182,7 @@ fn by_names(names: &[String]) -> Guess {
             (None, Meaning::Step) => "step",
             (None, Meaning::Other) => "-",
         };
-        // The first of two sensors, or of two clocks.
+        // Of two sensors or two clocks, the first is used.
         roles.push(if roles.contains(&role) { "-" } else { role });
     }
     Guess {
@@ -207,7 +207,7 @@ fn by_readings(file: &str, width: usize, rows: &[Vec<f64>]) -> Guess {
     if let Some(at) = time {
         roles[at] = "t_s";
     }
-    // One gravity is large beside the noise of a unit at rest, and a rate of zero is not.
+    // Gravity is large compared with the noise of a unit at rest; a rate of zero is not.
     let size = |from: usize| -> f64 {
         let mean = |at| column(at).sum::<f64>() / rows.len().max(1) as f64;
         (from..from + 3)
@@ -239,7 +239,7 @@ fn by_readings(file: &str, width: usize, rows: &[Vec<f64>]) -> Guess {
     }
 }
 
-/// Unit of an accelerometer by the median magnitude of what it reads: one gravity.
+/// Unit of an accelerometer, if the median magnitude of its readings is one g in it.
 fn by_size(roles: &[&'static str], rows: &[Vec<f64>]) -> Option<&'static str> {
     let at: Vec<usize> = ACCEL
         .iter()

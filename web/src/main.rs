@@ -1,10 +1,10 @@
-//! The program of the page: the command, and beside it what only a page asks.
+//! The program of the page: the command, and what only a page needs.
 //!
 //! | arguments | what it prints, as JSON |
 //! |---|---|
-//! | `columns FILE ...` | the columns of dropped files, and what each is taken for |
+//! | `columns FILE ...` | the columns of dropped files, and their guessed roles |
 //! | `board FILE SECONDS` | the columns of lines that a board has written |
-//! | `session wizard ...` | a session with a board, of which [`session`] says more |
+//! | `session wizard ...` | a session with a board (see [`session`]) |
 //! | `view REC [CALIBRATION]` | the readings with the dwells, the poses, and which pose would add most |
 //! | any other | what `mimu` prints |
 
@@ -69,7 +69,7 @@ fn json(answer: impl Serialize) -> Result<String> {
 /// What the page shows of dropped files.
 #[derive(Serialize)]
 struct Dropped {
-    /// The maker's layout that all of them have.
+    /// The preset that all of them fit.
     preset: Option<Recognised>,
     files: Vec<DroppedFile>,
 }
@@ -78,7 +78,7 @@ struct Dropped {
 struct Recognised {
     name: &'static str,
     title: &'static str,
-    /// Unit of the readings, where the maker has only one.
+    /// Unit of the readings, if the maker uses only one.
     raw_unit: Option<String>,
     /// Factors as `mimu import --scale` takes them.
     scales: Vec<String>,

@@ -1,4 +1,4 @@
-//! The poses of a recording, and what each further pose would add to what is known of the accelerometer.
+//! The poses of a recording, and how much each further pose would improve the accelerometer's parameters.
 
 use mimu::calibration::Calibration;
 use mimu::plan::design::information::{Inverse, Rows};
@@ -9,12 +9,13 @@ use mimu::quantity::Sensor;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// The poses, and the map of what another would add.
+/// The poses, and the map of the gain of another one.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Poses {
     /// Directions that were up in the dwells at rest, in the body frame.
     poses: Vec<[f64; 3]>,
-    /// Directions on a grid over both hemispheres, each with the share by which one more dwell with it up would lower the geometric mean of the parameters' sigmas.
+    /// Directions on a grid over both hemispheres, each with its gain: the share by which one more dwell with it up would lower the geometric mean of
+    /// the parameters' sigmas.
     map: Vec<[f64; 4]>,
     /// Size of a cell of the grid over the radius of a hemisphere.
     cell: f64,
@@ -32,7 +33,7 @@ struct Next {
 /// Cells of the map across a hemisphere.
 const CELLS: i32 = 36;
 
-/// Of the dwells that the accelerometer's fit may use. Without a calibration the directions are not known.
+/// Uses the dwells that the accelerometer's fit may use. Without a calibration the directions are unknown.
 pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
     let Some(model) = calibration.and_then(|c| c.inverse(Sensor::Accel)) else {
         return Poses::default();
@@ -56,7 +57,7 @@ pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
     let plain = reach.plain();
     let gain = |up: Vector3<f64>| gains.as_ref().map_or(0.0, |gain| gain(up));
     let best = plain.iter().map(|s| (s.up, gain(s.up)));
-    // Of equal ones the first: faces stand before edges and corners.
+    // Of equal ones the first is used: faces come before edges and corners.
     let best = best.reduce(|a, b| if b.1 > a.1 * 1.001 { b } else { a });
     Poses {
         poses: ups.iter().map(|up| (*up).into()).collect(),
@@ -70,7 +71,7 @@ pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
     }
 }
 
-/// Middles of the cells of both hemispheres, in which equal areas are equal.
+/// Middles of the cells of both hemispheres, in an equal-area projection.
 fn cells() -> impl Iterator<Item = Vector3<f64>> {
     let middles = || (0..CELLS).map(|k| f64::from(2 * k + 1 - CELLS) / f64::from(CELLS));
     let flat = middles().flat_map(move |x| middles().map(move |y| (x, y, x * x + y * y)));
@@ -82,7 +83,7 @@ fn cells() -> impl Iterator<Item = Vector3<f64>> {
     })
 }
 
-/// The share of a direction, after dwells with `ups` up; `None` if those do not determine all parameters.
+/// The gain of a direction after dwells with `ups` up; `None` if those do not determine all parameters.
 fn gains(reach: &Reach, ups: &[Vector3<f64>]) -> Option<impl Fn(Vector3<f64>) -> f64> {
     let regressions = reach.model.distinct_regressions();
     let row = move |up: Vector3<f64>| {

@@ -1,23 +1,23 @@
 //! A session of the wizard with a board at a port of the browser. `session` begins it by the arguments of `mimu wizard`; the page calls
-//! [`mimu_go_on`] when the board or the person has said something.
+//! [`mimu_go_on`] when something has come from the board or the person.
 //!
 //! In (standard input) and out (standard output) are lines of JSON:
 //!
 //! | in | what |
 //! |---|---|
 //! | `{"opened": 1.5}` | the port was opened, at this time in s |
-//! | `{"bytes": [1.5, "1,2,3\n"]}` | what came, each byte as the character of its number |
+//! | `{"bytes": [1.5, "1,2,3\n"]}` | received bytes, each as the character with its code |
 //! | `{"lost": [1.5, "it was unplugged"]}` | the port is gone |
-//! | `{"time": 1.5}` | nothing but time |
+//! | `{"time": 1.5}` | only the time |
 //! | `{"wish": "cancel"}` | also `redo-last`, `skip` |
-//! | `{"answer": true}` | to the question that is open |
+//! | `{"answer": true}` | the answer to the open question |
 //!
 //! | out | what |
 //! |---|---|
 //! | `{"event": ..., "lines": [...]}` | an event as `mimu wizard --events` writes it, and as the terminal shows it |
 //! | `{"question": "..."}` | a question waits for its answer |
-//! | `{"standing": ...}` | how it stands, ten times a second |
-//! | `{"ended": {"outcome", "text", "refused"}}` | what it has come to, as `--json` writes it and in words; or why it was refused |
+//! | `{"standing": ...}` | its state, ten times a second |
+//! | `{"ended": {"outcome", "text", "refused"}}` | its outcome, as `--json` writes it and in words; or why it was refused |
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -44,7 +44,7 @@ struct OpenSession {
     person: Rc<RefCell<Person>>,
 }
 
-/// What the person has said and the session has not heard yet.
+/// Input of the person that the session has not taken yet.
 #[derive(Default)]
 struct Person {
     wishes: VecDeque<Wish>,
@@ -74,7 +74,7 @@ fn say(line: &Value) {
     println!("{line}");
 }
 
-/// Begins a session by the arguments of `mimu wizard`. The error is its line.
+/// Begins a session by the arguments of `mimu wizard`. The error is the line to print.
 pub fn begin(arguments: &[String]) -> Result<(), String> {
     let person = Rc::new(RefCell::new(Person::default()));
     let (arrivals, heard) = channel();
@@ -97,8 +97,8 @@ pub fn begin(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Hears what waits at standard input, and goes on with the session until it has to wait again. Whether it has ended.
-// A program for WASI ends with `main`, and a session does not: the page goes on with it by this name.
+/// Reads what waits at standard input, and continues the session until it must wait again. Returns 1 if the session has ended.
+// A WASI program ends with `main`, but a session does not: the page continues it through this function.
 #[unsafe(no_mangle)]
 #[expect(unsafe_code)]
 pub extern "C" fn mimu_go_on() -> u32 {
@@ -130,7 +130,7 @@ impl OpenSession {
         let mut person = self.person.borrow_mut();
         let arrived = match input {
             Input::Opened(at_s) => (at_s, Arrival::Opened),
-            // The page hands over characters below 256 only.
+            // The page sends only characters below 256.
             Input::Bytes(at_s, text) => (
                 at_s,
                 Arrival::Bytes(text.chars().map(|c| c as u8).collect()),
@@ -150,7 +150,7 @@ impl OpenSession {
                 return Ok(());
             }
         };
-        // A session that has dropped its line ends with the next step.
+        // A session that has closed its line ends with the next step.
         let _ = self.arrivals.send(arrived);
         Ok(())
     }
@@ -178,7 +178,7 @@ impl View for PageView {
     fn ask(&mut self, question: &Question) -> Option<bool> {
         if self.asked.as_ref() != Some(question) {
             self.asked = Some(question.clone());
-            // What was said before is no answer to it.
+            // An earlier answer does not belong to this question.
             self.person.borrow_mut().answer = None;
             say(&json!({"question": question.words()}));
         }

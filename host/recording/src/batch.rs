@@ -11,7 +11,7 @@ pub struct Batch {
     pub first_row: u64,
     /// Time in s.
     pub t_s: Vec<f64>,
-    /// Number of the dwell; -1 is in transit between two.
+    /// Number of the dwell; -1 between two dwells.
     pub step: Vec<i32>,
     /// Temperature in °C; NaN is an empty cell.
     pub temp_c: Vec<f64>,
@@ -32,7 +32,7 @@ impl Batch {
         self.t_s.is_empty()
     }
 
-    /// Numbers of `column`; `None` for the dwell numbers, which are no measurement.
+    /// Numbers of `column`; `None` for the dwell numbers, which are integers.
     pub fn values(&self, column: Column) -> Option<&[f64]> {
         match column {
             Column::Time => Some(&self.t_s),

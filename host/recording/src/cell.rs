@@ -1,4 +1,4 @@
-//! One cell of text: a number, a dwell number, or what to say about it.
+//! One cell of text: parsed as a number or a dwell number, or refused with a reason.
 
 /// Text of a cell for an error message: printable, on one line, 40 characters at most.
 pub(super) fn shorten(cell: &[u8]) -> String {
@@ -15,11 +15,10 @@ pub(super) fn shorten(cell: &[u8]) -> String {
     format!("\"{short}\"")
 }
 
-/// Largest size of a number that can be a reading: no unit makes one larger, and squares of sums of these are
-/// far from overflowing.
+/// Largest magnitude of a reading. No unit needs more, and squares of sums of such numbers are far from overflowing.
 const LARGEST: f64 = 1e30;
 
-/// Whether `value` can be a reading. Not a number, an empty cell, can.
+/// Whether `value` can be a reading. NaN can: it is an empty cell.
 pub(super) fn is_reading(value: f64) -> bool {
     !(value.abs() > LARGEST)
 }
@@ -37,9 +36,9 @@ impl Refusal {
     }
 }
 
-/// Number in a cell; NaN where it is empty or says so.
+/// Number in a cell; NaN if the cell is empty or contains `nan`.
 ///
-/// An infinite or absurd one is refused: no sensor measures it, and it would pass every later sum unnoticed.
+/// Infinite and absurdly large values are refused: no sensor measures them, and later sums would include them unnoticed.
 pub(super) fn number(cell: &[u8]) -> Result<f64, Refusal> {
     let cell = cell.trim_ascii();
     if cell.is_empty() {
@@ -56,7 +55,7 @@ pub(super) fn number(cell: &[u8]) -> Result<f64, Refusal> {
     }
 }
 
-/// What to say about a cell that holds something else.
+/// Refusal of a cell that is not a number.
 pub(super) fn no_number(cell: &[u8]) -> Refusal {
     Refusal::new(
         format!("{} is not a number", shorten(cell)),
@@ -64,7 +63,7 @@ pub(super) fn no_number(cell: &[u8]) -> Refusal {
     )
 }
 
-/// What to say about a value that is no reading, `shown` as in the file.
+/// Refusal of a value that cannot be a reading; `shown` is its text in the file.
 pub(super) fn no_reading(value: f64, shown: &str) -> Refusal {
     let problem = match value.is_infinite() {
         true => format!("{shown} is infinite"),
@@ -73,7 +72,7 @@ pub(super) fn no_reading(value: f64, shown: &str) -> Refusal {
     Refusal::new(problem, "leave the cell empty if nothing was measured")
 }
 
-/// What to say about a row without a time.
+/// Refusal of a row without a time.
 pub(super) fn no_time() -> Refusal {
     Refusal::new(
         "the time is empty".to_owned(),
@@ -81,14 +80,13 @@ pub(super) fn no_time() -> Refusal {
     )
 }
 
-/// Number of a dwell from its value; NaN is in transit.
+/// Number of a dwell from its value; NaN (between two dwells) becomes -1.
 ///
 /// Whole numbers written as `3.0` pass: tables with empty cells come out of pandas that way.
 pub(super) fn step_from_value(value: f64, text: &dyn Fn() -> String) -> Result<i32, Refusal> {
     if value.is_nan() {
         Ok(-1)
     } else if value.fract() == 0.0 && (-1.0..=f64::from(i32::MAX)).contains(&value) {
-        // In range and whole, by the line above.
         Ok(value as i32)
     } else {
         Err(Refusal::new(
@@ -98,7 +96,7 @@ pub(super) fn step_from_value(value: f64, text: &dyn Fn() -> String) -> Result<i
     }
 }
 
-/// Number of a dwell in a cell; -1 where it is empty.
+/// Number of a dwell in a cell; -1 if it is empty.
 pub(super) fn step(cell: &[u8]) -> Result<i32, Refusal> {
     let cell = cell.trim_ascii();
     // The plain case first: one or more digits that fit.
@@ -110,7 +108,7 @@ pub(super) fn step(cell: &[u8]) -> Result<i32, Refusal> {
     let value = if cell.is_empty() {
         f64::NAN
     } else {
-        // A word becomes a fraction, which the check below refuses with the right words.
+        // A word becomes a fraction, which the check below refuses.
         fast_float2::parse::<f64, _>(cell).unwrap_or(0.5)
     };
     step_from_value(value, &|| shorten(cell))

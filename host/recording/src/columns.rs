@@ -21,7 +21,7 @@ pub const REFERENCE_COLUMNS: [&str; 6] = [
 /// One column of a samples file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Column {
-    /// Time in s; the one column that must be there.
+    /// Time in s; every recording has it.
     Time,
     /// Number of the dwell.
     Step,
@@ -53,7 +53,7 @@ impl Column {
         }
     }
 
-    /// Column of that name, if a recording knows it.
+    /// Column with that name, if there is one.
     pub fn from_name(name: &str) -> Option<Column> {
         Column::all().find(|column| column.name() == name)
     }
@@ -92,7 +92,7 @@ impl Columns {
         }
     }
 
-    /// The columns that are there, in file order of a writer.
+    /// The columns that are there, in the order of a writer.
     pub fn present(&self) -> impl Iterator<Item = Column> + '_ {
         Column::all().filter(|&column| self.has(column))
     }
@@ -101,7 +101,7 @@ impl Columns {
 /// What the names in a header mean.
 #[derive(Debug, Clone)]
 pub(super) struct Layout {
-    /// Meaning of each column of the file; `None` is one that nobody knows.
+    /// Meaning of each column of the file; `None` for an unknown name.
     pub slots: Vec<Option<Column>>,
     /// Which columns there are.
     pub columns: Columns,
@@ -110,7 +110,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Checks the names of a header; `place` is the file (and line) that they stand in.
+    /// Checks the names of a header; `place` is its file (and line).
     pub fn from_names<S: AsRef<str>>(names: &[S], place: &str) -> Result<Layout> {
         let mut slots = Vec::with_capacity(names.len());
         let mut warnings = Vec::new();

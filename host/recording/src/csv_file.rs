@@ -19,7 +19,7 @@ mod tests;
 /// Bytes that a worker parses at a time: large beside a seek, small beside the memory.
 pub(super) const CHUNK: u64 = 4 << 20;
 
-/// Longest line in bytes; a longer one is no table.
+/// Longest line in bytes; a file with a longer one is not a table.
 const LONGEST_LINE: u64 = 1 << 20;
 
 /// UTF-8 byte order mark, which spreadsheets put before the header.
@@ -77,7 +77,7 @@ impl CsvFile {
             .map(|name| String::from_utf8_lossy(name).into_owned())
             .collect();
         let layout = Layout::from_names(&names, &format!("{place}, row 1"))?;
-        // Something after the header: a row, or at least the attempt at one.
+        // At least part of a row must follow the header.
         if head[end..].trim_ascii().is_empty() && length == head.len() as u64 {
             return Err(Error::new(
                 format!("{place}, row 2"),
@@ -94,8 +94,8 @@ impl CsvFile {
         })
     }
 
-    /// Leaves out what stands behind the last line break: of a file that nobody has ended it may be half a row, and half a number reads
-    /// like a whole one. Returns how many bytes that is.
+    /// Leaves out what follows the last line break, and returns its number of bytes. In an unfinished file this may be half a row, and half a number
+    /// reads like a whole one.
     pub fn leave_out_cut_row(&mut self) -> Result<u64> {
         let io = |error: std::io::Error| Error::io(&self.path, &error);
         let mut file = File::open(&self.path).map_err(io)?;
@@ -109,8 +109,7 @@ impl CsvFile {
         Ok(cut)
     }
 
-    /// Hands the rows to `consume` in order and returns their number; `chunk` is the bytes that a
-    /// worker parses at a time.
+    /// Hands the rows to `consume` in order and returns their number. A worker parses `chunk` bytes at a time.
     pub fn for_each_batch(
         &self,
         chunk: u64,
@@ -157,7 +156,7 @@ impl CsvFile {
 /// Rows of one chunk.
 struct Parsed {
     batch: Batch,
-    /// Lines of text, of whatever kind.
+    /// Lines of text, blank ones included.
     lines: u64,
 }
 
@@ -199,7 +198,7 @@ struct Worker<'a> {
     chunk: u64,
     file: Option<File>,
     text: Vec<u8>,
-    /// Rows of the chunk before, as a guess how many come next.
+    /// Number of rows to allocate for, guessed from the chunk before.
     expected_rows: usize,
     record: csv::ByteRecord,
 }
@@ -235,7 +234,7 @@ impl<'a> Worker<'a> {
         let length = self.source.length;
         let begin = self.source.start + index * self.chunk;
         let end = (begin + self.chunk).min(length);
-        // One byte more in front tells whether a line begins right at `begin`.
+        // One byte more in front shows whether a line begins right at `begin`.
         let from = if index == 0 { begin } else { begin - 1 };
         file.seek(SeekFrom::Start(from))?;
         text.clear();
@@ -250,7 +249,7 @@ impl<'a> Worker<'a> {
         };
         let mut too_long = false;
         if first < text.len() && text.last() != Some(&b'\n') && end < length {
-            // The last line runs into the next chunk, which will leave it alone.
+            // The last line runs into the next chunk, which skips it.
             const STEP: u64 = 1 << 16;
             let whole = text.len();
             loop {
@@ -373,7 +372,7 @@ impl<'a> Worker<'a> {
 /// The lines that belong to a chunk.
 struct Owned<'t> {
     text: &'t [u8],
-    /// Whether the last one was given up on.
+    /// Whether reading stopped within the last line because it was too long.
     too_long: bool,
 }
 
@@ -392,8 +391,8 @@ enum RowFault {
 
 /// Parses a line without quotes.
 ///
-/// The numbers are parsed in place, without looking for the end of the cell first: half the time
-/// of splitting and then parsing with the standard library (12 instead of 25 ns a cell).
+/// The numbers are parsed in place, without looking for the end of the cell first. This takes half the time of splitting first and then parsing with
+/// the standard library (12 instead of 25 ns a cell).
 fn parse_plain(
     slots: &[Option<Column>],
     line: &[u8],
@@ -405,7 +404,7 @@ fn parse_plain(
         let text = rest.ok_or(RowFault::Width)?;
         if !matches!(slot, None | Some(Column::Step))
             && let Ok((value, used)) = fast_float2::parse_partial::<f64, _>(text)
-            // Not a number must go the long way too: it may be the time.
+            // NaN takes the long way too, where it is refused in the column of the time.
             && !value.is_nan()
             && cell::is_reading(value)
             && (used == text.len() || text[used] == b',')

@@ -34,7 +34,7 @@ impl CsvWriter {
         })
     }
 
-    /// Goes on behind the first `bytes` bytes of a file that [`Self::create`] began.
+    /// Continues after the first `bytes` bytes of a file that [`Self::create`] began; the rest is cut off.
     pub fn append(path: &Path, columns: Columns, bytes: u64) -> Result<CsvWriter> {
         let io = |error: std::io::Error| Error::io(path, &error);
         let file = File::options().append(true).open(path).map_err(io)?;
@@ -84,7 +84,7 @@ impl CsvWriter {
         &self.file
     }
 
-    /// Hands everything over to the system, which keeps it whatever becomes of this program.
+    /// Hands everything to the operating system, which keeps it even if this program is killed.
     pub fn flush(&mut self) -> Result<()> {
         self.file
             .write_all(&self.text)

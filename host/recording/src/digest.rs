@@ -1,4 +1,4 @@
-//! SHA-256 of files, beside the reading.
+//! SHA-256 of files, computed while they are read.
 
 use std::fs::File;
 use std::io::Read;
@@ -11,11 +11,10 @@ use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
 
-/// Runs `work` and, at the same time on a thread of its own, hashes the bytes of `path`; returns
-/// what `work` returns and the digest in hexadecimal, as `sha256sum` prints it.
+/// Runs `work` while another thread hashes the bytes of `path`. Returns what `work` returns, and the digest in hexadecimal as `sha256sum` prints it.
 ///
-/// The file is read twice, the second time from the page cache. The alternative, to pass the
-/// chunks of the readers on in file order, would make the slowest of the two hold up the other.
+/// The file is read twice, the second time from the page cache. If the readers passed their chunks on in file order instead, the slower side would
+/// hold up the other.
 #[cfg(not(target_family = "wasm"))]
 pub(super) fn beside<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<(T, String)> {
     /// Tells the hashing thread to stop when the reading ends in an error, or panics.
@@ -42,7 +41,7 @@ pub(super) fn beside<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result
     })
 }
 
-/// The same where there are no threads: one after the other.
+/// The same without threads: one after the other.
 #[cfg(target_family = "wasm")]
 pub(super) fn beside<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<(T, String)> {
     Ok((work()?, sha256(path)?))

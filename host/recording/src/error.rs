@@ -1,10 +1,9 @@
-//! Errors: what kind, the place, what is wrong there, and what to do.
+//! Errors: kind, place, problem and remedy.
 
 use std::fmt;
 use std::path::Path;
 
-/// What was refused, as the one line that a person reads: `PLACE: PROBLEM; REMEDY`. A line that lacks one of the three parts is
-/// what makes tools tiresome, so none can be left out.
+/// What was refused, shown as one line: `PLACE: PROBLEM; REMEDY`. A user needs all three parts, so none can be left out.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refused {
     /// File with row and column, or step, axis, parameter: as narrow as is known.
@@ -13,7 +12,7 @@ pub struct Refused {
     pub problem: String,
     /// What the reader can do about it.
     pub remedy: String,
-    /// What the caller can set otherwise; a command adds the names of its flags.
+    /// Settings that the caller can change; a command adds the names of its flags.
     pub arguments: Vec<Argument>,
 }
 
@@ -23,19 +22,19 @@ pub struct Refused {
 pub enum Error {
     /// The operating system refused a file, a folder or a port.
     Io(std::io::ErrorKind, Refused),
-    /// A file, its samples or a setting is not what it has to be.
+    /// A file, its samples or a setting is invalid.
     Invalid(Refused),
     /// The experiment does not determine what was asked for.
     Undetermined(Refused),
-    /// A device does not answer, or refused.
+    /// A device does not answer, or refuses.
     Device(Refused),
 }
 
-/// Something that a caller sets, which an error may suggest to set otherwise.
+/// A setting of the caller that an error may suggest to change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Argument {
-    /// Which column is what.
+    /// What each column contains.
     Columns,
     /// Samples a second.
     SampleRate,
@@ -49,9 +48,9 @@ pub enum Argument {
     Reference,
     /// Name of the unit.
     Device,
-    /// The dwells of the step column as they are.
+    /// Use the dwells of the step column.
     StepsGiven,
-    /// Dwells that are found, whatever the step column says.
+    /// Find the dwells, and ignore the step column.
     StepsFound,
     /// Largest variance of a dwell.
     StillFactor,
@@ -61,7 +60,7 @@ pub enum Argument {
     Method,
     /// Which of the two sensors is calibrated.
     Only,
-    /// Beginning and end of a stretch of time.
+    /// Beginning and end of a time segment.
     Stretch,
     /// A calibration to convert readings by.
     Calibration,
@@ -71,9 +70,9 @@ pub enum Argument {
     Sensor,
     /// Magnitudes of a turntable's rates.
     TurntableRates,
-    /// How well they are known.
+    /// Uncertainty of these rates.
     TurntableRateError,
-    /// Whether what exists is replaced.
+    /// Whether an existing result is replaced.
     Replace,
     /// Serial port.
     Port,
@@ -85,13 +84,13 @@ pub enum Argument {
     Instance,
     /// Which rows of a foreign file are read.
     Where,
-    /// Whose layout a foreign file has.
+    /// Software or device whose files are read.
     Preset,
-    /// Whether rows are means, and no samples.
+    /// Whether rows are means instead of samples.
     Means,
     /// How many rows that cannot be read are left out.
     SkipBroken,
-    /// Of which columns a firmware took the low byte for a signed number.
+    /// Columns whose low byte a firmware took for a signed number.
     SignedLowByte,
     /// Products that are accepted on the evidence of one recording.
     Accept,
@@ -141,21 +140,21 @@ pub enum Argument {
     CalibrationOfNoise,
     /// Noise of the unit.
     Noise,
-    /// Rate random walk of the gyro, where its noise shows none.
+    /// Rate random walk of the gyro, if its noise file shows none.
     GyroWalk,
-    /// That of the accelerometer.
+    /// The same for the accelerometer.
     AccelWalk,
     /// SI unit per raw unit by which a driver converts a gyro's readings.
     GyroConversion,
-    /// The same of an accelerometer's.
+    /// The same for an accelerometer.
     AccelConversion,
-    /// Raw reading that a driver takes for no rate.
+    /// Raw reading that a driver converts to a rate of 0.
     GyroZero,
-    /// Raw reading that a driver takes for no force.
+    /// Raw reading that a driver converts to a force of 0.
     AccelZero,
     /// Beginning of the names in a source file.
     Prefix,
-    /// Of how many samples one is written.
+    /// One sample out of this many is written.
     Every,
 }
 
@@ -163,7 +162,7 @@ pub enum Argument {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// Something that is not what it has to be, at `place` (file, row, column, step or axis).
+    /// An invalid input at `place` (file, row, column, step or axis).
     pub fn new(
         place: impl fmt::Display,
         problem: impl fmt::Display,
@@ -186,7 +185,7 @@ impl Error {
         Self::Undetermined(Self::new(place, problem, remedy).into_refused())
     }
 
-    /// A device that does not answer, or refused.
+    /// A device that does not answer, or refuses.
     pub fn device(
         place: impl fmt::Display,
         problem: impl fmt::Display,
@@ -195,13 +194,13 @@ impl Error {
         Self::Device(Self::new(place, problem, remedy).into_refused())
     }
 
-    /// It, saying that `argument` can be set otherwise.
+    /// Adds `argument` to the settings that can be changed.
     pub fn about(mut self, argument: Argument) -> Self {
         self.refused_mut().arguments.push(argument);
         self
     }
 
-    /// It, with another place, problem or remedy.
+    /// Changes the place, problem or remedy.
     pub fn map(mut self, change: impl FnOnce(&mut Refused)) -> Self {
         change(self.refused_mut());
         self
@@ -244,7 +243,7 @@ impl Error {
             std::io::ErrorKind::StorageFull => "free some space and run it again",
             _ => "check the file and the disk",
         };
-        // "(os error 2)" helps nobody who reads the sentence before it.
+        // "(os error 2)" adds nothing to the sentence before it.
         let text = error.to_string();
         let text = text
             .split(" (os error")
@@ -267,7 +266,7 @@ impl fmt::Display for Error {
             ..
         } = self.refused();
         let line = format!("{place}: {problem}; {remedy}");
-        // A file name or a cell may hold a line break, or what moves a terminal's cursor; the promise is one line.
+        // A file name or a cell may contain line breaks or control characters. The message stays on one line.
         let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
         f.write_str(&line.replace(breaks, " "))
     }

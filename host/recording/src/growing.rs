@@ -1,8 +1,8 @@
-//! A recording that grows while it is received, and can be read whatever becomes of the program.
+//! A recording that grows while it is received, and stays readable even if the program is killed.
 //!
-//! Rows are appended to `samples.csv` as they come and handed to the system at once, so that a killed program loses none; another
-//! thread waits for the disk every second, so that a power failure loses no more than that. Not Parquet, whose files cannot be read
-//! before they are ended, and no journal of another kind, which would need a program of its own to be read.
+//! Rows are appended to `samples.csv` as they come and handed to the operating system at once, so that a killed program loses none. Another thread
+//! syncs the file to disk every second, so that a power failure loses no more than that. Parquet files would be unreadable before they are finished,
+//! and a journal of another format would need its own program to be read.
 
 use std::fs::{self, File};
 use std::io::Write as _;
@@ -21,7 +21,7 @@ use super::staging::{check_target, sync_directory};
 use super::writer::{SampleFormat, Writer};
 use crate::error::{Error, Result};
 
-/// Time between two waits for the disk.
+/// Time between two syncs to disk.
 const SYNC: Duration = Duration::from_secs(1);
 
 /// A recording that is being received.
@@ -34,7 +34,7 @@ pub struct Growing {
     disk: Option<Disk>,
 }
 
-/// The thread that waits for the disk: a disk may take longer than the port's buffer of some tenths of a second holds.
+/// The thread that syncs the file to disk. A sync may take longer than the port can buffer, which is some tenths of a second.
 #[derive(Debug)]
 struct Disk {
     stop: Sender<()>,
@@ -42,14 +42,14 @@ struct Disk {
 }
 
 impl Growing {
-    /// Refuses a directory in which none can be begun.
+    /// Refuses a directory in which no recording can be started.
     pub fn check(directory: &Path) -> Result<()> {
         check_target(directory, None)?;
-        // Only a try: dropped, it leaves nothing.
+        // Only a trial: when dropped, it removes the folders again.
         Parents::create(directory).map(drop)
     }
 
-    /// Begins a recording in a new directory. Its manifest is written now, and says that it is unfinished.
+    /// Starts a recording in a new directory. Its manifest is written now and marks the recording as unfinished.
     pub fn create(directory: &Path, columns: Columns, manifest: &Manifest) -> Result<Self> {
         let place = directory.join(MANIFEST_FILE).display().to_string();
         manifest.check(&place)?;
@@ -74,8 +74,7 @@ impl Growing {
         Ok(growing)
     }
 
-    /// Goes on with a recording that was not ended, behind its first `rows` rows, which take `bytes` bytes: what is behind them is
-    /// cut off.
+    /// Continues an unfinished recording after its first `rows` rows, which end at byte `bytes` of the samples file. The rest is cut off.
     pub fn resume(directory: &Path, columns: Columns, rows: u64, bytes: u64) -> Result<Self> {
         let path = directory.join(SampleFormat::Csv.file_name());
         let csv = CsvWriter::append(&path, columns, bytes)?;
@@ -89,7 +88,7 @@ impl Growing {
         })
     }
 
-    /// Waits until the disk has what was written; bytes of the samples.
+    /// Waits until everything written is on the disk; returns the size of the samples file in bytes.
     pub fn sync(&self) -> Result<u64> {
         let Some(csv) = &self.csv else {
             return Ok(0);
@@ -101,7 +100,7 @@ impl Growing {
             .map_err(|error| Error::io(&self.directory, &error))
     }
 
-    /// Appends rows, which have the announced columns and nothing that a reader would refuse.
+    /// Appends rows. They must have the announced columns, and no value that a reader would refuse.
     pub fn write(&mut self, batch: &Batch) -> Result<()> {
         if let Some(column) = batch.ragged(&self.columns) {
             return Err(Error::new(
@@ -130,8 +129,8 @@ impl Growing {
         self.rows
     }
 
-    /// Ends it: `manifest` takes the place of the one of the beginning, the samples become Parquet if that is wanted. `complete` writes
-    /// into the rows what was not known before the end. Without a row nothing is left.
+    /// Finishes the recording: `manifest` replaces the first one, and the samples are converted if `format` is Parquet. `complete` fills in what was
+    /// known only at the end. A recording without rows is removed.
     pub fn finish(
         mut self,
         manifest: &Manifest,
@@ -168,7 +167,7 @@ impl Growing {
         writer.finish(&manifest).map(drop)
     }
 
-    /// Puts a manifest in the place of the one that is there.
+    /// Replaces the manifest.
     fn state(&self, manifest: &Manifest) -> Result<()> {
         let io = |error: std::io::Error| Error::io(&self.directory, &error);
         let text = manifest.to_toml()?;
@@ -178,7 +177,7 @@ impl Growing {
             .map_err(io)?;
         file.write_all(text.as_bytes()).map_err(io)?;
         file.as_file().sync_all().map_err(io)?;
-        // Temporary files are private; a recording is for everybody who may read the folder.
+        // Temporary files are private, but everybody who may read the folder may read the recording.
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt as _;
@@ -191,7 +190,7 @@ impl Growing {
         Ok(())
     }
 
-    /// Ends the thread, and says what it says.
+    /// Ends the syncing thread and returns its result.
     fn settle(&mut self) -> Result<()> {
         let Some(Disk { stop, thread }) = self.disk.take() else {
             return Ok(());
@@ -209,7 +208,7 @@ impl Growing {
 }
 
 impl Disk {
-    /// `None` where files are in memory: there is no disk to wait for, and no thread.
+    /// `None` if files are in memory: there is no disk to sync.
     fn new(file: &File) -> std::io::Result<Option<Self>> {
         if cfg!(target_family = "wasm") {
             return Ok(None);
@@ -230,7 +229,7 @@ impl Disk {
 
 impl Drop for Growing {
     fn drop(&mut self) {
-        // What it says does not matter any more: the recording was given up, and stays unfinished.
+        // The result no longer matters: the recording was abandoned and stays unfinished.
         let _ = self.settle();
     }
 }

@@ -1,42 +1,43 @@
-//! Readings that are written again until the sensor has a new one, as by a logger that is faster than its sensor.
+//! Repeated readings: a logger that is faster than its sensor writes each reading several times.
 
-/// Longest run of equal readings, in rows, that is a hold: longer ones are a sensor that is stuck, or so quiet that its converter shows nothing.
+/// Longest run of equal readings, in rows, that counts as a hold. A longer run comes from a stuck sensor, or from noise far below the quantisation
+/// step.
 const LONGEST: usize = 31;
-/// Readings that show a rule.
+/// Fewest readings from which repetition is concluded.
 const FEWEST: u64 = 50;
-/// Least share of rows that repeat the one before. A bus that fails now and then repeats fewer.
+/// Least share of rows that repeat the one before. A bus that fails occasionally repeats fewer.
 const SHARE: f64 = 0.1;
-/// Axes of three that change with a new reading, at least. Where rows repeat by chance, as the noise is less than the converter's step, a
-/// tenth of all rows does so only if less than two axes change in the others.
+/// Least mean number of axes, out of three, that change with a new reading. If rows repeat by chance, because the noise is below the quantisation
+/// step, a tenth of all rows repeats only if fewer than two axes change in the others.
 const CHANGED: f64 = 2.5;
-/// Share of the rows in holds that last as long as the others, to two rows.
+/// Least share of the held rows in runs whose length is within two rows of the mean.
 const ALIKE: f64 = 0.9;
 
 /// Watches the readings of a sensor, row by row.
 #[derive(Debug, Clone, Default)]
 pub struct HeldReadings {
     last: Option<[f64; 3]>,
-    /// Rows with the reading at hand so far.
+    /// Rows so far with the current reading.
     run: usize,
     changes: u64,
     changed_axes: u64,
-    /// How many readings stood for so many rows.
+    /// Number of readings by the number of rows that each lasted.
     runs: [u64; LONGEST + 1],
 }
 
-/// What was found of a sensor that is slower than its log.
+/// Result for a sensor that is slower than its log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held {
     /// Rows that repeat all axes of the row before.
     pub repeated: u64,
     /// Rows in which the sensor was watched.
     pub rows: u64,
-    /// Rows to a reading, in the mean.
+    /// Mean number of rows per reading.
     pub rows_per_reading: f64,
 }
 
 impl HeldReadings {
-    /// The next row.
+    /// Takes the next row.
     pub fn push(&mut self, reading: [f64; 3]) {
         if reading.iter().any(|value| value.is_nan()) {
             (self.last, self.run) = (None, 0);
@@ -50,7 +51,7 @@ impl HeldReadings {
             }
             self.changes += 1;
             self.changed_axes += changed as u64;
-            // The first run has no beginning.
+            // The first run may have begun before the log.
             if self.run > 0 && self.run <= LONGEST && self.changes > 1 {
                 self.runs[self.run] += 1;
             }
@@ -84,7 +85,7 @@ impl HeldReadings {
 }
 
 impl Held {
-    /// In a sentence about `sensor`, whose rows come at `rate_hz`.
+    /// A sentence about `sensor`, whose rows come at `rate_hz`.
     pub fn words(&self, sensor: &str, rate_hz: f64) -> String {
         let per_reading = self.rows_per_reading;
         format!(
@@ -111,7 +112,8 @@ mod tests {
         }
     }
 
-    /// Readings of three axes with noise of `sigma` steps of the converter, new every `per_reading` rows; at rest but for `moves` of the rows.
+    /// Result for three axes with noise of `sigma` quantisation steps and a new reading every `per_reading` rows. The unit moves in the rows that
+    /// `moves` selects.
     fn watched(per_reading: f64, sigma: f64, moves: impl Fn(usize) -> bool) -> Option<Held> {
         let mut random = uniform();
         let mut held = HeldReadings::default();
@@ -147,7 +149,7 @@ mod tests {
     fn readings_that_repeat_as_the_converter_is_coarse_are_not_held() {
         for sigma in [0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 3.0, 100.0] {
             assert_eq!(watched(1.0, sigma, |_| false), None, "{sigma}");
-            // At rest nothing shows, and in every fourth second it moves.
+            // At rest nothing shows; the unit moves during a quarter of the rows.
             assert_eq!(watched(1.0, sigma, |row| row % 400 < 100), None, "{sigma}");
         }
     }

@@ -1,4 +1,4 @@
-//! A recording whose samples another program holds, as arrays: nothing is written, and no copy of the whole is made.
+//! A recording whose samples are arrays of another program: nothing is written, and the whole is never copied.
 
 use std::fmt;
 use std::ops::Range;
@@ -13,7 +13,7 @@ use crate::error::{Argument, Error, Result};
 /// Rows that are copied at a time: 6 MB with every column.
 const ROWS: usize = 1 << 16;
 
-/// Samples that another program holds.
+/// Samples in the memory of another program.
 pub trait InMemory: fmt::Debug + Send + Sync {
     /// Number of rows.
     fn rows(&self) -> usize;
@@ -24,14 +24,14 @@ pub trait InMemory: fmt::Debug + Send + Sync {
     /// Appends `rows` of `column`, steps as numbers, to `values`.
     ///
     /// # Errors
-    /// The other program does not give them.
+    /// The other program fails to provide them.
     fn append(&self, column: Column, rows: Range<usize>, values: &mut Vec<f64>) -> Result<()>;
 }
 
-/// Sample rate, Hz, that most of `times`, s, are apart by: the median, which neither gaps nor bursts move.
+/// Sample rate, Hz, from the median interval of `times`, s, which neither gaps nor bursts move.
 ///
 /// # Errors
-/// There are fewer than two times, or most of them do not go on.
+/// There are fewer than two times, or most of them do not increase.
 pub fn usual_rate_hz(times: &[f64]) -> Result<f64> {
     let mut apart: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = apart.len() / 2;
@@ -70,7 +70,7 @@ pub(super) fn for_each_batch(
             bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
             digest.update(&bytes);
         }
-        // An empty cell is in transit, as in a file.
+        // As in a file, an empty cell is between two dwells.
         let number = |step: &f64| if step.is_nan() { -1 } else { *step as i32 };
         batch.step.extend(steps.iter().map(number));
         consume(&batch)?;
@@ -88,7 +88,7 @@ mod tests {
     use crate::reader::Recording;
     use crate::writer::{SampleFormat, Writer};
 
-    /// 150,000 rows of a gyro with steps: more than two pieces.
+    /// 150,000 rows of a gyro with steps: more than two batches.
     #[derive(Debug)]
     struct Numbers(usize);
 

@@ -10,9 +10,9 @@ use crate::error::{Error, Result};
 #[cfg(not(target_family = "wasm"))]
 const WAITING: usize = 2;
 
-/// Threads worth starting.
+/// Number of threads to start.
 ///
-/// Eight at most: each holds a few chunks, and the one consumer is slower than eight parsers.
+/// At most eight: each holds a few chunks, and the one consumer is slower than eight parsers.
 pub(super) fn worker_count() -> usize {
     thread::available_parallelism()
         .map_or(1, usize::from)
@@ -21,8 +21,8 @@ pub(super) fn worker_count() -> usize {
 
 /// Makes results 0..`count` on `workers` threads and hands them to `take` in that order.
 ///
-/// Worker w makes w, w + workers, w + 2 workers and so on, with a state of its own that `start(w)`
-/// builds. An error of `take` stops everything. `place` names the file for the case that a worker panics.
+/// Worker w makes w, w + workers, w + 2 workers and so on, with its own state from `start(w)`. An error of `take` stops everything. `place` names the
+/// file in the error if a worker panics.
 #[cfg(not(target_family = "wasm"))]
 pub(super) fn in_order<T, W, S>(
     place: &str,
@@ -47,7 +47,7 @@ where
             let body = move || {
                 let mut work = start(worker);
                 let mut index = worker as u64;
-                // A send fails when the consumer has given up; nobody wants the rest then.
+                // A send fails when the consumer has stopped; the rest is not needed then.
                 while index < count && sender.send(work(index)).is_ok() {
                     index += workers as u64;
                 }
@@ -78,7 +78,7 @@ where
         // Workers that wait in `send` must see that nobody listens, or the joins below never end.
         drop(receivers);
         for handle in handles {
-            // Joined by hand, as the scope passes on the panic of a thread that nobody has joined.
+            // Joined here, because the scope would pass on the panic of an unjoined thread.
             if handle.join().is_err() && outcome.is_ok() {
                 outcome = Err(broke_down(place));
             }
@@ -87,7 +87,7 @@ where
     })
 }
 
-/// The same where there are no threads: each result is made when it is wanted.
+/// The same without threads: each result is computed on demand.
 #[cfg(target_family = "wasm")]
 pub(super) fn in_order<T, W, S>(
     _: &str,
@@ -105,7 +105,7 @@ where
     (0..count).try_for_each(|index| take(index, works[(index % each) as usize](index)))
 }
 
-/// What to say when the code that reads a file panicked.
+/// Error after the code that reads a file has panicked.
 pub(super) fn broke_down(place: &str) -> Error {
     Error::new(
         place,

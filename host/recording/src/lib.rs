@@ -1,11 +1,10 @@
 //! Recordings: reading them in a stream, writing them whole, and importing foreign files.
 //!
-//! A recording is a directory with `recording.toml` ([`Manifest`]) and `samples.csv` or
-//! `samples.parquet`. Four hours at 1 kHz are ordinary, so nothing here holds a whole file:
-//! [`Recording::for_each_batch`] hands rows over in order, a few thousand at a time.
+//! A recording is a directory with `recording.toml` ([`Manifest`]) and `samples.csv` or `samples.parquet`. Four hours at 1 kHz are ordinary, so a
+//! recording is never read into memory as a whole: [`Recording::for_each_batch`] hands rows over in order, some hundred thousand at a time.
 //!
-//! The features `parquet` and `bags` are on by default. Without them neither Parquet nor the readers of ROS bags and MCAP are compiled, recordings are
-//! CSV, and such files are refused.
+//! The features `parquet` and `bags` are on by default. Without them neither Parquet nor the readers of ROS bags and MCAP are compiled, recordings
+//! are CSV, and such files are refused.
 
 pub mod error;
 pub mod result_file;

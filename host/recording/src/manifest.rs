@@ -1,4 +1,4 @@
-//! `recording.toml`: what is known of a recording beside its samples.
+//! `recording.toml`: what is known about a recording beside its samples.
 
 use std::fmt;
 use std::path::Path;
@@ -16,7 +16,7 @@ pub const MANIFEST_FILE: &str = "recording.toml";
 /// Gravity on the Earth's surface with room to spare: 9.764 (Huascarán) to 9.834 (poles) m/s².
 const GRAVITY_RANGE: std::ops::RangeInclusive<f64> = 9.7..=9.9;
 
-/// No inertial sensor is slower or faster.
+/// Sample rates in Hz; no inertial sensor is slower or faster.
 const RATE_RANGE: std::ops::RangeInclusive<f64> = 0.01..=1e7;
 
 /// Version of the layout of a recording.
@@ -37,8 +37,8 @@ pub enum RawUnit {
     /// The device's own counts.
     #[serde(rename = "count")]
     Count,
-    /// Already rad/s and m/s², from a device that applies a calibration of its own. "Raw" is then
-    /// what that device reports, and the fit finds what its calibration has left.
+    /// Already rad/s and m/s², from a device that applies its own calibration. "Raw" is then what that device reports, and the fit finds the errors
+    /// that its calibration leaves.
     #[serde(rename = "SI")]
     Si,
 }
@@ -47,7 +47,7 @@ pub enum RawUnit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reference {
-    /// The `ref_` columns hold it.
+    /// The `ref_` columns contain it.
     Table,
     /// Only the magnitude of gravity, at rest.
     Gravity,
@@ -139,50 +139,50 @@ pub struct Manifest {
     pub format: Format,
     /// Unit that was recorded.
     pub device: String,
-    /// Nominal sample rate in Hz; may be absent, not a number, of means alone.
+    /// Nominal sample rate in Hz. Only means may lack it; it is NaN then.
     #[serde(default = "unknown", skip_serializing_if = "is_unknown")]
     pub sample_rate_hz: f64,
     /// Local gravity in m/s².
     pub gravity_mps2: f64,
     /// Unit of the raw columns.
     pub raw_unit: RawUnit,
-    /// Latitude in degrees, north positive. Kept with the recording; no fit takes the Earth's rate out.
+    /// Latitude in degrees, north positive. Kept with the recording; no fit subtracts the Earth's rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub latitude_deg: Option<f64>,
     /// What is known of the true input.
     pub reference: Reference,
-    /// When the power came, on the clock of `t_s`, s: what goes by the time since then is counted from there. Without it, from the first
+    /// Time of the power-on, on the clock of `t_s`, s. Effects that depend on the time since power-on count from it; without it, from the first
     /// sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub power_on_s: Option<f64>,
-    /// It was not ended: what records it was killed, or is still at it. Its last row may be cut, and is left out then.
+    /// Whether the recording was not finished: its program was killed, or is still recording. A cut last row is then left out.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub unfinished: bool,
-    /// Instead of samples there are means, one row for each pose: only a fit and a verification can use them.
+    /// Whether there are means instead of samples, one row for each pose: only a fit and a verification can use them.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub means: bool,
-    /// Text label of step i, where the source named its steps.
+    /// Text label of step i, if the source named its steps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub step_labels: Vec<String>,
-    /// Steps that are turns of a known angle: only the mean of their rate is known, and they are anything but still.
+    /// Steps that are turns by a known angle: only their mean rate is known, and the unit is not at rest.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub turn_steps: Vec<i32>,
-    /// Steps that do not count, as they were had again: they are in transit like what is between the dwells.
+    /// Steps that were repeated and do not count: their rows are treated like those between dwells.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub dropped_steps: Vec<i32>,
     /// Arguments of the import that made the recording, with file names instead of paths.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub imported_with: Vec<String>,
-    /// The device that it was recorded from.
+    /// The device from which it was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recorded: Option<Recorded>,
     /// Where readings saturate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rails: Option<Rails>,
-    /// The rates that are known, where the reference is the magnitude of the rate.
+    /// The known rates, if the reference is the magnitude of the rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turntable: Option<Turntable>,
-    /// Files that it was imported from.
+    /// Files from which it was imported.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Source>,
 }
@@ -196,20 +196,20 @@ fn is_unknown(number: &f64) -> bool {
 }
 
 impl Manifest {
-    /// Why the device had started, where it says that it was no power-on and nobody has said when the power came: no time since power-on is
-    /// known then, not even that it was the first sample's.
+    /// Why the device had started, if it was not by a power-on and `power_on_s` is not given. The time since power-on is then unknown: it did not
+    /// begin at the first sample.
     pub fn start_without_power_on(&self) -> Option<&str> {
         let start = self.recorded.as_ref()?.start.as_deref()?;
         self.power_on_s.is_none().then_some(start)
     }
 
-    /// Number of the unit, if it was recorded from one that has any: that of an emulated one is zero.
+    /// Number of the unit, if it has one; an emulated unit has the number 0.
     pub fn unit_id(&self) -> Option<&str> {
         let recorded = self.recorded.as_ref()?;
         Some(recorded.unit_id.as_str()).filter(|id| id.bytes().any(|digit| digit != b'0'))
     }
 
-    /// Whether it was joined from files that follow one another, a step each.
+    /// Whether it was joined from files that follow one another, one step each.
     pub fn is_joined(&self) -> bool {
         let by = ["--sequence", "--faces"];
         self.imported_with.iter().any(|a| by.contains(&a.as_str()))
@@ -223,7 +223,7 @@ impl Manifest {
         label.cloned().unwrap_or_else(|| step.to_string())
     }
 
-    /// Manifest with the keys that have no default; the others empty.
+    /// Manifest with the keys that have no default; the others are empty.
     pub fn new(
         device: impl Into<String>,
         sample_rate_hz: f64,
@@ -266,7 +266,7 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// Checks the values; `place` is the file that they are in, or go to.
+    /// Checks the values; `place` is their file.
     pub fn check(&self, place: &str) -> Result<()> {
         let at = |key: &str| format!("{place}, {key}");
         match (self.sample_rate_hz.is_nan(), self.means) {

@@ -1,12 +1,11 @@
-//! The folders that a result is written into, made where they are missing.
+//! The folders of a result, created if they are missing.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Folders that were made for a result. Dropped, those that nothing was written into are removed again, so that a command which refuses
-/// leaves nothing behind.
+/// Folders that were created for a result. When dropped, it removes those that are still empty, so that a command that refuses leaves nothing behind.
 #[derive(Debug)]
 pub struct Parents {
     /// From the outermost to the innermost.
@@ -14,7 +13,7 @@ pub struct Parents {
 }
 
 impl Parents {
-    /// Makes the folder of `target`, with those that it lies in, where they are missing.
+    /// Creates the missing folders above `target`.
     pub fn create(target: &Path) -> Result<Self> {
         let folder = folder(target);
         let missing = folder
@@ -26,7 +25,7 @@ impl Parents {
         for path in missing {
             match fs::create_dir(&path) {
                 Ok(()) => parents.made.push(path),
-                // Another command made it in the meantime, and it is not for this one to remove.
+                // Another command created it meanwhile, so this one must not remove it.
                 Err(_) if path.is_dir() => {}
                 Err(error) => return Err(refused(target, &path, &error)),
             }
@@ -54,14 +53,14 @@ fn refused(target: &Path, folder: &Path, error: &std::io::Error) -> Error {
 
 impl Drop for Parents {
     fn drop(&mut self) {
-        // What holds the result is not empty, and stays.
+        // The folder of the result is not empty, and stays.
         for path in self.made.iter().rev() {
             let _ = fs::remove_dir(path);
         }
     }
 }
 
-/// The folder that `path` lies in.
+/// The folder that contains `path`.
 pub(crate) fn folder(path: &Path) -> &Path {
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
     parent.unwrap_or(Path::new("."))

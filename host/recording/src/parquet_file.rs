@@ -1,8 +1,7 @@
 //! `samples.parquet`: decoded by several threads, each with some of the columns, slice by slice.
 //!
-//! The work is divided by column and not by row group. Files by other programs often are one big
-//! row group, which could not be divided at all, and with a thread for each row group the memory
-//! grows with the row group, of whatever size its writer chose.
+//! The work is divided by columns, not by row groups. Files of other programs are often one big row group, which could not be divided at all. With a
+//! thread for each row group, the memory would grow with the row group, whose size its writer chose.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -28,7 +27,7 @@ mod tests;
 /// Rows that are decoded at a time: 1 MiB of numbers in each column.
 pub(super) const SLICE: usize = 1 << 17;
 
-/// Numbers that a column's vector is made for in advance, at most: half a GiB, which is taken page by page as it fills.
+/// Most numbers for which a column's vector is reserved in advance: half a GiB, which is used page by page as it fills.
 const MOST_RESERVED: u64 = 1 << 26;
 
 /// A Parquet file whose footer has been read.
@@ -50,7 +49,7 @@ pub(super) struct Leaf {
 }
 
 impl Leaf {
-    /// Whether it holds text and not numbers.
+    /// Whether it contains text instead of numbers.
     pub fn is_text(&self) -> bool {
         self.text
     }
@@ -61,7 +60,7 @@ impl ParquetFile {
     pub fn open(path: &Path) -> Result<ParquetFile> {
         let place = path.display().to_string();
         let file = StrictFile::open(path).map_err(|error| Error::io(path, &error))?;
-        // The decoder of the footer has panicked on damaged files before.
+        // The decoder of the footer panics on some damaged files.
         let metadata = catch_unwind(AssertUnwindSafe(|| {
             ParquetMetaDataReader::new().parse_and_finish(&file)
         }))
@@ -175,8 +174,7 @@ impl ParquetFile {
 }
 
 impl ParquetFile {
-    /// Hands the rows to `consume` in order; `layout` says what the columns mean and `slice` how
-    /// many rows to decode at a time.
+    /// Hands the rows to `consume` in order. `layout` gives the meaning of the columns, `slice` the number of rows to decode at a time.
     pub fn for_each_batch(
         &self,
         layout: &Layout,
@@ -201,7 +199,7 @@ impl ParquetFile {
             slices * workers as u64,
             workers,
             |worker| {
-                // Dealt like cards, so that neighbours, which cost the same, go to different threads.
+                // Distributed in turn, so that neighbours, which cost the same, go to different threads.
                 let mine = wanted.iter().skip(worker).step_by(workers);
                 let mut cursors: Vec<(Column, Cursor)> = mine
                     .map(|&(column, leaf)| (column, Cursor::new(self, leaf)))
@@ -218,7 +216,7 @@ impl ParquetFile {
             |index, part: std::result::Result<Vec<(Column, Decoded)>, Fault>| {
                 match part {
                     Err(worse) => {
-                        // Of the columns that fail in this slice the earliest row counts.
+                        // If several columns fail in this slice, the earliest row is reported.
                         if fault.as_ref().is_none_or(|known| worse.row < known.row) {
                             fault = Some(worse);
                         }
@@ -335,7 +333,7 @@ pub(super) struct Cursor {
     group: usize,
     reader: Option<ColumnReader>,
     levels: Vec<i16>,
-    /// Whether an error has been returned: the decoder's state is then anything.
+    /// Whether an error has been returned: the decoder's state is then undefined.
     broken: bool,
 }
 
@@ -373,7 +371,7 @@ impl Cursor {
                     false => f64::from(value),
                 })
             }
-            // Beyond 2^53 the nearest double is as good as a sensor's number gets.
+            // Beyond 2^53 the nearest double is used: no sensor resolves more.
             ColumnReader::Int64ColumnReader(reader) => {
                 append(reader, count, levels, values, |value| match unsigned {
                     true => value.cast_unsigned() as f64,
@@ -386,7 +384,7 @@ impl Cursor {
         })
     }
 
-    /// Appends the next `count` values, and of a column of INT64 that are not unsigned also undiminished, `None` for null.
+    /// Appends the next `count` values. A column of signed INT64 is also appended to `wholes` without rounding, `None` for null.
     pub fn read_whole(
         &mut self,
         count: usize,
@@ -434,7 +432,7 @@ impl Cursor {
         })
     }
 
-    /// Has `decode` take `count` rows, from as many row groups as that takes.
+    /// Lets `decode` read `count` rows, from as many row groups as needed.
     fn advance<F>(&mut self, count: usize, mut decode: F) -> std::result::Result<(), String>
     where
         F: FnMut(&mut ColumnReader, &mut Vec<i16>, usize) -> parquet::errors::Result<usize>,
@@ -442,7 +440,7 @@ impl Cursor {
         if self.broken {
             return Err("the file is damaged before this row".to_owned());
         }
-        // Until the end is reached well, what the decoder holds is anything.
+        // Until this succeeds, the decoder's state is undefined.
         self.broken = true;
         let mut missing = count;
         while missing > 0 {
@@ -472,7 +470,7 @@ impl Cursor {
     fn open_group(&mut self, group: usize) -> parquet::errors::Result<ColumnReader> {
         let file = match &self.file {
             Some(file) => file.clone(),
-            // A handle of its own: the position of a shared one would move under the other threads.
+            // A separate handle: other threads would move the position of a shared one.
             None => {
                 let file = Arc::new(StrictFile::open(&self.source.path)?);
                 self.file.insert(file).clone()
@@ -502,7 +500,7 @@ fn append<T: DataType>(
     Ok(rows)
 }
 
-/// Moves the values from `start` on apart so that every null among `rows` rows has its place.
+/// Spreads the values from `start` on so that every null among `rows` rows has its place.
 fn spread<T: Clone>(values: &mut Vec<T>, start: usize, rows: usize, levels: &[i16], null: T) {
     let mut from = values.len();
     if from - start == rows {

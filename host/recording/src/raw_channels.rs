@@ -1,4 +1,4 @@
-//! Raw channels that a person names: those of a sensor, or one by itself.
+//! Raw channels by name: those of a sensor, or a single one.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ use crate::columns::{Column, RAW_COLUMNS};
 pub(crate) struct RawChannels(String);
 
 impl RawChannels {
-    /// The channels of this name; the error says what is wrong with it.
+    /// The channels of this name; the error gives the reason.
     pub fn named(text: &str) -> Result<Self, String> {
         match text == "gyro" || text == "accel" || RAW_COLUMNS.contains(&text) {
             true => Ok(Self(text.to_owned())),

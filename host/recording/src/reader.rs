@@ -21,7 +21,7 @@ pub struct Recording {
     pub manifest: Manifest,
     /// Directory that it is in.
     pub directory: PathBuf,
-    /// `samples.csv` or `samples.parquet` in that directory; in memory, the name of the device as the directory is.
+    /// `samples.csv` or `samples.parquet` in that directory. For samples in memory, this and `directory` are the name of the device.
     pub samples: PathBuf,
     /// Which of the optional columns there are.
     pub columns: Columns,
@@ -37,12 +37,12 @@ enum Samples {
     InMemory(Arc<dyn InMemory>),
 }
 
-/// What a reading has found.
+/// Result of reading all rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReadSummary {
     /// Rows read.
     pub rows: u64,
-    /// SHA-256 of the samples file, as `sha256sum` prints it; of samples in memory that of their numbers.
+    /// SHA-256 of the samples file, as `sha256sum` prints it; for samples in memory, of their numbers.
     pub sha256: String,
     /// One sentence for each thing that was ignored.
     pub warnings: Vec<Warning>,
@@ -128,10 +128,10 @@ impl Recording {
         })
     }
 
-    /// The recording of samples that another program holds. Messages call it by the name of its device.
+    /// A recording of samples in the memory of another program. Messages use the name of its device.
     ///
     /// # Errors
-    /// The manifest is not one of samples; there are no rows, or neither sensor.
+    /// The manifest is invalid; there are no rows, or neither sensor.
     pub fn in_memory(manifest: Manifest, samples: Arc<dyn InMemory>) -> Result<Recording> {
         manifest.check("recording in memory")?;
         let place = PathBuf::from(&manifest.device);
@@ -155,7 +155,7 @@ impl Recording {
         })
     }
 
-    /// Number of rows, where it is known without reading: CSV does not say it.
+    /// Number of rows, if it is known without reading; CSV does not contain it.
     pub fn rows(&self) -> Option<u64> {
         match &self.source {
             Samples::Csv(_) => None,
@@ -164,11 +164,11 @@ impl Recording {
         }
     }
 
-    /// Hands all rows to `consume`, in order and on this thread, while other threads read and
-    /// parse the next ones; `progress` hears the share that is done, up to 1.
+    /// Hands all rows to `consume`, in order and on this thread, while other threads read and parse the next ones; `progress` receives the share that
+    /// is done, up to 1.
     ///
-    /// An error is that of the first row that has one, in the words of an editor: rows of a CSV file
-    /// are its lines, counted from 1 with the header. An error of `consume` ends the reading.
+    /// An error is about the first bad row. Rows of a CSV file are numbered like lines in an editor, from 1 with the header. An error of `consume`
+    /// ends the reading.
     pub fn for_each_batch(
         &self,
         progress: impl Fn(f64),
@@ -177,12 +177,12 @@ impl Recording {
         self.in_pieces(CHUNK, SLICE, progress, consume)
     }
 
-    /// Whether one column can be read without the others: all but CSV.
+    /// Whether one column can be read without the others; only in CSV it cannot.
     pub fn is_columnar(&self) -> bool {
         !matches!(self.source, Samples::Csv(..))
     }
 
-    /// Some columns that the recording has, whole, steps as numbers. Of a CSV file every column is parsed.
+    /// Whole columns of the recording, steps as numbers. In a CSV file every column is parsed.
     pub fn read_columns(
         &self,
         columns: &[Column],

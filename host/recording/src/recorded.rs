@@ -1,8 +1,8 @@
-//! Where a recording of a device comes from: `[recorded]` in `recording.toml`.
+//! The device from which a recording comes: `[recorded]` in `recording.toml`.
 
 use serde::{Deserialize, Serialize};
 
-/// What recorded it from a device, and what was lost on the way.
+/// The device, the program that recorded it, and what was lost on the way.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recorded {
@@ -14,13 +14,13 @@ pub struct Recorded {
     pub board: String,
     /// The microcontroller's own number, hexadecimal.
     pub unit_id: String,
-    /// Why the device had started, where that was no power-on: its clock began then, and nobody knows when the power came.
+    /// Why the device had started, if it was not by a power-on: its clock began then, and the time of the power-on is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<String>,
-    /// Samples that are missing between the first and the last, restarts left out: every gap is a step of `t_s`.
+    /// Samples missing between the first and the last, except at restarts. Each gap is a longer interval of `t_s`.
     #[serde(default)]
     pub missing: u64,
-    /// Times that the device restarted: it began counting anew, and how long it took is known by the PC's clock only.
+    /// Restarts of the device: its counter began anew, and only the PC's clock shows how long each took.
     #[serde(default, rename = "restart", skip_serializing_if = "Vec::is_empty")]
     pub restarts: Vec<Restart>,
 }
@@ -31,6 +31,6 @@ pub struct Recorded {
 pub struct Restart {
     /// Time of the first sample after it, s.
     pub t_s: f64,
-    /// Why, as the device says.
+    /// Cause, as the device reports it.
     pub start: String,
 }

@@ -8,17 +8,17 @@ use tempfile::NamedTempFile;
 use crate::error::{Error, Result};
 use crate::parents::{Parents, folder};
 
-/// A result that is written, and has yet to appear under its name.
+/// A result that is written, but not yet visible under its name.
 #[derive(Debug)]
 pub struct Staged {
     path: PathBuf,
     file: Option<NamedTempFile>,
     content: Vec<u8>,
-    /// Behind the file in this list, so that they are empty when they are dropped without it.
+    /// After the file in this list: dropped later, the folders are empty if the file was not published.
     _parents: Option<Parents>,
 }
 
-/// Writes `content` beside `path`, so that whatever can fail fails before any file has appeared. Missing folders of it are made.
+/// Writes `content` beside `path`, so that all failures come before any file appears. Creates missing folders.
 pub fn stage(path: &Path, content: impl Into<Vec<u8>>) -> Result<Staged> {
     let content = content.into();
     let failed = |e: std::io::Error| Error::io(path, &e);
@@ -28,7 +28,7 @@ pub fn stage(path: &Path, content: impl Into<Vec<u8>>) -> Result<Staged> {
             let problem = "this is a directory, but a file is to be written";
             return Err(Error::new(path.display(), problem, "name a file in it"));
         }
-        // A device or a pipe is written to, never replaced: `/dev/null` has to stay what it is.
+        // A device or a pipe is written to, never replaced: `/dev/null` must stay a device.
         Ok(there) if !there.is_file() => {
             let file = None;
             return Ok(Staged {
@@ -44,7 +44,7 @@ pub fn stage(path: &Path, content: impl Into<Vec<u8>>) -> Result<Staged> {
     let mut file = NamedTempFile::new_in(folder(&path)).map_err(failed)?;
     file.write_all(&content).map_err(failed)?;
     file.as_file().sync_all().map_err(failed)?;
-    // Temporary files are private; a result is for everybody who may read the folder's other files.
+    // Temporary files are private, but everybody who may read the folder may read a result.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;
@@ -61,7 +61,7 @@ pub fn stage(path: &Path, content: impl Into<Vec<u8>>) -> Result<Staged> {
 }
 
 impl Staged {
-    /// Folder that the file will be in, with its links resolved.
+    /// Folder of the file, with its links resolved.
     pub fn folder(&self) -> PathBuf {
         let folder = folder(&self.path);
         folder.canonicalize().unwrap_or_else(|_| folder.to_owned())

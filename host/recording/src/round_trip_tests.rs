@@ -201,7 +201,7 @@ fn an_existing_recording_is_replaced_only_when_told_and_other_files_never() {
     assert!(error.to_string().contains("thesis.tex"), "{error}");
     let file = path.join("thesis.tex");
     assert!(Writer::create(&file, columns, SampleFormat::Csv, true).is_err());
-    // Folders that are missing are made, and go again with a recording that is given up.
+    // Missing folders are created, and removed again with an abandoned recording.
     drop(Writer::create(&folder.path().join("a/b"), columns, SampleFormat::Csv, true).unwrap());
     assert_eq!(entries(folder.path()), ["r"]);
     assert!(Writer::create(Path::new(".."), columns, SampleFormat::Csv, true).is_err());

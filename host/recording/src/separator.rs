@@ -1,4 +1,4 @@
-//! What stands between the cells of a text file.
+//! The separator of the cells of a text file.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 use crate::cell::shorten;
 use crate::error::{Error, Result};
 
-/// What stands between two cells.
+/// The separator of two cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Separator {
     /// `,`
@@ -20,10 +20,10 @@ pub enum Separator {
 }
 
 impl Separator {
-    /// Finds the separator that cuts most of `lines` alike, into two cells at least.
+    /// Finds the separator that splits most of `lines` into the same number of cells, at least two.
     pub(crate) fn detect(lines: &[&[u8]]) -> Separator {
-        // Whitespace last, as blanks may follow any other; comma after semicolon, as numbers with decimal commas stand between
-        // semicolons, and not at all where they stand between blanks.
+        // Whitespace comes last, because blanks may follow any other separator. Comma comes after semicolon, because semicolons may separate numbers
+        // with decimal commas; it is left out if blanks separate such numbers.
         let candidates = [
             Separator::Tab,
             Separator::Semicolon,
@@ -84,13 +84,13 @@ impl Separator {
             .flexible(true)
             .delimiter(delimiter)
             .from_reader(line);
-        // Reading from memory cannot fail, and any bytes at all make a record.
+        // Reading from memory cannot fail, and any bytes make a record.
         let _ = reader.read_byte_record(cells);
         cells.trim();
     }
 }
 
-/// Whether a line has words between blanks, each with one comma between digits or none, and one at all.
+/// Whether a line consists of words between blanks, some with a comma, each comma single and between digits.
 fn has_decimal_commas(line: &[u8]) -> bool {
     let mut words = line
         .split(u8::is_ascii_whitespace)

@@ -1,33 +1,34 @@
-//! Two bytes of a reading of which a firmware took the low one for a signed number, `(high << 8) + (int8_t)low`.
+//! Readings of two bytes whose low byte a firmware took for a signed number: `(high << 8) + (int8_t)low`.
 
 use crate::columns::Column;
 use crate::error::{Error, Result};
 use crate::raw_channels::RawChannels;
 
-/// Values of a byte.
+/// Number of values of a byte.
 const BYTE: f64 = 256.0;
 /// Largest reading of two bytes.
 const LARGEST: f64 = 32_767.0;
 
-/// What a reading in whole counts is without the fault. A low byte of 128 or more makes it 256 counts low, and is right itself: this is exact.
+/// A reading in whole counts without this fault. A low byte of 128 or more makes the reading 256 counts low. The low byte itself is right, so the
+/// correction is exact.
 pub fn undone(reading: f64) -> f64 {
     let mended = match reading.rem_euclid(BYTE) >= 0.5 * BYTE {
         true => reading + BYTE,
         false => reading,
     };
-    // Below its smallest number a variable of two bytes goes on at its largest.
+    // A variable of two bytes wraps from its smallest number to its largest.
     match mended > LARGEST {
         true => mended - BYTE * BYTE,
         false => mended,
     }
 }
 
-/// Raw channels that an import mends.
+/// Raw channels that an import corrects.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SignedLowByte(RawChannels);
 
 impl SignedLowByte {
-    /// Whether it is the fault of `column`.
+    /// Whether `column` has this fault.
     pub(crate) fn applies_to(&self, column: Column) -> bool {
         self.0.have(column)
     }

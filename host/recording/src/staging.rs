@@ -18,7 +18,7 @@ pub(super) struct Staging {
     path: PathBuf,
     target: PathBuf,
     replace: bool,
-    /// Behind the directory in this list, so that it is empty when these are dropped.
+    /// Dropped after the directory has been removed, so that these folders are empty.
     _parents: Parents,
 }
 
@@ -59,11 +59,11 @@ impl Staging {
 
     /// Gives the directory its name.
     pub fn publish(self) -> Result<()> {
-        // Looked at again: hours may have passed since the start.
+        // Checked again: hours may have passed since the start.
         check_target(&self.target, Some(self.replace))?;
         sync_directory(&self.path);
         let old = if self.target.exists() {
-            // A directory with files in it cannot be renamed over; the old one steps aside first.
+            // A directory with files cannot be replaced by a rename, so the old one is renamed first.
             let aside = sibling(&self.target, "old")?;
             let old = aside.join("recording");
             fs::rename(&self.target, &old).map_err(|error| {
@@ -83,7 +83,7 @@ impl Staging {
         }
         sync_directory(folder(&self.target));
         if let Some((aside, _)) = old {
-            // The new recording stands; what cannot be removed of the old one does no harm.
+            // The new recording is in place; remains of the old one do no harm.
             let _ = fs::remove_dir_all(aside);
         }
         Ok(())
@@ -92,12 +92,12 @@ impl Staging {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        // Gone already after a rename.
+        // After a rename it no longer exists.
         let _ = fs::remove_dir_all(&self.path);
     }
 }
 
-/// `replace`: whether what is there is replaced; `None` where the caller offers no such thing.
+/// Checks that a recording can be written at `target`. `replace`: whether an existing one is replaced; `None` if the caller does not offer that.
 pub(super) fn check_target(target: &Path, replace: Option<bool>) -> Result<()> {
     let refuse = |problem: &str, remedy: &str| Err(Error::new(target.display(), problem, remedy));
     let metadata = match fs::symlink_metadata(target) {
@@ -126,7 +126,7 @@ pub(super) fn check_target(target: &Path, replace: Option<bool>) -> Result<()> {
         .find(|name| !OWN_FILES.contains(&name.as_str()))
     {
         None => Ok(()),
-        // What a person has put there is not for this program to delete.
+        // This program must not delete what a person has put there.
         Some(other) => refuse(
             &format!("it contains {other}, which does not belong to a recording"),
             "move that file elsewhere, or choose another name",
@@ -144,7 +144,7 @@ fn sibling(target: &Path, purpose: &str) -> Result<PathBuf> {
         ));
     };
     let parent = folder(target);
-    // WebAssembly has one process, and its number cannot be asked for.
+    // WebAssembly has one process, without a number.
     let process = match cfg!(target_family = "wasm") {
         true => 0,
         false => std::process::id(),
@@ -167,7 +167,7 @@ fn sibling(target: &Path, purpose: &str) -> Result<PathBuf> {
     ))
 }
 
-/// Makes a rename durable, where the system can: Windows cannot open a directory, and needs not.
+/// Makes a rename durable if the system can. Windows cannot open a directory, and need not.
 pub(super) fn sync_directory(path: &Path) {
     if let Ok(directory) = File::open(path) {
         let _ = directory.sync_all();

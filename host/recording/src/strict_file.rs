@@ -1,4 +1,4 @@
-//! A file whose end is an error and not an empty read.
+//! A file whose end is an error instead of an empty read.
 
 use std::fs::File;
 use std::io::{BufReader, Error, ErrorKind, Read, Seek, SeekFrom};
@@ -11,11 +11,10 @@ use parquet::file::reader::{ChunkReader, Length};
 
 /// A file for the readers of `parquet`.
 ///
-/// That crate skips what it does not know in the header of a page without noticing the end of the file (60.1,
-/// `ThriftReadInputProtocol::skip_bytes`): one flipped bit that makes a list of 2³¹ numbers of it, and a file of ten
-/// kilobytes is read for half an hour.
+/// That crate skips unknown parts of a page header without noticing the end of the file (60.1, `ThriftReadInputProtocol::skip_bytes`). If one flipped
+/// bit turns such a part into a list of 2³¹ numbers, a file of ten kilobytes is read for half an hour.
 ///
-/// Its own readers of a file duplicate the handle, which WebAssembly's system cannot. One handle serves here, on one thread.
+/// Its own readers of a file duplicate the handle, which WebAssembly cannot. Here one handle is shared, on one thread.
 #[derive(Debug)]
 pub(super) struct StrictFile(Arc<File>);
 

@@ -1,4 +1,4 @@
-//! A turntable whose rates are known and whose axis is not: a record player, with the unit on it in any orientation.
+//! A turntable with known rates and an unknown axis: a record player, with the unit on it in any orientation.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -11,12 +11,12 @@ use crate::error::{Argument, Error, Result};
 
 /// Largest rate, deg/s: gyros of this kind end at 4000 deg/s.
 const LARGEST_DPS: f64 = 1e4;
-/// Largest error of a rate, as a share of it: with more the rate is not known.
+/// Largest error of a rate, as a share of it: with a larger error the rate counts as unknown.
 const LARGEST_ERROR: f64 = 0.2;
-/// Two rates that differ by less than this share of the larger are one: no recording tells them apart.
+/// Two rates that differ by less than this share of the larger one are refused: a recording does not distinguish them.
 const ALIKE: f64 = 0.05;
 
-/// Rates of a turntable, of which the magnitude is known.
+/// Rates of a turntable with known magnitude.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Turntable {
@@ -94,7 +94,7 @@ impl Turntable {
         let all: Vec<String> = rates.chain(steps).collect();
         [
             ("--rate-dps", all.join(",")),
-            // More digits than anybody knows: a share of 0.001 is 0.1 %, and not 0.1000000001.
+            // Rounded, so that a share of 0.001 is written as 0.1 % instead of 0.1000000001 %.
             (
                 "--rate-error",
                 format!("{}%", (self.rate_error * 1e8).round() / 1e6),

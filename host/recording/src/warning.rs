@@ -1,12 +1,12 @@
-//! What a person should know of a recording that is read, and the only place that puts it into words.
+//! Warnings about a recording that is read, and the only place with their texts.
 
 use std::fmt;
 use std::path::PathBuf;
 
-/// What a person should know of a recording that is read.
+/// A warning about a recording that is read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Warning {
-    /// The folder of a recording that was not ended, and whether its last row is cut.
+    /// The folder of an unfinished recording, and whether its last row is cut.
     Unfinished(PathBuf, bool),
     /// A file of samples, and a column of it that is ignored.
     UnknownColumn(String, String),

@@ -1,4 +1,4 @@
-//! Parquet in a build without the feature `parquet`: a file is refused, and there is none otherwise.
+//! Parquet in a build without the feature `parquet`: all files are refused.
 
 use std::convert::Infallible;
 use std::path::Path;
@@ -17,7 +17,7 @@ pub(crate) fn refused(path: &Path) -> Error {
     Error::new(path.display(), problem, remedy)
 }
 
-/// A file that cannot be there.
+/// Never constructed.
 #[derive(Debug, Clone)]
 pub(super) struct ParquetFile(Infallible);
 
@@ -53,7 +53,7 @@ impl ParquetFile {
     }
 }
 
-/// A column that cannot be there.
+/// Never constructed.
 pub(super) struct Leaf(Infallible);
 
 impl Leaf {
@@ -62,7 +62,7 @@ impl Leaf {
     }
 }
 
-/// A writer that cannot be there.
+/// Never constructed.
 #[derive(Debug)]
 pub(super) struct ParquetWriter(Infallible);
 

@@ -48,8 +48,8 @@ impl std::str::FromStr for SampleFormat {
     }
 }
 
-/// Writes a recording into a directory beside its target, which takes the target's name when all
-/// is written; dropped before [`Writer::finish`], it leaves nothing behind.
+/// Writes a recording into a directory beside its target, which is renamed to the target at the end. If dropped before [`Writer::finish`], it leaves
+/// nothing behind.
 #[derive(Debug)]
 pub struct Writer {
     staging: Staging,
@@ -65,8 +65,8 @@ enum Samples {
 }
 
 impl Writer {
-    /// Starts a recording at `target` with the given columns. An existing recording is refused, or with
-    /// `replace` taken away at the end; anything else that exists there is refused always.
+    /// Starts a recording at `target` with the given columns. An existing recording is refused, or with `replace` replaced at the end. Anything else
+    /// at `target` is always refused.
     pub fn create(
         target: &Path,
         columns: Columns,
@@ -96,7 +96,7 @@ impl Writer {
         })
     }
 
-    /// Appends rows. `batch.first_row` is not looked at: rows are numbered as they come.
+    /// Appends rows. `batch.first_row` is ignored: rows are numbered as they come.
     pub fn write(&mut self, batch: &Batch) -> Result<()> {
         let at = |row: usize| {
             let row = self.rows + row as u64 + 1;

@@ -1,4 +1,4 @@
-//! Time stamps of loggers that lose samples, pause or are slow: the bench says when each sample was taken.
+//! Time stamps of loggers that lose samples, pause or are slow. The virtual bench gives the true time of each sample.
 
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{
@@ -41,7 +41,7 @@ impl Log {
         log
     }
 
-    /// The log imported with what `with` sets: what was said of its time, and the times of its rows from the first on.
+    /// Imports the log with the options that `with` sets. Returns the summary of its times, and the times of its rows relative to the first.
     fn import(&self, with: impl Fn(&mut ImportOptions)) -> Result<(TimeSummary, Vec<f64>)> {
         let folder = tempfile::tempdir().expect("a folder");
         let (file, out) = (folder.path().join("log.csv"), folder.path().join("out"));
@@ -102,7 +102,7 @@ fn samples_that_a_logger_loses_or_pauses_for_are_counted_and_bend_no_time() {
 
 #[test]
 fn a_buffer_that_is_handed_over_in_bursts_is_still_a_steady_stream_without_gaps() {
-    // By the steps within a burst it would be 10 Hz, of milliseconds.
+    // The intervals within a burst alone would mean 10 Hz, in milliseconds.
     let log = Log::new(100.0, "stamp_burst = 4");
     let (time, _) = log.import(|_| ()).expect("importable");
     assert_eq!((time.gaps, time.stamps_kept), (0, false), "{time:?}");

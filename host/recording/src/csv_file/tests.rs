@@ -1,4 +1,4 @@
-//! What a CSV recording may look like, and what is said where it may not.
+//! What a CSV recording may look like, and the message where it may not.
 
 use std::cell::RefCell;
 
@@ -43,7 +43,7 @@ fn read(text: &[u8], chunk: u64) -> Result<(Batch, ReadSummary)> {
 
 fn refused(text: &str) -> String {
     let whole = read(text.as_bytes(), 1 << 20).unwrap_err().to_string();
-    // Wherever the chunks are cut, the first bad row is the one that is told of.
+    // Wherever the chunks are cut, the message is about the first bad row.
     for chunk in [1, 7, 64] {
         let cut = read(text.as_bytes(), chunk).unwrap_err().to_string();
         let tail = |message: &str| message.split("samples.csv").nth(1).map(str::to_owned);

@@ -1,8 +1,8 @@
 //! Logs of ArduPilot (DataFlash, `.bin`), with ArduPilot's own calibration undone.
 //!
-//! `IMU` has the readings of one sensor `I` at the rate of the main loop or below, `GYR` and `ACC` at the sensor's own. Both are calibrated and on the
-//! vehicle's axes: `R ((raw - INS_ACCOFFS) INS_ACCSCAL)` and `R (raw - INS_GYROFFS)`, with R by `AHRS_ORIENTATION`
-//! (`_rotate_and_correct_accel` of AP_InertialSensor_Backend). `IMT` has what a sensor has gathered in an interval, of the same readings.
+//! `IMU` contains the readings of sensor number `I` at the rate of the main loop or below, `GYR` and `ACC` those at the sensor's own rate. All are
+//! calibrated and rotated to the vehicle's axes: `R ((raw - INS_ACCOFFS) INS_ACCSCAL)` and `R (raw - INS_GYROFFS)`, with R given by
+//! `AHRS_ORIENTATION` (`_rotate_and_correct_accel` of AP_InertialSensor_Backend). `IMT` contains the same readings, integrated over an interval.
 
 mod records;
 
@@ -15,7 +15,7 @@ use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use records::{Record, Records};
 
-/// Messages that are read, the best first. `IMT` only where there is no other.
+/// Messages that are read. [`Log::chosen`] prefers `GYR` with `ACC`, then `IMU`, then `IMT`.
 const MESSAGES: [&str; 4] = ["IMU", "GYR", "ACC", "IMT"];
 
 /// Readings of one sensor in messages of one kind.
@@ -25,7 +25,7 @@ struct Samples {
     gyro: Vec<[f64; 3]>,
     accel: Vec<[f64; 3]>,
     temp_c: Vec<f64>,
-    /// Whether the parameters of its calibration were known at all, and have changed.
+    /// Whether some readings came without known parameters of the calibration.
     uncorrected: bool,
     changes: u64,
     last: Option<[Correction; 2]>,
@@ -33,10 +33,10 @@ struct Samples {
 
 #[derive(Default)]
 struct Log {
-    /// By message and number of the sensor, from 0.
+    /// By message and number of the sensor, counted from 0.
     samples: BTreeMap<(&'static str, u32), Samples>,
     parameters: BTreeMap<String, f64>,
-    /// Whether parameters have changed since the corrections were made of them.
+    /// Whether parameters have changed since the corrections were computed.
     stale: bool,
     corrections: BTreeMap<u32, Option<[Correction; 2]>>,
 }
@@ -78,7 +78,7 @@ impl Log {
             }
             return;
         }
-        // Before instances there was IMU2, ACC3 and so on.
+        // Older logs have no instances, but messages IMU2, ACC3 and so on.
         let name = record.name();
         let (kind, number) = match name.strip_suffix(['1', '2', '3']) {
             Some(kind) => (kind, name[kind.len()..].parse().ok()),
@@ -104,7 +104,7 @@ impl Log {
         samples.take(kind, record, correction.as_ref());
     }
 
-    /// What there is to choose from.
+    /// The messages to choose from.
     fn listed(&self) -> String {
         let one = |((kind, instance), samples): (&(&str, u32), &Samples)| {
             format!(
@@ -250,7 +250,7 @@ impl Samples {
         let sensors = [&self.gyro, &self.accel];
         let has = |sensor: usize| !sensors[sensor].is_empty();
         let columns = (0..6).filter(|c| has(c / 3)).map(Column::Raw);
-        // A sensor without a thermometer says 0.
+        // A sensor without a thermometer reports 0.
         let temperature = self.temp_c.iter().any(|t| t.is_finite() && *t != 0.0);
         let mut readings = Readings::of(
             columns
@@ -293,9 +293,9 @@ impl Samples {
     }
 }
 
-/// What was done to gyro and accelerometer number `instance`; `None` where the log does not say.
+/// ArduPilot's calibration of gyro and accelerometer number `instance`; `None` if the log does not contain it.
 fn corrections(parameters: &BTreeMap<String, f64>, instance: u32) -> Option<[Correction; 2]> {
-    // The first three sensors have their number within the name, those of later versions before it.
+    // Parameters of sensors 2 and 3 have the number within the name, those of further sensors before it.
     let (before, within) = match instance {
         0 => ("INS".to_owned(), String::new()),
         1 | 2 => ("INS".to_owned(), (instance + 1).to_string()),

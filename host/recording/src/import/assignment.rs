@@ -1,4 +1,4 @@
-//! What the columns of a foreign file become, and by what they are multiplied.
+//! What the columns of a foreign file become, with which factors and offsets.
 
 use std::fmt;
 use std::str::FromStr;
@@ -88,7 +88,7 @@ impl ColumnList {
         time.map(|(_, name)| name.as_str())
     }
 
-    /// Roles that are given out.
+    /// Roles of the listed columns.
     pub fn roles(&self) -> Vec<Role> {
         match self {
             ColumnList::ByPosition(items) => items.iter().flatten().copied().collect(),
@@ -137,7 +137,7 @@ impl FromStr for ColumnList {
         match (positions.is_empty(), names.is_empty()) {
             (_, true) => Ok(ColumnList::ByPosition(positions)),
             (true, false) => Ok(ColumnList::ByName(names)),
-            // Is a plain name among named ones meant by position or by name? Nobody can tell.
+            // A plain name among named ones may mean a position or a name.
             (false, false) => Err(Error::new(
                 PLACE,
                 "some columns are given by position, others by name",
@@ -163,7 +163,7 @@ impl fmt::Display for ColumnList {
     }
 }
 
-/// A factor for a column, or for the three of a sensor, as in `gyro=57.2958`.
+/// A factor for a column, or for the three columns of a sensor, as in `gyro=57.2958`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scale {
     /// `gyro`, `accel` or the name of a column.
@@ -183,7 +183,7 @@ impl Scale {
         }
     }
 
-    /// Those of `scales` that are of columns of which `by_hand` has none; of three axes of which it has some, the others.
+    /// The scales of those columns for which `by_hand` has none. If it has some axes of a sensor, the scale is kept for the others.
     pub(super) fn beside(scales: &[Scale], by_hand: &[Scale]) -> Vec<Scale> {
         let free = |column: &Column| Self::given(by_hand, *column).is_none();
         let mut beside = Vec::new();
@@ -200,7 +200,7 @@ impl Scale {
         beside
     }
 
-    /// Product of the factors for `column`, if there is one.
+    /// Product of the factors for `column`, if there are any.
     pub(super) fn given(scales: &[Scale], column: Column) -> Option<f64> {
         let any = scales.iter().any(|scale| scale.applies_to(column));
         any.then(|| Self::product(scales, column))

@@ -1,4 +1,4 @@
-//! Files that are no text, told by their first bytes.
+//! Binary files, recognised by their first bytes.
 
 use std::path::Path;
 
@@ -32,10 +32,10 @@ const BINARY: [(&[u8], &str, &str); 8] = [
     (b"\xfe\xff", "UTF-16 text", "save it as UTF-8"),
 ];
 
-/// A line without the bytes of 0 before and after it.
+/// A line without zero bytes before and after it.
 ///
-/// A file system that keeps room for a file fills it with zeros, and a serial port hands over some before its first byte: a log whose supply
-/// was cut ends with them, or begins. Between the characters of a line they are those of UTF-16, or of binary numbers.
+/// A file system fills preallocated space with zeros, so a log whose supply was cut may end with them; a serial port may deliver some before the
+/// first byte. Zeros between the characters of a line belong to UTF-16 or to binary numbers.
 pub(super) fn without_zeros(line: &[u8]) -> &[u8] {
     let from = line.iter().position(|byte| *byte != 0);
     let to = line.iter().rposition(|byte| !matches!(byte, 0 | b'\r'));
@@ -45,7 +45,7 @@ pub(super) fn without_zeros(line: &[u8]) -> &[u8] {
     }
 }
 
-/// Refuses what is no text, by its first bytes.
+/// Refuses binary files, by their first bytes.
 pub(super) fn refuse_binary(path: &Path, head: &[u8]) -> Result<()> {
     for (signature, kind, remedy) in BINARY {
         if head.starts_with(signature) {

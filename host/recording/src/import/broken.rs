@@ -10,7 +10,7 @@ use crate::error::{Argument, Error, Result};
 
 /// Row numbers that are kept of each kind.
 const LISTED: usize = 5;
-/// After so many broken rows, and if most are, no more are read: the file is another one than was said.
+/// After this many broken rows, reading stops if they are the majority: the file has another format than given.
 const ENOUGH: u64 = 10_000;
 /// Above this share the remaining rows are not a usable recording.
 const LARGEST_SHARE: f64 = 0.5;
@@ -23,7 +23,7 @@ pub enum BrokenLimit {
     None,
     /// This share of the rows of a file.
     Share(f64),
-    /// So many rows of a file, and at most half of it.
+    /// This many rows of a file, and at most half of it.
     Rows(u64),
 }
 
@@ -80,16 +80,16 @@ pub struct BrokenRows {
     pub kinds: Vec<BrokenKind>,
 }
 
-/// Broken rows that are broken alike.
+/// Broken rows with the same problem.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BrokenKind {
-    /// What they have.
+    /// Their problem, as in "3 with no time".
     pub problem: &'static str,
     /// How many.
     pub rows: u64,
-    /// The numbers of the first of them, as in the file.
+    /// Numbers of the first of these rows in the file.
     pub first_rows: Vec<u64>,
-    /// What exactly is wrong with the first.
+    /// The first row's error in full.
     pub example: String,
 }
 
@@ -124,7 +124,7 @@ impl fmt::Display for BrokenKind {
     }
 }
 
-/// What a row may have that keeps it from being read.
+/// Why a row cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fault {
     Width,
@@ -170,7 +170,7 @@ impl Unreadable {
         })
     }
 
-    /// As an error that ends the reading. No conversion: it would make `?` ambiguous in every crate above.
+    /// As an error that ends the reading. This is not a `From`, which would make `?` ambiguous in every dependent crate.
     pub fn into_error(self) -> Error {
         match self {
             Self::Row(row) => row.error,
@@ -189,7 +189,7 @@ impl From<Error> for Unreadable {
 #[derive(Debug, Default)]
 pub(super) struct BrokenTally {
     limit: BrokenLimit,
-    /// Rows so far, with the broken ones.
+    /// Rows so far, including the broken ones.
     pub rows: u64,
     broken: u64,
     first: Option<Error>,
@@ -204,7 +204,7 @@ impl BrokenTally {
         }
     }
 
-    /// Notes a broken row. Refuses when there are so many that reading on shows nothing more.
+    /// Counts a broken row. If there are many and they are the majority, the file is refused without reading on.
     pub fn add(&mut self, row: BrokenRow) -> Result<()> {
         self.broken += 1;
         let refused = row.error.refused();
@@ -233,7 +233,7 @@ impl BrokenTally {
         }
     }
 
-    /// Refuses a file with more broken rows than may be left out: by the first of them, and what all of them are.
+    /// Refuses a file with more broken rows than may be left out. The error reports the first one and summarises all.
     pub fn check(&self) -> Result<()> {
         let Some(first) = &self.first else {
             return Ok(());

@@ -1,4 +1,4 @@
-//! From the cell of a file to a reading: codes of a converter first, then the factor and what is added.
+//! From a cell of a file to a reading: first the converter's code, then the factor and the offset.
 
 use std::fmt;
 use std::str::FromStr;
@@ -17,7 +17,7 @@ pub struct TwosComplement {
 }
 
 impl TwosComplement {
-    /// Bits of `column`, if it is of such codes.
+    /// Bits of `column`, if its codes are in two's complement.
     pub(super) fn bits(all: &[TwosComplement], column: Column) -> Option<u32> {
         let own = all.iter().find(|codes| codes.channels.have(column));
         own.map(|codes| codes.bits)
@@ -59,7 +59,7 @@ pub struct Zero {
 }
 
 impl Zero {
-    /// Code at 0 of `column`.
+    /// Code of `column` at an input of 0.
     pub(super) fn of(all: &[Zero], column: Column) -> f64 {
         let own = all.iter().filter(|zero| zero.channels.have(column));
         own.map(|zero| zero.code).sum()
@@ -93,7 +93,7 @@ impl fmt::Display for Zero {
     }
 }
 
-/// What is done to the cells of a column, in the order of the fields.
+/// Conversion of the cells of a column, in the order of the fields.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Conversion {
     pub twos_complement: Option<u32>,
@@ -105,7 +105,7 @@ pub(super) struct Conversion {
 }
 
 impl Conversion {
-    /// The reading that a cell with `number` has; not a number where the cell is empty.
+    /// Reading of a cell that contains `number`; NaN if the cell is empty.
     pub fn reading(&self, number: f64) -> std::result::Result<f64, Refusal> {
         let mut code = number;
         if let Some(bits) = self.twos_complement {
@@ -134,7 +134,7 @@ impl Conversion {
     }
 }
 
-/// The number that an unsigned code of so many bits is in two's complement.
+/// The signed number that an unsigned code of `bits` bits means in two's complement.
 fn signed(code: f64, bits: u32) -> std::result::Result<f64, Refusal> {
     if code.is_nan() {
         return Ok(code);

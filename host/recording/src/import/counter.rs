@@ -1,37 +1,37 @@
-//! Running numbers of samples, and time stamps, that begin again at 0.
+//! Sample counters and time stamps that wrap around to 0.
 
 use super::time::Stamp;
 
-/// How many numbers the counters of 16 and of 32 bits have.
+/// Number of values of 16-bit and 32-bit counters.
 const SIZES: [f64; 2] = [65_536.0, 4_294_967_296.0];
 
-/// How many values the time stamps of microcontrollers have.
+/// Number of values of the time stamps of microcontrollers.
 const STAMP_SIZES: [i64; 3] = [1 << 16, 1 << 24, 1 << 32];
 
-/// A number that goes back from within so many of the end to within so many of 0 has begun again: ten seconds at 100 Hz may be lost
-/// there. Anything else that goes back is another recording, or a mistake, and is not counted on.
+/// A counter has wrapped if it goes back from within this distance of its end to within this distance of 0. So ten seconds at 100 Hz may be lost at
+/// the wrap. Any other step back is another recording or a mistake, and is kept as it is.
 const NEAR: f64 = 1000.0;
 
-/// Counts on where a running number begins again.
+/// Continues a sample counter across its wraps.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Counter {
     last: Option<f64>,
     before: f64,
-    /// How often it began again.
+    /// How often it wrapped.
     pub wraps: u64,
 }
 
-/// A stamp that begins again is at most so many steps after the one before: a second at 100 Hz may be lost there.
+/// A wrapped stamp is at most this many intervals after the one before. So a second at 100 Hz may be lost at the wrap.
 const NEAR_STEPS: i64 = 100;
 
-/// Counts on where time stamps begin again at 0, as those of a microcontroller do: milliseconds in 16 bits after 65.5 s, microseconds in 32
-/// bits after 71.6 min.
+/// Continues time stamps across their wraps. Those of a microcontroller wrap in 16 bits of milliseconds after 65.5 s, in 32 bits of microseconds
+/// after 71.6 min.
 #[derive(Debug, Clone, Default)]
 pub(super) struct StampCounter {
     last: Option<i64>,
     step: i64,
     before: i64,
-    /// How often they began again.
+    /// How often they wrapped.
     pub wraps: u64,
 }
 
@@ -41,7 +41,7 @@ impl StampCounter {
         self.last.is_some_and(|last| last > 0)
     }
 
-    /// The stamp counted on; `stamp` is that of the next row.
+    /// The stamp of the next row, without wraps.
     pub fn next(&mut self, stamp: Stamp) -> Stamp {
         let whole = stamp.whole();
         let last = self.last.replace(whole).unwrap_or(whole);
@@ -61,7 +61,7 @@ impl StampCounter {
 }
 
 impl Counter {
-    /// The number counted on; `number` is that of the next row.
+    /// The number of the next row, without wraps.
     pub fn next(&mut self, number: f64) -> f64 {
         let last = self.last.replace(number).unwrap_or(number);
         let wrapped = |size: &f64| (*size - NEAR..*size).contains(&last) && number < NEAR;

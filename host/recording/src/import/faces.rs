@@ -1,4 +1,4 @@
-//! Files of a unit that lay on one face each: which axis was up, and the specific force that follows.
+//! Files that show the unit at rest on one face each: which axis was up, and the specific force that follows.
 
 use std::fmt;
 use std::str::FromStr;
@@ -23,7 +23,7 @@ impl Face {
         })
     }
 
-    /// Its known inputs, in the order of [`REFERENCE_COLUMNS`]: m/s² along each axis; not a number for the rates, which are not known.
+    /// Its known inputs, in the order of [`REFERENCE_COLUMNS`]: m/s² along each axis, and NaN for the unknown rates.
     pub(super) fn inputs(self, gravity_mps2: f64) -> [f64; REFERENCE_COLUMNS.len()] {
         let mut inputs = [f64::NAN, f64::NAN, f64::NAN, 0.0, 0.0, 0.0];
         inputs[3 + self.axis] = match self.down {
@@ -33,7 +33,7 @@ impl Face {
         inputs
     }
 
-    /// A warning of the faces that are not among `faces`, if there are any.
+    /// A warning that lists the faces not among `faces`, if there are any.
     pub(super) fn missing(faces: &[Face]) -> Option<String> {
         let missing = Face::all().into_iter().filter(|face| !faces.contains(face));
         let names: Vec<String> = missing.map(|face| face.to_string()).collect();

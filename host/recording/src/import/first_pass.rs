@@ -1,4 +1,4 @@
-//! A first pass over a foreign file, for the time that its stamps stand for.
+//! A first pass over a foreign file, to find the times behind its stamps.
 
 use std::path::Path;
 
@@ -10,10 +10,10 @@ use super::time::{Known, Stamps, Times};
 use crate::columns::Column;
 use crate::error::Result;
 
-/// The times of the rows of `path`. `rate_hz` is the rate that somebody has given, `joined_to` are the times of the file that it is joined to.
+/// The times of the rows of `path`. `rate_hz` is the given rate, `joined_to` the times of the file to which this one is joined.
 ///
-/// The stamps are held, 8 bytes a row: 115 MB for four hours at 1 kHz. Whether a sample is missing or late is only seen by what comes
-/// later, and the rate only at the end.
+/// All stamps are kept in memory, 8 bytes a row: 115 MB for four hours at 1 kHz. Only later stamps show whether a sample is missing or late, and only
+/// all of them show the rate.
 pub(super) fn times(
     path: &Path,
     how: &HowToRead<'_>,
@@ -51,13 +51,13 @@ fn read(path: &Path, how: &HowToRead<'_>) -> Result<Stamps> {
         std::mem::swap(&mut row, &mut before);
     }
     stamps.wraps = file.stamp_wraps();
-    // Before anything is said of their times: rows that were left out have none.
+    // Checked before the times, as rows that were left out have none.
     file.seen.check(&path.display().to_string())?;
     Ok(stamps)
 }
 
 impl HowToRead<'_> {
-    /// Seconds in the unit of the stamps, where somebody has said so or the names are those of a recording.
+    /// Seconds per unit of the stamps, if it was given or the kind of file determines it.
     fn time_factor(&self, path: &Path) -> Option<f64> {
         let own = match (is_log(path), self.list) {
             (true, _) => Some(1e-9),

@@ -38,16 +38,16 @@ pub(super) struct HowToRead<'a> {
     pub choice: Choice<'a>,
     /// Which of the readings of a log, counted from 0.
     pub part: usize,
-    /// Sample rate, where it was given or is known.
+    /// Sample rate, if given or known.
     pub rate_hz: Option<f64>,
-    /// Unit of the time stamps, where it was given.
+    /// Unit of the time stamps, if given.
     pub time_unit: Option<Decimal>,
     /// How many broken rows may be left out.
     pub skip_broken: BrokenLimit,
 }
 
 impl HowToRead<'_> {
-    /// What is done to the cells of `column`.
+    /// Conversion of the cells of `column`.
     fn conversion(&self, column: Column) -> Conversion {
         Conversion {
             twos_complement: TwosComplement::bits(self.twos_complements, column),
@@ -64,17 +64,17 @@ impl HowToRead<'_> {
 pub(super) struct ForeignFile {
     path: PathBuf,
     table: Table,
-    /// How many parts the file has: those of a log whose sensors have clocks of their own.
+    /// Number of parts: a log has several if its sensors have separate clocks.
     pub parts: usize,
     cells: Cells,
     source: TimeSource,
     counter: Counter,
     stamps: StampCounter,
-    /// The time behind its stamps, once that is known.
+    /// The times of its rows, once they are known.
     clock: Option<Clock>,
     before: Row,
     values: Vec<Cell>,
-    /// What the readings have shown.
+    /// Counts and checks of the readings.
     pub seen: Plausibility,
     has_step: bool,
     pub labels: StepLabels,
@@ -101,11 +101,11 @@ struct Cell {
 /// Where the time of a row comes from.
 #[derive(Debug, Clone, Copy)]
 enum TimeSource {
-    /// A cell with its stamp.
+    /// A cell with a time stamp.
     Stamp,
-    /// Cell with a running number, and the sample rate.
+    /// A cell with a sample counter, and the sample rate.
     Sample(usize, f64),
-    /// Count of rows, and the sample rate.
+    /// The number of rows before, and the sample rate.
     Rows(f64),
 }
 
@@ -220,23 +220,23 @@ impl ForeignFile {
         }
     }
 
-    /// Whether it says which step a row belongs to.
+    /// Whether it has a column step.
     pub fn has_step(&self) -> bool {
         self.has_step
     }
 
-    /// Whether the file itself tells the time.
+    /// Whether the file has time stamps.
     pub fn has_time(&self) -> bool {
         matches!(self.source, TimeSource::Stamp)
     }
 
-    /// The file with the time that its stamps stand for; no row of it has been read.
+    /// Sets the times of the rows; no row has been read yet.
     pub fn with_times(mut self, times: Times) -> Self {
         self.clock = Some(Clock::new(times));
         self
     }
 
-    /// Lines that held no row, so far.
+    /// Lines so far that contained no row.
     pub fn skipped(&self) -> SkippedLines {
         match &self.table {
             Table::Text(table) => table.skipped,
@@ -244,7 +244,7 @@ impl ForeignFile {
         }
     }
 
-    /// Rows that were left out as they are not those that were asked for, so far.
+    /// Rows so far that the filters left out.
     pub fn not_chosen(&self) -> u64 {
         match &self.table {
             Table::Text(table) => table.left_out(),
@@ -253,7 +253,7 @@ impl ForeignFile {
         }
     }
 
-    /// Bytes of 0 around its lines, so far.
+    /// Zero bytes around its lines so far.
     pub fn zero_bytes(&self) -> u64 {
         match &self.table {
             Table::Text(table) => table.zero_bytes,
@@ -261,7 +261,7 @@ impl ForeignFile {
         }
     }
 
-    /// What was ignored.
+    /// Warnings about what was ignored.
     pub fn warnings(&self) -> &[String] {
         match &self.table {
             Table::Text(table) => &table.warnings,
@@ -270,7 +270,7 @@ impl ForeignFile {
         }
     }
 
-    /// What was read of a log, and what was done to it.
+    /// What was read from a log, and how its readings were changed.
     pub fn notes(&self) -> &[String] {
         match &self.table {
             Table::Log(readings) => &readings.notes,
@@ -278,12 +278,12 @@ impl ForeignFile {
         }
     }
 
-    /// How often its running number has begun again at 0, so far.
+    /// How often its sample counter has wrapped so far.
     pub fn wraps(&self) -> u64 {
         self.counter.wraps
     }
 
-    /// How often its time stamps have begun again at 0, so far.
+    /// How often its time stamps have wrapped so far.
     pub fn stamp_wraps(&self) -> u64 {
         self.stamps.wraps
     }
@@ -302,8 +302,8 @@ impl ForeignFile {
         format!("{}, row {number}", self.path.display())
     }
 
-    /// Reads the next row; `false` at the end. Broken rows are passed over; at the end more of them than may be left out are refused, so that
-    /// a person hears of all kinds at once.
+    /// Reads the next row; `false` at the end. Broken rows are skipped. If there are more than the limit, the file is refused at its end, so that the
+    /// error lists all kinds.
     pub fn next(&mut self, row: &mut Row) -> Result<bool> {
         loop {
             match self.read(row) {
@@ -359,7 +359,7 @@ impl ForeignFile {
         let time = match self.source {
             TimeSource::Stamp => self.cells.stamp.value,
             TimeSource::Sample(cell, rate) => self.cells.numbers[cell] / rate,
-            // A broken row was a sample as well, and took its time.
+            // A broken row was a sample too, and took its time.
             TimeSource::Rows(rate) => self.broken.rows as f64 / rate,
         };
         if time.is_nan() || !is_reading(time) {

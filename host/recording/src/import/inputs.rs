@@ -17,9 +17,8 @@ const LONGEST: u64 = 64 << 20;
 
 /// Known inputs by step.
 ///
-/// A CSV file with the column `step` (label or number) and any of the `ref_` columns of a
-/// recording, and `turn_x_deg` and so on: the angle that was turned in all, from which the mean
-/// rate follows with the duration of the step.
+/// A CSV file with the column `step` (label or number), any of the `ref_` columns of a recording, and `turn_x_deg` and so on: the total angle of a
+/// turn. Divided by the duration of the step it gives the mean rate.
 #[derive(Debug)]
 pub struct Inputs {
     path: PathBuf,
@@ -57,7 +56,7 @@ impl Inputs {
         Self::parse(&bytes, path)
     }
 
-    /// Those of steps that are named by the face that is up.
+    /// Inputs of steps that are labelled with the face that is up.
     pub(super) fn of_faces(faces: &[Face], gravity_mps2: f64) -> Inputs {
         let step = |(row, face): (u64, &Face)| {
             let step = Step {
@@ -213,7 +212,7 @@ impl Inputs {
         Ok(())
     }
 
-    /// Labels of its rows from the first on: those of the steps 0, 1 and so on where the samples have none. Empty if they are numbers.
+    /// Labels of its rows in order. If the samples have no labels, these belong to the steps 0, 1 and so on. Empty if all labels are numbers.
     pub fn labels(&self) -> Vec<String> {
         let mut rows: Vec<(u64, &String)> = self.steps.iter().map(|(l, s)| (s.row, l)).collect();
         rows.sort_unstable();
@@ -224,8 +223,7 @@ impl Inputs {
         }
     }
 
-    /// Input during step `number`, which lasts `duration_s`, in deg/s and m/s²; `None` where the
-    /// table does not have it.
+    /// Input during step `number`, which lasts `duration_s`, in deg/s and m/s²; `None` if the table lacks the step.
     pub(super) fn input(
         &mut self,
         number: i32,
@@ -235,7 +233,7 @@ impl Inputs {
         self.of_step(number, labels.label(number), duration_s)
     }
 
-    /// The same of a step that has this label, or none.
+    /// The same for a step with this label, or without one.
     pub fn of_step(
         &mut self,
         number: i32,
@@ -247,7 +245,8 @@ impl Inputs {
             .map_or_else(|| number.to_string(), str::to_owned);
         let step = self.steps.get_mut(&key)?;
         step.used = true;
-        // A turn by 0 about every axis is rest: taken for a turn, 20 s at rest showed no noise, and the intervals had none.
+        // A turn by 0 about every axis is rest. When such a step counted as a turn, its 20 s at rest did not show the noise, and the intervals lacked
+        // it.
         if step
             .turn_deg
             .iter()
@@ -264,7 +263,7 @@ impl Inputs {
         Some(input)
     }
 
-    /// One sentence for the rows that no sample belongs to, if there are any.
+    /// A warning about the rows without a sample, if there are any.
     pub fn unused(&self) -> Option<String> {
         let mut unused: Vec<(u64, &str)> = self
             .steps

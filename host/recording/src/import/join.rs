@@ -39,7 +39,7 @@ pub(super) struct Follower {
 }
 
 impl Follower {
-    /// A follower of a file whose rows are `first_period_s` apart; its own are `period_s` apart.
+    /// Follows a file whose rows are `first_period_s` apart; its own rows are `period_s` apart.
     pub fn new(file: ForeignFile, period_s: f64, first_period_s: f64) -> Follower {
         Follower {
             file,

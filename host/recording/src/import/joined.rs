@@ -22,7 +22,7 @@ use crate::writer::Writer;
 /// Rows that are written at a time.
 const BATCH: usize = 1 << 14;
 
-/// What to say where a rate was given and the time stamps have another one.
+/// A warning if the time stamps have another rate than the given one.
 fn other_rate(times: &Times, given: f64) -> Option<String> {
     let summary = &times.summary;
     let off = given / summary.rate_hz - 1.0;
@@ -39,9 +39,9 @@ pub(super) struct JoinedFiles {
     pub first: ForeignFile,
     /// Gives the rows of the first file regular times, if a loop took them at irregular ones.
     resampler: Option<Resampler>,
-    /// Where the first file stands in a sequence of them.
+    /// Place of the first file in a sequence.
     pub place: Option<Place>,
-    /// Pause that parts two steps, s.
+    /// Pause that separates two steps, s.
     step_gap_s: Option<f64>,
     followers: Vec<Follower>,
     pub rate_hz: f64,
@@ -53,7 +53,7 @@ pub(super) struct JoinedFiles {
 }
 
 impl JoinedFiles {
-    /// Opens the files of `options` and finds their times and columns; `left_out` are sensors, gyro and accelerometer, that are not wanted.
+    /// Opens the files of `options` and finds their times and columns. `left_out`: whether to leave out the gyro and the accelerometer.
     pub fn open(options: &ImportOptions, left_out: [bool; 2]) -> Result<Self> {
         let mut warnings = options.preset_warnings.clone();
         let mut first = ForeignFile::open(&options.files[0], &options.how(0))?;
@@ -103,7 +103,7 @@ impl JoinedFiles {
             }
             let mut period_s = 1.0 / rate_hz;
             if file.has_time() {
-                // A sensor of its own, with a rate and delays of its own; the instants are those of one clock.
+                // Another sensor has its own rate and delays, but the times of both come from one clock.
                 let times = first_pass::times(path, &how, options.rate_hz, first_times.as_ref())?;
                 period_s = times.period_s();
                 time.push(times.summary.clone());
@@ -198,7 +198,7 @@ impl JoinedFiles {
         })
     }
 
-    /// The manifest of the recording at `out`, but for its sources and steps.
+    /// The manifest of the recording at `out`, without its sources and steps.
     pub fn manifest(&self, options: &ImportOptions, out: &Path) -> Manifest {
         let device = options.device.clone().unwrap_or_else(|| file_name(out));
         let mut manifest = Manifest::new(
@@ -247,7 +247,7 @@ impl JoinedFiles {
         Ok(())
     }
 
-    /// Appends what the other files have at that time; `false` where the row is to be dropped.
+    /// Appends the values of the other files at that time; `false` if the row must be dropped.
     fn join(&mut self, t_s: f64, values: &mut Vec<f64>) -> Result<bool> {
         let mut worst = Joined::Exactly;
         for follower in &mut self.followers {
@@ -287,7 +287,7 @@ impl JoinedFiles {
         }
     }
 
-    /// Which sensors, gyro and accelerometer, have shown nothing but zeros in the files that have them.
+    /// Whether gyro and accelerometer read only zeros in one of the files.
     pub fn dead_sensors(&self) -> [bool; 2] {
         [0, 1].map(|s| self.files().any(|file| file.seen.dead()[s].is_some()))
     }
@@ -330,7 +330,7 @@ impl JoinedFiles {
         }
         if let Some(inputs) = &self.inputs {
             summary.warnings.extend(inputs.unknown(&self.first.labels));
-            // Of a sequence that is known when all of it has been read.
+            // For a sequence, this is known only when all files have been read.
             if self.place.is_none() {
                 summary.warnings.extend(inputs.unused());
             }

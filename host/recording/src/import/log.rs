@@ -1,6 +1,6 @@
-//! Logs that say themselves what they hold: bags of ROS, logs of PX4 and of ArduPilot.
+//! Logs that describe their own contents: bags of ROS, logs of PX4 and of ArduPilot.
 //!
-//! Another format is a module with a `read` and a line in [`FORMATS`].
+//! To add a format, write a module with a `read` and add it to [`FORMATS`].
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use super::readings::{Choice, Readings};
 use super::{ardupilot, px4, ros};
 use crate::error::{Argument, Error, Result};
 
-/// A format: how its files are named, and who reads them.
+/// A format: the endings of its files, and their reader.
 struct LogFormat {
     endings: &'static [&'static str],
     read: fn(&Path, Choice<'_>) -> Result<Vec<Readings>>,
@@ -48,12 +48,12 @@ fn format(path: &Path) -> Option<&'static LogFormat> {
     FORMATS.iter().find(has)
 }
 
-/// Whether a file is such a log, by its name. Its readings are in rad/s and m/s², its stamps in ns.
+/// Whether a file is such a log, by its ending. The readings of logs are in rad/s and m/s², their stamps in ns.
 pub fn is_log(path: &Path) -> bool {
     format(path).is_some()
 }
 
-/// The readings of a log: one for the whole unit, or one for each sensor where they have clocks of their own, the faster one first.
+/// The readings of a log: one set for the whole unit, or one for each sensor if these have separate clocks, the faster one first.
 pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     let Some(format) = format(path) else {
         return Err(Error::new(

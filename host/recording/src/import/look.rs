@@ -1,4 +1,4 @@
-//! The beginning of a foreign file, for a person to say what its columns are.
+//! The beginning of a foreign file, shown to a person who names its columns.
 
 use std::io::Read as _;
 use std::path::Path;
@@ -13,17 +13,17 @@ use crate::csv_file::BOM;
 use crate::error::{Error, Result};
 use crate::separator::Separator;
 
-/// Bytes at the start that are looked at.
+/// Bytes that are read at the start.
 const HEAD: u64 = 1 << 18;
 /// Most rows that are shown.
 const ROWS: usize = 200;
 
-/// What stands at the beginning of a foreign file.
+/// The beginning of a foreign file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Look {
-    /// Whether it is a log, whose messages have their own columns; then nothing else is here.
+    /// Whether it is a log, whose columns are fixed; the other fields are then empty.
     pub log: bool,
-    /// Names of the columns; empty where no line has them.
+    /// Names of the columns; empty if no line has them.
     pub names: Vec<String>,
     /// The first rows, cell by cell, as they are written.
     pub rows: Vec<Vec<String>>,
@@ -32,7 +32,7 @@ pub struct Look {
 /// Looks at the beginning of a file; `separator` as in an import.
 ///
 /// # Errors
-/// The file cannot be read, is of another kind, or no line of it holds numbers.
+/// The file cannot be read, is of another kind, or none of its lines contains numbers.
 pub fn look(path: &Path, separator: Option<Separator>) -> Result<Look> {
     let ending = path.extension().unwrap_or_default();
     if is_log(path) {
@@ -69,7 +69,7 @@ pub fn look(path: &Path, separator: Option<Separator>) -> Result<Look> {
 }
 
 fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Look> {
-    // Names may stand behind the sign of a comment.
+    // Names may follow the sign of a comment.
     let plain = |line: &[u8]| {
         let from = line
             .iter()

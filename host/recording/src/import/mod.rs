@@ -74,8 +74,7 @@ use super::manifest::Source;
 use super::writer::Writer;
 use crate::error::Result;
 
-/// Imports foreign files as a recording at `out`; `progress` hears the share of the first file
-/// that has been read.
+/// Imports foreign files as a recording at `out`; `progress` receives the share of the first file that has been read.
 pub fn import(
     options: &ImportOptions,
     out: &Path,
@@ -88,7 +87,7 @@ pub fn import(
     if options.is_sequence() {
         return sequence::import_sequence(options, out, progress);
     }
-    // Only when all rows have been read it is known that a sensor has nothing but zeros. That is rare, and worth a second time.
+    // Only reading all rows shows that a sensor reads nothing but zeros. This is rare, so the import is then repeated without the sensor.
     let mut left_out = [false; 2];
     loop {
         match import_sensors(options, out, &progress, left_out)? {
@@ -98,14 +97,14 @@ pub fn import(
     }
 }
 
-/// What has become of an import.
+/// Outcome of an import.
 enum Outcome {
     Done(Box<ImportSummary>),
-    /// Nothing was written, as these sensors, gyro and accelerometer, have nothing but zeros.
+    /// Nothing was written, because these sensors (gyro, accelerometer) read only zeros.
     NotConnected([bool; 2]),
 }
 
-/// Imports without the sensors, gyro and accelerometer, that are to be left out.
+/// Imports without the sensors (gyro, accelerometer) that `left_out` marks.
 fn import_sensors(
     options: &ImportOptions,
     out: &Path,

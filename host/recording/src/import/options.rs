@@ -23,13 +23,13 @@ use crate::writer::SampleFormat;
 pub struct ImportOptions {
     /// Files; the later ones are joined onto the times of the first.
     pub files: Vec<PathBuf>,
-    /// One list for each file; none at all where the headers have the names of a recording.
+    /// One list for each file; none if the headers have the names of a recording.
     pub columns: Vec<ColumnList>,
-    /// Separator of text files; found out where it is `None`.
+    /// Separator of text files; detected if `None`.
     pub separator: Option<Separator>,
-    /// Sample rate in Hz: of files without time stamps the rate, of others what decides where their stamps can be read in two ways.
+    /// Sample rate in Hz. Files without time stamps need it; for others it decides between two possible units of the stamps.
     pub rate_hz: Option<f64>,
-    /// Unit of the time stamps; found out where it is `None`.
+    /// Unit of the time stamps; detected if `None`.
     pub time_unit: Option<Decimal>,
     /// Local gravity in m/s².
     pub gravity_mps2: f64,
@@ -41,7 +41,7 @@ pub struct ImportOptions {
     pub scales: Vec<Scale>,
     /// What is added to columns after their factors; several for the same column add up.
     pub offsets: Vec<Offset>,
-    /// Columns of which a firmware took the low byte for a signed number, in whole counts: mended before any factor.
+    /// Columns whose low byte a firmware took for a signed number. They are corrected in whole counts, before any factor.
     pub signed_low_bytes: Vec<SignedLowByte>,
     /// Columns of unsigned codes in two's complement.
     pub twos_complements: Vec<TwosComplement>,
@@ -55,25 +55,25 @@ pub struct ImportOptions {
     pub device: Option<String>,
     /// Latitude in degrees.
     pub latitude_deg: Option<f64>,
-    /// The turntable of which the magnitude of the rate is known.
+    /// The turntable, if the magnitude of its rate is known.
     pub turntable: Option<Turntable>,
     /// Table of the known input of each step.
     pub inputs: Option<PathBuf>,
-    /// Whether the files follow one another, each a step with the name of its file, in place of being joined on their times.
+    /// Whether the files follow one another, each a step labelled with its file name. Otherwise they are joined on their times.
     pub sequence: bool,
-    /// Face of the unit that was up in each file, which makes them a sequence; empty where the files are none of faces.
+    /// Face of the unit that was up in each file; the files are then a sequence. Otherwise empty.
     pub faces: Vec<Face>,
-    /// Rows after a pause of more than this, s, are a new step; `None` where the steps are in a column, or are to be found.
+    /// A longer pause than this, in s, begins a new step; `None` if a column numbers the steps, or they are found later.
     pub step_gap_s: Option<f64>,
-    /// Which rows of text and Parquet files are read: those that all of these fit.
+    /// Filters of text and Parquet files: a row is read if it satisfies all of them.
     pub filters: Vec<RowFilter>,
     /// How many rows that cannot be read may be left out.
     pub skip_broken: BrokenLimit,
-    /// Whether the rows are means over a pose or a step each, and no samples.
+    /// Whether each row is the mean over a pose or a step instead of a sample.
     pub means: bool,
-    /// What a preset has said of the files; see [`ImportOptions::with_preset`].
+    /// The preset that was used; see [`ImportOptions::with_preset`].
     pub preset: Option<PresetUse>,
-    /// What it has to warn of.
+    /// Its warnings.
     pub preset_warnings: Vec<String>,
     /// Format of the samples.
     pub format: SampleFormat,
@@ -122,7 +122,7 @@ impl ImportOptions {
         }
     }
 
-    /// With what a preset says of the files where nothing was given by hand. The unit of the readings stays, as it has no default.
+    /// Adds what a preset knows about the files where nothing was given by hand. The unit of the readings stays, because every caller gives it.
     pub fn with_preset(mut self, chosen: Chosen) -> Self {
         self.files = chosen.files;
         if self.columns.is_empty() {
@@ -136,7 +136,7 @@ impl ImportOptions {
         self
     }
 
-    /// Refuses options that contradict each other, or a recording at `out` that one of the files lies in.
+    /// Refuses options that contradict each other, or a recording at `out` that contains one of the files.
     pub(super) fn check(&self, out: &Path) -> Result<()> {
         let refuse = |problem: String, remedy: &str| Err(Error::new("import", problem, remedy));
         let (files, lists) = (self.files.len(), self.columns.len());
@@ -228,8 +228,8 @@ impl ImportOptions {
         self.sequence || !self.faces.is_empty()
     }
 
-    /// The options as arguments of `mimu import`, for the manifest. File names only: where the
-    /// files were on somebody's machine helps nobody and may not be meant to be passed on.
+    /// The options as arguments of `mimu import`, for the manifest. File names come without folders, which are useless on another machine and may be
+    /// private.
     pub(super) fn arguments(&self) -> Vec<String> {
         let mut arguments: Vec<String> = self.files.iter().map(|file| file_name(file)).collect();
         if !self.faces.is_empty() {

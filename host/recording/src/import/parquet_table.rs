@@ -25,10 +25,10 @@ pub(super) struct ParquetTable {
     path: PathBuf,
     rows: u64,
     columns: Vec<Source>,
-    /// The columns of the filters, which may be wanted as well.
+    /// The columns of the filters; they may be among `columns` too.
     filtered: Vec<Source>,
     pub filters: RowFilters,
-    /// Rows of the slice that have been handed out, and those that it has.
+    /// Rows of the slice that were handed out, and rows in it.
     at: usize,
     filled: usize,
     row: u64,
@@ -36,14 +36,14 @@ pub(super) struct ParquetTable {
 }
 
 struct Source {
-    /// `None` of a column that only chooses rows.
+    /// `None` for a column that only filters rows.
     role: Option<Role>,
     name: String,
     leaf: Leaf,
     cursor: Cursor,
     values: Vec<f64>,
     texts: Vec<ByteArray>,
-    /// Time stamps that are whole numbers, which a double may not hold.
+    /// Integer time stamps, which may have more digits than a double.
     wholes: Vec<Option<i64>>,
 }
 
@@ -65,7 +65,7 @@ impl Source {
         self.values.clear();
         self.texts.clear();
         self.wholes.clear();
-        // The decoders have panicked on damaged files before; a damaged file is no bug of ours.
+        // The decoders panic on some damaged files; this becomes an error about the file.
         let decode = std::panic::AssertUnwindSafe(|| match self.leaf.is_text() {
             true => self.cursor.read_text(count, &mut self.texts),
             false if self.role == Some(Role::Column(Column::Time)) => {
@@ -82,7 +82,7 @@ impl Source {
         })
     }
 
-    /// What the row `at` of the slice holds, as text.
+    /// The cell of row `at` of the slice, as text.
     fn text(&self, at: usize) -> Cow<'_, str> {
         match self.leaf.is_text() {
             true => String::from_utf8_lossy(self.texts[at].data()),
@@ -99,7 +99,7 @@ impl std::fmt::Debug for ParquetTable {
     }
 }
 
-/// Names of all columns and the first rows, cell by cell; what is no number stays empty.
+/// Names of all columns and the first rows, cell by cell. Columns of unsupported types stay empty.
 pub(super) fn first_rows(path: &Path, most: usize) -> Result<(Vec<String>, Vec<Vec<String>>)> {
     let file = ParquetFile::open(path)?;
     let names = file.names();
@@ -117,7 +117,7 @@ pub(super) fn first_rows(path: &Path, most: usize) -> Result<(Vec<String>, Vec<V
 }
 
 impl ParquetTable {
-    /// Opens the file; without `list` its columns must have the names of a recording's. Rows that are not as `filters` say are passed over.
+    /// Opens the file; without `list` its columns must have the names of a recording's. Rows that do not satisfy `filters` are skipped.
     pub fn open(
         path: &Path,
         list: Option<&ColumnList>,

@@ -1,15 +1,15 @@
-//! Where a file stands in a sequence: the step that its rows are of, and their times among those of the other files.
+//! Place of a file in a sequence: the step of its rows, and their times among those of the other files.
 
 use super::row::Row;
 
-/// Time between two files of which nobody knows it, s: a gap that no turn is integrated across.
+/// Time in s from one file to the next if it is unknown. No turn is integrated across such a gap.
 pub(super) const PAUSE_S: f64 = 10.0;
 
-/// Where a file stands in a sequence.
+/// Place of a file in a sequence.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     step: i32,
-    /// What its times are behind those of the first file by, s.
+    /// Delay of its times relative to those of the first file, s.
     behind_s: f64,
     /// Time of the last row before it, s.
     after_s: f64,
@@ -19,7 +19,7 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// Of the file of `step`, which says that it was begun `behind_s` after the first; the last row before it is at `after_s`.
+    /// For the file of `step`, which by its stamps began `behind_s` after the first; the last row before it is at `after_s`.
     pub fn new(step: i32, behind_s: f64, after_s: f64) -> Self {
         Self {
             step,

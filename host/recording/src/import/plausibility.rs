@@ -1,4 +1,4 @@
-//! Readings that no sensor makes: zeros that only fill a row, temperatures that are none, readings that are held or of two sources.
+//! Implausible readings: rows padded with zeros, impossible temperatures, and readings that are repeated or come from two sources.
 
 use super::row::Row;
 use super::two_sources::TwoSources;
@@ -8,29 +8,29 @@ use crate::error::{Argument, Error, Result};
 use crate::held::HeldReadings;
 use crate::no_temperature::NoTemperatures;
 
-/// What silicon and the chambers around it reach, °C.
+/// Temperatures that silicon and thermal chambers reach, °C.
 const USUAL_C: std::ops::RangeInclusive<f64> = -100.0..=200.0;
-/// What can be a temperature in °C at all: from absolute zero. Counts of a converter are mostly beyond.
+/// Possible temperatures in °C, from absolute zero on. Counts of a converter are mostly outside.
 const POSSIBLE_C: std::ops::RangeInclusive<f64> = -273.15..=1000.0;
-/// What to do about a column that is not in °C.
+/// Remedy for a column that is not in °C.
 const CONVERT: &str = "convert it to degrees Celsius (counts of an MPU-6050 or MPU-9150: a factor of 0.00294118 and an offset of 36.53), or skip the column";
 
-/// What to do where `c` cannot be a temperature in °C.
+/// Remedy if `c` cannot be a temperature in °C.
 pub(super) fn no_temperature(c: f64) -> Option<&'static str> {
     (!c.is_nan() && !POSSIBLE_C.contains(&c)).then_some(CONVERT)
 }
 
-/// What the readings of a file have shown.
+/// Counts and checks of the readings of a file.
 #[derive(Debug, Clone)]
 pub(super) struct Plausibility {
     /// Of both sensors: places among the values of a row, and channels.
     sensors: [Vec<(usize, usize)>; 2],
     temperature: Option<usize>,
-    /// Rows that were left out, as all readings are 0.
+    /// Rows that were left out because all readings are 0.
     pub padding: u64,
     /// Rows in which only the accelerometer has zeros.
     empty_accel: u64,
-    /// Whether a value other than 0 was seen, of each of the six channels.
+    /// Whether each of the six channels has shown a value other than 0.
     alive: [bool; 6],
     rows: u64,
     /// Of both sensors.
@@ -42,7 +42,7 @@ pub(super) struct Plausibility {
 }
 
 impl Plausibility {
-    /// Of a file with these columns.
+    /// For a file with these columns.
     pub fn new(columns: impl Iterator<Item = Column>) -> Self {
         let mut sensors: [Vec<(usize, usize)>; 2] = Default::default();
         let mut temperature = None;
@@ -69,10 +69,11 @@ impl Plausibility {
         }
     }
 
-    /// Whether `row` is padding: of a buffer, or of a time at which nothing was connected. Looks at its temperature as well.
+    /// Whether `row` is padding of a buffer, or comes from a time when nothing was connected. Other rows are counted and checked; impossible values
+    /// in them become NaN.
     ///
-    /// An accelerometer whose three axes are exactly 0 has measured nothing, as gravity is always there. A gyro at rest may well read 0, so that
-    /// by itself it is taken for padding only where the time stamp is 0 too, after others that are not.
+    /// An accelerometer whose three axes are exactly 0 has measured nothing, because gravity is always there. A gyro at rest may well read 0. Without
+    /// an accelerometer, its zeros are padding only if the time stamp is 0 too, after stamps above 0.
     pub fn is_padding(&mut self, row: &mut Row, zero_stamp: bool, begun: bool) -> bool {
         let zero =
             |sensor: &[(usize, usize)]| sensor.iter().all(|(place, _)| row.values[*place] == 0.0);
@@ -109,7 +110,7 @@ impl Plausibility {
         false
     }
 
-    /// The temperature `c` of a row, or not a number where it is impossible.
+    /// The temperature `c` of a row, or NaN if it is impossible.
     fn temperature(&mut self, c: f64, number: u64) -> f64 {
         if c.is_nan() {
             return c;
@@ -125,7 +126,7 @@ impl Plausibility {
         c
     }
 
-    /// Which sensors, gyro and accelerometer, have shown nothing but 0, and in how many rows.
+    /// For gyro and accelerometer, the number of rows if all of them read 0.
     pub fn dead(&self) -> [Option<u64>; 2] {
         [0, 1].map(|s| {
             let all = &self.sensors[s];
@@ -134,7 +135,7 @@ impl Plausibility {
         })
     }
 
-    /// Refuses a file at `place` of which nothing is left, or whose temperatures are none.
+    /// Refuses a file at `place` if all its readings are 0, if they alternate between two sources, or if most of its temperatures are impossible.
     pub fn check(&self, place: &str) -> Result<()> {
         if self.rows == 0 && self.padding > 0 {
             return Err(Error::new(
@@ -157,12 +158,12 @@ impl Plausibility {
         Ok(())
     }
 
-    /// What to say of an accelerometer whose readings are to be in m/s².
+    /// A warning if an accelerometer's readings are probably not in m/s².
     pub fn wrong_unit(&self, place: &str, gravity_mps2: f64) -> Option<String> {
         self.two_sources.wrong_unit(place, gravity_mps2)
     }
 
-    /// One sentence for each thing that was left out or looks wrong; `place` is the file, whose rows come at `rate_hz`.
+    /// One warning for each thing that was left out or looks wrong; `place` is the file, whose rows come at `rate_hz`.
     pub fn warnings(&self, place: &str, rate_hz: f64) -> Vec<String> {
         let mut warnings = Vec::new();
         for (sensor, held) in ["gyro", "accel"].iter().zip(&self.held) {

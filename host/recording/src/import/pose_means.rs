@@ -1,4 +1,4 @@
-//! Tables of means: one row for each pose or rate, in place of its samples.
+//! Tables of means: one row for each pose or rate instead of its samples.
 
 use std::path::{Path, PathBuf};
 
@@ -20,30 +20,30 @@ use crate::staging::Staging;
 /// File of the means in a recording's directory, beside its manifest.
 pub const MEANS_FILE: &str = "means.csv";
 
-/// More samples are averaged by nobody; a double counts to here without a gap.
+/// Largest number of averaged samples. Nobody averages more, and a double counts exactly up to here.
 const MOST_AVERAGED: f64 = 1e15;
 
 /// The means of one pose, or of one step of a rate table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseMean {
-    /// What the table calls it; empty where it has no names.
+    /// Its label in the table; empty if it has none.
     pub label: String,
-    /// Mean readings: gyro x, y, z, accelerometer x, y, z, in the raw unit. Not a number where there is none.
+    /// Mean readings: gyro x, y, z, accelerometer x, y, z, in the raw unit. NaN if there is none.
     pub raw: [f64; 6],
-    /// Standard deviations of one sample, raw units; not a number where unknown.
+    /// Standard deviations of one sample, raw units; NaN if unknown.
     pub deviation: [f64; 6],
-    /// Samples averaged; `None` where unknown.
+    /// Samples averaged; `None` if unknown.
     pub averaged: [Option<u64>; 6],
-    /// Known input: rates (deg/s), specific forces (m/s²). Not a number where unknown.
+    /// Known input: rates (deg/s), specific forces (m/s²). NaN if unknown.
     pub reference: [f64; 6],
-    /// Temperature, °C, or not a number.
+    /// Temperature, °C, or NaN.
     pub temp_c: f64,
 }
 
 /// A table of means with its manifest.
 #[derive(Debug, Clone)]
 pub struct PoseMeans {
-    /// What is known beside the means; the sample rate is not a number where it is not known.
+    /// The manifest; its sample rate is NaN if unknown.
     pub manifest: Manifest,
     /// Where it is, for messages.
     pub place: String,
@@ -56,7 +56,7 @@ pub struct PoseMeans {
 }
 
 impl PoseMeans {
-    /// The file of the means of `directory`, where it is a recording of means.
+    /// The file of the means of `directory`, if it is a recording of means.
     pub fn file(directory: &Path) -> Option<PathBuf> {
         let path = directory.join(MEANS_FILE);
         path.is_file().then_some(path)
@@ -87,7 +87,7 @@ impl PoseMeans {
     }
 }
 
-/// What was read of a table.
+/// A table as it was read.
 struct Table {
     poses: Vec<PoseMean>,
     columns: Columns,
@@ -130,7 +130,7 @@ impl Table {
                 );
             }
         }
-        // The same rules as for a recording's header, but for the time.
+        // The same rules as for a recording's header, except for the time.
         let names = roles.iter().filter_map(|role| match role {
             Role::Column(column) => Some(column.name()),
             _ => None,
@@ -207,7 +207,7 @@ fn pose(
                     Some(c) => pose.averaged[c] = count,
                     None => {
                         for (c, averaged) in pose.averaged.iter_mut().enumerate() {
-                            // A count of the channel's own goes before that of the row.
+                            // A count for the channel overrides the count of the row.
                             if !roles.contains(&Role::Averaged(Some(c))) {
                                 *averaged = count;
                             }
@@ -327,7 +327,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
     })
 }
 
-/// The table in the units of the recording, by the names of its columns. Labels stand last, as a line that begins with # is a comment.
+/// The table as CSV, with the units and column names of a recording. Labels come last, because a line that begins with # is a comment.
 fn to_csv(table: &Table) -> Vec<u8> {
     let poses = &table.poses;
     let columns = &table.columns;

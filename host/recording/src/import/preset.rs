@@ -1,6 +1,6 @@
-//! Recordings of well-known makers: whether files are theirs, and what their columns mean.
+//! Presets for the files of well-known makers: how to recognise them, and what their columns mean.
 //!
-//! A preset is data; what it says goes the way that the same would go by hand, as lists of columns and factors.
+//! A preset is data: lists of columns and factors, which are used as if they were given by hand.
 
 mod layout;
 mod table;
@@ -23,17 +23,17 @@ use layout::Layout;
 pub use layout::Preset;
 use table::PRESETS;
 
-/// Bytes at the start of a file among which its header and the lines above it stand.
+/// Bytes at the start of a file that contain its header and the lines above it.
 const HEAD: u64 = 1 << 16;
 
-/// What a preset has said of the files of an import.
+/// The preset of an import.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PresetUse {
     /// Name of the preset.
     pub name: &'static str,
-    /// What it reads.
+    /// The files that it reads.
     pub title: &'static str,
-    /// Whether it was found out by the headers, and not given.
+    /// Whether it was recognised by the headers instead of given.
     pub recognised: bool,
 }
 
@@ -42,25 +42,25 @@ pub struct PresetUse {
 pub struct Chosen {
     /// Which one.
     pub used: PresetUse,
-    /// Unit of the readings, where the maker has only one.
+    /// Unit of the readings, if the maker uses only one.
     pub raw_unit: Option<RawUnit>,
-    /// The files; of a folder, those in it.
+    /// The files; those in a folder if a folder was given.
     pub files: Vec<PathBuf>,
     /// What their columns mean.
     pub columns: Vec<ColumnList>,
     /// Factors, signs included.
     pub scales: Vec<Scale>,
-    /// Sample rate in Hz, where a line above the data says it.
+    /// Sample rate in Hz, if a line above the data contains it.
     pub rate_hz: Option<f64>,
-    /// What a person should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// Why files are not of a preset.
+/// Why files do not fit a preset.
 enum Unfit {
-    /// They are another maker's, or are not whole.
+    /// They come from another maker, or are incomplete.
     Other(Error),
-    /// They are its maker's, and of no use.
+    /// They come from its maker, but do not contain readings of a sensor.
     Useless(Error),
 }
 
@@ -100,10 +100,9 @@ impl Preset {
         &PRESETS
     }
 
-    /// What `named` says of `paths`, files or folders; without it what the only preset says that their headers are of, and `None` if
-    /// they are of none.
+    /// Applies `named` to `paths`, files or folders. Without `named`, applies the only preset that their headers fit; `None` if none fits.
     ///
-    /// Errors: the files are not of the preset that is named, are of several, or are of no use.
+    /// Errors: the files do not fit the named preset, fit several presets, or contain no readings of a sensor.
     pub fn choose(
         named: Option<Preset>,
         paths: &[PathBuf],
@@ -139,7 +138,7 @@ impl Preset {
         }
     }
 
-    /// What it says of `paths`. `recognise`: whether files that have no header are none of its own.
+    /// Applies the preset to `paths`. With `recognise`, files without a header never fit.
     fn of(
         &self,
         paths: &[PathBuf],
@@ -199,7 +198,7 @@ impl Preset {
         Ok(chosen)
     }
 
-    /// The first of its sets of files that `folder` has.
+    /// The first of its sets of files that `folder` contains.
     fn files_in(&self, folder: &Path) -> Result<Vec<PathBuf>> {
         let sets = self.in_folder.iter();
         let mut sets = sets.map(|set| set.iter().map(|file| folder.join(file)).collect());
@@ -221,7 +220,7 @@ impl Preset {
             })
     }
 
-    /// The layout of `path`, its columns and the sample rate that it says.
+    /// The layout of `path`, its columns, and the sample rate in it.
     fn layout(
         &self,
         path: &Path,
@@ -274,7 +273,7 @@ impl Preset {
                 format!("the preset {} has no file of this name", self.name),
                 "rename it as its maker names it, or name the columns",
             ),
-            // The names are there, and something else is wrong.
+            // The names are there, but something else is wrong.
             Some((missing, error)) if missing.is_empty() => Err(error.into()),
             Some((missing, _)) => refused(
                 format!(
@@ -287,7 +286,7 @@ impl Preset {
         }
     }
 
-    /// Whether the file beside `path` says that it is of another preset.
+    /// Whether the file beside `path` shows that it belongs to another preset.
     fn contradicted_beside(&self, path: &Path) -> bool {
         let Some(beside) = &self.beside else {
             return false;
@@ -314,7 +313,7 @@ impl Preset {
 }
 
 impl Layout {
-    /// Its columns in `path`, with those that it may have; the first row must have a time if any row should.
+    /// Its columns in `path`, including the optional ones that are there. If a column is the time, the first row must have a time.
     fn read(
         &self,
         path: &Path,
@@ -340,7 +339,7 @@ impl Layout {
         let mut table = TextTable::open(path, Some(&list), separator, &[])?;
         let mut cells = Cells::default();
         let row = match table.next(&mut cells) {
-            // Whoever reads all rows says so.
+            // The import itself reports this.
             Err(Unreadable::Row(_)) => return Ok(list),
             row => row.map_err(Unreadable::into_error)?,
         };
@@ -354,7 +353,7 @@ impl Layout {
         Ok(list)
     }
 
-    /// The names in the header that are not in `head`.
+    /// Names of its columns that `head` lacks.
     fn missing(&self, head: &str) -> Vec<String> {
         let list: Result<ColumnList> = self.columns.parse();
         match list {
@@ -376,7 +375,7 @@ fn head(path: &Path) -> Result<String> {
     Ok(String::from_utf8_lossy(&head).into_owned())
 }
 
-/// The number behind `words` in one of the first lines.
+/// The number after `words` in one of the first lines.
 fn rate_after(head: &str, words: &str) -> Option<f64> {
     let behind = head.lines().find_map(|line| line.split_once(words))?.1;
     let digits = behind.trim_start();

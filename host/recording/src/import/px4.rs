@@ -1,8 +1,8 @@
 //! Logs of PX4 (ULog): the raw topics of each sensor, or `sensor_combined` with PX4's own calibration undone.
 //!
-//! `sensor_accel`, `sensor_gyro` and their FIFO topics have the readings of the driver, on the board's axes, before calibration.
-//! `sensor_combined` has the calibrated readings of the sensors that PX4 has chosen: `R ((raw - offset) scale)` with the parameters `CAL_ACCn_` and
-//! `CAL_GYROn_` of the sensor with that device id, and R the mounting of the board (`src/lib/sensor_calibration` of PX4-Autopilot).
+//! `sensor_accel`, `sensor_gyro` and their FIFO topics contain the readings of the driver, on the board's axes, before calibration. `sensor_combined`
+//! contains the calibrated readings of the sensors that PX4 has selected: `R ((raw - offset) scale)`. Offset and scale are the parameters `CAL_ACCn_`
+//! and `CAL_GYROn_` with the device id of the sensor; R is the mounting of the board (`src/lib/sensor_calibration` of PX4-Autopilot).
 
 mod calibration;
 mod topics;
@@ -21,7 +21,7 @@ use crate::error::{Argument, Error, Result};
 use calibration::{Parameters, Sensor};
 use topics::{Combined, Topic, u32_in};
 
-/// What a log begins with, and the bytes of its header.
+/// Signature at the start of a log, and length of its header in bytes.
 const SIGNATURE: &[u8] = b"ULog\x01\x12\x35";
 const HEADER: u64 = 16;
 
@@ -32,17 +32,17 @@ const SELECTION: &str = "sensor_selection";
 const RAW: [&str; 2] = ["sensor_gyro", "sensor_accel"];
 const FIFO: [&str; 2] = ["sensor_gyro_fifo", "sensor_accel_fifo"];
 
-/// The default profile of the logger writes the raw topics once a second, and `sensor_combined` at 200 Hz. Where nobody chooses, the raw topics
-/// are taken unless they have this many times fewer samples.
+/// The default profile of the logger writes the raw topics once a second, and `sensor_combined` at 200 Hz. Without a choice, the raw topics are read
+/// unless they have this many times fewer samples.
 const SPARSE: usize = 4;
 
-/// What a log has of inertial sensors.
+/// What a log contains of inertial sensors.
 #[derive(Default)]
 struct Log {
     /// By name and instance.
     topics: BTreeMap<(&'static str, u32), Topic>,
     combined: Combined,
-    /// Ids of the gyro and the accelerometer in use, each with the first sample of `sensor_combined` that they are of.
+    /// Ids of the gyro and the accelerometer in use, each pair with the number of its first sample in `sensor_combined`.
     selected: Vec<(usize, [u32; 2])>,
     parameters: Parameters,
     dropouts: u64,
@@ -134,7 +134,7 @@ impl Log {
         Some(())
     }
 
-    /// The readings that `choice` is of.
+    /// The readings that `choice` selects.
     fn chosen(&self, path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
         let has = |names: [&str; 2]| self.topics.keys().any(|(name, _)| names.contains(name));
         let combined = self.combined.stamps_ns.len();
@@ -166,7 +166,7 @@ impl Log {
         self.raw_readings(path, of_raw, choice.instance)
     }
 
-    /// What there is to choose from.
+    /// The topics to choose from.
     fn listed(&self) -> String {
         let raw = self.topics.iter().map(|((name, instance), topic)| {
             format!("{name} instance {instance} ({})", topic.named())
@@ -275,7 +275,7 @@ impl Log {
         Ok(all)
     }
 
-    /// The readings of `sensor_combined`; `sparse`: the raw topics are there, with too few samples.
+    /// The readings of `sensor_combined`; `sparse`: the raw topics exist, but have too few samples.
     fn combined_readings(&self, path: &Path, sparse: bool) -> Result<Vec<Readings>> {
         if self.combined.stamps_ns.is_empty() {
             let problem = "the log has no messages of inertial sensors";
@@ -287,7 +287,7 @@ impl Log {
                 .iter()
                 .map(|(from, ids)| (*from, ids[sensor as usize]));
             match self.selected.is_empty() {
-                // Older logs do not say: where there is one calibrated sensor only, it is that.
+                // Older logs do not name the sensor: if only one is calibrated, it is that one.
                 true => self
                     .parameters
                     .only_id(sensor)
@@ -331,7 +331,7 @@ impl Log {
         Ok(vec![readings])
     }
 
-    /// What the logger has lost, and how the file ended.
+    /// Warnings about what the logger lost and how the file ended.
     fn of_the_logger(&self, ended: &Completeness) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.dropouts > 0 {

@@ -1,4 +1,4 @@
-//! What the readers of logs have read, as rows.
+//! Rows that the readers of logs have read.
 
 use std::panic::{UnwindSafe, catch_unwind};
 use std::path::Path;
@@ -10,10 +10,10 @@ use crate::columns::Column;
 use crate::error::Result;
 use crate::in_order::broke_down;
 
-/// Which of the sensors in a log is wanted.
+/// The chosen sensor in a log.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Choice<'a> {
-    /// Name of the topic or message; the format decides without it.
+    /// Name of the topic or message; without it, the format decides.
     pub topic: Option<&'a str>,
     /// Number of the sensor among those of one topic.
     pub instance: Option<u32>,
@@ -22,19 +22,19 @@ pub(super) struct Choice<'a> {
 /// Readings of one clock: those of a whole unit, or of one of its two sensors.
 #[derive(Debug, Default)]
 pub(super) struct Readings {
-    /// What each value of a row is.
+    /// Column of each value of a row.
     columns: Vec<Column>,
     stamps_ns: Vec<i64>,
     /// Row by row.
     values: Vec<f64>,
     next: usize,
-    /// What was read, and what was done to it.
+    /// What was read, and how it was changed.
     pub notes: Vec<String>,
     pub warnings: Vec<String>,
 }
 
 impl Readings {
-    /// Of these columns, in the order of the values, without rows yet.
+    /// Without rows yet; `columns` in the order of the values.
     pub fn of(columns: Vec<Column>) -> Self {
         Self {
             columns,
@@ -42,7 +42,7 @@ impl Readings {
         }
     }
 
-    /// Of both sensors.
+    /// Without rows yet, for both sensors.
     pub fn of_unit() -> Self {
         Self::of((0..6).map(Column::Raw).collect())
     }
@@ -88,7 +88,7 @@ impl Readings {
     }
 }
 
-/// What `read` makes of the file at `path`. Crates that read logs panic on some damaged files, and a damaged file is no bug of ours.
+/// Calls `read` on the file at `path`. The crates that read logs panic on some damaged files; this becomes an error about the file.
 pub(super) fn guarded<T>(path: &Path, read: impl FnOnce() -> Result<T> + UnwindSafe) -> Result<T> {
     catch_unwind(read).map_err(|_| broke_down(&path.display().to_string()))?
 }

@@ -1,7 +1,7 @@
 //! Regular times for the readings of a loop.
 //!
-//! A recording has one rate: dwells, noise and turns are judged by blocks of so many samples. Readings that a loop took at irregular
-//! times are therefore interpolated to its usual round. Where a round took longer than [`LONGEST`] of these there is a gap.
+//! A recording has one rate, because dwells, noise and turns are computed from blocks of a fixed number of samples. Readings that a loop took at
+//! irregular times are therefore interpolated to multiples of its usual round. A round longer than [`LONGEST`] usual ones is a gap.
 
 use super::foreign::ForeignFile;
 use super::join::check_order;
@@ -16,11 +16,11 @@ pub(super) struct Resampler {
     start_s: f64,
     /// Number of the next time.
     next: u64,
-    /// Rows on both sides of it; the first of them before anything was read.
+    /// Rows on both sides of it; both are the first row at the start.
     around: Option<[Row; 2]>,
 }
 
-/// Reads the next row of `file`, at regular times where there is a `resampler`; `false` at the end.
+/// Reads the next row of `file`, at regular times if there is a `resampler`; `false` at the end.
 pub(super) fn next(
     file: &mut ForeignFile,
     resampler: Option<&mut Resampler>,
@@ -43,7 +43,7 @@ impl Resampler {
         }
     }
 
-    /// The row of the next time; `false` behind the last row of `file`.
+    /// The row of the next time; `false` after the last row of `file`.
     pub fn next(&mut self, file: &mut ForeignFile, row: &mut Row) -> Result<bool> {
         let [before, after] = match &mut self.around {
             Some(around) => around,

@@ -1,6 +1,6 @@
 //! Messages `sensor_msgs/Imu` of ROS 1 bags (version 2.0), of ROS 2 bags in SQLite files, and of MCAP files.
 //!
-//! Their time is that of the header, which the driver has set, and not that at which they were received.
+//! Their time is the stamp of the header, which the driver has set. The time of reception is ignored.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -14,7 +14,7 @@ use crate::error::{Argument, Error, Result};
 /// Bytes that are read at a time.
 const PIECE: usize = 1 << 18;
 
-/// Longest record or chunk of an MCAP file, bytes. A damaged length would be taken from memory first.
+/// Longest record or chunk of an MCAP file, bytes. Without a limit, a damaged length would be allocated.
 const LONGEST_RECORD: usize = 1 << 30;
 
 /// One message.
@@ -25,7 +25,7 @@ struct Imu {
     values: [f64; 6],
 }
 
-/// How a message is laid out.
+/// Encoding of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Layout {
     Ros1,
@@ -37,7 +37,7 @@ enum Layout {
 struct Topic {
     name: String,
     kind: String,
-    /// `None` where the messages are others, or are laid out in an unknown way.
+    /// `None` if the messages are of another kind or encoding.
     layout: Option<Layout>,
 }
 
@@ -60,7 +60,7 @@ impl Topic {
 /// Messages by topic, as they come.
 #[derive(Default)]
 struct Found {
-    /// By the number that the file gives them.
+    /// By the number of the topic in the file.
     topics: BTreeMap<u32, Topic>,
     messages: BTreeMap<u32, Vec<Imu>>,
     broken: Option<String>,
@@ -88,7 +88,7 @@ impl Found {
     }
 }
 
-/// The messages of the topic that is wanted, which may be left out where there is one only.
+/// The messages of the chosen topic; without a choice, those of the only one.
 fn chosen(path: &Path, mut found: Found, choice: Choice<'_>) -> Result<Vec<Readings>> {
     if choice.instance.is_some() {
         let problem = "an instance is given, but topics have no instances";
@@ -152,7 +152,7 @@ pub(super) fn read_bag(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>>
     chosen(path, guarded(path, || messages_of_bag(path))?, choice)
 }
 
-/// Without the reader of bags, which maps the file into memory.
+/// The reader of bags maps the file into memory, which a browser cannot.
 #[cfg(target_family = "wasm")]
 fn messages_of_bag(path: &Path) -> Result<Found> {
     let problem = "a browser cannot read bags of ROS 1";
@@ -187,7 +187,7 @@ fn messages_of_bag(path: &Path) -> Result<Found> {
     Ok(found)
 }
 
-/// Makes one topic of all connections to it: each node that publishes has one of its own.
+/// Merges all connections of a topic: each node that publishes has a separate one.
 fn merge(found: &mut Found) {
     let mut first: BTreeMap<String, u32> = BTreeMap::new();
     let numbers: Vec<u32> = found.topics.keys().copied().collect();
@@ -257,7 +257,7 @@ fn messages_of_mcap(path: &Path) -> Result<Found> {
 
 /// Reads a bag of ROS 2 in an SQLite file.
 pub(super) fn read_db3(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
-    // A database that was not closed has its last messages beside it.
+    // The last messages of a database that was not closed are in a file beside it.
     let mut beside = path.as_os_str().to_owned();
     beside.push("-wal");
     if std::fs::metadata(&beside).is_ok_and(|beside| beside.len() > 0) {
@@ -293,7 +293,7 @@ fn messages_of_database(path: &Path) -> std::result::Result<Found, String> {
     let (topic, data) = (messages.column("topic_id")?, messages.column("data")?);
     database.each_row(messages, |row| {
         let number = u32::try_from(row.integer(topic)?).map_err(|_| "a message has no topic")?;
-        // The images of a bag are not even read.
+        // Other messages, such as images, are not read.
         if found
             .topics
             .get(&number)
@@ -312,7 +312,7 @@ struct Fields<'a> {
     bytes: &'a [u8],
     at: usize,
     big_endian: bool,
-    /// CDR begins each number at a multiple of its size.
+    /// Whether each number begins at a multiple of its size, as in CDR.
     aligned: bool,
 }
 

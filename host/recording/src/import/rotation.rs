@@ -1,9 +1,9 @@
-//! How a board is mounted, as PX4 and ArduPilot number it.
+//! Mounting of a board, by the numbers that PX4 and ArduPilot use.
 
 /// A rotation matrix, from the board's axes to the vehicle's.
 pub(super) type Rotation = [[f64; 3]; 3];
 
-/// Roll, pitch and yaw of the orientations 0 to 40, deg: those of `MAV_SENSOR_ORIENTATION`, alike in both. Beyond, the two differ.
+/// Roll, pitch and yaw in deg of the orientations 0 to 40 of `MAV_SENSOR_ORIENTATION`, which both use. Beyond 40, the two differ.
 const ORIENTATIONS: [[u16; 3]; 41] = [
     [0, 0, 0],
     [0, 0, 45],
@@ -48,14 +48,14 @@ const ORIENTATIONS: [[u16; 3]; 41] = [
     [90, 315, 0],
 ];
 
-/// The rotation of orientation `number`, if it is one of those that both number alike.
+/// The rotation of orientation `number`, if both number it alike.
 pub(super) fn orientation(number: f64) -> Option<Rotation> {
     let whole = number.fract() == 0.0 && number >= 0.0;
     let angles = ORIENTATIONS.get(whole.then_some(number as usize)?)?;
     Some(from_euler(angles.map(f64::from)))
 }
 
-/// Of roll, pitch and yaw in degrees, about z, then y, then x: `Rz(yaw) Ry(pitch) Rx(roll)`.
+/// From roll, pitch and yaw in degrees, about z, then y, then x: `Rz(yaw) Ry(pitch) Rx(roll)`.
 pub(super) fn from_euler(angles_deg: [f64; 3]) -> Rotation {
     let [(sr, cr), (sp, cp), (sy, cy)] = angles_deg.map(|angle| angle.to_radians().sin_cos());
     [
@@ -70,7 +70,7 @@ pub(super) fn product(a: &Rotation, b: &Rotation) -> Rotation {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// What was done to the readings of one sensor: `rotation ((raw - offset) scale)`, element by element but for the rotation.
+/// The calibration that was applied to one sensor's readings: `rotation ((raw - offset) scale)`, with offset and scale for each axis.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Correction {
     pub rotation: Rotation,
@@ -79,7 +79,7 @@ pub(super) struct Correction {
 }
 
 impl Correction {
-    /// The reading before it.
+    /// The reading before this calibration.
     pub fn undo(&self, reading: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| {
             let in_sensor: f64 = (0..3).map(|k| self.rotation[k][i] * reading[k]).sum();
@@ -92,8 +92,8 @@ impl Correction {
 mod tests {
     use super::*;
 
-    /// On a board that is mounted by roll 180, yaw 90, what the board calls its x points to the vehicle's y: rolling it over leaves x where it is, and
-    /// the yaw takes x to y. Its y and its z point to x and down.
+    /// On a board mounted with roll 180, yaw 90, the board's x points to the vehicle's y: the roll leaves x in place, and the yaw takes x to y. The
+    /// board's y points to the vehicle's x, its z to the vehicle's -z.
     #[test]
     fn axes_of_a_mounted_board_point_where_a_hand_turns_them() {
         let matrix = orientation(10.0).unwrap();

@@ -1,4 +1,4 @@
-//! Rows that are chosen by what a column holds, as one of several sensors in a file.
+//! Rows chosen by the value of a column, such as one of several sensors in a file.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -8,7 +8,7 @@ use std::str::FromStr;
 use crate::cell::shorten;
 use crate::error::{Argument, Error, Result};
 
-/// Different values of a column that are listed where the one that was asked for is not among them.
+/// Most values of a column that are listed if the requested one never occurs.
 const MOST_LISTED: usize = 20;
 
 /// The rows in which a column has a value, as in `channel=3`.
@@ -24,7 +24,7 @@ impl RowFilter {
         &self.column
     }
 
-    /// Where `names` has the column. Of names that are no header at all, its number from the left counts.
+    /// Position of the column in the header `names`.
     pub(super) fn position(&self, names: &[String]) -> Option<usize> {
         names.iter().position(|name| *name == self.column)
     }
@@ -34,7 +34,7 @@ impl RowFilter {
         self.column.parse::<usize>().ok()?.checked_sub(1)
     }
 
-    /// As text they may differ: 3, 3.0 and 03 are one channel.
+    /// Whether a cell has the value. Numbers may be written differently: 3, 3.0 and 03 are one channel.
     fn holds(&self, cell: &str) -> bool {
         let number = |text: &str| text.parse::<f64>().ok();
         cell == self.value || number(cell).is_some_and(|n| number(&self.value) == Some(n))
@@ -67,7 +67,7 @@ impl fmt::Display for RowFilter {
     }
 }
 
-/// Filters at work on the rows of a file.
+/// Filters, with counts over the rows of a file.
 #[derive(Debug, Default)]
 pub(super) struct RowFilters {
     filters: Vec<Tally>,
@@ -80,12 +80,12 @@ pub(super) struct RowFilters {
 struct Tally {
     filter: RowFilter,
     found: bool,
-    /// Values that were met, some of them.
+    /// Some of the values that occurred.
     met: BTreeSet<String>,
 }
 
 impl RowFilters {
-    /// Of these filters, no row having been seen.
+    /// From these filters, before any row.
     pub fn new(filters: &[RowFilter]) -> Self {
         let tally = |filter: &RowFilter| Tally {
             filter: filter.clone(),
@@ -98,7 +98,7 @@ impl RowFilters {
         }
     }
 
-    /// Whether a row is kept in which the columns of the filters hold `cells`, in their order.
+    /// Whether a row is kept; `cells` are those of the filters' columns, in the order of the filters.
     pub fn keep<'a>(&mut self, cells: impl Iterator<Item = std::borrow::Cow<'a, str>>) -> bool {
         let mut all = true;
         for (tally, cell) in self.filters.iter_mut().zip(cells) {

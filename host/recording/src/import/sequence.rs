@@ -1,7 +1,7 @@
-//! Files that follow one another: one for each pose or rate, as people record six faces.
+//! Files that follow one another: one for each pose or rate, as when six faces are recorded.
 //!
-//! Each file is a step, labelled with its name. Their clocks may begin anew: what a file says of when it was begun is believed if it is
-//! after the file before, and else it begins [`PAUSE_S`](super::place::PAUSE_S) later. No turn is known between them.
+//! Each file is a step, labelled with its name. Its clock may have restarted: its start time is used if it lies after the file before; otherwise the
+//! file begins [`PAUSE_S`](super::place::PAUSE_S) after that one. The turns between files are unknown.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -19,7 +19,7 @@ use crate::error::{Argument, Error, Result};
 use crate::manifest::{Manifest, Reference, Source};
 use crate::writer::Writer;
 
-/// Rates of two files may differ by this share: a loop that is paced by its own work is not as fast each time.
+/// Rates of two files may differ by this share: a loop without a timer is not equally fast each time.
 const ALIKE: f64 = 0.02;
 
 /// Imports the files of `options` one after the other.
@@ -47,7 +47,7 @@ pub(super) fn import_sequence(
             let remedy = "skip the column, or import this file alone";
             return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
         }
-        // What of the table is used is known when all files have been read.
+        // Which rows of the table are unused is known only after all files.
         let own = import.inputs.take();
         import.inputs = own.map(|own| own.of_step(step as i32, inputs.take()));
         import.first.labels = StepLabels::of(labels.clone());
@@ -133,7 +133,7 @@ pub(super) fn import_sequence(
     Ok(summary)
 }
 
-/// What six faces do not show.
+/// Warnings about what six faces do not determine.
 fn of_faces(options: &ImportOptions, gyro: bool) -> Vec<String> {
     let mut warnings: Vec<String> = Face::missing(&options.faces).into_iter().collect();
     if options.reference == Reference::Gravity {
@@ -159,7 +159,7 @@ fn source(path: &Path) -> Result<Source> {
     })
 }
 
-/// Labels of the steps: the faces, or the names of the files without what they end with.
+/// Labels of the steps: the faces, or the names of the files without their endings.
 fn labels(options: &ImportOptions) -> Result<Vec<String>> {
     if !options.faces.is_empty() {
         return Ok(options.faces.iter().map(Face::to_string).collect());
@@ -178,7 +178,7 @@ fn labels(options: &ImportOptions) -> Result<Vec<String>> {
     Ok(labels)
 }
 
-/// Adds what was seen of a file to what was seen of those before.
+/// Adds the counts and warnings of a file to those of the files before.
 fn add(all: &mut ImportSummary, one: ImportSummary) {
     all.time.extend(one.time);
     all.notes.extend(one.notes);

@@ -1,7 +1,7 @@
 //! Tables of an SQLite file, read page by page (<https://www.sqlite.org/fileformat2.html>).
 //!
-//! Just what a bag of ROS 2 needs: every row of a table, without indices and without SQL. The bundled library in C would be ten times the code of the
-//! whole import and a compiler for it.
+//! This reads just what a bag of ROS 2 needs: every row of a table, without indices and without SQL. The bundled C library would be ten times the
+//! code of the whole import, and need a C compiler.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -14,10 +14,10 @@ const SIGNATURE: &[u8] = b"SQLite format 3\0";
 /// Bytes of the file's header, before the tree of the first page.
 const HEADER: usize = 100;
 
-/// Levels of a tree. Each page but the leaves has two children at least, so more levels than this are none of 2^32 pages.
+/// Most levels of a tree. Each page except the leaves has at least two children, so 2^32 pages cannot have more levels.
 const DEEPEST: usize = 40;
 
-/// Longest content of a row, bytes: SQLite's own limit. A damaged length would be taken from memory first.
+/// Longest content of a row, bytes: SQLite's own limit. Without it, a damaged length would be allocated.
 const LONGEST: u64 = 1_000_000_000;
 
 type Result<T> = std::result::Result<T, String>;
@@ -45,21 +45,21 @@ impl Table {
     }
 }
 
-/// A row of a table; what did not fit into its page is read when it is asked for.
+/// A row of a table; what did not fit into its page is read on demand.
 pub(super) struct Row<'a> {
     database: &'a Database,
     id: i64,
     /// The beginning of its content.
     local: &'a [u8],
     length: u64,
-    /// Page that the rest begins on.
+    /// Page on which the rest begins.
     overflow: Option<u64>,
     /// Kind and position of each value.
     values: Vec<(u64, u64)>,
 }
 
 impl Row<'_> {
-    /// A whole number; the number of the row where the column is the key.
+    /// A whole number; the number of the row if the column is the key.
     pub fn integer(&self, column: usize) -> Result<i64> {
         let (kind, at) = self.value(column)?;
         let width = match kind {
@@ -110,7 +110,7 @@ impl Row<'_> {
 }
 
 impl Database {
-    /// Opens the file at `path`; the error is without the place.
+    /// Opens the file at `path`; the error does not name the file.
     pub fn open(path: &Path) -> Result<Database> {
         let mut file = File::open(path).map_err(|error| error.to_string())?;
         let mut header = [0; HEADER];
@@ -136,7 +136,7 @@ impl Database {
         })
     }
 
-    /// The tables by name, from the table of the schema that the first page begins.
+    /// The tables by name, from the schema table that begins on the first page.
     pub fn tables(&self) -> Result<HashMap<String, Table>> {
         let mut tables = HashMap::new();
         self.rows(1, &mut |row| {
@@ -280,7 +280,7 @@ impl Database {
     }
 }
 
-/// Names of the columns, by the words that a table was created with.
+/// Names of the columns, from the statement that created the table.
 fn columns_of(sql: &str) -> Vec<String> {
     let inner = sql.split_once('(').map_or("", |(_, inner)| inner);
     let name = |part: &str| {
@@ -322,7 +322,7 @@ fn u32_at(bytes: &[u8], at: usize) -> Result<u64> {
 mod tests {
     use super::*;
 
-    /// The string of 9000 letters that `rosbags` has written takes three pages; CDR puts 8 bytes before it and a 0 behind it.
+    /// The string of 9000 letters that `rosbags` wrote takes three pages; CDR puts 8 bytes before it and a 0 after it.
     #[test]
     fn a_blob_that_is_longer_than_a_page_is_put_together() {
         let bag = concat!(

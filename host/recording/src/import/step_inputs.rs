@@ -15,18 +15,18 @@ use crate::cell::shorten;
 use crate::error::Result;
 use crate::manifest::Reference;
 
-/// A table of inputs, and what the steps of the file have needed of it.
+/// A table of inputs, and the inputs of the steps met so far.
 pub(super) struct StepInputs {
     table: Inputs,
-    /// Rows of each step of the file, where angles must be divided by durations.
+    /// Rows of each step of the file, counted if angles must be divided by durations.
     rows: HashMap<i32, u64>,
-    /// Inputs of the steps met so far; `None` where they are not known.
+    /// Inputs of the steps met so far; `None` if they are unknown.
     known: HashMap<i32, Option<[f64; 6]>>,
 }
 
 impl StepInputs {
-    /// Of the faces or of the table of `options`, if they give inputs. Faces give them only where they are to be the reference: with gravity
-    /// nothing is known of them but its magnitude.
+    /// From the faces or the table of `options`, if they give inputs. Faces give inputs only if the reference is a table: with gravity only the
+    /// magnitude is known.
     pub fn of(options: &ImportOptions) -> Result<Option<Self>> {
         let table = match &options.inputs {
             _ if !options.faces.is_empty() => (options.reference == Reference::Table)
@@ -56,8 +56,8 @@ impl StepInputs {
         self.table.turns.iter().copied()
     }
 
-    /// A first pass over the file at `path`: the duration of a step is known only when all of it has been seen. `irregular` are its times
-    /// where it is to be given regular ones.
+    /// A first pass over the file at `path`: the duration of a step is known only after its last row. `irregular` are the times of a file that is to
+    /// be resampled at regular ones.
     pub fn count_rows(
         &mut self,
         path: &Path,
@@ -81,7 +81,7 @@ impl StepInputs {
         Ok(())
     }
 
-    /// That of a file of a sequence, all rows of which are of `step`, with what the files `before` it have used.
+    /// For a file of a sequence, whose rows all belong to `step`. The table of the files `before` it is used further, with its counts.
     pub fn of_step(mut self, step: i32, before: Option<Self>) -> Self {
         let count = self.rows.remove(&-1);
         let mut all = before.unwrap_or(self);
@@ -94,7 +94,7 @@ impl StepInputs {
         let known = match step {
             -1 => None,
             step => *self.known.entry(step).or_insert_with(|| {
-                // n samples span n periods: each stands for the time until the next.
+                // n samples last n periods: each lasts until the next.
                 let rows = self.rows.get(&step).copied().unwrap_or(0);
                 self.table.input(step, labels, rows as f64 / rate_hz)
             }),
@@ -106,7 +106,7 @@ impl StepInputs {
         }
     }
 
-    /// A warning of steps without an input.
+    /// A warning about steps without an input.
     pub fn unknown(&self, labels: &StepLabels) -> Option<String> {
         let unknown = self.known.iter().filter(|(_, input)| input.is_none());
         let steps: BTreeSet<i32> = unknown.map(|(&step, _)| step).collect();
@@ -122,7 +122,7 @@ impl StepInputs {
         Some(format!("the inputs of {count} dwells are unknown: {names}"))
     }
 
-    /// A warning of inputs without a step.
+    /// A warning about inputs without a step.
     pub fn unused(&self) -> Option<String> {
         self.table.unused()
     }

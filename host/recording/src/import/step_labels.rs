@@ -4,21 +4,21 @@ use std::collections::HashMap;
 
 use super::super::cell::{self, Refusal, shorten};
 
-/// Different labels that a file may have; with more of them the column is no step.
+/// Most different labels in a file; a column with more is not a step.
 const MOST_LABELS: usize = 10_000;
 
 /// Turns the cells of a `step` column into numbers: numbers stay what they are, labels are
 /// numbered in the order of their first appearance.
 #[derive(Debug, Default)]
 pub(super) struct StepLabels {
-    /// What the first cell that says something was; all others must be alike.
+    /// Whether the first cell that is not empty was a number; all others must be alike.
     numeric: Option<bool>,
     labels: Vec<String>,
     numbers: HashMap<Vec<u8>, i32>,
 }
 
 impl StepLabels {
-    /// Number of the step in a cell; -1 where it is empty or -1.
+    /// Number of the step in a cell; -1 if it is empty or -1.
     pub fn number(&mut self, cell: &[u8]) -> Result<i32, Refusal> {
         let cell = cell.trim_ascii();
         if cell.is_empty() || cell == b"-1" {
@@ -52,7 +52,7 @@ impl StepLabels {
         Ok(number)
     }
 
-    /// Of steps that are named beforehand.
+    /// For steps whose labels are known beforehand.
     pub fn of(labels: Vec<String>) -> Self {
         Self {
             numeric: Some(false),
@@ -61,7 +61,7 @@ impl StepLabels {
         }
     }
 
-    /// Label of step `number`, where it has one.
+    /// Label of step `number`, if it has one.
     pub fn label(&self, number: i32) -> Option<&str> {
         let index = usize::try_from(number).ok()?;
         self.labels.get(index).map(String::as_str)

@@ -1,4 +1,4 @@
-//! What an import has done.
+//! Result of an import.
 
 use serde::Serialize;
 
@@ -8,10 +8,10 @@ use super::options::file_name;
 use super::preset::PresetUse;
 use super::time::TimeSummary;
 
-/// Lines of the source files that held no row.
+/// Lines of the source files that contained no row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct SkippedLines {
-    /// Headers and whatever else stood above the data.
+    /// Headers and other lines above the data.
     pub header: u64,
     /// Lines that begin with # or %.
     pub comment: u64,
@@ -19,7 +19,7 @@ pub struct SkippedLines {
     pub blank: u64,
 }
 
-/// What an import has done: the result of `mimu import`, as its JSON has it.
+/// The result of `mimu import`, with the fields of its JSON.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ImportSummary {
     /// `mimu-import/1`.
@@ -28,39 +28,39 @@ pub struct ImportSummary {
     pub recording: String,
     /// Rows written.
     pub rows: u64,
-    /// Whether the rows are means over a pose each, and no samples.
+    /// Whether each row is the mean over a pose instead of a sample.
     pub means: bool,
-    /// The maker's layout that the files were read by, if any.
+    /// The preset by which the files were read, if any.
     pub preset: Option<PresetUse>,
-    /// Sample rate in Hz: that of the time stamps, or the one that was given where there are none; null of means without one.
+    /// Sample rate in Hz: that of the time stamps, or the given one if there are none; null for means without one.
     pub sample_rate_hz: f64,
-    /// What the time stamps have shown, of each file that has them.
+    /// Results about the time stamps of each file that has them.
     pub time: Vec<TimeSummary>,
     /// Lines without a row, over all files.
     #[serde(rename = "skipped_lines")]
     pub skipped: SkippedLines,
-    /// Rows of the first file that another file does not reach in time.
+    /// Rows of the first file before the beginning or after the end of another file.
     pub dropped_outside: u64,
     /// Rows of the first file that lie in a gap of another file.
     pub dropped_in_gaps: u64,
     /// Rows with values interpolated from another file.
     pub interpolated: u64,
-    /// Rows left out as they are not those that were asked for.
+    /// Rows that the filters left out.
     pub not_chosen: u64,
-    /// Rows left out as padding, as all of their readings are 0.
+    /// Rows left out as padding, because all of their readings are 0.
     pub padding: u64,
     /// Rows that could not be read and were left out, of each file that has some.
     pub broken_rows: Vec<BrokenRows>,
     /// Raw cells that are empty.
     pub empty_cells: u64,
-    /// What was read of logs, and what was undone of their own calibration.
+    /// What was read from logs, and whether their own calibration was undone.
     pub notes: Vec<String>,
-    /// One sentence for each thing that a person should know.
+    /// Warnings, one sentence each.
     pub warnings: Vec<String>,
 }
 
 impl ImportSummary {
-    /// Takes in what was skipped in `file` and what is to be said of it.
+    /// Adds the counts, notes and warnings of `file`.
     pub(super) fn add(&mut self, file: &ForeignFile) {
         let place = file_name(file.path());
         let notes = file.notes().iter().map(|note| format!("{place}: {note}"));
@@ -104,7 +104,7 @@ impl ImportSummary {
 }
 
 impl TimeSummary {
-    /// A warning of the irregular times at which a loop read the unit.
+    /// A warning about the irregular times at which a loop read the unit.
     pub(super) fn of_loop(&self) -> Option<String> {
         let rounds = self.polled.as_ref()?;
         let [shortest, longest] =

@@ -1,4 +1,4 @@
-//! Foreign files of the shapes that are met, and what is said of those that cannot be taken.
+//! Foreign files of common shapes, and the refusal of those that cannot be read.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ mod sequence;
 mod sources;
 mod stamps;
 
-/// A folder with foreign files, and the recording that comes of them.
+/// A folder with foreign files, and the recording made from them.
 struct Bench(tempfile::TempDir);
 
 impl Bench {
@@ -112,7 +112,7 @@ fn metadata_headers_comments_and_blank_lines_are_skipped_and_counted() {
 
 #[test]
 fn bytes_of_zero_around_lines_are_room_that_was_kept_and_within_them_no_text() {
-    // A serial port hands over some between two headers, and a card keeps room behind the last row.
+    // A serial port delivers zeros between two headers, and a card has preallocated space after the last row.
     let zeros = "\0".repeat(600);
     let room = "\0".repeat(3 << 20);
     let text = format!("ax,ay,az\r\n{zeros}ax,ay,az\r\n1,2,3\r\n4,5,6\r\n{room}");
@@ -223,7 +223,7 @@ fn bad_rows_are_refused_with_file_row_and_column() {
             "{error}"
         );
     }
-    // The first row is no header because one of its cells is broken.
+    // A broken cell does not make a header of the first row.
     let error = one_refused("1,2,x\n4,5,6\n", "gyro_x,gyro_y,gyro_z");
     assert!(error.contains("row 1, column gyro_z"), "{error}");
     let long = format!("1,2,3\n{}", "1".repeat(2 << 20));

@@ -1,4 +1,4 @@
-//! Rows of a foreign text file, whatever its separator and whatever stands above its data.
+//! Rows of a foreign text file with any separator and any lines above its data.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Chain, Cursor, Read};
@@ -22,12 +22,12 @@ const HEAD: u64 = 1 << 18;
 /// Longest line in bytes.
 const LONGEST_LINE: u64 = 1 << 20;
 
-/// The cells of a row that somebody asked for.
+/// The wanted cells of a row.
 #[derive(Debug, Default)]
 pub(super) struct Cells {
-    /// Numbers in the order of the table's roles; the place of a step holds nothing.
+    /// Numbers in the order of the table's roles; NaN in the place of a step.
     pub numbers: Vec<f64>,
-    /// Time stamp; its place among the numbers has it rounded.
+    /// Time stamp; among the numbers it is rounded.
     pub stamp: Stamp,
     /// Text of the step.
     pub step: Vec<u8>,
@@ -39,9 +39,9 @@ pub(super) struct TextTable {
     path: PathBuf,
     reader: BufReader<Chain<Cursor<Vec<u8>>, File>>,
     separator: Separator,
-    /// Position and role of each cell that is wanted.
+    /// Position and role of each wanted cell.
     wanted: Vec<(usize, Role)>,
-    /// Cells that a row must have; more of them must be empty.
+    /// Number of cells that a row must have; further cells must be empty.
     width: usize,
     filters: RowFilters,
     /// Position of the cell of each filter.
@@ -54,21 +54,21 @@ pub(super) struct TextTable {
     length: u64,
     record: csv::ByteRecord,
     pub skipped: SkippedLines,
-    /// Bytes of 0 around the lines, which were left out.
+    /// Zero bytes around the lines, which were left out.
     pub zero_bytes: u64,
     pub warnings: Vec<String>,
 }
 
-/// The line to name where no row fits the list: the first that holds data, or the first of all where none does. A title above the
-/// data has another width than the rows in any file, and says nothing of the list.
+/// The line to report if no row fits the list: the first with data, or the first of all if none has data. Titles above the data have another width
+/// than the rows in any file, so they tell nothing about the list.
 struct Misfit {
     number: u64,
     problem: String,
-    /// Whether it holds more numbers than words.
+    /// Whether it contains more numbers than words.
     data: bool,
 }
 
-/// What a line is, as far as that can be seen without the list of columns.
+/// Kind of a line, as far as it shows without the list of columns.
 enum Kind {
     Blank,
     Comment,
@@ -84,8 +84,8 @@ fn kind(line: &[u8]) -> Kind {
 }
 
 impl TextTable {
-    /// Opens the file and finds its header and its first row; without `list` the names in the
-    /// header must be those of a recording. Rows that are not as `filters` say are passed over.
+    /// Opens the file and finds its header and its first row; without `list` the names in the header must be those of a recording. Rows that do not
+    /// satisfy `filters` are skipped.
     pub fn open(
         path: &Path,
         list: Option<&ColumnList>,
@@ -173,7 +173,7 @@ impl TextTable {
             self.bytes += read as u64;
             let ended = self.line.pop_if(|last| *last == b'\n').is_some();
             self.leave_out_zeros();
-            // Room that was kept for a file has no ends of lines.
+            // Preallocated space has no line ends.
             if !ended && self.line.is_empty() {
                 continue;
             }
@@ -185,7 +185,7 @@ impl TextTable {
                 return Err(Error::new(self.place(number), problem, remedy).into());
             }
             if number < self.first_row {
-                // Looked at and counted when the file was opened.
+                // Counted when the file was opened.
                 continue;
             }
             match kind(&self.line) {
@@ -212,7 +212,7 @@ impl TextTable {
         }
     }
 
-    /// Rows that were left out as they are not as the filters say.
+    /// Rows that the filters left out.
     pub fn left_out(&self) -> u64 {
         self.filters.left_out
     }
@@ -222,7 +222,7 @@ impl TextTable {
         self.filters.check(&self.path)
     }
 
-    /// Whether the filters keep the row; one that is too short for them is looked at, as it is broken.
+    /// Whether the filters keep the row. A row that is too short for them is kept, so that it is reported as broken.
     fn chosen(&mut self) -> bool {
         if self.filtered.iter().any(|at| *at >= self.record.len()) {
             return true;
@@ -250,7 +250,7 @@ impl TextTable {
         })
     }
 
-    /// Leaves out the bytes of 0 around the line, and the carriage return at its end.
+    /// Leaves out the zero bytes around the line, and the carriage return at its end.
     fn leave_out_zeros(&mut self) {
         if memchr::memchr(0, &self.line).is_some() {
             self.zero_bytes += self.line.iter().filter(|byte| **byte == 0).count() as u64;
@@ -259,7 +259,7 @@ impl TextTable {
         self.line.pop_if(|last| *last == b'\r');
     }
 
-    /// Number in a cell; where commas do not separate cells, one of them is a decimal point.
+    /// Number in a cell. If commas do not separate cells, one comma is a decimal point.
     fn number(&self, cell: &[u8]) -> std::result::Result<f64, Refusal> {
         if self.separator != Separator::Comma
             && !cell.contains(&b'.')
@@ -310,7 +310,7 @@ impl TextTable {
                 remedy: "correct or remove the row",
             });
         }
-        // Spreadsheets leave separators behind where nothing stands.
+        // Spreadsheets write separators for empty cells at the end of a row.
         if record.iter().skip(self.width).all(<[u8]>::is_empty) {
             return None;
         }
@@ -320,9 +320,9 @@ impl TextTable {
         })
     }
 
-    /// Finds the first row among `lines` and, where columns go by name, the header above it.
+    /// Finds the first row among `lines` and, if columns are chosen by name, the header above it.
     fn find_rows(&mut self, lines: &[&[u8]], list: Option<&ColumnList>) -> Result<()> {
-        // The line that comes nearest to the header that is looked for.
+        // The names in the line that is nearest to the wanted header.
         let mut names: Vec<String> = Vec::new();
         if let Some(ColumnList::ByPosition(items)) = list {
             let place = |(position, role): (usize, &Option<Role>)| Some((position, (*role)?));
@@ -335,12 +335,12 @@ impl TextTable {
             let number = index as u64 + 1;
             match kind(line) {
                 Kind::Blank => {
-                    // The piece after the last line break is no line.
+                    // The text after the last line break is not a line.
                     self.skipped.blank += u64::from(index + 1 < lines.len());
                     continue;
                 }
                 Kind::Comment => {
-                    // Many programs write the names of the columns behind a #.
+                    // Many programs write the names of the columns after a #.
                     let text = line
                         .iter()
                         .position(|b| !matches!(b, b'#' | b'%' | b' ' | b'\t'));
@@ -427,7 +427,7 @@ impl TextTable {
         }
     }
 
-    /// Takes the line as header if it has the names that are looked for.
+    /// Takes the line as header if it has the wanted names.
     fn take_header(
         &mut self,
         names: &[String],
@@ -483,8 +483,8 @@ impl TextTable {
         Ok(())
     }
 
-    /// Whether a line of the right width is a row, and not words above the data: more of its cells are numbers than are not. Skipping a
-    /// row with a mistake as a header would lose it without a word.
+    /// Whether a line of the right width is a row instead of words above the data: more of its cells are numbers than are not. Otherwise a row with
+    /// one bad cell would be skipped silently as a header.
     fn is_row(&self, record: &csv::ByteRecord) -> bool {
         let numbers = self
             .wanted
@@ -493,7 +493,7 @@ impl TextTable {
         self.mostly_numbers(numbers.map(|(position, _)| &record[*position]))
     }
 
-    /// Whether a line of any width holds data.
+    /// Whether a line of any width contains data.
     fn are_numbers(&self, record: &csv::ByteRecord) -> bool {
         self.mostly_numbers(record.iter())
     }
@@ -516,7 +516,7 @@ fn texts(record: &csv::ByteRecord) -> Vec<String> {
     record.iter().map(text).collect()
 }
 
-/// How many of the columns that are wanted by name are among `names`.
+/// Number of the wanted names that are among `names`.
 fn matches(list: Option<&ColumnList>, names: &[String]) -> usize {
     match list {
         Some(ColumnList::ByName(wanted)) => {

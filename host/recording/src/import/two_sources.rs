@@ -4,42 +4,42 @@ use super::row::Row;
 use crate::columns::RAW_COLUMNS;
 use crate::error::{Error, Result};
 
-/// Rows at the beginning in which it is looked for rows that take turns.
+/// Rows at the beginning that are searched for alternating sources.
 const WATCHED: usize = 20_000;
-/// A leap, and what is back from one, in units of the change over two rows.
+/// Least size of a jump, and largest distance after the return, in units of the change over two rows.
 const LEAP: f64 = 8.0;
 const BACK: f64 = 4.0;
-/// Share of rows that leap away and back at least, where sources take turns in any order. One in four does with every other row by chance.
+/// Least share of rows that jump away and back. If two sources alternate at random, one row in four does.
 const LEAPING: f64 = 0.1;
-/// Rows that show it.
+/// Fewest rows from which this is concluded.
 const FEWEST: usize = 100;
 
-/// Width of a class of the size of specific force, in octaves: a quarter.
+/// Classes of the magnitude of specific force are a quarter of an octave wide.
 const CLASSES_PER_OCTAVE: f64 = 4.0;
 const CLASSES: usize = 800;
-/// Classes without force that part two units: an octave. The smaller part has this share of all rows at least, and of it this share may lie
-/// between them.
+/// Empty classes that separate two units: an octave. The smaller group has at least the share `SMALLER` of all rows; up to the share `BETWEEN` of its
+/// number may lie between the groups.
 const APART: usize = 4;
 const SMALLER: f64 = 0.01;
 const BETWEEN: f64 = 0.01;
-/// Sizes over gravity that are those of an accelerometer in m/s²: a class is a fifth wide, and bias and scale factor are some per cent.
+/// Magnitude relative to gravity that an accelerometer in m/s² may show: a class is a fifth wide, and bias and scale factor are some per cent.
 const UNIT_GAIN: std::ops::Range<f64> = 0.67..1.5;
-/// And the factor between the middles of both.
+/// Least factor between the usual magnitudes of both groups.
 const FACTOR: f64 = 3.0;
 
 /// Watches the readings of a file, row by row.
 #[derive(Debug, Clone)]
 pub(super) struct TwoSources {
-    /// Places of the channels among the values of a row, and their first readings.
+    /// Places of the channels among the values of a row, their numbers, and their first readings.
     channels: Vec<(usize, usize, Vec<f64>)>,
     /// Places of the accelerometer.
     accel: Vec<usize>,
-    /// Rows by the size of the specific force, and the first of each class.
+    /// Number of rows in each class of magnitude, and the first row of each.
     sizes: Vec<(u64, u64)>,
 }
 
 impl TwoSources {
-    /// Of a file in which these channels have these places.
+    /// For a file whose rows have these channels at these places.
     pub fn new(channels: impl Iterator<Item = (usize, usize)>) -> Self {
         let channels: Vec<_> = channels.map(|(place, c)| (place, c, Vec::new())).collect();
         let accel = channels.iter().filter(|(_, c, _)| *c >= 3);
@@ -50,7 +50,7 @@ impl TwoSources {
         }
     }
 
-    /// The next row.
+    /// Takes the next row.
     pub fn push(&mut self, row: &Row) {
         for (place, _, first) in &mut self.channels {
             if first.len() < WATCHED {
@@ -71,7 +71,7 @@ impl TwoSources {
         }
     }
 
-    /// Refuses a file in which the readings leap to and fro.
+    /// Refuses a file in which the readings jump back and forth.
     pub fn check(&self, place: &str) -> Result<()> {
         for (_, c, first) in &self.channels {
             let Some(share) = leaping(first) else {
@@ -92,7 +92,7 @@ impl TwoSources {
         Ok(())
     }
 
-    /// What to say of specific forces that claim to be in m/s², where most are of another size than `gravity_mps2`.
+    /// A warning if specific forces given in m/s² mostly have another magnitude than `gravity_mps2`.
     pub fn wrong_unit(&self, place: &str, gravity_mps2: f64) -> Option<String> {
         let most = (0..CLASSES).max_by_key(|class| self.sizes[*class].0)?;
         let usual = size(most);
@@ -105,7 +105,7 @@ impl TwoSources {
         })
     }
 
-    /// What to say where the accelerometer has two sizes.
+    /// A warning if the accelerometer shows two magnitudes.
     pub fn warning(&self, place: &str) -> Option<String> {
         let all: u64 = self.sizes.iter().map(|(rows, _)| rows).sum();
         let middle = |classes: std::ops::Range<usize>| {
@@ -150,12 +150,12 @@ impl TwoSources {
     }
 }
 
-/// Middle of a class of sizes.
+/// Magnitude in the middle of a class.
 fn size(class: usize) -> f64 {
     ((class as f64 + 0.5 - CLASSES as f64 / 2.0) / CLASSES_PER_OCTAVE).exp2()
 }
 
-/// Share of readings that leap away and back, if it is large.
+/// Share of readings that jump away and back, if it is large.
 fn leaping(readings: &[f64]) -> Option<f64> {
     let mut over_two: Vec<f64> = readings
         .windows(3)
@@ -166,7 +166,7 @@ fn leaping(readings: &[f64]) -> Option<f64> {
         return None;
     }
     let at = over_two.len() / 4;
-    // A quarter: where two sources take turns in any order, half of all pairs are of one of them.
+    // The lower quartile, because half of all pairs come from one source if two sources alternate at random.
     let quarter = *over_two.select_nth_unstable_by(at, f64::total_cmp).1;
     let nonzero = over_two.iter().copied().filter(|change| *change > 0.0);
     let step = nonzero.fold(f64::INFINITY, f64::min);

@@ -10,7 +10,7 @@ use super::text_table::Cells;
 use crate::error::Result;
 use crate::without_parquet::refused;
 
-/// A file that cannot be there.
+/// Never constructed.
 #[derive(Debug)]
 pub(super) struct ParquetTable {
     pub filters: RowFilters,

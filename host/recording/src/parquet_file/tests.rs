@@ -137,7 +137,7 @@ fn with_bad(column_index: usize, row: usize, bad: f64) -> tempfile::TempDir {
                 values[row] = bad;
             }
             if index == 4 {
-                // A later mistake, which must not be the one that is told of.
+                // A later mistake, which must not be reported.
                 values[99] = f64::INFINITY;
             }
             column::<DoubleType>(group, &values, None);

@@ -1,15 +1,15 @@
-//! Records of a DataFlash log: each begins with two bytes and a number, of which a record `FMT` has said what follows.
+//! Records of a DataFlash log. Each begins with two fixed bytes and a number; an earlier record `FMT` describes the records with this number.
 
 use std::collections::BTreeMap;
 
-/// What each record begins with.
+/// First two bytes of each record.
 const BEGINNING: [u8; 2] = [0xA3, 0x95];
 
-/// Number of the records that describe the others, and their length with beginning and number.
+/// Number of the `FMT` records, and their length including beginning and number.
 const FORMAT: u8 = 128;
 const FORMAT_LENGTH: usize = 89;
 
-/// How records of one number are laid out.
+/// Layout of the records with one number.
 #[derive(Debug, Default)]
 struct Format {
     name: String,
@@ -18,7 +18,7 @@ struct Format {
     fields: Vec<(String, u8, usize)>,
 }
 
-/// Takes the records of a log one after the other.
+/// Reads the records of a log one after the other.
 pub(super) struct Records<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -48,7 +48,7 @@ impl<'a> Records<'a> {
         self.formats.len()
     }
 
-    /// The next record that is described; bytes between records are passed over and counted.
+    /// The next record whose layout is known. Bytes between records are skipped and counted.
     pub fn next(&mut self) -> Option<Record<'_>> {
         loop {
             let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
@@ -60,7 +60,7 @@ impl<'a> Records<'a> {
                 _ => 0,
             };
             if length < 3 || length > rest.len() {
-                // Not a record: the next one begins with the next two bytes that may.
+                // Not a record: search for the next one byte by byte.
                 self.at += 1;
                 self.skipped += 1;
                 continue;
@@ -71,13 +71,13 @@ impl<'a> Records<'a> {
                 self.describe(data);
                 continue;
             }
-            // It was there a moment ago.
+            // Its length was found above.
             let format = self.formats.get(&number)?;
             return Some(Record { format, data });
         }
     }
 
-    /// Takes a record `FMT`: number and length of the records, their name, the kinds of their fields and the names of these.
+    /// Reads a record `FMT`: number and length of the records, their name, and the kinds and names of their fields.
     fn describe(&mut self, data: &[u8]) {
         let (number, length) = (data[0], usize::from(data[1]));
         let name = text(&data[2..6]);
@@ -88,7 +88,7 @@ impl<'a> Records<'a> {
         for (kind, label) in kinds.bytes().zip(labels.split(',')) {
             fields.push((label.to_owned(), kind, at));
             let Some(width) = width(kind) else {
-                // What is behind a field of unknown width has no position.
+                // After a field of unknown width, positions are unknown.
                 fields.pop();
                 break;
             };
@@ -160,7 +160,7 @@ fn width(kind: u8) -> Option<usize> {
     })
 }
 
-/// Text up to its first byte of 0.
+/// Text up to its first zero byte.
 fn text(bytes: &[u8]) -> String {
     let end = bytes
         .iter()

@@ -1,7 +1,7 @@
-//! Logs of ArduPilot. `two-sensors.bin` was written by a Python program with `struct`, from the description of the format, and reads in pymavlink 2.4.50 as it
-//! was meant: a board rolled over (AHRS_ORIENTATION 8), two sensors of known raw readings that were calibrated and turned before they were written.
-//! Sensor i reads (r / 4, 1 + i, -8) m/s² and (0.5, -r / 8, i) rad/s in row r of 24, 2.5 ms apart from 10 ms on. In row 12 the offset of the first
-//! gyro changes from 0.0625 to 1 rad/s.
+//! Logs of ArduPilot. A Python program wrote `two-sensors.bin` with `struct` from the description of the format; pymavlink 2.4.50 reads it as
+//! intended. It contains a board rolled over (AHRS_ORIENTATION 8) and two sensors whose known raw readings were calibrated and rotated before they
+//! were written. Sensor i reads (r / 4, 1 + i, -8) m/s² and (0.5, -r / 8, i) rad/s in row r of 24, 2.5 ms apart from 10 ms on. In row 12 the offset
+//! of the first gyro changes from 0.0625 to 1 rad/s.
 
 use std::path::PathBuf;
 
@@ -64,7 +64,7 @@ fn a_sensor_with_messages_at_its_own_rate_is_read_by_them() {
     );
     close(&gyro[7].1, &[0.5, -3.0 / 8.0, 1.0]);
     close(&accel[7].1, &[0.75, 2.0, -8.0]);
-    // Every second of its messages IMU is there.
+    // The log contains only every second of its IMU messages.
     assert_eq!(
         rows(&mut open(&fixture(), Some("IMU"), Some(1)).unwrap()[0]).len(),
         12
@@ -91,7 +91,7 @@ fn what_is_not_there_is_refused_with_what_is() {
     assert!(refused(Some("GYR"), Some(0)).contains("no GYR of instance 0"));
 }
 
-/// The log without the records of one kind, found by their three first bytes and length.
+/// The log without those records of kind `number`, `length` bytes long, that `keep` rejects.
 fn without(number: u8, length: usize, keep: impl Fn(&[u8]) -> bool) -> Vec<u8> {
     let whole = std::fs::read(fixture()).unwrap();
     let mut left = Vec::new();
@@ -133,7 +133,7 @@ fn of_a_log_without_its_parameters_nothing_is_undone_and_this_is_said() {
         &rows(&mut all[0])[0].1,
         &[0.4375, 0.125, -0.03125, -0.15625, -0.625, 17.0, 40.5],
     );
-    // The second sensor has its own.
+    // The parameters of the second sensor are complete.
     assert!(
         open(&path, Some("IMU"), Some(1)).unwrap()[0]
             .warnings
@@ -159,7 +159,7 @@ fn a_cut_or_damaged_log_is_read_as_far_as_it_is_whole_and_does_not_panic() {
         std::fs::write(&path, damaged).unwrap();
         let _ = open(&path, None, Some(0));
     }
-    // A record of another kind was written over the middle: what is behind it is found again.
+    // The middle is overwritten: the records after it are found again.
     let mut damaged = whole.clone();
     let at = whole.len() / 2;
     damaged[at..at + 60].fill(0xA3);

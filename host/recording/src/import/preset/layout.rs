@@ -1,23 +1,23 @@
-//! What is known of a maker's recordings.
+//! What is known about a maker's files.
 
 use crate::manifest::RawUnit;
 
-/// The recordings of one maker: which files they are, what their columns mean, and in which units they are.
+/// The files of one maker: their names, columns and units.
 #[derive(Debug, Clone, Copy)]
 pub struct Preset {
     /// Name on the command line.
     pub name: &'static str,
-    /// What it reads, for people.
+    /// The files that it reads, for people.
     pub title: &'static str,
-    /// Unit of the readings after the factors; `None` where the maker leaves it open.
+    /// Unit of the readings after the factors; `None` if the maker leaves it open.
     pub raw_unit: Option<RawUnit>,
-    /// Kinds of files; of several that fit, the first.
+    /// Kinds of files; the first that fits is used.
     pub(super) layouts: &'static [Layout],
-    /// Files that a folder may hold, the best set first; the faster sensor first in each.
+    /// Files that a folder may contain, the best set first; the faster sensor first in each.
     pub(super) in_folder: &'static [&'static [&'static str]],
-    /// Why its files are not joined, and what to do, where they have no time in common.
+    /// Why its files cannot be joined, and the remedy, if they have no time in common.
     pub(super) apart: Option<[&'static str; 2]>,
-    /// What a file beside the readings says where two presets share their headers.
+    /// A file beside the readings that decides between two presets with the same headers.
     pub(super) beside: Option<Beside>,
 }
 
@@ -31,14 +31,14 @@ pub(super) struct Layout {
     pub optional: &'static str,
     /// Factors of columns, signs included, written as for the command line.
     pub scales: &'static [&'static str],
-    /// Words behind which a line above the data has the sample rate in Hz; must be there as well.
+    /// Words after which a line above the data has the sample rate in Hz. The line is required.
     pub rate_after: Option<&'static str>,
-    /// What makes it no use, and what to do.
+    /// Why such a file is refused, and the remedy.
     pub unfit: Option<[&'static str; 2]>,
 }
 
 impl Layout {
-    /// With names in the header, and nothing more to say.
+    /// A layout with names in the header and no other property.
     pub const fn of(columns: &'static str) -> Layout {
         Layout {
             file: FileName::Any,
@@ -51,7 +51,7 @@ impl Layout {
     }
 }
 
-/// What a file has to be called, where its header does not say which sensor it is of. The case of letters does not count.
+/// The name that a file must have if its header does not show the sensor. Case is ignored.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum FileName {
     Any,
@@ -76,6 +76,6 @@ pub(super) struct Beside {
     pub file: &'static str,
     /// Columns and values.
     pub values: &'static [(&'static str, &'static str)],
-    /// Whether the recording is of this preset if one of the values is there, or if none is.
+    /// Whether the recording belongs to this preset if one of the values occurs, or (`false`) if none does.
     pub one_is_there: bool,
 }

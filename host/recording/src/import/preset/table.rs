@@ -1,9 +1,9 @@
-//! The presets. Another maker is another entry here, and a line in the table of `docs/import.md`.
+//! The presets. To add a maker, add an entry here and a line in the table of `docs/import.md`.
 
 use super::layout::{Beside, FileName, Layout, Preset};
 use crate::manifest::RawUnit;
 
-/// A file of Sensor Logger: the name says which sensor, as all have the same header.
+/// A file of Sensor Logger: all have the same header, so the name shows the sensor.
 const fn sensor_logger(file: &'static str, columns: &'static str) -> Layout {
     Layout {
         file: FileName::Is(file),
@@ -15,7 +15,7 @@ const fn sensor_logger(file: &'static str, columns: &'static str) -> Layout {
 const LOGGED_GYRO: &str = "t_s=time,gyro_x=x,gyro_y=y,gyro_z=z";
 const LOGGED_ACCEL: &str = "t_s=time,accel_x=x,accel_y=y,accel_z=z";
 
-/// Its acceleration that is no reading of a sensor.
+/// A file of Sensor Logger with an acceleration that is not a reading of a sensor.
 const fn without_gravity(file: &'static str) -> Layout {
     Layout {
         unfit: Some([
@@ -38,7 +38,7 @@ const LOGGED_FOLDER: [&[&str]; 6] = [
     &["TotalAcceleration.csv"],
 ];
 
-/// Calibrated readings of the packets, and the temperature where it was exported.
+/// Calibrated readings of the packets, and the temperature if it was exported.
 const XSENS: Layout = Layout {
     optional: "temp_c=Temperature",
     rate_after: Some("Update Rate:"),
@@ -47,8 +47,8 @@ const XSENS: Layout = Layout {
 
 /// All of them.
 pub(super) const PRESETS: [Preset; 7] = [
-    // The header of every imu0/data.csv of the EuRoC sequences and of those laid out like them (TUM VI, MRPT, OpenVINS);
-    // Burri et al., The EuRoC micro aerial vehicle datasets, IJRR 2016. Stamps since 1970; sensor.yaml beside it says nothing of units.
+    // The header of every imu0/data.csv of the EuRoC sequences and of those laid out like them (TUM VI, MRPT, OpenVINS); Burri et al., The EuRoC
+    // micro aerial vehicle datasets, IJRR 2016. Stamps count from 1970; sensor.yaml beside the file gives no units.
     Preset {
         name: "euroc",
         title: "EuRoC/ASL: imu0/data.csv",
@@ -64,9 +64,9 @@ pub(super) const PRESETS: [Preset; 7] = [
         apart: None,
         beside: None,
     },
-    // github.com/tszheichoi/awesome-sensor-logger at b10f5c5: README.md (Metadata.csv), UNITS.md, COORDINATES.md, CROSSPLATFORM.md.
-    // The columns stand as z, y, x, and go by their names. Uncalibrated is preferred, as Android subtracts its own estimate of the
-    // gyro's bias from the other one.
+    // github.com/tszheichoi/awesome-sensor-logger at b10f5c5: README.md (Metadata.csv), UNITS.md, COORDINATES.md, CROSSPLATFORM.md. The columns are
+    // in the order z, y, x and are read by name. Uncalibrated files are preferred, because Android subtracts its own estimate of the gyro's bias from
+    // the others.
     Preset {
         name: "sensor-logger",
         title: "Sensor Logger on Android, or on iOS with standardised units and frames",
@@ -87,8 +87,8 @@ pub(super) const PRESETS: [Preset; 7] = [
             one_is_there: true,
         }),
     },
-    // The same sources: on iOS uncalibrated acceleration is in g (of 9.80665 m/s²), and all three axes have the other sign: on its
-    // back a phone reads -1 on z, where its specific force is +g. Rates of rotation have the same sign on both.
+    // The same sources. On iOS, uncalibrated acceleration is in g (of 9.80665 m/s²) with the opposite sign on all three axes: a phone on its back
+    // reads -1 on z, where its specific force is +g. Rates have the same sign on both systems.
     Preset {
         name: "sensor-logger-ios",
         title: "Sensor Logger on iOS, without standardised units and frames",
@@ -111,8 +111,8 @@ pub(super) const PRESETS: [Preset; 7] = [
             one_is_there: false,
         }),
     },
-    // github.com/phyphox/phyphox-experiments at 972923d: <export> of accelerometer, gyroscope and linear_accelerometer; files and
-    // separators by DataExport.java of phyphox-android. Both signs are those of specific force and rate, on both systems.
+    // github.com/phyphox/phyphox-experiments at 972923d: <export> of accelerometer, gyroscope and linear_accelerometer; files and separators by
+    // DataExport.java of phyphox-android. On both systems the signs are those of specific force and rate.
     Preset {
         name: "phyphox",
         title: "phyphox: \"Acceleration (with g)\" and \"Gyroscope\", any separator",
@@ -150,9 +150,9 @@ pub(super) const PRESETS: [Preset; 7] = [
         apart: None,
         beside: None,
     },
-    // Text exports of MT Manager: lines with // above the names, one of which has the rate. Units by the MTw user manual (table of
-    // exported data): m/s², rad/s, °C, a counter that wraps at 65535. SampleTimeFine counts 10 kHz (MTi Family Reference Manual,
-    // XDI_SampleTimeFine); of a wireless unit it is there and empty. Xsens DOT has the same names in other units, and no such line.
+    // Text exports of MT Manager: lines with // above the names, one of which has the rate. Units by the MTw user manual (table of exported data):
+    // m/s², rad/s, °C, a counter that wraps at 65535. SampleTimeFine counts at 10 kHz (MTi Family Reference Manual, XDI_SampleTimeFine); a wireless
+    // unit leaves it empty. Xsens DOT has the same names in other units, and no such lines.
     Preset {
         name: "xsens",
         title: "Xsens MT Manager, export as text",
@@ -172,7 +172,7 @@ pub(super) const PRESETS: [Preset; 7] = [
         apart: None,
         beside: None,
     },
-    // github.com/Kyle-ak/imu_tk at 7780270: bin/test_data and importAsciiData in src/io_utils.cpp. Raw counts or SI, as one likes.
+    // github.com/Kyle-ak/imu_tk at 7780270: bin/test_data and importAsciiData in src/io_utils.cpp. Either raw counts or SI.
     Preset {
         name: "imu_tk",
         title: "imu_tk: one file each, time x y z, named with acc and gyr",
@@ -191,9 +191,9 @@ pub(super) const PRESETS: [Preset; 7] = [
         apart: None,
         beside: None,
     },
-    // github.com/IntelRealSense/librealsense at 0f85e5c: np.savetxt in tools/rs-imu-calibration/rs-imu-calibration.py, and frame.get_timestamp, in ms. The
-    // correction of the device is switched off there, and its axes are those of the camera: x right, y down, z forward. The six directions follow one
-    // another in the file of the accelerometer; that of the gyro is emptied before each, and has the last one only.
+    // github.com/IntelRealSense/librealsense at 0f85e5c: np.savetxt in tools/rs-imu-calibration/rs-imu-calibration.py, and frame.get_timestamp, in
+    // ms. The script switches the correction of the device off. Its axes are those of the camera: x right, y down, z forward. The accelerometer's
+    // file contains the six directions one after another. The gyro's file is emptied before each direction, so it contains only the last one.
     Preset {
         name: "realsense",
         title: "Intel RealSense D435i: accel_*.txt or gyro_*.txt of rs-imu-calibration.py",

@@ -1,10 +1,10 @@
-//! PX4's own calibration as its log has it, and readings without it.
+//! PX4's own calibration from its log, and readings with it undone.
 
 use std::collections::BTreeMap;
 
 use super::super::rotation::{Correction, Rotation, from_euler, orientation, product};
 
-/// Sensors that PX4 keeps a calibration of, of each kind.
+/// Number of sensors of each kind whose calibration PX4 stores.
 const MOST_SENSORS: usize = 4;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub(super) enum Sensor {
 impl Sensor {
     pub const ALL: [Sensor; 2] = [Sensor::Gyro, Sensor::Accel];
 
-    /// What its parameters begin with.
+    /// Prefix of its parameters.
     fn prefix(self) -> &'static str {
         match self {
             Sensor::Gyro => "CAL_GYRO",
@@ -24,7 +24,7 @@ impl Sensor {
         }
     }
 
-    /// The switch of its compensation over temperature.
+    /// The parameter that enables its compensation over temperature.
     fn thermal(self) -> &'static str {
         match self {
             Sensor::Gyro => "TC_G_ENABLE",
@@ -39,11 +39,11 @@ type Values = BTreeMap<String, f64>;
 /// The parameters of calibration and mounting, as they change.
 #[derive(Debug, Default)]
 pub(super) struct Parameters {
-    /// From which sample on they hold.
+    /// Values, each with the number of the first sample to which they apply.
     epochs: Vec<(usize, Values)>,
 }
 
-/// Readings without PX4's calibration, or with it where it cannot be undone.
+/// Readings without PX4's calibration, or with it if it cannot be undone.
 pub(super) struct Undone {
     pub values: Vec<[f64; 3]>,
     /// What was done, for people.
@@ -52,7 +52,7 @@ pub(super) struct Undone {
 }
 
 impl Parameters {
-    /// A parameter has this value from sample `row` on.
+    /// Sets a parameter from sample `row` on.
     pub fn set(&mut self, row: usize, name: &str, value: f64) {
         const ABOUT: [&str; 5] = [
             "CAL_ACC",
@@ -77,7 +77,7 @@ impl Parameters {
         }
     }
 
-    /// The id of the only sensor that is calibrated, if there is one only.
+    /// Id of the calibrated sensor, if only one is calibrated.
     pub fn only_id(&self, sensor: Sensor) -> Option<u32> {
         let (_, values) = self.epochs.last()?;
         let id = |n: usize| values.get(&format!("{}{n}_ID", sensor.prefix())).copied();
@@ -86,8 +86,8 @@ impl Parameters {
         ids.next().is_none().then(|| device_id(only))
     }
 
-    /// The `readings` of `sensor` before calibration; `devices` has its ids, each with its first reading, the first one's being all before it as
-    /// well. `mounted`: whether the readings are on the vehicle's axes, or still on the board's.
+    /// The `readings` of `sensor` before calibration. `devices` are its ids, each with the number of its first reading; the first id applies to
+    /// earlier readings too. `mounted`: whether the readings are on the vehicle's axes instead of the board's.
     pub fn undo(
         &self,
         sensor: Sensor,
@@ -166,12 +166,12 @@ impl Parameters {
     }
 }
 
-/// Ids are logged with a sign by some versions.
+/// Some versions log ids as signed numbers.
 fn device_id(parameter: f64) -> u32 {
     (parameter as i64 & 0xffff_ffff) as u32
 }
 
-/// What PX4 has done to the readings of the sensor of id `device`, and its name for people; or why that is not known.
+/// PX4's calibration of the sensor with id `device`, and a description of it; or why it is unknown.
 fn correction(
     sensor: Sensor,
     device: u32,
@@ -199,7 +199,7 @@ fn correction(
             own.unwrap_or(0)
         ));
     }
-    // A sensor beside the board has an orientation of its own; -1 is the board's.
+    // A sensor off the board has its own orientation; -1 means that of the board.
     let rotation = match (mounted, get("ROT", -1.0)) {
         (false, _) => orientation(0.0),
         (true, own) if own >= 0.0 => orientation(own),

@@ -1,5 +1,5 @@
-//! Logs of PX4. The numbers of real logs are those that pyulog 1.3.0 reads, and NumPy makes of them; the logs made here are written byte by byte from the
-//! description of the format (docs.px4.io, "ULog File Format").
+//! Logs of PX4. The expected values of real logs come from pyulog 1.3.0 and NumPy; the logs made here are written byte by byte from the description
+//! of the format (docs.px4.io, "ULog File Format").
 
 use std::path::PathBuf;
 
@@ -76,8 +76,9 @@ fn the_raw_topics_of_an_instance_are_what_pyulog_reads() {
     );
 }
 
-/// The unit lies still. Board mounted by yaw 180 and trimmed by 0.76 and -2.94 deg; NumPy undoes `R ((raw - offset) scale)` of the numbers of pyulog.
-/// That this is what PX4 does shows in the raw topics: their few samples have the mean (0.678, 0.263, -9.752) m/s², (-0.0431, 0.0071, 0.0326) rad/s.
+/// The unit is at rest. The board is mounted with a yaw of 180 deg and trimmed by 0.76 and -2.94 deg. The expected values are those of pyulog, with
+/// `R ((raw - offset) scale)` undone in NumPy. The raw topics confirm that PX4 calibrates so: their few samples have the mean (0.678, 0.263, -9.752)
+/// m/s², (-0.0431, 0.0071, 0.0326) rad/s.
 #[test]
 fn the_calibration_of_sensor_combined_is_undone_down_to_the_raw_topics() {
     let Some(path) = real("sample_log_small.ulg") else {
@@ -260,7 +261,7 @@ fn an_instance_is_asked_for_where_there_are_several_and_the_instances_are_listed
     assert_eq!(rows(&mut all[0])[9].1, [9.0, 2.0, 9.5, 25.0]);
     let mut all = open(&path, None, Some(0)).unwrap();
     assert_eq!(all.len(), 2);
-    // The clocks of the two are 0.3 ms apart, which is left to the join.
+    // The samples of the two are 0.3 ms apart; joining them comes later.
     assert_eq!(
         rows(&mut all[1])[3],
         (Stamp::from(8_300_000), vec![3.0, 1.0, 9.5])
@@ -283,7 +284,7 @@ fn an_instance_is_asked_for_where_there_are_several_and_the_instances_are_listed
 
 #[test]
 fn a_topic_that_an_old_version_calibrated_and_nothing_undoes_is_warned_of() {
-    // Before PX4 1.11 `sensor_accel` was calibrated, which shows in that it has no time of the sample.
+    // Before PX4 1.11, `sensor_accel` was calibrated and had no time of the sample.
     let old = SENSOR.replace("uint64_t timestamp_sample;", "");
     let mut log = Written::new()
         .format(&format!("sensor_accel:{old}"))
@@ -402,7 +403,7 @@ fn each_sample_is_undone_by_the_calibration_of_its_time() {
     let rows = rows(&mut readings);
     assert_eq!(rows[2].1, [1.0, 1.0, 1.25, 1.0, 1.0, 1.0]);
     assert_eq!(rows[3].1, [1.0, 1.0, 1.25, 1.25, 1.0, 1.0]);
-    // A mounting of a later version is not guessed at.
+    // An unknown mounting, as of a later version, is not guessed.
     let log = Written(log.0).parameter("int32_t SENS_BOARD_ROT", 99_i32.to_le_bytes());
     let readings = open(&sample(log, 6).save(&folder, "b.ulg"), None, None).unwrap();
     let warned = readings[0].warnings.join(" ");

@@ -1,4 +1,4 @@
-//! The topics of a log that have readings, sample by sample.
+//! The topics with readings, sample by sample.
 
 use px4_ulog::stream_parser::ParseableFieldType;
 use px4_ulog::stream_parser::model::DataMessage;
@@ -9,9 +9,9 @@ pub(super) struct Topic {
     pub stamps_ns: Vec<i64>,
     pub values: Vec<[f64; 3]>,
     pub temp_c: Vec<f64>,
-    /// Ids of the sensor as they follow one another, each with its first sample.
+    /// Ids of the sensor in order, each with the number of its first sample.
     pub devices: Vec<(usize, u32)>,
-    /// Whether its readings are calibrated, as those of PX4 before 1.11 are, which have no `timestamp_sample`.
+    /// Whether its readings are calibrated. Those of PX4 before 1.11 are; they have no `timestamp_sample`.
     pub calibrated: bool,
 }
 
@@ -24,7 +24,7 @@ pub(super) struct Combined {
 }
 
 impl Topic {
-    /// Its sensor, for people.
+    /// Name of its sensor, for people.
     pub fn named(&self) -> String {
         self.devices
             .first()
@@ -53,7 +53,7 @@ impl Topic {
         Some(())
     }
 
-    /// Takes a batch of the sensor's own buffer, of which the last sample is of the time of the message.
+    /// Takes a batch of the sensor's FIFO; its last sample has the time of the message.
     pub fn take_fifo(&mut self, data: &DataMessage<'_>) -> Option<()> {
         let last_ns = nanoseconds(u64_in(data, "timestamp_sample")?)?;
         let (step_us, scale) = (f32_in(data, "dt")?, f32_in(data, "scale")?);
@@ -97,7 +97,7 @@ fn u64_in(data: &DataMessage<'_>, name: &str) -> Option<u64> {
     field(data, name)
 }
 
-/// A whole number in field `name`, as of ids.
+/// A whole number in field `name`, such as an id.
 pub(super) fn u32_in(data: &DataMessage<'_>, name: &str) -> Option<u32> {
     field(data, name)
 }
@@ -106,7 +106,7 @@ fn f32_in(data: &DataMessage<'_>, name: &str) -> Option<f64> {
     field::<f32>(data, name).map(f64::from)
 }
 
-/// Of microseconds; `None` where no clock counts as far.
+/// Converts from microseconds; `None` on overflow.
 fn nanoseconds(microseconds: u64) -> Option<i64> {
     i64::try_from(microseconds).ok()?.checked_mul(1000)
 }

@@ -1,7 +1,7 @@
-//! Bags that the Python package `rosbags` 0.11.9 has written: 24 messages with header stamps 5 ms apart from 1700000000.123456789 s on,
-//! received some 3 to 4.4 ms later; angular velocity (0.5 + i, -0.25 i, 3), linear acceleration (100 + i, 200, -9.5), frame `imu`. `imu.bag` is
-//! compressed with LZ4 and has a second topic, `/imu/raw`, with two messages; both have one more, of strings. `imu.db3` has the three topics of `imu.bag`; its string of 9000
-//! characters takes pages of its own.
+//! Bags written by the Python package `rosbags` 0.11.9: 24 messages with header stamps 5 ms apart from 1700000000.123456789 s on, received 3 to 4.4
+//! ms later; angular velocity (0.5 + i, -0.25 i, 3), linear acceleration (100 + i, 200, -9.5), frame `imu`. `imu.bag` is compressed with LZ4 and has
+//! a second topic, `/imu/raw`, with two messages. Both `imu.bag` and `imu.mcap` have one more topic, of strings. `imu.db3` has the three topics of
+//! `imu.bag`; its string of 9000 characters fills overflow pages.
 
 use std::path::PathBuf;
 

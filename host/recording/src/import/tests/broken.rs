@@ -53,7 +53,7 @@ fn broken_rows_are_left_out_counted_and_listed_up_to_a_limit() {
     assert_eq!((broken.rows, broken.of, summary.rows), (5, 200, 195));
     assert_eq!(broken.kinds[0].first_rows, [12, 52]);
     assert!(broken.kinds[0].example.contains("x7f"), "{broken:?}");
-    // Nothing else moves: what is missing is a gap.
+    // The other rows keep their times; the missing ones are gaps.
     assert_eq!(summary.time[0].missing, 5);
     assert!((batch.t_s[194] - 1.99).abs() < 1e-9);
     assert!(limited(&log(&BROKEN), "5").is_ok());
@@ -99,7 +99,7 @@ fn where_no_row_fits_the_first_line_of_data_is_named_with_what_is_wrong_with_it(
             "{text}"
         );
     }
-    // Where nothing is data, the first of all lines.
+    // If no line is data, the first of all lines is named.
     let error = one("no\ndata,here\n", NAMES).unwrap_err();
     let text = error.to_string();
     assert!(

@@ -23,7 +23,8 @@ fn the_two_sensors_of_a_log_are_joined_on_the_times_of_one() {
     assert_eq!(summary.rows, 47);
     assert!(batch.raw[0].iter().all(|x| (x - 0.5).abs() < 1e-6));
     assert!(batch.raw[4].iter().all(|y| (y - 2.0).abs() < 1e-6));
-    // The first gyro sample is before the accelerometer's. The gyro's of r = 10 is 0.85 of 1.25 ms after the accelerometer's last of r = 9.
+    // The first gyro sample is before the accelerometer's first. The gyro's first sample of r = 10 is 0.85 ms after the accelerometer's last of r =
+    // 9: 0.68 of the interval of 1.25 ms.
     assert_eq!((summary.dropped_outside, summary.interpolated), (1, 47));
     let [gyro, accel] = [batch.raw[1][19] * -8.0, batch.raw[3][19] * 4.0];
     assert!(
@@ -81,7 +82,7 @@ fn a_real_log_of_px4_is_a_recording() {
     assert_eq!((summary.rows, summary.sample_rate_hz), (7783, 250.0));
     assert!((batch.t_s[7782] - batch.t_s[0] - 31.128).abs() < 1e-9);
     assert_eq!(summary.time[0].gaps, 0);
-    // The last sample (-0.0232, 0.0091, -9.8122) m/s², less the calibration: no mounting, factors of 1, offsets (-0.0390, 0.0257, 0.0032) m/s².
+    // The last sample (-0.0232, 0.0091, -9.8122) m/s² with the calibration undone: no mounting, factors of 1, offsets (-0.0390, 0.0257, 0.0032) m/s².
     let last = [3, 4, 5].map(|c| batch.raw[c][7782]);
     let raw = [-0.062_249_2, 0.034_716_1, -9.809_044_8];
     assert!(

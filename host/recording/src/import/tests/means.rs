@@ -1,4 +1,4 @@
-//! Tables of means: what is read of them, and what is refused.
+//! Tables of means: what is read from them, and what is refused.
 
 use super::*;
 
@@ -99,7 +99,7 @@ fn what_is_missing_or_wrong_in_a_table_of_means_is_named() {
         error.contains("column averaged belongs to a table of means"),
         "{error}"
     );
-    // And samples are not without their rate.
+    // Samples need their rate.
     let text = "format = \"mimu-recording/1\"\ndevice = \"u\"\ngravity_mps2 = 9.8\nraw_unit = \"V\"\nreference = \"gravity\"\n";
     let error = Manifest::parse(text, "recording.toml").unwrap_err();
     assert!(

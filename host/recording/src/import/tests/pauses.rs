@@ -1,4 +1,4 @@
-//! Steps that pauses part, as where a program writes the poses one after another and nothing between.
+//! Steps separated by pauses, as in the file of a program that records only the poses, one after another.
 
 use super::*;
 
@@ -54,7 +54,7 @@ fn the_six_directions_of_a_realsense_camera_are_steps_with_known_inputs() {
             .windows(2)
             .any(|w| w == ["--step-gap", "1"])
     );
-    // Nobody has given a step: they are to be found.
+    // Without the pause, the file has no steps for the inputs.
     options.step_gap_s = None;
     assert!(bench.refused(&options).contains("no column is step"));
 }

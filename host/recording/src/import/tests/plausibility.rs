@@ -1,10 +1,10 @@
-//! Readings that no sensor makes.
+//! Implausible readings.
 
 use super::*;
 
 const BOTH: &str = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
 
-/// Rows at 100 Hz, of which `readings` gives the six cells.
+/// Rows at 100 Hz; `readings` gives the six cells of each.
 fn log(rows: usize, readings: impl Fn(usize) -> [i32; 6]) -> String {
     let row = |i: usize| {
         let cells = readings(i).map(|cell| cell.to_string()).join(" ");
@@ -13,7 +13,7 @@ fn log(rows: usize, readings: impl Fn(usize) -> [i32; 6]) -> String {
     (0..rows).map(row).collect()
 }
 
-/// What a sensor at rest reads, off zero by a wandering count or two.
+/// Readings of a sensor at rest, with noise of up to two counts.
 fn at_rest(i: usize) -> [i32; 6] {
     let noise = |k: usize| (7 * i + 13 * k * i) as i32 % 5 - 2;
     [
@@ -116,7 +116,7 @@ fn counts_taken_for_degrees_are_refused_unless_a_factor_and_an_offset_make_them_
     options.scales = vec!["temp_c=0.00294118".parse().unwrap()];
     options.offsets = vec!["temp_c=36.53".parse().unwrap()];
     let (summary, batch, manifest) = bench.import(&options).unwrap();
-    // -7049 / 340 + 36.53, as the data sheet has it.
+    // -7049 / 340 + 36.53, by the data sheet.
     assert!(
         (batch.temp_c[0] - 15.798).abs() < 1e-3,
         "{}",

@@ -1,9 +1,9 @@
-//! Layouts of well-known makers. The files are written here, with numbers of their own, in the layout that the sources in
-//! `preset/table.rs` show.
+//! Layouts of well-known makers. The files are written here, with made-up numbers, in the layout that the sources cited in `preset/table.rs`
+//! describe.
 
 use super::*;
 
-/// `rows` lines, `line` of the number of each.
+/// `n` lines; `line` makes each from its number.
 fn rows(n: u32, line: impl Fn(u32) -> String) -> String {
     (0..n).map(|i| line(i) + "\n").collect()
 }
@@ -28,10 +28,10 @@ impl Bench {
     }
 }
 
-/// Nine digits of six readings, each another.
+/// Six different readings.
 const READINGS: [f64; 6] = [0.125, -0.25, 0.375, 1.5, -2.5, 9.75];
 
-/// Its first row reads `READINGS`, in SI, at `rate_hz`, by the preset `name`, recognised.
+/// Checks that the first row reads `READINGS` in SI, at `rate_hz`, by the preset `name`.
 fn right(outcome: Result<(ImportSummary, Batch, Manifest)>, name: &str, rate_hz: f64) {
     let (summary, batch, manifest) = outcome.unwrap();
     assert_eq!(summary.preset.as_ref().unwrap().name, name);
@@ -105,7 +105,7 @@ fn sensor_logger_goes_by_the_names_of_its_columns_and_by_the_convention_of_the_p
         "{error}"
     );
 
-    // In g, and of the other sign.
+    // In g, and with the opposite sign.
     let ios = Bench::new(&[
         ("GyroscopeUncalibrated.csv", &gyro),
         (
@@ -234,7 +234,7 @@ fn xsens_goes_by_its_clock_or_where_that_is_empty_by_its_counter_and_the_rate_ab
             .iter()
             .any(|w| w.contains("wrapped to 0 once"))
     );
-    // Xsens DOT has the same names, of degrees and of microseconds.
+    // Xsens DOT has the same names, but degrees and microseconds.
     assert!(bench.preset(None, &["bare.txt"]).unwrap().is_none());
     let error = bench
         .preset(Some("xsens"), &["bare.txt"])

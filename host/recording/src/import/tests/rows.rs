@@ -1,4 +1,4 @@
-//! Rows that are chosen by what a column holds.
+//! Rows chosen by the value of a column.
 
 use super::*;
 
@@ -51,7 +51,7 @@ fn several_choices_hold_at_once_and_numbers_are_compared_as_numbers() {
     let (summary, batch, _) = chosen(&text, LIST, &["channel=02.0", "range=high"]).unwrap();
     assert_eq!(summary.rows, 10);
     assert_eq!(batch.raw[5][0], 31.0);
-    // A file without names: the columns go by their numbers.
+    // In a file without names, columns are chosen by number.
     let list = "-,t_s,-,accel_x,accel_y,accel_z";
     let bench = Bench::new(&[("a.csv", &three_sensors(""))]);
     let mut options = bench.options(&["a.csv"], &[list]);
@@ -79,7 +79,7 @@ fn a_value_that_never_occurs_is_refused_with_those_that_do() {
     );
     let error = refused(&["sensor=7"]);
     assert!(error.contains("\"sensor\""), "{error}");
-    // `c` counts on: each row has another value, of which some are listed.
+    // `c` differs in each row; some of its values are listed.
     let error = refused(&["c=-1"]);
     assert!(error.contains("and others") && error.len() < 400, "{error}");
     for wrong in ["channel", "=3", "channel="] {

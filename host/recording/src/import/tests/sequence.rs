@@ -11,7 +11,7 @@ fn pose(from_us: u64, force: i32) -> String {
 const LIST: &str = "t_s=us,gyro_x=a,gyro_y=b,gyro_z=c,accel_x=d,accel_y=e,accel_z=f";
 
 fn six_faces() -> (Bench, ImportOptions) {
-    // The clock of the second begins anew; that of the third is a minute after the first.
+    // The clock of the second restarts; that of the third is a minute after the first.
     let files = [pose(500_000, 800), pose(0, -800), pose(60_000_000, 10)];
     let inputs = "step,ref_force_z_mps2\nz_up,9.81\nz_down,-9.81\nz_gone,0\n";
     let bench = Bench::new(&[
@@ -92,7 +92,7 @@ fn a_file_for_each_face_has_the_specific_force_of_the_axis_that_was_up() {
     options.reference = Reference::Table;
     let (summary, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!(manifest.step_labels, ["+z", "-z", "-y"]);
-    // Nobody knows how it was turned from face to face: neither a rate nor a turn may be fitted to.
+    // The turns from face to face are unknown: neither a rate nor a turn may enter a fit.
     assert!(manifest.turn_steps.is_empty());
     assert!(batch.reference[..3].iter().all(Vec::is_empty));
     assert!(batch.t_s[20] - batch.t_s[19] > 9.0);

@@ -1,4 +1,4 @@
-//! Readings that are held, interleaved, or in another unit than was said.
+//! Readings that are repeated, interleaved, or in another unit than given.
 
 use super::*;
 

@@ -28,7 +28,7 @@ fn a_file_with_nanoseconds_since_1970_has_the_rate_to_all_its_digits() {
     assert_eq!(summary.time[0].origin_s, 1_403_636_579);
     assert_eq!(batch.t_s[0], 0.763_555_584);
     assert!((batch.t_s[1999] - batch.t_s[0] - 9.995).abs() < 1e-12);
-    // The same where somebody has said it, and in seconds with nine decimals.
+    // The result is the same if the factor is given, or with seconds of nine decimals.
     let mut options = bench.options(&["a"], &[GYR]);
     options.scales = vec!["t_s=1e-9".parse().unwrap()];
     assert_eq!(bench.import(&options).unwrap().1, batch);
@@ -120,7 +120,7 @@ fn a_slow_log_is_asked_for_its_unit_and_not_made_a_thousand_times_as_fast() {
         let given = bench.import(&options).unwrap().0;
         assert_eq!(given.time[0].unit, Some(Decimal::Microsecond));
     }
-    // The name of the column says it as well.
+    // The name of the column may contain the unit.
     let text = format!(
         "time_us;x;y;z\n{}",
         stamped((0..399).map(|i| 500_000 * i)).replace(' ', ";")
@@ -165,7 +165,7 @@ fn counters_of_16_and_32_bits_that_begin_again_are_counted_on_and_reported() {
 
 #[test]
 fn steps_of_one_and_two_periods_are_lost_samples_and_the_stamps_stay_as_they_are() {
-    // A quarter is lost without any order: 4 and 8 ms, now and then 12.
+    // A quarter of the samples is lost at random: steps of 4 and 8 ms, occasionally 12.
     let mut state = 7_u64;
     let mut kept = |_: &u64| {
         state = state
@@ -203,7 +203,7 @@ fn a_clock_that_is_set_back_by_less_than_a_second_is_refused_with_its_row() {
 
 #[test]
 fn stamps_that_neither_their_steps_nor_the_count_explain_are_refused_and_not_smeared() {
-    // Every seventh row of a part is there twice, with other readings.
+    // Every seventh row of the first half occurs twice, with different readings.
     let stamps =
         (0..3000).flat_map(|i| vec![10_000 * i; if i < 1500 && i % 7 == 0 { 2 } else { 1 }]);
     let bench = Bench::new(&[("a", &stamped(stamps))]);
@@ -236,7 +236,7 @@ fn readings_of_a_loop_are_interpolated_to_its_usual_round() {
     assert!((rounds.usual_s - 0.0805).abs() < 0.002, "{time:?}");
     assert!(time.stamps_kept && time.gaps == 1, "{time:?}");
     assert!((manifest.sample_rate_hz * rounds.usual_s - 1.0).abs() < 1e-6);
-    // Where the unit was read the time is right wherever it is asked for, and the pause is no reading.
+    // The interpolated reading equals the time everywhere, and no row lies in the pause.
     let off = batch
         .t_s
         .iter()

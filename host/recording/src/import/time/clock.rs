@@ -1,4 +1,4 @@
-//! What the stamps of a file say, and the time of each of its rows that follows.
+//! The times of the rows of a file, from its stamps.
 
 use std::path::Path;
 
@@ -10,41 +10,41 @@ use super::regular::{Irregular, Regular};
 use super::stamp::{Decimal, Seen, Stamp, Unit};
 use crate::error::{Argument, Error, Result};
 
-/// From so many seconds on, stamps count from the first whole second: later ones lose digits of the steps between samples.
+/// Stamps beyond this many seconds are counted from the first whole second. Otherwise a double loses digits of the intervals between samples.
 const FAR_S: f64 = 1e8;
 
-/// What the stamps of a file have shown.
+/// Results about the stamps of a file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TimeSummary {
     /// File, without its folder.
     pub file: String,
-    /// Unit of the stamps; `None` where the factor is another one.
+    /// Unit of the stamps; `None` if the given factor is another one.
     pub unit: Option<Decimal>,
-    /// Whether the unit was found out, and not given.
+    /// Whether the unit was recognised instead of given.
     pub recognised: bool,
     /// Instant that was subtracted, in whole seconds.
     pub origin_s: i64,
     /// Rate of the straight line through count and stamp, Hz.
     pub rate_hz: f64,
-    /// Whether the stamps are kept; else the time is that of the count.
+    /// Whether the stamps are kept; otherwise the sample count gives the time.
     pub stamps_kept: bool,
-    /// What the stamps are off that time.
+    /// Deviations of the stamps from that time.
     pub jitter: Jitter,
-    /// Places where samples are missing, and how many in all.
+    /// Places where samples are missing.
     pub gaps: u64,
-    /// Samples missing in them.
+    /// Samples missing in all gaps.
     pub missing: u64,
     /// Time without samples of the longest gap, s.
     pub longest_gap_s: f64,
     /// Time from the first row to the last, s.
     pub lasts_s: f64,
-    /// How often the stamps began again at 0 and were counted on.
+    /// How often the stamps wrapped to 0 and were unwrapped.
     pub wraps: u64,
-    /// Rate within the bursts that stamps come in, Hz: that of the sensor if it pauses between them.
+    /// Rate within bursts of stamps, Hz: the sensor's rate if it pauses between bursts.
     pub rate_in_bursts_hz: Option<f64>,
     /// Rows left out because they repeat the row before, its stamp included.
     pub repeated_rows: u64,
-    /// Rounds of the loop that read the unit at irregular times, where one did; the readings are then interpolated to the usual one.
+    /// Rounds of a loop that read the unit at irregular times, if one did; the readings are then interpolated to the usual round.
     pub polled: Option<Rounds>,
 }
 
@@ -66,30 +66,30 @@ pub(in super::super) struct Stamps {
     pub since_first: Vec<f64>,
     /// Places in `since_first` of rows that repeat the one before.
     pub repeats: Vec<usize>,
-    /// Rows with the stamp of the row before, and other values.
+    /// Rows with the stamp of the row before, but other values.
     pub shared: u64,
-    /// How often they began again at 0.
+    /// How often they wrapped to 0.
     pub wraps: u64,
 }
 
-/// What is known of the time of a file beside its stamps.
+/// What is known about the times of a file apart from its stamps.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in super::super) struct Known<'a> {
-    /// Seconds in the unit of the stamps.
+    /// Seconds per unit of the stamps.
     pub factor: Option<f64>,
-    /// Rate that somebody has given, Hz.
+    /// Given rate, Hz.
     pub rate_hz: Option<f64>,
     /// Name of the column in the file.
     pub name: Option<&'a str>,
-    /// The times of the file that it is joined to.
+    /// The times of the file to which it is joined.
     pub joined_to: Option<&'a Times>,
 }
 
 impl Times {
-    /// Of the stamps of `path`.
+    /// The times of the rows of `path`.
     pub fn of(path: &Path, mut stamps: Stamps, known: &Known<'_>) -> Result<Times> {
-        // A logger that is faster than its sensor writes readings twice. Bursts of a sensor at rest may look like it, but have equal stamps
-        // with other readings as well.
+        // A logger that is faster than its sensor writes rows twice. Bursts of a sensor at rest may look the same, but also contain equal stamps with
+        // different readings.
         let drops_repeats = stamps.shared == 0 && !stamps.repeats.is_empty();
         let repeated_rows = if drops_repeats {
             stamps.repeats.len()
@@ -114,7 +114,7 @@ impl Times {
         };
         let unit = match (known.factor, known.joined_to) {
             (Some(factor), _) => Unit::of_factor(factor),
-            // The stamps of both are made by one clock.
+            // One clock makes the stamps of both.
             (None, Some(first)) if first.overlaps(&seen) => first.unit,
             (None, _) => {
                 Unit::Decimal(Unit::recognise(&seen).map_err(|both| either(path, &seen, both))?)
@@ -166,7 +166,7 @@ impl Times {
         })
     }
 
-    /// Whether stamps in the same unit are at times of this file.
+    /// Whether stamps, read in this file's unit, overlap its times.
     fn overlaps(&self, seen: &Seen<'_>) -> bool {
         let begins = self.unit.seconds(seen.first) - self.origin_s as f64;
         let ends = begins + self.unit.seconds(seen.lasts);
@@ -180,7 +180,7 @@ impl Times {
     }
 }
 
-/// A rate without the digits that only the rounding of time stamps has put there.
+/// A rate without the last digits, which come only from rounded time stamps.
 fn tidy(rate_hz: f64) -> f64 {
     format!("{rate_hz:.7e}").parse().unwrap_or(rate_hz)
 }
@@ -209,7 +209,7 @@ fn refused(path: &Path, irregular: Irregular) -> Error {
     }
 }
 
-/// The refusal of stamps that are in one of two units, the finer one first.
+/// Refusal of stamps that may be in one of two units, the finer one first.
 fn either(path: &Path, seen: &Seen<'_>, both: [Decimal; 2]) -> Error {
     let reading = |unit: Decimal| {
         let per_second = unit.per_second() as f64;
@@ -232,7 +232,7 @@ fn either(path: &Path, seen: &Seen<'_>, both: [Decimal; 2]) -> Error {
     .about(Argument::TimeUnit)
 }
 
-/// A number with three digits.
+/// A number with three significant digits.
 fn three_digits(value: f64) -> String {
     let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
     rounded.to_string()
@@ -257,7 +257,7 @@ impl Clock {
         }
     }
 
-    /// What it goes by.
+    /// The times that it gives.
     pub fn times(&self) -> &Times {
         &self.times
     }

@@ -1,16 +1,16 @@
-//! Gaps and jitter of stamps, and what tells the one from the other.
+//! Gaps and jitter of stamps, and the limit between them.
 
 use serde::Serialize;
 
 /// A stall that is caught up within this time is jitter, s.
 pub(super) const STALL_S: f64 = 5.0;
 
-/// Samples that never came.
+/// Missing samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in super::super) struct Gap {
     /// Row that comes after them, from 0.
     pub row: u64,
-    /// How many they are.
+    /// Their number.
     pub missing: u64,
 }
 

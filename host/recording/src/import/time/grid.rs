@@ -1,33 +1,33 @@
-//! Good stamps: each step is one period or, where samples are missing, several of them.
+//! Good stamps: each interval is one period, or several where samples are missing.
 //!
-//! Loggers that lose samples, or that record in bursts with pauses, write stamps that need no mending. A line through the count of
-//! samples would smear what is missing over all of them: a flight log with steps of 4 and 8 ms became 188.5 Hz with stamps off by 17 ms.
+//! Loggers that lose samples, or that record in bursts with pauses, write stamps that need no correction. A line through the sample count would
+//! spread the missing time over all samples: it made 188.5 Hz of a flight log with intervals of 4 and 8 ms, with stamps off by 17 ms.
 
 use super::gap::{Gap, Jitter, STALL_S, quantile};
 
-/// How far a step may be from a multiple of the period, in periods. Stamps in ms of a sensor at 60 Hz are off by 0.06, and stamps of
-/// samples that were handed over late by much more.
+/// How far an interval may be from a multiple of the period, in periods. Stamps in ms of a sensor at 60 Hz are off by 0.06; stamps of samples that
+/// were handed over late are off by much more.
 const NEAR: f64 = 0.25;
-/// Steps this near to a multiple are those of exact stamps.
+/// Intervals this close to a multiple come from exact stamps.
 pub(super) const EXACT: f64 = 0.02;
-/// A longer step, in periods, is a pause, after which samples may begin at any instant.
+/// A longer interval, in periods, is a pause, after which samples may begin at any instant.
 const PAUSE: f64 = 8.0;
-/// Share of steps that may be neither.
+/// Largest share of intervals that are neither multiples nor pauses.
 const ODD: f64 = 0.002;
-/// Least share of steps of one period: any steps are multiples of a period that is small enough.
+/// Least share of intervals of one period: a small enough period would divide any intervals.
 const SINGLE: f64 = 0.2;
-/// Low quantile of the steps, which is one period where at most four fifths of the steps are longer.
+/// Low quantile of the intervals, which is one period if a fifth of the intervals are that short.
 const LOW: f64 = 0.05;
-/// Values that a quantile over a long file is taken from.
+/// Number of values from which a quantile over a long file is computed.
 const SAMPLED: usize = 20_000;
 
-/// Samples nearer to each other than this were fetched from a buffer, s.
+/// Samples closer to each other than this, in s, were fetched from a buffer.
 const FETCHED_S: f64 = 1e-3;
-/// Those farther from each other than this were not, s: a bus or a serial line hands over a sample in 0.05 to 3 ms.
+/// Samples farther apart than this, in s, were not: a bus or a serial line hands over a sample in 0.05 to 3 ms.
 const SAMPLED_S: f64 = 4e-3;
-/// Long steps in a window that has to last as long as the others if stamps are those of a hand-over.
+/// Long intervals in a window. If stamps are those of hand-overs, all windows last equally long.
 const IN_WINDOW: usize = 16;
-/// Windows of which one may last longer than the others.
+/// From this many windows on, one may last longer than the others.
 const FEW_WINDOWS: usize = 8;
 
 /// Stamps that are kept.
@@ -36,7 +36,7 @@ pub(super) struct Grid {
     /// Time between samples, s.
     pub period_s: f64,
     pub gaps: Vec<Gap>,
-    /// How far steps are from multiples of the period.
+    /// How far intervals are from multiples of the period.
     pub jitter: Jitter,
     /// Whether all are exact.
     pub exact: bool,
@@ -44,30 +44,30 @@ pub(super) struct Grid {
     pub pauses: bool,
 }
 
-/// How the steps of some stamps are to be read.
+/// How to interpret the intervals of stamps.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Steps {
     /// As multiples of a period.
     Multiples(Grid),
-    /// As those of a hand-over of samples, which a buffer has kept, though they are multiples of a period.
+    /// As samples that a buffer hands over in bursts, although the intervals are multiples of a period.
     HandedOver {
-        /// That period, s.
+        /// Period within a burst, s.
         within_s: f64,
-        /// Time between samples as it mostly is over several hand-overs, s.
+        /// Usual time between samples over several hand-overs, s.
         mean_s: f64,
-        /// Time between two hand-overs, s: that which one in twenty exceeds.
+        /// Time between two hand-overs, s; one in twenty is longer.
         apart_s: f64,
     },
     /// As neither.
     Irregular,
 }
 
-/// Reads the steps of `stamps`, s. `rate_hz` decides, where it is known, between pauses and a hand-over in bursts.
+/// Interprets the intervals of `stamps`, s. A known `rate_hz` decides between pauses and hand-overs in bursts.
 pub(super) fn read(stamps: &[f64], rate_hz: Option<f64>) -> Steps {
     let Some(period_s) = base_period(stamps) else {
         return Steps::Irregular;
     };
-    // Again with the period of all rows: a pause of a thousand periods is counted to less than one.
+    // Repeated with the period of all rows, so that even a pause of a thousand periods is counted to less than one.
     let refined = multiples(stamps, period_s).and_then(|grid| multiples(stamps, grid.period_s));
     match refined {
         None => Steps::Irregular,
@@ -82,7 +82,7 @@ pub(super) fn read(stamps: &[f64], rate_hz: Option<f64>) -> Steps {
     }
 }
 
-/// The period that the shortest steps are, s: their mean, once with the steps of a few periods.
+/// The period, s: first the mean of the shortest intervals, then also of intervals of a few periods.
 fn base_period(stamps: &[f64]) -> Option<f64> {
     let stride = stamps.len().div_ceil(SAMPLED);
     let pairs = stamps.windows(2).step_by(stride);
@@ -108,7 +108,7 @@ fn base_period(stamps: &[f64]) -> Option<f64> {
     Some(period)
 }
 
-/// The stamps as those of samples `period_s` apart, if they are.
+/// The stamps as a grid of samples `period_s` apart, if they fit one.
 fn multiples(stamps: &[f64], period_s: f64) -> Option<Grid> {
     let mut grid = Grid {
         period_s,
@@ -119,7 +119,7 @@ fn multiples(stamps: &[f64], period_s: f64) -> Option<Grid> {
     };
     let (mut odd, mut single, mut near, mut squares) = (0_usize, 0_usize, 0_usize, 0.0);
     let (mut sum_s, mut periods) = (0.0, 0.0);
-    // The first sample of a burst is late now and then, as whatever reads it has other work before it.
+    // The first sample of a burst is sometimes late, because its reader had other work before it.
     let mut after_pause = true;
     for (i, pair) in stamps.windows(2).enumerate() {
         let step = (pair[1] - pair[0]) / period_s;
@@ -165,10 +165,11 @@ fn multiples(stamps: &[f64], period_s: f64) -> Option<Grid> {
     Some(grid)
 }
 
-/// The mean time between samples and that between hand-overs, s, if long steps are those between two hand-overs of samples that were taken steadily, and nothing is missing.
+/// The mean time between samples and the time between hand-overs, s, if the long intervals separate hand-overs of samples that were taken steadily,
+/// and nothing is missing.
 ///
-/// Then any stretch of so many samples lasts as long as any other, but for one hand-over, however many come at once. Where
-/// samples are lost or the logger pauses, it does not, or the samples of a burst are as far apart as only a sensor takes them.
+/// Then all segments with the same number of samples last equally long, to within one hand-over. If samples are lost or the logger pauses, segments
+/// differ, or the samples of a burst are as far apart as only a sensor takes them.
 fn handed_over(stamps: &[f64], period_s: f64, rate_hz: Option<f64>) -> Option<[f64; 2]> {
     let steps = || stamps.windows(2).map(|pair| pair[1] - pair[0]);
     let mut long: Vec<f64> = steps().filter(|s| *s > 1.5 * period_s).collect();
@@ -195,10 +196,10 @@ fn handed_over(stamps: &[f64], period_s: f64, rate_hz: Option<f64>) -> Option<[f
     let alike = lasts
         .iter()
         .filter(|last| (*last - usual).abs() <= 1.5 * longest);
-    // A hand-over that was lost makes one window longer, and of few windows one is more than the share.
+    // A lost hand-over makes one window longer; of few windows, one is more than the share.
     let odd = lasts.len() - alike.count();
     let few = usize::from(lasts.len() >= FEW_WINDOWS);
     let steady = lasts.len() >= 4 && odd <= few.max(lasts.len() / 20);
-    // Steps of one and two periods that take turns are those of a clock with coarse ticks.
+    // Alternating intervals of one and two periods come from a clock with coarse ticks.
     (steady && (period_s <= SAMPLED_S || longest < 2.5 * period_s)).then_some([mean_s, longest])
 }

@@ -1,28 +1,28 @@
 //! Stamps of a loop that reads the sensor once a round.
 //!
-//! A microcontroller that reads, formats and writes in one loop takes a sample whenever it comes round to it: usually after 80 ms, after
-//! 420 ms while a card is busy. Nothing is missing and nothing is late: each stamp is the time of its reading, and the count of samples
-//! is no clock. It was off the stamps by 16 s in half an hour.
+//! A microcontroller that reads, formats and writes in one loop takes one sample a round: usually after 80 ms, but after 420 ms while a card is busy.
+//! No sample is missing or late: each stamp is the time of its reading. The sample count does not give the time: it was off the stamps by 16 s in
+//! half an hour.
 
 use serde::Serialize;
 
 use super::gap::{Gap, STALL_S, quantile};
 
-/// A step that is shorter than this share of the usual one is that of a hand-over, or of a row that is there twice.
+/// An interval shorter than this share of the usual one comes from a hand-over or a repeated row.
 const SHORT: f64 = 0.5;
-/// Share of steps that may be shorter all the same.
+/// Largest share of intervals that may still be shorter.
 const ODD: f64 = 1e-3;
-/// A sample that is handed over late is followed by a short step: its neighbours correlate by -0.5. Rounds of a loop take what they
-/// take, whatever the one before took: 0, or more where the loop is slow for a while (0.6 and 0.7 in recordings).
+/// A late hand-over is followed by a short interval: successive intervals correlate by -0.5. Rounds of a loop do not depend on the round before: 0,
+/// or more if the loop is slow for a while (0.6 and 0.7 in recordings).
 const CAUGHT_UP: f64 = -0.2;
-/// Mean step over the usual one, pauses of more than [`STALL_S`] left out: 1.02 and 1.15 in recordings. Of samples that come ten at a time
-/// the steps between them are the usual ones, and the mean is several times that.
+/// Largest ratio of the mean interval to the usual one, without pauses of more than [`STALL_S`]: 1.02 and 1.15 in recordings. If samples come ten at
+/// a time, the usual interval is that within a burst, and the mean is several times that.
 const IN_BURSTS: f64 = 2.0;
-/// Longer rounds, in usual ones, count as so many in that correlation, so that a single pause does not decide.
+/// In that correlation, rounds count as at most this many usual ones, so that a single pause does not decide.
 const LONG: f64 = 4.0;
-/// A longer step, in usual ones, is not interpolated across.
+/// A longer interval, in usual ones, is not interpolated across.
 pub(in super::super) const LONGEST: f64 = 3.0;
-/// Fewer steps show no correlation: that of 100 is known to 0.1.
+/// Fewer intervals do not show the correlation: with 100 it is known to 0.1.
 const FEWEST: usize = 100;
 
 /// How long the rounds of a loop take.
@@ -36,7 +36,7 @@ pub struct Rounds {
     pub longest_s: f64,
 }
 
-/// The rounds that `stamps`, s, are those of; `None` if they are of something else.
+/// The rounds of the loop that made `stamps`, s; `None` if no loop did.
 pub(super) fn rounds(stamps: &[f64]) -> Option<Rounds> {
     let steps: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
     if steps.len() < FEWEST {
@@ -60,7 +60,7 @@ pub(super) fn rounds(stamps: &[f64]) -> Option<Rounds> {
     })
 }
 
-/// Correlation of each step with the one after it.
+/// Correlation of each interval with the next.
 fn correlation(steps: &[f64], usual_s: f64) -> f64 {
     let bounded: Vec<f64> = steps.iter().map(|s| s.min(LONG * usual_s)).collect();
     let mean = bounded.iter().sum::<f64>() / bounded.len() as f64;
@@ -114,10 +114,10 @@ mod tests {
             found.shortest_s >= 0.08 && found.longest_s > 0.2,
             "{found:?}"
         );
-        // The same delays of samples that a crystal took.
+        // Late stamps of samples that a crystal took.
         let late = |i: u64| 0.08 * i as f64 + 0.03 * uniform(&mut state);
         assert_eq!(rounds(&(0..2000).map(late).collect::<Vec<f64>>()), None);
-        // Every tenth row there twice.
+        // Every tenth row occurs twice.
         let twice: Vec<f64> = (0..2000).map(|i| 0.08 * f64::from(i - i / 10)).collect();
         assert_eq!(rounds(&twice), None);
     }

@@ -1,48 +1,47 @@
 //! The regular time behind noisy stamps.
 //!
-//! A sensor samples by a crystal of its own, and the stamps are made by whatever reads it: late when that is busy, several at once
-//! when a buffer is handed over. The count of samples is therefore the clock, and the stamps its witnesses: of its rate, of its
-//! beginning, and of samples that never came.
+//! A sensor samples by its own crystal, but the stamps come from the program that reads it: they are late when it is busy, and several come at once
+//! when a buffer is handed over. The sample count is therefore the clock. The stamps show its rate, its beginning, and missing samples.
 //!
-//! It is done when foreign files are imported, and not whenever a recording is read. The stamps are the other program's, and what
-//! can be known of them is known there: what their unit is, and whether rows are repeated. A recording says when its samples were taken, so that
-//! whatever reads one agrees on its gaps; and what our own device has recorded has exact stamps, which nothing should touch.
+//! This is done when foreign files are imported, not whenever a recording is read. Only the import knows the unit of the stamps and whether rows are
+//! repeated. A recording then contains the times at which its samples were taken, so all its readers agree on its gaps. Recordings of our own device
+//! have exact stamps, which must stay as they are.
 
 use super::gap::{Gap, Jitter, STALL_S, quantile};
 use super::grid::{self, Steps};
 use super::polled::{self, Rounds};
 
-/// A step that is longer than this many periods may hide missing samples.
+/// An interval longer than this many periods may hide missing samples.
 const LONG: f64 = 1.25;
-/// Low quantile of lateness that two windows are compared by: delays only make stamps late, and single early ones are outvoted.
+/// Quantile of lateness by which two windows are compared. It is low, because delays only make stamps late; single early stamps do not move it.
 const QUANTILE: f64 = 0.25;
-/// Samples in a window, at least and at most.
+/// Fewest and most samples in a window.
 const WINDOW: std::ops::RangeInclusive<usize> = 8..=2048;
 /// Samples in a window for each period of jitter.
 const WINDOW_PER_JITTER: f64 = 48.0;
-/// Share of later samples that may come back to the time before a gap.
+/// Largest share of later samples that may return to the time before a gap.
 const BACK: f64 = 0.25;
-/// Missing samples that windows show, at least; single ones are told from jitter as long as it varies by less.
+/// Fewest missing samples that windows show. Single ones are distinguished from jitter as long as it varies by less.
 const SMALLEST_GAP: f64 = 0.6;
-/// Share of a burst that is handed over within which missing samples cannot be told: windows begin and end within a burst.
+/// Missing samples up to this share of a burst cannot be detected: windows begin and end within a burst.
 const HIDDEN: f64 = 0.1;
-/// Bursts that a rate is taken from, at least.
+/// Fewest bursts from which a rate is computed.
 const FEWEST_BURSTS: usize = 8;
-/// Standard deviations of the difference of two windows that a gap has to exceed.
+/// A gap must exceed this many standard deviations of the difference of two windows.
 const SIGMAS: f64 = 6.0;
-/// A clock that is set back by more than so many periods is noticed.
+/// A clock that is set back by more than this many periods is noticed.
 const SET_BACK: f64 = 2.0;
-/// Stamps that are off the count by less than so many periods are those of samples that are handed over one by one.
+/// If stamps are off the count by less than this many periods, samples are handed over one by one.
 const LATE: f64 = 2.0;
 /// A clock that wanders is off by less than this share of the time.
 const WANDER: f64 = 1e-3;
-/// Rounds of rate and gaps; each needs the other.
+/// Iterations of rate and gaps; each needs the other.
 const ROUNDS: usize = 6;
-/// Rows of a stretch that the unit of the stamps is recognised by.
+/// Rows of a segment by which the unit of the stamps is recognised.
 const STRETCH: usize = 64;
-/// Values that a quantile over a long file is taken from.
+/// Number of values from which a quantile over a long file is computed.
 const SAMPLED: usize = 20_000;
-/// And from a window.
+/// The same for a window.
 const MOST: usize = 512;
 
 /// Regular times of the rows of a file.
@@ -54,30 +53,30 @@ pub(in super::super) struct Regular {
     pub period_s: f64,
     /// In the order of their rows.
     pub gaps: Vec<Gap>,
-    /// Whether the stamps are good, and are kept; then the regular time is not used.
+    /// Whether the stamps are good and kept; the regular time is then not used.
     pub kept: bool,
-    /// Whether a loop has read the unit once a round, however long that took: the stamps are then the times of the readings, and
-    /// `period_s` is the usual round.
+    /// The rounds of a loop, if one read the unit once a round, however long that took. The stamps are then the times of the readings, and `period_s`
+    /// is the usual round.
     pub polled: Option<Rounds>,
-    /// What is left of the stamps; of those that are kept, what is left of their steps.
+    /// Residuals of the stamps; for kept stamps, those of their intervals.
     pub jitter: Jitter,
-    /// Period within the bursts that stamps come in, s, where it may be that of the sensor and the rest gaps.
+    /// Period within bursts of stamps, s, if it may be the sensor's, with gaps between bursts.
     pub in_bursts_s: Option<f64>,
 }
 
-/// What keeps stamps from having a regular time.
+/// Why stamps have no regular time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) enum Irregular {
     /// Fewer than two rows at different times.
     Short,
     /// The clock is set back for good before that row.
     SetBack(usize),
-    /// The stamps are off the count of samples by so much, s, and no late hand-over explains it.
+    /// The stamps are off the sample count by this time, s, which no late hand-over explains.
     OffTheCount(f64),
 }
 
 impl Regular {
-    /// The time behind `stamps`, s. `rate_hz`, where it is known, decides whether bursts are a hand-over or the samples have pauses.
+    /// The time behind `stamps`, s. A known `rate_hz` decides whether bursts are hand-overs or the samples have pauses.
     pub fn find(stamps: &[f64], rate_hz: Option<f64>) -> Result<Regular, Irregular> {
         let period_s = first_period(stamps).ok_or(Irregular::Short)?;
         if let Some(row) = set_back(stamps, period_s) {
@@ -89,7 +88,7 @@ impl Regular {
         {
             return Ok(Self::of_grid(stamps, grid));
         }
-        // The steps within a burst of 32 samples are alike, and anything but the period.
+        // The intervals within a burst of 32 samples are alike, but unrelated to the period.
         let (period_s, burst) = match steps {
             Steps::HandedOver {
                 mean_s, apart_s, ..
@@ -101,7 +100,7 @@ impl Regular {
             counted.by_last_of_bursts(stamps, apart_s);
         }
         match steps {
-            // Jitter of less than a period about the count is rounding, which the count takes out.
+            // Jitter of less than a period about the count is rounding, which the count removes.
             Steps::Multiples(grid) if grid.pauses || counted.jitter.max_s > grid.period_s => {
                 return Ok(Self::of_grid(stamps, &grid));
             }
@@ -110,7 +109,7 @@ impl Regular {
             }
             _ => {}
         }
-        // A loop that pauses once has stamps as far off the count as a stall would, without its samples that come at once afterwards.
+        // After one pause of a loop, stamps are as far off the count as after a stall, but no samples come at once.
         if counted.jitter.max_s > LATE * counted.period_s
             && let Some(rounds) = polled::rounds(stamps)
         {
@@ -137,7 +136,7 @@ impl Regular {
 
     /// Stamps that are kept.
     fn of_grid(stamps: &[f64], grid: &grid::Grid) -> Regular {
-        // Behind a pause the samples begin at any instant, and a line through all would take the rounding for a rate.
+        // After a pause the samples begin at any instant. A line through all would take the rounded number of missing samples for a change of rate.
         let period_s = match grid.pauses {
             true => grid.period_s,
             false => line(stamps, &numbers(stamps.len(), &grid.gaps), grid.period_s).1,
@@ -153,10 +152,10 @@ impl Regular {
         }
     }
 
-    /// The regular time by the count of samples, which are about `period_s` apart; a gap is of more than `hidden` samples.
+    /// The regular time by the count of samples, which are about `period_s` apart; a gap has more than `hidden` samples.
     ///
-    /// Each gap too many makes the rate too high, and so explains itself: from a period that was 800 ppm off, bursts of 20 samples at 100 Hz
-    /// settled with 5 gaps. The line through all stamps as if nothing were missing is another beginning; what leaves the smaller jitter is taken.
+    /// Each false gap raises the rate, and so confirms itself: from a period that was 800 ppm off, bursts of 20 samples at 100 Hz converged to 5
+    /// gaps. The line through all stamps, as if nothing were missing, is therefore a second start; the result with the smaller jitter is used.
     fn by_count(stamps: &[f64], period_s: f64, hidden: f64) -> Regular {
         let found = Self::settle(stamps, period_s, hidden);
         if found.gaps.is_empty() {
@@ -170,7 +169,7 @@ impl Regular {
         }
     }
 
-    /// Rate and gaps, each from the other, beginning with `period_s`.
+    /// Iterates rate and gaps, each from the other, starting with `period_s`.
     fn settle(stamps: &[f64], mut period_s: f64, hidden: f64) -> Regular {
         let mut gaps = Vec::new();
         let mut start_s = stamps[0];
@@ -198,10 +197,10 @@ impl Regular {
         regular
     }
 
-    /// Takes the rate, and how much is missing in each gap, from the last samples of bursts that are about `apart_s` apart: they have not
+    /// Computes the rate and the missing samples of each gap from the last samples of bursts that are about `apart_s` apart: these samples have not
     /// waited.
     ///
-    /// A line through all stamps leans by the lateness of half a burst at either end: 275 ppm in a minute of bursts of a second.
+    /// A line through all stamps is tilted by the lateness of half a burst at either end: 275 ppm in a minute of bursts of a second.
     fn by_last_of_bursts(&mut self, stamps: &[f64], apart_s: f64) {
         let is_last = |row: &usize| stamps[row + 1] - stamps[*row] > 0.5 * apart_s;
         let last: Vec<usize> = (0..stamps.len() - 1).filter(is_last).collect();
@@ -229,7 +228,7 @@ impl Regular {
         self.jitter = jitter(stamps, self);
     }
 
-    /// By how much stamps are off the count, s, if that is more than what hands samples over late and clocks that wander explain.
+    /// Error of the stamps against the count, s, if it exceeds what late hand-overs and a wandering clock explain.
     fn unexplained(&self, stamps: &[f64]) -> Option<f64> {
         let steps = stamps.windows(2).map(|pair| pair[1] - pair[0]);
         let longest = steps.fold(0.0, f64::max);
@@ -238,8 +237,8 @@ impl Regular {
         (self.jitter.max_s > most).then_some(self.jitter.max_s)
     }
 
-    /// The time from row to row as it mostly is, in whatever unit the stamps are: the mean over stretches that hold a hand-over or two,
-    /// as the steps between samples that are fetched together say nothing of the rate.
+    /// The usual time from row to row, in the unit of the stamps: the median of the means over segments that contain a hand-over or two. Intervals
+    /// between samples that are fetched together do not show the rate.
     pub fn step(stamps: &[f64]) -> Option<f64> {
         let shortest = first_period(stamps)?;
         let rows = STRETCH.min(stamps.len() - 1);
@@ -251,7 +250,7 @@ impl Regular {
         Some(if mean > 0.0 { mean } else { shortest })
     }
 
-    /// Time without samples in the longest gap of `stamps`, s: a step, less the period that every sample has.
+    /// Time without samples in the longest gap of `stamps`, s: an interval minus one period.
     pub fn longest_gap_s(&self, stamps: &[f64]) -> f64 {
         let lasts = |gap: &Gap| match self.kept {
             true => {
@@ -283,7 +282,7 @@ fn jitter(stamps: &[f64], regular: &Regular) -> Jitter {
     }
 }
 
-/// Numbers of the samples that there are, counted with those that are missing.
+/// Numbers of the existing samples, counting the missing ones.
 fn numbers(rows: usize, gaps: &[Gap]) -> Vec<u64> {
     let mut gaps = gaps.iter().peekable();
     let mut missing = 0;
@@ -298,8 +297,8 @@ fn numbers(rows: usize, gaps: &[Gap]) -> Vec<u64> {
 
 /// The time between samples by the stamps alone, to a part in a thousand.
 ///
-/// The steps of stamps in bursts are anything but the period, and those over many rows have a gap among them. So it is the mean step over as few rows as
-/// agree with each other within a quarter of a period.
+/// Within bursts, intervals are unrelated to the period; over many rows, some include a gap. So this is the mean interval over as few rows as make
+/// the intervals agree within a quarter of a period.
 fn first_period(stamps: &[f64]) -> Option<f64> {
     let mut best: Option<(f64, f64)> = None;
     let mut lag = 1;
@@ -336,9 +335,9 @@ fn first_period(stamps: &[f64]) -> Option<f64> {
     best.map(|(_, period)| period).or_else(whole)
 }
 
-/// First row from which the clock is behind for good: by more than a second, or by more than jitter explains.
+/// First row from which the clock stays behind: by more than a second, or by more than jitter explains.
 ///
-/// Stamps that are late for a while come back at once or soon, and never fall behind the stamps before the delay.
+/// Stamps that are late for a while recover at once or soon, and never fall behind the stamps before the delay.
 fn set_back(stamps: &[f64], period: f64) -> Option<usize> {
     const AROUND: usize = 16;
     let behind = (20.0 * period).max(1.0);
@@ -361,7 +360,7 @@ fn set_back(stamps: &[f64], period: f64) -> Option<usize> {
     })
 }
 
-/// How late stamps are, in periods, before anything is known of gaps.
+/// How late stamps are, in periods, before gaps are known.
 struct Lateness<'a> {
     stamps: &'a [f64],
     period: f64,
@@ -372,7 +371,7 @@ impl Lateness<'_> {
         (self.stamps[row] - self.stamps[0]) / self.period - row as f64
     }
 
-    /// Of `rows`, at most `most` of them evenly spread.
+    /// Quantile over `rows`, from at most `most` of them, evenly spread.
     fn quantile(&self, rows: std::ops::Range<usize>, most: usize, share: f64) -> f64 {
         let rows = rows.start..rows.end.min(self.stamps.len());
         let stride = rows.len().div_ceil(most).max(1);
@@ -380,7 +379,7 @@ impl Lateness<'_> {
         quantile(&mut late, share)
     }
 
-    /// The gap that begins at `row` or soon after it, if one does; `past` is what came before, on top of `level`.
+    /// The gap that begins at `row` or soon after it, if one does; `past` is the lateness before it, relative to `level`.
     fn gap(
         &self,
         row: usize,
@@ -400,13 +399,13 @@ impl Lateness<'_> {
             back > 0.5 * missing
         };
         let soon = missing(more(row, window))?;
-        // The quantile of a long window sees a gap before it is there, and all of it as late as this.
+        // The quantile of a long window responds before the gap begins, and fully only from here on.
         let beyond = row + (QUANTILE * window as f64) as usize;
         let soon = match window > 2 * WINDOW.start() && beyond < self.stamps.len() {
             true => missing(more(beyond, window)).unwrap_or(soon),
             false => soon,
         };
-        // Of a stall some samples may be lost: then what is left after it counts.
+        // Some samples of a stall may be lost: then the lateness after it counts.
         let stall = || missing(more(row, stall)).filter(stays);
         let missing = Some(soon).filter(stays).or_else(stall)?;
         let centre = quantile(&mut past, 0.5) + level;
@@ -416,7 +415,7 @@ impl Lateness<'_> {
         })
     }
 
-    /// The row from which lateness is `more` than the `centre` that it had before, by the sum of what is off.
+    /// The row from which lateness is `more` above the `centre` before it, by the cumulative sum of the deviations.
     fn split(&self, rows: std::ops::Range<usize>, centre: f64, more: f64) -> usize {
         let mut best = (0.0, rows.start);
         let mut sum = 0.0;
@@ -430,7 +429,7 @@ impl Lateness<'_> {
         best.1
     }
 
-    /// Width of the middle four fifths within short blocks: the lower quartile of all, as there are gaps within the others.
+    /// Width of the middle four fifths of lateness within short blocks: the lower quartile of all, because other blocks contain gaps.
     fn width(&self) -> f64 {
         const BLOCK: usize = 32;
         let blocks = self.stamps.len() / BLOCK;
@@ -450,7 +449,7 @@ impl Lateness<'_> {
         quantile(&mut widths, 0.25)
     }
 
-    /// Standard deviation by which two windows next to each other differ where nothing is missing.
+    /// Standard deviation of the difference between neighbouring windows if nothing is missing.
     fn noise(&self, window: usize) -> f64 {
         let places = self.stamps.len() / window;
         let stride = places.div_ceil(2000).max(1);
@@ -470,9 +469,9 @@ impl Lateness<'_> {
 
 /// The gaps that stamps show if samples are `period` apart.
 ///
-/// A gap begins with a long step, and the stamps after it stay late by whole samples; of jitter they come back. What comes is judged
-/// by a low quantile over as many samples as the jitter asks for, which the next gap does not reach, and then by whether a share
-/// comes back within the longest stall.
+/// A gap begins with a long interval, and the stamps after it stay late by whole samples; after jitter they return. The stamps after the interval are
+/// judged by a low quantile over as many samples as the jitter requires, which the next gap does not move. Then it is checked whether a share of them
+/// returns within the longest stall.
 fn find_gaps(stamps: &[f64], period: f64, hidden: f64) -> Vec<Gap> {
     let late = Lateness { stamps, period };
     let window =
@@ -481,10 +480,10 @@ fn find_gaps(stamps: &[f64], period: f64, hidden: f64) -> Vec<Gap> {
     let stall = ((STALL_S / period) as usize).clamp(8 * window, 1 << 20);
     let mut gaps: Vec<Gap> = Vec::new();
     let mut level = 0_u64;
-    // Levels of the rows that a window may look back to.
+    // Lateness of the rows to which a window may look back.
     let mut before: Vec<f64> = vec![0.0; window];
     let mut ahead: Option<Gap> = None;
-    // At both ends there is less than a window to judge by: of bursts that are handed over with a delay the last one alone may be a sample late.
+    // At both ends there is less than a window to judge by: the last of several delayed bursts may alone be a sample late.
     let least_at = |row: usize| {
         let there = window.min(row).min(stamps.len() - row) as f64;
         match window > 2 * WINDOW.start() {
@@ -509,8 +508,8 @@ fn find_gaps(stamps: &[f64], period: f64, hidden: f64) -> Vec<Gap> {
 
 /// Beginning and period of the straight line through sample numbers and stamps.
 ///
-/// Theil's line over the medians of blocks, which no single stamp moves, however late; then that of least squares, which loses less of what
-/// the stamps say, without those that are far off.
+/// First Theil's line over the medians of blocks, which no single stamp moves, however late. Then the line of least squares, which is more precise,
+/// without the stamps that are far off.
 fn line(stamps: &[f64], numbers: &[u64], period: f64) -> (f64, f64) {
     let blocks = match stamps.len() {
         rows @ ..128 => rows,
@@ -546,7 +545,7 @@ fn line(stamps: &[f64], numbers: &[u64], period: f64) -> (f64, f64) {
     (stamps[0] + start, slope)
 }
 
-/// The line of least squares through the stamps that are not far off the line given, which is relative to the first stamp.
+/// The line of least squares through the stamps near the given line; both are relative to the first stamp.
 fn least_squares(stamps: &[f64], numbers: &[u64], period: f64, start: f64) -> (f64, f64) {
     let off = |row: usize| stamps[row] - stamps[0] - numbers[row] as f64 * period - start;
     let stride = stamps.len().div_ceil(SAMPLED);

@@ -1,4 +1,4 @@
-//! Time stamps as a file has them, and the unit that they are in.
+//! Time stamps of a file, and their unit.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,15 +10,15 @@ use crate::error::Error;
 
 /// A time stamp in the unit of its file.
 ///
-/// Both as a double and cut at the decimal point: nanoseconds since 1970 do not fit into a double, which would round them to
-/// 256 ns, nor do seconds since then with nine decimals.
+/// Stored as a double and also split at the decimal point: a double would round nanoseconds since 1970 to 256 ns, and seconds since then with nine
+/// decimals do not fit either.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) struct Stamp {
     /// As a double, NaN if there is none.
     pub value: f64,
     /// Whole part, towards zero.
     whole: i64,
-    /// What is left, with the same sign.
+    /// Fractional part, with the same sign.
     fraction: f64,
 }
 
@@ -30,7 +30,7 @@ impl Default for Stamp {
 
 impl From<f64> for Stamp {
     fn from(value: f64) -> Self {
-        // A cast saturates; what is beyond is refused elsewhere.
+        // A cast saturates; values beyond its range are refused elsewhere.
         Self {
             value,
             whole: value.trunc() as i64,
@@ -50,7 +50,7 @@ impl From<i64> for Stamp {
 }
 
 impl Stamp {
-    /// The stamp in a cell that is the number `value`.
+    /// The stamp in a cell whose number is `value`.
     pub fn in_cell(cell: &[u8], value: f64) -> Self {
         let cell = cell.trim_ascii();
         let (negative, digits) = match cell.split_first() {
@@ -68,7 +68,7 @@ impl Stamp {
         };
         let digit = |sum: i64, byte: &u8| sum * 10 + i64::from(byte - b'0');
         let sign = if negative { -1 } else { 1 };
-        // Eighteen decimals fit, and are more than a double tells apart.
+        // Eighteen decimals fit, and are more than a double distinguishes.
         let decimals = &decimals[..decimals.len().min(18)];
         let scale = 10_f64.powi(decimals.len() as i32);
         Self {
@@ -78,7 +78,7 @@ impl Stamp {
         }
     }
 
-    /// Time since `origin`, in the unit of the stamp. Without an origin the stamp as it stands.
+    /// Time since `origin`, in the unit of the stamp; the stamp itself if `origin` is 0.
     pub fn since(&self, origin: i64) -> f64 {
         match origin {
             0 => self.value,
@@ -107,9 +107,9 @@ impl Stamp {
 /// Unit of time stamps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) enum Unit {
-    /// One of those that clocks count in.
+    /// A decimal unit, in which clocks count.
     Decimal(Decimal),
-    /// So many seconds, as somebody has said.
+    /// This many seconds, as given.
     Other(f64),
 }
 
@@ -196,45 +196,45 @@ impl fmt::Display for Decimal {
     }
 }
 
-/// Seconds since 1970 from 2001 on: nothing else that is counted in seconds is as large.
+/// Seconds since 1970, from 2001 on: nothing else that is counted in seconds is as large.
 const EPOCH_S: std::ops::Range<f64> = 1e9..4.1e9;
 
 /// Rates of inertial units, Hz: from the slowest topic of a flight log to a gyro at 8 kHz.
 const RATES_HZ: std::ops::Range<f64> = 0.8..9000.0;
 
-/// No log is slower than this, Hz. So 2e9 microseconds since a start, 100 Hz, are no seconds since 1970.
+/// No log is slower than this, Hz. So 2e9 microseconds since a start, at 100 Hz, are not seconds since 1970.
 const SLOWEST_HZ: f64 = 0.01;
 
-/// Nobody records for longer, s: of two units that are possible the coarser one is not, if it makes the recording longer than a week.
+/// Longest recording, s. Of two possible units, the coarser one is excluded if it makes the recording longer than a week.
 const LONGEST_S: f64 = 7.0 * 86_400.0;
 
-/// What is known of stamps whose unit is looked for, in that unit.
+/// What is known about stamps of an unknown unit, in that unit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in super::super) struct Seen<'a> {
     /// The first of them.
     pub first: f64,
-    /// Time from row to row, as it mostly is.
+    /// Usual time from row to row.
     pub step: f64,
     /// Time from the first to the last.
     pub lasts: f64,
-    /// Rate, where somebody has given it, Hz.
+    /// Given rate, Hz.
     pub rate_hz: Option<f64>,
     /// Name of the column in the file.
     pub name: Option<&'a str>,
 }
 
 impl Unit {
-    /// That in which one is `factor` seconds.
+    /// The unit of `factor` seconds.
     pub fn of_factor(factor: f64) -> Unit {
         let same = |unit: &Decimal| (factor * unit.per_second() as f64 - 1.0).abs() < 1e-12;
         let known = Decimal::ALL.into_iter().find(same);
         known.map_or(Unit::Other(factor), Unit::Decimal)
     }
 
-    /// The unit of stamps that `seen` describes, or the two that it may be, the finer one first.
+    /// The unit of the stamps that `seen` describes, or the two possible ones, the finer one first.
     ///
-    /// By the size of an epoch, by the rate if that is known, else by what makes the rate a plausible one. Two units differ by a factor of
-    /// 1000, so that a log of 2 Hz in microseconds looks like one of 2 kHz in nanoseconds; then the name of the column may say which it is.
+    /// An epoch decides by its magnitude, else a known rate, else the unit that makes the rate plausible. Two units differ by a factor of 1000, so a
+    /// log of 2 Hz in microseconds looks like one of 2 kHz in nanoseconds. Then the name of the column may decide.
     pub fn recognise(seen: &Seen<'_>) -> Result<Decimal, [Decimal; 2]> {
         let rate = |unit: &Decimal| unit.per_second() as f64 / seen.step;
         let epoch = |unit: &Decimal| {
@@ -271,7 +271,7 @@ impl Unit {
         }
     }
 
-    /// `value` of it in s. Divided and not multiplied, so that 41 ms are the double nearest to 0.041.
+    /// `value` in s. Division instead of multiplication makes 41 ms the double nearest to 0.041.
     pub fn seconds(self, value: f64) -> f64 {
         match self {
             Unit::Decimal(unit) => value / unit.per_second() as f64,
@@ -279,7 +279,7 @@ impl Unit {
         }
     }
 
-    /// The instant `seconds` in it, as a whole number.
+    /// `seconds` in this unit, as a whole number.
     pub fn whole(self, seconds: i64) -> i64 {
         match self {
             Unit::Decimal(unit) => seconds.saturating_mul(unit.per_second()),

@@ -1,4 +1,4 @@
-//! Stamps as the ways of reading a sensor make them, of which the truth is known.
+//! Stamps as various ways of reading a sensor make them, with known truth.
 
 use super::*;
 
@@ -118,7 +118,7 @@ fn bursts_are_no_gaps_and_samples_lost_between_them_are() {
 fn a_clock_that_wanders_against_the_sensor_makes_no_gaps() {
     let mut random = uniform();
     let numbers: Vec<u64> = (0..720_000).collect();
-    // 100 ppm by turns within an hour: 11 samples at 200 Hz.
+    // The rate wanders by up to 100 ppm either way within an hour: 11 samples at 200 Hz.
     let wander = |n: u64| 0.0573 * (1.0 - (n as f64 / 720_000.0 * std::f64::consts::TAU).cos());
     let found = Regular::find(
         &stamps(&numbers, 0.005, |n| wander(n) + 0.002 * random()),
@@ -136,7 +136,7 @@ fn a_clock_that_is_set_back_and_a_file_without_two_times_are_refused() {
     for short in [&[][..], &[1.0], &[1.0, 1.0], &[2.0, 1.9]] {
         assert_eq!(Regular::find(short, None), Err(Irregular::Short));
     }
-    // One wrong stamp among good ones is neither.
+    // One wrong stamp among good ones is accepted.
     let mut once: Vec<f64> = (0..1000).map(|i| f64::from(i) * 0.1).collect();
     once[500] = 1e6;
     assert_eq!(Regular::find(&once, None).unwrap().gaps, []);
@@ -147,7 +147,7 @@ fn a_clock_that_is_set_back_and_a_file_without_two_times_are_refused() {
 #[test]
 fn bursts_with_pauses_keep_their_stamps_whatever_the_phase_behind_a_pause() {
     let mut random = uniform();
-    // 51 samples at 58.3 Hz, then nothing for 1 to 5 s; stamps in whole milliseconds, the first of a burst late by 5.
+    // 51 samples at 58.3 Hz, then nothing for 1 to 5 s; stamps in whole milliseconds, the first of a burst 5 ms late.
     let (period, mut at) = (0.01715, 0.0);
     let mut all = Vec::new();
     for _ in 0..60 {
@@ -189,7 +189,7 @@ fn bursts_of_any_length_have_the_rate_of_the_sensor_and_no_gaps_but_those_of_sam
     for burst in [10_u64, 20, 32, 40, 100] {
         for within_s in [0.0001, 0.0003, 0.0005, 0.0011, 0.002, 0.003] {
             for jitter_s in [0.0, 0.002, 0.02] {
-                // Of 60 bursts nobody can say that their samples were not taken a millisecond apart, and nothing in the pauses.
+                // With only 60 bursts, the samples may as well have been taken a millisecond apart, with pauses between bursts.
                 if burst == 100 && within_s > 1e-3 {
                     continue;
                 }
@@ -209,7 +209,7 @@ fn bursts_of_any_length_have_the_rate_of_the_sensor_and_no_gaps_but_those_of_sam
                 let lost = 10 * burst..13 * burst;
                 let kept: Vec<u64> = all.into_iter().filter(|n| !lost.contains(n)).collect();
                 let found = Regular::find(&stamps(&kept, 0.01, late), None).unwrap();
-                // To a twentieth of a burst and what the hand-overs are late by: jitter hides as much.
+                // Jitter hides up to a twentieth of a burst and the delay of the hand-overs.
                 let off = found.missing().abs_diff(3 * burst) as f64;
                 let hidden = (burst / 20) as f64 + (jitter_s / 0.01).ceil();
                 assert!(off <= hidden, "{case:?} {found:?}");
