@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -164,7 +165,9 @@ def gone(group: int, within_s: float) -> bool:
 def test_ctrl_c_keeps_what_is_done_and_another_run_goes_on(recordings: Path, tmp_path: Path) -> None:
     path = tmp_path / "results.parquet"
     asked = [sys.executable, EXAMPLES / "many_units.py", "fit", recordings, path, "--workers", "2"]
-    run = subprocess.Popen(asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    # A shell starts what it runs in the background with the signal ignored, and children inherit that.
+    noticed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    run = subprocess.Popen(asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=noticed)
     assert run.stdout is not None
     assert run.stdout.readline() == f"{UNITS} of {UNITS} recordings to fit\n"
     time.sleep(1.5)
