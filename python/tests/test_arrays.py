@@ -12,7 +12,7 @@ import pytest
 
 def test_arrays_of_doubles_are_the_same_arrays_within_a_recording() -> None:
     log = np.random.default_rng(1).normal(size=(500, 8))
-    # Columns of a table: their rows are 64 bytes apart.
+    # Columns of a table: successive rows are 64 bytes apart.
     t, gyro, accel, temp = np.arange(500) / 50.0, log[:, 0:3], log[:, 3:6], log[:, 6]
     rec = mimu.Recording(t, gyro, accel, temp, unit="count", gravity=9.81)
     assert rec.t is t and rec.gyro is gyro and rec.accel is accel and rec.temp_c is temp
@@ -38,7 +38,7 @@ def test_any_layout_is_read_as_the_same_numbers(arrays: mimu.Recording) -> None:
 
 
 def test_a_fit_copies_no_array_whole(chamber: ModuleType) -> None:
-    # numpy's own memory is traced, and that of the compiled part is not: what is looked for is a copy that Python is made to hold.
+    # Only numpy's memory is traced, not that of the compiled part: the test looks for a copy that Python holds.
     rec = mimu.Recording(**chamber.session().keywords())
     tracemalloc.start()
     mimu.fit(rec)
@@ -67,7 +67,7 @@ def test_the_truth_of_a_unit_in_a_chamber_is_found(chamber: ModuleType) -> None:
         curve = fit.curves[f"gyro_bias_{name}"]
         truth = chamber.gyro_bias(curve.temp_c)[:, axis]
         half = 0.5 * (curve.upper - curve.lower)
-        # 33 temperatures of a smooth curve, which err together: three intervals hold each of them.
+        # 33 temperatures of a smooth curve, whose errors are correlated: each must be within three intervals.
         assert np.all(np.abs(curve.value - truth) < 3 * half), name
     clean = fit.calibration.apply(mimu.Recording(**session.keywords()))
     for values, known in zip(clean, (np.radians(session.ref_rate_dps), session.ref_force_mps2), strict=True):

@@ -1,4 +1,4 @@
-"""What docs/python.md shows is what the lines show."""
+"""The lines of docs/python.md print what the page shows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is refused, and what of it a program can read."""
+"""Refusals, and what a program can read from them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ctrl-C, and other threads beside the work."""
+"""Ctrl-C, and other threads during the work."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ except KeyboardInterrupt:
 
 
 def test_ctrl_c_interrupts_long_work_within_a_moment() -> None:
-    # Eight million samples take 3.4 s; three million were once done before the signal came.
+    # Eight million samples take 3.4 s; three million were once finished before the signal came.
     process = subprocess.Popen([sys.executable, "-c", LONG], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
@@ -43,7 +43,7 @@ def test_ctrl_c_interrupts_long_work_within_a_moment() -> None:
     process.kill()
     process.wait()
     assert said[0] == "interrupted", said
-    # The clock is that of the machine. A signal is looked for twenty times a second, and the thread that works on takes a core.
+    # Wall-clock time on a busy machine. Signals are checked twenty times a second, and the working thread occupies a core.
     assert float(said[1]) - asked < 5.0
 
 
@@ -62,7 +62,7 @@ def test_other_threads_run_during_the_work(at_rest: mimu.Recording) -> None:
     took, during = time.monotonic() - begun, counted[0] - before
     stop.set()
     beside.join()
-    # Without the release of the lock it would not have counted at all.
+    # Without the release of the lock it would not count at all.
     assert during > 20 * took, f"{during} in {took:.2f} s"
 
 

@@ -1,4 +1,4 @@
-"""Numbers are those of the command to the last digit, as both are read from the same JSON."""
+"""Numbers equal those of the command to the last digit, because both are read from the same JSON."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from conftest import EXAMPLE, json_of, run
 
 
 def without(data: dict[str, Any], *keys: str) -> dict[str, Any]:
-    """``data`` but for what names the place of a recording."""
+    """``data`` without the keys that contain the path of a recording."""
     return {key: value for key, value in data.items() if key not in keys}
 
 
 def undated(text: str) -> str:
-    """``text`` of a file but for when it was made, which it has to say."""
+    """``text`` of a file without its creation time, which must be present."""
     rest, found = re.subn(r"^created = \"20\d\d-\S+Z\"$", "created", text, flags=re.MULTILINE)
     assert found == 1, text[:300]
     return rest
@@ -46,7 +46,7 @@ def test_a_fit_is_that_of_the_command(folder: Path, by_hand: mimu.Recording) -> 
 
 
 def test_a_fit_of_arrays_is_that_of_the_same_numbers_in_a_file(folder: Path, arrays: mimu.Recording) -> None:
-    # The digest of arrays is that of their numbers, and that of a file is that of its bytes.
+    # The digest of arrays is that of their numbers; the digest of a file is that of its bytes.
     assert without(mimu.fit(arrays).to_dict(), "sha256") == without(json_of("fit", folder), "sha256")
 
 
@@ -75,7 +75,7 @@ def test_attributes_are_the_numbers_of_the_json(by_hand: mimu.Recording) -> None
 def test_a_diagnosis_is_that_of_the_command(folder: Path, by_hand: mimu.Recording) -> None:
     found = mimu.diagnose(by_hand, verify=[by_hand])
     command = json_of("diagnose", folder, "--verify", folder)
-    # The command names the other recording by its path.
+    # The command identifies the other recording by its path.
     for one in (here := found.to_dict(), command):
         assert one["second"].pop("recording").endswith("by-hand")
     assert here == command
@@ -90,7 +90,7 @@ def test_noise_is_that_of_the_command(at_rest: mimu.Recording, tmp_path: Path) -
     assert noise.to_dict() == command
     assert undated(noise.to_toml()) == undated((tmp_path / "noise.toml").read_text())
     assert np.array_equal(noise["gyro_x"].adev, command["channels"][0]["adev"])
-    # Of arrays without a file, but for the name of the recording.
+    # From arrays without a file: the same, apart from the name of the recording.
     memory = mimu.allan(at_rest).to_dict()
     for here, there in zip(memory["channels"], command["channels"], strict=True):
         assert without(here, "recording") == without(there, "recording")
@@ -121,7 +121,7 @@ def test_the_next_experiment_is_that_of_the_command(folder: Path, arrays: mimu.R
     assert found.to_dict() == json_of(*asked, "-o", tmp_path / "plan.toml")
     assert found.to_toml() == (tmp_path / "plan.toml").read_text()
     assert [e.id for e in found.effects] == ids and len(found.positions) == len(found.begin_s)
-    # Of a recording on disk, and of arrays.
+    # For a recording on disk, and for arrays.
     command = json_of("design", "--effects", "accel_scale_cubic", "--after", folder, "--chamber", "25,45,5")
     for after in (folder, arrays):
         assert mimu.next_experiment("accel_scale_cubic", after=after, chamber=(25, 45, 5)).to_dict() == command
@@ -150,10 +150,10 @@ def test_readings_are_compensated_as_by_the_command(folder: Path, by_hand: mimu.
 
 
 def test_exports_are_those_of_the_command(by_hand: mimu.Recording, at_rest: mimu.Recording, tmp_path: Path) -> None:
-    # In volts, which the formats for the device of mimu want.
+    # In volts, as the formats for mimu's device require.
     volts = {"gyro": by_hand.gyro / 1000, "accel": by_hand.accel / 1000, "unit": "V", "gravity": by_hand.gravity_mps2}
     mimu.fit(mimu.Recording(by_hand.t, rate_hz=by_hand.rate_hz, **volts)).calibration.save(tmp_path / "cal.toml")
-    # The file says which calibration it is made from.
+    # The file names the calibration that it is made from.
     calibration = mimu.load(tmp_path / "cal.toml")
     noise = mimu.allan(at_rest).noise
     noise.save(tmp_path / "noise.toml")
