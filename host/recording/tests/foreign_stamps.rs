@@ -1,4 +1,4 @@
-//! Time stamps of loggers that lose samples, pause or are slow: the bench says when each sample was taken.
+//! Time stamps of loggers that lose samples, pause or are slow; the bench knows when each sample was taken.
 
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{
@@ -41,7 +41,7 @@ impl Log {
         log
     }
 
-    /// The log imported with what `with` sets: what was said of its time, and the times of its rows from the first on.
+    /// Imports the log with the options that `with` sets. Returns the summary of its time, and the times of its rows from the first on.
     fn import(&self, with: impl Fn(&mut ImportOptions)) -> Result<(TimeSummary, Vec<f64>)> {
         let folder = tempfile::tempdir().expect("a folder");
         let (file, out) = (folder.path().join("log.csv"), folder.path().join("out"));
