@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Imports a recording by hand and calibrates it: the best real recording that is
-# there, or the small simulated one beside this script. Usage: example.sh PATH-OF-MIMU
+# Imports a recording by hand and calibrates it: the best real recording that is available, or the small simulated one beside this script. Usage:
+# example.sh PATH-OF-MIMU
 set -euo pipefail
 mimu=$(realpath "$1")
 here=$(cd "$(dirname "$0")" && pwd)

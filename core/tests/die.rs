@@ -1,19 +1,19 @@
-//! Temperature of the dies against the solutions of the lag's equation for a ramp and for a step, in double precision.
+//! Temperature of the dies against closed-form solutions of the lag's equation for a ramp and a step, in double precision.
 
 use mimu_core::die::{DieLag, LAG_RANGE_S, RATE_SHARE, State};
 use proptest::prelude::*;
 
-/// A thermometer that stands at `from_c` and then rises by `rate` K/s.
+/// A thermometer that is constant at `from_c` and then rises by `rate` K/s.
 fn ramp(from_c: f64, rate: f64, t_s: f64) -> f64 {
     from_c + rate * t_s.max(0.0)
 }
 
-/// Solution of `lag D' + D = T` for it, at rest before.
+/// Solution of `lag D' + D = T` for this ramp, in equilibrium before it.
 fn behind_a_ramp(lag_s: f64, from_c: f64, rate: f64, t_s: f64) -> f64 {
     from_c + rate * (t_s - lag_s * (1.0 - (-t_s / lag_s).exp()))
 }
 
-/// After `t_s` of the ramp, in steps of `dt_s`.
+/// The followed temperature after `t_s` of the ramp, in steps of `dt_s`.
 fn followed(lag_s: f64, from_c: f64, rate: f64, t_s: f64, dt_s: f64) -> f64 {
     let lag = DieLag::new(lag_s).unwrap();
     let mut state = State::new();
@@ -76,7 +76,7 @@ fn before_the_first_reading_nothing_is_known_and_a_lost_one_is_that_of_before() 
         lost.unwrap() > risen + 5.0,
         "it goes on by the time that passed"
     );
-    // Time that does not pass leaves the dies where they are.
+    // A step of zero time leaves the dies unchanged.
     let now = state;
     assert_eq!(lag.follow(&mut state, -1.0, 50.0), lost);
     assert_eq!(state, now);
@@ -97,7 +97,7 @@ fn without_a_lag_the_dies_are_at_the_thermometer() {
 }
 
 proptest! {
-    /// Whoever hears thermometer and dies once knows what follows as well as who has heard all.
+    /// Once thermometer and dies are both known, the future follows as from the whole history.
     #[test]
     fn a_state_is_known_from_both_temperatures(
         lag_s in -120.0_f64..600.0, readings in prop::collection::vec(-40.0_f64..80.0, 2..40), dt_s in 0.02_f64..30.0,

@@ -1,4 +1,4 @@
-//! The README's program is the example's, which is compiled for the device and compared with the PC's command.
+//! The README's program is that of the example, which is compiled for the device and compared with the PC's command.
 
 #[test]
 fn the_readme_shows_the_example() {

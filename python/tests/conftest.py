@@ -1,4 +1,4 @@
-"""Recordings that the tests share, and the command as another way to the same numbers."""
+"""Recordings that the tests share, and the command as a second way to the same numbers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Marks of the tests."""
+    """Registers the marks of the tests."""
     config.addinivalue_line("markers", "nightly: what takes minutes; run by `make nightly`")
 
 
@@ -37,7 +37,7 @@ def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProc
 
 
 def json_of(*arguments: object, cwd: Path | None = None) -> Any:
-    """What the command writes as JSON."""
+    """The command's JSON output."""
     done = run(*arguments, "--json", "-", cwd=cwd)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -45,7 +45,7 @@ def json_of(*arguments: object, cwd: Path | None = None) -> Any:
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The recording by hand of the repository, imported by the command."""
+    """The repository's recording by hand, imported by the command."""
     path = tmp_path_factory.mktemp("by-hand") / "by-hand"
     done = run(
         "import", EXAMPLE / "accel.txt", EXAMPLE / "gyro.txt", "--columns", "t_s,accel_x,accel_y,accel_z", "--columns",
@@ -81,13 +81,13 @@ def example(name: str) -> ModuleType:
 
 @pytest.fixture(scope="session")
 def chamber() -> ModuleType:
-    """The unit in a chamber, with its truth."""
+    """The example of a unit in a chamber, with its truth."""
     return example("chamber")
 
 
 @pytest.fixture(scope="session")
 def at_rest() -> mimu.Recording:
-    """Ten minutes at rest: white noise of known density and a bias that walks."""
+    """Ten minutes at rest: white noise of known density and a bias with a random walk."""
     random = np.random.default_rng(5)
     rows, rate = 60_000, 100.0
     white = random.normal(size=(rows, 6)) * [2e-3] * 6

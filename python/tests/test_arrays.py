@@ -12,7 +12,7 @@ import pytest
 
 def test_arrays_of_doubles_are_the_same_arrays_within_a_recording() -> None:
     log = np.random.default_rng(1).normal(size=(500, 8))
-    # Columns of a table: their rows are 64 bytes apart.
+    # Columns of a table: successive rows are 64 bytes apart.
     t, gyro, accel, temp = np.arange(500) / 50.0, log[:, 0:3], log[:, 3:6], log[:, 6]
     rec = mimu.Recording(t, gyro, accel, temp, unit="count", gravity=9.81)
     assert rec.t is t and rec.gyro is gyro and rec.accel is accel and rec.temp_c is temp

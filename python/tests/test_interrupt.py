@@ -1,4 +1,4 @@
-"""Ctrl-C, and other threads beside the work."""
+"""Ctrl-C, and other threads during the work."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_other_threads_run_during_the_work(at_rest: mimu.Recording) -> None:
     took, during = time.monotonic() - begun, counted[0] - before
     stop.set()
     beside.join()
-    # Without the release of the lock it would not have counted at all.
+    # Without the release of the lock it would not count at all.
     assert during > 20 * took, f"{during} in {took:.2f} s"
 
 

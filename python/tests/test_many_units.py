@@ -59,7 +59,7 @@ def client(many: ModuleType) -> Iterator[Client]:
 
 @pytest.fixture(scope="module")
 def results(many: ModuleType, recordings: Path, client: Client, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The table."""
+    """The table of results."""
     path = tmp_path_factory.mktemp("results") / "results.parquet"
     many.calibrate_all(client, recordings, path)
     return path
@@ -113,7 +113,7 @@ def test_the_questions_find_what_is_wrong_with_the_lines(many: ModuleType, line:
     reasons = answers["share of failures by reason"].fetchall()
     broken = sum(unit.broken is not None for unit in line.units(UNITS))
     assert sum(row[1] for row in reasons) == broken and len(reasons) == len(line.BREAK)
-    # One decimal is shown.
+    # The output shows one decimal.
     assert all(abs(row[2] - 100.0 * row[1] / UNITS) <= 0.05 for row in reasons)
 
 
@@ -151,7 +151,7 @@ def test_a_worker_that_ends_costs_no_recording(many: ModuleType, tmp_path: Path,
 
 
 def gone(group: int, within_s: float) -> bool:
-    """Whether no process of the group is left."""
+    """Whether all processes of the group have ended."""
     until = time.monotonic() + within_s
     while time.monotonic() < until:
         try:
@@ -171,7 +171,7 @@ def test_ctrl_c_keeps_what_is_done_and_another_run_goes_on(recordings: Path, tmp
     assert run.stdout is not None
     assert run.stdout.readline() == f"{UNITS} of {UNITS} recordings to fit\n"
     time.sleep(1.5)
-    # To the workers too, as a terminal sends it.
+    # Also to the workers, as from a terminal.
     os.killpg(run.pid, signal.SIGINT)
     asked_s = time.monotonic()
     out, errors = run.communicate(timeout=60)

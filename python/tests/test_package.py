@@ -29,9 +29,9 @@ def test_the_command_is_there_with_its_help_and_status() -> None:
 @pytest.mark.parametrize(
     ("function", "subcommand", "elsewhere"),
     [
-        # Where a result goes; the faces' short options are in `faces`.
+        # Destinations of the result; the short options of the faces are in `faces`.
         (mimu.read, "import", {"json", "o", "x", "y", "z"}),
-        # Other results than a design, and what only these take.
+        # Results other than a design, and the options for these only.
         (mimu.design, "design", {"json", "o", "compare", "effects", "after", "chamber", "verbose"}),
         (mimu.compare_schemes, "design", {"json", "o", "compare", "effects", "after", "chamber", "verbose", "n", "budget", "scheme", "rates"}),
         (
@@ -55,7 +55,7 @@ def test_every_public_thing_is_documented() -> None:
 
 
 class Balance(html.parser.HTMLParser):
-    """Whether every element ends, and what a page would fetch."""
+    """Checks that every element ends, and collects what a page would fetch."""
 
     def __init__(self) -> None:
         super().__init__()

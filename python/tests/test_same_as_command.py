@@ -1,4 +1,4 @@
-"""Numbers are those of the command to the last digit, as both are read from the same JSON."""
+"""Numbers equal those of the command to the last digit, because both are read from the same JSON."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_a_fit_is_that_of_the_command(folder: Path, by_hand: mimu.Recording) -> 
 
 
 def test_a_fit_of_arrays_is_that_of_the_same_numbers_in_a_file(folder: Path, arrays: mimu.Recording) -> None:
-    # The digest of arrays is that of their numbers, and that of a file is that of its bytes.
+    # The digest of arrays is that of their numbers; the digest of a file is that of its bytes.
     assert without(mimu.fit(arrays).to_dict(), "sha256") == without(json_of("fit", folder), "sha256")
 
 
@@ -75,7 +75,7 @@ def test_attributes_are_the_numbers_of_the_json(by_hand: mimu.Recording) -> None
 def test_a_diagnosis_is_that_of_the_command(folder: Path, by_hand: mimu.Recording) -> None:
     found = mimu.diagnose(by_hand, verify=[by_hand])
     command = json_of("diagnose", folder, "--verify", folder)
-    # The command names the other recording by its path.
+    # The command identifies the other recording by its path.
     for one in (here := found.to_dict(), command):
         assert one["second"].pop("recording").endswith("by-hand")
     assert here == command

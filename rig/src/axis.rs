@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::chain::Jet;
 
-/// Load on a compliant drive: it lags behind an acceleration, and swings when that changes.
+/// Load on a compliant drive: it lags an acceleration, and swings when the acceleration changes.
 ///
 /// The lag obeys `e'' + 2 damping w e' + w² e = -fraction a`, with a the commanded acceleration and w = 2π
 /// frequency.
@@ -17,7 +17,7 @@ pub struct Settling {
     pub frequency_hz: f64,
     /// Damping ratio, above 0 and below 1.
     pub damping: f64,
-    /// Acceleration of the swing right after a stop over the commanded deceleration. 0 is a rigid drive.
+    /// Acceleration of the swing right after a stop, relative to the commanded deceleration. 0 is a rigid drive.
     pub fraction: f64,
 }
 
@@ -31,10 +31,10 @@ impl Default for Settling {
     }
 }
 
-/// Below this the swing is left out, rad: a rounding error of an angle.
+/// A smaller swing is neglected, rad: a rounding error of an angle.
 const QUIET: f64 = 1e-15;
 
-/// Stretch of constant commanded acceleration.
+/// Segment of constant commanded acceleration.
 #[derive(Debug, Clone, Copy)]
 struct Segment {
     start_s: f64,
@@ -45,11 +45,11 @@ struct Segment {
     lag: f64,
     /// Amplitudes of cosine and sine in the decaying part of the lag, rad.
     swing: [f64; 2],
-    /// When the swing is over.
+    /// Time after which the swing is neglected.
     quiet_s: f64,
 }
 
-/// Commanded motion of one axis, appended piece by piece and then read forwards.
+/// Commanded motion of one axis, appended segment by segment and then read forwards.
 #[derive(Debug, Clone)]
 pub(crate) struct Axis {
     segments: Vec<Segment>,
@@ -82,7 +82,7 @@ impl Axis {
         }
     }
 
-    /// Where the last piece ends, s.
+    /// End of the last segment, s.
     pub(crate) fn end_s(&self) -> f64 {
         self.end_s
     }
@@ -94,10 +94,10 @@ impl Axis {
         (jet.value, jet.rate)
     }
 
-    /// From rest to rest at the angle `to` (rad), within a rate and an acceleration.
+    /// From rest to rest at the angle `to` (rad), with limits on rate and acceleration.
     pub(crate) fn move_to(&mut self, to: f64, rate: f64, acceleration: f64) {
         let angle = to - self.end().0;
-        // Whole turns leave rounding errors in an angle; they are no reason to move.
+        // Whole turns leave rounding errors in an angle; these must not cause a motion.
         if angle.abs() < 1e-12 {
             return;
         }
@@ -111,7 +111,7 @@ impl Axis {
         self.push(to, 0.0, 0.0);
     }
 
-    /// To `rate` (rad/s) with an acceleration (rad/s², its size).
+    /// To `rate` (rad/s) with an acceleration (rad/s², absolute value).
     pub(crate) fn run_up(&mut self, rate: f64, acceleration: f64) {
         let change = rate - self.end().1;
         if change != 0.0 {
@@ -120,15 +120,15 @@ impl Axis {
         }
     }
 
-    /// Goes on as it is until `end_s`.
+    /// Continues unchanged until `end_s`.
     pub(crate) fn hold_until(&mut self, end_s: f64) {
         self.end_s = self.end_s.max(end_s);
     }
 
-    /// Forgets what was to come after `t_s`, which is not before the time that [`Axis::advance`] went to, and goes on
-    /// as it is at that instant: angle and rate do not jump, nor does the swing of the load.
+    /// Discards the commands after `t_s` and continues from its state at `t_s`, so angle, rate and swing of the load do not jump. `t_s` must not be
+    /// before the time of the last [`Axis::advance`].
     pub(crate) fn cut(&mut self, t_s: f64) {
-        // The first piece begins at 0.
+        // The first segment begins at 0.
         while self.segments.len() > 1 && self.segments[self.segments.len() - 1].start_s > t_s {
             self.segments.pop();
         }
@@ -179,7 +179,7 @@ impl Axis {
         let t = t_s - segment.start_s;
         let (s, c) = (self.frequency * t).sin_cos();
         let decayed = (-self.decay * t).exp();
-        // The derivative of E (a cos + b sin) is of the same form.
+        // The derivative of E (a cos + b sin) has the same form.
         let differentiated = |[a, b]: [f64; 2]| {
             [
                 self.frequency * b - self.decay * a,
@@ -196,7 +196,7 @@ impl Axis {
             }
     }
 
-    /// Goes forward to a time. Whether nothing moves from here to the end of the segment.
+    /// Advances to a time. Returns whether nothing moves from here to the end of the segment.
     pub(crate) fn advance(&mut self, t_s: f64) -> bool {
         while self
             .segments
@@ -209,12 +209,12 @@ impl Axis {
         here.rate == 0.0 && here.acceleration == 0.0 && t_s >= here.quiet_s
     }
 
-    /// Segment that [`Axis::advance`] went to.
+    /// Index of the segment reached by [`Axis::advance`].
     pub(crate) fn cursor(&self) -> usize {
         self.cursor
     }
 
-    /// Commanded angle, and the lag of the load behind it, at the time that [`Axis::advance`] went to, rad.
+    /// Commanded angle, and the lag of the load behind it, at the time of the last [`Axis::advance`], rad.
     pub(crate) fn at(&self, t_s: f64) -> (Jet, Jet) {
         let here = &self.segments[self.cursor];
         (commanded(here, t_s - here.start_s), self.lag(here, t_s))
@@ -229,7 +229,7 @@ fn commanded(segment: &Segment, t: f64) -> Jet {
     }
 }
 
-/// The turn nearest to `near` among those that differ from `angle` by whole turns, rad.
+/// The angle nearest to `near` among those that differ from `angle` by whole turns, rad.
 pub(crate) fn nearest_turn(angle: f64, near: f64) -> f64 {
     angle + TAU * ((near - angle) / TAU).round()
 }

@@ -1,4 +1,4 @@
-//! Sensors by their data sheets: `catalog/*.toml`, typical values and the tolerances that a seed draws from.
+//! Sensors by their data sheets: `catalog/*.toml`, with typical values and the tolerances within which a seed draws.
 
 use std::sync::LazyLock;
 
@@ -42,11 +42,11 @@ pub struct Sensor {
     pub ratiometric: bool,
     /// Raw per input.
     pub sensitivity: f64,
-    /// Relative, either way.
+    /// Relative tolerance, ±.
     pub sensitivity_tolerance: f64,
     /// Raw without input.
     pub null: f64,
-    /// Raw, either way.
+    /// Raw tolerance, ±.
     pub null_tolerance: f64,
     /// Lowest output, raw.
     pub low: f64,
@@ -54,7 +54,7 @@ pub struct Sensor {
     pub high: f64,
     /// -3 dB of the part's low-pass, per axis, Hz.
     pub bandwidth_hz: [f64; 3],
-    /// -3 dB of the filter behind it, Hz.
+    /// -3 dB of the external filter, Hz.
     pub rc_hz: f64,
     /// One-sided noise density, input/√Hz: √2 times the coefficient N of the Allan deviation.
     pub noise_density: f64,
@@ -62,17 +62,17 @@ pub struct Sensor {
     pub instability: f64,
     /// Coefficient K, input/√s.
     pub walk: f64,
-    /// Turn of a package on the board about each axis, standard deviation, degrees.
+    /// Standard deviation of a package's rotation on the board about each axis, degrees.
     pub misalignment_deg: f64,
-    /// Sensitivity to the other axes of a package, relative, either way.
+    /// Sensitivity to the other axes of a package, relative, ±.
     pub cross_axis: f64,
-    /// Rise of the die over the board by its own power, K.
+    /// Rise of the die over the board by self-heating, K.
     pub heating_c: f64,
     /// Nominal supply, V.
     pub supply_v: f64,
     /// Reference pin, V, if there is one.
     pub reference_v: Option<f64>,
-    /// Of the reference pin, V, either way.
+    /// Tolerance of the reference pin, V, ±.
     pub reference_tolerance_v: Option<f64>,
 }
 
@@ -95,7 +95,7 @@ pub fn sensors() -> &'static [Sensor] {
     &SENSORS
 }
 
-/// The sensor of that kind and name.
+/// The sensor of this kind and name.
 pub fn sensor(kind: MeasuredQuantity, name: &str) -> Option<&'static Sensor> {
     sensors().iter().find(|s| s.kind == kind && s.name == name)
 }

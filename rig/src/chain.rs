@@ -1,5 +1,4 @@
-//! A chain of turning frames: rate, angular acceleration and specific force at its end, by exact
-//! differentiation.
+//! A chain of turning frames: rate, angular acceleration and specific force at its end, by exact differentiation.
 
 use std::ops::{Add, Mul};
 
@@ -7,7 +6,7 @@ use crate::motion::Motion;
 use crate::place::Place;
 use crate::rotation::{Rotation, Vector, add, cross, scale};
 
-/// A quantity with its first two time derivatives: a second-order jet. Arithmetic on it is the chain rule.
+/// A quantity with its first two time derivatives, a second-order jet. Its arithmetic follows the chain rule.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Jet {
     /// The quantity.
@@ -19,7 +18,7 @@ pub struct Jet {
 }
 
 impl Jet {
-    /// Something that does not change.
+    /// A constant.
     pub fn constant(value: f64) -> Self {
         Self {
             value,
@@ -27,7 +26,7 @@ impl Jet {
         }
     }
 
-    /// Function of it, from the function's value and first two derivatives there.
+    /// A function of the quantity, from the function's value and first two derivatives at this point.
     pub fn through(self, [f, df, ddf]: [f64; 3]) -> Self {
         Self {
             value: f,
@@ -76,8 +75,7 @@ impl Mul for Jet {
     }
 }
 
-/// A frame that turns against the ground, built from the ground up: each link turns the frame so far about
-/// an axis of its own.
+/// A frame that turns relative to the ground, built from the ground up: each link turns the frame about one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
     /// This frame's axes into level axes (east, north, up).
@@ -98,7 +96,7 @@ impl Frame {
         }
     }
 
-    /// A frame fixed in this one: `rotation` turns components along the new axes into those along these.
+    /// A frame fixed in this one: `rotation` converts components along the new axes into those along these.
     pub fn fixed(self, rotation: Rotation) -> Self {
         let back = rotation.inverse();
         Self {
@@ -112,7 +110,7 @@ impl Frame {
     pub fn about(self, axis: Vector, angle: Jet) -> Self {
         let carried = self.fixed(Rotation::about(axis, angle.value));
         let spin = scale(angle.rate, axis);
-        // d(Rᵀω)/dt = Rᵀ dω/dt - spin x Rᵀω: the components change because the axes turn away beneath them.
+        // d(Rᵀω)/dt = Rᵀ dω/dt - spin x Rᵀω: the components change because their axes turn.
         Self {
             attitude: carried.attitude,
             rate: add(carried.rate, spin),
@@ -123,7 +121,7 @@ impl Frame {
         }
     }
 
-    /// As [`Frame::about`], about one of this frame's axes: 0 is x, 1 y, 2 z. Several times as fast.
+    /// As [`Frame::about`], about one of this frame's axes: 0 is x, 1 y, 2 z. Several times faster.
     pub fn about_own<const AXIS: usize>(self, angle: Jet) -> Self {
         let (j, k) = ((AXIS + 1) % 3, (AXIS + 2) % 3);
         let (sh, ch) = (0.5 * angle.value).sin_cos();
@@ -147,11 +145,11 @@ impl Frame {
         }
     }
 
-    /// Motion of a board in this frame, `lever` (m, this frame's axes) away from a pivot with `velocity` and
-    /// `acceleration` against the ground (m/s, m/s², level axes).
+    /// Motion of a board in this frame, at the lever `lever` (m, this frame's axes) from a pivot with `velocity` and `acceleration` relative to the
+    /// ground (m/s, m/s², level axes).
     ///
-    /// With the rate against inertial space the lever's Coriolis acceleration and the change of the Earth's
-    /// centrifugal acceleration along it are in. Left out is the gradient of gravity, 3e-6 m/s² per metre.
+    /// The rate against inertial space includes the lever's Coriolis acceleration and the change of the Earth's centrifugal acceleration along it.
+    /// The gradient of gravity is neglected, 3e-6 m/s² per metre.
     pub fn motion(
         self,
         t_s: f64,

@@ -1,4 +1,4 @@
-//! The converter of the microcontroller and what its firmware reports.
+//! The microcontroller's converter, and the readings that its firmware reports.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use crate::unit::UnitTruth;
 /// Unit of a recording's raw readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RawUnit {
-    /// Volts at the sensors' pins, as the device reckons them with the nominal reference and divider.
+    /// Volts at the sensors' pins, computed by the device with the nominal reference and divider.
     V,
     /// Codes of the converter, or of a digital part.
     #[serde(rename = "count")]
@@ -21,18 +21,18 @@ pub enum RawUnit {
 pub struct ConverterTruth {
     /// Resolution, bits.
     pub bits: u32,
-    /// Fraction of a gyro's voltages (rate and reference pin) that its divider lets through.
+    /// Fraction of a gyro's voltages (rate and reference pin) behind its divider.
     pub gyro_divider: f64,
-    /// Fraction of the accelerometer's voltages that its divider lets through.
+    /// Fraction of the accelerometer's voltages behind its divider.
     pub accel_divider: f64,
     /// Conversions averaged into one reading.
     pub conversions: u32,
     /// Noise of a single conversion, standard deviation, codes.
     pub noise_codes: f64,
-    /// Whether the firmware also converts each gyro's reference pin and half the accelerometer's supply, and
-    /// reports the ratio to them: the converter's reference then cancels.
+    /// Whether the firmware also converts each gyro's reference pin and half the accelerometer's supply, and reports ratios to them: the converter's
+    /// reference then cancels.
     pub take_out_reference: bool,
-    /// What is reported.
+    /// Unit of the reported readings.
     pub raw_unit: RawUnit,
 }
 
@@ -47,15 +47,15 @@ pub struct Readings {
     pub temp_c: f64,
 }
 
-/// How one triad is converted.
+/// Conversion of one triad.
 #[derive(Debug, Clone, Copy)]
 struct Channel {
     analog: bool,
-    /// Codes per volt at the pin and per volt of the true reference's inverse.
+    /// Codes per ratio of the voltage at the pin to the true reference.
     gain: f64,
     /// Reported unit per code.
     worth: f64,
-    /// Code that the nominal reference pin, or half the nominal supply, has at the nominal reference.
+    /// Code of the nominal reference pin, or of half the nominal supply, at the nominal reference.
     expected: f64,
 }
 
@@ -73,7 +73,7 @@ pub struct Converter {
 }
 
 impl Converter {
-    /// The converter behind the pins of a unit; its noise follows the seed.
+    /// The converter behind the pins of a unit. The seed determines its noise.
     pub fn new(truth: &ConverterTruth, unit: &UnitTruth, seed: u64) -> Self {
         let codes = f64::from(truth.bits).exp2();
         let nominal = unit.converter_reference.nominal_v;
@@ -103,7 +103,7 @@ impl Converter {
         }
     }
 
-    /// What the device reports of the voltages at its pins.
+    /// Readings that the device reports for the voltages at its pins.
     pub fn read(&mut self, pins: &Pins) -> Readings {
         let per_volt = 1.0 / pins.converter_reference_v;
         let mut gyro = pins.gyro_v;
@@ -111,7 +111,7 @@ impl Converter {
             for (i, v) in gyro.iter_mut().enumerate() {
                 *v = self.gyro.worth * self.code(*v * self.gyro.gain * per_volt);
                 if self.take_out_reference {
-                    // A dead pin reads 0, and no firmware divides by that.
+                    // A dead pin reads 0; a firmware avoids dividing by it.
                     let pin = self.code(pins.gyro_reference_v[i] * self.gyro.gain * per_volt);
                     *v *= self.gyro.expected / pin.max(1.0);
                 }
@@ -155,7 +155,7 @@ impl Converter {
     }
 }
 
-/// A digital part of 16 bits rounds for itself.
+/// A 16-bit digital part rounds its own output.
 fn digital(exact: f64) -> f64 {
     exact.round().clamp(-32768.0, 32767.0)
 }

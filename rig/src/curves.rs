@@ -1,14 +1,13 @@
-//! What a sensor does over the temperature of its die: cubic curves, a bias that scatters from power-on to power-on,
-//! hysteresis that is not a lag, and noise.
+//! A sensor over the temperature of its die: cubic curves, a bias that changes from power-on to power-on, hysteresis that is not a lag, and noise.
 //!
-//! The curves are those of niu (2013), (1) to (3): the error ahead of the sensor is `b(T) + (S(T) + N(T)) x`, with x
-//! the true input in body axes and each element of b, S and N a polynomial of the third degree.
+//! The curves are those of niu (2013), (1) to (3): the error before the sensor is `b(T) + (S(T) + N(T)) x`, with x the true input in body axes and
+//! each element of b, S and N a cubic polynomial.
 
 use crate::motion::Motion;
 use crate::rotation::Vector;
 use crate::thermal::Temperatures;
 
-/// Polynomial of the third degree: coefficients of 1, ΔT, ΔT², ΔT³.
+/// Cubic polynomial: coefficients of 1, ΔT, ΔT², ΔT³.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cubic(pub [f64; 4]);
 
@@ -25,24 +24,23 @@ impl Cubic {
 pub struct TriadCurves {
     /// Bias of each axis, SI.
     pub bias: [Cubic; 3],
-    /// Error over input, relative: scale factor errors on the diagonal, misalignments beside it. Rows are sensors,
-    /// columns body axes.
+    /// Error over input, relative: scale factor errors on the diagonal, misalignments off it. Rows are sensors, columns body axes.
     pub matrix: [[Cubic; 3]; 3],
-    /// Bias that this power-on has and the next one has not, SI.
+    /// Bias that applies to this power-on only, SI.
     pub power_on: Vector,
     /// Half the height of the hysteresis loop of the bias, SI.
     pub hysteresis: Vector,
-    /// Width of the loop, K: after a turn of the temperature the bias needs so much to pass from one branch to the other.
+    /// Width of the loop, K: after a reversal, the bias passes from one branch to the other over this temperature change.
     pub width_c: f64,
-    /// Standard deviation of each reading, raw, by the die's temperature: °C, then axes x, y, z; increasing, linear
-    /// between, held outside. Without any, that of the axis.
+    /// Standard deviation of each reading, raw, over the die's temperature: °C, then axes x, y, z. Temperatures increase; values are linear between
+    /// them and constant outside. If empty, the standard deviation of the axis applies.
     pub noise: Vec<[f64; 4]>,
 }
 
 /// Both triads.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CurvesTruth {
-    /// Temperature that the cubics count from, °C.
+    /// Temperature from which the cubics count, °C.
     pub reference_c: f64,
     /// Gyros.
     pub gyro: TriadCurves,
@@ -50,16 +48,16 @@ pub struct CurvesTruth {
     pub accel: TriadCurves,
 }
 
-/// A stop operator (the complement of the play operator, the elements of Prandtl and Ishlinskii): its state follows the
-/// path of the temperature, and neither its rate nor the time.
+/// A stop operator (the complement of the play operator, elements of Prandtl and Ishlinskii). Its state depends on the path of the temperature, but
+/// on neither its rate nor the time.
 #[derive(Debug, Clone, Copy, Default)]
 struct Stop {
-    /// Where the play has been pushed to, °C.
+    /// Centre of the play, °C.
     rest: Option<f64>,
 }
 
 impl Stop {
-    /// From -1, on the branch of falling temperature, to 1, on that of rising. It begins between them, at 0.
+    /// From -1, on the branch of falling temperature, to 1, on that of rising temperature. It begins at 0, between them.
     fn step(&mut self, temperature: f64, width_c: f64) -> f64 {
         let half = 0.5 * width_c;
         let rest = self.rest.get_or_insert(temperature);
@@ -73,7 +71,7 @@ impl Stop {
 struct Triad {
     truth: TriadCurves,
     stops: [Stop; 3],
-    /// Whether there is any error to be added at all.
+    /// Whether there is no error to add.
     idle: bool,
 }
 
@@ -109,7 +107,7 @@ impl Triad {
     }
 }
 
-/// The curves of a unit at work.
+/// The curves of a running unit, with their state.
 #[derive(Debug, Clone)]
 pub(crate) struct Curves {
     reference_c: f64,
@@ -126,7 +124,7 @@ impl Curves {
         }
     }
 
-    /// Adds the errors at the inputs of gyros (rad/s) and accelerometer (m/s²), one step on.
+    /// Advances one step: adds the errors at the inputs of gyros (rad/s) and accelerometer (m/s²).
     pub(crate) fn add(
         &mut self,
         motion: &Motion,

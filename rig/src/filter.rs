@@ -1,10 +1,9 @@
-//! First-order low-pass: the pole of an output stage, a cable, or a lump of heat.
+//! First-order low-pass: the pole of an output stage, a cable, or a heat capacity.
 
-/// Configuration and state of `τ y' + y = x`, discretised exactly for an input that is straight between the
-/// steps.
+/// Configuration and state of `τ y' + y = x`, discretised exactly for an input that is linear between the steps.
 ///
-/// Straight, not held: a held input makes a ramp lag by half a step too much or too little, which a rate
-/// table's spin-up shows as an error of the specific force at the lever arm.
+/// A held input would change the lag of a ramp by half a step. During a rate table's spin-up, this would show as an error of the specific force at
+/// the lever arm.
 #[derive(Debug, Clone, Copy)]
 pub struct LowPass {
     keep: f64,
@@ -18,7 +17,7 @@ impl LowPass {
     /// With time constant `tau_s` (0: no filter) and step `dt_s`, settled at `start`.
     pub fn new(tau_s: f64, dt_s: f64, start: f64) -> Self {
         let keep = (-dt_s / tau_s).exp();
-        // As a difference, 1 - keep loses the digits that a lag of hours at 20 kHz needs.
+        // Computed as 1 - keep, it would lose the digits that a lag of hours at 20 kHz needs.
         let late = -(-dt_s / tau_s).exp_m1() * tau_s / dt_s;
         Self {
             keep,
@@ -29,23 +28,23 @@ impl LowPass {
         }
     }
 
-    /// With the -3 dB frequency in place of the time constant; infinity is no filter.
+    /// With a -3 dB frequency instead of the time constant; infinity means no filter.
     pub fn of_bandwidth(bandwidth_hz: f64, dt_s: f64) -> Self {
         Self::new(1.0 / (std::f64::consts::TAU * bandwidth_hz), dt_s, 0.0)
     }
 
-    /// Settled at `value`, as after a constant input for ever.
+    /// Settled at `value`, as after a long constant input.
     pub fn settle(&mut self, value: f64) {
         self.start(value, value);
     }
 
-    /// Input and output of the instant before the first step.
+    /// Input and output one step before the first step.
     pub fn start(&mut self, input: f64, output: f64) {
         self.input = input;
         self.output = output;
     }
 
-    /// Output one step on, where the input is `input`.
+    /// Output after the next step, at which the input is `input`.
     #[inline]
     pub fn step(&mut self, input: f64) -> f64 {
         self.output = self.keep * self.output + self.before * self.input + self.now * input;

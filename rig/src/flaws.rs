@@ -1,4 +1,4 @@
-//! What goes wrong in recordings that people really make, and no tolerance of a data sheet covers.
+//! Flaws of real recordings that no tolerance of a data sheet covers.
 //!
 //! Each flaw has a separate random stream and is off by default: switching one on does not change the rest of a recording.
 
@@ -15,39 +15,39 @@ use crate::rotation::{Vector, add, scale};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FlawsTruth {
-    /// Jitter of the time stamps, standard deviation, s. The samples themselves stay steady.
+    /// Jitter of the time stamps, standard deviation, s. The samples themselves are evenly spaced.
     pub stamp_jitter_s: f64,
     /// Number of samples that are fetched and stamped at once; 1: no bursts.
     pub stamp_burst: u32,
-    /// Share of the samples that the recording has lost, drawn one at a time; the time stamps of the others are right.
+    /// Share of lost samples, each drawn separately; the time stamps of the others are right.
     pub lost_share: f64,
-    /// After so many samples the logger pauses and records none; 0 is never.
+    /// After this many samples the logger pauses and records none; 0 is never.
     pub pause_after: u32,
     /// Length of each pause, s, rounded to whole samples.
     pub pause_s: f64,
-    /// So many turns by hand have a violent shake in them.
+    /// Number of turns by hand that contain a violent shake.
     pub shake_turns: u32,
     /// Band of the shake, Hz.
     pub shake_hz: [f64; 2],
-    /// Shake about each axis, effective value in the middle of the turn.
+    /// Rms shake about each axis in the middle of the turn.
     pub shake_mrad: f64,
-    /// Slow settling of a hand after each turn, standard deviation about each axis.
+    /// Slow settling of the hand after each turn, standard deviation about each axis.
     pub settle_mrad: f64,
-    /// Length of it, s, or as much of it as there is before the next turn.
+    /// Its duration, s, cut short by the next turn.
     pub settle_s: f64,
-    /// In so many dwells by hand the unit turns evenly instead of resting.
+    /// Number of dwells by hand in which the unit turns evenly instead of resting.
     pub turning_rests: u32,
-    /// The rate of that, deg/s, about any axis.
+    /// Rate of these turns, deg/s, about random axes.
     pub turning_dps: f64,
-    /// Between so many dwells the biases of the gyros are upset.
+    /// Number of turns between dwells in which the biases of the gyros are disturbed.
     pub upset_turns: u32,
-    /// By this much, deg/s, along any direction.
+    /// Size of the disturbance, deg/s, in a random direction.
     pub upset_dps: f64,
-    /// From when to when the thermometer sticks and reports what it last did, s of the recording.
+    /// Start and end of the time in which the thermometer is stuck at its last value, s of the recording.
     pub thermometer_sticks_s: [f64; 2],
     /// When the thermometer jumps, s of the recording.
     pub thermometer_jumps_s: f64,
-    /// By how much it reads more from then on, K.
+    /// Size of the jump, K.
     pub thermometer_jump_c: f64,
     /// Frequency at which the building sways, Hz.
     pub building_hz: f64,
@@ -82,7 +82,7 @@ impl Default for FlawsTruth {
 }
 
 impl FlawsTruth {
-    /// Refuses what no recording has.
+    /// Refuses impossible values.
     pub(crate) fn check(&self) -> Result<(), Refusal> {
         let (size, time) = ([0.0, 1000.0], [0.0, 48.0 * 3600.0]);
         let [from, to] = self.thermometer_sticks_s;
@@ -124,7 +124,7 @@ impl FlawsTruth {
     }
 }
 
-/// Which `count` of `n` things it strikes.
+/// Selects at random `count` of `n` things for a flaw.
 pub(crate) fn struck(count: u32, n: usize, random: &mut Random) -> Vec<bool> {
     let mut order: Vec<usize> = (0..n).collect();
     let mut struck = vec![false; n];
@@ -136,22 +136,22 @@ pub(crate) fn struck(count: u32, n: usize, random: &mut Random) -> Vec<bool> {
     struck
 }
 
-/// Any direction, all equally likely.
+/// A random direction, uniformly distributed.
 pub(crate) fn direction(random: &mut Random) -> Vector {
     random.attitude().turn([0.0, 0.0, 1.0])
 }
 
-/// Which samples a recording lacks.
+/// Which samples are missing in a recording.
 #[derive(Debug, Clone)]
 pub(crate) struct Lost {
     share: f64,
     random: Random,
-    /// Samples between two pauses, and in one; none without pauses.
+    /// Samples between two pauses, and in one; `None` without pauses.
     pauses: Option<[usize; 2]>,
 }
 
 impl Lost {
-    /// Of a recording with a sample every `period_s`.
+    /// For a recording with a sample every `period_s`.
     pub(crate) fn new(truth: &FlawsTruth, period_s: f64, seed: u64) -> Self {
         let in_pause = (truth.pause_s / period_s).round() as usize;
         let between = truth.pause_after as usize;
@@ -162,33 +162,33 @@ impl Lost {
         }
     }
 
-    /// Whether sample `index` is lacking; to be asked of each in its order.
+    /// Whether sample `index` is missing; must be called for each sample in order.
     pub(crate) fn lacks(&mut self, index: usize) -> bool {
         let pauses = |[between, in_pause]: [usize; 2]| index % (between + in_pause) >= between;
         let lost = self.share > 0.0 && self.random.uniform() < self.share;
         lost || self.pauses.is_some_and(pauses)
     }
 
-    /// How many of the first `count` samples there are.
+    /// Number of recorded samples among the first `count`.
     pub(crate) fn recorded(&self, count: usize) -> usize {
         let mut again = self.clone();
         (0..count).filter(|&index| !again.lacks(index)).count()
     }
 }
 
-/// Two samples that are fetched together are stamped so far apart, s, or a tenth of a period.
+/// Distance of the time stamps of two samples that are fetched together, s; at most a tenth of a period.
 const FETCH_S: f64 = 1e-4;
-/// No stamp is less behind the one before, s.
+/// Smallest difference of successive time stamps, s.
 const STAMP_STEP_S: f64 = 1e-6;
 
-/// The flaws that come between the motion and the samples, sample by sample.
+/// The flaws between the motion and the samples, applied sample by sample.
 #[derive(Debug, Clone)]
 pub(crate) struct Flaws {
     truth: FlawsTruth,
     period_s: f64,
     jitter: Random,
     last_stamp_s: f64,
-    /// By the dwell before: what the gyros' biases are upset by, rad/s.
+    /// Disturbance of the gyros' biases after each dwell, rad/s.
     upset: Vec<Vector>,
     last_step: Option<u32>,
     phase: [f64; 2],
@@ -196,7 +196,7 @@ pub(crate) struct Flaws {
 }
 
 impl Flaws {
-    /// Of a recording with `dwells`, a sample every `period_s`.
+    /// For a recording with `dwells`, a sample every `period_s`.
     pub(crate) fn new(truth: &FlawsTruth, dwells: u64, period_s: f64, seed: u64) -> Self {
         let mut random = Random::new(seed, "upset turns");
         let turns = (dwells as usize).saturating_sub(1);
@@ -220,7 +220,7 @@ impl Flaws {
         }
     }
 
-    /// Adds what the building does to an instant.
+    /// Adds the building's sway to the motion.
     pub(crate) fn sway(&self, instant: &mut Instant) {
         if self.truth.building_mg == 0.0 {
             return;
@@ -234,7 +234,7 @@ impl Flaws {
         motion.force = add(motion.force, sway);
     }
 
-    /// What the sensors take an instant for: an upset gyro shows a rate that is not there.
+    /// The motion as sensed: a disturbed gyro has an additional rate.
     pub(crate) fn felt(&mut self, instant: &Instant) -> Motion {
         self.last_step = instant.step.or(self.last_step);
         let before = self.last_step.filter(|_| instant.step.is_none());
@@ -245,7 +245,7 @@ impl Flaws {
         }
     }
 
-    /// What the thermometer reports at a time where it should report `temp_c`.
+    /// Reported temperature, where a sound thermometer would report `temp_c`.
     pub(crate) fn thermometer(&mut self, t_s: f64, temp_c: f64) -> f64 {
         let truth = &self.truth;
         let mut reported = temp_c;

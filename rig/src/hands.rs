@@ -1,7 +1,6 @@
-//! A person who turns the board by hand: no pose is met, no turn is straight, and something gets knocked.
+//! A person who turns the board by hand: poses are missed, turns deviate from their axis, and the board gets knocked.
 //!
-//! Attitude and position are twice differentiable everywhere, so that rate, angular acceleration and
-//! specific force are their exact derivatives.
+//! Attitude and position are twice differentiable everywhere, so rate, angular acceleration and specific force are their exact derivatives.
 
 use std::f64::consts::TAU;
 
@@ -23,49 +22,49 @@ mod commanded;
 mod even;
 mod flaws;
 
-/// How the person works. Ranges are lowest and highest, all between equally likely.
+/// Behaviour of the person. Ranges are lowest and highest, uniformly distributed.
 ///
-/// By default the board lies still during the dwells, in a cube, a fixture, or against a book.
+/// By default the board rests during the dwells, in a cube, a fixture, or against a book.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HandsTruth {
-    /// Whether the board stays in the hand during the dwells.
+    /// Whether the person holds the board during the dwells.
     pub held: bool,
-    /// How far a pose misses its aim about each level axis, standard deviation.
+    /// Standard deviation of a pose from its target about each level axis.
     pub aim_deg: f64,
     /// Range of a turn's length, s.
     pub turn_s: [f64; 2],
     /// Range of the pause before and after a dwell, s.
     pub pause_s: [f64; 2],
-    /// A dwell is up to this fraction longer than planned.
+    /// Maximum relative lengthening of a dwell.
     pub dwell_stretch: f64,
-    /// How far a turn leaves its axis about each axis across it, standard deviation.
+    /// Standard deviation of a turn from its axis, about each perpendicular axis.
     pub wander_deg: f64,
-    /// How far apart the board is put down, standard deviation in each horizontal direction.
+    /// Standard deviation of the position where the board is put down, in each horizontal direction.
     pub carry_mm: f64,
-    /// Height of the arc from pose to pose, mean. The lowest is half of it, the highest one and a half.
+    /// Mean height of the arc from pose to pose. The lowest is half of it, the highest one and a half times it.
     pub lift_mm: f64,
-    /// Board's origin from the point about which the hand turns it, board axes.
+    /// Position of the board's origin relative to the point about which the hand turns it, board axes.
     pub lever_mm: Vector,
     /// Band of the tremor of a hand, Hz. Physiological tremor is at 8 to 12.
     pub tremor_hz: [f64; 2],
-    /// Tremor along each axis, effective value.
+    /// Rms tremor along each axis.
     pub tremor_mm: f64,
-    /// Tremor about each axis, effective value.
+    /// Rms tremor about each axis.
     pub tremor_mrad: f64,
     /// Band of the sway of a hand that holds still, Hz.
     pub sway_hz: [f64; 2],
-    /// Sway along each axis, effective value.
+    /// Rms sway along each axis.
     pub sway_mm: f64,
-    /// Sway about each axis, effective value.
+    /// Rms sway about each axis.
     pub sway_mrad: f64,
     /// Share of dwells with a knock in them.
     pub jolt_probability: f64,
     /// Length of a knock, s.
     pub jolt_s: f64,
-    /// Displacement at the height of a knock, standard deviation along each axis.
+    /// Displacement at the peak of a knock, standard deviation along each axis.
     pub jolt_mm: f64,
-    /// Turn at the height of a knock, standard deviation about each axis.
+    /// Rotation at the peak of a knock, standard deviation about each axis.
     pub jolt_mrad: f64,
 }
 
@@ -96,7 +95,7 @@ impl Default for HandsTruth {
 }
 
 impl HandsTruth {
-    /// Refuses what no person does.
+    /// Refuses impossible values.
     pub fn check(&self) -> Result<(), Refusal> {
         let (angle, size) = ([0.0, 90.0], [0.0, 1000.0]);
         let ranges: [(&str, &[f64], [f64; 2]); 18] = [
@@ -138,7 +137,7 @@ impl HandsTruth {
     }
 }
 
-/// Turn and displacement of the board beside the course of a turn.
+/// Rotation and displacement of the board relative to the path of a turn.
 #[derive(Debug, Clone, Copy, Default)]
 struct Shift {
     angle: [Jet; 3],
@@ -154,7 +153,7 @@ impl Shift {
     }
 }
 
-/// Oscillation within a band: three sines on each of six channels, whose beat makes it come and go.
+/// Oscillation within a band: three sines on each of six channels, whose beat varies the amplitude.
 #[derive(Debug, Clone)]
 struct Shake {
     /// Angular frequency (rad/s), phase (rad), amplitude (rad, m): angles, then positions.
@@ -164,7 +163,7 @@ struct Shake {
 impl Shake {
     fn new(random: &mut Random, [low, high]: [f64; 2], mrad: f64, mm: f64) -> Self {
         let sines = std::array::from_fn(|channel| {
-            // Sines of amplitude a have the effective value a √(3/2).
+            // Sines of amplitude a have an rms value of a √(3/2).
             let amplitude = 1e-3 * if channel < 3 { mrad } else { mm } / 1.5_f64.sqrt();
             std::array::from_fn(|_| {
                 let frequency = low + (high - low) * random.uniform();
@@ -207,12 +206,12 @@ pub struct Hands {
     shake: Shake,
     jolt_s: f64,
     still: Option<(usize, Motion)>,
-    /// What is to be done besides, where there is no plan.
+    /// State under command; `None` if there is a plan.
     told: Option<Told>,
 }
 
 impl Hands {
-    /// The person `truth` about to carry out `plan`. The seed decides what goes how.
+    /// The person `truth`, ready to carry out `plan`. The seed determines all random choices.
     pub fn new(plan: &Plan, truth: &HandsTruth, seed: u64) -> Result<Self, String> {
         truth.check()?;
         let mut random = Random::new(seed, "hands");
@@ -244,7 +243,7 @@ impl Hands {
         Ok(hands)
     }
 
-    /// The person, without anything to do.
+    /// The person without turns.
     fn of(plan: &Plan, truth: &HandsTruth, random: &mut Random) -> Self {
         let tremor = Shake::new(random, truth.tremor_hz, truth.tremor_mrad, truth.tremor_mm);
         let sway = Shake::new(random, truth.sway_hz, truth.sway_mrad, truth.sway_mm);
@@ -315,7 +314,7 @@ impl Hands {
             (Jet::constant(1.0), Jet::default())
         };
         let mut shift = Shift::default();
-        // How much of it is held: a hand lets go, or takes hold, as the turn goes.
+        // The share held: the hand lets go, or takes hold, during the turn.
         let held = match turn.held {
             [false, false] => None,
             [true, true] => Some(Jet::constant(1.0)),

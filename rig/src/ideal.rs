@@ -1,4 +1,4 @@
-//! Readings straight from a forward model: for Monte Carlo studies over dwell means, without running time.
+//! Readings directly from a forward model, for Monte Carlo studies with dwell means instead of time series.
 
 use crate::random::Random;
 use crate::rotation::{Vector, cross, dot, scale};
@@ -14,16 +14,15 @@ pub struct Ideal {
     pub sigma: Vector,
 }
 
-/// How misalignment follows from fang's angles.
+/// How the misalignment matrix follows from fang's angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Angles {
-    /// `Mo Rz(θz) Ry(θy) Rx(θx)` with true rotations by the right-hand rule. fang's (9) and (10) turn the
-    /// other way than his (11); his (12), which everything after builds on, is the small-angle form of the
-    /// product taken here.
+    /// `Mo Rz(θz) Ry(θy) Rx(θx)` with true rotations by the right-hand rule. fang's (9) and (10) have the opposite sense of rotation to his (11). All
+    /// his later equations use (12), which is the small-angle form of this product.
     Exact,
     /// `Mo Mp` with Mp as in (12): the middle of (14).
     Small,
-    /// The end of (14), products of two angles left out: (16) and (18).
+    /// The end of (14), without products of two angles: (16) and (18).
     Linear,
 }
 
@@ -40,7 +39,7 @@ pub struct Fang {
     pub beta: Vector,
 }
 
-/// fang, table 3; all dimensionless. The noise goes with (35): 0.001.
+/// fang, table 3; all dimensionless. Its noise is that of (35): 0.001.
 pub const FANG_TABLE_3: Fang = Fang {
     scale: [0.01, 0.05, 0.09],
     bias: [2.0, 2.5, 2.9],
@@ -71,8 +70,8 @@ pub const XU_TABLE_1: Inverse = Inverse {
     offset: [-0.04317 * DPS, -0.12395 * DPS, -0.35153 * DPS],
 };
 
-/// xu, table 2, averages of the accelerometers: raw in m/s², to m/s². The offsets are printed in mg, which their scatter rules out; g and
-/// m/s² it does not tell apart, and here they are in m/s², the unit of the model.
+/// xu, table 2, averages of the accelerometers: raw in m/s², to m/s². The printed unit of the offsets, mg, contradicts their scatter. The table does
+/// not show whether they are in g or m/s²; here they are in m/s², the unit of the model.
 pub const XU_TABLE_2: Inverse = Inverse {
     matrix: [
         [0.96667, 0.01434, -0.00180],
@@ -118,7 +117,7 @@ impl Fang {
 }
 
 impl Inverse {
-    /// The forward model whose readings this one brings back; `None` if C has no inverse.
+    /// The forward model to which this model is the inverse; `None` if C is singular.
     pub fn forward(&self, sigma: Vector) -> Option<Ideal> {
         let matrix = invert(&self.matrix)?;
         let bias = matrix.map(|row| -dot(row, self.offset));
@@ -149,7 +148,7 @@ fn product(a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
     a.map(|row| std::array::from_fn(|j| (0..3).map(|k| row[k] * b[k][j]).sum()))
 }
 
-/// Columns of the inverse are the vector products of the rows over their volume.
+/// The columns of the inverse are the vector products of the rows, divided by their volume.
 fn invert(m: &[Vector; 3]) -> Option<[Vector; 3]> {
     let columns = [cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])];
     let volume = dot(m[0], columns[0]);
@@ -196,8 +195,7 @@ mod tests {
 
     #[test]
     fn table_3_gives_the_products_of_equation_14() {
-        // By hand from Mo Mp. The print of (14) has βyz θz in its (3,2) where the product has βzy θz; in
-        // table 3 the two are equal.
+        // Computed by hand from Mo Mp. The printed (14) has βyz θz in its element (3,2), but the product gives βzy θz; in table 3 the two are equal.
         let m = FANG_TABLE_3.misalignment(Angles::Small);
         let expected = [[1.0, -0.1, 0.05], [0.6, 0.95, 0.015], [-0.47, 0.86, 0.967]];
         for (a, b) in m.as_flattened().iter().zip(expected.as_flattened()) {
@@ -232,7 +230,7 @@ mod tests {
             let u = ideal.read([0.0; 3], 25, &mut random);
             squares += (0..3).map(|i| (u[i] - ideal.bias[i]).powi(2)).sum::<f64>();
         }
-        // Chi-square with 12 000 degrees of freedom: 1.3 % one sigma of the variance.
+        // Chi-square with 12 000 degrees of freedom: the sigma of the variance is 1.3 %.
         let ratio = squares / f64::from(3 * runs) / (0.001_f64.powi(2) / 25.0);
         assert!((ratio - 1.0).abs() < 4.0 * 0.013, "{ratio}");
     }

@@ -1,26 +1,25 @@
-//! The virtual bench: inertial units with known truth, and what moves and heats them.
+//! The virtual bench: inertial units with known truth, and the equipment that moves and heats them.
 //!
-//! Physics from datasheets and kinematics, so that estimators can be judged by it. It shares no model code with
-//! them. `docs/bench.md` has the command and all keys of its files. The crate `mimu-board` puts the firmware on an emulated
-//! microcontroller behind the pins of such a unit.
+//! Physics from data sheets and kinematics, so that estimators can be judged by it; it shares no model code with them. `docs/bench.md` describes the
+//! command and all keys of its files. The crate `mimu-board` puts the firmware on an emulated microcontroller behind the pins of such a unit.
 //!
 //! | the experiment                 |                                                                   |
 //! |--------------------------------|-------------------------------------------------------------------|
-//! | [`plan`], [`located`]          | PLAN.toml; what to say of a line that is wrong                    |
+//! | [`plan`], [`located`]          | PLAN.toml; error messages with the line                           |
 //! | [`place`]                      | gravity and the Earth's rotation                                  |
 //! | [`table`], [`axis`]            | a turntable with its flaws                                        |
 //! | [`hands`]                      | a person                                                          |
-//! | [`flaws`]                      | what goes wrong in real recordings                                |
+//! | [`flaws`]                      | flaws of real recordings                                          |
 //! | [`command`]                    | commands to a table and a person, instead of a plan               |
-//! | [`motion`], [`chain`], [`rotation`] | what passes from a carrier to the sensors                    |
-//! | [`record`]                     | recordings of it, in memory or as files                           |
+//! | [`motion`], [`chain`], [`rotation`] | motion of the board, as the sensors get it                   |
+//! | [`record`]                     | recordings in memory or as files                                  |
 //!
 //! | the unit                       |                                                                   |
 //! |--------------------------------|-------------------------------------------------------------------|
 //! | [`mod@unit`], [`sensor`], [`filter`] | from motion and chamber to the voltages at the pins         |
-//! | [`noise`], [`thermal`]         | what disturbs every sensor                                        |
-//! | [`effects`]                    | what the affine model lacks, switched on one by one               |
-//! | [`curves`]                     | what each sensor does over the temperature of its die             |
+//! | [`noise`], [`thermal`]         | disturbances of every sensor                                      |
+//! | [`effects`]                    | errors that the affine model lacks, enabled one by one            |
+//! | [`curves`]                     | each sensor over the temperature of its die                       |
 //! | [`pins`], [`converter`]        | from the pins to the readings of a recording                      |
 //! | [`catalog`], [`rig_file`], [`refusal`] | sensors by their data sheets; RIG.toml, and the truth drawn by it |
 //! | [`ideal`]                      | forward models of papers, for Monte Carlo studies                 |

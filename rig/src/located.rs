@@ -1,4 +1,4 @@
-//! TOML that a person wrote: every complaint is one line with the file, the line, and what to do.
+//! TOML files written by people: every error is one line with the file, the line, and the remedy.
 
 use std::fmt::Display;
 use std::fs::File;
@@ -8,10 +8,10 @@ use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
-/// Most bytes that a file may have: ten thousand times what a person writes. More is another file, or a device.
+/// Largest size of a file, bytes: ten thousand times what a person writes. A larger one is another file, or a device.
 const LARGEST: u64 = 16 << 20;
 
-/// A text file and its name, for complaints that point into it.
+/// A text file and its name, for error messages that name the line.
 #[derive(Debug, Clone)]
 pub struct Source {
     name: String,
@@ -19,7 +19,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Text that is already here, under the name that complaints shall give it.
+    /// Text in memory, with the name for its error messages.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -27,7 +27,7 @@ impl Source {
         }
     }
 
-    /// Reads a file. A missing one, a directory, or one that is no UTF-8 text is refused in one line.
+    /// Reads a file. A missing file, a directory, or a file that is not UTF-8 text is refused in one line.
     pub fn read(path: &Path) -> Result<Self, String> {
         let name = path.display().to_string();
         let read = File::open(path).and_then(|file| {
@@ -69,21 +69,20 @@ impl Source {
 
     /// One line: `FILE:LINE: problem; remedy`, with the line on which the bytes `at` begin.
     pub fn error(&self, at: &Range<usize>, problem: impl Display, remedy: impl Display) -> String {
-        // A span may begin at the very end; the last line is then the one to look at.
+        // A span may begin at the very end; then the last line is reported.
         let text = self.text.trim_end().as_bytes();
         let before = &text[..at.start.min(text.len())];
         let line = 1 + before.iter().filter(|&&b| b == b'\n').count();
         format!("{}:{line}: {problem}; {remedy}", self.name)
     }
 
-    /// Reads the text as `T`, which should refuse unknown fields and mark with [`toml::Spanned`] what is checked later; `serde(flatten)`
-    /// would lose the lines. What is wrong is in the words of serde and of the parser, which name the keys and values that are possible.
+    /// Reads the text as `T`. This type should refuse unknown fields, and mark with [`toml::Spanned`] the values that are checked later;
+    /// `serde(flatten)` would lose the lines. The message is that of serde and the parser, which names the possible keys and values.
     ///
-    /// The bench has its own reader: with a shared one, a plan that the host reads wrongly would be read as wrongly here, and no test would
-    /// show it.
+    /// The bench has a separate reader. With a shared one, a plan that the host misreads would be misread here too, and no test would show it.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, String> {
         toml::from_str(&self.text).map_err(|e| {
-            // Without a span it is about the file as a whole.
+            // Without a span, the error concerns the whole file.
             let span = e.span().unwrap_or(0..0);
             let message = e.message().trim().replace('\n', ", ");
             let (key, remedy) = match message.split_once(' ') {
@@ -97,7 +96,7 @@ impl Source {
         })
     }
 
-    /// "`key`: " where the line has a key before the value at `span`, or is a table's heading.
+    /// "`key`: " if the line has a key before the value at `span`, or is a table's heading.
     fn key_before(&self, span: &Range<usize>) -> String {
         let before = self.text.get(..span.start).unwrap_or_default();
         let begin = before.rfind('\n').map_or(0, |at| at + 1);
@@ -110,7 +109,7 @@ impl Source {
     }
 }
 
-/// A number without three hundred zeros.
+/// A number with an exponent if it would have many digits.
 pub(crate) fn written(x: f64) -> String {
     if x == 0.0 || x.is_infinite() || (1e-4..1e7).contains(&x.abs()) {
         x.to_string()

@@ -1,9 +1,8 @@
-//! Random errors of one axis, with coefficients as an Allan deviation states them.
+//! Random errors of one axis, with the coefficients of an Allan deviation.
 //!
-//! IEEE Std 952, annex C: of a sensor with two-sided spectral density `N² + B²/(2π f) + K²/(2π f)²` the Allan
-//! deviation is the root of the sum of the squares of `N/√τ`, `B √(2 ln 2/π) = 0.664 B` and `K √(τ/3)`. So
-//! `B` is the coefficient; the floor that a plot shows is 0.664 of it. A datasheet's noise density is
-//! one-sided, the root mean square per root hertz of positive frequency: `N` is that over √2.
+//! IEEE Std 952, annex C: for a two-sided spectral density `N² + B²/(2π f) + K²/(2π f)²`, the Allan deviation is the root of the sum of the squares
+//! of `N/√τ`, `B √(2 ln 2/π) = 0.664 B` and `K √(τ/3)`. So `B` is the coefficient, and the floor in a plot is 0.664 of it. A data sheet's noise
+//! density is one-sided, the rms per root hertz of positive frequency: `N` is that over √2.
 
 use crate::random::Random;
 
@@ -12,32 +11,29 @@ use crate::random::Random;
 pub struct Coefficients {
     /// White noise N (angle or velocity random walk), unit/√Hz.
     pub white: f64,
-    /// Bias instability B, unit: the coefficient, not the floor of the plot.
+    /// Bias instability B, unit: the coefficient, which exceeds the floor of the plot.
     pub instability: f64,
     /// Rate random walk K, unit/√s.
     pub walk: f64,
 }
 
-/// Ratio of neighbouring correlation times of the flicker noise. The measured ripple of the floor is in
-/// [`Noise::new`].
+/// Ratio of neighbouring correlation times of the flicker noise. [`Noise::new`] gives the measured ripple of the floor.
 const RATIO: f64 = 3.162_277_660_168_379_5;
 
-/// Longest correlation time, s. Beyond a hundredth of it the flicker noise falls short.
+/// Longest correlation time, s. For times above a hundredth of it the flicker noise is too small.
 const LONGEST_S: f64 = 1e7;
 
-/// Variance of the fastest process relative to the others. It stands for all that are faster than a step and
-/// white from there, `1 + 1/(r - 1)` times its own power at low frequency; sampled, its own is already
-/// `coth(1/2)/2` times that.
+/// Variance of the fastest process relative to the others. It represents all processes that are faster than a step and therefore white, `1 + 1/(r -
+/// 1)` times its own power at low frequency. Its own power when sampled is already `coth(1/2)/2` times that.
 const FASTEST: f64 = 1.351_6;
 
-/// A slow process is redrawn so many times in its correlation time; each redraw is exact for the time since
-/// the last.
+/// Number of times that a slow process is redrawn in its correlation time; each redraw is exact for the time since the last.
 const REDRAWS: f64 = 16.0;
 
 /// One first-order Gauss–Markov process.
 #[derive(Debug, Clone, Copy)]
 struct Markov {
-    /// Redrawn when the step number has none of these bits: every power of two.
+    /// Redrawn when the step number has none of these bits: every `mask + 1` steps, a power of two.
     mask: u64,
     keep: f64,
     draw: f64,
@@ -62,13 +58,11 @@ pub struct Noise {
 impl Noise {
     /// Noise of the axis `name` at steps of `dt_s`.
     ///
-    /// White noise enters as its mean over the step, of variance `N²/dt`: no power beyond the step's rate is
-    /// folded back, as in a chain that averages over the sample. Flicker noise is a sum of Gauss–Markov
-    /// processes of equal variance `B² ln r/π`, correlation times in ratio r from the step up: an integral
-    /// over the logarithm of the correlation time gives `B²/(2π f)` exactly, and the sum of Lorentzians at r
-    /// = √10 follows it with a ripple of `2/cosh(π²/ln r)`, 8e-4. They start stationary. From 10 steps to 1e5
-    /// s the floor is flat within 0.5 % (`the_flicker_floor_is_flat_over_seven_decades`). The random walk
-    /// starts at zero.
+    /// White noise enters as its mean over the step, with variance `N²/dt`: power above the step's rate is not aliased, as in a chain that averages
+    /// over the sample. Flicker noise is a sum of Gauss–Markov processes of equal variance `B² ln r/π`, with correlation times in ratio r from one
+    /// step up. An integral over the logarithm of the correlation time would give `B²/(2π f)` exactly; the sum of Lorentzians at r = √10 follows it
+    /// with a ripple of `2/cosh(π²/ln r)`, 8e-4. The processes start stationary. From 10 steps to 1e5 s the floor is flat within 0.5 %
+    /// (`the_flicker_floor_is_flat_over_seven_decades`). The random walk starts at zero.
     pub fn new(of: &Coefficients, name: &str, dt_s: f64, seed: u64) -> Self {
         let mut flicker_stream = Random::new(seed, &format!("{name} flicker noise"));
         let mut markov = Vec::new();
@@ -103,7 +97,7 @@ impl Noise {
         }
     }
 
-    /// Error of the next step, mean over it.
+    /// Mean error over the next step.
     #[inline]
     pub fn step(&mut self) -> f64 {
         let mut error = 0.0;
@@ -112,8 +106,7 @@ impl Noise {
         }
         if self.instability > 0.0 {
             self.step += 1;
-            // The masks grow: the first that has a bit of the step number ends the round. At 1 kHz 4 of 20
-            // are redrawn on average.
+            // The masks grow, so the first one that shares a bit with the step number ends the round. At 1 kHz, 4 of 20 are redrawn on average.
             for m in &mut self.markov {
                 if self.step & m.mask != 0 {
                     break;
@@ -140,7 +133,7 @@ mod tests {
     /// `tau`.
     fn allan_of_markov(t: f64, tau: f64) -> f64 {
         let x = tau / t;
-        // 2 - (3 - 4 e^-x + e^-2x)/x cancels at small x; there it is 2x²/3 (1 - 3x/4 + 7x²/20 ...)/x.
+        // 2 - (3 - 4 e^-x + e^-2x)/x loses digits at small x, so its series 2x²/3 (1 - 3x/4 + 7x²/20 ...)/x is used there.
         if x < 1e-3 {
             return 2.0 / 3.0 * x * (1.0 - 0.75 * x);
         }

@@ -1,6 +1,6 @@
-//! Voltages at the pins of a unit, which a converter reads.
+//! Voltages at the pins of a unit, as input of a converter.
 
-/// Voltages at the pins at one instant. Of a digital part: its counts before rounding.
+/// Voltages at the pins at one time. For a digital part: its counts before rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pins {
     /// RATEOUT of the gyros x, y, z, V.

@@ -10,16 +10,14 @@ pub const EARTH_RATE: f64 = 7.292_115e-5;
 pub struct Place {
     /// Geodetic latitude, north positive, degrees.
     pub latitude_deg: f64,
-    /// Gravity, m/s². It includes what the Earth's rotation takes away, and points down along the level z
-    /// axis.
+    /// Gravity, m/s², reduced by the Earth's rotation. It points down along the level z axis.
     pub gravity: f64,
-    /// Rate of the Earth, rad/s: [`EARTH_RATE`], or zero where a study is better off without.
+    /// Rate of the Earth, rad/s: [`EARTH_RATE`], or zero for studies without it.
     pub rotation: f64,
 }
 
 impl Place {
-    /// Place at a latitude in degrees, with normal gravity on the ellipsoid unless `gravity_mps2` says
-    /// otherwise.
+    /// Place at a latitude in degrees, with normal gravity on the ellipsoid unless `gravity_mps2` is given.
     pub fn new(latitude_deg: f64, gravity_mps2: Option<f64>) -> Self {
         Self {
             latitude_deg,

@@ -1,5 +1,4 @@
-//! The plan of an experiment, `PLAN.toml`: what the designer writes, a person reads, and the bench carries
-//! out.
+//! The plan of an experiment, `PLAN.toml`: the designer writes it, a person reads it, and the bench carries it out.
 
 use std::ops::Range;
 use std::path::Path;
@@ -23,25 +22,25 @@ pub struct Plan {
     source: Source,
     /// Unit under test.
     pub device: String,
-    /// Samples a second.
+    /// Samples per second.
     pub sample_rate_hz: f64,
-    /// How the samples are to be stored.
+    /// Storage format of the samples.
     pub samples: Samples,
-    /// What carries the board.
+    /// What holds the board.
     pub carrier: CarriedBy,
     /// Whether the recording numbers the dwells.
     pub numbered: bool,
     /// Place of the bench.
     pub place: Place,
-    /// Chamber temperature: time (s, increasing) and °C at each breakpoint. Read it with [`Plan::chamber_c`].
+    /// Chamber temperature: time (s, increasing) and °C at each breakpoint. [`Plan::chamber_c`] interpolates.
     pub chamber: Vec<[f64; 2]>,
-    /// Time at the first pose before the first dwell, powered, s.
+    /// Time in the first pose before the first dwell, powered, s.
     pub lead_in_s: f64,
-    /// What to do, in order.
+    /// The steps, in order.
     pub steps: Vec<Step>,
-    /// So many times all steps are done.
+    /// How many times all steps are carried out.
     pub rounds: u32,
-    /// Time from the beginning of a round to that of the next, s. Without it they follow each other.
+    /// Time from the beginning of a round to that of the next, s. If missing, rounds follow without a pause.
     pub round_s: Option<f64>,
     round_at: Range<usize>,
 }
@@ -56,7 +55,7 @@ pub enum Samples {
     Csv,
 }
 
-/// What carries the board through the plan.
+/// What holds the board and moves it through the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CarriedBy {
@@ -66,12 +65,12 @@ pub enum CarriedBy {
     Hands,
 }
 
-/// One `[[step]]`: a pose or many, each with `repeat` dwells; or a turn.
+/// One `[[step]]`: one or several poses, each with `repeat` dwells; or a turn.
 #[derive(Debug, Clone)]
 pub struct Step {
-    /// Where up is.
+    /// Body direction that points up.
     pub pose: Pose,
-    /// Turn about the vertical from the body's nominal heading, rad. A person only aims at it.
+    /// Rotation about the vertical from the body's nominal heading, rad. A person reaches it only approximately.
     pub heading: Option<f64>,
     /// Rate about the vertical during the dwell, by the outer axis, rad/s.
     pub rate: f64,
@@ -79,15 +78,15 @@ pub struct Step {
     pub spin: f64,
     /// A turn by an angle in place of the dwells.
     pub turn: Option<Turn>,
-    /// Length of each dwell, s; of a turn, without its ramps.
+    /// Duration of each dwell, s; for a turn, without its ramps.
     pub dwell_s: f64,
-    /// Dwells in a row at each pose.
+    /// Successive dwells in each pose.
     pub repeat: u32,
     at: Places,
 }
 
 impl Step {
-    /// An entry that is not from a file: a pose, at rest.
+    /// A step that is not from a file: a pose at rest.
     pub(crate) fn commanded(up: Vector, heading: Option<f64>, dwell_s: f64) -> Self {
         Self {
             pose: Pose::Up(up),
@@ -101,7 +100,7 @@ impl Step {
         }
     }
 
-    /// Dwells in it.
+    /// Number of its dwells.
     pub fn dwells(&self) -> u64 {
         let poses = match self.pose {
             Pose::Up(_) | Pose::Here => 1,
@@ -116,9 +115,9 @@ impl Step {
 pub enum Pose {
     /// Body direction that points up, unit vector.
     Up(Vector),
-    /// So many poses: spread evenly by a table, chosen as people do by hand.
+    /// This number of poses: spread evenly by a table, chosen as people do by hand.
     Many(u32),
-    /// Where the step before left it.
+    /// Where the previous step ended.
     Here,
 }
 
@@ -131,7 +130,7 @@ struct Places {
     spin: Range<usize>,
 }
 
-/// What a table can do, for [`Plan::check`].
+/// Abilities of a table, for [`Plan::check`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Whether there is an outer (vertical) axis.
@@ -142,11 +141,11 @@ pub struct Limits {
     pub rate: [f64; 2],
 }
 
-/// Sine of the angle between the inner axis and the vertical below which they are one axis.
+/// Sine of the angle between the inner axis and the vertical below which the two axes coincide.
 pub(crate) const UPRIGHT: f64 = 1e-9;
 
 impl Limits {
-    /// Whether the middle axis gets to an angle, rad, rounding apart.
+    /// Whether the middle axis reaches an angle, rad, apart from rounding.
     pub fn reaches(&self, angle: f64) -> bool {
         angle >= self.middle[0] - 1e-9 && angle <= self.middle[1] + 1e-9
     }
@@ -158,8 +157,7 @@ impl Plan {
         Self::parse(Source::read(path)?)
     }
 
-    /// Chamber temperature at a time (s), °C: linear between the breakpoints, held outside, 25 °C without
-    /// any.
+    /// Chamber temperature at a time (s), °C: linear between the breakpoints, constant outside, 25 °C if there are none.
     pub fn chamber_c(&self, t_s: f64) -> f64 {
         let after = self.chamber.partition_point(|[t, _]| *t <= t_s);
         match (
@@ -172,7 +170,7 @@ impl Plan {
         }
     }
 
-    /// Refuses what a table cannot do, in one line that names the step's line and the limit.
+    /// Refuses steps that the table cannot carry out, in one line with the step's line and the limit.
     pub fn check(&self, limits: &Limits) -> Result<(), String> {
         for step in &self.steps {
             limits.check(step).map_err(|beyond| self.beyond(&beyond))?;
@@ -180,7 +178,7 @@ impl Plan {
         Ok(())
     }
 
-    /// One line of what is beyond a table's limits.
+    /// One line about a step beyond a table's limits.
     pub(crate) fn beyond(
         &self,
         Beyond {
@@ -193,7 +191,7 @@ impl Plan {
     }
 }
 
-/// What a table cannot do of a step.
+/// A step that a table cannot carry out.
 #[derive(Debug, Clone)]
 pub(crate) struct Beyond {
     at: Range<usize>,
@@ -202,7 +200,7 @@ pub(crate) struct Beyond {
 }
 
 impl Beyond {
-    /// Of the turn or the pose of a step.
+    /// For the turn or the pose of a step.
     pub(crate) fn step(step: &Step, problem: String, remedy: &'static str) -> Self {
         let at = step.at.pose.clone();
         Self {
@@ -212,7 +210,7 @@ impl Beyond {
         }
     }
 
-    /// Of the time from round to round.
+    /// For the time from round to round.
     pub(crate) fn rounds(plan: &Plan, problem: String, remedy: &'static str) -> Self {
         let at = plan.round_at.clone();
         Self {
@@ -288,7 +286,7 @@ impl Limits {
     }
 }
 
-/// Degrees as the plan has them: without the rounding errors of radians.
+/// Degrees as in the plan: without the rounding errors of radians.
 fn shown(angle: f64) -> f64 {
     (1e6 * angle.to_degrees()).round() / 1e6
 }

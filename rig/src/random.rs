@@ -1,4 +1,4 @@
-//! Random numbers that are the same on every machine, one independent stream for each physical cause.
+//! Random numbers that are equal on every machine, with an independent stream for each physical cause.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -6,14 +6,14 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::rotation::Rotation;
 
-/// Random numbers of one cause.
+/// Random numbers for one cause.
 #[derive(Debug, Clone)]
 pub struct Random(Pcg64Mcg);
 
 impl Random {
-    /// Stream of `cause` under a seed. Another cause that draws more or less leaves this one as it was.
+    /// Stream of `cause` under a seed. It does not depend on how much other causes draw.
     pub fn new(seed: u64, cause: &str) -> Self {
-        // FNV-1a: any spreading of names will do, the generator mixes its seed itself.
+        // FNV-1a: any hash of the name will do, because the generator mixes its seed itself.
         let name = cause.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| {
             (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
         });
@@ -27,7 +27,7 @@ impl Random {
         self.0.random()
     }
 
-    /// Any 64 bits.
+    /// Random 64 bits.
     pub fn word(&mut self) -> u64 {
         self.0.random()
     }
@@ -42,7 +42,7 @@ impl Random {
         size * (2.0 * self.uniform() - 1.0)
     }
 
-    /// Any attitude, all equally likely.
+    /// A random attitude, uniformly distributed.
     pub fn attitude(&mut self) -> Rotation {
         Rotation::of(std::array::from_fn(|_| self.normal()))
     }

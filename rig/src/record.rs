@@ -1,5 +1,4 @@
-//! Recordings: a plan carried out with a unit of known truth, sample by sample in memory or as a folder on
-//! disk.
+//! Recordings: a plan carried out with a unit of known truth, sample by sample in memory or as a folder on disk.
 
 mod folder;
 mod storage;
@@ -15,10 +14,10 @@ use crate::rig_file::RigTruth;
 use crate::table::Table;
 use crate::unit::Unit;
 
-/// One sample: what was true, and what the device reports.
+/// One sample: the truth, and the device's readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    /// Motion, step, and what the table states.
+    /// Motion, step, and the table's reported values.
     pub instant: Instant,
     /// Time stamp, s.
     pub stamp_s: f64,
@@ -35,16 +34,15 @@ pub struct Run<'a> {
     flaws: Flaws,
     lost: Lost,
     next: usize,
-    /// Samples that are taken.
+    /// Number of samples to take.
     count: usize,
-    /// Samples that are still to be recorded.
+    /// Number of samples still to be recorded.
     left: usize,
 }
 
 /// Carries out a plan in memory. The same plan, truth and seed give the same samples, bit by bit.
 ///
-/// Errors: the plan asks for what the table cannot do, it takes too long, or the truth has a table or hands that
-/// cannot be.
+/// Errors: the plan exceeds the table's abilities, it takes too long, or the truth describes an impossible table or person.
 pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a>, String> {
     let mut at = plan.clone();
     if !truth.earth_rate {
@@ -59,7 +57,7 @@ pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a
     plan.check_length(carrier.duration_s())?;
     let period_s = 1.0 / plan.sample_rate_hz;
     let dwells = plan.dwells();
-    // All before the end. The ends of dwells are sums: a sample that is late by a rounding error still counts.
+    // All samples before the end. The ends of dwells are sums: a sample that is late by a rounding error still counts.
     let count = (carrier.duration_s() * plan.sample_rate_hz - 1e-6).ceil() as usize;
     let lost = Lost::new(&truth.flaws, period_s, seed);
     Ok(Run {
@@ -98,7 +96,7 @@ impl Iterator for Run<'_> {
 impl Run<'_> {
     /// Takes the next sample, whether it is recorded or lost.
     fn sample(&mut self) -> Row {
-        // Not by adding up: the thousandth of a second has no exact sum.
+        // Multiplication instead of accumulation, because a millisecond has no exact binary value.
         let t_s = self.next as f64 / self.plan.sample_rate_hz;
         let stamp_s = self.flaws.stamp(self.next, t_s);
         self.next += 1;
@@ -118,22 +116,21 @@ impl Run<'_> {
 
 impl ExactSizeIterator for Run<'_> {}
 
-/// Where a recording goes.
+/// Destination of a recording.
 #[derive(Debug, Clone)]
 pub struct Output {
     /// Folder of the recording.
     pub folder: PathBuf,
-    /// File of the truth. Only the judge of a test reads it, so it is not in the folder of the recording.
+    /// File of the truth. Only the judge of a test reads it, so it is outside the folder of the recording.
     pub truth: PathBuf,
-    /// How the samples are stored.
+    /// Storage format of the samples.
     pub samples: Samples,
-    /// Whether a recording and a truth that are there may be replaced.
+    /// Whether an existing recording and truth may be replaced.
     pub replace: bool,
 }
 
 impl Output {
-    /// Into `folder`, the truth beside it (`folder.truth.toml`), stored as the plan says; nothing is
-    /// replaced.
+    /// Into `folder`, with the truth beside it (`folder.truth.toml`), in the plan's storage format; nothing is replaced.
     pub fn new(folder: &Path, plan: &Plan) -> Result<Self, String> {
         let Some(name) = folder.file_name() else {
             return Err(format!(
@@ -144,7 +141,7 @@ impl Output {
         let mut truth = name.to_owned();
         truth.push(".truth.toml");
         Ok(Self {
-            // Without a slash or a dot behind the name, which cannot be renamed to.
+            // Without a slash or a dot after the name, because such a path cannot be the target of a rename.
             folder: folder.with_file_name(name),
             truth: folder.with_file_name(truth),
             samples: plan.samples,

@@ -1,17 +1,17 @@
-//! What a rig file must not say.
+//! Errors in a rig file.
 
 use std::fmt;
 
 use crate::located::written;
 
-/// One thing that is wrong in a rig file.
+/// One error in a rig file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
-    /// Dotted path of the key, elements of lists from 0: `effect.1.id`.
+    /// Dotted path of the key, list elements counted from 0: `effect.1.id`.
     pub path: String,
-    /// What is wrong with it.
+    /// The problem.
     pub problem: String,
-    /// What to write instead.
+    /// The remedy.
     pub remedy: String,
 }
 
@@ -41,10 +41,10 @@ impl From<Refusal> for String {
     }
 }
 
-/// Refuses numbers that are not from `low` to `high`, both included; an infinite `high` lets inf pass.
+/// Refuses numbers outside `low` to `high`, both included; an infinite `high` admits inf.
 ///
-/// Ranges are far wider than any bench, but every one has an end: a size of 1e308 overflows somewhere and a
-/// time of 1e308 s is waited for, and the recording would be NaN or never done.
+/// Ranges are far wider than any bench needs, but all are finite. A size of 1e308 would overflow and make the recording NaN; a time of 1e308 s would
+/// never end.
 pub(crate) fn within(path: &str, values: &[f64], [low, high]: [f64; 2]) -> Result<(), Refusal> {
     let Some(v) = values.iter().find(|v| !(**v >= low && **v <= high)) else {
         return Ok(());

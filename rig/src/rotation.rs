@@ -1,4 +1,4 @@
-//! Attitudes: unit quaternions, written from kinematics for the rig alone.
+//! Attitudes as unit quaternions, derived from kinematics for the rig alone.
 
 use std::ops::Mul;
 
@@ -35,7 +35,7 @@ pub fn direction(v: Vector) -> Option<Vector> {
     if largest == 0.0 || !v.iter().all(|x| x.is_finite()) {
         return None;
     }
-    // First by the largest: squares of 1e200 are infinite.
+    // Divided by the largest first, because squares of 1e200 are infinite.
     let v = v.map(|x| x / largest);
     Some(scale(1.0 / norm(v), v))
 }
@@ -45,8 +45,8 @@ pub fn norm(a: Vector) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Unit quaternion w, x, y, z: turns the components of a vector in the first frame into those in the
-/// second. An attitude turns body into level axes (east, north, up).
+/// Unit quaternion w, x, y, z: converts the components of a vector in the first frame into those in the second. An attitude converts body into level
+/// axes (east, north, up).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotation([f64; 4]);
 
@@ -65,19 +65,18 @@ impl Rotation {
         Self([c, s * axis[0], s * axis[1], s * axis[2]])
     }
 
-    /// From four numbers, made a unit quaternion. Four independent normal numbers give any attitude, all
-    /// equally likely.
+    /// From four numbers, normalised. Four independent normal numbers give uniformly distributed attitudes.
     pub fn of(q: [f64; 4]) -> Self {
         let n = q.iter().map(|x| x * x).sum::<f64>().sqrt();
         Self(q.map(|x| x / n))
     }
 
-    /// The shortest that turns the direction `from` into the direction `to`.
+    /// The shortest rotation that turns the direction `from` into the direction `to`.
     pub fn between(from: Vector, to: Vector) -> Self {
         let (f, t) = (scale(1.0 / norm(from), from), scale(1.0 / norm(to), to));
         let cosine = dot(f, t);
         if cosine < -1.0 + 1e-12 {
-            // Opposite: about anything across.
+            // Opposite directions: any perpendicular axis will do.
             let across = if f[0].abs() < 0.9 {
                 cross(f, [1.0, 0.0, 0.0])
             } else {
@@ -89,7 +88,7 @@ impl Rotation {
         Self::of([1.0 + cosine, c[0], c[1], c[2]])
     }
 
-    /// The other way.
+    /// The inverse rotation.
     pub fn inverse(self) -> Self {
         let [w, x, y, z] = self.0;
         Self([w, -x, -y, -z])
@@ -103,9 +102,8 @@ impl Rotation {
         add(add(v, scale(w, t)), cross(q, t))
     }
 
-    /// Followed by a turn about the axis x (0), y (1) or z (2) of the frame that it starts from, given by
-    /// sine and cosine of half the angle. Not made a unit quaternion anew: a dozen in a row stay within
-    /// rounding.
+    /// Followed by a turn about the axis x (0), y (1) or z (2) of the frame that it starts from, given by sine and cosine of half the angle. Not
+    /// normalised again: a dozen in a row stay within rounding.
     pub fn then_about_own<const AXIS: usize>(self, sine: f64, cosine: f64) -> Self {
         let [w, v @ ..] = self.0;
         let (j, k) = ((AXIS + 1) % 3, (AXIS + 2) % 3);

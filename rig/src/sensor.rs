@@ -5,7 +5,7 @@ use crate::noise::{Coefficients, Noise};
 use crate::random::Random;
 use crate::rotation::{Vector, dot, norm, scale};
 
-/// What an axis is. "raw" is volts at the pin, or counts of a digital part; inputs are in rad/s or m/s².
+/// Truth of an axis. "raw" is volts at the pin, or counts of a digital part; inputs are in rad/s or m/s².
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisTruth {
     /// Sensitive direction in body axes, unit length.
@@ -16,15 +16,15 @@ pub struct AxisTruth {
     pub null: f64,
     /// Output filter of the part, -3 dB, Hz. Infinity: none.
     pub bandwidth_hz: f64,
-    /// RC filter behind the part, -3 dB, Hz. Infinity: none.
+    /// External RC filter, -3 dB, Hz. Infinity: none.
     pub rc_hz: f64,
-    /// Noise ahead of the filters.
+    /// Noise before the filters.
     pub noise: Coefficients,
-    /// Noise of each single reading behind the filters, standard deviation, raw: for models that state it so.
+    /// Noise of each reading after the filters, standard deviation, raw: for models that specify it this way.
     pub white_per_sample: f64,
-    /// The output reaches no further down, raw at the nominal supply.
+    /// Lowest output, raw at the nominal supply.
     pub low: f64,
-    /// The output reaches no further up, raw at the nominal supply.
+    /// Highest output, raw at the nominal supply.
     pub high: f64,
 }
 
@@ -35,7 +35,7 @@ pub struct TriadTruth {
     pub axes: [AxisTruth; 3],
     /// Output in proportion to the supply.
     pub ratiometric: bool,
-    /// Output in volts; otherwise in counts, which no divider and no reference touches.
+    /// Output in volts; otherwise in counts, on which dividers and references have no effect.
     pub analog: bool,
     /// Raw reading of the converter's lowest code at the nominal reference.
     pub code_low: f64,
@@ -90,18 +90,18 @@ impl Axis {
         }
     }
 
-    /// What the axis feels of a vector in body axes.
+    /// Component of a vector in body axes along the sensitive direction.
     #[inline]
     pub fn sensed(&self, vector: Vector) -> f64 {
         dot(self.truth.direction, vector)
     }
 
-    /// From here on each reading has this noise, standard deviation, raw.
+    /// Sets the noise of later readings, standard deviation, raw.
     pub(crate) fn set_reading_noise(&mut self, sigma: f64) {
         self.truth.white_per_sample = sigma;
     }
 
-    /// Output one step on, raw, at the input in SI along the axis and the supply relative to nominal.
+    /// Output after the next step, raw, for the input in SI along the axis and the supply relative to nominal.
     #[inline]
     pub fn step(&mut self, input: f64, supply: f64) -> f64 {
         if !self.started {

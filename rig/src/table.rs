@@ -1,11 +1,10 @@
-//! A turntable: three axes with the flaws that real ones have, and a controller that knows none of them.
+//! A turntable: three axes with realistic flaws, and a controller that does not know them.
 //!
-//! From the ground: an outer axis, vertical; a middle axis across it, east at zero; an inner axis, up at
-//! zero, which is the body's z axis. All angles zero, the body axes are east, north, up. The nominal
-//! attitude (body into level axes) is `Rz(outer) Rx(middle) Rz(inner)`, so that up in body axes is (sin m
-//! sin i, sin m cos i, cos m).
+//! From the ground up: an outer axis, vertical; a middle axis perpendicular to it, east at zero; an inner axis, up at zero, which is the body's z
+//! axis. At zero angles, the body axes are east, north, up. The nominal attitude (body into level axes) is `Rz(outer) Rx(middle) Rz(inner)`, so up in
+//! body axes is (sin m sin i, sin m cos i, cos m).
 //!
-//! Left out: axes that do not meet in a point, play, and noise of the controller's own.
+//! Neglected: axes that do not intersect, play, and the controller's noise.
 
 mod commanded;
 mod controller;
@@ -33,14 +32,14 @@ pub struct Table {
     wobble: Vector,
     nonorthogonality: [f64; 2],
     encoder: Vector,
-    /// Stated over true rate.
+    /// Reported over true rate.
     stated: Vector,
     offset: Vector,
     still: Option<([usize; 3], Instant)>,
 }
 
 impl Table {
-    /// The table `truth` about to carry out `plan`, which must be within its [`TableTruth::limits`].
+    /// The table `truth`, ready to carry out `plan`, which must be within its [`TableTruth::limits`].
     pub fn new(plan: &Plan, truth: &TableTruth) -> Result<Self, String> {
         truth.check()?;
         plan.check(&truth.limits())?;
@@ -106,7 +105,7 @@ impl Carrier for Table {
 }
 
 impl Table {
-    /// `stated` is stated over true rate of each axis.
+    /// `stated` is reported over true rate of each axis.
     fn moving(&self, t_s: f64, step: Option<u32>, stated: Vector) -> Instant {
         let mut angle = [Jet::default(); 3];
         let mut tilt = [Jet::default(); 3];
@@ -120,8 +119,8 @@ impl Table {
             rate[i] = commanded.rate * stated[i];
             (sine[i], cosine[i]) = (s, c);
         }
-        // Each axis tilts about a direction of the part that carries it: the outer and the inner about x,
-        // the middle, which lies along x, about y. There it adds to its angle with the outer axis.
+        // Each axis wobbles about a direction of the part that carries it: the outer and the inner axis about x. The middle axis, which is along x,
+        // wobbles about y, where the tilt adds to its angle with the outer axis.
         let body = self
             .base
             .about_own::<0>(tilt[OUTER])
@@ -132,7 +131,7 @@ impl Table {
             .about_own::<0>(tilt[INNER])
             .about_own::<2>(angle[INNER])
             .fixed(self.mounting);
-        // Up, and the middle axis, in nominal body axes.
+        // Up and the middle axis, in nominal body axes.
         let up = [
             sine[MIDDLE] * sine[INNER],
             sine[MIDDLE] * cosine[INNER],

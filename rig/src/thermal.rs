@@ -4,19 +4,18 @@ use crate::filter::LowPass;
 
 /// The thermal network. Temperatures in °C, times in s.
 ///
-/// `lag T' + T = temperature of what it sits on + heating`: the heating is the rise in still air of a part
-/// that is switched on.
+/// `lag T' + T = temperature of its support + heating`: the heating is the rise of a powered part in still air.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThermalTruth {
     /// Lag of the board behind the chamber's air, s.
     pub board_lag_s: f64,
     /// Lag of each die behind the board, s: gyros x, y, z, then the accelerometer.
     pub die_lag_s: [f64; 4],
-    /// Rise of the board over the air by its own power, K.
+    /// Rise of the board over the air by self-heating, K.
     pub board_heating_c: f64,
-    /// Rise of each die over the board by its own power, K, in the same order.
+    /// Rise of each die over the board by self-heating, K, in the same order.
     pub die_heating_c: [f64; 4],
-    /// Switched on so long before the recording begins, s. Infinity is warmed up.
+    /// Time since switch-on at the start of the recording, s. Infinity is warmed up.
     pub on_before_s: f64,
 }
 
@@ -31,9 +30,9 @@ pub struct Temperatures {
 
 /// State of the network.
 ///
-/// Partial fractions make a cascade of two lags a weighted difference of two single ones, `1/((1+sa)(1+sb)) =
-/// (a/(1+sa) - b/(1+sb))/(a-b)`, each of which [`LowPass`] discretises exactly. A chain of two filters would
-/// be exact for the board only: the board's temperature is not straight between the steps.
+/// Partial fractions make a cascade of two lags a weighted difference of two single ones, `1/((1+sa)(1+sb)) = (a/(1+sa) - b/(1+sb))/(a-b)`, each of
+/// which [`LowPass`] discretises exactly. A chain of two filters would be exact for the board only, because the board's temperature is not linear
+/// between the steps.
 #[derive(Debug, Clone)]
 pub struct Thermal {
     truth: ThermalTruth,
@@ -48,20 +47,18 @@ struct Die {
     /// Weights of the board's response and of the single lag's.
     of_board: f64,
     of_own: f64,
-    /// What the single lag's input has above the board's: the die's own heat, through `of_own`.
+    /// Excess of the single lag's input over the board's: the die's own heat, divided by `of_own`.
     heat: f64,
     lag_s: f64,
     own: LowPass,
 }
 
 impl Thermal {
-    /// A network that takes its first chamber temperature as the one at which it has stood, switched off,
-    /// since long ago.
+    /// A network that has been switched off at its first chamber temperature for a long time.
     pub fn new(truth: &ThermalTruth, dt_s: f64) -> Self {
         let a = truth.board_lag_s;
         let die = std::array::from_fn(|i| {
-            // At equal lags the fractions have no value; a millionth apart, the temperature is off by less
-            // than that.
+            // The fractions are undefined at equal lags. With lags that differ by a millionth, the error of the temperature is below a millionth.
             let b = truth.die_lag_s[i];
             let b = if (a - b).abs() < 1e-6 * a {
                 b * (1.0 - 1e-6)
@@ -86,8 +83,8 @@ impl Thermal {
         }
     }
 
-    /// Temperatures one step on, where the chamber's air is at `chamber_c`; straight since the last step. The
-    /// first call gives those at the start.
+    /// Temperatures after the next step, when the chamber's air is at `chamber_c`; linear since the last step. The first call returns those at the
+    /// start.
     pub fn step(&mut self, chamber_c: f64) -> Temperatures {
         let truth = &self.truth;
         let air = chamber_c + truth.board_heating_c;
@@ -96,7 +93,7 @@ impl Thermal {
             let on = truth.on_before_s;
             let cold = |lag: f64| (-on / lag).exp();
             let board = air - truth.board_heating_c * cold(truth.board_lag_s);
-            // One step of constant input brings the state from a step before the start to the start.
+            // One step of constant input advances the state from one step before the start to the start.
             self.board
                 .start(air, before(air, board, truth.board_lag_s, self.dt_s));
             for die in &mut self.die {

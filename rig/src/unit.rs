@@ -1,6 +1,6 @@
 //! The inertial unit: three gyros and an accelerometer on a board, from motion to the voltages at their pins.
 //!
-//! It does not depend on the converter: that of a recording, or of an emulated microcontroller.
+//! It does not depend on the converter, which may be that of a recording or of an emulated microcontroller.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,10 +13,10 @@ use crate::random::Random;
 use crate::sensor::{Axis, TriadTruth};
 use crate::thermal::{Temperatures, Thermal, ThermalTruth};
 
-/// A voltage that others are measured by.
+/// A voltage relative to which others are measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VoltageTruth {
-    /// What it should be, V.
+    /// Nominal value, V.
     pub nominal_v: f64,
     /// Constant relative error.
     pub error: f64,
@@ -45,12 +45,12 @@ pub enum TemperatureSensor {
 }
 
 impl TemperatureSensor {
-    /// Temperature where it is, °C.
+    /// Temperature at its place, °C.
     fn temperature(self, at: Temperatures) -> f64 {
         self.mean(at.board, at.die)
     }
 
-    /// Of a quantity of the board and one of each die, that at the sensor.
+    /// Selects or averages a quantity of the board and the dies according to its place.
     fn mean(self, board: f64, die: [f64; 4]) -> f64 {
         match self {
             Self::Dies => (die[0] + die[1] + die[2]) / 3.0,
@@ -66,9 +66,9 @@ impl TemperatureSensor {
 /// The sensor of the reported temperature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TemperatureTruth {
-    /// Where it is.
+    /// Its place.
     pub at: TemperatureSensor,
-    /// Lag of the sensor behind its place, s, from its package; 0: no lag.
+    /// Lag of the sensor behind its place, s, because of its package; 0: no lag.
     pub lag_s: f64,
     /// Constant error, K.
     pub offset_c: f64,
@@ -76,7 +76,7 @@ pub struct TemperatureTruth {
     pub noise_c: f64,
 }
 
-/// Everything about a unit that is true of it.
+/// The complete truth of a unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitTruth {
     /// Gyros; inputs in rad/s.
@@ -91,21 +91,20 @@ pub struct UnitTruth {
     pub supply: VoltageTruth,
     /// Reference of the converter.
     pub converter_reference: VoltageTruth,
-    /// What the reference pins of the gyros should give, V.
+    /// Nominal voltage of the gyros' reference pins, V.
     pub gyro_reference_nominal_v: f64,
-    /// What they give, V.
+    /// True voltages of these pins, V.
     pub gyro_reference_v: [f64; 3],
-    /// What the affine model lacks.
+    /// Effects that the affine model lacks.
     pub effects: Vec<EffectTruth>,
-    /// What the sensors do over temperature.
+    /// The sensors over temperature.
     pub curves: CurvesTruth,
 }
 
 impl UnitTruth {
-    /// How late each die (gyros x, y, z, then the accelerometer) is behind the reported temperature on a ramp that has
-    /// lasted long, s. Negative: the die leads.
+    /// Lag of each die (gyros x, y, z, then the accelerometer) behind the reported temperature on a long ramp, s. Negative: the die leads.
     ///
-    /// On such a ramp a chain of first-order lags is late by their sum.
+    /// On such a ramp the lags of a chain of first-order lags add up.
     pub fn die_lag_behind_reported_s(&self) -> [f64; 4] {
         let die = self.thermal.die_lag_s;
         let reported = self.temperature.at.mean(0.0, die) + self.temperature.lag_s;
@@ -138,7 +137,7 @@ impl Voltage {
     }
 }
 
-/// A unit that is switched on.
+/// A powered unit.
 pub struct Unit {
     gyro: [Axis; 3],
     accel: [Axis; 3],
@@ -156,8 +155,7 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// The unit at steps of `dt_s`. One seed gives the same voltages bit by bit; what an effect draws leaves
-    /// the noise as it was.
+    /// The unit at steps of `dt_s`. A seed determines the voltages bit by bit; random numbers of an effect leave the noise unchanged.
     pub fn new(truth: &UnitTruth, seed: u64, dt_s: f64) -> Self {
         let triad = |of: &TriadTruth, sensor: &str| {
             std::array::from_fn(|i| {
@@ -196,8 +194,7 @@ impl Unit {
         }
     }
 
-    /// Voltages one step on, at the motion and the chamber's air there. The first call gives those at the
-    /// start.
+    /// Voltages after the next step, for the motion and the chamber's air at that time. The first call returns those at the start.
     pub fn step(&mut self, motion: &Motion, chamber_c: f64) -> Pins {
         let temperatures = self.thermal.step(chamber_c);
         let at = Condition {

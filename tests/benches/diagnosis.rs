@@ -1,6 +1,6 @@
-//! Time and peak memory of a full diagnosis: half an hour on a table in a chamber at 1 kHz, with two effects in it.
+//! Time and peak memory of a full diagnosis: a recording of half an hour at 1 kHz, on a table in a chamber, with two effects.
 //!
-//! `cargo bench -p mimu-tests --bench diagnosis`. Prints figures and asserts nothing: times drift on shared machines.
+//! `cargo bench -p mimu-tests --bench diagnosis`. Prints figures and asserts nothing, because times vary on shared machines.
 
 use std::time::Instant;
 
@@ -16,7 +16,7 @@ use mimu_rig::record::{Output, write};
 use mimu_rig::rig_file::RigTruth;
 use mimu_tests::blind::{plan, unit};
 
-/// Largest memory so far, MB, or since the last [`forget_peak`].
+/// Peak memory in MB, since the start or since the last [`forget_peak`].
 fn peak_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
@@ -25,13 +25,13 @@ fn peak_mb() -> f64 {
 }
 
 fn forget_peak() {
-    // Where the system does not allow it, the peak is that of making the recording, and larger.
+    // If the system does not allow this, the peak includes making the recording, and is larger.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
 fn main() {
     let seed = 1;
-    // Half an hour, of which the plan as it is takes 23 minutes.
+    // The plan takes 23 minutes; longer dwells make it half an hour.
     let text = plan(seed)
         .replace("sample_rate_hz = 100.0", "sample_rate_hz = 1000.0")
         .replace("dwell_s = 10.0", "dwell_s = 14.2");

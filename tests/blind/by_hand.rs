@@ -1,11 +1,11 @@
-//! Units in somebody's hands.
+//! Units recorded by hand.
 
 use std::collections::BTreeMap;
 
 use mimu_tests::by_hand::{Case, Grade, SHOWN, case};
 use rayon::prelude::*;
 
-/// Effect over noise from which on a case counts: what is smaller, no test need see.
+/// Ratio of effect to noise above which a case counts: no test needs to see a smaller effect.
 const STRONG: f64 = 5.0;
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -14,7 +14,7 @@ struct Tally {
     named: u32,
     alone: u32,
     right_verdict: u32,
-    /// Something is named that is not there.
+    /// An effect was named that the unit lacks.
     not_there: u32,
     refused: u32,
 }
@@ -47,7 +47,7 @@ impl Tally {
 
 const HEAD: &str = "| | cases | named | named alone | alone, and the right verdict | something named that is not there | refused |\n|---|---:|---:|---:|---:|---:|---:|";
 
-/// So many seeds of each effect and of clean units, in each grade; every other one has the flaws of real recordings.
+/// Runs `seeds` seeds of each effect and `clean` clean units in each grade. Every second case has the flaws of real recordings.
 pub fn run(seeds: u64, clean: u64, chosen: &[&str]) {
     let mut jobs: Vec<(Vec<&'static str>, Grade, u64)> = Vec::new();
     for grade in Grade::ALL {
@@ -124,7 +124,7 @@ fn tables(cases: &[(u64, Case)]) {
     }
 }
 
-/// How often intervals held the truth in those cases that `is_counted`, where the model has the right effects and no others.
+/// How often the intervals contained the truth in the cases that `is_counted` selects: those whose model has exactly the right effects.
 fn coverage(name: &str, cases: &[(u64, Case)], is_counted: impl Fn(&Case) -> bool) {
     let mut sums = [[0; 2]; 2];
     let each = cases.iter().map(|c| &c.1);

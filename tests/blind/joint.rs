@@ -1,4 +1,4 @@
-//! Several sessions of one unit together, and their file on another session.
+//! Several sessions of one unit diagnosed together, and their calibration file applied to another session.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ struct Tally {
     named: u32,
     not_there: u32,
     refused: u32,
-    /// As written, gyro and accelerometer; then without a constant error.
+    /// Files as written, gyro and accelerometer; then with a constant error removed.
     worse: [[u32; 2]; 2],
     worst: [[f64; 2]; 2],
 }
@@ -65,7 +65,8 @@ fn both(case: &Case) -> [Option<Judged>; 2] {
 
 const HEAD: &str = "| | sets | all effects named | something named that is not there | refused | gyro worse, as written (worst ratio) | accelerometer | gyro worse, without a constant error | accelerometer |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|";
 
-/// So many sets from the seed `first` on; of `warm_up` sessions each, digital units by hand with nothing but a warm-up of the accelerometer.
+/// Runs `sets` sets from the seed `first` on. With `warm_up`, each set has that many sessions of a digital unit by hand, whose only effect is a
+/// warm-up of the accelerometer.
 pub fn run(sets: u64, first: u64, warm_up: Option<usize>) {
     let of = |seed| match warm_up {
         Some(sessions) => Set::of_warm_up(sessions, seed),

@@ -1,15 +1,15 @@
-//! `make blind`: units with effects that nobody declares, and what the diagnosis says of them, as tables.
+//! `make blind`: units with effects that are not declared to the diagnosis, and what it finds, as tables.
 //!
-//! `blind SEEDS CLEAN [NAME...]`: so many seeds of each effect and pair, so many clean units; names choose among the effects. Every
-//! case is a recording of its own; with names, each is printed.
+//! `blind SEEDS CLEAN [NAME...]`: SEEDS seeds of each effect and pair, and CLEAN clean units. Names select effects, and print each case. Every case
+//! has its own recording.
 //!
 //! | | |
 //! |---|---|
-//! | `blind by-hand SEEDS CLEAN [NAME...]` | the same of units in somebody's hands, so many of each grade; then `slow-bias` |
-//! | `blind slow-bias SEEDS [NAME...]` | biases that move with time, with temperature and behind it, so many of each grade |
-//! | `blind turning SEEDS CLEAN [NAME...]` | the first on a plan that also turns gravity through the unit |
-//! | `blind joint SETS [FIRST]` | 2 to 9 sessions of one unit diagnosed together, and their file on another session; from the seed FIRST on |
-//! | `blind joint-warm-up SETS FIRST SESSIONS` | the same of digital units by hand with nothing but a warm-up of the accelerometer |
+//! | `blind by-hand SEEDS CLEAN [NAME...]` | the same for units by hand, for each grade; then `slow-bias` |
+//! | `blind slow-bias SEEDS [NAME...]` | biases that follow time or temperature, at once or with a lag, for each grade |
+//! | `blind turning SEEDS CLEAN [NAME...]` | the first, on a plan that also turns gravity through the unit |
+//! | `blind joint SETS [FIRST]` | 2 to 9 sessions of one unit diagnosed together, and their file on another session; seeds from FIRST on |
+//! | `blind joint-warm-up SETS FIRST SESSIONS` | the same for digital units by hand, whose only effect is a warm-up of the accelerometer |
 
 mod by_hand;
 mod joint;
@@ -21,7 +21,7 @@ use mimu_rig::effects::specs;
 use mimu_tests::blind::{Case, case_on, is_listed, is_right, plan, turning_plan};
 use rayon::prelude::*;
 
-/// Pairs of effects, of one sensor and of both.
+/// Pairs of effects, in one sensor and in both.
 const PAIRS: [[&str; 2]; 10] = [
     ["gyro_g_sensitivity", "gyro_scale_cubic"],
     ["gyro_g_sensitivity", "gyro_thermal_bias"],
@@ -35,7 +35,7 @@ const PAIRS: [[&str; 2]; 10] = [
     ["accel_warm_up", "gyro_scale_cubic"],
 ];
 
-/// Strengths, effect over noise of a dwell mean, that the tables tell apart.
+/// Classes of strength (effect over the noise of a dwell mean) in the tables.
 const CLASSES: [(f64, &str); 5] = [
     (0.5, "below 0.5"),
     (1.0, "0.5 to 1"),
@@ -44,21 +44,21 @@ const CLASSES: [(f64, &str); 5] = [
     (f64::INFINITY, "above 5"),
 ];
 
-/// What became of some cases.
+/// Results of several cases.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
     cases: u32,
     detected: u32,
     right: u32,
-    /// Right, and something else besides.
+    /// All effects named, and others besides.
     more: u32,
     wrong: u32,
     missed: u32,
-    /// Right ones whose error after is at most 1.2 times the floor.
+    /// Right ones whose held-out error with the effects is at most 1.2 times the noise floor.
     at_floor: u32,
-    /// The same where every fourth dwell is held out instead of blocks of time.
+    /// The same with every fourth dwell held out instead of blocks of time.
     between: u32,
-    /// Right ones whose error after is at most 1.2 times that of the same unit, with the same noise, without the effect.
+    /// Right ones whose held-out error with the effects is at most 1.2 times that of the same unit with the same noise, but without the effect.
     at_clean: u32,
 }
 
@@ -77,7 +77,7 @@ impl Tally {
             }
             (true, false, _) => self.more += 1,
             (false, _, "clean") => self.missed += 1,
-            // Nothing named, but the verdict says that something is there.
+            // Nothing is named, but the verdict reports an error.
             (false, _, _) if case.found.is_empty() => {}
             (false, ..) => self.wrong += 1,
         }
@@ -187,7 +187,7 @@ fn tables(cases: &[(String, u64, Case)]) {
             count[5] += u32::from(case.verdict == "refused");
         } else {
             by_kind.entry(name).or_default().add(case, without);
-            // A pair is as strong as its weaker part.
+            // The weaker effect determines the strength of a pair.
             let strength = case.strength.iter().copied().fold(f64::INFINITY, f64::min);
             let class = CLASSES
                 .iter()

@@ -1,4 +1,4 @@
-//! Biases that move slowly: what each kind of them is taken for.
+//! Biases that move slowly: as which effect each kind is identified.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use mimu_tests::by_hand::{Case, Grade};
 use mimu_tests::slow_bias::Kind;
 use rayon::prelude::*;
 
-/// What may be named first, by the end of its id.
+/// Effects that may be named first, by the end of their id.
 const NAMED: [(&str, &str); 5] = [
     ("bias_drift", "drift"),
     ("warm_up", "warm-up"),
@@ -67,7 +67,7 @@ impl Tally {
     }
 }
 
-/// So many seeds of each kind in each grade; `chosen` are parts of their names or of those of their effects.
+/// Runs `seeds` seeds of each kind in each grade. `chosen` contains parts of the kinds' names or of their effects' ids.
 pub fn run(seeds: u64, chosen: &[&str]) {
     let is_chosen = |kind: &Kind| {
         let name = format!("{} {}", kind.name(), kind.effects().join(" "));

@@ -1,5 +1,5 @@
-//! Hands the linker the memory layout, as the firmware's build does, and an empty `defmt.x`: the target's flags ask for
-//! one, and nothing here logs.
+//! Gives the linker the memory layout, as the firmware's build does, and an empty `defmt.x`: the target's flags require this file, and nothing here
+//! logs.
 
 use std::{env, fs, path::PathBuf};
 

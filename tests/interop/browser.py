@@ -14,12 +14,12 @@ needs_page = [
     pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on the PATH"),
     pytest.mark.skipif(PAGE is None, reason="no page is given: make web-tests"),
 ]
-# Of a computation on a machine that does something else as well, ms.
+# For a computation on a busy machine, ms.
 PATIENCE = 300_000
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
-    """Static files, with the types that a browser wants."""
+    """Static files with the MIME types that a browser requires."""
 
     extensions_map = {**http.server.SimpleHTTPRequestHandler.extensions_map, ".wasm": "application/wasm", ".js": "text/javascript"}
 
@@ -28,7 +28,7 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 
 
 class Server:
-    """The page as any server hands it out."""
+    """Serves the page like any web server."""
 
     def __init__(self):
         handler = functools.partial(Quiet, directory=PAGE)
@@ -60,7 +60,7 @@ def server():
 
 @pytest.fixture
 def page(chromium, server):
-    """The page, freshly loaded. A message on the console, an error of a script or a request to elsewhere fails the test."""
+    """The page, freshly loaded. A console message, a script error or a request to another server fails the test."""
     context = chromium.new_context(viewport={"width": 1280, "height": 900})
     page = context.new_page()
     said = []
@@ -75,14 +75,14 @@ def page(chromium, server):
 
 
 def taken_away(page, name):
-    """Content of a file that the page offers."""
+    """Contents of a file that the page offers."""
     with page.expect_download() as download:
         page.get_by_role("button", name=name, exact=True).click()
     return pathlib.Path(download.value.path()).read_bytes()
 
 
 def numbers(ours, theirs, path=""):
-    """All numbers of two results that have one layout, as (place, ours, theirs). Words and keys have to be the same."""
+    """All numbers of two results of one layout, as (place, ours, theirs). Words and keys must be equal."""
     if isinstance(ours, dict):
         assert ours.keys() == theirs.keys(), path
         return [pair for key in ours for pair in numbers(ours[key], theirs[key], f"{path}.{key}")]
@@ -96,7 +96,7 @@ def numbers(ours, theirs, path=""):
 
 
 def same(ours, theirs, what):
-    """Asserts that results of the page are the command's, but for the last digits of what was computed with rounding.
+    """Asserts that results of the page equal the command's, apart from the last digits of computations with rounding.
 
     The dwells are equal to the bit. Products of matrices are fused on a PC that can, and sine, exponential and logarithm are another
     library's: parameters then differ by 1e-15 of their size, and residuals, which are small differences of large numbers, by up to 1e-7.

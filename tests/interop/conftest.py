@@ -1,4 +1,4 @@
-"""Calibrations, recordings and what `mimu apply` makes of them, for the tests of every format."""
+"""Calibrations, recordings and the output of `mimu apply`, for the tests of every format."""
 import csv
 import json
 import os
@@ -15,7 +15,7 @@ G = 9.80665
 
 
 def run(*arguments, cwd):
-    """Runs mimu; what it printed."""
+    """Runs mimu and returns its output."""
     done = subprocess.run([os.environ["MIMU"], *map(str, arguments)], cwd=cwd, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -32,7 +32,7 @@ class Unit:
         self.applied = read_samples(folder / "applied")
 
     def export(self, form, *arguments, name=None):
-        """Exports to `name`; the path, and the result as JSON."""
+        """Exports to `name`; returns the path and the result as JSON."""
         path = self.folder / (name or f"export-{form}")
         out = run("export", form, "--calibration", "cal.toml", "-o", path, "--json", "-", *arguments, cwd=self.folder)
         return path, json.loads(out)
@@ -44,7 +44,7 @@ class Unit:
 
 
 def read_samples(folder):
-    """Columns of a recording's samples by name; an empty cell is no number."""
+    """Columns of a recording's samples by name; an empty cell is NaN."""
     with open(folder / "samples.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     return {name: numpy.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
@@ -90,7 +90,7 @@ def inverse(temp_c):
 
 @pytest.fixture(scope="session")
 def thermal_unit(tmp_path_factory):
-    """A unit with curves from -20 to 60 °C and dies that lag by 60 s, readings in volts; its file is written here, not by mimu."""
+    """A unit with curves from -20 to 60 °C and dies that lag by 60 s, readings in volts. Its file is written here, not by mimu."""
     folder = tmp_path_factory.mktemp("thermal")
     rows = lambda m: json.dumps(m.tolist())  # noqa: E731
     text = 'format = "mimu-calibration/2"\ndevice = "unit"\ncreated = "2026-01-02T03:04:05Z"\ntool = "test"\n'
@@ -111,11 +111,11 @@ def thermal_unit(tmp_path_factory):
             (ca, oa), (cb, ob) = inverse(temp_c - h)[sensor], inverse(temp_c + h)[sensor]
             text += f"[temperature.node.{sensor}]\nC = {rows(c)}\no = {rows(o)}\n"
             text += f"slope_C = {rows((cb - ca) / (2 * h))}\nslope_o = {rows((ob - oa) / (2 * h))}\n"
-            # Intervals that are seen beside the curves: wider where it is cold.
+            # Intervals that are visible beside the curves: wider at low temperature.
             gain, share = numpy.diag(curves(temp_c)[sensor][0]), 3e-4 * (2 - temp_c / 60)
             text += f"sigma_scale_factor = {rows(share * gain)}\nsigma_bias = {rows(share * gain * G)}\n"
     (folder / "cal.toml").write_text(text)
-    # Ten minutes at 10 Hz, in which it warms from -15 to 55 °C and turns about everything.
+    # Ten minutes at 10 Hz, warming from -15 to 55 °C and turning about all axes.
     random = numpy.random.default_rng(1)
     (folder / "warming").mkdir()
     header = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,temp_c"

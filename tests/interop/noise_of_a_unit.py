@@ -1,4 +1,4 @@
-"""A noise file, written here: N and K of each channel, and what the worst axis has."""
+"""A noise file, written here: N and K of each channel, and those of the worst axis."""
 import math
 
 RATE_HZ = 200.0
@@ -15,7 +15,7 @@ WORST = {"gyro": (1.9e-4, 2.3e-5), "accel": (2.4e-3, 3.1e-4)}
 
 
 def write(folder):
-    """Writes it; its path."""
+    """Writes the file and returns its path."""
     text = f'format = "mimu-noise/1"\ndevice = "unit"\nsample_rate_hz = {RATE_HZ}\nduration_s = 7200.0\nconfidence = 0.95\n'
     for name, (n, k) in CHANNELS.items():
         si = "rad/s" if name.startswith("gyro") else "m/s^2"
@@ -28,7 +28,7 @@ def write(folder):
 
 
 def random_walk_variances(n, k, seconds):
-    """What white noise N and a bias with random walk K do after some time at rest: variances of the integral of the one, and of the other."""
+    """Effect of white noise N and of a bias with random walk K after some time at rest: variances of their integrals."""
     return n**2 * seconds, k**2 * seconds
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Tests of the exports with the programs that they are for. Usage: run.sh PATH-OF-MIMU [pytest's arguments]
+# Tests the exports with their target programs. Usage: run.sh PATH-OF-MIMU [pytest's arguments]
 set -euo pipefail
 export MIMU=$(realpath "$1")
 shift

@@ -1,4 +1,4 @@
-"""Parameters of PX4 and ArduPilot: pymavlink reads the files, and what the sources of both compute with them is the input of the unit."""
+"""Parameters of PX4 and ArduPilot: pymavlink reads the files, and the formulas from the sources of both recover the input of the unit."""
 import os
 import subprocess
 
@@ -7,7 +7,7 @@ import pytest
 from conftest import G, Unit, curves, run
 from pymavlink import mavparm
 
-# A unit at one temperature whose driver converts by nominal factors: its biases, scale factors and cross terms, readings in SI.
+# A unit at one temperature whose driver converts with nominal factors: its biases, scale factors and cross terms, readings in SI.
 SCALE = {"gyro": numpy.array([1.004, 0.997, 1.01]), "accel": numpy.array([1.02, 0.985, 1.006])}
 BIAS = {"gyro": numpy.array([0.01, -0.02, 0.03]), "accel": numpy.array([0.2, -0.3, 0.1])}
 ACROSS = numpy.array([[0, 0.003, -0.002], [0.001, 0, 0.002], [-0.002, 0.001, 0]])
@@ -18,7 +18,7 @@ def forward(sensor):
 
 
 def calibration(raw_unit="SI", factor=1.0, zero=0.0):
-    """Its file, with readings `v / factor + zero` of what the driver makes of them."""
+    """Its file, with readings `v / factor + zero` where the driver computes `v`."""
     rows = lambda m: str(numpy.asarray(m).tolist())  # noqa: E731
     text = f'format = "mimu-calibration/1"\ndevice = "unit"\ncreated = "2026-01-02T03:04:05Z"\ntool = "test"\n[recording]\nraw_unit = "{raw_unit}"\ntemp_c = 22.0\n'
     for sensor, unit in [("gyro", "rad/s"), ("accel", "m/s^2")]:
@@ -39,7 +39,7 @@ def export(folder, form, *arguments):
     read = mavparm.MAVParmDict()
     assert read.load(str(folder / "out.param"))
     lines = (folder / "out.param").read_text().splitlines()
-    # Every line that is no comment was taken.
+    # Every line that is not a comment was read.
     assert len(read) == sum(not line.startswith("#") for line in lines)
     # Names of MAVLink have 16 characters.
     assert all(len(name) <= 16 for name in read)
@@ -73,12 +73,12 @@ def assert_input_comes_back(correct, head):
             x[k // 2] = size if k % 2 else -size
             off = correct(sensor, p @ x + b) - x
             gain = numpy.diag(p)
-            # What has no place, and nothing else: cross terms, and the scale factors of a gyro.
+            # Only what has no parameter: cross terms, and the scale factors of a gyro.
             left = ACROSS @ x / gain if scales else (p - numpy.eye(3)) @ x
             assert numpy.allclose(off, left, atol=2e-6 * size), (sensor, off, left)
             rms["across"].append(ACROSS @ x / gain)
             rms["scale"].append((gain - 1) * x)
-        # Both are stated with their sizes.
+        # Both are reported with their sizes.
         worst = {key: numpy.abs(value).max() for key, value in rms.items()}
         assert f"{sensor}: cross terms, at" in head
         assert (f"{sensor}: scale factors, at" in head) == (not scales)
@@ -113,7 +113,7 @@ def test_readings_in_volts_need_the_conversion_of_the_driver(tmp_path):
     known = ["--gyro-si-per-raw", 20, "--accel-si-per-raw", 20, "--gyro-zero", 1.65, "--accel-zero", 1.65]
     p, head = export(tmp_path, "ardupilot", *known)
     assert_input_comes_back(lambda sensor, v: ardupilot(p, sensor, v), head)
-    # Without it the driver is taken to convert by the calibration, which is said, and leaves no factor.
+    # Without it, the driver is assumed to convert with the calibration. The output says so, and no factor remains.
     p, head = export(tmp_path, "px4")
     assert "--accel-si-per-raw" in head and (of(p, "CAL_ACC0_#SCALE") == 1).all()
 
@@ -134,7 +134,7 @@ def test_what_ardupilot_does_not_take_is_refused(tmp_path, arguments, says):
 
 
 def reading(sensor, temp_c):
-    """What the driver makes of the unit over temperature at rest without input."""
+    """Reading of the driver for the unit over temperature at rest."""
     factor, zero = {"gyro": (1 / 0.344, 2.5), "accel": (1 / 0.0306, 1.65)}[sensor]
     return (curves(temp_c)[sensor][1] - zero) * factor
 
@@ -148,7 +148,7 @@ def test_px4_over_temperature(thermal_unit: Unit, temp_c):
     for sensor, letter in [("gyro", "G"), ("accel", "A")]:
         d = temp_c - p[f"TC_{letter}0_TREF"]
         offset = [sum(p[f"TC_{letter}0_X{k}_{axis}"] * d**k for k in range(4)) for axis in range(3)]
-        # Biases of this unit are cubics; single precision and six decimals of the conversion are left.
+        # Biases of this unit are cubics; the tolerance covers single precision and the six decimals of the conversion.
         assert numpy.allclose(offset, reading(sensor, temp_c), atol=2e-5)
 
 
@@ -156,7 +156,7 @@ def test_px4_over_temperature(thermal_unit: Unit, temp_c):
 def test_ardupilot_over_temperature(thermal_unit: Unit, temp_c):
     p, _ = export(thermal_unit.folder, "ardupilot", *NOMINAL)
     for sensor, short in [("gyro", "GYR"), ("accel", "ACC")]:
-        # AP_InertialSensor_tempcal.cpp: polynomial_eval() about 35 °C in millionths, minus that at the temperature of the calibration.
+        # AP_InertialSensor_tempcal.cpp: polynomial_eval() about 35 °C in millionths, minus its value at the temperature of the calibration.
         def polynomial(temp_c, axis, short=short):
             d = temp_c - 35.0
             return sum(p[f"INS_TCAL1_{short}{k}_{axis}"] * d**k for k in (1, 2, 3)) * 1e-6
@@ -167,7 +167,7 @@ def test_ardupilot_over_temperature(thermal_unit: Unit, temp_c):
 
 
 def rest_bias(sensor, temp_c):
-    """Biases of a unit in SI that lies still while its temperature changes."""
+    """Biases in SI of a unit at rest while its temperature changes."""
     x = (numpy.asarray(temp_c)[..., None] - 20.0) / 30.0
     size = {"gyro": 0.01, "accel": 0.1}[sensor]
     return size * (numpy.array([0.5, -0.3, 0.2]) + numpy.array([1.0, -0.7, 0.4]) * x + numpy.array([0.2, 0.1, -0.3]) * x**2 + numpy.array([0.1, 0.0, 0.2]) * x**3)
@@ -175,7 +175,7 @@ def rest_bias(sensor, temp_c):
 
 @pytest.fixture(scope="session")
 def at_rest(tmp_path_factory):
-    """Biases of a recording at rest, from -10 to 50 °C and back in two hours, in a pose that nobody knows; without a calibration."""
+    """Biases of a recording at rest in an unknown pose, from -10 to 50 °C and back in two hours; without a calibration."""
     folder = tmp_path_factory.mktemp("at-rest")
     t_s = numpy.arange(0, 7200, 0.1)
     temp_c = 50.0 - numpy.abs(t_s - 3600.0) / 60.0
@@ -194,13 +194,13 @@ def at_rest(tmp_path_factory):
     return folder
 
 
-# White noise over 10 of 60 K, and what the fit makes of the ends of the range.
+# White noise over 10 of 60 K, and the errors of the fit at the ends of the range.
 LEFT = {"gyro": 2e-5, "accel": 4e-4}
 
 
 def test_px4_from_a_recording_at_rest_alone(at_rest):
     p, head = export(at_rest, "px4", "--gyro-id", 7, "--accel-id", 8)
-    # TemperatureCompensation.cpp: calc_thermal_offsets_3D(), with the temperature held within TMIN to TMAX.
+    # TemperatureCompensation.cpp: calc_thermal_offsets_3D(), with the temperature clamped to TMIN to TMAX.
     temperatures = numpy.linspace(-9.0, 49.0, 30)
     for sensor, letter in [("gyro", "G"), ("accel", "A")]:
         of = lambda name, letter=letter: p[f"TC_{letter}0_{name}"]  # noqa: E731
@@ -209,7 +209,7 @@ def test_px4_from_a_recording_at_rest_alone(at_rest):
         offset = numpy.stack([sum(of(f"X{k}_{axis}") * d**k for k in range(4)) for axis in range(3)], axis=1)
         truth = rest_bias(sensor, temperatures)
         if sensor == "accel":
-            # As accel.cpp of PX4's own calibration: zero at the reference temperature.
+            # As in accel.cpp of PX4's own calibration: zero at the reference temperature.
             assert all(of(f"X0_{axis}") == 0 for axis in range(3))
             truth = truth - rest_bias(sensor, of("TREF"))
         assert numpy.abs(offset - truth).max() < LEFT[sensor], numpy.abs(offset - truth).max(axis=0)
@@ -218,7 +218,7 @@ def test_px4_from_a_recording_at_rest_alone(at_rest):
 
 def test_ardupilot_from_a_recording_at_rest_alone(at_rest):
     p, head = export(at_rest, "ardupilot", "--imu", 3)
-    # Nothing but what its own calibration over temperature writes.
+    # Only the parameters that its own calibration over temperature writes.
     assert len(p) == 3 + 2 * 9 and all(name.startswith("INS_TCAL3_") for name in p)
     temperatures, calibrated_c = numpy.linspace(-9.0, 49.0, 30), 22.0
     for sensor, short in [("gyro", "GYR"), ("accel", "ACC")]:

@@ -7,8 +7,8 @@ import numpy
 import pytest
 from conftest import Unit, triad
 
-# A program that reads "follow dt temp" and "sample x y z x y z" and writes six numbers for each sample. What is in the header depends on
-# the calibration, so the calls do too.
+# A program that reads "follow dt temp" and "sample x y z x y z" and writes six numbers for each sample. The contents of the header depend on the
+# calibration, so the calls do too.
 MAIN = """
 #include <stdio.h>
 #include "calibration.h"
@@ -33,7 +33,7 @@ int main(void)
     return 0;
 }}
 """
-# Half a unit in the last place of 1: what one rounding is off by at most.
+# Half a unit in the last place of 1: the largest error of one rounding.
 U = 2.0**-24
 
 
@@ -59,7 +59,7 @@ def steps(unit):
 
 
 def by_c(unit, name, state=False, follow=False, effects=False, sample_rate_hz=None):
-    """Samples as a program makes them that is compiled with the header."""
+    """Samples computed by a program that is compiled with the header."""
     folder = unit.folder / f"by-{name}"
     folder.mkdir(exist_ok=True)
     unit.export("c", "--prefix", "unit7", name=folder / "calibration.h")
@@ -86,7 +86,7 @@ def by_c(unit, name, state=False, follow=False, effects=False, sample_rate_hz=No
 
 
 def magnitude(unit, sensor):
-    """Sum of the sizes of the terms of C u + o: what is rounded."""
+    """Sum of the absolute terms of C u + o: what is rounded."""
     c, o = unit.model(sensor)
     return numpy.abs(triad(unit.raw, sensor)) @ numpy.abs(c).T + numpy.abs(o)
 
@@ -96,7 +96,7 @@ def test_at_one_temperature(unit, name):
     ours = by_c(unit, name)
     for sensor in ["gyro", "accel"]:
         off = numpy.abs(ours[sensor] - triad(unit.applied, sensor))
-        # Each term: C, u and their product are rounded, and three sums follow.
+        # In each term C, u and their product are rounded, and three sums follow.
         assert (off <= 6 * U * magnitude(unit, sensor)).all(), off.max()
 
 
@@ -105,8 +105,8 @@ def test_over_temperature_behind_the_lag_of_the_dies(thermal_unit, name):
     ours = by_c(thermal_unit, name, state=True, follow=True)
     for sensor in ["gyro", "accel"]:
         off = numpy.abs(ours[sensor] - triad(thermal_unit.applied, sensor))
-        # Each number of the model: four products with weights of up to six roundings, and their sums. The lag is a sum of 1500 steps of a
-        # difference of 7 K, of which each loses a share of 0.4 s / 60 s: 150 roundings of 7 K, and half a digit of 55 °C.
+        # Each number of the model: four products with weights of up to six roundings, and their sums. The lag is a sum of 1500 steps of a difference
+        # of 7 K, each of which loses a share of 0.4 s / 60 s: 150 roundings of 7 K, and half a unit in the last place of 55 °C.
         die_c = U * (150 * 7.0 + 55.0)
         nodes = thermal_unit.calibration["temperature"]["node"]
         slope_c = numpy.max([numpy.abs(node[sensor]["slope_C"]) for node in nodes], axis=0)
@@ -114,7 +114,7 @@ def test_over_temperature_behind_the_lag_of_the_dies(thermal_unit, name):
         per_k = numpy.abs(triad(thermal_unit.raw, sensor)) @ slope_c.T + slope_o
         bound = 20 * U * magnitude(thermal_unit, sensor) + die_c * per_k
         assert (off <= bound).all(), (off / bound).max()
-        # It does follow: with the model of one temperature it would not be near.
+        # The model does follow: the model at one temperature would be far off.
         c, o = thermal_unit.model(sensor)
         assert numpy.abs(triad(thermal_unit.raw, sensor) @ c.T + o - ours[sensor]).max() > 1000 * bound.max()
 
@@ -166,12 +166,12 @@ def test_with_effects(thermal_unit, unit_with_effects, name):
     for sensor in ["gyro", "accel"]:
         applied = triad(unit.applied, sensor)
         off = numpy.abs(ours[sensor] - applied)
-        # As without effects. An error is a function of rounded inputs: its share of them, below 3 %, is less than one rounding more; the
-        # angular acceleration is a difference of two times 10 Hz.
+        # As without effects. An error is a function of rounded inputs: its share of them, below 3 %, adds less than one rounding. The angular
+        # acceleration is a difference of two rates times 10 Hz.
         bound = 22 * U * magnitude(unit, sensor) + U * (150 * 7.0 + 55.0) * 0.05
         bound += {"gyro": 0.0, "accel": 2 * 10.0 * 0.02 * 22 * U * magnitude(unit, "gyro").max()}[sensor]
         assert (off <= bound).all(), (off / bound).max()
-        # They do something.
+        # The effects make a difference.
         without = triad(thermal_unit.applied, sensor)
         assert numpy.abs(applied - without).max() > 100 * bound.max()
 
@@ -179,7 +179,7 @@ def test_with_effects(thermal_unit, unit_with_effects, name):
 def test_errors_of_a_converter_by_its_code(tmp_path, unit):
     compiler("gcc")
     shutil.copytree(unit.folder / "by-hand", tmp_path / "recording")
-    # Counts of 12 bits: bit 0 is worth 2048, and its errors are some counts.
+    # 12-bit counts: bit 0 is worth 2048, and its errors are some counts.
     bits = [("bit 0", 1e-3), ("bit -1", -5e-4), ("bit -4", 4e-4)]
     names = {f"bit {-k}" if k else "bit 0": 0.0 for k in range(9)} | dict(bits)
     text = effect(

@@ -1,4 +1,4 @@
-"""Noise for VINS, ORB-SLAM3, LIO-SAM and FAST-LIO: their readers, and what their filters make of it after two seconds at rest.
+"""Noise for VINS, ORB-SLAM3, LIO-SAM and FAST-LIO: their readers, and the results of their filters after two seconds at rest.
 
 The truth is that of the noise: after a time t, white noise N has the variance N² t in its integral, and a bias with random walk K has K² t.
 """
@@ -38,13 +38,13 @@ def test_vins(noise, tmp_path):  # noqa: F811
     for sensor, key in [("accel", "acc"), ("gyr", "gyr")]:
         n, w = numbers[f"{key}_n"], numbers[f"{key}_w"]
         white, walk = expected("gyro" if key == "gyr" else sensor)
-        # midPointIntegration at rest: V has dt / 2 for the reading before and the one after, and dt for the bias.
+        # midPointIntegration at rest: V has dt / 2 for the previous reading and for the present one, and dt for the bias.
         integral = sum((0.5 * DT) ** 2 * n**2 * 2 for _ in range(STEPS))
         bias = sum(DT**2 * w**2 for _ in range(STEPS))
         assert close(bias, walk)
-        # It counts the two as independent, so it has half of what such readings make...
+        # It treats the two as independent, so it has half the variance of such readings ...
         assert close(2 * integral, white)
-        # ... as the mean over readings of this standard deviation shows.
+        # ... as the mean over readings with this standard deviation shows.
         random = numpy.random.default_rng(3)
         readings = random.normal(0, n, (4000, STEPS + 1))
         made = (0.5 * DT * (readings[:, 1:] + readings[:, :-1])).sum(axis=1).var()
@@ -56,11 +56,11 @@ def test_orbslam3(noise, tmp_path):  # noqa: F811
     path = export("orbslam3", noise, tmp_path)
     numbers = opencv(path, keys)
     file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-    # The older reader wants an integer here and reals there.
+    # The older reader requires an integer here and reals there.
     assert file.getNode("IMU.Frequency").isInt() and all(file.getNode(key).isReal() for key in keys[:4])
     sf = numbers["IMU.Frequency"] ** 0.5
     for sensor, noise_key, walk_key in [("gyro", "IMU.NoiseGyro", "IMU.GyroWalk"), ("accel", "IMU.NoiseAcc", "IMU.AccWalk")]:
-        # Calib(Tbc, Ng*sf, Na*sf, Ngw/sf, Naw/sf); B has dt, and the covariance of the walk is added with every reading.
+        # Calib(Tbc, Ng*sf, Na*sf, Ngw/sf, Naw/sf); B has dt, and the covariance of the walk is added at every reading.
         white = sum((numbers[noise_key] * sf) ** 2 * DT**2 for _ in range(STEPS))
         walk = sum((numbers[walk_key] / sf) ** 2 for _ in range(STEPS))
         assert close(white, expected(sensor)[0]) and close(walk, expected(sensor)[1])
@@ -73,7 +73,7 @@ def test_liosam(ros, noise, tmp_path):  # noqa: F811
     numbers = read["/**"]["ros__parameters"] if ros == 2 else read["lio_sam"]
     assert numbers["imuGravity"] == 9.81744
     for sensor, key in [("accel", "Acc"), ("gyro", "Gyr")]:
-        # GTSAM: the discrete covariance is the continuous one over dt; the bias moves by sqrt(deltaTij) imuAccBiasN.
+        # GTSAM: the discrete covariance is the continuous one over dt; the bias changes by sqrt(deltaTij) imuAccBiasN.
         white = sum(numbers[f"imu{key}Noise"] ** 2 / DT * DT**2 for _ in range(STEPS))
         walk = (SECONDS**0.5 * numbers[f"imu{key}BiasN"]) ** 2
         assert close(white, expected(sensor)[0]) and close(walk, expected(sensor)[1])
@@ -100,5 +100,5 @@ def test_gravity_is_that_of_the_calibration(unit, noise):  # noqa: F811
     path, result = unit.export("vins", "--noise", noise)
     gravity = unit.calibration["recording"]["gravity_mps2"]
     assert close(opencv(path, ["g_norm"])["g_norm"], gravity)
-    # What it does not use of a calibration, it says.
+    # It reports what it does not use of a calibration.
     assert any("no place for a calibration" in note for note in result["notes"])

@@ -1,4 +1,4 @@
-"""The units of the other tests are what they are meant to be: else these would show nothing."""
+"""Checks the units of the other tests, which otherwise would show nothing."""
 import numpy
 from conftest import inverse, triad
 
@@ -10,7 +10,7 @@ def test_apply_is_the_affine_model(unit):
 
 
 def test_apply_follows_temperature(thermal_unit):
-    # Past the first minutes, a die that lags by 60 s behind 7 K/min is 7 K late.
+    # After the first minutes, a die that lags by 60 s at 7 K/min is 7 K behind.
     last = -1
     temp_c = thermal_unit.raw["temp_c"][last] - 60.0 * 70 / 600
     for sensor in ["gyro", "accel"]:

@@ -16,7 +16,7 @@ def test_corrected_is_what_apply_gives(factor, zero, unit):
     readings, _ = driver(unit, "accel", factor, zero)
     corrected = readings @ sm.T - read["bias"]
     assert numpy.allclose(corrected, triad(unit.applied, "accel"), atol=1e-6)
-    # It says what stays of the gyro: the largest error of readings with their scale factors and cross terms, at 100 deg/s.
+    # It reports the gyro's remaining error: the largest error from scale factors and cross terms, at 100 deg/s.
     stays = [r for r in result["remaining"] if r["sensor"] == "gyro"]
     p = numpy.array(unit.calibration["gyro"]["forward"]["P"])
     off = numpy.radians(100) * (p / numpy.linalg.norm(p, axis=1)[:, None] - numpy.eye(3))

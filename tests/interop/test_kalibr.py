@@ -1,4 +1,4 @@
-"""imu.yaml as Kalibr reads it, and its scale-misalignment model as IccSensors.py writes it down."""
+"""imu.yaml as read by Kalibr, and its scale-misalignment model as in IccSensors.py."""
 import numpy
 import noise_of_a_unit
 import pytest
@@ -15,7 +15,7 @@ def noise(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def oblique(thermal_unit, tmp_path_factory):
-    """A unit in volts with its triads turned by degrees against the body and each other, one axis of the gyro inverted."""
+    """A unit in volts with its triads rotated by degrees against the body and each other, one axis of the gyro inverted."""
     p_gyro = 0.344 * numpy.array([[0.98, 0.05, -0.02], [0.04, -1.01, 0.06], [-0.03, 0.08, 1.03]])
     p_accel = 0.0306 * numpy.array([[1.02, -0.07, 0.03], [0.06, 0.99, 0.01], [-0.02, 0.04, 0.97]])
     triads = {"gyro": (p_gyro, [2.51, 2.48, 2.53], "rad/s"), "accel": (p_accel, [1.66, 1.64, 1.67], "m/s^2")}
@@ -24,7 +24,7 @@ def oblique(thermal_unit, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def sagging(oblique, tmp_path_factory):
-    """The same with a g-sensitivity in its calibration, as a diagnosis writes it; `mimu apply` removes it."""
+    """The same with a g-sensitivity in its calibration, as written by a diagnosis; `mimu apply` removes it."""
     text = (oblique.folder / "cal.toml").read_text()
     text += '\n[[effect]]\nid = "gyro_g_sensitivity"\nsensor = "gyro"\nabout = ""\n'
     text += 'formula = "x = C (u - S e) + o, e_i = sum of coefficient * regressor"\ndirection = "raw to SI"\n'
@@ -36,7 +36,7 @@ def sagging(oblique, tmp_path_factory):
 
 
 def text_of(triads):
-    """A calibration at one temperature by P, b and the unit of each triad, readings in volts; not written by mimu."""
+    """A calibration at one temperature from P, b and the unit of each triad, readings in volts; not written by mimu."""
     text = 'format = "mimu-calibration/1"\ndevice = "unit"\ncreated = "2026-01-02T03:04:05Z"\ntool = "test"\n[recording]\nraw_unit = "V"\n'
     for sensor, (p, b, unit_name) in triads.items():
         c = numpy.linalg.inv(p)
@@ -55,7 +55,7 @@ def variant(calibration, recording, folder):
 
 
 def driver(unit, sensor, si_per_raw=None, zero=0.0):
-    """The readings in SI, and their bias, by the tables of cal.toml."""
+    """The readings in SI, and their bias, from the tables of cal.toml."""
     forward = unit.calibration[sensor]["forward"]
     factors = 1 / numpy.linalg.norm(forward["P"], axis=1) if si_per_raw is None else si_per_raw
     return factors * (triad(unit.raw, sensor) - zero), factors * (numpy.array(forward["b"]) - zero)
@@ -74,7 +74,7 @@ def check_intrinsics(imu, unit, gyro, accel):
     for m in [m_accel, m_gyro]:
         assert numpy.array_equal(m, numpy.tril(m)), "Kalibr's M is lower triangular"
     assert numpy.allclose(c @ c.T, numpy.eye(3), atol=1e-9) and numpy.linalg.det(c) > 0
-    # The frame of Kalibr: a rotation from that of the calibration, found here from the forces alone.
+    # The frame of Kalibr: a rotation of the calibration's frame, determined here from the forces alone.
     (y_gyro, b_gyro), (y_accel, b_accel) = gyro, accel
     body = triad(unit.applied, "accel")
     in_frame = (y_accel - b_accel) @ numpy.linalg.inv(m_accel).T
@@ -117,7 +117,7 @@ def test_intrinsics_give_the_readings(which, noise, request):
         assert numpy.abs(rotation - numpy.eye(3)).max() > 0.05 and imu["gyroscopes"]["M"][1][1] < -0.9
     assert not numpy.any(imu["gyroscopes"]["A"])
     assert {"rms", "source"} <= set(result["remaining"][0])
-    # Sensors that the driver scales right have the densities of calibrated readings.
+    # If the driver scales correctly, the densities are those of calibrated readings.
     assert noise_of_a_unit.close(imu["gyroscope_noise_density"], noise_of_a_unit.WORST["gyro"][0])
 
 
@@ -126,7 +126,7 @@ def test_a_driver_of_other_factors_and_zeros(unit, noise):
     path, _ = unit.export("kalibr", "--noise", noise, "--result", *arguments)
     imu = yaml.safe_load(path.read_text())["imu0"]
     check_intrinsics(imu, unit, driver(unit, "gyro", 2e-4, 100), driver(unit, "accel", 3e-4, 50))
-    # The noise is that of these readings: density times what the driver makes of a unit of input, on the axis where that is most.
+    # The noise is that of these readings: density times the driver's gain, on the axis where this is largest.
     gains = 2e-4 * numpy.linalg.norm(unit.calibration["gyro"]["forward"]["P"], axis=1)
     ours = max(gain * noise_of_a_unit.CHANNELS[f"gyro_{axis}"][0] for gain, axis in zip(gains, "xyz"))
     assert noise_of_a_unit.close(imu["gyroscope_noise_density"], ours)
@@ -136,6 +136,6 @@ def test_g_sensitivity_has_a_place(sagging, noise):
     path, result = sagging.export("kalibr", "--noise", noise)
     imu = yaml.safe_load(path.read_text())
     check_intrinsics(imu, sagging, driver(sagging, "gyro"), driver(sagging, "accel"))
-    # Otherwise the test would show nothing: without A the readings miss by what gravity makes of it.
+    # Otherwise the test would show nothing: without A the readings would have the error of the g-sensitivity under gravity.
     assert numpy.abs(numpy.array(imu["gyroscopes"]["A"])).max() > 1e-4
     assert "gyro_g_sensitivity" not in [r["source"] for r in result["remaining"]]

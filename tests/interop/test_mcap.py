@@ -1,4 +1,4 @@
-"""The reader of MCAP in Python finds the samples as recorded and as `mimu apply` writes them, and the dwells with what they err by."""
+"""The Python reader of MCAP finds the samples as recorded and as written by `mimu apply`, and the dwells with their residuals."""
 import collections
 import json
 import os
@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 
 
 class File:
-    """Messages by topic, in order of time, and what the reader says of the file."""
+    """Messages by topic, in order of time, and what the reader reports about the file."""
 
     def __init__(self, path):
         self.messages = collections.defaultdict(list)
@@ -25,7 +25,7 @@ class File:
             for schema, channel, message in reader.iter_messages():
                 assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
                 value = json.loads(message.data)
-                # Validation of all samples takes minutes; they are all made alike.
+                # Validation of all samples takes minutes; all have the same structure.
                 if channel.topic == "/dwells" or len(self.messages[channel.topic]) % 100 == 0:
                     validators[schema.id].validate(value)
                 self.messages[channel.topic].append((message.log_time, schema.name, value))
@@ -50,7 +50,7 @@ def test_samples_are_as_recorded_and_as_applied(unit, by_hand):
         ("/compensated", unit.applied, {"gyro": "angular_velocity", "accel": "linear_acceleration"}),
     ]:
         for sensor, key in keys.items():
-            # What the file of samples has is the same double.
+            # The file of samples contains the same double.
             assert numpy.array_equal(file.triad(topic, key), triad(samples, sensor))
         stamps = [m[0] for m in file.messages[topic]]
         assert numpy.allclose(numpy.array(stamps) * 1e-9, samples["t_s"], atol=1e-9)
@@ -73,14 +73,14 @@ def test_dwells_are_on_the_sphere_with_their_residuals(unit, by_hand):
     for dwell in dwells:
         known = {pair["key"]: pair["value"] for pair in dwell["metadata"]}
         mean, residual = (numpy.array(json.loads(known[key])) for key in ["force_mps2", "residual_mps2"])
-        # A mean of samples that are there, around the last of them.
+        # The mean of the samples up to this end.
         end = round((dwell["timestamp"]["sec"] + 1e-9 * dwell["timestamp"]["nsec"] - unit.raw["t_s"][0]) / numpy.median(numpy.diff(unit.raw["t_s"])))
         assert numpy.allclose(force[end - 20 : end].mean(axis=0), mean, atol=0.1)
-        # Only gravity is known: the residual is along the force, and what its size is off by.
+        # Only gravity is known: the residual is along the force and equals the error of its magnitude.
         assert numpy.allclose(residual, mean - G * mean / numpy.linalg.norm(mean), atol=1e-9)
         point = dwell["spheres"][0]["pose"]["position"]
         assert numpy.allclose([point[a] for a in "xyz"], mean / G)
-        # The arrow begins there, and its x axis turned by its orientation is along the residual.
+        # The arrow begins at this point, and its x axis, rotated by its orientation, is along the residual.
         arrow = dwell["arrows"][0]
         q = arrow["pose"]["orientation"]
         along = [

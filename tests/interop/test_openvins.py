@@ -1,4 +1,4 @@
-"""kalibr_imu_chain.yaml by OpenCV's reader, and the readings that Propagator.cpp makes of raw ones."""
+"""kalibr_imu_chain.yaml read by OpenCV, and the readings that Propagator.cpp computes from raw ones."""
 import cv2
 import numpy
 import noise_of_a_unit
@@ -8,7 +8,7 @@ from test_kalibr import driver, noise, oblique, sagging  # noqa: F401
 
 
 def read(path):
-    """As opencv_yaml_parse.h does: a matrix element by element."""
+    """As in opencv_yaml_parse.h: a matrix element by element."""
     file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
     assert file.isOpened()
     imu = file.getNode("imu0")
@@ -22,7 +22,7 @@ def read(path):
 
 
 def openvins(matrices, model, y_gyro, b_gyro, y_accel, b_accel):
-    """State::Dm keeps half of the inverse of Tw and Ta, by the model; then Propagator.cpp, with Rot() the transpose of what is in the file."""
+    """State::Dm keeps half of the inverse of Tw and Ta, by the model; then Propagator.cpp, with Rot() the transpose of the file's matrix."""
     half = {"kalibr": numpy.tril, "rpng": numpy.triu}[model]
     dw, da = half(numpy.linalg.inv(matrices["Tw"])), half(numpy.linalg.inv(matrices["Ta"]))
     forces = (y_accel - b_accel) @ (matrices["R_IMUtoACC"].T @ da).T

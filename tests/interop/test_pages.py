@@ -11,7 +11,7 @@ from conftest import run
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on the PATH")
 
-# What reaches beyond the page or beyond its own drawing, in words. A table may scroll in its own box.
+# Elements that extend beyond the page or beyond their own drawing, in words. A table may scroll in its own box.
 CLIPPED = """() => {
     const out = [];
     const page = document.documentElement;
@@ -26,7 +26,7 @@ CLIPPED = """() => {
     return out;
 }"""
 
-# Texts whose contrast to the paper behind them is below 4.5 to 1 (WCAG 2, AA).
+# Texts with a contrast below 4.5 to 1 against their background (WCAG 2, AA).
 FAINT = """() => {
     const channel = v => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
     const light = c => 0.2126 * channel(c[0]) + 0.7152 * channel(c[1]) + 0.0722 * channel(c[2]);
@@ -59,7 +59,7 @@ def pages(unit, thermal_unit):
     run("diagnose", "by-hand", "--page", "diagnosis.html", cwd=unit.folder)
     noise = noise_of_a_unit.write(thermal_unit.folder)
     text = noise.read_text()
-    # One coefficient that the record did not show, with its reason.
+    # One coefficient that the recording did not show, with its reason.
     reason = 'k_reason = "not seen: at most 2.00 mg/√h; to see half of that, record at least 27.0 min more"\n'
     head, last = text[: text.rindex("[channel.k]")].rsplit("[channel.n]", 1)
     noise.write_text(f"{head}{reason}[channel.n]{last}")
@@ -100,7 +100,7 @@ def test_a_page_can_be_read(pages, browser, name, scheme):
 
 @pytest.mark.parametrize("name", ["report", "diagnose", "report over temperature"])
 def test_a_page_prints_on_a4(pages, browser, name):
-    # A4 without margins of 13 mm at 96 pixels an inch.
+    # A4 without margins of 13 mm at 96 pixels per inch.
     context = browser.new_context(viewport={"width": 695, "height": 1000})
     page = context.new_page()
     page.emulate_media(media="print")

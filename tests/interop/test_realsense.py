@@ -18,7 +18,7 @@ def header(data):
 
 
 def read_eeprom(data):
-    """dm_v2_eeprom, dm_v2_calib_info, dm_v2_calibration_table; check_calib of the first, and the other two checked as well."""
+    """dm_v2_eeprom, dm_v2_calib_info, dm_v2_calibration_table; check_calib for the first, and checks of the other two."""
     assert len(data) == 520
     content, found = data, []
     for _ in range(3):
@@ -28,7 +28,7 @@ def read_eeprom(data):
         assert size <= len(content)
         content = content[:size]
         assert zlib.crc32(content) == crc
-    # The parser is chosen by the first two bytes, read as a little-endian number: dm_v2_eeprom_id.
+    # The first two bytes, read as a little-endian number, select the parser: dm_v2_eeprom_id.
     assert struct.unpack_from("<H", data)[0] == 0x0101
     assert found == [(0x0101, 0x09), (0x0200, 0x20), (0x0201, 0x20)]
     extrinsic_valid, intrinsic_valid = content[0], content[1]

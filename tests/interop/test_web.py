@@ -53,7 +53,7 @@ def test_an_export_is_the_file_of_the_command(page, tmp_path):
     run("export", "c", "--calibration", "calibration.toml", "-o", "mimu.h", cwd=tmp_path)
     assert pathlib.Path(download.value.path()).read_text() == (tmp_path / "mimu.h").read_text()
     assert "deg/s" in page.inner_text("#exported")
-    # Where the example was recorded says nothing of where the next log was.
+    # The place of the example does not apply to the next log.
     assert page.input_value("#gravity") == "9.80665"
     page.set_input_files("#file", EXAMPLE / "accel.txt")
     assert page.input_value("#gravity") == ""
@@ -61,7 +61,7 @@ def test_an_export_is_the_file_of_the_command(page, tmp_path):
 
 def test_columns_are_taken_by_their_names_and_can_be_corrected(page, tmp_path):
     rows = web_logs.by_hand()
-    # x and y of the accelerometer under each other's name.
+    # x and y of the accelerometer have each other's names.
     rows[:, [4, 5]] = rows[:, [5, 4]]
     web_logs.write_csv(tmp_path / "log.csv", rows)
     page.set_input_files("#file", tmp_path / "log.csv")
@@ -118,8 +118,8 @@ def test_several_recordings_of_a_unit_are_diagnosed_as_by_the_command(page, tmp_
     second = ["--verify", "rec-2"] if several == "verify" else ["rec-2"]
     ours = json.loads(taken_away(page, "diagnosis.json"))
     theirs = json.loads(run("diagnose", "rec", *second, "--json", "-", cwd=tmp_path))
-    # What is drawn of residuals is left out: quantiles of the gyro's, in logs that are made by a formula, differ by per cents between the page and
-    # the command, of a single recording as well.
+    # The drawn residuals are left out. In these synthetic logs the quantiles of the gyro's residuals differ by per cents between page and command,
+    # also for a single recording.
     for found in [ours, theirs]:
         for sensor in found["sensors"].values():
             sensor.pop("picture")
@@ -277,7 +277,7 @@ def test_the_page_can_be_used_from_the_keyboard_and_by_ear(page):
             break
     page.keyboard.press("Enter")
     page.wait_for_selector("#away:not([hidden])", timeout=PATIENCE)
-    # The result is told where the reader's place is.
+    # The focus is on the result, so that a screen reader reads it.
     assert page.evaluate("document.activeElement.id") == "result-title"
     assert page.evaluate(unnamed) == []
     assert page.locator("h1").count() == 1

@@ -24,7 +24,7 @@ def lines(tmp_path_factory):
 
 @pytest.fixture
 def usb(page):
-    """The page with a port."""
+    """The page with a serial port."""
     page.add_init_script(web_board.MOCK)
     page.reload()
     return page
@@ -50,14 +50,14 @@ def begin(page, per_second=4000):
 
 
 def finished(page):
-    """Waits for the end of the session and for what is made of it."""
+    """Waits for the end of the session and for its results."""
     page.locator("#prompt", has_text="The session is finished.").wait_for(timeout=100_000)
     page.wait_for_selector("#away:not([hidden])", timeout=100_000)
     assert page.inner_text("#error") == ""
 
 
 def reaches(page, pose):
-    """Waits until so many poses have been had: one may come while nobody looks."""
+    """Waits until at least so many poses are recorded: one may come between two checks."""
     begun = time.monotonic()
     while int((page.inner_text("#count").split() or [0, 0])[1]) < pose:
         assert page.inner_text("#error") == "", page.inner_text("#log")
@@ -72,7 +72,7 @@ def stopped_at(page, pose):
 
 
 def journal(page, folder):
-    """The session that the page keeps, unpacked."""
+    """The session stored by the page, unpacked."""
     archive = zipfile.ZipFile(io.BytesIO(taken_away(page, "Download the journal")))
     assert archive.testzip() is None
     archive.extractall(folder)
@@ -88,7 +88,7 @@ def dwells(folder):
 
 
 def equal(ours, theirs, most=1e-9):
-    """Asserts that two calibrations are one but for the last digits."""
+    """Asserts that two calibrations are equal, apart from the last digits."""
     for path, a, b in numbers(ours, theirs):
         assert abs(a - b) <= most * max(abs(a), abs(b)) or abs(a - b) < 1e-15, (path, a, b)
 
@@ -108,7 +108,7 @@ def test_a_whole_session_gives_the_calibration_of_the_command(usb, lines, tmp_pa
     calibration = tomllib.loads((ours / "calibration.toml").read_text())
     web_board.assert_true(calibration)
 
-    # The command goes on with the journal from the last dwell: it has none to do, and makes its own calibration.
+    # The command continues with the journal after the last dwell: it has no dwell to record, and makes its own calibration.
     theirs = tmp_path / "command"
     journal(usb, theirs)
     kept = [line for line in (theirs / "journal.jsonl").read_text().splitlines() if json.loads(line)["entry"] in ["dwell", "redo", "made"]]
@@ -122,7 +122,7 @@ def test_a_whole_session_gives_the_calibration_of_the_command(usb, lines, tmp_pa
     assert dwells(theirs) == dwells(ours)
     equal(calibration, tomllib.loads((theirs / "calibration.toml").read_text()))
 
-    # What the page makes of the recording is what the command makes of it.
+    # The page's result from the recording equals the command's.
     fit = json.loads(run("fit", ours / "calibration", "--json", "-", cwd=tmp_path))
     same(json.loads(taken_away(usb, "fit.json")), fit, "fit of the session")
     found = run("diagnose", ours / "calibration", "--verify", ours / "verification", "--json", "-", cwd=tmp_path)
@@ -213,7 +213,7 @@ def test_a_session_that_was_stopped_goes_on_in_the_page(usb, lines, tmp_path):
 
 def test_axes_with_the_names_of_others_are_asked_about_and_end_the_session(usb, lines):
     connect(usb, lines)
-    # Of both sensors alike, so that only the poses show it.
+    # In both sensors alike, so that only the poses show it.
     for at, name in enumerate(["ay", "az", "ax", "gy", "gz", "gx"], start=1):
         usb.select_option(f"#line-role-{at}", name)
     begin(usb)
@@ -236,7 +236,7 @@ def test_garbage_is_shown_and_says_which_field_to_correct(usb, lines):
     usb.evaluate("board.garbage = null")
     connect(usb, lines)
     assert usb.evaluate("board.opened") == [115200, 9600]
-    # Garbage in the middle of a session is counted, and the session goes on.
+    # Garbage during a session is counted, and the session continues.
     begin(usb, 1000)
     reaches(usb, 2)
     usb.evaluate("board.garbage = '1,2,\\u00ff\\n'")
@@ -275,7 +275,7 @@ def test_a_browser_without_serial_ports_says_which_has_them(page):
     page.reload()
     assert "open this page in Chrome, Edge or Opera" in page.inner_text("#no-serial")
     assert page.is_disabled("#connect")
-    # A journal can be calibrated from all the same, and logs as before.
+    # A journal and logs can be calibrated all the same.
     assert page.is_enabled("#journal") and page.is_enabled("#file")
 
 

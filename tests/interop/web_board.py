@@ -18,12 +18,12 @@ GYRO = numpy.array([[3790.0, 31.0, -22.0], [-45.0, 3715.0, 18.0], [27.0, -39.0, 
 ACCEL = numpy.array([[1689.0, 0.0, 0.0], [14.0, 1655.0, 0.0], [-21.0, 9.0, 1702.0]]), numpy.array([410.0, -385.0, 702.0])
 COLUMNS = "t_us,ax,ay,az,gx,gy,gz"
 DWELL_S = 1.2
-# What `mimu wizard` is told on both sides.
+# Options of `mimu wizard`, used on both sides.
 SESSION = ["--gravity", "9.80665", "--text", COLUMNS, "--device", "plane-7", "--dwell", str(DWELL_S), "--warm-up", "0", "--as-planned"]
 
 
 class Socket:
-    """The board at `tcp://...`, which writes its lines from the beginning to everybody who connects."""
+    """The board at `tcp://...`, which writes its lines from the beginning to every client."""
 
     def __init__(self, lines, per_second=4000.0):
         self.lines, self.per_second = lines, per_second
@@ -51,7 +51,7 @@ class Socket:
 
 
 def wizard(port, folder, until=None):
-    """`mimu wizard` at `port`, to its end or `until(events)`; what it said."""
+    """Runs `mimu wizard` at `port`, to its end or until `until(events)`; returns its output."""
     events = folder.parent / "events.jsonl"
     command = [os.environ["MIMU"], "wizard", "-o", str(folder), "--port", port, *SESSION, "--events", str(events), "--plain"]
     running = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -66,7 +66,7 @@ def wizard(port, folder, until=None):
 
 
 def lines(folder):
-    """What the board writes, with some lines lost and some cut; its poses are those that a session asks for, and again."""
+    """The lines of the board, some lost and some truncated. Its poses are those that a session asks for, repeated."""
     rest = [f"{10_000 * k},700,-400,17400,120,-210,{64 + k % 3}\r\n" for k in range(3000)]
     board = Socket(rest)
     wizard(board.port, folder / "plan", until=lambda _: (folder / "plan" / "session.json").exists())
@@ -76,7 +76,7 @@ def lines(folder):
     plan = 'format = "mimu-plan/1"\nsample_rate_hz = 100.0\ncarrier = "hands"\nlead_in_s = 30.0\n'
     plan += "".join(f"[[step]]\nup = {step['up']}\ndwell_s = 3.0\n" for step in [*first, *then, *first, *then, *then])
     (folder / "plan.toml").write_text(plan)
-    # White noise, so that nothing else is to be found in it.
+    # White noise, so that a diagnosis finds nothing else.
     still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n"
     rig = 'format = "mimu-rig/1"\nearth_rate = false\n[unit]\ngyro = "MPU6050-gyro"\naccel = "MPU6050-accel"\n'
     rig += f"[unit.gyro_axes]\n{still}[unit.accel_axes]\n{still}"
@@ -92,7 +92,7 @@ def lines(folder):
         for k, row in enumerate(csv.DictReader(file)):
             codes = [round(float(row[f"{sensor}_{axis}"])) for sensor in ["accel", "gyro"] for axis in "xyz"]
             line = ",".join(map(str, [700_000 + 10_000 * k, *codes])) + "\r\n"
-            # Not many: a turn with a sample missing cannot be integrated.
+            # Only a few: a turn with a missing sample cannot be integrated.
             if k % 7001 == 500:
                 continue
             written.append(line[20:] if k % 9001 == 700 else line)
@@ -100,7 +100,7 @@ def lines(folder):
 
 
 def assert_true(calibration):
-    """Asserts that a calibration's intervals hold the truth, as those of the command's session have to."""
+    """Asserts that a calibration's intervals contain the truth, as required of the command's session too."""
     inside = every = 0
     for sensor, (matrix, bias) in {"gyro": GYRO, "accel": ACCEL}.items():
         table = calibration[sensor]
@@ -113,11 +113,11 @@ def assert_true(calibration):
                 assert off < 2, (sensor, i, value, interval, truth)
                 every += 1
                 inside += off <= 1
-    # Of 21 intervals of 95 % five and more miss with a chance of 0.3 %.
+    # Of 21 intervals at 95 %, five or more miss with a probability of 0.3 %.
     assert inside + 4 >= every, (inside, every)
 
 
-# The port of the page: what a browser has at `navigator.serial`, with a board at its end that can be unplugged. `board` is for the tests.
+# The page's serial port: replaces `navigator.serial`, with a board that can be unplugged. `board` is for the tests.
 MOCK = """(() => {
   const board = (window.board = { lines: [], at: 0, perSecond: 100, held: false, refused: false, opened: [], garbage: null });
   const ports = new EventTarget();

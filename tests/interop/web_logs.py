@@ -1,4 +1,4 @@
-"""Logs for the tests of the page in the browser: made here, by no code of mimu."""
+"""Logs for the tests of the page in the browser, made here without code of mimu."""
 import numpy
 
 G = 9.80665

@@ -1,21 +1,20 @@
 #!/usr/bin/env bash
-# Compiles mimu-core for the target, fails if any path of it leads to a panic, and counts the instructions of what runs with every
-# sample.
+# Compiles mimu-core for the target, fails if a path can lead to a panic, and counts the instructions of the code that runs at every sample.
 # Usage: check.sh CARGO...
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
-# Assembly of everything, since what mimu-core calls must be seen as well; with one unit and no debug information it is code and nothing
-# else. In a directory of its own: the flags would have the caller's built anew.
+# Emits the assembly of all crates, because mimu-core's callees must be searched as well. With one codegen unit and no debug information it contains
+# only code. A separate target directory keeps these flags from rebuilding the caller's.
 RUSTFLAGS="-C target-cpu=cortex-m7 -C codegen-units=1 -C debuginfo=0 --emit=asm" \
     "$@" build --locked --quiet -p mimu-no-panic --release --target thumbv7em-none-eabihf --target-dir "$out"
 asm=("$out"/thumbv7em-none-eabihf/release/deps/*.s)
-# From the functions of mimu-no-panic along every call, branch and address, through data too (a table of functions, say). What is
-# reached and stands in no assembly is of the precompiled core, and has to be among those that are known: panics hide behind many names
-# (unwrap_failed, slice_index_fail, panic_bounds_check), so it is the harmless ones that are listed.
+# Starts at the functions of mimu-no-panic and follows every call, branch and address, also through data such as a table of functions. A symbol that
+# is reached but not found in the assembly belongs to the precompiled core, and must be in the list of harmless ones: panics have too many names to
+# list (unwrap_failed, slice_index_fail, panic_bounds_check).
 awk '
-    # Local labels are the function they stand in, unless they are data.
+    # A local label is part of the function that contains it, unless it labels data.
     function node(name) { return name ~ /^\.L/ ? FILENAME "|" name : name }
     function is_data(name) { return name ~ /^\.L(anon|switch|__unnamed)/ }
     /^[^ \t.#@][^ \t]*:/ || /^\.L(anon|switch|__unnamed)[^ \t]*:/ {
@@ -23,7 +22,7 @@ awk '
         if (at ~ /^_R[A-Za-z0-9_]*mimu_no_panic[0-9]+[a-z_]+$/) { reached[at] = 1; todo[++last] = at; functions++ }
         next
     }
-    # Functions of equal code are one with several names.
+    # Functions with equal code are merged into one with several names.
     $2 == "=" { name = node($1); defined[name] = 1; edges[name] = edges[name] " " node($3); next }
     at == "" { next }
     $1 ~ /^\.(section|type|size|globl|hidden|p2align|file|ident|fnstart|fnend|cantunwind|save|pad|setfp|vsave|eabi_attribute|ascii|asciz|string|zero|byte|short|text|syntax|code|thumb_func|cpu|fpu|weak|personality|handlerdata)/ { next }
@@ -53,7 +52,7 @@ awk '
         if (bad) exit 1
         print "no-panic check: " functions " functions of mimu-core, " last " reached, no path to a panic"
     }' "${asm[@]}" >&2
-# Instructions from entry to return, which is what runs: nothing in there may jump backwards or call.
+# Counts the instructions from entry to return. These equal the executed ones, because the code must not jump backwards or call.
 awk '/^_R[A-Za-z0-9_]*9mimu_core7effects3law[0-9]+[a-z_]+/ {
          name = $1; sub(/.*9mimu_core7effects3law[0-9]+/, "", name); sub(/f?E?(Cs|B[0-9]).*/, "", name); limit = 60; count = 0; delete seen; next
      }

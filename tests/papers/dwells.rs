@@ -1,4 +1,4 @@
-//! How many dwells a given sigma takes: designed poses against poses chosen by hand.
+//! How many dwells a required sigma needs: designed poses against poses chosen by hand.
 
 use mimu::estimate::Observation;
 use mimu::plan::design::Problem;
@@ -16,18 +16,18 @@ use nalgebra::Vector3;
 use crate::page::{Block, Table, significant};
 use crate::plot::{Band, Chart, Line, Mark};
 
-/// Poses of the session that the designs are measured against.
+/// Number of poses of the session by hand that the designs are compared with.
 const BY_HAND: usize = 38;
 /// Sessions by hand for each number of poses.
 const SESSIONS: u64 = 200;
-/// Numbers of dwells that are tried.
+/// Tested numbers of dwells.
 const NUMBERS: [usize; 20] = [
     4, 6, 8, 9, 10, 11, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30, 32, 36, 38, 48,
 ];
 
-/// Rms over the parameters of sigma times what it does at one g, in units of the noise of a dwell mean.
+/// Rms over the parameters of sigma times the parameter's effect at 1 g, in units of the noise of a dwell mean.
 ///
-/// `None` where the poses leave a parameter undetermined.
+/// `None` if the poses leave a parameter undetermined.
 fn sigma(problem: &Problem, poses: &[Setting]) -> Option<f64> {
     let judged = problem.judge(poses, 1.0);
     let squares: f64 = judged.parameters.iter().map(|p| p.sigma * p.sigma).sum();
@@ -35,7 +35,7 @@ fn sigma(problem: &Problem, poses: &[Setting]) -> Option<f64> {
     rms.is_finite().then_some(rms)
 }
 
-/// Poses as a person takes them, who has been told to take so many in all directions.
+/// Poses chosen by a person who was asked for that many in all directions.
 fn by_hand(poses: usize, seed: u64) -> Vec<Setting> {
     let text = format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = 10.0\ncarrier = \"hands\"\nsteps = true\n[[step]]\nposes = {poses}\ndwell_s = 2.0\n"
@@ -56,7 +56,7 @@ fn by_hand(poses: usize, seed: u64) -> Vec<Setting> {
     found
 }
 
-/// Lowest twentieth, middle and highest twentieth of the sessions' sigmas.
+/// 5th percentile, median and 95th percentile of the sessions' sigmas.
 fn sessions(problem: &Problem, poses: usize) -> [f64; 3] {
     let sigma = |seed| sigma(problem, &by_hand(poses, seed)).unwrap_or(f64::INFINITY);
     let mut all: Vec<f64> = (0..SESSIONS).map(sigma).collect();
@@ -73,7 +73,7 @@ fn published_session() -> Option<Vec<Setting>> {
     Some(ups.collect())
 }
 
-/// Fewest dwells of our designs that do as well, between the numbers tried.
+/// The smallest number of dwells with which our designs reach `sigma`, interpolated between the tested numbers.
 fn needed(ours: &[(f64, f64)], sigma: f64) -> Option<usize> {
     let first = ours.windows(2).find(|w| w[1].1 <= sigma)?;
     let [(n0, s0), (n1, s1)] = [first[0], first[1]];
@@ -179,7 +179,7 @@ fn study(
     (table, published, chart)
 }
 
-/// Tables, and the plots to draw: none without the published session, which is in them.
+/// Tables and plots. The plots need the published session; without it there are none.
 pub fn blocks() -> (Vec<Block>, Vec<Chart>) {
     let published = published_session();
     let (by_size, session_by_size, size_chart) = study(

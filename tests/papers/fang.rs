@@ -1,4 +1,4 @@
-//! fang, section 5.1: its Table 3 and noise, with the six and nine positions and with our own.
+//! fang, section 5.1: its Table 3 and noise, with its six and nine positions and with our own designs.
 
 use mimu::estimate::known_input::{kalman, least_squares, six_positions};
 use mimu::estimate::{Estimated, Observation};
@@ -21,7 +21,7 @@ const RUNS: u64 = 1000;
 /// Standard deviation of a reading, fang (35).
 const SIGMA: f64 = 1e-3;
 
-/// How a calibration is made of readings.
+/// How the readings are fitted.
 #[derive(Clone, Copy)]
 enum Estimator {
     Scalar,
@@ -31,11 +31,11 @@ enum Estimator {
     KalmanOfFour,
 }
 
-/// A scheme, the readings that each of its positions gets in units of what others get, and an estimator.
+/// A scheme, the number of readings in each of its positions relative to the other contenders, and an estimator.
 struct Contender {
     name: &'static str,
     positions: Vec<Vector3<f64>>,
-    /// Halves.
+    /// In halves: 2 is the full number.
     share: u32,
     estimator: Estimator,
 }
@@ -100,7 +100,7 @@ impl Contender {
 type Errors = [[f64; 3]; 4];
 
 fn physical(forward: &Forward, angles: Angles) -> [Vector3<f64>; 4] {
-    // The decomposition is all that is asked; it has no covariance.
+    // Only the decomposition is needed, so no covariance is given.
     let triad = mimu::triad::Triad::from_forward(*forward, Vec::new()).expect("regular");
     let Physical {
         scale,
@@ -143,7 +143,7 @@ fn estimate(contender: &Contender, dwells: &[Observation]) -> Forward {
     }
 }
 
-/// Means and scatters of the errors over the runs, `readings` of `truth` at each position.
+/// Means and scatters of the errors over the runs, with `readings` of `truth` at each position.
 fn monte_carlo(
     contender: &Contender,
     truth: &Ideal,
@@ -194,7 +194,7 @@ fn errors_of(truth: &Ideal, of_truth: &[Vector3<f64>; 4], angles: Angles, readin
     table
 }
 
-/// The decomposition of noiseless truth: what small angles do to angles that are not small.
+/// Decomposition of noiseless truth: the error of the small-angle approximation if the angles are not small.
 fn decompositions() -> Table {
     let mut table = Table::new(&[
         "unit made with",
@@ -276,8 +276,8 @@ fn table_3() -> [Vector3<f64>; 4] {
     [t.bias, t.scale, t.theta, t.beta].map(Vector3::from)
 }
 
-/// The same with scale factors and angles of the sensors' axes as directions: what (13) writes as 1 and β has the length
-/// √(1 + β²), which is part of the scale factor.
+/// The same for exact angles, with the scale factors of the sensors' true axes. An axis that (13) writes as 1 and β has the length √(1 + β²), which
+/// belongs to the scale factor.
 fn table_3_of_axes() -> [Vector3<f64>; 4] {
     let [bias, scale, theta, beta] = table_3();
     let lengths = Vector3::new(
@@ -294,7 +294,7 @@ fn table_3_of_axes() -> [Vector3<f64>; 4] {
     ]
 }
 
-/// Mean error over its standard error, the largest of all twelve parameters: whether an estimator is biased.
+/// The largest ratio of mean error to its standard error among all twelve parameters: shows whether an estimator is biased.
 fn biases() -> Table {
     let mut table = Table::new(&[
         "scheme and estimator",
@@ -324,7 +324,7 @@ fn biases() -> Table {
     table
 }
 
-/// All of it.
+/// All blocks of this study.
 pub fn blocks() -> Vec<Block> {
     let unit = linear();
     let block = |name, table| Block::table(name, &table);

@@ -1,4 +1,4 @@
-//! Whether the 95 % intervals hold the truth, over recordings from the virtual bench.
+//! Whether the 95 % intervals contain the truth, over recordings from the virtual bench.
 
 use mimu_tests::coverage::{Dwells, Tally, by_hand, with_a_table};
 
@@ -35,7 +35,7 @@ const NAMES: [&str; 4] = [
     "intervals, by hand",
 ];
 
-/// With a table in an order drawn by lot, as listed, as listed with the noise of the unit at rest; and by hand.
+/// On a table in random order, in the listed order, in the listed order with the noise of the unit at rest; and by hand.
 pub fn blocks() -> Vec<Block> {
     let hand = [by_hand(RUNS, false), by_hand(RUNS, true)].concat();
     let [randomised, listed, known] = [Dwells::ByLot, Dwells::AsListed, Dwells::AsListedWithNoise]
@@ -45,7 +45,7 @@ pub fn blocks() -> Vec<Block> {
     NAMES.into_iter().zip(&all).map(block).collect()
 }
 
-/// The same blocks as they are in the document.
+/// The same blocks, without text: the document keeps what it has.
 pub fn kept() -> Vec<Block> {
     NAMES.map(|name| Block { name, text: None }).into()
 }

@@ -1,8 +1,7 @@
-//! `make papers`: computes every figure of docs/papers.md and puts it in its place.
+//! `make papers`: computes every figure of docs/papers.md and inserts it.
 //!
-//! Prose in the document is written by people. Blocks between markers, and the plots, are made here: `papers` writes them,
-//! `papers --check` says whether they are as written. It leaves out the intervals, which take longest and which the tests
-//! judge.
+//! People write the prose. This program makes the plots and the blocks between markers: `papers` writes them, `papers --check` compares them with the
+//! document. The check omits the intervals, which take longest and have their own tests.
 
 mod dwells;
 mod fang;

@@ -1,11 +1,11 @@
-//! niu: its tables checked against each other, and the curves of the units that are made by them.
+//! niu: consistency of its tables, and curves of the units that are made from them.
 
 use crate::page::{Block, Table, significant};
 
-/// A row of a table: what of, and its figures.
+/// A row of a table: its name and its figures.
 type Row<const N: usize> = (&'static str, [f64; N]);
 
-/// Table 4, MTi-G: rms against the soak at -10, 10, 30, 50 and 70 °C, and the largest; deg/h, µg, ppm.
+/// Table 4, MTi-G: rms error against the soak at -10, 10, 30, 50 and 70 °C, and the largest; deg/h, µg, ppm.
 const TABLE_4: [Row<6>; 24] = [
     ("b_gx", [353.0, 214.0, 137.0, 87.0, 158.0, 353.0]),
     ("b_gy", [224.0, 85.0, 204.0, 286.0, 5.0, 286.0]),
@@ -33,7 +33,7 @@ const TABLE_4: [Row<6>; 24] = [
     ("m_zy", [85.0, 41.0, 55.0, 67.0, 123.0, 123.0]),
 ];
 
-/// Table 6, the same of the NV-IMU100.
+/// Table 6, the same for the NV-IMU100.
 const TABLE_6: [Row<6>; 24] = [
     ("b_gx", [5.0, 1.0, 1.0, 0.0, 2.0, 5.0]),
     ("b_gy", [0.0, 1.0, 1.0, 2.0, 3.0, 3.0]),
@@ -61,7 +61,7 @@ const TABLE_6: [Row<6>; 24] = [
     ("m_zy", [205.0, 112.0, 100.0, 110.0, 69.0, 205.0]),
 ];
 
-/// Table 9, A0 to A3 of MTi-G, then of NV-IMU100, T in °C, as printed; deg/h, µg, ppm.
+/// Table 9: A0 to A3 of the MTi-G, then of the NV-IMU100, as printed; T in °C; deg/h, µg, ppm.
 const TABLE_9: [Row<8>; 24] = [
     (
         "b_gx",
@@ -201,7 +201,7 @@ const TABLE_10: [Row<4>; 6] = [
     ("accel z", [1416.0, 1219.0, 1951.0, 1852.0]),
 ];
 
-/// Section 5.2 of the same: rms compensated and uncompensated.
+/// Section 5.2, MTi-G: rms compensated and uncompensated.
 const SECTION_5_2: [[f64; 2]; 6] = [
     [189.0, 279.0],
     [254.0, 197.0],
@@ -221,7 +221,7 @@ const TABLE_11: [Row<4>; 6] = [
     ("accel z", [5410.0, 4781.0, 6894.0, -4403.0]),
 ];
 
-/// Drifts over -10 to 70 °C that Tables 5 (MTi-G) and 7 (NV-IMU100) give, by the beginning of the names in Table 9.
+/// Drifts over -10 to 70 °C from Tables 5 (MTi-G) and 7 (NV-IMU100); the key is the beginning of the names in Table 9.
 const DRIFTS: [(&str, &str, [f64; 2]); 6] = [
     ("gyro bias, deg/h", "b_g", [2100.0, 13.0]),
     ("gyro scale factor, ppm", "δs_g", [11000.0, 10000.0]),
@@ -233,10 +233,10 @@ const DRIFTS: [(&str, &str, [f64; 2]); 6] = [
 
 /// Rate of the dynamic tests, 10 deg/s, in deg/h (Table 8 and 5.1).
 const RATE: f64 = 36000.0;
-/// The power of ten that two coefficients have lost.
+/// The power of ten that is missing in two coefficients.
 const MENDED: f64 = 1e-5;
 
-/// Coefficients of a row for a unit, 0 or 1, the third times `power` where it has lost its own.
+/// Coefficients of a row for a unit, 0 or 1. The third is multiplied by `power` if its own is missing.
 fn cubic(name: &str, unit: usize, power: f64) -> [f64; 4] {
     let row = TABLE_9.iter().find(|r| r.0 == name).expect("in Table 9").1;
     let mut a: [f64; 4] = std::array::from_fn(|k| row[4 * unit + k]);
@@ -246,7 +246,7 @@ fn cubic(name: &str, unit: usize, power: f64) -> [f64; 4] {
     a
 }
 
-/// Values of a cubic from -10 to 70 °C, every tenth of a kelvin.
+/// Values of a cubic from -10 to 70 °C, every 0.1 K.
 fn course(a: [f64; 4]) -> Vec<f64> {
     let at = |t: f64| a[0] + t * (a[1] + t * (a[2] + t * a[3]));
     (0..=800).map(|k| at(0.1 * f64::from(k) - 10.0)).collect()
@@ -264,7 +264,7 @@ fn moments(course: &[f64]) -> [f64; 2] {
     [course.iter().sum::<f64>() / n, (squares / n).sqrt()]
 }
 
-/// Rows of Tables 4 and 6 whose last figure is not the largest of the others.
+/// Rows of Tables 4 and 6 whose last figure is not the maximum of the others.
 fn maxima() -> Table {
     let mut table = Table::new(&["table", "row", "maximum, printed", "largest of the row"]);
     for (name, rows) in [("4", &TABLE_4), ("6", &TABLE_6)] {
@@ -280,7 +280,7 @@ fn maxima() -> Table {
     table
 }
 
-/// Largest drift of the axes by the cubics, against what Tables 5 and 7 give.
+/// Largest drift of the axes by the cubics, against Tables 5 and 7.
 fn drifts() -> Table {
     let mut table = Table::new(&[
         "drift of -10 to 70 °C",
@@ -308,7 +308,7 @@ fn drifts() -> Table {
     table
 }
 
-/// What powers of ten make of the two curves, and of the uncompensated error at 10 deg/s that Table 11 gives.
+/// How the power of ten changes the two curves and the uncompensated error at 10 deg/s, which Table 11 reports.
 fn powers() -> Table {
     let mut table = Table::new(&[
         "power of ten of A3",
@@ -346,7 +346,7 @@ fn powers() -> Table {
     table
 }
 
-/// Rows of Tables 10 and 11 with a mean beyond the root mean square, and where 5.2 gives other figures than Table 10.
+/// Rows of Tables 10 and 11 whose mean exceeds the root mean square, and differences between section 5.2 and Table 10.
 fn contradictions() -> Table {
     let mut table = Table::new(&["where", "row", "figure", "and the other"]);
     for (name, rows) in [("Table 10", &TABLE_10), ("Table 11", &TABLE_11)] {
@@ -368,7 +368,7 @@ fn contradictions() -> Table {
             ("compensated", after, said[0]),
             ("uncompensated", before, said[1]),
         ] {
-            // A last digit is rounding.
+            // A difference in the last digit is rounding.
             if (printed - said).abs() > 0.005 * printed {
                 let cells = [format!("{printed} in Table 10"), format!("{said} in 5.2")];
                 let row = format!("rms of {row}, {of}");
@@ -379,7 +379,7 @@ fn contradictions() -> Table {
     table
 }
 
-/// All of it.
+/// All blocks of this study.
 pub fn blocks() -> Vec<Block> {
     vec![
         Block::table("niu, maxima", &maxima()),

@@ -1,4 +1,4 @@
-//! The document: prose that people write, and between markers what this program computed.
+//! The document: prose that people write, and between markers the output of this program.
 
 use std::fmt::Write as _;
 
@@ -6,12 +6,12 @@ use std::fmt::Write as _;
 pub struct Block {
     /// Name in its markers.
     pub name: &'static str,
-    /// Markdown; `None` where the recording that it comes from is not at hand, and the document keeps what it has.
+    /// Markdown. `None` if the recording is not available: the document then keeps its text.
     pub text: Option<String>,
 }
 
 impl Block {
-    /// Of a table.
+    /// From a table.
     pub fn table(name: &'static str, table: &Table) -> Self {
         Self {
             name,
@@ -26,19 +26,19 @@ pub struct Table {
 }
 
 impl Table {
-    /// With the headings of its columns.
+    /// A table with these column headings.
     pub fn new(headings: &[&str]) -> Self {
         Self {
             rows: vec![headings.iter().map(ToString::to_string).collect()],
         }
     }
 
-    /// One more row.
+    /// Adds a row.
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(cells.into_iter().collect());
     }
 
-    /// As Markdown: the first column to the left, numbers to the right.
+    /// As Markdown: the first column left-aligned, numbers right-aligned.
     pub fn markdown(&self) -> String {
         let columns = self.rows[0].len();
         let width = |c: usize| {
@@ -73,7 +73,7 @@ impl Table {
     }
 }
 
-/// `x` to three significant digits, as the pages of the papers are written: an exponent from seven digits on.
+/// `x` to three significant digits, in the style of docs/papers.md: with an exponent from seven digits on.
 pub fn significant(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
@@ -85,7 +85,7 @@ pub fn significant(x: f64) -> String {
     }
 }
 
-/// `document` with every block in its place. Each block must have its place and each place its block.
+/// `document` with every block in its place. Blocks and places must match one to one.
 pub fn filled(document: &str, blocks: &[Block]) -> Result<String, String> {
     let mut out = document.to_string();
     for block in blocks {
@@ -115,7 +115,7 @@ pub fn filled(document: &str, blocks: &[Block]) -> Result<String, String> {
     Ok(out)
 }
 
-/// Whether two lines have the same words and, to 3 %, the same numbers: a machine whose sine rounds another way is no error.
+/// Whether two lines have the same words and the same numbers to 3 %. The tolerance allows for machines whose sine rounds differently.
 pub fn agree(a: &str, b: &str) -> bool {
     let words = |line: &str| -> Vec<String> {
         let cells = line.replace('|', " ");

@@ -34,7 +34,7 @@ pub struct Chart {
     pub marks: Vec<Mark>,
 }
 
-/// Colours that stay apart for the colour-blind (Okabe and Ito).
+/// Colours that colour-blind readers can distinguish (Okabe and Ito).
 const COLOURS: [RGBColor; 4] = [
     RGBColor(230, 159, 0),
     RGBColor(0, 114, 178),
@@ -43,7 +43,7 @@ const COLOURS: [RGBColor; 4] = [
 ];
 
 impl Chart {
-    /// Draws it into `folder`.
+    /// Draws the chart into `folder`.
     pub fn draw(&self, folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
         let path = folder.join(&self.file);
         let root = SVGBackend::new(&path, (860, 520)).into_drawing_area();
@@ -107,7 +107,7 @@ impl Chart {
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], style));
         }
         for mark in &self.marks {
-            // To the left of a mark in the right half, where its name would leave the picture.
+            // In the right half, the name is to the left of its mark; to the right it would leave the picture.
             let right = mark.at.0 * mark.at.0 > x.start * x.end;
             let (side, from) = if right {
                 (HPos::Right, -8)
@@ -137,7 +137,7 @@ impl Chart {
 fn ticks(low: f64, high: f64) -> Vec<f64> {
     let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
     let all = decades.flat_map(|d| [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0].map(|m| m * 10f64.powi(d)));
-    // Powers of ten by multiplication are off by a rounding, which a label would show.
+    // Powers of ten by multiplication have a rounding error, which a label would show.
     let tidy = all.map(|t| (t * 1e6).round() / 1e6);
     tidy.filter(|t| (low..=high).contains(t)).collect()
 }

@@ -10,7 +10,7 @@ use mimu_recording::Reference;
 
 use crate::page::{Block, Table, significant};
 
-/// Sigmas of the parameters that `belongs` picks, as one number or lowest to highest.
+/// Sigmas of the parameters that `belongs` selects: one number, or the lowest and the highest.
 fn sigmas(judged: &Judgement, belongs: impl Fn(&str) -> bool) -> String {
     let all = judged.parameters.iter();
     let picked = all.filter(|p| belongs(&p.parameter.name)).map(|p| p.sigma);
@@ -60,7 +60,7 @@ fn table(problem: &Problem, sensor: Sensor, sizes: &[usize]) -> Table {
     table
 }
 
-/// Tables for the accelerometer by both references and for the gyro.
+/// Tables for the accelerometer with both references, and for the gyro.
 pub fn blocks() -> Vec<Block> {
     let accel = |reference| {
         let model = Model::accel(reference, &Terms::default());

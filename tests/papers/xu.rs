@@ -14,8 +14,7 @@ use crate::page::{Block, Table, significant};
 /// Runs of the Monte Carlo.
 const RUNS: u64 = 1000;
 
-/// Table 1, five repeats: k_g11 to k_g33 by rows, then the offsets. The table says rad/s; deg/s is what agrees with
-/// its Table 3.
+/// Table 1, five repeats: k_g11 to k_g33 by rows, then the offsets. The table's unit is rad/s, but only deg/s agrees with its Table 3.
 const TABLE_1: [[f64; 5]; 12] = [
     [0.99974, 0.99973, 0.99973, 0.99970, 0.99969],
     [-0.01196, -0.01191, -0.01191, -0.01208, -0.01209],
@@ -31,7 +30,7 @@ const TABLE_1: [[f64; 5]; 12] = [
     [-0.29703, -0.41339, -0.30428, -0.36567, -0.37728],
 ];
 
-/// Table 2: k_a11 to k_a33 by rows, then the offsets, said to be in mg.
+/// Table 2: k_a11 to k_a33 by rows, then the offsets, according to the paper in mg.
 const TABLE_2: [[f64; 5]; 12] = [
     [0.96698, 0.96695, 0.96676, 0.96642, 0.96625],
     [0.01448, 0.01419, 0.01444, 0.01441, 0.01417],
@@ -77,7 +76,7 @@ fn averages(table: &[[f64; 5]; 12]) -> Affine<f64> {
     }
 }
 
-/// One of the two experiments: inputs in the paper's units, and how the paper's estimator turns noise into scatter.
+/// One of the two experiments: inputs in the paper's units, its repeats and its estimator.
 struct Experiment {
     inputs: Vec<Vector3<f64>>,
     table: &'static [[f64; 5]; 12],
@@ -122,7 +121,7 @@ impl Experiment {
         self.inputs.iter().enumerate().map(read).collect()
     }
 
-    /// Sigmas of the twelve parameters for noise of one in every dwell mean, by the estimator's own covariance.
+    /// Sigmas of the twelve parameters for dwell means with unit noise, from the estimator's own covariance.
     fn gains(&self) -> [f64; 12] {
         let mut random = Random::new(0, "xu gains");
         let unit = averages(self.table);
@@ -132,10 +131,10 @@ impl Experiment {
         std::array::from_fn(|k| found.inverse_covariance[(k, k)].sqrt() / tiny)
     }
 
-    /// Noise of a dwell mean of each axis that reproduces the five repeats best, and what scatters more.
+    /// For each axis the noise of a dwell mean that explains as much of the five repeats as possible, and for each parameter the remaining scatter.
     ///
-    /// Repeats are five, so a scatter is known to 35 %; noise of the dwells is the most that no scatter of its row
-    /// contradicts: the smallest ratio of scatter to gain.
+    /// Five repeats determine a scatter to 35 %. The noise is the largest that no scatter of its row contradicts: the smallest ratio of scatter to
+    /// gain.
     fn noise(&self) -> ([f64; 3], [f64; 12]) {
         let gains = self.gains();
         let row = |k: usize| if k < 9 { k / 3 } else { k - 9 };
@@ -154,7 +153,7 @@ impl Experiment {
         (sigma, rest)
     }
 
-    /// The unit as it is on one day: the averages, and what differs from repeat to repeat.
+    /// The unit on one day: the averages plus a random change from repeat to repeat.
     fn of_the_day(&self, rest: &[f64; 12], random: &mut Random) -> Affine<f64> {
         let mut unit = averages(self.table);
         for k in 0..12 {
@@ -175,7 +174,7 @@ fn names(letter: &str, offset: &str) -> [String; 12] {
     })
 }
 
-/// Scatter of the repeats against what one noise of the dwells makes of each parameter.
+/// Scatter of the repeats against the scatter that one noise of the dwell means causes in each parameter.
 fn repeats(experiment: &Experiment, names: &[String; 12], unit: &str) -> Table {
     let (sigma, _) = experiment.noise();
     let gains = experiment.gains();
@@ -225,8 +224,7 @@ fn simulated(experiment: &Experiment) -> [f64; 12] {
     squares.map(f64::sqrt)
 }
 
-/// Errors of the estimators against the unit of the day: rms over all elements of C, and over o, and the share of intervals that
-/// hold the truth.
+/// Errors of the estimators against the unit of the day: rms over all elements of C and over o, and the share of intervals that contain the truth.
 fn estimators(experiment: &Experiment) -> Table {
     let (sigma, rest) = experiment.noise();
     type Estimator = fn(&[Observation]) -> Result<Estimated, Failure>;
@@ -275,7 +273,7 @@ fn estimators(experiment: &Experiment) -> Table {
     table
 }
 
-/// Lowest and highest of input less output over the rates about one axis.
+/// Lowest and highest difference of input minus output over the rates about one axis.
 fn range(
     inputs: &[Vector3<f64>],
     about: usize,
@@ -289,13 +287,13 @@ fn range(
     })
 }
 
-/// Table 3 done again, before: with the averages of Table 1, and nothing else.
+/// Table 3 recomputed. Before calibration: from the averages of Table 1 alone.
 fn before_and_after() -> Table {
     let experiment = gyro();
     let unit = averages(experiment.table);
     let (sigma, rest) = experiment.noise();
     let c = unit.matrix.try_inverse().expect("regular");
-    // After: the range over the rates of one verification, mean of the ends over the runs.
+    // After calibration: the range over the rates of one verification; the ends are averaged over the runs.
     let mut after = [[[0.0; 2]; 3]; 3];
     for run in 0..RUNS {
         let mut random = Random::new(run, "xu after");
@@ -340,7 +338,7 @@ fn before_and_after() -> Table {
     table
 }
 
-/// How much regressing on the noisy side shrinks C: the largest singular direction of noise over signal.
+/// How much regression on the noisy side shrinks C: the largest ratio, among the axes, of noise variance to mean squared input.
 fn attenuation(experiment: &Experiment) -> f64 {
     let (sigma, _) = experiment.noise();
     let n = experiment.inputs.len();
@@ -351,7 +349,7 @@ fn attenuation(experiment: &Experiment) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// All of it.
+/// All blocks of this study.
 pub fn blocks() -> Vec<Block> {
     let (g, a) = (gyro(), accel());
     let block = |name, table| Block::table(name, &table);

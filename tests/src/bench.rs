@@ -1,4 +1,4 @@
-//! Units with known truth on the virtual bench, recorded and read the way a user's would be.
+//! Units with known truth on the virtual bench, recorded and read as a user's recordings are.
 
 use std::fmt::Write as _;
 
@@ -20,13 +20,13 @@ pub fn gyro(random: &mut Random) -> AffineFile {
     affine(5e-3f64.to_degrees(), 2.5, random)
 }
 
-/// The same of an accelerometer; lower triangular, so that its x axis and xy plane are the body's, which by hand nothing else
-/// defines.
+/// The same for an accelerometer. Its matrix is lower triangular, so its x axis and xy plane are the body's; by hand, nothing else defines the body's
+/// axes.
 pub fn accel(random: &mut Random) -> AffineFile {
     in_own_frame(affine(0.08, 1.65, random))
 }
 
-/// The model without what turns its frame: x along the sensor x, the xy plane through the sensor y.
+/// The model with its frame aligned to the sensors: x along the sensor x, the xy plane through the sensor y.
 pub fn in_own_frame(mut model: AffineFile) -> AffineFile {
     for i in 0..3 {
         for j in i + 1..3 {
@@ -56,8 +56,8 @@ pub fn parameters(model: &AffineFile) -> SVector<f64, 12> {
     mimu::triad::vector(&matrix, &Vector3::from(model.bias))
 }
 
-/// A unit of the usual parts with their noise, whose affine models are as given and whole, on a table without flaws on an
-/// Earth that does not turn: what is left for an interval to hold is noise.
+/// A unit of the usual parts with their noise and the given affine models, on a table without flaws on an Earth that does not turn. The only
+/// remaining errors are noise.
 pub fn clean(gyro: AffineFile, accel: AffineFile) -> RigFile {
     let mut file = RigFile {
         earth_rate: Some(false),
@@ -71,11 +71,10 @@ pub fn clean(gyro: AffineFile, accel: AffineFile) -> RigFile {
     file
 }
 
-/// Plan of six faces, four corners, and four rates about each axis, 3 s each at 100 Hz; in an order drawn by the
-/// seed, or as listed.
+/// Plan of six faces, four corners and four rates about each axis, 3 s each at 100 Hz; in random order by the seed, or as listed.
 ///
-/// Sensors wander, and what neighbouring dwells share of it goes into the parameters that their difference determines.
-/// Randomised, it is noise like any other.
+/// Sensor biases wander. Neighbouring dwells share this wander, so it enters the parameters that their difference determines. In random order it acts
+/// like any other noise.
 pub fn table_plan(order: Option<u64>) -> String {
     let mut steps = Vec::new();
     for axis in 0..3 {
@@ -108,8 +107,8 @@ pub fn table_plan(order: Option<u64>) -> String {
     plan
 }
 
-/// Plan of the faces, of rates about each axis upright, and of turns about the body's z axis, level and slanted, with a rate about the
-/// vertical besides or without one: gravity turns through the accelerometer, and the rate through the gyro; in an order drawn by the seed.
+/// Plan of the faces, of rates about each axis upright, and of turns about the body's z axis, level and slanted, with and without a rate about the
+/// vertical. Gravity turns through the accelerometer, and the rate through the gyro. The seed draws the order.
 pub fn turning_plan(seed: u64) -> String {
     let mut steps: Vec<([f64; 3], f64, f64)> = Vec::new();
     for axis in 0..3 {
@@ -142,9 +141,10 @@ pub fn turning_plan(seed: u64) -> String {
     plan
 }
 
-/// Plan of a record player: in `orientations` drawn by the seed a rest and 33 1/3 and 45 rpm, each off by the share in `off`, 5 s each at 100 Hz.
+/// Plan of a record player: in each of `orientations` random orientations a rest, 33 1/3 rpm and 45 rpm, 5 s each at 100 Hz. `off` gives the relative
+/// errors of the two rates.
 ///
-/// The first six have an axis near the vertical, as a phone lies on its faces and edges; the others lean on something.
+/// In the first six an axis is near the vertical, as when a phone lies on its faces and edges; in the others the unit leans on something.
 pub fn record_player_plan(orientations: usize, off: [f64; 2], seed: u64) -> String {
     let mut random = Random::new(seed, "orientations");
     let mut plan =
@@ -165,14 +165,14 @@ pub fn record_player_plan(orientations: usize, off: [f64; 2], seed: u64) -> Stri
     plan
 }
 
-/// Plan of so many poses by hand, 3 s each at 100 Hz.
+/// Plan of `poses` poses by hand, 3 s each at 100 Hz.
 pub fn hand_plan(poses: usize) -> String {
     format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\n[[step]]\nposes = {poses}\ndwell_s = 3.0\n"
     )
 }
 
-/// The recording of a plan in `recording`, a folder of a temporary one.
+/// The recording of a plan, in the folder `recording` of a temporary folder.
 pub fn written(plan: &str, file: &RigFile, seed: u64) -> tempfile::TempDir {
     let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
     let truth = RigTruth::resolve(file, seed).expect("a rig");
@@ -182,7 +182,7 @@ pub fn written(plan: &str, file: &RigFile, seed: u64) -> tempfile::TempDir {
     folder
 }
 
-/// The recording of a plan, of which nothing is known but the magnitude of the rates of `turntable`.
+/// The recording of a plan on a turntable: only the magnitudes of its rates are known.
 pub fn on_a_turntable(plan: &str, file: &RigFile, seed: u64, turntable: Turntable) -> Prepared {
     let folder = written(plan, file, seed);
     let recording = Recording::open(&folder.path().join("recording"));
@@ -199,11 +199,10 @@ pub fn recorded(plan: &str, file: &RigFile, seed: u64) -> Prepared {
     Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable")
 }
 
-/// What slow noise (bias instability, rate random walk) adds to the biases of gyro and accelerometer on the average of a
-/// recording: the same recording with and without, sample by sample, all else being the same bits.
+/// The average contribution of slow noise (bias instability, rate random walk) to the biases of gyro and accelerometer over a recording. It is the
+/// difference of two recordings, with and without slow noise and otherwise equal bit by bit.
 ///
-/// The bias of one session is all that the recording of one session can tell. That of 1/f noise over all sessions has
-/// no value that any average would tend to.
+/// A recording of one session can only determine the bias of that session. The average of 1/f noise over all sessions does not converge.
 pub fn wander(plan: &str, file: &RigFile, seed: u64) -> [[f64; 3]; 2] {
     let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
     let mut still = file.clone();
@@ -221,10 +220,10 @@ pub fn wander(plan: &str, file: &RigFile, seed: u64) -> [[f64; 3]; 2] {
     sums
 }
 
-/// What a unit reads at `at_s` beyond what it would read without an effect, which is a straight line of time: the effect is the one in
-/// `files[0]` that `files[1]` lacks. Raw.
+/// Difference that an effect makes to the readings at `at_s`, raw. `files[0]` has the effect and `files[1]` lacks it; the effect must be linear in
+/// time.
 ///
-/// By the line through all samples: a converter rounds each, and the first and the last alone gave half a count for a fifth of one.
+/// A line is fitted to all samples, because the converter rounds each: from the first and the last alone, a fifth of a count became half a count.
 pub fn drifted(plan: &str, files: [&RigFile; 2], seed: u64, at_s: f64) -> [[f64; 3]; 2] {
     let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
     let all = differences(&plan, files, seed);
@@ -240,7 +239,8 @@ pub fn drifted(plan: &str, files: [&RigFile; 2], seed: u64, at_s: f64) -> [[f64;
     })
 }
 
-/// Time, and what the first of two units reads more than the second: gyro and accelerometer, raw. All else is the same bits.
+/// Time, and the readings of the first unit minus those of the second: gyro and accelerometer, raw. Apart from the units, both runs are equal bit by
+/// bit.
 fn differences(plan: &Plan, files: [&RigFile; 2], seed: u64) -> Vec<(f64, [[f64; 3]; 2])> {
     let truths = files.map(|file| RigTruth::resolve(file, seed).expect("a rig"));
     let [with, without] = truths
@@ -257,7 +257,7 @@ fn differences(plan: &Plan, files: [&RigFile; 2], seed: u64) -> Vec<(f64, [[f64;
     each.collect()
 }
 
-/// Noise file with the true coefficients of a unit whose affine models are stated, in volts.
+/// Noise file with the true coefficients of a unit whose affine models are given, in volts.
 pub fn noise_file(file: &RigFile, seed: u64, period_s: f64) -> NoiseFile {
     let truth = RigTruth::resolve(file, seed).expect("a rig");
     let mut text = String::from(
@@ -268,7 +268,7 @@ pub fn noise_file(file: &RigFile, seed: u64, period_s: f64) -> NoiseFile {
     let models = [&file.unit.gyro_affine, &file.unit.accel_affine];
     for (k, sensor) in [&unit.gyro, &unit.accel].into_iter().enumerate() {
         let divider = [converter.gyro_divider, converter.accel_divider][k];
-        // A sample is the mean of so many conversions, each with the noise of the converter.
+        // A sample is the mean of several conversions, each with the noise of the converter.
         let conversion =
             converter.noise_codes * code_v / divider / f64::from(converter.conversions).sqrt();
         for (i, axis) in sensor.axes.iter().enumerate() {

@@ -1,7 +1,7 @@
-//! Units with an effect that nobody told the diagnosis of.
+//! Units with an effect that is not declared to the diagnosis.
 //!
-//! The truth is made by the bench, whose physics shares no code with the diagnosis; how large an effect is, is the
-//! difference of two recordings of the same unit, with and without it, all else being the same bits.
+//! The bench makes the truth; its physics share no code with the diagnosis. The size of an effect is the difference of two recordings of the same
+//! unit, with and without the effect and otherwise equal bit by bit.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -22,14 +22,13 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::bench;
 
-/// Plan of half an hour on a table in a chamber: faces, edges, corners and eight rates about each axis, all twice, in an order drawn
-/// by the seed, while the chamber warms by 15 °C and cools again.
+/// Plan of half an hour on a table in a chamber: faces, edges, corners and eight rates about each axis, all twice, in random order by the seed, while
+/// the chamber warms by 15 °C and cools again.
 pub fn plan(seed: u64) -> String {
     written_plan(seed, false)
 }
 
-/// The same with rates about the edges, and with turns about the body's z axis, level and slanted, with a rate about the vertical besides or
-/// without one.
+/// The same with rates about the edges, and with turns about the body's z axis, level and slanted, with and without a rate about the vertical.
 pub fn turning_plan(seed: u64) -> String {
     written_plan(seed, true)
 }
@@ -82,7 +81,7 @@ fn written_plan(seed: u64, turning: bool) -> String {
     plan
 }
 
-/// A unit with `ids`, the size of each drawn evenly in the logarithm over a decade around that of data sheets.
+/// A unit with the effects `ids`. The size of each is drawn from a log-uniform distribution over a decade around the data-sheet size.
 pub fn unit(ids: &[&str], seed: u64) -> RigFile {
     let mut random = Random::new(seed, "unit");
     let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
@@ -90,7 +89,7 @@ pub fn unit(ids: &[&str], seed: u64) -> RigFile {
     with_effects(file, ids, seed)
 }
 
-/// `file` with `ids`, the size of each drawn evenly in the logarithm over a decade around that of data sheets.
+/// `file` with the effects `ids`, sizes drawn as in [`unit`].
 pub fn with_effects(mut file: RigFile, ids: &[&str], seed: u64) -> RigFile {
     file.effect = ids
         .iter()
@@ -123,13 +122,13 @@ fn scale(value: &mut toml::Value, factor: f64) {
     }
 }
 
-/// Whether an effect of the bench is one that the diagnosis knows by name.
+/// Whether the diagnosis knows this effect of the bench by name.
 pub fn is_listed(id: &str) -> bool {
     effects::by_id(id).is_some()
 }
 
-/// Whether the effect `found` is what the bench's `id` does: codes that never come, converters of each axis, and a signed low byte
-/// are functions of the code.
+/// Whether the effect `found` describes the bench's effect `id`. Missing codes, separate converters for each axis and a signed low byte are all
+/// functions of the code.
 pub fn is_right(found: &str, id: &str) -> bool {
     let of_code = ["missing_codes", "converters", "sign_extension"]
         .iter()
@@ -143,27 +142,27 @@ pub fn is_right(found: &str, id: &str) -> bool {
 pub struct Case {
     /// Effects that it has.
     pub truth: Vec<String>,
-    /// Root mean square over the noise floor that each effect leaves in the dwell means after an affine fit.
+    /// For each effect, the rms of its residuals in the dwell means after an affine fit, over the noise floor.
     pub strength: Vec<f64>,
-    /// Effects that were accepted.
+    /// Accepted effects.
     pub found: Vec<String>,
     /// Verdict, or `refused`.
     pub verdict: &'static str,
     /// Sensor of the first effect.
     pub judged: Sensor,
-    /// Its error after over noise floor, held out.
+    /// Its held-out error with the effects, over the noise floor.
     pub after: f64,
-    /// The same with every fourth dwell held out, instead of blocks of time.
+    /// The same with every fourth dwell held out instead of blocks of time.
     pub interleaved: f64,
-    /// Error after, held out, of gyro and accelerometer, SI.
+    /// Held-out error with the effects, of gyro and accelerometer, SI.
     pub held_out: [f64; 2],
-    /// What was found and not accepted, and why.
+    /// Effects that were found but not accepted, with the reasons.
     pub rejected: Vec<String>,
-    /// What was left, in words.
+    /// Remaining errors, in words.
     pub left: Vec<String>,
 }
 
-/// How a unit of the suites is diagnosed.
+/// Options of the diagnosis in the suites.
 pub(crate) fn options() -> Options {
     Options {
         method: Method::LeastSquares,
@@ -172,11 +171,11 @@ pub(crate) fn options() -> Options {
     }
 }
 
-/// What remains of the difference between two recordings after an affine model, over the noise floor, of the sensor that has more.
+/// Rms of the difference between two recordings after an affine model, over the noise floor, for the sensor where it is larger.
 fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
     let of = |sensor: Sensor| {
         let (a, all) = (with.observations(sensor), without.observations(sensor));
-        // A dwell that the effect makes unusable is in one of them only.
+        // A dwell that the effect makes unusable is in only one of the recordings.
         let step = |p: &Prepared, o: &Observation| p.dwells.list[o.dwell].step;
         let pairs = a.into_iter().filter_map(|a| {
             let same = |b: &&Observation| step(without, b) == step(with, &a);
@@ -184,7 +183,7 @@ fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
         });
         let (mut a, mut b): (Vec<Observation>, Vec<Observation>) = pairs.unzip();
         let means = a.len();
-        // How the readings follow inputs that move; the inputs are the same.
+        // How the readings follow inputs that move; both recordings have the same inputs.
         let within = [with, without].map(|p| p.within_dwells(sensor));
         if within[0].len() == within[1].len() {
             let [of_with, of_without] = within;
@@ -210,9 +209,9 @@ fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
     if g.1 > a.1 { g } else { a }
 }
 
-/// Recording of the unit of a seed without any effect, which every effect of that seed is measured against.
+/// Recording of the seed's unit without any effect; every effect of that seed is compared with it.
 fn clean(plan: &str, file: &RigFile, seed: u64) -> Arc<Prepared> {
-    // Of one seed there is one plan of each kind, and they differ in length.
+    // Each seed has one plan of each kind, and the kinds differ in length.
     type Recorded = BTreeMap<(u64, usize), Arc<Prepared>>;
     static RECORDED: Mutex<Recorded> = Mutex::new(BTreeMap::new());
     let known = || RECORDED.lock().expect("nobody panics with it");
@@ -224,7 +223,7 @@ fn clean(plan: &str, file: &RigFile, seed: u64) -> Arc<Prepared> {
     known().entry(key).or_insert(recorded).clone()
 }
 
-/// A diagnosis that everything was said and drawn of: none may fail for what was found.
+/// A diagnosis whose text and drawings were all made: none of them may fail, whatever was found.
 pub fn reported(diagnosis: Diagnosis) -> Diagnosis {
     let report = DiagnosisResult::of(&diagnosis, &next(&diagnosis), None);
     let made = Made {
@@ -256,7 +255,7 @@ pub fn case(ids: &[&str], seed: u64) -> Case {
     case_on(&plan(seed), ids, seed)
 }
 
-/// The same on a plan of another kind.
+/// The same on another plan.
 pub fn case_on(plan: &str, ids: &[&str], seed: u64) -> Case {
     let file = unit(ids, seed);
     let with = bench::recorded(plan, &file, seed);
@@ -278,7 +277,7 @@ pub fn case_on(plan: &str, ids: &[&str], seed: u64) -> Case {
     let truth: Vec<String> = ids.iter().map(|id| (*id).into()).collect();
     let found: Diagnosis = match diagnose(with.into(), options()) {
         Ok(found) => found,
-        // An error so large that the readings no longer follow their inputs is refused before anything is diagnosed.
+        // If an error is so large that the readings no longer follow their inputs, the recording is refused before the diagnosis.
         Err(refusal) => {
             return Case {
                 truth,

@@ -1,7 +1,7 @@
-//! Units in somebody's hands, of three grades, with effects that nobody told the diagnosis of.
+//! Units recorded by hand, of three grades, with effects that are not declared to the diagnosis.
 //!
-//! The truth is made by the bench. What is judged is what a user would be told: which effects, which verdict, and intervals that hold
-//! the truth.
+//! The bench makes the truth. The judgement covers the output for the user: which effects, which verdict, and whether the intervals contain the
+//! truth.
 
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::fit::{Fit, fit};
@@ -15,7 +15,7 @@ use nalgebra::SVector;
 use crate::bench;
 use crate::blind::{options, reported, with_effects};
 
-/// What hands can show of an unit in some minutes: no steady rate, no temperature that comes and goes.
+/// Effects that a few minutes by hand can show: hands have no steady rate, and the temperature does not go up and down.
 pub const SHOWN: [&str; 10] = [
     "gyro_g_sensitivity",
     "gyro_scale_quadratic",
@@ -38,7 +38,7 @@ pub enum Grade {
     Consumer,
     /// The class of a STIM300: 0.0025 deg/s/√Hz (0.15 deg/√h), 0.5 deg/h; 100 µg/√Hz, 50 µg.
     ///
-    /// A gyro five times quieter reads in 100 samples a second of a hand's turns what lies between them: 5 arc seconds a turn.
+    /// A gyro five times quieter would be limited by its 100 samples per second: the hand's motion between them is worth 5 arc seconds a turn.
     Tactical,
 }
 
@@ -56,30 +56,30 @@ pub struct Case {
     pub grade: Grade,
     /// Whether the recording has the flaws of a real one.
     pub flawed: bool,
-    /// Root mean square over the noise that the weakest effect leaves behind the affine fit.
+    /// Rms that the weakest effect leaves after the affine fit, over the noise.
     pub strength: f64,
-    /// Effects that were accepted, each with those that it says the recording does not tell from it.
+    /// Accepted effects, each with those that the recording does not distinguish from it.
     pub found: Vec<Vec<String>>,
     /// Verdict, or `refused`.
     pub verdict: &'static str,
-    /// Parameters of C and o that were within their intervals, and all, of gyro and accelerometer.
+    /// Number of parameters of C and o inside their intervals, and number of all, of gyro and accelerometer.
     pub inside: [[u32; 2]; 2],
-    /// What was left, or why it was refused, in words.
+    /// Remaining errors, or the reason of the refusal, in words.
     pub left: Vec<String>,
 }
 
 impl Case {
-    /// Whether `found` is what the unit has, or what this recording cannot tell from it.
+    /// Whether `found` contains an effect of the unit, also as one that the recording does not distinguish.
     pub fn is_right(&self, found: &[String]) -> bool {
         self.truth.iter().any(|t| found.iter().any(|f| f == t))
     }
 
-    /// Whether every effect is named, and nothing else.
+    /// Whether all effects of the unit are named, and no others.
     pub fn is_named_alone(&self) -> bool {
         self.found.len() == self.truth.len() && self.found.iter().all(|f| self.is_right(f))
     }
 
-    /// Whether the verdict is that of what the unit has.
+    /// Whether the verdict is correct for the effects of the unit.
     pub fn has_right_verdict(&self) -> bool {
         let right = if self.truth.is_empty() {
             "clean"
@@ -97,7 +97,7 @@ fn counts(model: AffineFile, per_volt: f64) -> AffineFile {
     }
 }
 
-/// A unit of `grade` with `ids`, sizes drawn over a decade around that of data sheets; its affine models are stated.
+/// A unit of `grade` with the effects `ids`, sizes drawn over a decade around the data-sheet size; its affine models are given.
 pub fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
     let mut random = Random::new(seed, "unit");
     let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
@@ -122,7 +122,7 @@ pub fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
     with_effects(file, ids, seed)
 }
 
-/// One flaw of real recordings, another with each seed.
+/// One flaw of real recordings; the seed selects which.
 fn flaw(seed: u64) -> FlawsTruth {
     let none = FlawsTruth::default();
     match seed / 2 % 6 {
@@ -164,7 +164,7 @@ pub fn plan(seed: u64) -> String {
     )
 }
 
-/// What the affine fit of `with` leaves beyond that of `without`, over the noise, of the sensor that has more.
+/// Rms that the affine fit of `with` leaves in excess of that of `without`, over the noise, for the sensor where it is larger.
 fn strength(with: &Prepared, without: &Prepared) -> f64 {
     let chi = |prepared: &Prepared, sensor: Sensor| {
         let fit = fit(prepared.clone(), options()).ok()?;
@@ -179,7 +179,7 @@ fn strength(with: &Prepared, without: &Prepared) -> f64 {
     both[0].max(both[1])
 }
 
-/// How many of the intervals of C and o hold the truth; of `truths`, what is not a number is not judged.
+/// How many intervals of C and o contain the truth. Parameters whose truth is NaN are not judged.
 fn inside(fit: &Fit, truths: &[SVector<f64, 12>; 2]) -> [[u32; 2]; 2] {
     std::array::from_fn(|k| {
         let Some(found) = fit.sensor(Sensor::BOTH[k]) else {
@@ -226,7 +226,7 @@ pub(crate) fn case_of(
     });
     let strength = strengths.fold(f64::INFINITY, f64::min);
     let wander = bench::wander(plan, file, seed);
-    // A bias that drifts is that of the middle of the dwells.
+    // The true value of a drifting bias is its value in the middle of the dwells.
     let mut drift = [[0.0; 3]; 2];
     for k in (0..ids.len()).filter(|k| ids[*k].ends_with("_bias_drift")) {
         let mut less = file.clone();
@@ -277,8 +277,8 @@ pub(crate) fn case_of(
         left.chain(undecided.map(|u| format!("{}: {} {:.1}", u.id, u.law, u.difference)))
     });
     let accepted = || diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
-    // A bias is that at which its effect is zero: at 25 °C for one over temperature, the settled one for a warm-up. Beside a rival that the
-    // recording does not tell from the true effect it is another quantity than the truth's.
+    // A bias is defined where its effect is zero: at 25 °C for an effect of temperature, after settling for a warm-up. If a rival was accepted that
+    // the recording does not distinguish from the true effect, its bias is a different quantity and is not judged.
     for a in accepted().filter(|a| a.chosen.candidate.is_slow_bias()) {
         if ids.iter().all(|id| *id != a.chosen.candidate.id()) {
             let k = usize::from(a.chosen.candidate.sensor == Sensor::Accel);

@@ -1,4 +1,4 @@
-//! Whether 95 % intervals hold the truth in 95 % of the cases, parameter by parameter, over the whole path of a recording.
+//! Whether 95 % intervals contain the truth in 95 % of the cases, parameter by parameter, from recording to fit.
 
 use std::sync::Mutex;
 
@@ -13,12 +13,12 @@ use rayon::prelude::*;
 
 use crate::bench;
 
-/// How often the interval of each parameter held the truth, and the mean squared error in sigmas.
+/// How often the interval of each parameter contained the truth, and the mean squared error in sigmas.
 #[derive(Debug, Clone)]
 pub struct Tally {
     /// Estimator, sensor and experiment.
     pub name: String,
-    /// Which of the twelve parameters of the forward model the estimator finds.
+    /// Indices of the parameters, of the twelve of the forward model, that the estimator determines.
     pub free: Vec<usize>,
     inside: [u32; 12],
     squared: [f64; 12],
@@ -27,7 +27,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Nothing counted yet.
+    /// A tally without cases.
     pub fn new(name: impl Into<String>, free: &[usize]) -> Self {
         Self {
             name: name.into(),
@@ -50,7 +50,7 @@ impl Tally {
         }
     }
 
-    /// Share of the cases in which each free parameter was inside.
+    /// Share of the cases in which the interval of each free parameter contained the truth.
     pub fn shares(&self) -> Vec<f64> {
         let share = |i: &usize| f64::from(self.inside[*i]) / f64::from(self.runs);
         self.free.iter().map(share).collect()
@@ -91,7 +91,7 @@ fn triad(fit: &Fit, sensor: Sensor) -> &Triad {
     &fit.sensor(sensor).expect("recorded").estimated.triad
 }
 
-/// Forward models of gyro and accelerometer as they are on the average of the recording.
+/// Forward models of gyro and accelerometer with the average biases of the recording.
 fn of_the_session(plan: &str, file: &RigFile, seed: u64) -> [SVector<f64, 12>; 2] {
     let wander = bench::wander(plan, file, seed);
     let models = [&file.unit.gyro_affine, &file.unit.accel_affine];
@@ -104,7 +104,7 @@ fn of_the_session(plan: &str, file: &RigFile, seed: u64) -> [SVector<f64, 12>; 2
     })
 }
 
-/// Adds the cases of many seeds, side by side.
+/// Runs the cases of many seeds in parallel and adds them up.
 fn over(runs: u64, empty: &[Tally], case: impl Fn(u64, &mut [Tally]) + Sync) -> Vec<Tally> {
     let merged = |mut a: Vec<Tally>, b: Vec<Tally>| {
         a.iter_mut().zip(&b).for_each(|(a, b)| a.merge(b));
@@ -125,14 +125,14 @@ fn over(runs: u64, empty: &[Tally], case: impl Fn(u64, &mut [Tally]) + Sync) -> 
 pub enum Dwells {
     /// In a randomised order.
     ByLot,
-    /// As listed, axis by axis: neighbours share what the bias wanders, and differ along one axis only.
+    /// As listed, axis by axis: neighbouring dwells share the wander of the bias and differ along one axis only.
     AsListed,
     /// As listed, fitted with the noise of the unit at rest.
     AsListedWithNoise,
 }
 
-/// Every estimator for known inputs, both sensors, on recordings from a table. With the noise of the unit at rest the two
-/// that can use it.
+/// All estimators for known inputs, for both sensors, on recordings from a table. If the noise of the unit at rest is given, only the two that can
+/// use it.
 pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
     let methods = [
         ("least squares", Method::LeastSquares),
@@ -145,7 +145,7 @@ pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
         _ => &methods[..],
     };
     let all: Vec<usize> = (0..12).collect();
-    // Nothing but scale factors and biases is what six positions find.
+    // Six positions determine only scale factors and biases.
     let diagonal = [0, 4, 8, 9, 10, 11];
     let mut empty = Vec::new();
     for &(name, method) in methods {
@@ -178,8 +178,8 @@ pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
     })
 }
 
-/// Least squares of both sensors on recordings from a table that turns gravity through the accelerometer; with the errors of the delays
-/// in sigmas, gyro and accelerometer. A first-order filter delays a slow input by its time constant.
+/// Least squares for both sensors on recordings from a table that turns gravity through the accelerometer. Also returns the errors of the delays in
+/// sigmas, gyro and accelerometer; a first-order filter delays a slow input by its time constant.
 pub fn with_turning_inputs(runs: u64) -> (Vec<Tally>, [Vec<f64>; 2]) {
     let all: Vec<usize> = (0..12).collect();
     let empty = Sensor::BOTH.map(|s| Tally::new(format!("inputs that turn, {s}"), &all));
@@ -215,9 +215,8 @@ pub fn with_turning_inputs(runs: u64) -> (Vec<Tally>, [Vec<f64>; 2]) {
     (tallies, delays.into_inner().expect("nobody panics with it"))
 }
 
-/// Both sensors on recordings by hand, with nothing known but the magnitude of gravity. A gyro that is `quiet` beside
-/// its accelerometer shows whether the errors that all turns share, those of the accelerometer's calibration, are in its
-/// intervals.
+/// Both sensors on recordings by hand; only the magnitude of gravity is known. All turns share the errors of the accelerometer's calibration. A gyro
+/// that is `quiet` compared with the accelerometer shows whether its intervals include them.
 pub fn by_hand(runs: u64, quiet: bool) -> Vec<Tally> {
     let note = if quiet { ", quiet gyro" } else { "" };
     let all: Vec<usize> = (0..12).collect();
@@ -249,10 +248,10 @@ pub fn by_hand(runs: u64, quiet: bool) -> Vec<Tally> {
     })
 }
 
-/// Gyro and accelerometer on a record player, of whose rates the magnitude is known to within `rate_error` (95 %): each recording's two rates are off by
-/// errors of that size. With what they leave of the gyro's scale factors.
+/// Gyro and accelerometer on a record player. The magnitudes of its rates are known to within `rate_error` (95 %); each recording's two rates have
+/// errors of that size, which limit the gyro's scale factors.
 pub fn on_a_record_player(runs: u64, rate_error: f64) -> Vec<Tally> {
-    // A triad whose input is known by its magnitude defines the frame.
+    // A triad whose input is known only by its magnitude defines the frame.
     let lower = [0, 3, 4, 6, 7, 8, 9, 10, 11];
     let empty = Sensor::BOTH.map(|s| Tally::new(format!("record player, {s}"), &lower));
     over(runs, &empty, |seed, tallies| {

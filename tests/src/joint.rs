@@ -1,7 +1,7 @@
-//! Several sessions of one unit diagnosed together, and what the file that comes of it does to another session.
+//! Several sessions of one unit diagnosed together, and the effect of the resulting file on another session.
 //!
-//! The judge knows the true motion from the bench and shares nothing with the diagnosis: the file is written and read as the command does it,
-//! another session is compensated by it sample by sample (`mimu apply`), and rate and force are compared with the true ones.
+//! The judge knows the true motion from the bench and shares nothing with the diagnosis. The file is written and read as by the command, another
+//! session is compensated with it sample by sample (`mimu apply`), and rate and force are compared with the true ones.
 
 use mimu::calibration::Calibration;
 use mimu::calibration::apply::apply;
@@ -23,13 +23,13 @@ use crate::bench;
 use crate::blind::{options, reported};
 use crate::by_hand::{Grade, unit};
 
-/// Time of every file.
+/// Creation time of every file.
 const NOW: &str = "2026-01-01T00:00:00Z";
-/// Bias of a session beside that of the unit, standard deviation: deg/s and mg.
+/// Standard deviation of a session's bias from the unit's: deg/s and mg.
 const TURN_ON: [f64; 2] = [0.2, 3.0];
-/// A file is worse than another if its error is by more than this factor larger,
+/// A file is worse than another if its error is larger by more than this factor,
 const FACTOR: f64 = 1.05;
-/// and if what it has more, as a root of squares, is more than this share of what noise alone leaves in the same session.
+/// and if its excess (difference in squares) is more than the square of this share of the noise-only error in the same session.
 const SHARE_OF_NOISE: f64 = 0.5;
 
 /// One set of sessions.
@@ -43,7 +43,7 @@ pub struct Set {
     pub sessions: usize,
     /// On a table, or by hand.
     pub on_table: bool,
-    /// Share of the sessions that begin as the power comes. The others begin an hour later.
+    /// Share of the sessions that begin at power-on. The others begin an hour later.
     pub cold: f64,
     seed: u64,
 }
@@ -51,34 +51,34 @@ pub struct Set {
 /// Errors of a file on another session: gyro (deg/s over dwells on a table, degrees after a turn by hand), accelerometer (m/s² over dwells).
 pub type Errors = [f64; 2];
 
-/// How a file without effects and one with them do on another session.
+/// Errors of a file without effects and of one with effects on another session.
 #[derive(Debug, Clone, Copy)]
 pub struct Judged {
-    /// What noise alone leaves, the true model being known.
+    /// Error from noise alone, with the true model.
     pub noise: Errors,
-    /// Of the file without effects, and of that with them.
+    /// Error of the file without effects, and of the file with effects.
     pub of_files: [Errors; 2],
 }
 
-/// What became of a set.
+/// Result of a set.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// The set.
     pub set: Set,
-    /// Effects that were accepted, each with those that it says the recordings do not tell from it.
+    /// Accepted effects, each with those that the recordings do not distinguish from it.
     pub found: Vec<Vec<String>>,
     /// Verdict, or why the set was refused.
     pub verdict: String,
-    /// A session with the biases of the first of the set, the files as they are written.
+    /// On a session with the biases of the first session, files as written.
     pub as_written: Option<Judged>,
-    /// A session with biases of its own, a constant error of each axis taken out.
+    /// On a session with different biases, with the constant error of each axis removed.
     pub without_offset: Option<Judged>,
-    /// The same session, the files as they are written: the change of the biases is in both.
+    /// On that session, files as written: both errors include the change of the biases.
     pub own_biases: Option<Judged>,
 }
 
 impl Set {
-    /// That of a seed: effects and number of sessions in turn, all else drawn.
+    /// The set of a seed: effects and number of sessions cycle through their values; the rest is drawn at random.
     pub fn of(seed: u64) -> Self {
         let mut random = Random::new(seed, "joint set");
         let mut one_of = |all: &[&'static str]| all[(random.uniform() * all.len() as f64) as usize];
@@ -101,7 +101,7 @@ impl Set {
                 true => Grade::Analog,
                 false => Grade::Consumer,
             },
-            // 6 and 8 have a common factor: every kind of effects meets every number.
+            // 6 and 8 have a common factor; `seed / 6` makes every kind of effects meet every number.
             sessions: 2 + ((seed / 6 + seed) % 8) as usize,
             on_table: random.uniform() < 1.0 / 3.0,
             cold: [0.0, 0.5, 1.0][(random.uniform() * 3.0) as usize],
@@ -109,7 +109,7 @@ impl Set {
         }
     }
 
-    /// So many sessions by hand of a digital unit with nothing but a warm-up of the accelerometer, each recorded from the power on.
+    /// A set of `sessions` sessions by hand of a digital unit whose only effect is a warm-up of the accelerometer, each recorded from power-on.
     pub fn of_warm_up(sessions: usize, seed: u64) -> Self {
         Self {
             effects: vec!["accel_warm_up"],
@@ -137,7 +137,7 @@ impl Set {
         1000 * self.seed + session
     }
 
-    /// The unit in a session, with the biases of the session `biases`.
+    /// The unit in a session, with the biases of session number `biases`.
     fn unit(&self, session: u64, biases: u64) -> RigFile {
         let mut file = unit(&self.effects, self.grade, self.seed);
         let mut random = Random::new(self.session_seed(biases), "turn-on");
@@ -154,7 +154,7 @@ impl Set {
         file
     }
 
-    /// Records a session, which says when the power came.
+    /// Records a session, whose manifest states when the power came.
     fn recorded(&self, session: u64, biases: u64) -> Session {
         let file = self.unit(session, biases);
         let seed = self.session_seed(session);
@@ -180,7 +180,7 @@ impl Set {
     }
 }
 
-/// A recording with what is true of it.
+/// A recording and its truth.
 struct Session {
     folder: tempfile::TempDir,
     recording: Recording,
@@ -197,7 +197,7 @@ impl Session {
         Prepared::read(&self.recording, STILL_FACTOR, |_| ()).expect("readable")
     }
 
-    /// What `calibration` errs by, sample by sample.
+    /// Errors of `calibration`, sample by sample.
     fn errors(&self, calibration: &Calibration) -> Result<Vec<Sample>> {
         let out = self.folder.path().join("compensated");
         apply(
@@ -235,7 +235,7 @@ impl Session {
             .collect())
     }
 
-    /// What noise alone makes of a perfect calibration of a unit without effects.
+    /// Errors of a perfect calibration of a unit without effects: noise alone.
     fn noise(&self) -> Vec<Sample> {
         let mut file = self.file.clone();
         file.effect.clear();
@@ -262,10 +262,10 @@ impl Session {
         .collect()
     }
 
-    /// Root mean squares of the errors, as they are and without a constant error of each axis.
+    /// Root mean squares of the errors, as they are and with the constant error of each axis removed.
     fn rms(&self, samples: &[Sample]) -> [Errors; 2] {
         let on_table = matches!(self.plan.carrier, mimu_rig::plan::CarriedBy::Table);
-        // Sum and count of each dwell and of each turn between two.
+        // Sum and count of each dwell and of each turn between two dwells.
         let mut segments: Vec<(Option<u32>, [Vector3<f64>; 2], f64)> = Vec::new();
         for (errors, step) in samples {
             match segments.last_mut() {
@@ -281,7 +281,7 @@ impl Session {
             .filter(|s| s.0.is_some())
             .map(|(_, sums, count)| sums.map(|s| s / *count))
             .collect();
-        // The lead-in and the end are no turns.
+        // The lead-in and the end are not turns.
         let first = segments.iter().position(|s| s.0.is_some()).unwrap_or(0);
         let last = segments.iter().rposition(|s| s.0.is_some()).unwrap_or(0);
         let turns: Vec<(Vector3<f64>, f64)> = segments[first..last]
@@ -314,7 +314,7 @@ impl Session {
         })
     }
 
-    /// Errors of a file without effects and of one with them: as they are written, and without a constant error of each axis.
+    /// Errors of a file without effects and of one with them: as written, and with the constant error of each axis removed.
     fn judge(&self, files: &[Calibration; 2]) -> Result<[Judged; 2]> {
         let noise = self.rms(&self.noise());
         let without = self.rms(&self.errors(&files[0])?);
@@ -332,7 +332,7 @@ impl Judged {
         [0, 1].map(|k| self.of_files[1][k] / self.of_files[0][k])
     }
 
-    /// Of which sensors the file with effects is worse, by more than noise.
+    /// For each sensor, whether the file with effects is worse by more than noise.
     pub fn is_worse(&self) -> [bool; 2] {
         [0, 1].map(|k| {
             let [without, with] = self.of_files.map(|e| e[k]);
@@ -343,7 +343,7 @@ impl Judged {
 }
 
 impl Case {
-    /// Whether `found` is what the unit has, or what the recordings cannot tell from it. The Earth turns.
+    /// Whether `found` contains an effect of the unit, also as one that the recordings do not distinguish. The Earth's rotation is always right.
     pub fn is_right(&self, found: &[String]) -> bool {
         let is_true = |f: &String| f == "earth_rate" || self.set.effects.iter().any(|t| f == t);
         found.iter().any(is_true)
@@ -359,7 +359,7 @@ impl Case {
     }
 }
 
-/// A file, as a command writes it and another one reads it.
+/// A file after one command has written it and another has read it.
 fn written(made: &Calibration) -> Result<Calibration> {
     Calibration::parse(&made.to_toml(), "cal.toml")
 }

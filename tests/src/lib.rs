@@ -3,15 +3,15 @@
 //! | where                  | what                                                              |
 //! |------------------------|-------------------------------------------------------------------|
 //! | [`mod@bench`]          | units with known truth on the virtual bench, read as a user's would be |
-//! | [`blind`], [`by_hand`] | units with undeclared effects, on a table and in the hand         |
-//! | [`joint`]              | several sessions of one unit together, and their file on another one |
-//! | [`slow_bias`]          | units by hand whose biases move with time, with temperature, and behind it |
-//! | [`coverage`]           | how often intervals hold the truth, over the whole path of a recording |
+//! | [`blind`], [`by_hand`] | units with undeclared effects, on a table and by hand             |
+//! | [`joint`]              | several sessions of one unit together, and their file on another session |
+//! | [`slow_bias`]          | units by hand whose biases move with time or temperature, at once or with a lag |
+//! | [`coverage`]           | how often intervals contain the truth, from recording to fit      |
 //! | [`recordings`]         | recordings by other people                                        |
 //! | `tests/all/`           | agreement of estimators, intervals, diagnosis, published results  |
 //! | `papers/`, `blind/`    | figures of `docs/papers.md`; units with undeclared effects        |
-//! | `board/`, `counted/`, `no_panic/` | crates of their own: the firmware's image on the emulated board, what its loops cost, what cannot panic |
-//! | `example.sh`, `example/` | what `make example` runs, and the small recording that it falls back on |
+//! | `board/`, `counted/`, `no_panic/` | separate crates: the firmware's image on the emulated board, the cost of its loops, freedom from panics |
+//! | `example.sh`, `example/` | the commands of `make example`, and the small recording that it uses if no other is there |
 
 pub mod bench;
 pub mod blind;

@@ -1,4 +1,4 @@
-//! Recordings by other people: found, imported and fitted the way a user does it.
+//! Recordings by other people, found, imported and fitted as by a user.
 
 use std::path::{Path, PathBuf};
 
@@ -12,8 +12,7 @@ use mimu_recording::{ImportOptions, RawUnit, Recording, Reference, import};
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 use tempfile::TempDir;
 
-/// The folder of the data set `name`, below `$MIMU_DATA` or beside the repository; `None`, and a line that says so,
-/// where the data are not.
+/// The folder of the data set `name`, below `$MIMU_DATA` or beside the repository. `None`, and a printed line, if the data are missing.
 pub fn data_set(name: &str) -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let all = std::env::var_os("MIMU_DATA").map_or(beside, PathBuf::from);
@@ -25,7 +24,7 @@ pub fn data_set(name: &str) -> Option<PathBuf> {
     None
 }
 
-/// A foreign recording as its owner would describe it on the command line of `mimu import`.
+/// A foreign recording, described as on the command line of `mimu import`.
 #[derive(Debug, Clone)]
 pub struct Foreign<'a> {
     /// Files with their `--columns`.
@@ -38,7 +37,7 @@ pub struct Foreign<'a> {
     pub raw_unit: RawUnit,
     /// `--scale`.
     pub scales: &'a [&'a str],
-    /// Text of the file for `--inputs`; with it the reference is a table, without it gravity.
+    /// Contents of the file for `--inputs`. With it the reference is a table, without it gravity.
     pub inputs: Option<&'a str>,
 }
 
@@ -73,7 +72,7 @@ impl Foreign<'_> {
         Recording::open(&out)
     }
 
-    /// Imports it, finds its dwells and fits it by `method`, judged by four blocks left out in turn.
+    /// Imports it, finds its dwells and fits it by `method`; four blocks are held out in turn.
     pub fn fit(&self, method: Method) -> Result<Fit> {
         let folder = TempDir::new().expect("there is a temporary folder");
         let recording = self.import(&folder)?;
@@ -87,7 +86,7 @@ impl Foreign<'_> {
     }
 }
 
-/// The session with an Xsens MTi that was published with IMU-TK, calibrated; `None` where the data are not.
+/// The session with an Xsens MTi that was published with IMU-TK, calibrated; `None` if the data are missing.
 pub fn xsens() -> Option<Fit> {
     let folder = data_set("imu_tk_xsens")?;
     let foreign = Foreign {
@@ -104,7 +103,7 @@ pub fn xsens() -> Option<Fit> {
     Some(foreign.fit(Method::LeastSquares).expect("it can be fitted"))
 }
 
-/// One of the five MPU-9150 of A. Mikov et al. (ICINS 2020), calibrated; `None` where the data are not.
+/// One of the five MPU-9150 of A. Mikov et al. (ICINS 2020), calibrated; `None` if the data are missing.
 pub fn mikoff(unit: usize) -> Option<Fit> {
     let file = data_set("mikoff_mpu9150x5")?.join(format!("imu{unit}.log"));
     let foreign = Foreign {
@@ -120,8 +119,8 @@ pub fn mikoff(unit: usize) -> Option<Fit> {
 
 /// `matrix = U Q` with U upper triangular, its diagonal positive, and Q orthogonal.
 ///
-/// Where gravity is the only reference the frame is a convention: mimu's has a lower triangular matrix, others' an
-/// upper triangular one. `Q` takes mimu's frame into theirs.
+/// If gravity is the only reference, the frame is a convention: mimu has a lower triangular matrix, others an upper triangular one. `Q` transforms
+/// mimu's frame into theirs.
 pub fn upper_triangular_frame(matrix: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     // Reversing rows and columns turns an upper triangle into a lower one, which the QR factorization of the transpose gives.
     let reverse = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
@@ -139,20 +138,20 @@ pub fn upper_triangular_frame(matrix: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f
     (u, q)
 }
 
-/// Inverse models of accelerometer and gyro with their joint covariance, for carrying both to another convention.
+/// Inverse models of accelerometer and gyro with their joint covariance, for conversion to another convention.
 #[derive(Debug, Clone)]
 pub struct Models {
     parameters: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// What it is the sum of, and the degrees of freedom of each.
+    /// The terms of the covariance, each with its degrees of freedom.
     parts: Vec<(DMatrix<f64>, f64)>,
 }
 
 impl Models {
-    /// Those of a fit with both sensors.
+    /// The models of a fit with both sensors.
     ///
-    /// The gyro is fitted in the frame that the accelerometer's estimate defines, as if that were exact, so the two
-    /// covariances are independent of each other.
+    /// The gyro is fitted in the frame that the accelerometer's estimate defines, as if that frame were exact. So the two covariances are
+    /// independent.
     pub fn of(fit: &Fit) -> Self {
         use mimu::quantity::Sensor::{Accel, Gyro};
         let triads = [Accel, Gyro].map(|s| {
@@ -191,7 +190,7 @@ impl Models {
         })
     }
 
-    /// Value, sigma and half of a 95 % interval of everything that `convention` makes of the inverse models of accelerometer and gyro.
+    /// Value, sigma and half of a 95 % interval of each quantity that `convention` computes from the inverse models of accelerometer and gyro.
     pub fn in_convention(
         &self,
         convention: impl Fn(&Affine<f64>, &Affine<f64>) -> Vec<f64>,
@@ -203,7 +202,7 @@ impl Models {
         let values = evaluate(&self.parameters);
         let mut jacobian = DMatrix::zeros(values.len(), 24);
         for k in 0..24 {
-            // A sigma: where the convention is not linear over it, neither is the interval.
+            // The step is one sigma: if the convention is not linear over it, the interval is not either.
             let step = self.covariance[(k, k)].sqrt();
             if step == 0.0 {
                 continue;
@@ -224,7 +223,7 @@ impl Models {
     }
 }
 
-/// Samples as the foreign file has them, for integrating them without mimu.
+/// Samples as in the foreign file, to integrate them without mimu.
 #[derive(Debug, Clone, Default)]
 pub struct Samples {
     /// Time, s.
@@ -235,7 +234,7 @@ pub struct Samples {
     pub accel: Vec<Vector3<f64>>,
 }
 
-/// All numbers of a file with white space or commas between them, row by row; lines that hold none are left out.
+/// All numbers of a file, separated by white space or commas, row by row. Lines without numbers are skipped.
 pub fn numbers(file: &Path) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(file).expect("the file was there a moment ago");
     let row = |line: &str| {
@@ -250,7 +249,7 @@ pub fn numbers(file: &Path) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// First row and row after the last of every dwell that both sensors can use.
+/// Row range of every dwell that both sensors can use.
 pub fn dwell_rows(fit: &Fit) -> Vec<std::ops::Range<usize>> {
     let usable = fit.prepared.dwells.list.iter().filter(|d| {
         mimu::quantity::Sensor::BOTH
@@ -263,8 +262,8 @@ pub fn dwell_rows(fit: &Fit) -> Vec<std::ops::Range<usize>> {
 }
 
 impl Samples {
-    /// Rotation of the body from one sample to another, by a chain of quaternions with the mean rate of neighbours.
-    /// It takes a vector from the frame at `to` into that at `from`.
+    /// Rotation of the body from one sample to another: a chain of quaternions with the mean rate of neighbouring samples. It transforms a vector
+    /// from the frame at `to` into that at `from`.
     pub fn rotation(&self, gyro: &Affine<f64>, from: usize, to: usize) -> UnitQuaternion<f64> {
         (from..to).fold(UnitQuaternion::identity(), |q, k| {
             let rate = gyro.apply(&((self.gyro[k] + self.gyro[k + 1]) * 0.5));
@@ -278,7 +277,7 @@ impl Samples {
         accel.apply(&(sum / dwell.len() as f64))
     }
 
-    /// Angle (rad) between the direction of gravity carried through each turn and that measured after it.
+    /// Angle (rad) between the direction of gravity propagated through each turn and the direction measured after it.
     pub fn direction_errors(
         &self,
         dwells: &[std::ops::Range<usize>],
@@ -296,18 +295,18 @@ impl Samples {
     }
 }
 
-/// What `mimu verify` says of a calibration by other people.
+/// Result of `mimu verify` for a calibration by other people.
 #[derive(Debug, Clone, Copy)]
 pub struct Verification {
-    /// Size of gravity over dwell means, m/s².
+    /// Error of the magnitude of specific force over dwell means, m/s².
     pub size_mps2: f64,
-    /// Direction of gravity after turns, rad.
+    /// Error of the direction of gravity after turns, rad.
     pub direction_rad: f64,
     /// Rate at rest over dwell means, rad/s.
     pub rest_rps: f64,
 }
 
-/// Judges the calibration `accel`, `gyro` (raw to SI) by the dwells and turns of `fit`.
+/// Judges the calibration `accel`, `gyro` (raw to SI) with the dwells and turns of `fit`.
 pub fn verdict(fit: &Fit, accel: &Affine<f64>, gyro: &Affine<f64>) -> Result<Verification> {
     use mimu::calibration::Calibration;
     let mut calibration = Calibration::of(fit, &[], "2020-01-01T00:00:00Z")?;

@@ -1,7 +1,7 @@
-//! Units by hand whose biases move slowly: with time, evenly or in a bend, with temperature, and behind it.
+//! Units by hand whose biases move slowly: linearly or exponentially in time, or with temperature, at once or with a lag.
 //!
-//! These are each other's rivals. Every size is many times the noise of a dwell, so that what a diagnosis names is a matter of its
-//! judgement and not of luck.
+//! These effects can be mistaken for each other. Every size is many times the noise of a dwell, so the named effect depends on the diagnosis and not
+//! on chance.
 
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile};
@@ -9,7 +9,7 @@ use mimu_rig::unit::TemperatureSensor;
 
 use crate::by_hand::{Case, Grade, case_of, plan, unit};
 
-/// What moves the bias, and what the recording shows besides.
+/// What moves the bias, and what else happens in the recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// Linear in time, of a unit that has been on for an hour.
@@ -22,11 +22,11 @@ pub enum Kind {
     AccelEvenDrift,
     /// Exponential, of the accelerometer.
     AccelBentDrift,
-    /// Linear in the temperature that is reported, in a chamber that warms and cools.
+    /// Linear in the reported temperature, in a chamber that warms and cools.
     StraightOverTemperature,
     /// With a curvature of 1 % a kelvin.
     BentOverTemperature,
-    /// Linear in the temperature, and a part that follows it late.
+    /// Linear in the temperature, plus a part that follows the temperature with a lag.
     LagBesideBias,
 }
 
@@ -80,7 +80,7 @@ impl Kind {
         self.in_chamber() || matches!(self, Self::EvenDrift | Self::AccelEvenDrift)
     }
 
-    /// 3 to 5 minutes of a warm desk, or 9 minutes in which the unit warms by some 15 K and cools again.
+    /// 3 to 5 minutes on a warm desk, or 9 minutes in which the unit warms by some 15 K and cools again.
     fn plan(self, seed: u64) -> String {
         if !self.in_chamber() {
             return plan(seed);
@@ -97,7 +97,7 @@ impl Kind {
             file.thermal.on_before_s = Some(3600.0);
         }
         if self.in_chamber() {
-            // Thermometer and dies are of one temperature, so that what lags is the effect alone.
+            // Thermometer and dies have the same temperature, so the only lag is the effect's.
             file.thermal.board_lag_s = Some(40.0);
             file.thermal.die_lag_s = Some([5.0; 4]);
             file.thermal.die_heating_c = Some([1.0; 4]);
@@ -113,7 +113,7 @@ impl Kind {
         file
     }
 
-    /// Parameters of its effect `k`. A dwell of 2.5 s has a noise of 0.04, 0.003 and 0.002 deg/s and of 0.2, 0.2 and 0.07 mg.
+    /// Parameters of its effect number `k`. A dwell of 2.5 s has a noise of 0.04, 0.003 and 0.002 deg/s and of 0.2, 0.2 and 0.07 mg by grade.
     fn parameters(self, k: usize, grade: Grade, seed: u64) -> toml::Table {
         let mut random = Random::new(seed, &format!("{} {k}", self.name()));
         let [dwell_dps, dwell_mg] = match grade {
@@ -121,7 +121,7 @@ impl Kind {
             Grade::Consumer => [0.003, 0.2],
             Grade::Tactical => [0.002, 0.07],
         };
-        // Of the whole recording, 8 to 40 times the noise of a dwell.
+        // Over the whole recording, 8 to 40 times the noise of a dwell.
         let times = 8.0 * 5f64.powf(random.uniform());
         let mut axes = |size: f64| {
             let one = |_| {
@@ -130,7 +130,7 @@ impl Kind {
             };
             toml::Value::Array((0..3).map(one).collect())
         };
-        // About as long as the shortest of these recordings.
+        // About the length of the shortest of these recordings.
         let session_s = 180.0;
         let mut table = toml::Table::new();
         let mut add = |key: &str, value| table.insert(key.into(), value);

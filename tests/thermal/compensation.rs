@@ -1,7 +1,7 @@
 //! niu, section 5: three tests at 10 deg/s and three at rest while the chamber goes from -10 to 70 °C in an hour, compensated as a device does.
 //!
-//! The units are niu's, behind sensors with outputs in volts, as the device has them. The calibration is that of `mimu thermal fit` on niu's
-//! own ramp; it is encoded and decoded as for the device, and applied in single precision by the code that the firmware runs.
+//! The units are niu's, behind sensors with outputs in volts, as on the device. `mimu thermal fit` on niu's own ramp makes the calibration. It is
+//! encoded and decoded as for the device, and applied in single precision by the code that the firmware runs.
 
 use std::path::Path;
 
@@ -20,17 +20,17 @@ use rayon::prelude::*;
 
 use crate::on_bench::{read, session, unit};
 
-/// Volts per rad/s and per m/s² of the parts that stand in, and their volts without input.
+/// Volts per rad/s and per m/s² of the replacement parts, and their volts without input.
 const GAIN: [f64; 2] = [0.2865, 0.08];
 const NULL_V: [f64; 2] = [2.5, 1.65];
 /// Names of the tests as plans for the emulated board.
 const PLANS: [&str; 6] = [
     "gyro-x", "gyro-y", "gyro-z", "accel-x", "accel-y", "accel-z",
 ];
-/// Samples between two looks at the temperature: 20 ms, a batch of the device.
+/// Samples between two temperature updates: 20 ms, a batch of the device.
 const FOLLOW: usize = 2;
 const RATE_HZ: usize = 100;
-/// Length of a test, s, and of those on the emulated board, which take nearly as long as the real ones.
+/// Length of a test, s, and of a test on the emulated board, which runs at nearly real time.
 const HOUR_S: f64 = 3600.0;
 const QUICK_S: f64 = 1200.0;
 /// Lag of the dies behind the thermometer, s, gyro and accelerometer, as in the rig files.
@@ -38,7 +38,7 @@ const DIE_LAG_S: [f64; 2] = [60.0, 30.0];
 /// deg/h and µg.
 const UNITS: [f64; 2] = [180.0 / std::f64::consts::PI * 3600.0, 1e6 / 9.80665];
 
-/// Mean and rms of one test, raw, compensated, and as the curves of Table 9 have it at the temperatures of the test.
+/// Mean and rms of one test: raw, compensated, and by the curves of Table 9 at the temperatures of the test.
 struct Outcome {
     name: String,
     raw: [f64; 2],
@@ -47,7 +47,7 @@ struct Outcome {
     range_c: [f64; 2],
 }
 
-/// Prints both units' tests. Into `folder`, where there is one, go rig files and quicker plans for the emulated board.
+/// Prints the tests of both units. If `folder` is given, writes rig files and shorter plans for the emulated board into it.
 pub fn run(folder: Option<&Path>) {
     for (name, rig) in [("MTi-G", "niu-mtig"), ("NV-IMU100", "niu-nv")] {
         let file = unit(&on_board(&read(&format!("rigs/{rig}.toml"))), 1);
@@ -108,7 +108,7 @@ fn write(folder: &Path, name: &str, text: &str) {
     std::fs::write(folder.join(name), text).expect("a folder to write to");
 }
 
-/// niu's unit behind parts with outputs in volts, with a supply and a reference that are nominal, on a table that turns about any axis.
+/// niu's unit behind parts with outputs in volts, with nominal supply and reference, on a table that turns about any axis.
 fn on_board(rig: &str) -> String {
     let matrix =
         |gain: f64| format!("[[{gain:?}, 0.0, 0.0], [0.0, {gain:?}, 0.0], [0.0, 0.0, {gain:?}]]");
@@ -153,7 +153,7 @@ fn plan(test: usize, ramp_s: f64) -> String {
 fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
     let (sensor, axis) = (k / 3, k % 3);
     let mut file = file.clone();
-    // niu's table has two axes, on which x and y are never upright and turning.
+    // niu's table has two axes, on which x and y cannot be upright and turn.
     file.table.axes = 3;
     let truth = RigTruth::resolve(&file, 1).expect("a rig");
     let plan = Plan::parse(Source::new("plan", plan(k, HOUR_S))).expect("a plan");

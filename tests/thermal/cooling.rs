@@ -1,19 +1,18 @@
-//! A cubesat's gyro in a chamber that only cools (`pan_tvac_gyro`): lines against curvature, of bursts that were not fitted.
+//! A cubesat's gyro in a chamber that only cools (`pan_tvac_gyro`): lines against curves, judged on bursts that were not fitted.
 //!
-//! The program refuses curvature of a span below 20 K and never gets so far. Here the curves of the estimators go through the means of the
-//! bursts all the same, beside bare polynomials, which bend on outside the temperatures that they were fitted to, where the estimators'
-//! curves go on along their slope.
+//! The program refuses to fit curvature over a span below 20 K. Here the curves of the estimators are fitted to the means of the bursts all the same,
+//! beside bare polynomials. Outside the fitted temperatures the polynomials continue to bend, and the estimators' curves continue along their slope.
 
 use mimu::quantity::Sensor;
 use mimu_thermal::basis::Shape;
 use mimu_thermal::points::{Point, curves};
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// Silence that parts two bursts, ms.
+/// A pause of this length separates two bursts, ms.
 const APART_MS: f64 = 10_000.0;
 /// Parts that are held out in turn: the bursts k, k + 4, k + 8 and so on.
 const PARTS: usize = 4;
-/// Noise of a burst's mean, rad/s: what the estimators' smoothness is weighed by.
+/// Noise of a burst's mean, rad/s, against which the estimators weigh smoothness.
 const BURST: f64 = 2e-5;
 
 /// Mean of a burst.
@@ -24,7 +23,7 @@ struct Burst {
     variance: Vector3<f64>,
 }
 
-/// The bursts of the recording; none where there are no recordings.
+/// The bursts of the recording; `None` if the data are missing.
 fn bursts() -> Option<Vec<Burst>> {
     let beside = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let all = std::env::var_os("MIMU_DATA").map_or(beside, Into::into);
@@ -40,7 +39,7 @@ fn bursts() -> Option<Vec<Burst>> {
             samples.push(Vec::new());
         }
         before = ms;
-        // Signed 16-bit counts, 172 of them a kelvin, from an origin that nobody recorded; the driver's rates are twice the true ones.
+        // Signed 16-bit counts, 172 per kelvin, from an unrecorded origin; the driver's rates are twice the true ones.
         let signed = if counts > 32767.0 {
             counts - 65536.0
         } else {
@@ -70,7 +69,7 @@ enum Curve {
     Of(Shape),
 }
 
-/// What `curve` through `fitted` says at the temperatures of `held`.
+/// Values of `curve`, fitted to `fitted`, at the temperatures of `held`.
 fn predicted(curve: Curve, fitted: &[&Burst], held: &[&Burst]) -> Vec<Vector3<f64>> {
     match curve {
         Curve::Polynomial(degree) => {
@@ -95,7 +94,7 @@ fn predicted(curve: Curve, fitted: &[&Burst], held: &[&Burst]) -> Vec<Vector3<f6
                 numbers: [
                     1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, b.rate.x, b.rate.y, b.rate.z,
                 ],
-                // Scale factors are not known and not asked for; the points weigh alike, as what they err by is not their noise.
+                // Scale factors are unknown and not needed. All points have the same weight, because their errors are not noise.
                 variances: [BURST.powi(2); 12],
             };
             let points: Vec<Point> = fitted.iter().map(point).collect();
@@ -107,7 +106,7 @@ fn predicted(curve: Curve, fitted: &[&Burst], held: &[&Burst]) -> Vec<Vector3<f6
     }
 }
 
-/// Prints what lines and curves miss the bursts by.
+/// Prints the errors of lines and curves on the bursts.
 pub fn run() {
     let Some(bursts) = bursts() else {
         println!("no recordings (set MIMU_DATA)");

@@ -1,4 +1,4 @@
-//! fang, 5.2 and 5.3: a soak at nine temperatures with the noise of Table 5, and what each estimator leaves of the errors.
+//! fang, 5.2 and 5.3: a soak at nine temperatures with the noise of Table 5, and the errors that each estimator leaves.
 
 use mimu::quantity::Sensor;
 use mimu::triad::Forward;
@@ -17,14 +17,14 @@ const STEPS: i32 = 12;
 const FACES: i32 = 6;
 const Z_UP: i32 = 4;
 
-/// How a model at a temperature is made of the curves.
+/// How the model at a temperature is made from the curves.
 #[derive(Clone, Copy, PartialEq)]
 enum Model {
     /// As they are.
     AsFitted,
-    /// Its scale factors and biases; misalignments of all scalars in the middle of the range, which do not change (fang, 4.4).
+    /// Scale factors and biases of the curves; misalignments from all scalars in the middle of the range, constant over temperature (fang, 4.4).
     WithM,
-    /// Those of the middle of the range at all temperatures.
+    /// The model of the middle of the range at all temperatures.
     OneTemperature,
 }
 
@@ -133,7 +133,7 @@ fn once(noisy: &Session, truth: &Session) -> Vec<Errors> {
     each.collect()
 }
 
-/// What is left of the noiseless readings: compensated minus known input.
+/// Errors on the noiseless readings: compensated minus known input.
 fn errors(joint: &Joint, soak: &Joint, how: Model, truth: &Session) -> Errors {
     let mut out = Errors::default();
     for sensor in [0, 1] {

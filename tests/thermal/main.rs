@@ -1,4 +1,4 @@
-//! Errors of the estimates over temperature, their bounds, and how often their intervals hold the truth: the table of `docs/thermal.md`.
+//! Errors of the estimates over temperature, their bounds, and how often their intervals contain the truth: the table of `docs/thermal.md`.
 //!
 //! `cargo run --release -p mimu-tests --bin thermal -- RUNS`, or one of
 //!
@@ -41,7 +41,7 @@ fn main() {
     }
 }
 
-/// Errors of the joint estimate and how often its intervals hold the truth; `only` names an experiment.
+/// Errors of the joint estimate and how often its intervals contain the truth; `only` selects an experiment.
 fn coverage(runs: u64, only: Option<&String>) {
     let wanted = |name: &str| only.is_none_or(|o| name.contains(o.as_str()));
     print_header(runs);

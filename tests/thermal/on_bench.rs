@@ -1,4 +1,4 @@
-//! Sessions of the virtual bench, and the same without noise: what a unit truly reads.
+//! Sessions of the virtual bench, and the same without noise, which gives the true readings of a unit.
 
 use std::path::Path;
 
@@ -16,14 +16,14 @@ pub fn read(name: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// A rig file with nothing left to draw: the unit of this seed, whose other seeds are other noise.
+/// A rig file with nothing left to draw: the unit of this seed. Another seed then changes only the noise.
 pub fn unit(text: &str, seed: u64) -> RigFile {
     let file = RigFile::parse(&Source::new("rig", text)).expect("a rig file");
     RigTruth::resolve(&file, seed).expect("a rig").file
 }
 
-/// `file` without noise, but that of its thermometer and a hundredth of a millivolt of the converter: what repeats one value is taken for
-/// stuck, or clipped. Its converter has 24 bits: without noise the steps of 16 would be errors that a mean keeps.
+/// `file` without noise, apart from its thermometer's and a hundredth of a millivolt of the converter's: a channel that repeats one value would be
+/// taken for stuck or clipped. Its converter has 24 bits, because without noise the quantisation steps of 16 bits would be errors that a mean keeps.
 pub fn noiseless(file: &RigFile) -> RigFile {
     let mut file = file.clone();
     for axes in [&mut file.unit.gyro_axes, &mut file.unit.accel_axes] {
@@ -39,7 +39,7 @@ pub fn noiseless(file: &RigFile) -> RigFile {
     file
 }
 
-/// A plan carried out and read as a user's recording is.
+/// A plan carried out, and read as a user's recording is.
 pub fn session(plan: &str, file: &RigFile, seed: u64) -> Session {
     Session::of(&recorded(plan, file, seed)).expect("its thermometer works")
 }

@@ -1,4 +1,4 @@
-//! Standard deviations that `mimu thermal plan --procedure ramp` promises, against the scatter of as many recordings of that plan.
+//! Standard deviations that `mimu thermal plan --procedure ramp` predicts, against the scatter over recordings of that plan.
 
 use mimu::plan::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::on_bench::{noiseless, read, session, unit};
 
-/// What the command asks for without further options.
+/// The command's request without further options.
 fn request() -> Request {
     Request {
         procedure: Procedure::Ramp,
@@ -27,12 +27,12 @@ fn request() -> Request {
     }
 }
 
-/// Prints promised and found, of the worst axis: deg/h, ppm and ppm; µg, ppm and ppm.
+/// Prints predicted and found values of the worst axis: deg/h, ppm and ppm; µg, ppm and ppm.
 pub fn run(runs: u64) {
     let planned = plan(&request()).expect("a plan");
     let text = to_toml(&planned, request().sample_rate_hz);
     let mut file = unit(&read("rigs/fang-soak.toml"), 1);
-    // The dies are as warm as the chamber, as the plan takes them to be; the noise is all that it was made for.
+    // As the plan assumes, the dies follow the chamber's temperature, and the noise is the one it was made for.
     file.thermal.board_lag_s = Some(10.0);
     file.thermal.board_heating_c = Some(0.0);
     file.thermal.die_heating_c = Some([0.0; 4]);
@@ -61,7 +61,7 @@ pub fn run(runs: u64) {
         .into_par_iter()
         .map(|k| by(session(&text, &file, 100 + k)));
     let each: Vec<Joint> = each.collect();
-    // Cubics are what the curves of this unit are, so that a fit without noise is the truth.
+    // The curves of this unit are cubics, so a fit without noise is the truth.
     let truth = by(session(&text, &noiseless(&file), 1));
     println!("{runs} recordings: promised, rms of the errors of one cubic (of their mean)\n");
     println!("| sensor, °C | bias | scale factor | cross terms |\n|---|---|---|---|");

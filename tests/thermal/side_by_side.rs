@@ -1,4 +1,4 @@
-//! Estimators of the literature and the joint one on the same recordings, beside the hours in the chamber.
+//! Estimators of the literature and the joint one on the same recordings, with the hours in the chamber.
 
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
@@ -30,7 +30,7 @@ const ON_RAMP: [Row; 5] = [
     ("ramp-niu", Estimator::Classic(Classic::RampNiu), false),
 ];
 
-/// All of it.
+/// Prints all tables.
 pub fn run(runs: u64) {
     println!("{runs} runs, lag {LAG_S} s, worst axis, rms over -4 to 66 °C\n");
     println!(
@@ -64,7 +64,7 @@ fn table(
     record: &(impl Fn(u64) -> (Manifest, Batch) + Sync),
     rows: &[Row],
 ) {
-    // All estimators see the same recordings, of which each is made and read once.
+    // All estimators use the same recordings; each is made and read once.
     let each = (0..runs).into_par_iter().map(|seed| {
         let (manifest, batch) = record(seed);
         let prepared = Prepared::of(manifest, &batch, STILL_FACTOR).expect("it is prepared");

@@ -1,4 +1,4 @@
-//! A unit with the curves of niu's MTi-G in a chamber, simulated sample by sample: it shares nothing with the estimators.
+//! A unit with the curves of niu's MTi-G in a chamber, simulated sample by sample. It shares no code with the estimators.
 
 use mimu_recording::{Batch, Manifest, RawUnit, Reference};
 use nalgebra::{DMatrix, Matrix3, Rotation3, Vector3};
@@ -78,20 +78,20 @@ pub fn truth(sensor: usize, temp_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
     (matrix, bias)
 }
 
-/// What is done with the unit.
+/// An experiment with the unit.
 #[derive(Debug, Clone)]
 pub struct Experiment {
-    /// Corners of the driving temperature: s, °C. The die follows them, or the thermometer where the lag is negative.
+    /// Corners of the driving temperature: s, °C. The die follows it; if the lag is negative, the thermometer follows it.
     pub corners: Vec<(f64, f64)>,
     /// Lag of the dies behind the thermometer, s.
     pub lag_s: f64,
-    /// Lag of the accelerometer's die, s, if it has one of its own; not negative, and the other is not either.
+    /// Lag of the accelerometer's die, s, if it differs. Then neither lag may be negative.
     pub accel_lag_s: Option<f64>,
-    /// Random walk of the biases over what white noise gives in a second, per √s; zero for none.
+    /// Random walk of the biases over the white noise in one second, per √s; zero for none.
     pub walk: f64,
     /// White noise of the thermometer, K, at 10 Hz.
     pub thermometer_noise: f64,
-    /// Bias that this session has and others do not, SI; gyro, accelerometer.
+    /// Additional bias of this session, SI; gyro, accelerometer.
     pub offset: [f64; 2],
 }
 
@@ -137,7 +137,7 @@ impl Experiment {
                 lag if lag >= 0.0 => [driven, followers[0], followers[1]],
                 _ => [followers[0], driven, driven],
             });
-            // Between two samples the driving temperature is that of their middle.
+            // Between two samples the driving temperature is taken in their middle.
             let middle = self.driven((k as f64 + 0.5) * step);
             for (follower, follow) in followers.iter_mut().zip(follow) {
                 *follower += follow * (middle - *follower);
@@ -146,7 +146,7 @@ impl Experiment {
         out
     }
 
-    /// Recording of the scheme over and over; the same seed gives the same noise.
+    /// Recording of the repeated scheme; the same seed gives the same noise.
     pub fn record(&self, seed: u64) -> (Manifest, Batch) {
         let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d);
         let mut out = Batch::default();
@@ -178,10 +178,10 @@ impl Experiment {
     }
 }
 
-/// The eight turns by 90 degrees and eight dwells of niu, again and again.
+/// niu's eight turns by 90 degrees and eight dwells, repeated.
 struct Scheme {
     up: Vector3<f64>,
-    /// Sample within the present part, and the part: even ones are turns.
+    /// Sample within the current part, and the part: even ones are turns.
     at: usize,
     part: usize,
 }
@@ -189,7 +189,7 @@ struct Scheme {
 /// Samples of a dwell of 10 s and of a turn at 10 deg/s.
 const DWELL: usize = 100;
 const TURN: usize = 90;
-/// Axes of the turns, with their signs: from z down over y down, y up, x up, y up and x down.
+/// Axes of the turns, with their signs: from z down through y down, y up, x up, y up and x down.
 const TURNS: [(usize, f64); 8] = [
     (0, 1.0),
     (0, -1.0),
@@ -235,8 +235,8 @@ impl Scheme {
     }
 }
 
-/// Cramér-Rao bounds of the forward models at `temps`, relative to the gain (SI for b), if the curves are cubics and `lag` is unknown
-/// too. Gyro and accelerometer; at each temperature P by rows, then b.
+/// Cramér-Rao bounds of the forward models at `temps`, relative to the gain (SI for b), if the curves are cubics and `lag` tells whether the lag is
+/// unknown too. Gyro and accelerometer; at each temperature P by rows, then b.
 pub fn bounds(experiment: &Experiment, lag: bool, temps: &[f64]) -> [Vec<[f64; 12]>; 2] {
     const H: f64 = 0.5;
     let other = Experiment {
@@ -252,10 +252,10 @@ pub fn bounds(experiment: &Experiment, lag: bool, temps: &[f64]) -> [Vec<[f64; 1
     let mut scheme = Scheme::new();
     for k in 0..driven[0].len() {
         let (step, rate, force) = scheme.next();
-        // The same rows as a user has: forces that turn are not used.
+        // The same rows as for a user: forces during turns are not used.
         let still = step % 2 == 1;
         let die = driven[0][k][1];
-        // Where the thermometer is given, the die's temperature changes with the lag; where the die leads, the other way round.
+        // If the die lags the thermometer, its temperature changes with the lag; if it leads, the thermometer's does.
         let by_lag = match experiment.lag_s >= 0.0 {
             true => (driven[1][k][1] - die) / H,
             false => -(driven[1][k][0] - driven[0][k][0]) / H,

@@ -1,4 +1,4 @@
-//! The unit of `simulation` soaked: nine set points, an hour each, of which the last minutes measure (`rig/plans/soak.toml`).
+//! The unit of `simulation` soaked: nine set points, an hour each; the last minutes of each are measured (`rig/plans/soak.toml`).
 
 use mimu_recording::{Batch, Manifest, RawUnit, Reference};
 use nalgebra::Vector3;
@@ -9,7 +9,7 @@ use crate::simulation::{GAIN, GRAVITY, RATE_HZ, Random, WHITE, truth};
 const POINTS: usize = 9;
 const ROUND_S: f64 = 3600.0;
 const RAMP_S: f64 = 300.0;
-/// Six faces for so long, then rates both ways about each axis upright, s and deg/s.
+/// Duration of each of the six faces, s; then of each rate in both directions about each axis upright, s and deg/s.
 const FACE_S: f64 = 20.0;
 const RATE_S: f64 = 15.0;
 const RATE_DPS: f64 = 50.0;
@@ -28,7 +28,7 @@ fn driven(t_s: f64) -> f64 {
     }
 }
 
-/// Number within a round, rate and specific force; none while it soaks.
+/// Number within a round, rate and specific force; none during the soak.
 fn pose(t_s: f64) -> Option<(usize, Vector3<f64>, Vector3<f64>)> {
     let since = t_s % ROUND_S - (ROUND_S - MEASURED_S);
     let of = |axis: usize, sign: f64| {
@@ -51,7 +51,7 @@ fn pose(t_s: f64) -> Option<(usize, Vector3<f64>, Vector3<f64>)> {
     }
 }
 
-/// Recording; the die is late by `lag_s`.
+/// Recording of a unit whose dies lag by `lag_s`.
 pub fn record(lag_s: f64, seed: u64) -> (Manifest, Batch) {
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d);
     let mut out = Batch::default();
@@ -62,7 +62,7 @@ pub fn record(lag_s: f64, seed: u64) -> (Manifest, Batch) {
         die += follow * (driven(t_s) - die);
         let pose = pose(t_s);
         let step = pose.map_or(-1, |p| (12.0 * (t_s / ROUND_S).floor()) as i32 + p.0 as i32);
-        // What the unit does while it soaks is used by nobody.
+        // The state during the soak is not used.
         let (_, rate, force) = pose.unwrap_or((0, Vector3::zeros(), GRAVITY * Vector3::z()));
         out.t_s.push(t_s);
         out.step.push(step);

@@ -1,4 +1,4 @@
-//! Many runs of one experiment, and what is left of them.
+//! Many runs of one experiment, and their errors.
 
 use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
@@ -22,7 +22,7 @@ pub struct Study {
     experiment: Experiment,
 }
 
-/// Of one run: squared errors relative to the gain and whether the interval held the truth, by sensor, temperature and number.
+/// Of one run: squared errors relative to the gain, and whether the interval contained the truth, by sensor, temperature and number.
 pub struct Errors {
     squared: [Vec<[f64; 12]>; 2],
     inside: [Vec<[bool; 12]>; 2],
@@ -51,7 +51,7 @@ pub fn print_header(runs: u64) {
 }
 
 impl Study {
-    /// With its name in the table.
+    /// A study with its name in the table.
     pub fn new(name: &str, experiment: Experiment) -> Self {
         Self {
             name: name.into(),
@@ -73,7 +73,7 @@ impl Study {
         }
     }
 
-    /// The same with dies that are taken to be as warm as the thermometer.
+    /// The same with the dies' temperature taken to be the thermometer's.
     pub fn run_without_lag(&self, runs: u64) {
         let choice = Choice {
             lag_s: Some(0.0),
@@ -183,7 +183,7 @@ pub fn shares(runs: &[&Errors]) -> [f64; 6] {
     })
 }
 
-/// Cramér-Rao bound of `experiment` in the units of the table, with a lag that is unknown too or known.
+/// Cramér-Rao bound of `experiment` in the units of the table; `lag` tells whether the lag is unknown too.
 pub fn bound(experiment: &Experiment, lag: bool) -> [f64; 6] {
     let bound = bounds(experiment, lag, &temps());
     worst(&[0, 1].map(|s| bound[s].iter().map(|b| b.map(|v| v * v)).collect()))

@@ -1,7 +1,7 @@
-//! `rig/plans/thermal.toml` with units of `rig/rigs/thermal.toml`: one fit for each seed, against the truth and against what was planned.
+//! `rig/plans/thermal.toml` with units of `rig/rigs/thermal.toml`: one fit per seed, against the truth and against the prediction of the plan.
 //!
-//! The truth is asked of the bench itself: the same unit without noise, for a few seconds at each of several temperatures at which it has
-//! stood for ever, with six faces and rates both ways.
+//! The bench itself gives the truth: the same unit without noise, for a few seconds at each of several temperatures in equilibrium, with six faces
+//! and rates in both directions.
 
 use std::fmt::Write as _;
 
@@ -19,9 +19,9 @@ use rayon::prelude::*;
 
 use crate::on_bench::{noiseless, read, session, unit};
 
-/// Temperatures of the chamber at which the truth is asked for, °C.
+/// Temperatures of the chamber at which the truth is determined, °C.
 const PROBES: [f64; 7] = [-16.0, -5.0, 6.0, 17.0, 28.0, 39.0, 50.0];
-/// Units of bias, scale factor and cross terms: of gyro, then accelerometer.
+/// Units of bias, scale factor and cross terms: of the gyro, then of the accelerometer.
 const UNITS: [f64; 6] = [
     180.0 / std::f64::consts::PI * 3600.0,
     1e6,
@@ -30,15 +30,15 @@ const UNITS: [f64; 6] = [
     1e6,
     1e6,
 ];
-/// Errors beyond so many of their own standard deviations, rms, are wrong.
+/// If the rms of the errors over their standard deviations exceeds this, the standard deviations are wrong.
 const WRONG: f64 = 2.0;
-/// Seeds of the variants.
+/// Number of seeds for the variants.
 const FEWER: u64 = 5;
 
 /// Twelve numbers at a temperature of the thermometer.
 type At = (f64, SVector<f64, 12>);
 
-/// Of one seed: for each of the six kinds errors and standard deviations, claimed and planned.
+/// Of one seed: for each of the six kinds the errors and their standard deviations, claimed and planned.
 struct Outcome {
     verdict: String,
     numbers: [Vec<[f64; 3]>; 6],
@@ -68,7 +68,7 @@ pub fn run(runs: u64) {
         println!(
             "\n{name}: rms of errors over their standard deviations, then errors (planned sigma): bias, scale, cross terms"
         );
-        // The first is the question, the others say why.
+        // The first variant is the question; the others explain the result.
         let runs = if text == &rig { runs } else { runs.min(FEWER) };
         let each = (1..=runs)
             .into_par_iter()
@@ -128,7 +128,7 @@ fn once(plan: &str, rig: &str, stated: bool, seed: u64) -> Outcome {
     }
 }
 
-/// What a long record at rest says of the unit, raw: its own noise.
+/// Noise coefficients of the unit from a long recording at rest, raw.
 fn at_rest(file: &RigFile, seed: u64) -> [Option<AllanModel>; 6] {
     let [gyro, accel] = Sensor::BOTH.map(|sensor| probes(file, sensor, seed)[0].1);
     std::array::from_fn(|channel| {
@@ -226,7 +226,7 @@ fn probes(file: &RigFile, sensor: Sensor, seed: u64) -> Vec<At> {
             }
         }
         let probe = session(&plan, &still, seed);
-        // At a rate the accelerometer feels how far it is from the axes of the table, which no reference has in it.
+        // At a rate, the accelerometer senses its distance from the table's axes, which no reference includes.
         let felt = |r: &&Row| sensor == Sensor::Gyro || r.step % 2 == 0;
         let rows: Vec<&Row> = probe.rows[sensor].iter().filter(felt).collect();
         let (mut gram, mut with) = (Matrix4::zeros(), Matrix4x3::zeros());
@@ -243,8 +243,8 @@ fn probes(file: &RigFile, sensor: Sensor, seed: u64) -> Vec<At> {
     each.collect()
 }
 
-/// Standard deviation of a number at a temperature by the information matrix of cubics with the true noise and a lag of zero, relative to
-/// the gain; infinite where it is singular.
+/// Standard deviation of a number at a temperature, from the information matrix of cubics with the true noise and a lag of zero, relative to the
+/// gain; infinite if the matrix is singular.
 fn planned(recorded: &Session, file: &RigFile, sensor: Sensor) -> impl Fn(usize, f64) -> f64 {
     let temp = |r: &Row| recorded.thermometer.at(r.middle_s).0;
     let dies: Vec<f64> = recorded.rows[sensor].iter().map(temp).collect();

@@ -1,4 +1,4 @@
-//! Errors by the code of a converter.
+//! Errors of a converter that depend on the code.
 
 use mimu_core::compensation::Sample;
 use mimu_core::effects::{DeviceEffect, EffectError, Effects, FARTHEST_ZERO};
@@ -16,7 +16,7 @@ fn of(sensor: Sensor, own: Vector3<f64>, other: Vector3<f64>) -> Sample<f64> {
 fn a_converter_with_wrong_weights_reads_as_one_with_right_ones() {
     let unit = Mounted::crooked();
     let code_v = 3.3 / 65536.0;
-    // Bits 15 to 7, in units of the weight of bit 15: 6 codes and less.
+    // Errors of bits 15 to 7, in units of the weight of bit 15: up to 6 codes.
     let errors = [
         1.8e-4, -1.2e-4, 1.5e-4, -1.7e-4, 1.0e-4, 0.6e-4, -0.9e-4, 1.1e-4, -0.4e-4,
     ];
@@ -42,7 +42,7 @@ fn a_converter_with_wrong_weights_reads_as_one_with_right_ones() {
             wrong += u32::from(left.norm() > 1e-9);
             largest = largest.max((read - right).norm());
         }
-        // Within the error of a turn of the last bit, 10 of 128 codes, a reading may be of either side.
+        // Within the error of the last bit around its transition, 10 of 128 codes, either side may be chosen.
         assert!(
             largest > 5e-4 && wrong < all / 10,
             "{wrong} of {all}, {largest:e}"
@@ -52,7 +52,7 @@ fn a_converter_with_wrong_weights_reads_as_one_with_right_ones() {
 
 #[test]
 fn converters_of_their_own_whose_readings_have_a_bias_subtracted_read_as_right_ones() {
-    // Reference, V, and what has been subtracted, V, which is no multiple of a code; and bits 15 to 7, in units of bit 15.
+    // Reference, V; the subtracted bias, V, not a multiple of a code; and errors of bits 15 to 7, in units of bit 15.
     let converters = [
         (
             3.3,
@@ -71,7 +71,7 @@ fn converters_of_their_own_whose_readings_have_a_bias_subtracted_read_as_right_o
         ),
     ];
     for sensor in [Sensor::Gyro, Sensor::Accel] {
-        // In no order of axes.
+        // The order of the axes must not matter.
         let effects = [2, 0, 1].map(|axis: usize| {
             let (volts, less, errors) = &converters[axis];
             DeviceEffect::code(sensor, Some(axis), errors, volts / 2.0, -less).unwrap()
@@ -80,11 +80,11 @@ fn converters_of_their_own_whose_readings_have_a_bias_subtracted_read_as_right_o
         let (mut wrong, mut err) = ([0; 3], [0; 3]);
         let all = 20_000_u32;
         for k in 0..all {
-            // All codes of the converters, each axis in a pace of its own.
+            // All codes of the converters; each axis steps by a different amount.
             let code = [40_503, 25_717, 51_001].map(|pace| (k * pace + 977) % 65_536);
             let (mut right, mut read) = (Vector3::zeros(), Vector3::zeros());
             for (axis, (volts, less, errors)) in converters.iter().enumerate() {
-                // A converter adds what its bits weigh.
+                // A converter adds the weights of its bits.
                 let (mut sound, mut faulty) = (0.0, 0.0);
                 let mut weight = volts / 2.0;
                 for bit in (0..16).rev() {
@@ -105,7 +105,7 @@ fn converters_of_their_own_whose_readings_have_a_bias_subtracted_read_as_right_o
             }
         }
         for axis in 0..3 {
-            // Within the errors of a turn, 10 codes and less of 128 at the worst, a reading may be of either side.
+            // Within the error around a transition, up to 10 of 128 codes, either side may be chosen.
             assert!(err[axis] > all / 2, "{axis}: {} of {all}", err[axis]);
             assert!(wrong[axis] < all / 25, "{axis}: {} of {all}", wrong[axis]);
         }
@@ -115,7 +115,7 @@ fn converters_of_their_own_whose_readings_have_a_bias_subtracted_read_as_right_o
 #[test]
 fn readings_above_a_missing_range_of_codes_move_down_by_it() {
     let (range, missing) = (3.0, 7e-4);
-    // Steps anywhere, below 0 as well; of one axis each, or the same one of all.
+    // Steps at any readings, also below 0: a different one for each axis, and one for all axes.
     let steps = [0.437_219, -0.9, 1.1];
     let weight = 2.0 * range;
     let step = |axis, at: f64| {
@@ -127,12 +127,11 @@ fn readings_above_a_missing_range_of_codes_move_down_by_it() {
     let alone = with(&[step(Some(1), steps[1])], &si());
     let alike = with(&[step(None, steps[0])], &si());
     let gyro = Vector3::repeat(0.7);
-    // What a reading of less than 1/65536 of the weight below the step is taken for is not asked; and rounding in single precision is
-    // an eighth of that.
+    // Readings less than 1/65536 of the weight below the step are not tested; rounding in single precision is an eighth of that.
     let near = 1.15 * weight / 65_536.0;
     let mut above = 0;
     for k in 0..60_000 {
-        // Over the range, and as close to the steps as comes, on them and beside them.
+        // Over the range, and as close to the steps as tested, on them and beside them.
         let right = match k {
             0 => Vector3::from(steps),
             1 => Vector3::from(steps.map(|at| at - 1.01 * near)),
@@ -141,7 +140,7 @@ fn readings_above_a_missing_range_of_codes_move_down_by_it() {
                 Vector3::from_fn(|i, _| -1.5 + f64::from((k * (7 + 2 * i as u32)) % 60_000) * 5e-5)
             }
         };
-        // None of the missing codes is ever read.
+        // The missing codes are never read.
         let skip = |right: f64, at: f64| right + if right >= at { missing } else { 0.0 };
         let told = |right: f64, at: f64| right >= at || right < at - near;
         let read = Vector3::from_fn(|i, _| skip(right[i], steps[i]));
@@ -179,15 +178,16 @@ fn readings_above_a_missing_range_of_codes_move_down_by_it() {
 
 #[test]
 fn whether_a_second_look_is_kept_is_asked_of_each_axis() {
-    // The weights are such that the last bit is worth 1. Bits of 4, 2 and 1 err; and, on the other axis, far less those of 128
-    // than those below it.
+    // The weights make the last bit worth 1. On one axis the bits of 4, 2 and 1 have errors; on the other the error of bit 128 is far smaller than
+    // those of lower bits.
     let small = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.4, 1.5, 0.2].map(|e| e / 256.0);
     let large = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 5.0, 0.0, 0.0].map(|e| e / 256.0);
     let code =
         |axis, errors| DeviceEffect::code(Sensor::Gyro, Some(axis), errors, 256.0, 0.0).unwrap();
     let effects = with(&[code(0, &large), code(1, &small)], &si());
-    // 128.1 read as 128 has an error of 0.3, without which it would be 127 and have one of 5: kept is the first. A 3.8 with bits of 2
-    // and 1 is read as 5.5, whose bits of 4 and 1 err by 1.6; without that it is a 3 again, and has lost 1.7.
+    // 128.1 is read as 128, whose error is 0.3. Without this error the code would be 127, whose error is 5, so the first correction is kept. 3.8 with
+    // errors in the bits of 2 and 1 is read as 5.5, whose bits of 4 and 1 have an error of 1.6. Corrected, it is a 3 again, and the correction
+    // becomes 1.7.
     let read = Vector3::new(128.1, 3.8 + 1.7, -9.0);
     let clean = effects.without_code_errors(&of(Sensor::Gyro, read, Vector3::zeros()));
     let expected = Vector3::new(128.1 - 0.3, 3.8, -9.0);
@@ -269,7 +269,7 @@ fn a_code_that_cannot_be_removed_is_refused() {
             );
         }
     }
-    // Finite, and not what becomes of them in single precision.
+    // Finite numbers whose product under- or overflows single precision.
     let single =
         |error, weight| DeviceEffect::code(Sensor::Gyro, None, &[error; 9], weight, 0.0_f32);
     for (error, weight) in [(1e-3, 1e-37), (1e20, 1e20), (1e38, 1.0)] {
@@ -282,7 +282,7 @@ fn a_code_that_cannot_be_removed_is_refused() {
         );
     }
 
-    // A converter for each axis of each triad, and what is refused leaves those that there are as they were.
+    // A converter for each axis of each triad. A refused one leaves the others unchanged.
     let rank = |axis, size: f64| {
         DeviceEffect::code(
             Sensor::Gyro,

@@ -1,4 +1,4 @@
-//! Each effect against the physics that it is about, as a sensor that has it would read.
+//! Each effect against its physics: readings are made as by a sensor with the effect.
 
 mod codes;
 
@@ -14,7 +14,7 @@ use proptest::prelude::*;
 
 type Eight = Effects<f64, 8>;
 
-/// Sensitive directions by rows, scale factors and biases of a triad that nobody has mounted with care.
+/// Sensitive directions by rows, scale factors and biases of a carelessly mounted triad.
 struct Mounted {
     directions: Matrix3<f64>,
     scale: Vector3<f64>,
@@ -36,16 +36,16 @@ impl Mounted {
         }
     }
 
-    /// Reading of sensors whose sensed inputs err by `error`.
+    /// Reading of sensors with the error `error` in their sensed inputs.
     fn read(&self, input: &Vector3<f64>, error: &Vector3<f64>) -> Vector3<f64> {
-        // |P_i| is a size: the sign of a scale factor belongs to the direction.
+        // |P_i| is positive: the sign of a scale factor belongs to the direction.
         let sensed = self.directions * input;
         Vector3::from_fn(|i, _| {
             self.scale[i] * sensed[i] + self.scale[i].abs() * error[i] + self.bias[i]
         })
     }
 
-    /// Direction in which sensor i reads more.
+    /// Inputs along the sensitive directions.
     fn sensed(&self, input: &Vector3<f64>) -> Vector3<f64> {
         (self.directions * input).component_mul(&self.scale.map(f64::signum))
     }
@@ -79,7 +79,8 @@ fn named(id: &str, coefficients: &[f64]) -> DeviceEffect<f64> {
     DeviceEffect::named(id, coefficients, None).unwrap()
 }
 
-/// What is left, at most, of an error of sensor inputs `error(sensed)` on a crooked triad by an effect of that triad.
+/// The largest remaining error and the largest error, if the sensor inputs of a crooked triad have the error `error(sensed)` and the effect `id`
+/// removes it.
 fn left(
     id: &str,
     coefficients: &[f64],
@@ -104,8 +105,8 @@ fn left(
     (worst, largest)
 }
 
-/// The conditions are read by the sensor that errs, and those of the first sample are taken again without the error, so what is left is
-/// of third order: `slope` is how much the error itself changes with its input.
+/// The erring sensor itself reads the variables of the effect. For the first sample the effect is evaluated a second time, without the error, so the
+/// remaining error is of third order. `slope` is the change of the error with its input.
 fn assert_third_order(left: (f64, f64), slope: f64) {
     let (worst, error) = left;
     assert!(error > 1e-4, "there is something to remove: {error:e}");
@@ -120,7 +121,7 @@ fn sagging_proof_masses_no_longer_read_force_as_rate() {
     let unit = Mounted::crooked();
     let matrix = [1e-3, 2e-3, -3e-3, 4e-3, -5e-3, 6e-3, 7e-3, 8e-3, -9e-3];
     let effects = with(&[named("gyro_g_sensitivity", &matrix)], &unit.inverse());
-    // Each axis up: the error is a column of the matrix, and the accelerometer does not err.
+    // Each axis up: the error is a column of the matrix; the accelerometer has no error.
     for axis in 0..3 {
         let force = Vector3::ith(axis, 9.8);
         let error = Vector3::new(matrix[axis], matrix[3 + axis], matrix[6 + axis]) * 9.8;
@@ -152,7 +153,7 @@ fn bent_responses_become_straight() {
             3e-4 * 12.0,
         );
     }
-    // Two scale factors.
+    // A different scale factor for each sign of the input.
     let c = [1e-3, -2e-3, 3e-3];
     let halves = |s: &Vector3<f64>| {
         let gain = |i: usize| if s[i] > 0.0 { 1.0 + c[i] } else { 1.0 - c[i] };
@@ -161,8 +162,8 @@ fn bent_responses_become_straight() {
     assert_third_order(left("gyro_scale_asymmetry", &c, halves), 3e-3);
 }
 
-/// Largest error that is left of a stream of samples, and the largest there was, of errors `error(x)` of a triad that reads SI already
-/// and whose input is `x(t)`, 1000 times a second.
+/// The largest remaining error and the largest error of a stream of samples with errors `error(x)`. The triad reads SI and has the input `x(t)`, at
+/// 1000 Hz.
 fn left_of_a_stream(
     sensor: &str,
     effects: &[DeviceEffect<f64>],
@@ -194,8 +195,7 @@ fn sines(size: f64, hz: f64) -> impl Fn(f64) -> Vector3<f64> {
 
 #[test]
 fn what_one_evaluation_a_sample_leaves_is_far_below_the_noise_of_a_sample() {
-    // ADXRS300: 300 deg/s, 0.1 % of that nonlinear, 40 Hz, 0.1 (deg/s)/√Hz over 1.57 times that. The whole range at 40 Hz
-    // is more than any table does.
+    // ADXRS300: 300 deg/s, 0.1 % nonlinearity, 40 Hz, 0.1 (deg/s)/√Hz over 1.57 times that. No table moves through the whole range at 40 Hz.
     let range = 300.0_f64.to_radians();
     let noise = 0.1_f64.to_radians() * (1.57 * 40.0_f64).sqrt();
     let each = [1e-3; 3];
@@ -210,7 +210,8 @@ fn what_one_evaluation_a_sample_leaves_is_far_below_the_noise_of_a_sample() {
     println!("gyro: {worst:.1e} of {largest:.1e} rad/s are left, noise {noise:.1e} rad/s");
     assert!(largest > 0.9 * noise && worst < 0.002 * noise);
 
-    // MMA7260QT: 1.5 g, 1 % of that nonlinear, 4.7 mV of noise at 0.8 V/g. As much of it along as across, and the range as fast.
+    // MMA7260QT: 1.5 g, 1 % nonlinearity, 4.7 mV of noise at 0.8 V/g. The error is the same along and across, and the input moves through the range
+    // as fast.
     let range = 1.5 * 9.80665;
     let noise = 4.7e-3 / 0.8 * 9.80665;
     let effects = [
@@ -225,7 +226,7 @@ fn what_one_evaluation_a_sample_leaves_is_far_below_the_noise_of_a_sample() {
     println!("accelerometer: {worst:.1e} of {largest:.1e} m/s² are left, noise {noise:.1e} m/s²");
     assert!(largest > 1.5 * noise && worst < 0.01 * noise);
 
-    // While nothing moves, nothing is left.
+    // At rest the error is removed completely.
     let effects = with(&effects, &si());
     let mut state = State::new(1000.0);
     let x = Vector3::new(3.0, -5.0, 8.0);
@@ -237,7 +238,7 @@ fn what_one_evaluation_a_sample_leaves_is_far_below_the_noise_of_a_sample() {
         .map(|_| (effects.remove(&mut state, &read).accel - x).norm())
         .collect();
     assert!(left[0] > 1e-6 && left[9] < 1e-14, "{left:?}");
-    // After a gap it begins with two evaluations again.
+    // After a gap, the first sample is evaluated twice again.
     state.gap();
     let again = effects.remove(&mut state, &read).accel;
     assert_eq!((again - x).norm(), left[0]);
@@ -246,7 +247,7 @@ fn what_one_evaluation_a_sample_leaves_is_far_below_the_noise_of_a_sample() {
 #[test]
 fn force_across_the_comb_is_taken_out() {
     let c = [1e-4, 2e-4, 3e-4, -4e-4, 5e-4, -6e-4, 7e-4, 8e-4, 9e-4];
-    // A product is a quarter of the square of the sum less that of the difference.
+    // A product is a quarter of the difference of the squares of sum and difference.
     let product = |a: f64, b: f64| 0.25 * ((a + b).powi(2) - (a - b).powi(2));
     let error = |s: &Vector3<f64>| {
         let pairs = [product(s.x, s.y), product(s.y, s.z), product(s.z, s.x)];
@@ -269,7 +270,7 @@ fn arms_of_a_spinning_unit_are_those_of_its_path_through_space() {
     for k in 0..200 {
         let t = f64::from(k) * dt;
         let gyro = axis.into_inner() * (rate + spin_up * t);
-        // Each sensor feels, along its own axis, the acceleration of the place that it sits at.
+        // Each sensor senses, along its own axis, the acceleration of its position.
         let h = 1e-4;
         let accel = Vector3::from_fn(|i, _| {
             let arm = Vector3::new(arms[3 * i], arms[3 * i + 1], arms[3 * i + 2]);
@@ -278,7 +279,7 @@ fn arms_of_a_spinning_unit_are_those_of_its_path_through_space() {
             (attitude(t).inverse() * felt)[i]
         });
         let clean = effects.remove(&mut state, &Sample { gyro, accel });
-        // The first sample has none before it to tell the angular acceleration by.
+        // The first sample has no predecessor, so its angular acceleration is unknown.
         if k > 0 {
             assert!(accel.norm() > 0.1);
             assert!(
@@ -291,7 +292,7 @@ fn arms_of_a_spinning_unit_are_those_of_its_path_through_space() {
     }
 }
 
-/// Bias that is removed from a resting triad.
+/// Bias that is removed from a triad at rest.
 fn bias<const N: usize>(effects: &Effects<f64, N>, state: &mut State<f64, N>) -> Vector3<f64> {
     let rest = Sample {
         gyro: Vector3::zeros(),
@@ -372,7 +373,7 @@ fn thermal_errors_are_those_of_a_sensor_at_that_temperature() {
     );
     let mut state = State::new(1000.0);
     let rate = Vector3::new(1.0, -2.0, 3.0);
-    // At 45 °C, by hand: 20 times the line and 400 times the bend; 20 times 1e-4 of what each senses; 20 times 2e-5 rad.
+    // Expected at 45 °C: 20 times the linear and 400 times the quadratic coefficient; 20 times 1e-4 of each sensed input; 20 times 2e-5 rad.
     let sensed = unit.sensed(&rate);
     let error = Vector3::new(
         0.024 + 0.002 * sensed.x + 20.0 * (2e-5 * -2.0 - 3e-5 * 3.0),
@@ -384,9 +385,9 @@ fn thermal_errors_are_those_of_a_sensor_at_that_temperature() {
     let accel = Vector3::zeros();
     let clean = effects.remove(&mut state, &Sample { gyro, accel });
     assert!((gyro - rate).norm() > 0.05);
-    // Scale and misalignment act on what is read: 0.6 % of an error of 0.05.
+    // Scale and misalignment act on the reading with its error: 0.6 % of an error of 0.05.
     assert!((clean.gyro - rate).norm() < 6e-4);
-    // A sensor that has lost its thermometer keeps the last temperature; at the reference there is nothing to remove.
+    // If the thermometer fails, the last temperature is used; at the reference temperature nothing is removed.
     effects.slow(&mut state, 0.1, f64::NAN);
     state.gap();
     assert_eq!(effects.remove(&mut state, &Sample { gyro, accel }), clean);
@@ -443,7 +444,7 @@ fn terms_are_products_of_what_they_name() {
     assert!(!cubic.is_slow() && warm.is_slow() && rising.is_slow() && !mixed.is_slow());
     let effects = with(&[cubic, warm, rising, mixed], &si());
     let mut state = State::new(1000.0);
-    // 0.02 °C/s for so long that the filter has settled, to 25 + 8 °C at 400 s.
+    // 0.02 °C/s until the filter has settled, to 25 + 8 °C at 400 s.
     for k in 0..=4000 {
         let dt = if k == 0 { 0.0 } else { 0.1 };
         effects.slow(&mut state, dt, 25.0 + 0.002 * f64::from(k));
@@ -499,7 +500,7 @@ fn what_cannot_be_removed_is_refused() {
     assert_eq!(pushed, [true, true, false, true, true, false]);
 }
 
-/// Everything at once, with coefficients of some sizes of data sheets times `c`; in either precision.
+/// All effects at once, with coefficients of data-sheet size times `c`; in either precision.
 macro_rules! all_at_once {
     ($t:ty, $c:expr, $inputs:expr, $temp_c:expr) => {{
         let unit = Mounted::crooked().inverse();
@@ -571,7 +572,7 @@ proptest! {
         let single = all_at_once!(f32, c, inputs, temp_c);
         for (a, b) in double.iter().zip(&single) {
             prop_assert!(a.is_finite());
-            // Angular accelerations reach 4000 rad/s², so errors 80 m/s². Over 20 000 cases the largest difference was 1.1e-5.
+            // Angular accelerations reach 4000 rad/s², so errors reach 80 m/s². Over 20 000 cases the largest difference was 1.1e-5.
             prop_assert!((a - b).abs() < 3e-5, "{a} {b}");
         }
     }

@@ -1,4 +1,4 @@
-//! Calibrations as bytes, and curves between nodes, against a reader, cubics and lines written out here in double precision.
+//! Calibrations as bytes, and curves between nodes, against a separate reader, cubics and lines in double precision.
 
 mod table;
 
@@ -33,7 +33,7 @@ fn node(temp_c: f32, numbers: &[f32; 24]) -> Node<f32> {
     Node::constant(temp_c, model(numbers))
 }
 
-/// One of which they do.
+/// A node whose numbers change with temperature.
 fn sloping(temp_c: f32, numbers: &[f32; 24], slopes: &[f32; 24]) -> Node<f32> {
     Node {
         slope: model(slopes),
@@ -109,7 +109,7 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         ),
     ]
     .map(Result::unwrap);
-    // Sensors that look along -y, x and z, 2, 4 and 0.5 V per unit; and C of a gyro that looks along y, -x and z.
+    // Sensors along -y, x and z with 2, 4 and 0.5 V per unit; and C of a gyro with its sensors along y, -x and z.
     let accel = Matrix3::new(0.0, 0.25, 0.0, -0.5, 0.0, 0.0, 0.0, 0.0, 2.0);
     let gyro = Matrix3::new(0.0, -2.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.5);
     let mut all = [0; MAX_LENGTH];
@@ -148,7 +148,7 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     expected.extend([0x00, 0xb9, 0x55, 0x69, 0, 0, 0, 0]);
     expected.extend([0xab; 32]);
     expected.extend([0x80, 0x0a, 0x57, 0x69, 0, 0, 0, 0]);
-    // D by rows, and R: of right angles the one is the other transposed.
+    // D by rows, and R: for right angles, one is the transpose of the other.
     for rows in [
         [[0, 1, 0], [-1, 0, 0], [0, 0, 1]],
         [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
@@ -200,11 +200,11 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         stored.compensator.lags.map(|lag| lag.lag_s()),
         PerSensor::from([61.5, -4.25])
     );
-    // 384 of 256 codes to 1.65 V are bits 0 and -1, and 255 are bits -1 to -8; half a code more, so that no error turns any.
+    // 384 of 256 codes to 1.65 V have bits 0 and -1, and 255 have bits -1 to -8. Another half code keeps every error from causing a transition.
     let right = Vector3::new(384.5, 0.5, 255.5) * (1.65 / 256.0);
     let read = Sample {
         gyro: right + Vector3::new(0.001, 0.0, -0.0005) * 1.65,
-        // 2.25 V at the converter of the third axis, whose second bit is of 1 V and not set; and 1.25 V, where it is.
+        // 2.25 V at the converter of the third axis, whose second bit, worth 1 V, is not set; and 1.25 V, where it is set.
         accel: Vector3::new(2.475, 0.0, 1.0),
     };
     let clean = single::without_code_errors(stored.compensator.effects.as_ref().unwrap(), &read);
@@ -242,10 +242,10 @@ fn a_trim_moves_the_curves_as_they_are_and_nothing_else() {
         }
         assert_eq!(*node, expected);
     }
-    // Besides the offsets (three each of two triads of two nodes), the time and the CRC, no byte.
+    // Only the offsets (three in each of two triads of two nodes), the time and the CRC may change.
     let changed = before.iter().zip(&after).filter(|(a, b)| a != b).count();
     assert!(changed <= 4 * 12 + 8 + 4, "{changed}");
-    // Back again, but for rounding.
+    // Back again, apart from rounding.
     trim(&mut after, add.map(|triad| triad.map(|x| -x)), 1).unwrap();
     let mut back = Vec::new();
     read(&after, |node| back.push(*node), |_| {}).unwrap();
@@ -259,7 +259,7 @@ fn a_trim_moves_the_curves_as_they_are_and_nothing_else() {
     );
 }
 
-/// Neither the thermometer of a later version nor numbers that no dies have are taken for something else.
+/// A later version's thermometer and impossible lags or ranges must not be taken for something else.
 #[test]
 fn a_range_a_lag_or_a_thermometer_that_makes_no_sense_is_refused() {
     let one = [node(25.0, &regular())];
@@ -294,7 +294,7 @@ fn a_range_a_lag_or_a_thermometer_that_makes_no_sense_is_refused() {
     assert_eq!(decode(&resealed(later)).err(), no);
 }
 
-/// Whoever made them: a program that does not check what it uploads, or a bit of a header of a later version.
+/// Whatever made them: a program that uploads without checks, or a header bit of a later version.
 #[test]
 fn numbers_that_no_unit_has_are_refused_by_their_node() {
     let [good, other] = [node(0.0, &regular()), node(50.0, &regular())];
@@ -339,7 +339,7 @@ fn numbers_that_no_unit_has_are_refused_by_their_node() {
     let mut bad = other;
     bad.slope.gyro.matrix[(0, 0)] = 4.0;
     assert_eq!(refused(bad), at_1);
-    // As oblique and as far apart in scale as can be believed.
+    // The most oblique sensors and the largest ratio of scale factors that are accepted.
     let mut odd = other;
     odd.model.gyro.matrix = Matrix3::new(1e-9, 0.0, 0.0, 0.0, 200.0, 140.0, 0.0, 0.0, 0.3);
     assert_eq!(refused(odd), None);
@@ -380,7 +380,7 @@ fn bits_of_a_later_version_and_lags_that_nothing_follows_are_refused() {
             effect(constant).err(),
             refused.then_some(effects::EffectError::Value)
         );
-        // The same from bytes: the constant is the last number before the check.
+        // The same from bytes: the constant is the last number before the CRC.
         let mut all = bytes(&one, &[effect(60.0).unwrap()]);
         let at = all.len() - 8;
         all[at..at + 4].copy_from_slice(&constant.to_le_bytes());
@@ -403,7 +403,7 @@ fn a_code_of_no_axis_is_not_one_of_all() {
     assert_eq!(refused(&[code(None)]), None);
     let three = [0, 1, 2].map(|axis| code(Some(axis)));
     assert_eq!(refused(&three), None);
-    // From bytes an axis of 3 is all of them; behind it stand eleven numbers and the check.
+    // In bytes, an axis of 3 means all axes; eleven numbers and the CRC follow it.
     for axis in 3..=u8::MAX {
         let mut all = bytes(&[node(0.0, &regular())], &[code(Some(1))]);
         let at = all.len() - 4 - 4 * 11 - 1;
@@ -442,7 +442,7 @@ fn everything_at_its_longest_has_room() {
 
 #[test]
 fn the_hash_is_crc_64_xz() {
-    // The check value of the catalogue of CRC algorithms.
+    // The check value from the catalogue of CRC algorithms.
     assert_eq!(hash(b"123456789"), 0x995d_c9bb_df19_39fa);
     let one = bytes(&[node(25.0, &regular())], &[]);
     let two = bytes(&[node(26.0, &regular())], &[]);
@@ -507,7 +507,7 @@ fn every_refusal_has_its_name() {
         refused(&resealed(unknown)),
         Some(StoredError::EffectUnknown { at: 1 })
     );
-    // Two coefficients and a constant, where there have to be three.
+    // Two coefficients and a constant, where three coefficients are required.
     let mut short = bytes(&one, &[known]);
     let at = short.len() - 4 - 4 * 4 - 1;
     short[at] = 2;
@@ -534,7 +534,7 @@ fn every_flipped_bit_is_noticed() {
     }
 }
 
-/// Each number of a node that grows by 0.1 per kelvin at the lower end, and by -0.2 at the upper.
+/// Every number of a node changes by 0.1 per kelvin at the lower node, and by -0.2 at the upper.
 fn two_nodes() -> [Node<f32>; 2] {
     let low = regular();
     let high = low.map(|v| 2.0 * v);
@@ -545,7 +545,7 @@ fn two_nodes() -> [Node<f32>; 2] {
 }
 
 proptest! {
-    /// Whatever the bytes are, they are refused or make a calibration; the check is made to hold, or nothing would get past it.
+    /// Any bytes are either refused or decoded to a calibration. Their CRC is made valid, because otherwise all would fail it.
     #[test]
     fn no_bytes_are_too_bad_to_be_refused(noise in prop::collection::vec(any::<u8>(), 0..600), at in 12..360_usize) {
         let named = DeviceEffect::named("gyro_scale_cubic", &[0.0; 3], None).unwrap();

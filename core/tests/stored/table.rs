@@ -37,7 +37,7 @@ fn outside_the_nodes_the_end_slope_goes_on_for_five_kelvin_and_is_then_held() {
         table.follow(&mut state, lost.into());
         assert_eq!(state.place, Place::Above, "as before");
     }
-    // One triad outside is outside, and either is on its own curve.
+    // If one triad is outside, the place is outside; each triad is on its own curve.
     for (dies_c, place) in [
         ([20.0, 51.0], Place::Above),
         ([51.0, 20.0], Place::Above),
@@ -77,14 +77,14 @@ fn a_single_node_is_for_all_temperatures_unless_its_range_is_known() {
     ] {
         assert_eq!(place(&known, temp_c), expected, "{temp_c}");
     }
-    // Of several nodes only what both have: the nodes are from 0 to 50.
+    // For several nodes, the range is the intersection with theirs, 0 to 50.
     let two = Table::<f32, 16>::new([one, other]).unwrap();
     let limits = |range| two.clone().with_range(range).unwrap().limits();
     assert_eq!(limits([-20.0, 40.0]), Some([0.0, 40.0]));
     assert_eq!(limits([10.0, 90.0]), Some([10.0, 50.0]));
 }
 
-/// A cubic in double precision by Newton's divided differences with both ends doubled, and not by Hermite's weights.
+/// A cubic in double precision by Newton's divided differences with both ends doubled, independent of Hermite's weights.
 fn cubic([t0, t1]: [f64; 2], [v0, v1]: [f64; 2], [s0, s1]: [f64; 2], t: f64) -> f64 {
     let (h, d) = (t1 - t0, t - t0);
     let secant = (v1 - v0) / h;
@@ -94,7 +94,7 @@ fn cubic([t0, t1]: [f64; 2], [v0, v1]: [f64; 2], [s0, s1]: [f64; 2], t: f64) -> 
 }
 
 proptest! {
-    /// The version for the device, to the last bit.
+    /// The device's version, compared bit by bit.
     #[test]
     fn compensation_on_the_device_is_that_of_the_model(
         numbers in prop::collection::vec(-20.0_f32..20.0, 24), raw in prop::collection::vec(0.0_f32..5.0, 6),
@@ -107,7 +107,7 @@ proptest! {
         prop_assert_eq!(single::compensate(&model, &raw), model.apply(&raw));
     }
 
-    /// Every number on the cubic of its two neighbours, on the end slope for five kelvin outside, and held farther out.
+    /// Every number is on the cubic of its two neighbours, on the end slope for five kelvin outside, and constant beyond.
     #[test]
     fn every_number_is_on_the_curve_of_its_nodes(
         steps in prop::collection::vec(0.5_f32..30.0, 0..16),
@@ -139,8 +139,8 @@ proptest! {
                 Some(i) => cubic([temps[i], temps[i + 1]], [value(i), value(i + 1)], [slope(i), slope(i + 1)], t),
                 None => value(end) + slope(end) * (t - temps[end]).clamp(-BEYOND_C, BEYOND_C),
             };
-            // Some roundings of numbers up to 20 (2e-6 each), and that of the place between nodes, whose temperatures are rounded to 3e-5
-            // and whose numbers change by up to 120 a kelvin where nodes are half a kelvin apart.
+            // Some roundings of numbers up to 20 (2e-6 each), and that of the position between nodes. Temperatures are rounded to 3e-5, and numbers
+            // change by up to 120 per kelvin if nodes are half a kelvin apart.
             let steepest = pair.map_or(0.0, |i| 2.0 * (value(i + 1) - value(i)).abs() / (temps[i + 1] - temps[i]));
             let bound = 1.2e-5 + 1.6e-5 * (steepest + 0.2);
             prop_assert!((f64::from(found[k]) - expected).abs() < bound, "{} {expected} {bound}", found[k]);

@@ -1,4 +1,4 @@
-//! Frames: what is sent arrives, what is garbled is counted, and the next frame arrives again.
+//! Frames: what is sent arrives, garbled frames are counted, and the next frame arrives again.
 
 use mimu_core::effects::DeviceEffect;
 use mimu_core::wire::{
@@ -8,7 +8,7 @@ use mimu_core::wire::{
 };
 use proptest::prelude::*;
 
-/// The payloads of the whole frames in `bytes`, and how many others there were.
+/// The payloads of the intact frames in `bytes`, and the number of garbled frames.
 fn decode(bytes: &[u8]) -> (Vec<Vec<u8>>, u32) {
     let mut decoder = Decoder::new();
     let mut all = Vec::new();
@@ -24,7 +24,7 @@ fn frame(message: &impl serde::Serialize) -> Vec<u8> {
     out[..length].to_vec()
 }
 
-/// Message `01 00`; its CRC-32 by zlib, and COBS by hand: each run begins with the distance to the zero that it ends in.
+/// Message `01 00`; its CRC-32 by zlib, and COBS by hand: each run begins with the distance to the zero that ends it.
 #[test]
 fn a_frame_written_by_hand() {
     let hello = Call {
@@ -42,7 +42,7 @@ fn a_frame_written_by_hand() {
     assert_eq!(decoder.garbled(), 0);
 }
 
-/// `zlib.crc32(b"\x01\x00")`, little end first: no zero among them.
+/// `zlib.crc32(b"\x01\x00")`, little-endian: it contains no zero.
 const CRC: [u8; 4] = CRC_OF_01_00.to_le_bytes();
 const CRC_OF_01_00: u32 = 0x58c2_23be;
 
@@ -56,7 +56,7 @@ fn head() -> BatchHead {
     }
 }
 
-/// The longest messages there are fit a frame, and 1 kHz of them the line.
+/// The longest messages fit into a frame, and 1 kHz of them fit the line.
 #[test]
 fn full_batches_fit() {
     let raw = [255; BATCH * RAW_BYTES];
@@ -160,7 +160,7 @@ proptest! {
         }
     }
 
-    /// Any one byte changed, inserted or removed costs at most the frames that touch it, and what is lost is counted.
+    /// Any one byte changed, inserted or removed destroys only the frames that it touches, and lost frames are counted.
     #[test]
     fn after_damage_the_next_frame_arrives(
         length in 1..=510_usize, at in 0.0..1.0_f64, kind in 0..3, by in 1..=255_u8,
@@ -176,7 +176,7 @@ proptest! {
         let (payloads, garbled) = decode(&line);
         let all = decode(&one).0.remove(0);
         prop_assert!(payloads.iter().all(|p| *p == all));
-        // At worst it was the end of one and the beginning of the next.
+        // At worst the byte was the end of one frame and the beginning of the next.
         prop_assert!(!payloads.is_empty());
         prop_assert!(payloads.len() == 3 || garbled >= 1);
     }

@@ -1,7 +1,7 @@
-//! Frames of version 2.0, byte by byte as a device sends them, made by a program of its own from the specifications of postcard, COBS
-//! and CRC-32. They never change: a device in the field is met with programs older and newer than its firmware.
+//! Frames of version 2.0 as a device sends them, byte by byte. A separate program made them from the specifications of postcard, COBS and CRC-32.
+//! They never change: a device in the field meets programs older and newer than its firmware.
 
-// What is not written out is of a later version.
+// Fields that are not written out belong to later versions.
 #![allow(clippy::needless_update)]
 
 use mimu_core::wire::{
@@ -9,37 +9,37 @@ use mimu_core::wire::{
     Refusal, Reply, SelfTest, Slot, Start, StoredInfo, Version, compatibility,
 };
 
-/// As the device sends it.
+/// A device's greeting.
 const GREETING: &str = "000107076d696d7502650d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
      0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015601 \
      250301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca0602010501059a3c25b400";
-/// The same of a device that does not send its slots, the last field, yet.
+/// The same from a device that does not yet send its slots, the last field.
 const GREETING_SHORTER: &str = "000107076d696d7502650d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
      0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015601 \
      250301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca066b8fe73f00";
-/// The same with more behind it.
+/// The same with additional bytes at the end.
 const GREETING_LONGER: &str = "000107076d696d7502650d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
      0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015601 \
      250301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca0602010501010a05746578746a3f7aee00";
-/// The same with a reason to start of a later version, number 19, with five bytes.
+/// The same with a start reason of a later version, number 19, with five bytes.
 const UNKNOWN_START: &str = "000107076d696d7502900d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
      0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015607 \
      130568656c6c6f0301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca0602010501050e29b3db00";
 const COUNTERS: &str = "001d010701bbd024fccf24fbcf240102030405060708090a9c036be31a2d00";
-/// Without the last.
+/// Without the last field.
 const COUNTERS_SHORTER: &str = "001b010701bbd024fccf24fbcf240102030405060708090a24e942de00";
-/// With two more.
+/// With two additional fields.
 const COUNTERS_LONGER: &str =
     "0020010701bbd024fccf24fbcf240102030405060708090a9c030580019dcebd7900";
 const SELF_TEST: &str = "0034010702713d8abe713d8abe713d8abe713d8a3e713d8a3e713d8a3e3333d33f3333d33fcdcc1c403333d33f3333d33fcd \
      ccec3f0103cc410103d2410103c641010d204033335340ff1fc61d8cf300";
-/// Without what comes after the accelerometer's fine range.
+/// Without the fields after the accelerometer's fine range.
 const SELF_TEST_SHORTER: &str =
     "002c010702713d8abe713d8abe713d8abe713d8a3e713d8a3e713d8a3e3333d33f3333d33fcdcc1c400bcd240100";
-/// With one more.
+/// With an additional field.
 const SELF_TEST_LONGER: &str = "0034010702713d8abe713d8abe713d8abe713d8a3e713d8a3e713d8a3e3333d33f3333d33fcdcc1c403333d33f3333d33fcd \
      ccec3f0103cc410103d2410103c641010f204033335340ff1f0101b5fc63d100";
-/// For a reason of a later version, number 99, with three bytes.
+/// With a reason of a later version, number 99, with three bytes.
 const UNKNOWN_REFUSAL: &str = "000b0207630102035add44cd00";
 
 fn bytes(hex: &str) -> Vec<u8> {
@@ -50,7 +50,7 @@ fn bytes(hex: &str) -> Vec<u8> {
     digits.chunks(2).map(|d| d[0] << 4 | d[1]).collect()
 }
 
-/// Has `look` see the message in the frame.
+/// Calls `look` with the message in the frame.
 fn read<T>(hex: &str, look: impl Fn(&Message<'_>) -> T) -> T {
     let mut decoder = Decoder::new();
     let frame = bytes(hex);
@@ -115,7 +115,7 @@ fn greets(hex: &str, expected: &Greeting<'_>) {
 #[test]
 fn a_greeting_of_2_0_is_read_for_ever() {
     greets(GREETING, &greeting());
-    // What is sent today begins as it did then.
+    // Today's greeting begins with the same bytes.
     let message = Message::Greeting {
         id: 7,
         greeting: greeting(),
@@ -262,14 +262,14 @@ fn a_compensated_batch_is_read_whatever_follows_its_samples() {
         assert!(batch.is_whole());
         assert_eq!((batch.head.first, batch.dies_c()), (5, dies_c.into()));
     }
-    // What ends within the samples is none.
+    // A batch that ends within the samples is invalid.
     let message = mimu_core::wire::Frame(&before[..20]).message();
     assert_eq!(message, None);
 }
 
 #[test]
 fn a_message_of_another_kind_is_whole_or_none() {
-    // Done of call 7, with a byte behind it, and half of it.
+    // `Done` for call 7: with an additional byte, and truncated.
     for payload in [&[1, 7, 0, 9][..], &[1, 7], &[0], &[0, 7, b'n']] {
         assert_eq!(mimu_core::wire::Frame(payload).message(), None);
     }

@@ -1,5 +1,5 @@
-//! The bytes of every message, written out by hand from the specification of postcard: a variant is its number, integers above
-//! 127 are varints, `f32` are little end first (1.0 is `0000803f`, -2.0 is `000000c0`, 0.5 is `0000003f`), text has its length in front.
+//! The bytes of every message, written by hand from the specification of postcard: a variant is its number; integers above 127 are varints; `f32` are
+//! little-endian (1.0 is `0000803f`, -2.0 is `000000c0`, 0.5 is `0000003f`); text is preceded by its length.
 
 use mimu_core::Sensor;
 use mimu_core::stored;
@@ -138,7 +138,7 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
     }
 }
 
-/// A greeting as far as `start`. 0xfffff in sevens is 7f 7f 3f; 4096 is 32 * 128.
+/// A greeting up to `start`. 0xfffff in groups of seven bits is 7f 7f 3f; 4096 is 32 * 128.
 const BEFORE: &str = "00 01 6d696d75 02 01 05 302e312e30 01 42 0102030405060708090a0b0c \
                       1f ffff3f 08 10 8020 e807 03 782c79 01 56";
 
@@ -245,7 +245,7 @@ fn replies() {
     );
 }
 
-/// A state as far as the axes.
+/// A state up to the axes.
 const KALMAN: &str = "01 ac02 8001 02 03";
 
 fn kalman() -> KalmanState {
@@ -345,7 +345,7 @@ fn events() {
             "03 00 ac02 01 8001 0000003f 8204 0000803f 000000c0 0000003f 0000803f 000000c0 03 010203",
         ),
     );
-    // Its last field is not there where there is nothing to say.
+    // The last field is omitted if it is empty.
     let compensated = Message::Event(Event::Compensated(CompensatedBatch {
         head,
         samples,

@@ -1,4 +1,4 @@
-//! The line between device and host: bytes that must never change, and what a decoder makes of anything else.
+//! The line between device and host: bytes that must never change, and a decoder's reaction to anything else.
 
 mod frames;
 mod frozen;

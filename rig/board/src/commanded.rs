@@ -22,11 +22,11 @@ pub const GRAVITY: f64 = 9.793;
 /// Latitude, degrees.
 pub const LATITUDE_DEG: f64 = 30.5;
 
-/// Longest wait for an answer: a busy machine takes its time.
+/// Longest wait for an answer, long enough for a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A board with its unit on a fixture, at the fast pace. Its folder holds `port`, a link to the serial port, and `flash`, what the device
-/// stores.
+/// A board with its unit on a fixture, at the fast pace. Its folder contains `port`, a link to the serial port, and `flash`, the stored contents of
+/// the device.
 #[derive(Debug)]
 pub struct Commanded {
     folder: PathBuf,
@@ -39,7 +39,7 @@ pub struct Commanded {
 impl Commanded {
     /// Switches it on. `fixture`: `table` or `hands`.
     ///
-    /// Errors: the folder cannot be written to, the unit is refused, or there is no terminal to be had.
+    /// Errors: the folder cannot be written to, the unit is refused, or no terminal is available.
     pub fn start(
         image: &Image,
         fixture: &str,
@@ -82,7 +82,7 @@ impl Commanded {
         })
     }
 
-    /// Where commands are taken.
+    /// Address for commands.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
@@ -92,9 +92,9 @@ impl Commanded {
         self.folder.join(name)
     }
 
-    /// Says a line; what is answered.
+    /// Sends a line and returns the answer.
     ///
-    /// Errors: nothing is, in time.
+    /// Errors: no answer in time.
     pub fn ask(&mut self, line: &str) -> Result<String, String> {
         let broken = |e: std::io::Error| format!("the bench, told {line:?}: {e}");
         let said = self
@@ -107,9 +107,9 @@ impl Commanded {
         Ok(answer.trim().to_owned())
     }
 
-    /// Says a line that is to be answered by `OK`.
+    /// Sends a line whose answer must be `OK`.
     ///
-    /// Errors: it is not.
+    /// Errors: another answer, or none.
     pub fn tell(&mut self, line: &str) -> Result<(), String> {
         match self.ask(line)? {
             answer if answer == "OK" => Ok(()),
@@ -117,9 +117,9 @@ impl Commanded {
         }
     }
 
-    /// Switches it off; how long it ran by its own clock, s.
+    /// Switches it off and returns how long it ran by its own clock, s.
     ///
-    /// Errors: what ended it before.
+    /// Errors: the reason for which it ended before.
     pub fn stop(mut self) -> Result<f64, String> {
         self.end.store(true, Ordering::Relaxed);
         match self.thread.take().map(JoinHandle::join) {

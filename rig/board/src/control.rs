@@ -1,4 +1,4 @@
-//! Lines of text over TCP, each answered by a line. It never waits for anybody.
+//! Lines of text over TCP, each answered by a line. Never blocks.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -6,13 +6,13 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 /// Longest line, bytes. The longest command takes a tenth of it.
 const LONGEST: usize = 1000;
 
-/// Most clients at a time.
+/// Largest number of simultaneous clients.
 const MOST: usize = 16;
 
-/// Bytes of answers that a client may leave unread, after which it is dropped.
+/// A client with more unread bytes of answers is dropped.
 const UNREAD: usize = 1 << 16;
 
-/// Where commands come in.
+/// The listener for commands, and its clients.
 #[derive(Debug)]
 pub(crate) struct Control {
     listener: TcpListener,
@@ -20,20 +20,20 @@ pub(crate) struct Control {
     clients: Vec<Client>,
 }
 
-/// Somebody who sends commands.
+/// A client that sends commands.
 #[derive(Debug)]
 struct Client {
     stream: TcpStream,
     received: Vec<u8>,
     unsent: Vec<u8>,
-    /// Nothing more comes: it is dropped once it has its answers.
+    /// No more input follows: it is dropped after its last answer.
     ended: bool,
 }
 
 impl Control {
-    /// Listens at an address, as `127.0.0.1:0`; port 0 is any that is free.
+    /// Listens at an address such as `127.0.0.1:0`; port 0 selects any free port.
     ///
-    /// Errors: not an address, or it is taken.
+    /// Errors: not an address, or it is in use.
     pub(crate) fn bind(address: &str) -> Result<Self, String> {
         let refused = |e: io::Error| {
             format!(
@@ -55,18 +55,18 @@ impl Control {
         self.address
     }
 
-    /// Answers every line that has come.
+    /// Answers every line that has arrived.
     ///
-    /// Errors: those of `answer`, for which there is no line to give back.
+    /// Errors: those of `answer` for which there is no answer line.
     pub(crate) fn poll(
         &mut self,
         answer: &mut dyn FnMut(&str) -> Result<String, String>,
     ) -> Result<(), String> {
         // A client that gives up before it is accepted does not matter.
         while let Ok((stream, _)) = self.listener.accept() {
-            // A client beyond the most finds its connection closed.
+            // If there are too many clients, the connection of a new one is closed.
             if self.clients.len() < MOST && stream.set_nonblocking(true).is_ok() {
-                // Without it an answer may wait for 40 ms.
+                // Without this, an answer may be delayed by 40 ms.
                 let _ = stream.set_nodelay(true);
                 self.clients.push(Client {
                     stream,
@@ -97,7 +97,7 @@ impl Control {
 }
 
 impl Client {
-    /// Takes in what has come, as much as one look is for.
+    /// Reads what has arrived, up to the limit of one poll.
     fn listen(&mut self) {
         let mut some = [0; LONGEST];
         if self.ended {
@@ -106,7 +106,7 @@ impl Client {
         match self.stream.read(&mut some) {
             Ok(0) => {
                 self.ended = true;
-                // A last line without its end is one as well.
+                // An unterminated last line counts too.
                 if !self.received.is_empty() {
                     self.received.push(b'\n');
                 }
@@ -121,7 +121,7 @@ impl Client {
         }
     }
 
-    /// The next line without its end; within, `None` for one that is too long.
+    /// The next line without its end; the inner value is `None` if the line is too long.
     fn line(&mut self) -> Option<Option<String>> {
         match self.received.iter().position(|&byte| byte == b'\n') {
             Some(end) => {

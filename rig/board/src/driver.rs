@@ -8,16 +8,16 @@ use rigless::time::VirtualNanos;
 
 use crate::part::Machine;
 
-/// Present state of a board.
+/// Current state of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Standing {
-    /// The virtual clock, ns since the board was switched on first.
+    /// The virtual clock, ns since the board was first switched on.
     pub ns: u64,
     /// Instructions executed. Waiting for an interrupt executes none.
     pub instructions: u64,
 }
 
-/// An arrival at an instruction that is watched.
+/// An arrival at a watched instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Arrival {
     /// The instruction.
@@ -28,14 +28,14 @@ pub struct Arrival {
     pub instructions: u64,
 }
 
-/// What a stopped board can be asked for.
+/// A function to run on a stopped board.
 pub(crate) type Errand = Box<dyn FnOnce(&mut Stopped<'_>) + Send>;
 
 /// Commands to the board.
 pub(crate) enum Order {
-    /// Run to an instant, ns.
+    /// Run until this time, ns.
     To(u64),
-    /// Run a function at the board's present instant.
+    /// Run a function at the board's current time.
     Do(Errand),
 }
 
@@ -78,7 +78,7 @@ impl Driver<Machine> for Puppet {
             })
             .ok()?;
         loop {
-            // An error is the board's owner gone.
+            // An error means that the board's owner is gone.
             match self.orders.recv().ok()? {
                 Order::To(ns) => return Some(VirtualNanos(ns)),
                 Order::Do(errand) => errand(&mut Stopped {

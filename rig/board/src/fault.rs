@@ -1,21 +1,21 @@
-//! Faults that a program has no part in: an instruction that is not what the image says, as after a flash bit that nobody noticed, or where
-//! a debugger has put the program counter.
+//! Faults outside the program: an instruction that differs from the image, as after an undetected bit flip in the flash, or after a debugger has
+//! moved the program counter.
 
 use crate::memory::{program, read};
 use crate::running::Board;
 
-/// What stands in the place of an instruction.
+/// The instruction that replaces the original one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fault {
-    /// A branch to itself: the program stands still there.
+    /// A branch to itself: the program hangs there.
     Hang,
-    /// An instruction that is none (`UDF`, ARMv7-M A7.7.194).
+    /// An undefined instruction (`UDF`, ARMv7-M A7.7.194).
     Undefined,
     /// A branch to another instruction, within 16 MiB.
     Jump(u64),
 }
 
-/// What has been replaced, for [`Board::heal`].
+/// The replaced code, for [`Board::heal`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Replaced {
     address: u64,
@@ -26,10 +26,10 @@ impl Fault {
     /// The instruction, by half words.
     fn code(self, address: u64) -> Vec<u16> {
         match self {
-            // B, encoding T2 (A7.7.12): four bytes ahead of itself is where it counts from.
+            // B, encoding T2 (A7.7.12): the distance counts from four bytes after the instruction.
             Self::Hang => vec![0xe7fe],
             Self::Undefined => vec![0xde00],
-            // Encoding T4. The two uppermost bits of the distance are stored as whether they are the sign.
+            // Encoding T4. The two uppermost bits of the distance are stored as whether they equal the sign.
             Self::Jump(target) => {
                 let distance = target.wrapping_sub(address + 4) as u32;
                 let bit = |n: u32| (distance >> n) & 1;
@@ -44,7 +44,7 @@ impl Fault {
 }
 
 impl Board {
-    /// Puts a fault in the place of the instruction at an address of the program's own flash, without the program noticing.
+    /// Replaces the instruction at an address in the program's own flash, unnoticed by the program.
     ///
     /// Errors: an address that is not flash, or the emulator gave up.
     pub fn inject(&mut self, address: u64, fault: Fault) -> Result<Replaced, String> {
@@ -60,7 +60,7 @@ impl Board {
         })?
     }
 
-    /// Puts back what a fault has replaced.
+    /// Restores the original code.
     ///
     /// Errors: the emulator gave up.
     pub fn heal(&mut self, replaced: Replaced) -> Result<(), String> {
@@ -72,7 +72,7 @@ impl Board {
 mod tests {
     use super::Fault;
 
-    /// Against the assembler of LLVM: `b.w` to the next instruction, forth, far forth, and back.
+    /// Against LLVM's assembler: `b.w` to the next instruction, forwards, far forwards, and backwards.
     #[test]
     fn branches_are_encoded_as_an_assembler_does() {
         let code = |target: u64| Fault::Jump(target).code(0x0800_0000);

@@ -1,4 +1,4 @@
-//! What the emulator found out about a firmware.
+//! The emulator's findings about a firmware.
 
 use std::collections::BTreeMap;
 
@@ -6,16 +6,16 @@ use rigless::session::Session;
 
 use crate::part::Machine;
 
-/// What the emulator has to say about a firmware.
+/// The emulator's findings about a firmware.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Findings {
-    /// Rules of the reference manual that were broken, and accesses that the part refused.
+    /// Violated rules of the reference manual, and accesses that the part refused.
     pub broken: Vec<String>,
-    /// Writes that nothing acted upon, since the emulator has no model of what they are for.
+    /// Writes without effect, because the emulator does not model the function.
     pub unmodelled: Vec<String>,
 }
 
-/// All of it so far.
+/// All findings so far.
 pub(crate) fn findings(session: &Session<Machine>) -> Findings {
     let mut findings = Findings::default();
     for told in session.told() {

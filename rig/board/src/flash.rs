@@ -1,7 +1,7 @@
-//! The flash interface, watched: what is being programmed or erased, and what a supply that is cut then leaves.
+//! The flash interface under observation: running program and erase operations, and the contents after a cut of the supply.
 //!
-//! The emulator's own model puts a word or a sector into memory at the end of its time, so a run that ends in
-//! between would find it untouched. A cut supply is worse: some cells have changed and others have not.
+//! The emulator's own model changes memory only at the end of an operation, so a run that ends during it would find the memory unchanged. A real
+//! supply cut is worse: some cells have changed and others have not.
 
 use std::collections::VecDeque;
 
@@ -18,14 +18,14 @@ pub const BASE: u64 = 0x0800_0000;
 /// Bytes in a bank.
 pub const BANK: u64 = 1 << 20;
 
-/// Bytes in a sector, the least that is erased.
+/// Bytes in a sector, the smallest unit of an erase.
 pub const SECTOR: u64 = 128 << 10;
 
-/// Bytes in a flash word, the least that is programmed.
+/// Bytes in a flash word, the smallest unit of programming.
 pub const WORD: u64 = 32;
 
-/// Typical times by the register's parallelism (x8, x16, x32, x64), ns; DS12110 rev 11, table 140. The emulator
-/// takes the same, so that the fraction done is right.
+/// Typical durations by the register's parallelism (x8, x16, x32, x64), ns; DS12110 rev 11, table 140. The emulator uses the same, so the fraction
+/// done is right.
 const PROGRAM_NS: [u64; 4] = [290_000, 180_000, 130_000, 100_000];
 const SECTOR_ERASE_NS: [u64; 4] = [2_000_000_000, 1_800_000_000, 1_100_000_000, 1_000_000_000];
 const BANK_ERASE_NS: [u64; 4] = [13_000_000_000, 8_000_000_000, 6_000_000_000, 5_000_000_000];
@@ -36,43 +36,43 @@ const CR_SER: u64 = 1 << 2;
 const CR_BER: u64 = 1 << 3;
 const CR_FW: u64 = 1 << 6;
 const CR_START: u64 = 1 << 7;
-/// QW of FLASH_SR1 and FLASH_SR2 (RM0433 4.9.5): an operation waits or runs.
+/// QW of FLASH_SR1 and FLASH_SR2 (RM0433 4.9.5): an operation is waiting or running.
 const SR_QW: u64 = 1 << 2;
 
-/// What is done to a stretch of memory.
+/// The change of a memory range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
-    /// A word gets these bytes.
+    /// Program a word with these bytes.
     Program([u8; WORD as usize]),
-    /// All ones.
+    /// Erase: all ones.
     Erase,
 }
 
 /// One operation of a bank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Operation {
-    /// What.
+    /// The change.
     pub change: Change,
     /// First address.
     pub address: u64,
-    /// Bytes.
+    /// Length, bytes.
     pub length: u64,
-    /// When it begins, ns.
+    /// Begin, ns.
     pub begins_ns: u64,
-    /// When it is done, ns.
+    /// End, ns.
     pub ends_ns: u64,
 }
 
 impl Operation {
-    /// What memory holds where the supply is cut at an instant, of what it held before.
+    /// Memory after a supply cut at this time; `before` are the previous contents.
     ///
-    /// Each cell on its own has changed with the probability that is the fraction of the time gone by. The cells
-    /// of the error-correcting code are not modelled: see what the page says is left out.
+    /// Each cell has changed independently, with a probability equal to the fraction of the time elapsed. The cells of the error-correcting code are
+    /// not modelled; docs/bench.md lists what is left out.
     pub fn torn(&self, before: &[u8], at_ns: u64, random: &mut Random) -> Vec<u8> {
         let took = self.ends_ns - self.begins_ns;
         let done = at_ns.saturating_sub(self.begins_ns) as f64 / took as f64;
         let wanted = |i: usize| match &self.change {
-            // Programming clears bits and sets none.
+            // Programming only clears bits.
             Change::Program(bytes) => before[i] & bytes[i],
             Change::Erase => 0xFF,
         };
@@ -91,23 +91,23 @@ impl Operation {
     }
 }
 
-/// What one bank is doing.
+/// Current operations of one bank.
 #[derive(Debug, Default)]
 struct Bank {
-    /// The word being gathered, which bytes of it have come, and they.
+    /// The word being gathered, which of its bytes have arrived, and the bytes.
     word: u64,
     come: u32,
     bytes: [u8; WORD as usize],
     queue: VecDeque<Operation>,
 }
 
-/// The flash interface and what it is doing.
+/// The flash interface and its operations.
 #[derive(Debug)]
 pub(crate) struct Watched {
     flash: Flash,
     banks: [Bank; 2],
     landed: Vec<(u64, u64)>,
-    /// No operation ends any more.
+    /// Operations no longer end.
     pub(crate) stuck: bool,
 }
 
@@ -121,7 +121,7 @@ impl Watched {
         }
     }
 
-    /// After a system reset: what was in flight is lost, the option bytes stay. `registers` are reset already.
+    /// After a system reset: operations in flight are lost, the option bytes stay. `registers` are reset already.
     pub(crate) fn restart(&mut self, registers: &mut RegisterFile) {
         let options = self.flash.committed_options();
         self.flash = Flash::new();
@@ -129,14 +129,14 @@ impl Watched {
         self.banks = Default::default();
     }
 
-    /// Operations in flight at an instant.
+    /// Operations in flight at a time.
     pub(crate) fn in_flight(&self, at_ns: u64) -> Vec<Operation> {
         let running = |o: &&Operation| o.begins_ns <= at_ns && at_ns < o.ends_ns;
         let queues = self.banks.iter().flat_map(|bank| &bank.queue);
         queues.filter(running).copied().collect()
     }
 
-    /// Stretches (first address, bytes) that have changed since this was last asked, up to an instant.
+    /// Ranges (first address, bytes) that have changed since the last call, up to a time.
     pub(crate) fn take_landed(&mut self, at_ns: u64) -> Vec<(u64, u64)> {
         self.retire(at_ns);
         std::mem::take(&mut self.landed)
@@ -163,12 +163,12 @@ impl Watched {
         });
     }
 
-    /// Takes note of a word that the interface has accepted.
+    /// Records a word that the interface has accepted.
     fn programmed(&mut self, bank: usize, registers: &RegisterFile, now: u64) {
         let gathered = &mut self.banks[bank];
         let come = std::mem::take(&mut gathered.come);
         let (word, mut bytes) = (gathered.word, gathered.bytes);
-        // Forced out early, the rest are ones.
+        // If a word is forced out early, the missing bytes are ones.
         for (i, byte) in bytes.iter_mut().enumerate() {
             if come & (1 << i) == 0 {
                 *byte = 0xFF;

@@ -1,4 +1,4 @@
-//! The bench in front of the converter: voltages at its pins at any instant of the virtual clock.
+//! The bench in front of the converter: voltages at its pins at any time of the virtual clock.
 
 use std::fmt;
 
@@ -15,34 +15,34 @@ use mimu_rig::unit::Unit;
 
 use crate::schematic::{Drives, Filters, Volts};
 
-/// Steps of the physics per second. One for each conversion of a firmware that scans ten inputs twice a
-/// millisecond; faster ones are served by straight lines, which the slowest filter (1.6 kHz) leaves nothing of.
+/// Steps of the physics per second: one per conversion of a firmware that scans ten inputs twice a millisecond. Faster conversions are interpolated
+/// linearly; even the widest filter (1.6 kHz) makes the error negligible.
 const STEPS_PER_S: u64 = 20_000;
 const STEP_NS: u64 = 1_000_000_000 / STEPS_PER_S;
 
-/// Change of an ADXRS300's output by its inputs ST1 and ST2, V, typically (data sheet, recalled: 150 to 450 mV).
+/// Typical change of an ADXRS300's output by its inputs ST1 and ST2, V (data sheet, from memory: 150 to 450 mV).
 const SELF_TEST_V: [f64; 2] = [-0.27, 0.27];
 
-/// Bandwidth of the gyros, Hz, which the deflection passes like any rate.
+/// Bandwidth of the gyros, Hz; it filters the deflection like a rate.
 const GYRO_BANDWIDTH_HZ: f64 = 40.0;
 
 /// Sensitivity of an MMA7260QT by g-Select2 and g-Select1 as a binary number, over that of its finest range: 800, 600,
 /// 300 and 200 mV/g.
 const RANGES: [f64; 4] = [1.0, 0.75, 0.375, 0.25];
 
-/// What stands in front of the pins.
+/// Source of the voltages at the pins.
 pub enum Front {
-    /// Voltages that a test sets, without noise.
+    /// Fixed voltages that a test sets, without noise.
     Still(Volts),
-    /// A unit that is carried through a plan, or as it is told.
+    /// A unit that is moved through a plan, or by commands.
     Bench(Box<Bench>),
 }
 
 impl Front {
-    /// A unit of known truth carried through a plan, which begins as the board is switched on first. Behind the
-    /// plan's end the last instant lasts.
+    /// A unit of known truth moved through a plan, which begins when the board is first switched on. After the end of the plan its last state
+    /// remains.
     ///
-    /// Errors: the plan asks for what the table cannot do, or a sensor is not analog.
+    /// Errors: the plan exceeds the table's abilities, or a sensor is not analog.
     pub fn bench(plan: &Plan, truth: &RigTruth, seed: u64) -> Result<Self, String> {
         Self::carried(
             plan,
@@ -57,10 +57,10 @@ impl Front {
         )
     }
 
-    /// A unit of known truth that is moved by [`Front::command`]. Of the plan it has carrier, place, lead-in, chamber and
-    /// the first pose, in which it stands; the steps are not carried out.
+    /// A unit of known truth that is moved by [`Front::command`]. The plan provides carrier, place, lead-in, chamber and first pose; its steps are
+    /// not carried out.
     ///
-    /// Errors: the first pose is out of the table's reach, or a sensor is not analog.
+    /// Errors: the table cannot reach the first pose, or a sensor is not analog.
     pub fn commanded(plan: &Plan, truth: &RigTruth, seed: u64) -> Result<Self, String> {
         Self::carried(
             plan,
@@ -119,7 +119,7 @@ impl Front {
         })))
     }
 
-    /// The same, with the plan's beginning at an instant, ns, that is not yet past.
+    /// The same, with the plan beginning at a time, ns, that is not yet past.
     pub fn begun_at(mut self, ns: u64) -> Self {
         if let Self::Bench(bench) = &mut self {
             bench.began_ns = ns;
@@ -127,14 +127,14 @@ impl Front {
         self
     }
 
-    /// What the microcontroller drives from now on.
+    /// Sets what the microcontroller drives from now on.
     pub fn drive(&mut self, drives: Drives) {
         if let Self::Bench(bench) = self {
             bench.drives = drives;
         }
     }
 
-    /// What carries the unit, if there is one.
+    /// What holds the unit, if there is one.
     pub fn carried_by(&self) -> Option<CarriedBy> {
         match self {
             Self::Still(_) => None,
@@ -142,15 +142,15 @@ impl Front {
         }
     }
 
-    /// Tells what carries the unit what to do from an instant on, ns.
+    /// Gives a command to the table or the person, from a time on, ns.
     ///
-    /// Errors: it cannot do that, or carries out a plan, in one line that says what instead.
+    /// Errors: it cannot do this, or it carries out a plan; a one-line message names the alternative.
     pub fn command(&mut self, ns: u64, command: Command) -> Result<(), String> {
         let t_s = self.advanced(ns);
         self.taking_commands()?.command(t_s, command)
     }
 
-    /// Whether it still moves as it was told, at an instant, ns.
+    /// Whether it is still moving by command at a time, ns.
     ///
     /// Errors: it carries out a plan.
     pub fn busy(&mut self, ns: u64) -> Result<bool, String> {
@@ -158,7 +158,7 @@ impl Front {
         Ok(self.taking_commands()?.busy(t_s))
     }
 
-    /// Where it was told to be, at an instant, ns.
+    /// Its commanded position at a time, ns.
     ///
     /// Errors: it carries out a plan.
     pub fn position(&mut self, ns: u64) -> Result<Position, String> {
@@ -166,7 +166,7 @@ impl Front {
         Ok(self.taking_commands()?.position(t_s))
     }
 
-    /// Brings the chamber to a temperature (°C) from an instant (ns) on: at a steady rate (K/s), or at once.
+    /// Brings the chamber to a temperature (°C) from a time (ns) on: at a steady rate (K/s), or at once.
     ///
     /// Errors: there is no chamber.
     pub fn set_chamber(&mut self, ns: u64, to_c: f64, rate: Option<f64>) -> Result<(), String> {
@@ -183,7 +183,7 @@ impl Front {
         Ok(())
     }
 
-    /// Temperature of the chamber's air at an instant, ns, °C.
+    /// Temperature of the chamber's air at a time, ns, °C.
     ///
     /// Errors: there is no chamber.
     pub fn chamber_c(&mut self, ns: u64) -> Result<f64, String> {
@@ -194,7 +194,7 @@ impl Front {
         }
     }
 
-    /// The true motion of the unit at an instant, ns, or up to 50 µs after it.
+    /// The true motion of the unit at a time, ns, or up to 50 µs after it.
     ///
     /// Errors: there is no unit.
     pub fn motion(&mut self, ns: u64) -> Result<Motion, String> {
@@ -205,13 +205,13 @@ impl Front {
         }
     }
 
-    /// Moves the unit on to an instant, ns, where nobody asks for voltages.
+    /// Advances the unit to a time, ns, when no voltages are needed.
     pub fn advance(&mut self, ns: u64) {
         self.advanced(ns);
     }
 
-    /// Steps up to an instant, ns, and returns the time of the last step, s since the plan or the lead-in began: what
-    /// was computed cannot be changed any more.
+    /// Advances to a time, ns, and returns the time of the last step, s since the plan or the lead-in began: computed steps cannot be changed any
+    /// more.
     fn advanced(&mut self, ns: u64) -> f64 {
         match self {
             Self::Still(_) => 0.0,
@@ -234,7 +234,7 @@ impl Front {
         }
     }
 
-    /// Voltages at an instant, ns. Instants do not go back.
+    /// Voltages at a time, ns. Times must not decrease.
     pub fn at(&mut self, ns: u64) -> Volts {
         match self {
             Self::Still(volts) => *volts,
@@ -252,10 +252,10 @@ impl fmt::Debug for Front {
     }
 }
 
-/// What is said where voltages stand in the place of a unit.
+/// Message if fixed voltages replace the unit.
 const NO_UNIT: &str = "no unit is at the pins of the board; start the bench with --unit";
 
-/// What carries the unit, and by what.
+/// What moves the unit: a plan or commands.
 enum Carried {
     Plan(Box<dyn Carrier + Send>),
     Commands(Box<dyn Commanded + Send>),
@@ -270,24 +270,24 @@ impl Carried {
     }
 }
 
-/// A unit on the move in front of the pins.
+/// A moving unit in front of the pins.
 pub struct Bench {
     plan: Plan,
     carrier: Carried,
-    /// At the step `steps`.
+    /// Motion at the step number `steps`.
     motion: Motion,
     unit: Unit,
     filters: Filters,
-    /// At the steps `steps - 1` and `steps`.
+    /// Voltages at the steps `steps - 1` and `steps`.
     before: Volts,
     after: Volts,
-    /// The virtual clock at step 0.
+    /// Virtual time at step 0.
     began_ns: u64,
     steps: u64,
     drives: Drives,
     /// Self-test of the gyros behind their filter, V.
     deflection: LowPass,
-    /// Output without input, V at the nominal supply, and that.
+    /// Output without input, V at the nominal supply, and the nominal supply, V.
     accel_null: [f64; 3],
     accel_supply_v: f64,
     noise_v: f64,
@@ -295,7 +295,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// What the sensors' own inputs do to their outputs.
+    /// Applies the sensors' own inputs (self-test, range) to their outputs.
     fn deflect(&mut self, pins: &mut Pins) {
         let [st1, st2] = SELF_TEST_V;
         let of = |on: bool, v: f64| if on { v } else { 0.0 };
@@ -317,7 +317,7 @@ impl Bench {
         self.steps as f64 / STEPS_PER_S as f64
     }
 
-    /// Steps until the last one is behind an instant, ns since it began.
+    /// Steps until the last step is not before a time, ns since the start.
     fn advance(&mut self, ns: u64) {
         while self.steps * STEP_NS <= ns {
             self.steps += 1;
@@ -336,7 +336,7 @@ impl Bench {
         let mut volts = self
             .before
             .between(&self.after, since as f64 / STEP_NS as f64);
-        // One input is converted at an instant, so that one draw is each conversion's own.
+        // One input is converted at a time, so each conversion gets its own draw.
         let noise = self.noise_v * self.stream.normal();
         for v in &mut volts.input {
             *v += noise;

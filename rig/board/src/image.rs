@@ -1,4 +1,4 @@
-//! A firmware image: the ELF file that `cargo build` leaves.
+//! A firmware image: the ELF file made by `cargo build`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,7 +18,7 @@ pub struct Image {
     sizes: Sizes,
 }
 
-/// What an image takes of the part's memory, bytes.
+/// Memory use of an image, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sizes {
     /// Code, constants, and the initial values of variables.
@@ -27,8 +27,8 @@ pub struct Sizes {
     pub ram: u64,
 }
 
-/// Where `cargo build -p mimu-firmware --profile image --target thumbv7em-none-eabihf` leaves the image: in the target
-/// directory that `CARGO_TARGET_DIR` names, or in `target` here.
+/// Location of the image from `cargo build -p mimu-firmware --profile image --target thumbv7em-none-eabihf`: in the target directory that
+/// `CARGO_TARGET_DIR` names, or in `target` here.
 pub fn release_image() -> PathBuf {
     let target =
         std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
@@ -76,10 +76,9 @@ impl Image {
             .ok_or_else(|| format!("the image has no symbol {symbol}"))
     }
 
-    /// Address of the only symbol whose mangled name contains this, but for tables of the compiler's, which have the name of their
-    /// function in theirs.
+    /// Address of the only symbol whose mangled name contains `part`. Tables of the compiler contain the names of their functions and are ignored.
     ///
-    /// Errors: no symbol does, or several.
+    /// Errors: no such symbol, or several.
     pub fn find(&self, part: &str) -> Result<u64, String> {
         let meant = |name: &str| name.contains(part) && !name.starts_with(".L");
         let mut found = self.symbols.iter().filter(|(name, _)| meant(name));
@@ -92,7 +91,7 @@ impl Image {
         }
     }
 
-    /// What it takes of the part's memory.
+    /// Its memory use.
     pub fn sizes(&self) -> Sizes {
         self.sizes
     }

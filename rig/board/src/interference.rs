@@ -1,22 +1,22 @@
-//! Faults of the line from the device: bytes that come garbled.
+//! Faults of the line from the device: garbled bytes.
 
 use mimu_rig::random::Random;
 
-/// Whole.
+/// The unit of `per_million`.
 pub(crate) const MILLION: u32 = 1_000_000;
 
-/// What garbles bytes.
+/// Garbles bytes.
 #[derive(Debug)]
 pub(crate) struct Interference {
     random: Random,
-    /// So many of a million.
+    /// Garbled bytes per million.
     per_million: u32,
-    /// So many of the next ones, all of them.
+    /// The next so many bytes are all garbled.
     burst: u64,
 }
 
 impl Interference {
-    /// None yet. The seed decides which bytes it is.
+    /// Garbles nothing yet. The seed decides which bytes are garbled later.
     pub(crate) fn new(seed: u64) -> Self {
         Self {
             random: Random::new(seed, "line from the device"),
@@ -25,17 +25,17 @@ impl Interference {
         }
     }
 
-    /// So many of a million bytes from now on.
+    /// Garbles so many of a million bytes from now on.
     pub(crate) fn garble(&mut self, per_million: u32) {
         self.per_million = per_million;
     }
 
-    /// The next so many bytes.
+    /// Garbles the next `count` bytes.
     pub(crate) fn burst(&mut self, count: u64) {
         self.burst = count;
     }
 
-    /// What arrives of bytes that were sent. Returns how many of them are others.
+    /// Garbles bytes on the line. Returns how many were changed.
     pub(crate) fn pass(&mut self, bytes: &mut [u8]) -> u64 {
         let mut garbled = 0;
         for byte in bytes {
@@ -44,7 +44,7 @@ impl Interference {
                     && self.random.uniform() * f64::from(MILLION) < f64::from(self.per_million);
             self.burst = self.burst.saturating_sub(1);
             if struck {
-                // Any pattern of bits but none: it never arrives as it was sent.
+                // Any bit pattern except zero, so that a garbled byte always differs.
                 *byte ^= 1 + (self.random.word() % 255) as u8;
                 garbled += 1;
             }
@@ -57,7 +57,7 @@ impl Interference {
 mod tests {
     use super::*;
 
-    /// Which of so many bytes arrive as others.
+    /// Indices, among `count` bytes, of those that arrive changed.
     fn struck(interference: &mut Interference, count: usize) -> Vec<usize> {
         let sent: Vec<u8> = (0..count).map(|k| k as u8).collect();
         let mut come = sent.clone();
@@ -83,7 +83,7 @@ mod tests {
             interference.garble(10_000);
         }
         let first = struck(&mut one, 100_000);
-        // 1000, and a standard deviation of 31.
+        // 1000 expected, with a standard deviation of 31.
         assert!((850..1150).contains(&first.len()), "{}", first.len());
         assert_eq!(first, struck(&mut same, 100_000));
         assert_ne!(first, struck(&mut other, 100_000));

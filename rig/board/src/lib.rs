@@ -1,19 +1,19 @@
 //! The emulated board: the release image of the firmware, unmodified, on an emulated NUCLEO-H743ZI2 with the
 //! bench's physics in front of its pins.
 //!
-//! The emulator is the crate `rigless`; what is the bench's own:
+//! The emulator is the crate `rigless`. The bench adds:
 //!
 //! | module        |                                                                               |
 //! |---------------|-------------------------------------------------------------------------------|
 //! | [`schematic`] | what is wired to which pin                                                    |
-//! | [`front`]     | voltages at the converter's pins at any instant                               |
-//! | [`sampler`]   | the converter, shown the voltages of each conversion's own instant            |
-//! | [`flash`]     | what is being written, and what a cut supply leaves of it                     |
+//! | [`front`]     | voltages at the converter's pins at any time                                  |
+//! | [`sampler`]   | the converter, which gets the voltages at the time of each conversion         |
+//! | [`flash`]     | what is being written, and the contents after a cut of the supply             |
 //! | `watchdog`    | a model that the emulator lacks                                               |
 //! | `line`        | the serial line                                                               |
 //! | [`image`]     | the ELF file                                                                  |
 //! | [`fault`]     | an instruction that differs from the image                                    |
-//! | [`findings`]  | what the emulator found out about the firmware                                |
+//! | [`findings`]  | the emulator's findings about the firmware                                    |
 //! | [`running`]   | a board that runs: time, bytes, supply, reset, counters                       |
 //! | [`serve`], [`terminal`], `port` | the same behind a pseudo-terminal                            |
 //! | [`commanded`] | the same in a thread, under command                                         |

@@ -1,4 +1,4 @@
-//! The far end of the serial line: bytes to and from the microcontroller, each at its instant.
+//! The far end of the serial line: bytes to and from the microcontroller, each with its time.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,27 +8,27 @@ use rigless::chip::uart::Peer;
 use rigless::snapshot::Store;
 use rigless::time::VirtualNanos;
 
-/// What is on its way in either direction.
+/// Bytes on their way in both directions.
 #[derive(Debug, Default)]
 pub(crate) struct Bytes {
-    /// Waiting for the line, oldest first.
+    /// Waiting to be sent, oldest first.
     pub(crate) to_device: VecDeque<u8>,
-    /// Come in, oldest first, each with the end of its stop bit, ns.
+    /// Received, oldest first, each with the end of its stop bit, ns.
     pub(crate) from_device: Vec<(u64, u8)>,
 }
 
-/// A cable: what is put in at one end comes out at the other.
+/// A cable: bytes put in at one end come out at the other.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Line(Arc<Mutex<Bytes>>);
 
 impl Line {
     pub(crate) fn bytes(&self) -> MutexGuard<'_, Bytes> {
-        // A panic elsewhere leaves bytes as good as any.
+        // After a panic elsewhere the bytes are still valid.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The end that the microcontroller's port sees.
+/// The end that is connected to the microcontroller's port.
 #[derive(Debug)]
 pub(crate) struct FarEnd(pub(crate) Line);
 

@@ -21,7 +21,7 @@ struct Cli {
     command: Command,
 }
 
-/// Where to go on reading.
+/// References for further reading.
 const KEYS: &str =
     "docs/bench.md has all keys of both files; rig/plans and rig/rigs have examples to copy.";
 
@@ -100,7 +100,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Reads 24 hexadecimal digits.
+/// Parses 24 hexadecimal digits.
 fn unit_id(text: &str) -> Result<[u8; 12], String> {
     let mut id = [0; 12];
     let refused = || format!("{text:?} is not a unit id: write 24 hexadecimal digits");
@@ -120,7 +120,7 @@ fn seeded(seed: u64) -> [u8; 12] {
     id
 }
 
-/// Time between two warnings of lost bytes, of which a second loses a thousand chunks.
+/// Interval between two warnings of lost bytes: a second can lose a thousand chunks.
 const BETWEEN_WARNINGS: Duration = Duration::from_secs(1);
 
 /// The unit at rest with z up, in a room.
@@ -163,7 +163,7 @@ impl Serve {
             None => None,
         };
         served.start()?;
-        // A host that calibrates with another gravity finds scale factors that are wrong by the ratio, and no reading shows it.
+        // A host that calibrates with another gravity finds scale factors that are wrong by the ratio, and no reading shows this.
         eprintln!(
             "mimu-board: gravity here is {:.5} m/s², at latitude {}°: give the same to the host (--gravity, --latitude)",
             plan.place.gravity, plan.place.latitude_deg

@@ -1,9 +1,9 @@
-//! The part's memory, as a debugger reaches it.
+//! The part's memory, as accessed by a debugger.
 
 use rigless::emulator::Host;
 use rigless::soc::Width;
 
-/// Bytes from an address on.
+/// Reads bytes from an address on.
 pub(crate) fn read(host: &mut dyn Host, address: u64, length: usize) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::with_capacity(length);
     let mut at = address;
@@ -22,7 +22,7 @@ pub(crate) fn read(host: &mut dyn Host, address: u64, length: usize) -> Result<V
     Ok(bytes)
 }
 
-/// Puts bytes into flash memory where they differ from what is there.
+/// Writes bytes into flash memory where they differ from the current ones.
 pub(crate) fn program(host: &mut dyn Host, address: u64, bytes: &[u8]) -> Result<(), String> {
     let before = read(host, address, bytes.len())?;
     for ((at, &new), old) in (address..).zip(bytes).zip(before) {

@@ -1,5 +1,4 @@
-//! The microcontroller of the board: the emulator's STM32H743 with three of its models in the bench's hands, and
-//! a reset by the supply.
+//! The microcontroller of the board: the emulator's STM32H743 with three of its models replaced by the bench's, and a reset by the supply.
 
 use std::path::Path;
 
@@ -23,10 +22,10 @@ use crate::sampler::Sampler;
 use crate::schematic::{DRIVEN, Drives, HSE_HZ, LSE_HZ};
 use crate::watchdog::Watchdog;
 
-/// The serial line to the debugger's USB bridge.
+/// The serial port that is wired to the debugger's USB bridge.
 const SERIAL: &str = "USART3";
 
-/// Where the part keeps its number of 96 bits (RM0433, section 61.1).
+/// Address of the part's 96-bit unique number (RM0433, section 61.1).
 const UNIT_ID_AT: u64 = 0x1FF1_E800;
 
 /// The microcontroller.
@@ -39,7 +38,7 @@ pub(crate) struct Part {
     slots: Slots,
 }
 
-/// Where on the bus the bench's own models answer.
+/// Bus slots of the bench's own models.
 #[derive(Debug, Clone, Copy)]
 struct Slots {
     adc1: usize,
@@ -50,7 +49,7 @@ struct Slots {
     ports: [usize; DRIVEN.len()],
 }
 
-/// The part as its supply comes up.
+/// The part when its supply comes up.
 fn powered_up() -> Result<Stm32h743, Error> {
     let mut mcu = Stm32h743::new()?;
     mcu.rcc.attach_crystals(HSE_HZ, LSE_HZ);
@@ -59,7 +58,7 @@ fn powered_up() -> Result<Stm32h743, Error> {
     Ok(mcu)
 }
 
-/// Which of the part's serial ports goes to the debugger.
+/// The serial port that is wired to the debugger.
 fn serial_port(mcu: &mut Stm32h743) -> &mut Usart {
     let nth = usart::INSTANCES.iter().position(|&name| name == SERIAL);
     &mut mcu.usart[nth.expect("the part has the port")]
@@ -91,14 +90,14 @@ impl Part {
         Ok(part)
     }
 
-    /// The serial port, whose line can be garbled.
+    /// The serial port, to garble its line.
     pub(crate) fn serial(&mut self) -> &mut Usart {
         serial_port(&mut self.mcu)
     }
 
-    /// Cuts the supply, or gives it back, as the run goes on from this stop.
+    /// Cuts or restores the supply when the run continues from this stop.
     pub(crate) fn supply(&mut self, at: VirtualNanos, on: bool) {
-        // Any model's context asks for it; a port's is what the part lends.
+        // Any model's context can request this; the part lends that of a port.
         self.mcu
             .drive_port(at, 0, |_, _, context| context.request_power(on));
     }
@@ -115,7 +114,7 @@ impl Mcu for Part {
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         if cause == ResetCause::PowerOn {
-            // The emulator's part keeps what a system reset keeps and refuses this one.
+            // The emulator's part keeps what a system reset keeps, and refuses a power-on reset.
             let mut fresh = powered_up().expect("built once already");
             serial_port(&mut fresh).inherit(serial_port(&mut self.mcu));
             self.mcu = fresh;
@@ -130,8 +129,8 @@ impl Mcu for Part {
     }
 
     fn poll(&mut self, now: VirtualNanos) {
-        // Nothing but the serial line has anything outside. To ask all of the 122 models at each of 20 000
-        // conversions a second takes longer than the conversions.
+        // Only the serial line has anything outside. Polling all of the 122 models at each of 20 000 conversions a second takes longer than the
+        // conversions.
         let slot = self.slots.serial;
         let (bus, model) = self.mcu.split(slot);
         if let Some(model) = model {
@@ -140,7 +139,7 @@ impl Mcu for Part {
         }
         let drives = self.drives();
         self.sampler.front.drive(drives);
-        // All converters have one VREF+, and this one the part's own reference, in mV.
+        // All converters share one VREF+; this one uses the part's own reference, in mV.
         let [.., adc3] = &mut self.mcu.adc;
         adc3.set_reference(self.sampler.rail_mv);
     }
@@ -158,7 +157,7 @@ impl Mcu for Part {
 }
 
 impl Part {
-    /// What the firmware drives at the sensors' own inputs.
+    /// The levels that the firmware drives at the sensors' own inputs.
     fn drives(&self) -> Drives {
         let [st1, st2, low, high] = std::array::from_fn(|k| {
             let (port, pin) = DRIVEN[k];
@@ -186,9 +185,9 @@ pub(crate) struct Machine {
 }
 
 impl Machine {
-    /// `unit_id`: what the part's maker has written to it.
+    /// `unit_id`: the number programmed by the part's manufacturer.
     pub(crate) fn new(front: Front, far_end: FarEnd, unit_id: [u8; 12]) -> Result<Self, Error> {
-        // The emulator describes this part's core nowhere else.
+        // The emulator describes this part's core only here.
         let mut core = Stm32h743Bench::new()?.targets().swap_remove(0).core;
         let written = Image::new(Path::new("unit id"), unit_id.to_vec(), Some(UNIT_ID_AT));
         core.factory_images
@@ -200,7 +199,7 @@ impl Machine {
     }
 }
 
-// Snapshots are not used: a run from its start takes no longer than it must.
+// Snapshots are not used: every run starts from the beginning.
 impl Store for Machine {}
 
 impl Board for Machine {

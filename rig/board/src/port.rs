@@ -1,4 +1,4 @@
-//! The port of a served board: a terminal that can be unplugged, under a name that stays.
+//! The port of a served board: a terminal that can be unplugged, with a constant name.
 
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -11,13 +11,13 @@ use crate::terminal::Terminal;
 #[derive(Debug)]
 pub(crate) struct Port {
     terminal: Option<Terminal>,
-    /// Of the terminal, or of the last one.
+    /// Path of the terminal, or of the last one.
     path: PathBuf,
     link: Option<PathBuf>,
 }
 
 impl Port {
-    /// Plugged in.
+    /// A plugged-in port.
     pub(crate) fn new() -> Result<Self, String> {
         let terminal = opened()?;
         let path = terminal.path().to_owned();
@@ -28,9 +28,9 @@ impl Port {
         })
     }
 
-    /// Gives it a name that stays when it is plugged in again: a symbolic link, which is kept current.
+    /// Gives it a constant name: a symbolic link, which is updated when it is plugged in again.
     ///
-    /// Errors: something else than a symbolic link has the name, or it cannot be made.
+    /// Errors: the name belongs to something other than a symbolic link, or the link cannot be made.
     pub(crate) fn link(&mut self, link: &Path) -> Result<(), String> {
         match fs::symlink_metadata(link) {
             Ok(there) if !there.is_symlink() => {
@@ -59,7 +59,7 @@ impl Port {
         fs::rename(&new, link).map_err(refused)
     }
 
-    /// What to open: the link, where there is one.
+    /// The path to open: the link, if there is one.
     pub(crate) fn path(&self) -> &Path {
         self.link.as_deref().unwrap_or(&self.path)
     }
@@ -75,9 +75,9 @@ impl Port {
         self.remove_link();
     }
 
-    /// A new terminal, unless one is plugged in.
+    /// Plugs in a new terminal, unless one is plugged in.
     ///
-    /// Errors: the system has none to give, or the link cannot be made.
+    /// Errors: the system has no terminal available, or the link cannot be made.
     pub(crate) fn plug(&mut self) -> Result<(), String> {
         if self.terminal.is_none() {
             let terminal = opened()?;
@@ -88,29 +88,29 @@ impl Port {
         Ok(())
     }
 
-    /// The link, unless it points elsewhere by now.
+    /// Removes the link, unless it points elsewhere by now.
     fn remove_link(&self) {
         if let Some(link) = &self.link
             && fs::read_link(link).is_ok_and(|to| to == self.path)
         {
-            // Where it cannot be removed it dangles, and opening it fails as well.
+            // If it cannot be removed, it dangles, and opening it fails as well.
             let _ = fs::remove_file(link);
         }
     }
 
-    /// Whether anybody has it open.
+    /// Whether any program has it open.
     pub(crate) fn is_open(&self) -> bool {
         self.terminal.as_ref().is_some_and(Terminal::is_open)
     }
 
-    /// As [`Terminal::wait_for_room`]; at once where it is unplugged.
+    /// As [`Terminal::wait_for_room`]; returns at once if it is unplugged.
     pub(crate) fn wait_for_room(&self, ms: u32) {
         if let Some(terminal) = &self.terminal {
             terminal.wait_for_room(ms);
         }
     }
 
-    /// As [`Terminal::read`]; nothing where it is unplugged.
+    /// As [`Terminal::read`]; nothing if it is unplugged.
     pub(crate) fn read(&mut self, into: &mut [u8]) -> Result<usize, String> {
         match &mut self.terminal {
             Some(terminal) => terminal.read(into).map_err(broken),
@@ -118,7 +118,7 @@ impl Port {
         }
     }
 
-    /// As [`Terminal::write`]; nothing where it is unplugged.
+    /// As [`Terminal::write`]; nothing if it is unplugged.
     pub(crate) fn write(&mut self, bytes: &[u8]) -> Result<usize, String> {
         match &mut self.terminal {
             Some(terminal) => terminal.write(bytes).map_err(broken),

@@ -1,5 +1,4 @@
-//! A board that runs: an image executed for so much virtual time, with everything that can be done to a board
-//! from outside in between.
+//! A running board: executes an image for a given virtual time; between runs, the environment can act on the board.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
@@ -21,7 +20,7 @@ use crate::memory::{program, read};
 use crate::part::Machine;
 use crate::sampler::Conversions;
 
-/// The bank that the program is not in, where a device keeps what it stores: its first address.
+/// First address of the bank without the program, where a device stores its data.
 pub const STORE: u64 = BASE + BANK;
 
 /// RAM that loses its content with the supply: first address and bytes.
@@ -31,11 +30,11 @@ const RAM: [(u64, u64); 6] = [
     (0x2400_0000, 512 << 10),
     (0x3000_0000, 288 << 10),
     (0x3800_0000, 64 << 10),
-    // Its supply pin is wired to the board's own.
+    // Its supply pin is wired to the board's own supply.
     (0x3880_0000, 4 << 10),
 ];
 
-/// Why a part restarted, and when.
+/// Cause and time of a restart.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Restart {
     /// The virtual clock, ns.
@@ -46,8 +45,8 @@ pub struct Restart {
 
 /// A board that runs an image.
 ///
-/// It begins switched on at virtual time 0, before the first instruction, and moves only when told to. One image,
-/// front and sequence of calls give the same run, instruction by instruction.
+/// It begins switched on at virtual time 0, before the first instruction, and advances only on request. The same image, front and sequence of calls
+/// give the same run, instruction by instruction.
 #[derive(Debug)]
 pub struct Board {
     orders: Sender<Order>,
@@ -58,14 +57,14 @@ pub struct Board {
 }
 
 impl Board {
-    /// A board with an image in its flash, and nothing else there. Its unit id is zero.
+    /// A board whose flash contains only an image. Its unit id is zero.
     ///
-    /// Errors: an image that the part has no room for.
+    /// Errors: the image does not fit into the part.
     pub fn new(image: &Image, front: Front) -> Result<Self, String> {
         Self::numbered(image, front, [0; 12])
     }
 
-    /// The same with a unit id, the number of 96 bits that the part's maker gives to each.
+    /// The same with a unit id, the 96-bit number that the part's manufacturer gives to each part.
     ///
     /// Errors: as [`Board::new`].
     pub fn numbered(image: &Image, front: Front, unit_id: [u8; 12]) -> Result<Self, String> {
@@ -126,26 +125,26 @@ impl Board {
         format!("the emulator: {why}")
     }
 
-    /// Does an errand on the stopped board.
+    /// Runs a function on the stopped board.
     pub(crate) fn with<T: Send + 'static>(
         &mut self,
         errand: impl FnOnce(&mut Stopped<'_>) -> T + Send + 'static,
     ) -> Result<T, String> {
         let (back, answer) = channel();
         let errand = Box::new(move |stopped: &mut Stopped<'_>| {
-            // Nobody waits for it only where the board is gone too.
+            // The receiver is missing only if the board is gone too.
             let _ = back.send(errand(stopped));
         });
         let _ = self.orders.send(Order::Do(errand));
         answer.recv().map_err(|_| self.ended())
     }
 
-    /// Where it stands.
+    /// Its current state.
     pub fn standing(&self) -> Standing {
         self.standing
     }
 
-    /// Runs to an instant of the virtual clock, ns. Bytes put on the line before arrive in the meantime.
+    /// Runs until a virtual time, ns. Bytes put on the line before arrive in the meantime.
     ///
     /// Errors: the emulator gave up.
     pub fn run_to(&mut self, ns: u64) -> Result<Standing, String> {
@@ -156,15 +155,14 @@ impl Board {
         Ok(self.standing)
     }
 
-    /// Runs for so much virtual time, ns.
+    /// Runs for a virtual duration, ns.
     ///
     /// Errors: as [`Board::run_to`].
     pub fn run_for(&mut self, ns: u64) -> Result<Standing, String> {
         self.run_to(self.standing.ns + ns)
     }
 
-    /// Puts bytes on the serial line towards the device, behind those that still wait there. They arrive at the rate
-    /// that the device's port is set to.
+    /// Puts bytes on the serial line to the device, behind those that still wait. They arrive at the baud rate of the device's port.
     pub fn send(&mut self, bytes: &[u8]) {
         self.line.bytes().to_device.extend(bytes);
     }
@@ -174,12 +172,12 @@ impl Board {
         self.line.bytes().to_device.len()
     }
 
-    /// Bytes that the device has sent since this was last asked, each with the end of its stop bit, ns.
+    /// Bytes that the device has sent since the last call, each with the end of its stop bit, ns.
     pub fn receive(&mut self) -> Vec<(u64, u8)> {
         std::mem::take(&mut self.line.bytes().from_device)
     }
 
-    /// Garbles so many of a million bytes that arrive at the device, as noise on the line does.
+    /// Garbles so many of a million bytes on their way to the device, like noise on the line.
     ///
     /// Errors: the emulator gave up, as for all that follow.
     pub fn garble(&mut self, per_million: u32) -> Result<(), String> {
@@ -190,26 +188,26 @@ impl Board {
         })
     }
 
-    /// Puts something else in front of the pins.
+    /// Replaces the front end at the pins.
     pub fn set_front(&mut self, front: Front) -> Result<(), String> {
         self.with(move |s| s.session.board_mut().part.sampler.front = front)
     }
 
-    /// Conversions of ADC1 since this was last asked.
+    /// Conversions of ADC1 since the last call.
     pub fn conversions(&mut self) -> Result<Conversions, String> {
         self.with(|s| s.session.board_mut().part.sampler.take_conversions())
     }
 
-    /// Reads memory, as a debugger would.
+    /// Reads memory, like a debugger.
     ///
-    /// Errors: besides, an address where no memory is.
+    /// Errors: also an address without memory.
     pub fn memory(&mut self, address: u64, length: usize) -> Result<Vec<u8>, String> {
         self.with(move |s| read(s.host, address, length))?
     }
 
-    /// Writes memory, as a debugger would, or a reset that comes in the middle of a write.
+    /// Writes memory, like a debugger, or like a write that a reset interrupts.
     ///
-    /// Errors: besides, an address where no memory is.
+    /// Errors: also an address without memory.
     pub fn set_memory(&mut self, address: u64, bytes: Vec<u8>) -> Result<(), String> {
         self.with(move |s| {
             (address..).zip(bytes).try_for_each(|(at, byte)| {
@@ -220,19 +218,19 @@ impl Board {
         })?
     }
 
-    /// Stops the converter ADC1 for good: what it is asked to convert never ends.
+    /// Stops the converter ADC1 for good: conversions never end.
     pub fn stop_converter(&mut self) -> Result<(), String> {
         self.with(|s| s.session.board_mut().part.sampler.stopped = true)
     }
 
-    /// Has the flash interface hang for good: what it is asked to program or to erase never ends.
+    /// Makes the flash interface hang for good: program and erase operations never end.
     pub fn stop_flash(&mut self) -> Result<(), String> {
         self.with(|s| s.session.board_mut().part.flash.stuck = true)
     }
 
-    /// Reads a register of a peripheral without the firmware noticing.
+    /// Reads a peripheral's register, unnoticed by the firmware.
     ///
-    /// Errors: besides, an address where no register is.
+    /// Errors: also an address without a register.
     pub fn register(&mut self, address: u64) -> Result<u64, String> {
         self.with(move |s| {
             use rigless::mcu::Operate;
@@ -244,7 +242,7 @@ impl Board {
 
     /// Flips one bit of flash memory.
     ///
-    /// Errors: besides, an address that is not flash.
+    /// Errors: also an address that is not flash.
     pub fn flip(&mut self, address: u64, bit: u32) -> Result<(), String> {
         self.with(move |s| {
             let byte = read(s.host, address, 1)?[0] ^ (1 << (bit % 8));
@@ -252,14 +250,14 @@ impl Board {
         })?
     }
 
-    /// The stored part of flash memory, bank 2.
+    /// The contents of bank 2, where the device stores its data.
     pub fn store(&mut self) -> Result<Vec<u8>, String> {
         self.memory(STORE, BANK as usize)
     }
 
-    /// Puts a stored part of flash memory in the place of what is there, as a debugger would.
+    /// Replaces the contents of bank 2, like a debugger.
     ///
-    /// Errors: besides, bytes that are not a whole bank.
+    /// Errors: also a length other than a whole bank's.
     pub fn set_store(&mut self, bytes: Vec<u8>) -> Result<(), String> {
         if bytes.len() as u64 != BANK {
             return Err(format!(
@@ -270,7 +268,7 @@ impl Board {
         self.with(move |s| program(s.host, STORE, &bytes))?
     }
 
-    /// Stretches of flash memory (first address, bytes) that have changed since this was last asked.
+    /// Ranges of flash memory (first address, bytes) that have changed since the last call.
     pub fn changed(&mut self) -> Result<Vec<(u64, u64)>, String> {
         self.with(|s| {
             let at = s.stop.at.0;
@@ -297,8 +295,7 @@ impl Board {
         Ok(bytes)
     }
 
-    /// Cuts the supply at this instant. A flash word or sector that is being written is left in between, RAM is lost,
-    /// and nothing runs until the supply is back.
+    /// Cuts the supply now. A flash word or sector that is being written stays incomplete, RAM is lost, and nothing runs until the supply is back.
     pub fn cut_supply(&mut self, seed: u64) -> Result<(), String> {
         self.with(move |s| {
             let at = s.stop.at;
@@ -320,7 +317,7 @@ impl Board {
         })?
     }
 
-    /// Gives the supply back: a power-on reset.
+    /// Restores the supply: a power-on reset.
     pub fn restore_supply(&mut self) -> Result<(), String> {
         self.with(|s| {
             let at = s.stop.at;
@@ -328,7 +325,7 @@ impl Board {
         })
     }
 
-    /// Pulls the reset pin. RAM and flash stay, but for what is in flight there.
+    /// Pulls the reset pin. RAM and flash stay, except for flash operations in flight.
     pub fn reset_by_pin(&mut self, seed: u64) -> Result<(), String> {
         self.with(move |s| {
             let at = s.stop.at;
@@ -370,12 +367,12 @@ impl Board {
         })
     }
 
-    /// Arrivals at the instructions that are watched, since this was last asked.
+    /// Arrivals at the watched instructions since the last call.
     pub fn arrivals(&mut self) -> Result<Vec<Arrival>, String> {
         self.with(|s| std::mem::take(&mut s.driver.arrivals))
     }
 
-    /// What the emulator found so far.
+    /// The emulator's findings so far.
     pub fn findings(&mut self) -> Result<Findings, String> {
         self.with(|s| findings(s.session))
     }

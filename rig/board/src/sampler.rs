@@ -1,5 +1,4 @@
-//! ADC1 with the bench at its pins: the emulator's converter, which is shown the voltages of each conversion's
-//! own instant.
+//! ADC1 with the bench at its pins: the emulator's converter, which gets the voltages at the time of each conversion.
 
 use rigless::device::{Device, DeviceContext, RegisterFile, RequestChange};
 use rigless::soc::stm32h743::generated::adc3::{Register, isr};
@@ -9,16 +8,16 @@ use rigless::time::{EventId, VirtualNanos};
 use crate::front::Front;
 use crate::schematic::{INPUTS, Volts};
 
-/// Conversions since they were last asked for, with the longest and the shortest time from one to the next.
+/// Conversions since the last call, with the longest and the shortest time between successive ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Conversions {
-    /// How many.
+    /// Number of conversions.
     pub count: u64,
     /// End of the first, ns.
     pub first_ns: u64,
     /// End of the last, ns.
     pub last_ns: u64,
-    /// Shortest time between two, ns; `u64::MAX` where there are not two.
+    /// Shortest time between two, ns; `u64::MAX` if there are fewer than two.
     pub shortest_ns: u64,
     /// Longest time between two, ns.
     pub longest_ns: u64,
@@ -50,7 +49,7 @@ impl Conversions {
 pub(crate) struct Sampler {
     adc: Adc,
     pub(crate) front: Front,
-    /// No conversion ends.
+    /// Conversions never end.
     pub(crate) stopped: bool,
     /// VREF+ at the last conversion, mV.
     pub(crate) rail_mv: u32,
@@ -60,7 +59,7 @@ pub(crate) struct Sampler {
 impl Sampler {
     pub(crate) fn new(front: Front) -> Self {
         Self {
-            // Without a clock until the firmware starts one.
+            // It has no clock until the firmware starts one.
             adc: Adc::new(Converter::Adc1, 0),
             front,
             stopped: false,
@@ -74,7 +73,7 @@ impl Sampler {
     }
 
     fn show(&mut self, volts: &Volts) {
-        // The model takes millivolts and uses nothing but the ratio. In those its own step, 50 µV, would be lost.
+        // The model takes millivolts but uses only ratios. Microvolts are passed, because the converter's step, 50 µV, would be lost in millivolts.
         let microvolts = |v: f64| (v * 1e6).round() as u32;
         self.adc.set_reference(microvolts(volts.rail));
         self.rail_mv = (volts.rail * 1e3).round() as u32;

@@ -1,7 +1,6 @@
-//! What is wired to which pin: the drawing of the board, in numbers.
+//! The schematic of the board in numbers: what is wired to which pin.
 //!
-//! Written from the wiring table and not from the firmware's constants, so that a mistake in either shows as a
-//! wrong voltage.
+//! Written from the wiring table, not from the firmware's constants, so a mistake in either shows as a wrong voltage.
 
 use mimu_rig::filter::LowPass;
 use mimu_rig::pins::Pins;
@@ -9,14 +8,13 @@ use mimu_rig::pins::Pins;
 /// Inputs of ADC1 that exist on the part.
 pub const INPUTS: usize = 20;
 
-/// Frequency of the clock that the debugger feeds to the oscillator input, Hz.
+/// Frequency of the clock that the debugger supplies to the oscillator input, Hz.
 pub const HSE_HZ: u64 = 8_000_000;
 
-/// The board's crystal for a calendar, Hz.
+/// Frequency of the board's crystal for the real-time clock, Hz.
 pub const LSE_HZ: u64 = 32_768;
 
-/// Upper and lower resistor of the divider behind every output of a gyro, Ω, and the capacitor across the lower
-/// one, F.
+/// Upper and lower resistor of the divider at every output of a gyro, Ω, and the capacitor across the lower one, F.
 const DIVIDER: [f64; 2] = [24e3, 36e3];
 const DIVIDER_F: f64 = 47e-9;
 
@@ -56,10 +54,10 @@ pub const WIRING: [(Net, &str, usize); 10] = [
     (Net::Reference(0), "PA7", 7),
 ];
 
-/// What the microcontroller drives: the sensors' own inputs, high or low.
+/// Levels that the microcontroller drives at the sensors' own inputs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Drives {
-    /// ST1 of all three gyros, PE13 by way of a 5 V buffer.
+    /// ST1 of all three gyros, PE13 through a 5 V buffer.
     pub st1: bool,
     /// ST2 of all three gyros, PE11 likewise.
     pub st2: bool,
@@ -67,7 +65,7 @@ pub struct Drives {
     pub g_select: [bool; 2],
 }
 
-/// The pins of [`Drives`] in its order: index of the port from A, pin.
+/// The pins of [`Drives`] in the order of its fields: index of the port from A, pin.
 pub const DRIVEN: [(usize, u8); 4] = [(4, 13), (4, 11), (4, 9), (3, 15)];
 
 /// Voltages that the converter sees.
@@ -86,7 +84,7 @@ impl Volts {
         rail: 3.3,
     };
 
-    /// A fraction of the way from one instant to another.
+    /// Linear interpolation between two times.
     pub fn between(&self, other: &Self, fraction: f64) -> Self {
         let mix = |a: f64, b: f64| a + fraction * (b - a);
         Self {
@@ -112,7 +110,7 @@ impl Filters {
         }
     }
 
-    /// Voltages at the converter one step on, from those at the unit's pins.
+    /// Advances one step: voltages at the converter from those at the unit's pins.
     pub fn step(&mut self, pins: &Pins) -> Volts {
         let mut volts = Volts {
             rail: pins.converter_reference_v,
@@ -123,8 +121,8 @@ impl Filters {
                 Net::Rate(axis) => pins.gyro_v[axis],
                 Net::Temperature(axis) => pins.gyro_temp_v[axis],
                 Net::Reference(axis) => pins.gyro_reference_v[axis],
-                // The unit has the accelerometer at a supply of its own. Here that is the converter's
-                // reference, which its outputs follow.
+                // The rig's unit has a separate supply for the accelerometer. Here it is the converter's reference, and the outputs are proportional
+                // to it.
                 Net::Force(axis) => {
                     volts.input[input] = pins.accel_v[axis] / pins.supply_v * volts.rail;
                     continue;

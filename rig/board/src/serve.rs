@@ -1,4 +1,4 @@
-//! A board behind a pseudo-terminal, for whatever opens serial ports.
+//! A board behind a pseudo-terminal, for any program that opens serial ports.
 
 use std::fmt;
 use std::fs::{File, OpenOptions};
@@ -21,30 +21,29 @@ use orders::Desk;
 /// Speed of virtual time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
-    /// With the clock on the wall, or as near as the machine can.
+    /// Follows the wall clock, as closely as the machine can.
     Wall,
-    /// As fast as the machine allows, but never ahead of the reader: it stands still while no program has the terminal
-    /// open, and while bytes wait to be read.
+    /// As fast as the machine allows, but never ahead of the reader: time stands still while no program has the terminal open, and while bytes wait
+    /// to be read.
     Fast,
 }
 
 /// Longest virtual time until a firmware sends its first byte, ms.
 const START_MS: u32 = 2000;
 
-/// Virtual time between two looks at the terminal, ns. A request waits so long at most.
+/// Virtual time between two polls of the terminal, ns: the longest delay of a request.
 const SLICE_NS: u64 = 1_000_000;
 
-/// The same at the fast pace, where two threads that hand over a thousand times in a second of it cost a fifth of the time.
+/// The same at the fast pace: at 1 ms, a thousand handovers between two threads per virtual second would cost a fifth of the time.
 const FAST_SLICE_NS: u64 = 5_000_000;
 
-/// A board that is later than this at the wall's pace stays behind. Less is made up for: other programs take such turns.
+/// A board that is later than this at the wall's pace stays behind. Shorter delays, as other programs cause them, are caught up.
 const MOST_LATE: Duration = Duration::from_millis(20);
 
-/// Bytes that may wait for the line towards the device. The rest stays in the terminal, which holds up the sender
-/// as a port's driver would.
+/// Bytes that may wait for the line to the device. The rest stays in the terminal, which holds up the sender as a port's driver would.
 const WAITING: usize = 256;
 
-/// What became of the bytes.
+/// Counts of bytes by their fate.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Traffic {
     /// From the device: read, or waiting in the terminal.
@@ -57,7 +56,7 @@ pub struct Traffic {
     pub sent: u64,
     /// To the device while its supply was off.
     pub unpowered: u64,
-    /// From the device, and made others by the bench.
+    /// From the device, and changed by the bench.
     pub garbled: u64,
 }
 
@@ -91,18 +90,18 @@ pub struct Served {
     traffic: Traffic,
     /// Bytes from the device that the terminal has not taken yet.
     waiting: Vec<u8>,
-    /// When it began, by the wall's clock and by the board's, ns.
+    /// When it began, by the wall clock and by the board's clock, ns.
     began: Instant,
     first_ns: u64,
-    /// By how much all of it came later than the wall's clock.
+    /// Total delay relative to the wall clock.
     behind: Duration,
 }
 
 impl Served {
-    /// Puts a board that has not run yet behind a terminal. What it stores in flash is kept in a file, if one is
-    /// given: read if it is there, made if it is not. The firmware reads it once, when it starts.
+    /// Puts a board that has not yet run behind a terminal. If `store` is given, this file keeps the stored flash contents: it is read if it exists,
+    /// and created otherwise. The firmware reads the flash once, at its start.
     ///
-    /// Errors: no terminal to be had; the file cannot be read or made, or is not one of these.
+    /// Errors: no terminal available; the file cannot be read or created, or is of another kind.
     pub fn new(mut board: Board, pace: Pace, store: Option<&Path>) -> Result<Self, String> {
         let store = match store {
             Some(path) => {
@@ -129,8 +128,8 @@ impl Served {
         })
     }
 
-    /// Runs the board until its firmware has said something, as one does that was plugged in before its port is opened. Executing
-    /// this takes seconds on a busy machine, which whoever opens the port would otherwise spend waiting for an answer.
+    /// Runs the board until its firmware has sent something, like a board that was plugged in before its port is opened. Executing this takes seconds
+    /// on a busy machine; otherwise the program that opens the port would wait for its answer that long.
     ///
     /// Errors: the emulator gave up.
     pub fn start(&mut self) -> Result<(), String> {
@@ -148,12 +147,12 @@ impl Served {
         Ok(())
     }
 
-    /// Takes commands at a TCP address of this machine, as `127.0.0.1:0`, where port 0 is any that is free. They are
-    /// answered while the board steps or waits. The seed is what it says of itself, and decides what faults strike.
+    /// Takes commands at a TCP address of this machine such as `127.0.0.1:0`, where port 0 selects any free port. They are answered while the board
+    /// steps or waits. The seed is reported in the identity, and decides which bytes the faults change.
     ///
-    /// Returns where it listens.
+    /// Returns the address on which it listens.
     ///
-    /// Errors: not an address, or it is taken.
+    /// Errors: not an address, or it is in use.
     pub fn listen(&mut self, address: &str, seed: u64) -> Result<SocketAddr, String> {
         let control = Control::bind(address)?;
         let address = control.address();
@@ -163,19 +162,19 @@ impl Served {
         Ok(address)
     }
 
-    /// Makes a symbolic link to the terminal, which points to the new one after the line was unplugged.
+    /// Makes a symbolic link to the terminal. After the line was unplugged, it points to the new terminal.
     ///
-    /// Errors: something else has that name.
+    /// Errors: the name belongs to something else.
     pub fn link(&mut self, link: &Path) -> Result<(), String> {
         self.port.link(link)
     }
 
-    /// What to open: the link, if there is one.
+    /// The path to open: the link, if there is one.
     pub fn path(&self) -> &Path {
         self.port.path()
     }
 
-    /// What became of the bytes so far.
+    /// Counts of bytes so far.
     pub fn traffic(&self) -> Traffic {
         self.traffic
     }
@@ -185,7 +184,7 @@ impl Served {
         &mut self.board
     }
 
-    /// Answers the commands that have come, then runs a millisecond of virtual time, or waits.
+    /// Answers the commands that have arrived, then runs a slice of virtual time, or waits.
     ///
     /// Errors: the emulator, the terminal or the file gave up.
     pub fn step(&mut self) -> Result<(), String> {
@@ -196,7 +195,7 @@ impl Served {
         }
         if self.pace == Pace::Fast && !(self.port.is_open() && self.waiting.is_empty()) {
             if !self.port.is_open() {
-                // Poll returns at once for a terminal that is not open.
+                // Poll returns at once if the terminal is not open.
                 std::thread::sleep(Duration::from_millis(1));
             }
             self.port.wait_for_room(10);
@@ -217,7 +216,7 @@ impl Served {
         self.deliver()?;
         self.keep()?;
         if self.desk.is_off() {
-            // Nothing is converted, and the unit is moved all the same: without this all of it at once at the end.
+            // Nothing is converted, but the unit moves. Without this, all of the motion would be computed at once at the end.
             self.board.front(|front, ns| front.advance(ns))?;
         }
         if self.pace == Pace::Wall {
@@ -226,8 +225,8 @@ impl Served {
         Ok(())
     }
 
-    /// Waits for the wall's clock. A board that is late does not hurry after it, as no crystal does: at three times its rate it would
-    /// send faster than whoever reads it has to be able to read.
+    /// Waits for the wall clock. A late board does not hurry, because a real crystal does not: at three times its rate, it would send faster than a
+    /// host must be able to read.
     fn keep_pace(&mut self, now_ns: u64) {
         let due = self.began + Duration::from_nanos(now_ns - self.first_ns);
         let now = Instant::now();
@@ -239,12 +238,12 @@ impl Served {
         }
     }
 
-    /// By how much the board has fallen behind the wall's clock, at its pace.
+    /// How far the board has fallen behind the wall clock, at its pace.
     pub fn behind(&self) -> Duration {
         self.behind
     }
 
-    /// Writes what has changed in the flash to the file.
+    /// Writes the changes of the flash to the file.
     fn keep(&mut self) -> Result<(), String> {
         if self.store.is_none() {
             return Ok(());
@@ -253,7 +252,7 @@ impl Served {
         self.keep_spans(&changed)
     }
 
-    /// Writes stretches of the flash (first address, bytes) to the file.
+    /// Writes ranges of the flash (first address, bytes) to the file.
     fn keep_spans(&mut self, spans: &[(u64, u64)]) -> Result<(), String> {
         if let Some(store) = &mut self.store {
             for &(first, length) in spans.iter().filter(|(first, _)| *first >= STORE) {
@@ -301,8 +300,8 @@ impl Served {
     }
 }
 
-/// A file that holds bank 2, byte by byte. Each word and each erased sector is written as it lands in the flash, so
-/// that the end of the program is no more to the device than a cut supply.
+/// A file with the contents of bank 2. Each word and each erased sector is written when it changes in the flash. So to the device the end of this
+/// program is like a cut supply.
 #[derive(Debug)]
 struct StoreFile {
     file: File,

@@ -1,4 +1,4 @@
-//! A pseudo-terminal in the place of the serial port.
+//! A pseudo-terminal that replaces the serial port.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
@@ -20,7 +20,7 @@ pub struct Terminal {
 impl Terminal {
     /// A pseudo-terminal in raw mode: bytes pass as they are, and what is sent is not echoed.
     ///
-    /// Errors: the system has none to give.
+    /// Errors: the system has no terminal available.
     pub fn open() -> io::Result<Self> {
         let side = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
         grantpt(&side)?;
@@ -29,8 +29,8 @@ impl Terminal {
         let path = PathBuf::from(name.to_string_lossy().into_owned());
         fcntl_setfl(&side, fcntl_getfl(&side)? | OFlags::NONBLOCK)?;
 
-        // The mode belongs to the terminal and stays when this is closed. That it was open once is also what makes
-        // the system tell from then on whether anybody has it open.
+        // The mode belongs to the terminal and stays after this is closed. Opening it once also lets the system report from then on whether any
+        // program has it open.
         let other = File::options()
             .read(true)
             .write(true)
@@ -45,17 +45,17 @@ impl Terminal {
         })
     }
 
-    /// What to open.
+    /// The path to open.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether anybody has it open.
+    /// Whether any program has it open.
     pub fn is_open(&self) -> bool {
         !self.ready(PollFlags::OUT, 0).contains(PollFlags::HUP)
     }
 
-    /// Waits until it takes bytes again, is closed, or so many milliseconds have passed.
+    /// Waits until it accepts bytes again, is closed, or so many milliseconds have passed.
     pub fn wait_for_room(&self, ms: u32) {
         self.ready(PollFlags::OUT, ms);
     }
@@ -68,13 +68,12 @@ impl Terminal {
         };
         match poll(&mut wanted, Some(&timeout)) {
             Ok(_) => wanted[0].revents(),
-            // Interrupted: as good as nothing yet.
+            // If interrupted, nothing is ready yet.
             Err(_) => PollFlags::empty(),
         }
     }
 
-    /// Takes what was written to it, up to the length of `into`. Returns how many bytes; none where there are none
-    /// or nobody has it open.
+    /// Reads what was written to it, up to the length of `into`, and returns the number of bytes: zero if there are none or no program has it open.
     ///
     /// Errors: the terminal is broken.
     pub fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
@@ -83,13 +82,13 @@ impl Terminal {
             Err(e) if e.kind() == ErrorKind::WouldBlock || e.kind() == ErrorKind::Interrupted => {
                 Ok(0)
             }
-            // What Linux says of a terminal that nobody has open.
+            // Linux returns this for a terminal that no program has open.
             Err(e) if e.raw_os_error() == Some(rustix::io::Errno::IO.raw_os_error()) => Ok(0),
             Err(e) => Err(e),
         }
     }
 
-    /// Writes as many bytes as it takes. Returns how many.
+    /// Writes as many bytes as the terminal accepts, and returns their number.
     ///
     /// Errors: the terminal is broken.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

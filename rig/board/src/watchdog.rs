@@ -1,4 +1,4 @@
-//! The independent watchdog (RM0433 chapter 45), which the emulator has no model of.
+//! The independent watchdog (RM0433 chapter 45), which the emulator does not model.
 
 use rigless::device::{Device, DeviceContext, RegisterFile};
 use rigless::soc::stm32h743::generated::iwdg::{Register, pr, rlr};
@@ -12,7 +12,7 @@ const START: u64 = 0xCCCC;
 const RELOAD: u64 = 0xAAAA;
 const UNLOCK: u64 = 0x5555;
 
-/// The watchdog. Left out: the window, and that new values take some cycles of its own clock to get there.
+/// The watchdog. Not modelled: the window, and the delay of new values by some cycles of its own clock.
 #[derive(Debug, Default)]
 pub(crate) struct Watchdog {
     running: bool,

@@ -19,8 +19,7 @@ pub(super) const SPECS: &[Spec] = &[
         parameters: &[axes("mg_per_g3", 5.0)],
         build: |b| power(b.list("mg_per_g3"), |f| f * f * f),
     },
-    // Force across pulls the comb aside and changes the gap of the sense capacitors. Assumed of the size of
-    // the nonlinearity.
+    // Force across the axis pulls the comb aside and changes the gap of the sense capacitors. Assumed as large as the nonlinearity.
     Spec {
         id: "accel_cross_axis_product",
         about: "error = row of matrix · (fx fy, fy fz, fz fx) of the forces along the axes",
@@ -36,8 +35,7 @@ pub(super) const SPECS: &[Spec] = &[
             })
         },
     },
-    // The three g-cells do not sit at the board's origin: millimetres within a package, centimetres on a
-    // board.
+    // The three g-cells are not at the board's origin: millimetres within a package, centimetres on a board.
     Spec {
         id: "accel_size_effect",
         about: "each axis has its own point r: error = direction · (α×r + ω×(ω×r))",

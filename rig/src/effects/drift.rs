@@ -5,7 +5,7 @@ use super::{Active, Build, DPS, G, Spec, axes, form, input};
 const MG: f64 = 1e-3 * G;
 
 pub(super) const SPECS: &[Spec] = &[
-    // Sizes assumed: no datasheet of these parts states an ageing within hours.
+    // Sizes assumed: no data sheet of these parts gives ageing within hours.
     Spec {
         id: "gyro_bias_drift",
         about: "bias linear in the recording's time",
@@ -18,7 +18,7 @@ pub(super) const SPECS: &[Spec] = &[
         parameters: &[axes("mg_per_hour", 3.0)],
         build: |b| drift(b.list("mg_per_hour"), MG, accel),
     },
-    // Size and times assumed: of the order in which a die of some tens of milliwatts and its package settle.
+    // Size and times assumed: the order of magnitude in which a die of some tens of milliwatts and its package settle.
     Spec {
         id: "gyro_warm_up",
         about: "bias size · exp(-t / time constant) since power-on, whatever the temperature",
@@ -33,7 +33,7 @@ pub(super) const SPECS: &[Spec] = &[
     },
 ];
 
-/// Which triad an error is added to.
+/// Selects the triad to which an error is added.
 type Triad = fn(&mut super::Disturbance) -> &mut [f64; 3];
 
 fn gyro(add: &mut super::Disturbance) -> &mut [f64; 3] {

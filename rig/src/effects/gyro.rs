@@ -3,7 +3,7 @@
 use super::{DPS, G, Spec, axes, input, matrix};
 use crate::rotation::dot;
 
-/// Rate at which the errors of the scale are stated, rad/s: full scale of an ADXRS300.
+/// Rate at which the nonlinearities are specified, rad/s: full scale of an ADXRS300.
 const FULL: f64 = 300.0 * DPS;
 
 pub(super) const SPECS: &[Spec] = &[
@@ -24,8 +24,7 @@ pub(super) const SPECS: &[Spec] = &[
             })
         },
     },
-    // Springs that are stiffer one way than the other rectify: of a force its square remains. Size assumed: a quarter of the
-    // g-sensitivity per g.
+    // Springs that are stiffer in one direction rectify a force, leaving its square. Size assumed: a quarter of the g-sensitivity per g.
     Spec {
         id: "gyro_g_squared",
         about: "rectification: error = matrix · (fx², fy², fz²) (body axes)",
@@ -54,7 +53,7 @@ pub(super) const SPECS: &[Spec] = &[
         parameters: &[axes("dps_at_300dps", 0.3)],
         build: |b| scale(b.list("dps_at_300dps"), |x| x * x * x),
     },
-    // Of the same size as the nonlinearity: the demodulator's two half-waves differ in gain.
+    // As large as the nonlinearity: the demodulator's two half-waves differ in gain.
     Spec {
         id: "gyro_scale_asymmetry",
         about: "scale factors of the two directions differ: error = size · |rate| / 300 deg/s",

@@ -1,11 +1,9 @@
-//! What the affine model lacks: each effect from its physics, switched on by the rig file or drawn by a seed.
+//! Errors that the affine model lacks: each effect from its physics, enabled by the rig file or drawn by a seed.
 //!
-//! Effects add: each works on the undisturbed motion and temperature, so the order in which they stand does
-//! not matter and two of them do what they do apart. What that leaves out is the effect of one on another, a
-//! product of two small numbers.
+//! Effects add: each acts on the undisturbed motion and temperature, so their order does not matter and two together act as each alone. Neglected is
+//! the effect of one on another, a product of two small numbers.
 //!
-//! An effect is one [`Spec`]: its id, the parameters with units and sizes, and a function that does it. Ids
-//! that start with `x_` stand on no list that an estimator could know.
+//! An effect is one [`Spec`]: its id, the parameters with units and sizes, and a function. Ids that start with `x_` are unknown to every estimator.
 
 mod accel;
 mod drift;
@@ -24,11 +22,11 @@ use crate::random::Random;
 use crate::sensor::TriadTruth;
 use crate::thermal::Temperatures;
 
-/// Radians per second in a degree per second.
+/// rad/s per deg/s.
 pub(crate) const DPS: f64 = std::f64::consts::PI / 180.0;
 /// Standard gravity, m/s².
 pub(crate) const G: f64 = 9.80665;
-/// Temperature from which thermal errors count, °C.
+/// Reference temperature of thermal errors, °C.
 const REFERENCE_C: f64 = 25.0;
 
 /// All effects.
@@ -43,7 +41,7 @@ const ALL: &[&[Spec]] = &[
     unlisted_accel::SPECS,
 ];
 
-/// What effects see at one instant: nothing of it is disturbed.
+/// Undisturbed quantities at one time, as input of the effects.
 pub struct Condition<'a> {
     /// The motion of the board.
     pub motion: &'a Motion,
@@ -51,13 +49,13 @@ pub struct Condition<'a> {
     pub gyro: [f64; 3],
     /// Specific force at the board's origin along each accelerometer axis, m/s².
     pub accel: [f64; 3],
-    /// Board and dies.
+    /// Temperatures of board and dies.
     pub temperatures: Temperatures,
     /// Time since the unit was switched on, s.
     pub on_s: f64,
 }
 
-/// What effects add to the inputs.
+/// Errors that the effects add to the inputs.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Disturbance {
     /// At each gyro, rad/s.
@@ -71,7 +69,7 @@ pub struct Disturbance {
 pub enum Shape {
     /// One number.
     Scalar,
-    /// So many numbers; three are for the axes x, y, z.
+    /// A list of numbers; three are for the axes x, y, z.
     List(usize),
     /// Three rows of three; rows are the sensor's axes.
     Matrix,
@@ -79,13 +77,13 @@ pub enum Shape {
     Cross,
 }
 
-/// How a parameter that was not given is drawn.
+/// How a parameter is drawn if it is not given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Draw {
-    /// The amplitude of the effect: each number of either sign, between a half and three halves of this size.
-    /// None is near 0, so that an effect which is on is on.
+    /// The amplitude of the effect: each number has a random sign and is between half and one and a half times this size. None is near 0, so an
+    /// enabled effect is visible.
     Size(f64),
-    /// The form of the effect: between two positive numbers, evenly in the logarithm.
+    /// A nonlinear parameter of the effect: between two positive numbers, log-uniform.
     Between(f64, f64),
 }
 
@@ -94,9 +92,9 @@ pub enum Draw {
 pub struct Parameter {
     /// Key in the rig file, with the unit.
     pub key: &'static str,
-    /// Numbers that it holds.
+    /// Layout of its numbers.
     pub shape: Shape,
-    /// Value if it is not given.
+    /// How its value is drawn if it is not given.
     pub draw: Draw,
 }
 
@@ -104,26 +102,26 @@ pub struct Parameter {
 pub struct Spec {
     /// Stable name.
     pub id: &'static str,
-    /// What it does, in a line.
+    /// Description in a line.
     pub about: &'static str,
-    /// The size first, then those of its form.
+    /// The size first, then the nonlinear parameters.
     pub parameters: &'static [Parameter],
     build: fn(&Build) -> Active,
 }
 
-/// One effect of a unit, every parameter known.
+/// One effect of a unit with all parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectTruth {
-    /// Which.
+    /// Its id.
     pub id: &'static str,
     /// Numbers of each parameter, row by row.
     pub values: BTreeMap<&'static str, Vec<f64>>,
 }
 
-/// Something done at every step, with its memory.
+/// A function called at every step, with its state.
 type Step<T> = Box<dyn FnMut(&Condition, &mut T) + Send>;
 
-/// An effect at work.
+/// A running effect.
 pub enum Active {
     /// Adds to the inputs of the sensors.
     Input(Step<Disturbance>),
@@ -132,14 +130,14 @@ pub enum Active {
 }
 
 impl Active {
-    /// Its part in the disturbance.
+    /// Its contribution to the inputs.
     pub fn disturb(&mut self, at: &Condition, add: &mut Disturbance) {
         if let Self::Input(f) = self {
             f(at, add);
         }
     }
 
-    /// Its part in the voltages.
+    /// Its contribution to the voltages.
     pub fn read_out(&mut self, at: &Condition, pins: &mut Pins) {
         if let Self::ReadOut(f) = self {
             f(at, pins);
@@ -147,16 +145,16 @@ impl Active {
     }
 }
 
-/// The sensors of the unit that an effect is in.
+/// The sensors of the unit with an effect.
 #[derive(Clone, Copy)]
 pub(crate) struct Sensors<'a> {
     pub(crate) gyro: &'a TriadTruth,
     pub(crate) accel: &'a TriadTruth,
-    /// What the reference of the converter that reads analog ones should be, V.
+    /// Nominal reference of the converter for analog sensors, V.
     pub(crate) converter_reference_nominal_v: f64,
 }
 
-/// What the making of an effect can ask for.
+/// Inputs for building an effect.
 struct Build<'a> {
     effect: &'a EffectTruth,
     sensors: Sensors<'a>,
@@ -228,7 +226,7 @@ impl Shape {
         }
     }
 
-    /// In words.
+    /// The layout in words.
     pub(crate) fn form(self) -> String {
         match self {
             Self::Scalar => "one number".to_owned(),
@@ -239,8 +237,7 @@ impl Shape {
 }
 
 impl Parameter {
-    /// Draws the numbers of this parameter of the effect `id`: its own stream, so that stating one leaves the
-    /// others.
+    /// Draws the numbers of this parameter of the effect `id` from a separate stream, so that a given parameter leaves the others unchanged.
     fn draw(&self, id: &str, amplitude: f64, seed: u64) -> Vec<f64> {
         let mut random = Random::new(seed, &format!("{id} {}", self.key));
         let one = |i: usize| match self.draw {
@@ -256,8 +253,7 @@ impl Parameter {
 }
 
 impl EffectTruth {
-    /// The effect with the stated numbers; the rest is drawn, its size `amplitude` times the usual one.
-    /// `None`: no such id.
+    /// The effect with the given numbers; the others are drawn, the size times `amplitude`. `None`: no such id.
     pub fn draw(
         id: &str,
         stated: BTreeMap<&'static str, Vec<f64>>,
@@ -283,7 +279,7 @@ impl EffectTruth {
             .map(|p| (p, self.values[p.key].as_slice()))
     }
 
-    /// Puts the effect to work in a unit.
+    /// Starts the effect in a unit.
     pub(crate) fn activate(&self, sensors: Sensors<'_>, seed: u64, dt_s: f64) -> Active {
         let spec = spec(self.id).expect("made from a spec");
         (spec.build)(&Build {
@@ -295,7 +291,7 @@ impl EffectTruth {
     }
 }
 
-/// Every kind of effect.
+/// All kinds of effects.
 pub fn specs() -> impl Iterator<Item = &'static Spec> {
     ALL.iter().copied().flatten()
 }
@@ -305,7 +301,7 @@ pub fn spec(id: &str) -> Option<&'static Spec> {
     specs().find(|s| s.id == id)
 }
 
-/// Effects with these ids, all numbers drawn, sizes `amplitude` times the usual ones. Errors: an unknown id.
+/// Effects with these ids, all numbers drawn, sizes times `amplitude`. Errors: an unknown id.
 pub fn draw(ids: &[&str], amplitude: f64, seed: u64) -> Result<Vec<EffectTruth>, String> {
     let one = |id: &&str| {
         EffectTruth::draw(id, BTreeMap::new(), amplitude, seed)

@@ -1,5 +1,4 @@
-//! Errors of the converter, as changes of the voltage in front of an ideal one: they then act on an emulated
-//! converter too.
+//! Errors of the converter, as changes of the voltage at an ideal one, so that they act on an emulated converter too.
 
 use std::f64::consts::TAU;
 
@@ -7,14 +6,14 @@ use super::{Active, Build, Draw, Parameter, Shape, Spec, axes, form, read_out, s
 use crate::pins::Pins;
 use crate::sensor::TriadTruth;
 
-/// Mismatch of the capacitors of the six top bits, in codes of 16 bits. Assumed: a few codes, the order of
-/// the integral nonlinearity that makers state for 16-bit converters in microcontrollers.
+/// Mismatch of the capacitors of the six top bits, in 16-bit codes. Assumed: a few codes, the order of magnitude of the integral nonlinearity in the
+/// data sheets of 16-bit converters in microcontrollers.
 const MISMATCH: [Parameter; 1] = [sized("bit_errors_lsb", Shape::List(6), 6.0)];
 
-/// Codes that never come, and where. Assumed: some times a usual integral nonlinearity, off the ends.
+/// Number of missing codes, and their position. Assumed: several times a usual integral nonlinearity, away from the ends.
 const MISSING: [Parameter; 2] = [scalar("codes", 20.0), form("at", 0.4, 0.6)];
 
-/// Six errors of each of three converters, and what is added to their codes.
+/// Six errors of each of three converters, and the offset of their codes.
 const CONVERTERS: [Parameter; 2] = [
     sized("bit_errors_lsb", Shape::List(18), 6.0),
     Parameter {
@@ -24,7 +23,7 @@ const CONVERTERS: [Parameter; 2] = [
     },
 ];
 
-/// One more than the highest value of the low part of a code: that of a byte.
+/// Number of values of the low part of a code: that of a byte.
 const LOW_PART: [Parameter; 1] = [scalar("codes", 256.0)];
 
 pub(super) const SPECS: &[Spec] = &[
@@ -40,7 +39,7 @@ pub(super) const SPECS: &[Spec] = &[
         parameters: &MISMATCH,
         build: |b| mismatch(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },
-    // The charge that a capacitor array has lost by the middle of its range: codes that never come.
+    // The charge that a capacitor array has lost by the middle of its range causes missing codes.
     Spec {
         id: "gyro_missing_codes",
         about: "from a code at this fraction of the converter's range, all codes are too high by this number (digital: of 16 bits)",
@@ -53,7 +52,7 @@ pub(super) const SPECS: &[Spec] = &[
         parameters: &MISSING,
         build: |b| missing(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },
-    // Three converters, as of a part for each axis, with a bias register that is added before the bits are found.
+    // Three converters, as in a separate part for each axis, with a bias register that is added before the conversion.
     Spec {
         id: "gyro_converters",
         about: "each axis has a separate converter whose code 0 is at another input; each of its six top bits, when set, adds this error",
@@ -66,7 +65,7 @@ pub(super) const SPECS: &[Spec] = &[
         parameters: &CONVERTERS,
         build: |b| converters(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },
-    // A firmware that puts a code together from two bytes and takes the low one for a signed number: from 128 on it counts 256 less.
+    // A firmware combines two bytes to a code and takes the low one for a signed number: from 128 on the code is 256 too low.
     Spec {
         id: "gyro_sign_extension",
         about: "the low part of a code is read as a signed number: if it is in its upper half, the code is too low by the power of two nearest to the size (256: a byte)",
@@ -95,16 +94,15 @@ pub(super) const SPECS: &[Spec] = &[
             })
         },
     },
-    // The mains' field in the loop between gyro and converter. The grid stays within a tenth of a hertz of
-    // 50.
+    // The mains' magnetic field in the loop between gyro and converter. The grid's frequency stays within 0.1 Hz of 50 Hz.
     Spec {
         id: "x_mains_hum",
         about: "gyro outputs carry a sine of this amplitude (digital: thousandths of a count)",
         parameters: &[axes("mv", 5.0), form("frequency_hz", 49.9, 50.1)],
         build: |b| hum(b, |pins| &mut pins.gyro_v),
     },
-    // The host polls a full-speed USB bridge every millisecond by its own crystal, and the supply feels each
-    // poll: sampled at 1 kHz it becomes a slow wave.
+    // The host polls a full-speed USB bridge every millisecond by its own crystal, and each poll disturbs the supply. Sampled at 1 kHz, this becomes
+    // a slow wave.
     Spec {
         id: "x_usb_beat",
         about: "accelerometer outputs carry a sine near 1 kHz of this amplitude (as x_mains_hum)",
@@ -113,10 +111,10 @@ pub(super) const SPECS: &[Spec] = &[
     },
 ];
 
-/// Which outputs.
+/// Selects the disturbed outputs.
 type Outputs = fn(&mut Pins) -> &mut [f64; 3];
 
-/// Raw range of a converter, for codes of 16 bits.
+/// Raw range of a converter, for 16-bit codes.
 #[derive(Clone, Copy)]
 struct Span {
     low: f64,
@@ -135,12 +133,12 @@ impl Span {
         }
     }
 
-    /// Moves each output by the error, in codes, that its code has.
+    /// Moves each output by the error of its code, in codes.
     fn shift(&self, outputs: &mut [f64; 3], reference_v: f64, error: impl Fn(i64) -> f64) {
         self.shift_each(outputs, reference_v, |_, code| error(code));
     }
 
-    /// The same with errors of each axis.
+    /// The same with separate errors for each axis.
     fn shift_each(
         &self,
         outputs: &mut [f64; 3],
@@ -157,13 +155,13 @@ impl Span {
     }
 }
 
-/// The power of two nearest to `size`, from that of `lowest` up, within 16 bits.
+/// The power of two nearest to `size`, at least that of `lowest`, within 16 bits.
 fn power_of_two(size: f64, lowest: f64) -> i64 {
     1 << size.abs().log2().round().clamp(lowest, 15.0) as u32
 }
 
 fn sign_extension(b: &Build, triad: &TriadTruth, outputs: Outputs) -> Active {
-    // A part of one bit has no half.
+    // A part of one bit cannot be split in half.
     let codes = power_of_two(b.number("codes"), 1.0);
     let span = Span::new(b, triad);
     read_out(move |_, pins| {
@@ -221,7 +219,7 @@ fn hum(b: &Build, outputs: Outputs) -> Active {
     let frequency_hz = b.number("frequency_hz");
     let phase = TAU * b.random().uniform();
     read_out(move |at, pins| {
-        // Turns first: at 1 kHz and a day the phase itself would lose digits.
+        // The fraction of a turn first: after a day at 1 kHz the phase itself would lose digits.
         let wave = (TAU * (frequency_hz * at.motion.t_s).fract() + phase).sin();
         for (v, size) in outputs(pins).iter_mut().zip(size) {
             *v += 1e-3 * size * wave;

@@ -1,4 +1,4 @@
-//! Errors that come in through the supply.
+//! Errors caused by the supply.
 
 use super::{DPS, Spec, read_out, scalar};
 use crate::rotation::norm;

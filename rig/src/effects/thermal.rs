@@ -1,4 +1,4 @@
-//! Errors by the temperature of the dies.
+//! Errors that depend on the temperature of the dies.
 
 use super::{
     Active, Build, Condition, DPS, Disturbance, G, Parameter, REFERENCE_C, Shape, Spec, axes, form,
@@ -9,8 +9,7 @@ use crate::rotation::{Vector, dot};
 
 const MG: f64 = 1e-3 * G;
 
-/// The triad that an effect is about: the dies, what the axes feel, what acts on the board, and where errors
-/// go.
+/// The triad of an effect: its dies, its sensed inputs, the input of the board, and the destination of the errors.
 #[derive(Clone, Copy)]
 struct Triad {
     dies: [usize; 3],
@@ -36,7 +35,7 @@ const ACCEL: Triad = Triad {
     unit: MG,
 };
 
-/// Tilt of the axes per kelvin: boards bend and solder creeps. Assumed: 20 µrad/K is 70 arcseconds in 17 K.
+/// Tilt of the axes per kelvin, because boards bend and solder creeps. Assumed: 20 µrad/K is 70 arcseconds in 17 K.
 const TILT: [Parameter; 1] = [sized("matrix_urad_per_c", Shape::Cross, 20.0)];
 
 /// Curvature of the bias, relative, and the lags: assumed.
@@ -44,8 +43,7 @@ const CURVATURE: Parameter = form("curvature_per_c", 0.001, 0.01);
 const LAG: Parameter = form("lag_s", 20.0, 120.0);
 
 pub(super) const SPECS: &[Spec] = &[
-    // ADXRS300: the null may move by 0.2 V, 40 deg/s, between the ends of -40 to 85 °C: 0.6 deg/s/K at most.
-    // A sixth of that.
+    // ADXRS300: the null may change by 0.2 V, 40 deg/s, between -40 and 85 °C: 0.6 deg/s/K at most. A sixth of that.
     Spec {
         id: "gyro_thermal_bias",
         about: "bias = size · (ΔT + curvature · ΔT²), ΔT of its die from 25 °C",
@@ -84,7 +82,7 @@ pub(super) const SPECS: &[Spec] = &[
         parameters: &TILT,
         build: |b| misalignment(b, ACCEL),
     },
-    // The package follows the die late and strains it meanwhile.
+    // The package follows the die with a lag and meanwhile strains it.
     Spec {
         id: "gyro_thermal_lag",
         about: "bias = size · (T one lag behind the die - T of the die): a loop on ramps",

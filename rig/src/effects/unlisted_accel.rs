@@ -5,8 +5,7 @@ use super::{DPS, G, Spec, axes, form, input};
 const MG: f64 = 1e-3 * G;
 
 pub(super) const SPECS: &[Spec] = &[
-    // The supply of the board sags with rate in one gyro and changes the gain of another chip's amplifier.
-    // Size assumed.
+    // The supply of the board sags with the rate of one gyro and changes the gain of another chip's amplifier. Size assumed.
     Spec {
         id: "x_accel_rotation_coupling",
         about: "axis i: error = size · rate of axis i+1 · force of axis i+2, body axes",
@@ -23,8 +22,7 @@ pub(super) const SPECS: &[Spec] = &[
             })
         },
     },
-    // Glue between die and package gives way a little under load and keeps it: the play (backlash) operator.
-    // Size assumed.
+    // Glue between die and package yields slightly under load and stays deformed: the play (backlash) operator. Size assumed.
     Spec {
         id: "x_accel_stress_hysteresis",
         about: "error of plus or minus the size, by the direction of the last change of force that exceeded twice the play",
@@ -43,7 +41,7 @@ pub(super) const SPECS: &[Spec] = &[
             })
         },
     },
-    // Moulding relaxes in the logarithm of time. Size assumed.
+    // The moulding compound relaxes with the logarithm of time. Size assumed.
     Spec {
         id: "x_accel_creep",
         about: "bias = size · log10(1 + t / onset) since power-on",
@@ -52,7 +50,7 @@ pub(super) const SPECS: &[Spec] = &[
             let size = b.list::<3>("mg_per_decade");
             let onset_s = b.number("onset_s");
             input(move |at, add| {
-                // A unit that was always on has crept forever: the creep is constant.
+                // For a unit that was always on, the creep is constant.
                 let decades = if at.on_s.is_finite() {
                     (at.on_s / onset_s).ln_1p() / 10_f64.ln()
                 } else {

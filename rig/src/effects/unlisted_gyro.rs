@@ -47,8 +47,8 @@ pub(super) const SPECS: &[Spec] = &[
             })
         },
     },
-    // Coupled resonators lock to each other at small rates, as ring lasers do by backscatter: √(ω² - w²)
-    // beyond the zone. Size assumed: a fraction of the null's stability.
+    // At small rates coupled resonators lock to each other, like ring lasers by backscatter: √(ω² - w²) beyond the dead zone. Size assumed: a
+    // fraction of the null's stability.
     Spec {
         id: "x_gyro_dead_zone",
         about: "no output below the half width w, sign · √(rate² - w²) above",

@@ -1,4 +1,4 @@
-//! What a person makes of a plan: which pose next, how it is met, how long everything takes.
+//! Choices of a person carrying out a plan: the next pose, how well it is met, and how long everything takes.
 
 use super::HandsTruth;
 use super::even::Even;
@@ -6,16 +6,16 @@ use crate::plan::{Step, attitude};
 use crate::random::Random;
 use crate::rotation::{Rotation, Vector, norm};
 
-/// From one pose to the next, and the rest there.
+/// A turn to the next pose, and the rest there.
 #[derive(Debug, Clone)]
 pub(super) struct Turn {
     pub(super) start_s: f64,
-    /// Where it was to lead: what was to be upright (unit, body axes), and the heading, rad.
+    /// Its target: the direction that should point up (unit, body axes), and the heading, rad.
     pub(super) up: Vector,
     pub(super) heading: Option<f64>,
-    /// Whether the board is in the hand before and after.
+    /// Whether the board is held before and after.
     pub(super) held: [bool; 2],
-    /// Length of the turn, s; 0 where the recording begins.
+    /// Duration of the turn, s; 0 at the start of the recording.
     pub(super) turn_s: f64,
     pub(super) from: Rotation,
     /// Axis (unit, body axes before the turn) and angle (rad).
@@ -30,7 +30,7 @@ pub(super) struct Turn {
     pub(super) jolt: Option<Jolt>,
     /// Whether it is shaken violently on the way.
     pub(super) shaken: bool,
-    /// Angle from its pose at which it arrives, rad, and the time in which it gets there, s.
+    /// Rotation from its pose at which it arrives, rad, and the time to settle, s.
     pub(super) settling: Option<(Vector, f64)>,
     /// A slow turn instead of a rest.
     pub(super) even: Option<Even>,
@@ -44,8 +44,7 @@ pub(super) struct Jolt {
 }
 
 impl Turn {
-    /// The turn that begins at `at_s` and the dwell after it; without a `last` one just the dwell, from
-    /// `at_s` on.
+    /// The turn that begins at `at_s` and the following dwell; without `last` only the dwell, from `at_s` on.
     pub(super) fn draw(
         last: Option<&Turn>,
         at_s: f64,
@@ -59,7 +58,7 @@ impl Turn {
         });
         let aim = match step.heading {
             Some(heading) => attitude(up, heading),
-            // The nearest way to get it upright, and then about any.
+            // The shortest turn that brings it upright, then a random one about the vertical.
             None => {
                 let upright = Rotation::between(from.turn(up), [0.0, 0.0, 1.0]) * from;
                 Rotation::about([0.0, 0.0, 1.0], 0.5 * random.normal()) * upright
@@ -86,7 +85,7 @@ impl Turn {
         let length_s = step.dwell_s * (1.0 + truth.dwell_stretch * random.uniform());
         let jolted = random.uniform() < truth.jolt_probability && length_s > truth.jolt_s;
         let when = random.uniform();
-        // The board lies at the first pose from the beginning, and no turn leads there.
+        // The board is in the first pose from the beginning, without a turn.
         let (from, turn_s, dwell_s) = match last {
             Some(_) => (from, turn_s, at_s + turn_s + pause_s),
             None => (to, 0.0, at_s),
@@ -120,7 +119,7 @@ pub(super) fn between([low, high]: [f64; 2], random: &mut Random) -> f64 {
     low + (high - low) * random.uniform()
 }
 
-/// What a person takes for all directions: faces, edges, corners of a cube, and from then on anyhow.
+/// A person's idea of all directions: faces, edges, corners of a cube, then random ones.
 pub(super) fn chosen(count: u32, random: &mut Random) -> Vec<Vector> {
     let mut cube: Vec<Vector> = (0..27)
         .map(|k| [k % 3, k / 3 % 3, k / 9].map(|i| f64::from(i) - 1.0))

@@ -1,4 +1,4 @@
-//! A person who gets commands, pose by pose.
+//! A person under command, pose by pose.
 
 use super::choice::{Turn, between, chosen};
 use super::{Hands, HandsTruth};
@@ -8,24 +8,23 @@ use crate::plan::{Plan, Pose, Step};
 use crate::random::Random;
 use crate::rotation::Vector;
 
-/// What a person takes for the length of a dwell where nobody says when it ends, s: a knock falls within it. As in the
-/// plan of 38 poses.
+/// Assumed length of a dwell whose end is not announced, s: a knock falls within it. As in the plan of 38 poses.
 const DWELL_S: f64 = 4.0;
 
-/// A hand that moves does so within this time after it has come to rest, s, while a short dwell still lasts.
+/// A hand that moves in a pose does so within this time after it has come to rest, s, while a short dwell still lasts.
 const FIDGET_AFTER_S: [f64; 2] = [1.0, 3.0];
 
-/// And turns the unit by so much, degrees: about as much as a pose misses its aim, and far more than tremor.
+/// And it turns the unit by this angle, degrees: as much as a pose misses its target, and far more than tremor.
 const FIDGET_DEG: [f64; 2] = [3.0, 8.0];
 
-/// What a person under command has in mind.
+/// State of a person under command.
 #[derive(Debug, Clone)]
 pub(super) struct Told {
     truth: HandsTruth,
     random: Random,
-    /// For what a hand does that moves: it leaves all else as it was.
+    /// Separate stream for a hand that moves in a pose, so that all else is unchanged.
     fidget: Random,
-    /// In every so many-th pose, 0 is never, and the poses since that was told.
+    /// The hand moves in every so many-th pose, 0 is never; and the number of poses since this command.
     every: u32,
     poses: u32,
     lead_in_s: f64,
@@ -33,8 +32,8 @@ pub(super) struct Told {
 }
 
 impl Hands {
-    /// The person `truth` with the unit in the first pose of `plan`, whose steps are not carried out. What is told before
-    /// the lead-in is over waits for that. The seed decides what goes how.
+    /// The person `truth` with the unit in the first pose of `plan`, whose steps are not carried out. Commands during the lead-in wait for its end.
+    /// The seed determines all random choices.
     pub fn commanded(plan: &Plan, truth: &HandsTruth, seed: u64) -> Result<Self, String> {
         truth.check()?;
         let mut random = Random::new(seed, "hands");
@@ -67,7 +66,7 @@ impl Hands {
         Ok(hands)
     }
 
-    /// Forgets every turn that has not begun at `t_s`. Returns the turn that it is in or was in last.
+    /// Discards every turn that has not begun at `t_s`. Returns the current turn, or the last one.
     fn drop_pending(&mut self, t_s: f64) -> Option<Turn> {
         // The first begins at 0.
         while self.turns.len() > 1 && self.turns[self.turns.len() - 1].start_s > t_s {
@@ -78,7 +77,7 @@ impl Hands {
 }
 
 impl Told {
-    /// The turn to a pose, once `last` is over, and the one of a hand that moves there.
+    /// The turn to a pose, after the end of `last`, and the motion of the hand in that pose, if any.
     fn turns(
         &mut self,
         last: &Turn,
@@ -118,7 +117,7 @@ impl Told {
 }
 
 impl Turn {
-    /// The first instant from `t_s` on at which the next turn may begin without cutting a knock short.
+    /// The first time from `t_s` on at which the next turn may begin without cutting a knock short.
     fn may_leave_s(&self, t_s: f64, jolt_s: f64) -> f64 {
         match self.jolt {
             Some(jolt) if jolt.start_s < t_s => t_s.max(jolt.start_s + jolt_s),
@@ -142,7 +141,7 @@ impl Commanded for Hands {
                 }
             }
             Command::Stop => {
-                // What has begun is put down.
+                // A turn that has begun is completed.
                 if let Some(last) = self.drop_pending(t_s) {
                     told.busy_s = told.busy_s.min(last.dwell[0].max(t_s));
                 }

@@ -3,15 +3,15 @@
 use crate::chain::Jet;
 use crate::rotation::{Rotation, Vector, norm, scale};
 
-/// Time in which an even turn gets going, and in which it stops, s; or a quarter of it.
+/// Time in which an even turn accelerates, and in which it stops, s; at most a quarter of the dwell.
 const RAMP_S: f64 = 0.3;
 
-/// An even turn in place of a rest.
+/// An even turn instead of a rest.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Even {
     /// Rate, rad/s, body axes.
     pub(super) rate: Vector,
-    /// From the end of the turn to that of the dwell, s.
+    /// From the end of the turn to the end of the dwell, s.
     pub(super) span_s: [f64; 2],
 }
 
@@ -41,7 +41,7 @@ impl Even {
         (scale(1.0 / size, self.rate), seconds.times(size))
     }
 
-    /// The whole of it.
+    /// The rotation by the whole turn.
     pub(super) fn turned(&self) -> Rotation {
         let (axis, angle) = self.at(self.span_s[1]);
         Rotation::about(axis, angle.value)

@@ -14,7 +14,7 @@ impl Hands {
         let n = self.turns.len();
         let mut shake = random("violent shake");
         self.shake = Shake::new(&mut shake, truth.shake_hz, truth.shake_mrad, 0.0);
-        // No turn leads to the first pose.
+        // The first pose has no turn before it.
         let shaken = struck(truth.shake_turns, n.saturating_sub(1), &mut shake);
         for (turn, shaken) in self.turns.iter_mut().skip(1).zip(shaken) {
             turn.shaken = shaken;
@@ -53,17 +53,17 @@ impl Hands {
 }
 
 impl Turn {
-    /// When the turn is over and the rest begins, s.
+    /// Time at which the turn ends and the rest begins, s.
     pub(super) fn arrived_s(&self) -> f64 {
         self.start_s + self.turn_s
     }
 
-    /// The attitude that it leads to.
+    /// The attitude at its end.
     pub(super) fn aim(&self) -> Rotation {
         self.from * Rotation::about(self.axis, self.angle)
     }
 
-    /// Leads from one attitude to another, and keeps all else.
+    /// Changes its start and end attitudes, and keeps everything else.
     fn lead(&mut self, from: Rotation, to: Rotation) {
         (self.axis, self.angle) = (from.inverse() * to).axis_angle();
         self.from = from;

@@ -1,13 +1,13 @@
-//! Numbers of a plan within their limits.
+//! Range checks for numbers of a plan.
 
 use toml::Spanned;
 
 use crate::located::{Source, written};
 
-/// Beyond any centrifuge that takes a board, degrees per second.
+/// More than any centrifuge for boards, degrees per second.
 pub(super) const FASTEST_DPS: f64 = 36_000.0;
 
-/// What is checked after parsing.
+/// Checks values after parsing.
 pub(super) struct Reader<'a> {
     pub(super) source: &'a Source,
 }
@@ -29,7 +29,7 @@ impl Reader<'_> {
         Err(self.source.error(&value.span(), problem, remedy))
     }
 
-    /// As [`Reader::within`], 0 for what is left out, and in radians.
+    /// As [`Reader::within`], 0 if missing, and in radians.
     pub(super) fn angle(
         &self,
         key: &str,

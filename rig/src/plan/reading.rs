@@ -11,11 +11,11 @@ use super::{CarriedBy, Plan, Pose, Samples, Step};
 use crate::located::{Source, written};
 use crate::place::Place;
 
-/// Longest recording, s: a plan that asks for more has a wrong unit in it.
+/// Longest recording, s: a longer plan must contain a wrong unit.
 const LONGEST_S: f64 = 48.0 * 3600.0;
-/// Most dwells in one plan, for the same reason.
+/// Maximum number of dwells in a plan, for the same reason.
 const MOST_DWELLS: u64 = 100_000;
-/// Most samples, for the same reason: 48 h at 1 kHz are 173 million, and each is some hundred bytes on disk.
+/// Maximum number of samples, for the same reason: 48 h at 1 kHz are 173 million, and each takes some hundred bytes on disk.
 const MOST_SAMPLES: f64 = 200e6;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -43,7 +43,7 @@ fn unit() -> Spanned<String> {
 }
 
 impl Plan {
-    /// Reads a plan. An error is one line: the file, the line, what is wrong, what to do.
+    /// Reads a plan. An error is one line: the file, the line, the problem and the remedy.
     pub fn parse(source: Source) -> Result<Self, String> {
         let raw: RawPlan = source.parse()?;
         let reader = Reader { source: &source };
@@ -69,7 +69,7 @@ impl Plan {
             None => 45.0,
         };
         let gravity = match &raw.gravity_mps2 {
-            // Normal gravity on the ellipsoid is 9.780 to 9.832; mountains take 0.02 away.
+            // Normal gravity on the ellipsoid is 9.780 to 9.832; mountains reduce it by 0.02.
             Some(value) => Some(reader.within("gravity_mps2", value, [9.7, 9.9], "m/s²")?),
             None => None,
         };
@@ -115,12 +115,12 @@ impl Plan {
 }
 
 impl Plan {
-    /// Dwells and turns in it, over all rounds.
+    /// Number of its dwells and turns, over all rounds.
     pub fn dwells(&self) -> u64 {
         u64::from(self.rounds) * self.steps.iter().map(Step::dwells).sum::<u64>()
     }
 
-    /// Refuses a plan that takes too long with the moves from pose to pose, at its last step.
+    /// Refuses a plan that takes too long including the moves from pose to pose; the error is at its last step.
     pub(crate) fn check_length(&self, duration_s: f64) -> Result<(), String> {
         let last = self.steps.last().map_or(0..0, |step| step.at.pose.clone());
         let dwells = self.dwells();
@@ -159,7 +159,7 @@ fn too_long(
 }
 
 impl Reader<'_> {
-    /// How often all steps are done, and the time from one round to the next.
+    /// Number of rounds, and the time from one round to the next.
     fn rounds(&self, raw: &RawPlan) -> Result<(u32, Option<f64>), String> {
         let rounds = raw.rounds.as_ref().map_or(1, |r| *r.get_ref());
         if let (0, Some(key)) = (rounds, &raw.rounds) {
@@ -178,8 +178,7 @@ impl Reader<'_> {
         Ok((rounds, round_s.transpose()?))
     }
 
-    /// Refuses more than the longest recording, at the step where it becomes too long. Moves come on top, see
-    /// [`Plan::check_length`].
+    /// Refuses recordings that are too long, at the step where the limit is exceeded. Moves are added in [`Plan::check_length`].
     fn length(
         &self,
         lead_in_s: f64,
@@ -215,7 +214,7 @@ impl Reader<'_> {
                     "give [time in s, °C] pairs in order of time",
                 ));
             }
-            // Beyond the limits of chambers and silicon; 298 is a temperature in kelvins.
+            // Beyond the limits of chambers and silicon; 298 is a temperature in kelvin.
             if !(-100.0..=200.0).contains(&c) {
                 let problem = format!("`chamber_c`: {} °C at {t} s", written(c));
                 return Err(self.source.error(

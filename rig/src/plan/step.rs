@@ -133,7 +133,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Refuses by hand what only a table can do.
+    /// Refuses a step by hand that only a table can carry out.
     fn on_table(&self, raw: &RawStep, carrier: CarriedBy) -> Result<(), String> {
         if carrier == CarriedBy::Table {
             return Ok(());
@@ -159,7 +159,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Whether a step without a pose is to begin where the one before left off.
+    /// Whether a step without a pose begins where the previous one ended.
     fn stays(&self, raw: &RawStep, turns: bool) -> Result<bool, String> {
         let stay = raw.stay.as_ref().is_some_and(|s| *s.get_ref());
         let stays = stay || turns;

@@ -14,12 +14,12 @@ pub enum TableAxis {
     Outer,
     /// The tilt axis.
     Middle,
-    /// The one that the board sits on: the body's z axis.
+    /// The axis that carries the board: the body's z axis.
     Inner,
 }
 
 impl TableAxis {
-    /// Its number where three are in a list: outer, middle, inner.
+    /// Index in lists of outer, middle, inner.
     pub(crate) fn number(self) -> usize {
         match self {
             Self::Outer => 0,
@@ -28,14 +28,14 @@ impl TableAxis {
         }
     }
 
-    /// What a plan calls it.
+    /// Its name in a plan.
     pub fn name(self) -> &'static str {
         ["outer", "middle", "inner"][self.number()]
     }
 }
 
-/// Turn of one axis of the table from rest to rest. The recording numbers it like a dwell, from the first to the last
-/// instant at which the axis moves, so that the integral of the reference rate over it is the angle.
+/// Turn of one axis of the table from rest to rest. The recording numbers it like a dwell, from the first to the last time at which the axis moves,
+/// so that the integral of the reference rate over it is the angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turn {
     /// Axis of the table.

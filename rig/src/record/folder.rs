@@ -1,4 +1,4 @@
-//! The folder of a recording and the file of its truth: there whole, or not there.
+//! The folder of a recording and the file of its truth: written completely or not at all.
 
 use std::fmt::Display;
 use std::fs;
@@ -14,10 +14,10 @@ use crate::rig_file::{self, RigTruth};
 
 /// Format of `recording.toml`.
 const FORMAT: &str = "mimu-recording/1";
-/// All that a recording may have in it.
+/// All files that a recording may contain.
 const FILES: [&str; 3] = ["recording.toml", "samples.csv", "samples.parquet"];
 
-/// Beginning of a truth file, which a rig file by hand does not have.
+/// Beginning of a truth file, which a rig file written by hand lacks.
 const TRUTH: &str = "# The truth of the recording ";
 
 /// `recording.toml`.
@@ -28,7 +28,7 @@ struct Recording<'a> {
     sample_rate_hz: f64,
     gravity_mps2: f64,
     raw_unit: RawUnit,
-    /// Left out where the Earth does not turn: who reads it takes the Earth's rate out.
+    /// Omitted if the Earth does not turn: otherwise readers would subtract the Earth's rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     latitude_deg: Option<f64>,
     reference: &'a str,
@@ -38,7 +38,7 @@ fn said(path: &Path, problem: impl Display, remedy: &str) -> String {
     format!("{}: {problem}; {remedy}", path.display())
 }
 
-/// The folder of `path`.
+/// The folder that contains `path`.
 fn parent(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -46,10 +46,10 @@ fn parent(path: &Path) -> &Path {
     }
 }
 
-/// Refuses places where nothing can or must be written, before any time is spent.
+/// Refuses destinations that cannot or must not be written, before any time is spent.
 pub(super) fn check(output: &Output) -> Result<(), String> {
     let Output { folder, truth, .. } = output;
-    // Two ways to one place must not look like two places.
+    // Two paths to one place must not look like two places.
     let place = |path: &Path| match (parent(path).canonicalize(), path.file_name()) {
         (Ok(parent), Some(name)) if parent.is_dir() => Ok(parent.join(name)),
         _ => {
@@ -123,7 +123,7 @@ fn is_recording(folder: &Path) -> bool {
         && entries.flatten().all(|entry| known(&entry.file_name()))
 }
 
-/// Writes everything beside its place first and then moves it there.
+/// Writes everything beside its destination first, then moves it there.
 pub(super) fn write(
     plan: &Plan,
     truth: &RigTruth,
@@ -193,21 +193,20 @@ pub(super) fn write(
     let (old, old_truth) = (beside.path().join("old"), truth_beside.path().join("old"));
     let away = [(folder, folder, &old), (truth_path, truth_path, &old_truth)];
     let here = [(truth_path, &new_truth, truth_path), (folder, &new, folder)];
-    // What was not there when the run began has come since then: it is left alone.
+    // A destination that did not exist at the start has been created since then, and is not replaced.
     let away = away
         .into_iter()
         .filter(|(path, ..)| output.replace && path.symlink_metadata().is_ok());
     put(&away.chain(here).collect::<Vec<_>>()).map_err(|(path, e)| failed(path)(e))
 }
 
-/// Carries out moves (of what, from, to) in their order, all or none. Errors: what could not be moved.
+/// Carries out moves (of what, from, to) in order, all or none. Errors: what could not be moved.
 ///
-/// An old recording goes first and the new one comes last: cut short anywhere, no recording stands without its
-/// truth or beside another's.
+/// An old recording moves first and a new one last. So if this is interrupted anywhere, there is no recording without its truth or with another's.
 fn put<'a>(moves: &[(&'a PathBuf, &PathBuf, &PathBuf)]) -> Result<(), (&'a Path, io::Error)> {
     for (i, (what, from, to)) in moves.iter().enumerate() {
         if let Err(e) = fs::rename(from, to) {
-            // Nothing has come of it: everything goes back, the last first.
+            // After a failure all moves are undone, the last first.
             for (_, from, to) in moves[..i].iter().rev() {
                 let _ = fs::rename(to, from);
             }

@@ -14,7 +14,7 @@ use parquet::schema::types::{Type, TypePtr};
 use super::{Row, Run};
 use crate::plan::{CarriedBy, Plan};
 
-/// Columns before those of the table; if the dwells are numbered, `step` is after the first.
+/// Columns before those of the table; if the dwells are numbered, `step` follows the first.
 const READINGS: [&str; 8] = [
     "t_s", "temp_c", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z",
 ];
@@ -27,10 +27,10 @@ const REFERENCES: [&str; 6] = [
     "ref_force_y_mps2",
     "ref_force_z_mps2",
 ];
-/// Samples that are put together before they go into a file.
+/// Number of samples written to a file at once.
 const BLOCK: usize = 65_536;
 
-/// Columns that a plan's recording has, but for `step`.
+/// Columns of a plan's recording, without `step`.
 fn columns(plan: &Plan) -> impl Iterator<Item = &'static str> {
     let references: &[_] = match plan.carrier {
         CarriedBy::Table => &REFERENCES,
@@ -39,7 +39,7 @@ fn columns(plan: &Plan) -> impl Iterator<Item = &'static str> {
     READINGS.into_iter().chain(references.iter().copied())
 }
 
-/// The values of [`columns`], as many as there are of them.
+/// The values of [`columns`] in their order; by hand the last six are not used.
 fn values(row: &Row) -> [f64; 14] {
     let Row {
         instant,
@@ -53,12 +53,12 @@ fn values(row: &Row) -> [f64; 14] {
     [t_s, temp_c, gx, gy, gz, ax, ay, az, wx, wy, wz, fx, fy, fz]
 }
 
-/// Number of the dwell, -1 in transit.
+/// Number of the dwell, -1 between dwells.
 fn step(row: &Row) -> i32 {
     row.instant.step.map_or(-1, |step| step as i32)
 }
 
-/// Writes a CSV file: every number as short as it can be without losing a bit.
+/// Writes a CSV file: every number with the fewest digits that lose no bit.
 pub(super) fn csv(path: &Path, plan: &Plan, run: Run) -> io::Result<()> {
     let mut out = BufWriter::with_capacity(1 << 18, File::create(path)?);
     let columns: Vec<_> = columns(plan).collect();
@@ -93,7 +93,7 @@ pub(super) fn parquet(path: &Path, plan: &Plan, run: Run) -> io::Result<()> {
         .build()?;
     let properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
-        // Readings hardly repeat, and a dictionary of them costs more time than all else.
+        // Readings rarely repeat, and a dictionary of them would cost more time than all else.
         .set_dictionary_enabled(false)
         .set_encoding(Encoding::PLAIN)
         .build();

@@ -1,4 +1,4 @@
-//! What a rig file must not say.
+//! Checks of a rig file.
 
 use super::{AxesFile, FORMAT, Parts, RigFile};
 use crate::catalog::{MeasuredQuantity, Sensor, sensor, sensors};
@@ -8,10 +8,9 @@ use crate::located::written;
 use crate::refusal::{Refusal, within};
 use crate::rotation::{Vector, cross, dot, norm, scale};
 
-/// Smallest volume that three unit directions may span: 1 is orthogonal, 0 in one plane. fang's table 3,
-/// far beyond any unit, has 0.65.
+/// Smallest volume spanned by three unit directions: 1 is orthogonal, 0 coplanar. fang's table 3, far beyond any real unit, has 0.65.
 const LEAST_VOLUME: f64 = 0.05;
-/// Raw per SI, and the length of a direction, below which an axis senses nothing.
+/// Raw per SI, and the length of a direction, below which an axis counts as insensitive.
 const LEAST_GAIN: f64 = 1e-9;
 
 // Ranges of numbers, see `within`.
@@ -31,7 +30,7 @@ fn refuse(
 }
 
 impl RigFile {
-    /// Complains of the first thing that is wrong.
+    /// Returns the first error.
     pub(super) fn check(&self) -> Result<(), Refusal> {
         if self.format != FORMAT {
             return refuse(
@@ -118,7 +117,7 @@ impl RigFile {
 
     fn check_numbers(&self) -> Result<(), Refusal> {
         let (unit, thermal, converter) = (&self.unit, &self.thermal, &self.converter);
-        // Error, drift and noise of a voltage: at the worst of all three it still has its sign.
+        // Error, drift and noise of a voltage: even at the worst of all three its sign stays.
         let (error, drift, noise) = ([-2e5, 2e5], [-2e3, 2e3], [0.0, 2e4]);
         for (path, value, range) in [
             (
@@ -192,7 +191,7 @@ impl RigFile {
         within("unit.gyro_reference_v", pins, [0.1, 10.0])
     }
 
-    /// Catalog entries of the three axes, which must agree in what concerns all three.
+    /// Catalog entries of the three axes, which must agree in the properties of the whole triad.
     pub(super) fn sensors(&self, kind: MeasuredQuantity) -> Result<[&'static Sensor; 3], Refusal> {
         let (path, parts, usual) = match kind {
             MeasuredQuantity::Gyro => ("unit.gyro", &self.unit.gyro, "ADXRS300"),
@@ -260,7 +259,7 @@ fn axes(path: &str, axes: &AxesFile, parts: &[&Sensor; 3]) -> Result<(), Refusal
     ] {
         within(&at(key), value.as_slice(), range)?;
     }
-    // One of the two may be the data sheet's.
+    // One of the two may come from the data sheet.
     let (low, high) = (
         axes.low_raw.unwrap_or(parts[0].low),
         axes.high_raw.unwrap_or(parts[0].high),

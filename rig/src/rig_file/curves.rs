@@ -1,4 +1,4 @@
-//! `[curves]` of a rig file: what the sensors do over temperature.
+//! `[curves]` of a rig file: the sensors over temperature.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,15 +13,15 @@ use crate::rotation::Vector;
 const DEG_PER_H: f64 = DPS / 3600.0;
 /// A thousandth of standard gravity, m/s².
 const MG: f64 = 1e-3 * G;
-/// Elements of a misalignment beside the diagonal, by rows: xy, xz, yx, yz, zx, zy. The first is the sensor, the second
-/// the axis of the body that it should not sense.
+/// Off-diagonal elements of a misalignment, by rows: xy, xz, yx, yz, zx, zy. The first letter is the sensor, the second the body axis that it should
+/// not sense.
 const BESIDE: [(usize, usize); 6] = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)];
 
 /// `[curves]`. Four numbers are the coefficients A0 to A3 of `A0 + A1 ΔT + A2 ΔT² + A3 ΔT³`, ΔT in K from `reference_c`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CurvesFile {
-    /// Temperature that the curves count from. Default 25.
+    /// Temperature from which the curves count. Default 25.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_c: Option<f64>,
     /// `[curves.gyro]`.
@@ -42,7 +42,7 @@ pub struct GyroCurvesFile {
     /// Cubics of the scale factor errors x, y, z.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale_ppm: Option<[[f64; 4]; 3]>,
-    /// Cubics of the misalignments xy, xz, yx, yz, zx, zy: sensor, then the body axis that it senses too.
+    /// Cubics of the misalignments xy, xz, yx, yz, zx, zy: sensor, then the body axis that it also senses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub misalignment_ppm: Option<[[f64; 4]; 6]>,
     /// Scatter of the biases from power-on to power-on, standard deviation.
@@ -57,7 +57,7 @@ pub struct GyroCurvesFile {
     /// Width of the loop. Default 10.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hysteresis_width_c: Option<f64>,
-    /// Temperature, and the standard deviation of a reading of each axis there, raw.
+    /// Temperature, and the standard deviation of a reading of each axis at it, raw.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_at_c_raw: Option<Vec<[f64; 4]>>,
 }
@@ -72,7 +72,7 @@ pub struct AccelCurvesFile {
     /// Cubics of the scale factor errors x, y, z.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale_ppm: Option<[[f64; 4]; 3]>,
-    /// Cubics of the misalignments xy, xz, yx, yz, zx, zy: sensor, then the body axis that it senses too.
+    /// Cubics of the misalignments xy, xz, yx, yz, zx, zy: sensor, then the body axis that it also senses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub misalignment_ppm: Option<[[f64; 4]; 6]>,
     /// Scatter of the biases from power-on to power-on, standard deviation.
@@ -87,7 +87,7 @@ pub struct AccelCurvesFile {
     /// Width of the loop. Default 10.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hysteresis_width_c: Option<f64>,
-    /// Temperature, and the standard deviation of a reading of each axis there, raw.
+    /// Temperature, and the standard deviation of a reading of each axis at it, raw.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_at_c_raw: Option<Vec<[f64; 4]>>,
 }
@@ -104,10 +104,10 @@ impl AccelCurvesFile {
     }
 }
 
-/// What both kinds of triad have, borrowed from either file.
+/// Fields that both kinds of triad share, borrowed from either file.
 struct Triad<'a> {
     path: &'static str,
-    /// Unit of a bias in its keys, and what it is in SI.
+    /// Unit of a bias in its keys, and its SI value.
     unit: &'static str,
     si: f64,
     bias: &'a Option<[[f64; 4]; 3]>,
@@ -153,7 +153,7 @@ impl CurvesFile {
         ]
     }
 
-    /// Complains of the first thing that is wrong.
+    /// Returns the first error.
     pub(super) fn check(&self) -> Result<(), Refusal> {
         within(
             "curves.reference_c",
@@ -163,7 +163,7 @@ impl CurvesFile {
         self.clone().triads().iter().try_for_each(Triad::check)
     }
 
-    /// The truth; what is drawn is written into the file.
+    /// The truth. Drawn values are written into the file.
     pub(super) fn resolve(&mut self, seed: u64) -> CurvesTruth {
         let reference_c = self.reference_c.unwrap_or(25.0);
         let [gyro, accel] = self.triads().map(|triad| triad.resolve(seed));
@@ -179,7 +179,7 @@ impl Triad<'_> {
     fn check(&self) -> Result<(), Refusal> {
         let at = |key: &str| format!("{}.{key}", self.path);
         let in_unit = |key: &str| format!("{}.{key}_{}", self.path, self.unit);
-        // A hundred thousand degrees per hour and a hundred g, at a coefficient of 1 K³.
+        // A hundred thousand degrees per hour and a hundred g, for a coefficient of 1 K³.
         let (size, any) = ([0.0, 1e6], [-1e6, 1e6]);
         for (path, values, range) in [
             (

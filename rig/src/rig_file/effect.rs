@@ -1,4 +1,4 @@
-//! One `[[effect]]` of a rig file: what may be stated, and how a drawn one is written.
+//! One `[[effect]]` of a rig file: its possible parameters, and the text of a drawn one.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use crate::effects::{Draw, EffectTruth, Parameter, Shape, spec, specs};
 use crate::refusal::{Refusal, within};
 
 impl EffectFile {
-    /// Stated numbers by key, as the kind of effect wants them; `i` counts effects from 0.
+    /// Given numbers by key, in the layout of the kind of effect; `i` counts effects from 0.
     pub(super) fn numbers(&self, i: usize) -> Result<BTreeMap<&'static str, Vec<f64>>, Refusal> {
         let wrong = |key: &str, problem: String, remedy: String| Refusal {
             path: format!("effect.{i}.{key}"),
@@ -53,7 +53,7 @@ impl EffectFile {
     }
 }
 
-/// A size may have any sign; times, frequencies and limits are positive. Both a long way from the usual.
+/// A size may have any sign; times, frequencies and limits are positive. Both ranges are far wider than usual values.
 fn range(parameter: &Parameter) -> [f64; 2] {
     match parameter.draw {
         Draw::Size(size) => [-1e6 * size, 1e6 * size],
@@ -61,7 +61,7 @@ fn range(parameter: &Parameter) -> [f64; 2] {
     }
 }
 
-/// The numbers of a value, row by row, if it has the shape.
+/// The numbers of a value, row by row, if its layout is right.
 fn layout(value: &toml::Value, shape: Shape) -> Option<Vec<f64>> {
     let number = |v: &toml::Value| {
         let v = v.as_float().or_else(|| v.as_integer().map(|i| i as f64));

@@ -7,10 +7,9 @@ use std::ops::Range;
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use toml::Spanned;
 
-/// Keys of a table, elements of a list, or neither, with their places in the text.
+/// Keys of a table, elements of a list, or neither, with their positions in the text.
 ///
-/// Marking every checked value with `Spanned` would do as well, but then no truth would equal another and
-/// none could be written by hand.
+/// It would be possible to mark every checked value with `Spanned`, but then truths could not be compared or constructed in code.
 #[derive(Debug)]
 pub enum Lines {
     Table(BTreeMap<String, (Range<usize>, Lines)>),
@@ -19,8 +18,7 @@ pub enum Lines {
 }
 
 impl Lines {
-    /// Bytes of the key at the end of a dotted path (`effect.1.id`, elements from 0), or of the last there is
-    /// on the way to it.
+    /// Bytes of the key at the end of a dotted path (`effect.1.id`, elements counted from 0), or of the last existing key on the way.
     pub fn find(&self, path: &str) -> Range<usize> {
         let mut at = 0..0;
         let mut here = self;
@@ -35,7 +33,7 @@ impl Lines {
             };
             let Some(next) = next else { break };
             here = next;
-            // Tables of a list have no key of their own: the first within is next to their heading.
+            // Tables in a list have no key: the first key within is next to their heading.
             if let (Self::Table(keys), Ok(_)) = (here, part.parse::<usize>()) {
                 let first = keys
                     .values()

@@ -1,8 +1,7 @@
-//! RIG.toml: a unit, its converter and what carries it, format "mimu-rig/1".
+//! RIG.toml: a unit, its converter, and the table or person that moves it, format "mimu-rig/1".
 //!
-//! Everything is optional. [`RigTruth::resolve`] draws what is not stated from a seed, within the tolerances
-//! of the data sheets. Its result is again such a file in which nothing is left to draw: the truth of a
-//! recording, and the way to make it again.
+//! Everything is optional. [`RigTruth::resolve`] draws the values that are not given from a seed, within the tolerances of the data sheets. Its
+//! result is again such a file, with nothing left to draw: it is the truth of a recording, and reproduces it.
 //!
 //! "raw" in a key is V or counts, "si" is rad/s for gyros and m/s² for accelerometers.
 
@@ -27,7 +26,7 @@ use crate::unit::TemperatureSensor;
 pub use curves::{AccelCurvesFile, CurvesFile, GyroCurvesFile};
 pub use resolve::RigTruth;
 
-/// What the key `format` must be.
+/// Required value of the key `format`.
 pub const FORMAT: &str = "mimu-rig/1";
 
 /// A rig file.
@@ -39,8 +38,7 @@ pub struct RigFile {
     /// Whether the Earth turns. Default: it does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub earth_rate: Option<bool>,
-    /// So many effects besides the stated ones, drawn by the seed from all there are. The truth states them
-    /// instead.
+    /// Number of effects in addition to the given ones, drawn by the seed from all effects. The truth contains the drawn effects instead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub draw_effects: Option<usize>,
     /// The sensors.
@@ -49,7 +47,7 @@ pub struct RigFile {
     /// Heat.
     #[serde(default)]
     pub thermal: ThermalFile,
-    /// What the sensors do over temperature.
+    /// The sensors over temperature.
     #[serde(default)]
     pub curves: CurvesFile,
     /// The converter.
@@ -61,22 +59,22 @@ pub struct RigFile {
     /// The person, if the plan has one.
     #[serde(default)]
     pub hands: HandsTruth,
-    /// What goes wrong in the recording.
+    /// Flaws of the recording.
     #[serde(default)]
     pub flaws: FlawsTruth,
-    /// What the affine model lacks.
+    /// Effects that the affine model lacks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effect: Vec<EffectFile>,
 }
 
-/// Sensors by the catalog: one for all axes, or one for each.
+/// Sensors of the catalog: one for all axes, or one for each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(
     untagged,
     expecting = "expected the name of a sensor, or a list of three"
 )]
 pub enum Parts {
-    /// Three alike.
+    /// One sensor for all three axes.
     One(String),
     /// Axes x, y, z.
     Each([String; 3]),
@@ -92,10 +90,10 @@ pub struct UnitFile {
     /// Default: MMA7260QT.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accel: Option<Parts>,
-    /// Default: the dies where the gyros have TEMP pins (ADXRS300), else the board.
+    /// Default: the dies if the gyros have TEMP pins (ADXRS300), otherwise the board.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature: Option<TemperatureSensor>,
-    /// Lag of that thermometer behind the place where it is. Default 0.
+    /// Lag of the thermometer behind its place. Default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature_lag_s: Option<f64>,
     /// Constant error of the reported temperature, K. Default: drawn within 2.
@@ -128,8 +126,7 @@ pub struct UnitFile {
     pub accel_affine: Option<AffineFile>,
 }
 
-/// `[unit.gyro_axes]`, `[unit.accel_axes]`: one number for each axis. The default of each is drawn by the
-/// data sheet.
+/// `[unit.gyro_axes]`, `[unit.accel_axes]`: one number for each axis. Defaults are drawn within the data sheet's tolerances.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AxesFile {
@@ -145,7 +142,7 @@ pub struct AxesFile {
     /// -3 dB of the part.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bandwidth_hz: Option<[f64; 3]>,
-    /// -3 dB of the filter behind it; inf is none.
+    /// -3 dB of the external filter; inf is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rc_hz: Option<f64>,
     /// Coefficient N of the Allan deviation, rad/s/√Hz or m/s²/√Hz.
@@ -157,7 +154,7 @@ pub struct AxesFile {
     /// Coefficient K of the Allan deviation, rad/s/√s or m/s²/√s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub walk_si: Option<[f64; 3]>,
-    /// Noise of each single reading behind the filters, standard deviation. Default 0.
+    /// Noise of each reading after the filters, standard deviation. Default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub white_per_sample: Option<[f64; 3]>,
     /// Lowest output.
@@ -191,10 +188,10 @@ pub struct ThermalFile {
     /// Default: drawn from 3 to 6.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub board_heating_c: Option<f64>,
-    /// Default: by the catalog, within a fifth.
+    /// Default: from the catalog, within a fifth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub die_heating_c: Option<[f64; 4]>,
-    /// Switched on so long before the recording; inf is warmed up. Default 0.
+    /// Time since switch-on at the start of the recording; inf is warmed up. Default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on_before_s: Option<f64>,
 }
@@ -218,7 +215,7 @@ pub struct ConverterFile {
     /// Noise of the true reference, standard deviation of one sample. Default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_noise_ppm: Option<f64>,
-    /// Default: as much as fits the gyro's highest output by its data sheet under the reference, in twentieths.
+    /// Default: the largest multiple of 1/20 that keeps the gyro's highest output by its data sheet below the reference.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro_divider: Option<f64>,
     /// Default: the same for the accelerometer.
@@ -233,12 +230,12 @@ pub struct ConverterFile {
     /// Default: false.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub take_out_reference: Option<bool>,
-    /// Default: V where both kinds of sensor are analog, else count.
+    /// Default: V if both kinds of sensor are analog, otherwise count.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub raw_unit: Option<RawUnit>,
 }
 
-/// `[[effect]]`: the id, and whichever of its parameters are not to be drawn.
+/// `[[effect]]`: the id, and the parameters that are not to be drawn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EffectFile {
     /// See [`crate::effects::specs`].

@@ -17,10 +17,10 @@ use crate::table::TableTruth;
 use crate::thermal::ThermalTruth;
 use crate::unit::{TemperatureSensor, TemperatureTruth, UnitTruth, VoltageTruth};
 
-/// Everything that is true of a bench.
+/// The complete truth of a bench.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RigTruth {
-    /// The same as a rig file in which nothing is left to draw.
+    /// The same as a rig file with nothing left to draw.
     pub file: RigFile,
     /// Whether the Earth turns.
     pub earth_rate: bool,
@@ -32,15 +32,14 @@ pub struct RigTruth {
     pub table: TableTruth,
     /// The person.
     pub hands: HandsTruth,
-    /// What goes wrong in the recording.
+    /// Flaws of the recording.
     pub flaws: FlawsTruth,
 }
 
 impl RigTruth {
-    /// Draws what the file does not state. Each quantity has a stream of its own: stating one leaves the
-    /// others as they were.
+    /// Draws the values that the file does not give. Each quantity has a separate stream, so a given value leaves the others unchanged.
     ///
-    /// Errors: a file put together in memory that [`RigFile::parse`] would refuse.
+    /// Errors: a file constructed in memory that [`RigFile::parse`] would refuse.
     pub fn resolve(file: &RigFile, seed: u64) -> Result<Self, String> {
         file.check()?;
         let mut file = file.clone();
@@ -63,7 +62,7 @@ impl RigTruth {
         }
 
         let gyro_reference_nominal_v = gyro[0].reference_v.unwrap_or(0.0);
-        // Of the catalog's parts those with a reference pin have a TEMP pin too.
+        // In the catalog, parts with a reference pin also have a TEMP pin.
         let dies = gyro[0].reference_v.is_some();
         if dies {
             unit.gyro_reference_v.get_or_insert_with(|| {
@@ -106,7 +105,7 @@ impl RigTruth {
             per_c: 1e-6 * *c.reference_ppm_per_c.get_or_insert(0.0),
             noise: 1e-6 * *c.reference_noise_ppm.get_or_insert(0.0),
         };
-        // Of the part, whatever output is stated: boards are made by data sheets.
+        // By the part, even if its output range is given, because boards are designed from data sheets.
         let divider = |part: &Sensor| match part.output {
             RawUnit::V => (20.0 * (nominal_v / part.high).min(1.0)).floor() / 20.0,
             RawUnit::Count => 1.0,
@@ -160,7 +159,7 @@ impl RigTruth {
     }
 }
 
-/// Draws the effects, and writes them into the file.
+/// Draws the effects and adds them to the file.
 fn effects(file: &mut RigFile, seed: u64) -> Result<Vec<EffectTruth>, Refusal> {
     let count = file.draw_effects.take().unwrap_or(0);
     let stated = file.effect.len();
@@ -205,8 +204,7 @@ fn thermal(file: &mut RigFile, parts: [&Sensor; 4], seed: u64) -> ThermalTruth {
     }
 }
 
-/// Axes by the catalog, what is stated aside. With a forward model the directions, sensitivities and nulls
-/// stay open.
+/// Axes from the catalog, except for given values. With a forward model, directions, sensitivities and nulls stay undetermined here.
 fn triad(
     file: &mut AxesFile,
     parts: [&Sensor; 3],
@@ -216,7 +214,7 @@ fn triad(
 ) -> TriadTruth {
     let si = parts[0].kind.si();
     let random = |cause: &str| Random::new(seed, &format!("{name} {cause}"));
-    // Noise differs from part to part; no data sheet gives by how much.
+    // Noise differs from part to part, but data sheets do not give by how much.
     let noise = |slot: &mut Option<[f64; 3]>, cause: &str, typical: [f64; 3]| {
         *slot.get_or_insert_with(|| {
             let mut r = random(cause);
@@ -279,7 +277,7 @@ fn triad(
     }
 }
 
-/// A length that is 1 already is left unchanged, bit by bit.
+/// A length of exactly 1 is left unchanged, bit by bit.
 fn unit(v: Vector) -> Vector {
     let length = norm(v);
     if length == 0.0 || (length - 1.0).abs() < 1e-15 {

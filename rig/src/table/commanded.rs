@@ -1,4 +1,4 @@
-//! A table that gets commands, move by move.
+//! A table under command, move by move.
 
 use super::controller::Controller;
 use super::{Table, TableTruth};
@@ -6,8 +6,7 @@ use crate::command::{Command, Commanded, Position};
 use crate::plan::{Plan, Step};
 
 impl Table {
-    /// The table `truth` at rest in the first pose of `plan`, whose steps it does not carry out. What it is told before
-    /// the lead-in is over waits for that.
+    /// The table `truth` at rest in the first pose of `plan`, whose steps it does not carry out. Commands during the lead-in wait for its end.
     pub fn commanded(plan: &Plan, truth: &TableTruth) -> Result<Self, String> {
         truth.check()?;
         let controller = Controller::standing(plan, truth).map_err(|e| plan.beyond(&e))?;

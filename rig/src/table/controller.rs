@@ -1,4 +1,4 @@
-//! What makes a table carry out a plan: which angles give a pose, and when each axis moves.
+//! Controller of a table: the angles of a pose, and the motions of each axis.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,12 +11,12 @@ pub(super) const OUTER: usize = 0;
 pub(super) const MIDDLE: usize = 1;
 pub(super) const INNER: usize = 2;
 
-/// A dwell: from and to, s.
+/// A dwell: start and end, s.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Dwell {
     pub(super) start_s: f64,
     pub(super) end_s: f64,
-    /// Whether it is a turn by an angle, which the encoder ends and no rate's error reaches.
+    /// Whether it is a turn by an angle: the encoder ends it, so rate errors do not affect it.
     pub(super) by_angle: bool,
 }
 
@@ -28,11 +28,11 @@ pub(super) struct Controller {
     lead_in_s: f64,
     pub(super) axes: [Axis; 3],
     pub(super) dwells: Vec<Dwell>,
-    /// Whether it has turned by an angle, and the load has had no time to come to rest.
+    /// Whether it has turned by an angle and the load has not yet had time to settle.
     unsettled: bool,
     /// Under command: last commanded rates about the vertical and about the inner axis, rad/s.
     pub(super) rates: [f64; 2],
-    /// End of the last commanded move, s, and the time at which the load has come to rest.
+    /// End of the last commanded move, s, and the time at which the load has settled.
     pose_s: f64,
     settled_s: f64,
     /// End of all commanded motion, s.
@@ -40,7 +40,7 @@ pub(super) struct Controller {
 }
 
 impl Controller {
-    /// All of a plan that is within the table's limits.
+    /// Carries out a whole plan within the table's limits.
     pub(super) fn carry_out(plan: &Plan, truth: &TableTruth) -> Result<Self, Beyond> {
         let mut controller = Self::new(plan, truth);
         for round in 0..plan.rounds {
@@ -69,7 +69,7 @@ impl Controller {
         if round == 0 {
             return Ok(());
         }
-        // The ends of dwells are sums: a rounding error beyond the time does not count.
+        // The ends of dwells are sums: an excess by a rounding error is ignored.
         if self.now() > due_s + 1e-6 {
             let problem = format!(
                 "round {round} is due at {due_s} s, but the one before ends at {:.1} s",
@@ -115,13 +115,13 @@ impl Controller {
         }
     }
 
-    /// Is in a pose from the beginning.
+    /// Starts in a pose.
     fn stand(&mut self, up: Vector, heading: Option<f64>) {
         let target = self.angles(up, heading.unwrap_or(0.0));
         self.axes = target.map(|angle| Axis::new(angle, self.truth.settling));
     }
 
-    /// To a pose, or nowhere. When it was done with what came before, s.
+    /// Moves to a pose, or stays. Returns the time at which the previous motion ended, s.
     fn pose(&mut self, up: Option<Vector>, heading: Option<f64>) -> f64 {
         let first = self.dwells.is_empty();
         let before = if first { self.lead_in_s } else { self.now() };
@@ -138,7 +138,7 @@ impl Controller {
         before
     }
 
-    /// Time for the load to come to rest, if anything has moved since `before`.
+    /// Waits for the load to settle, if anything has moved since `before`.
     fn settle(&mut self, before: f64) {
         if self.now() > before || self.unsettled {
             self.hold(self.truth.settle_s);
@@ -146,7 +146,7 @@ impl Controller {
         self.unsettled = false;
     }
 
-    /// Pose, then one axis by an angle.
+    /// Moves to a pose, then turns one axis by an angle.
     fn turn_by(&mut self, step: &Step, turn: Turn) -> Result<(), Beyond> {
         let up = match step.pose {
             Pose::Up(up) => Some(up),
@@ -173,7 +173,7 @@ impl Controller {
         Ok(())
     }
 
-    /// Refuses a turn to an angle that the axis does not reach, or too fast a one: what is wrong, and what to do.
+    /// Refuses a turn to an angle beyond the axis's range, or one that is too fast; returns problem and remedy.
     fn check_turn(&self, turn: Turn, to: f64) -> Result<(), (String, &'static str)> {
         let name = turn.axis.name();
         let fastest = self.truth.max_rate_dps[turn.axis.number()];
@@ -196,7 +196,7 @@ impl Controller {
         Err((problem, remedy))
     }
 
-    /// Pose, rates up, dwells, rates down. Between the dwells of one pose nothing stops. Without a pose it stays.
+    /// Pose, rates up, dwells, rates down. Between the dwells of one pose the rates continue. Without a pose the table stays.
     fn step(&mut self, step: &Step, up: Option<Vector>) {
         let before = self.pose(up, step.heading);
         let up = up.unwrap_or_else(|| self.position(self.now()).0);
@@ -236,17 +236,17 @@ impl Controller {
         }
     }
 
-    /// Which axis turns at which rate, for rates about the vertical and about the inner axis.
+    /// Rate of each axis, for rates about the vertical and about the inner axis.
     fn axis_rates(&self, [rate, spin]: [f64; 2], up: Vector) -> Vector {
         if self.limits.outer {
             [rate, 0.0, spin]
         } else {
-            // The check lets a rate about the vertical pass where the inner axis is upright, either way up.
+            // The check allows a rate about the vertical only if the inner axis is upright, in either direction.
             [0.0, 0.0, spin + rate * up[2].signum()]
         }
     }
 
-    /// Leaves whatever it does at `t_s` for a pose at rest, as between the steps of a plan: the rates down first.
+    /// At `t_s` stops its motion, rates down first, and moves to a pose at rest, as between the steps of a plan.
     pub(super) fn go(&mut self, t_s: f64, up: Vector, heading: Option<f64>) {
         let from_s = t_s.max(self.lead_in_s);
         self.halt(from_s);
@@ -255,7 +255,7 @@ impl Controller {
         self.posed(from_s);
     }
 
-    /// To rest where it is at `t_s`.
+    /// Stops at its position at `t_s`.
     pub(super) fn halt(&mut self, t_s: f64) {
         for axis in &mut self.axes {
             axis.cut(t_s);
@@ -292,14 +292,13 @@ impl Controller {
         self.busy_s = self.settled_s;
     }
 
-    /// When the load has come to rest behind the axes, as before a dwell, if anything moves after `from_s`.
+    /// Time at which the load has settled behind the axes, as before a dwell, if anything moves after `from_s`.
     fn settled_s(&self, from_s: f64) -> f64 {
         let moved = self.now() > from_s;
         self.now() + if moved { self.truth.settle_s } else { 0.0 }
     }
 
-    /// To rates about the vertical and about the inner axis, rad/s, from `t_s` on, or from the end of the move that
-    /// it is in.
+    /// Changes to rates about the vertical and about the inner axis, rad/s, from `t_s` on, or from the end of the current move.
     pub(super) fn turn(&mut self, t_s: f64, rates: [f64; 2]) {
         let from_s = t_s.max(self.lead_in_s).max(self.pose_s);
         for axis in &mut self.axes {
@@ -311,8 +310,7 @@ impl Controller {
         self.busy_s = self.settled_s.max(self.settled_s(from_s));
     }
 
-    /// Where its axes have been turned to at a time, or will be when the move that it is in is over: up in body
-    /// axes, and heading (rad).
+    /// Position of its axes at a time, or at the end of the current move: up in body axes, and heading (rad).
     pub(super) fn position(&self, t_s: f64) -> (Vector, f64) {
         let t_s = t_s.max(self.pose_s);
         let [outer, middle, inner] = [0, 1, 2].map(|i| self.axes[i].angle(t_s));
@@ -324,12 +322,12 @@ impl Controller {
         (up, angle * axis[2].signum())
     }
 
-    /// When the last axis is done, s.
+    /// Time at which the last axis ends its motion, s.
     fn now(&self) -> f64 {
         self.axes.iter().map(Axis::end_s).fold(0.0, f64::max)
     }
 
-    /// All axes go on as they are until so long after the last is done.
+    /// All axes continue unchanged for this long after the last one has finished.
     fn hold(&mut self, duration_s: f64) {
         let end_s = self.now() + duration_s;
         for axis in &mut self.axes {
@@ -337,7 +335,7 @@ impl Controller {
         }
     }
 
-    /// Angles for a pose and a heading: of the two ways that there may be, the one that takes less time.
+    /// Angles for a pose and a heading. If there are two solutions, the one that takes less time.
     fn angles(&self, up: Vector, heading: f64) -> Vector {
         let from = [0, 1, 2].map(|i| self.axes[i].end().0);
         let (tilt, inner) = tilt(up);
@@ -348,7 +346,7 @@ impl Controller {
                 let [outer, inner] = if self.limits.outer {
                     [outer, inner]
                 } else if upright {
-                    // The heading falls to the inner axis, which turns the other way when it is upside down.
+                    // The inner axis provides the heading; upside down it turns in the opposite direction.
                     [0.0, heading * up[2].signum()]
                 } else {
                     [0.0, inner]
@@ -372,8 +370,7 @@ impl Controller {
     }
 }
 
-/// Directions of up spread evenly over what the middle axis reaches: a Fibonacci spiral, from the inner
-/// axis upright down.
+/// Directions of up, spread evenly over the range of the middle axis: a Fibonacci spiral, from inner axis upright downwards.
 fn spread(count: u32, limits: &Limits) -> impl Iterator<Item = Vector> {
     let reach = limits.middle[1].max(-limits.middle[0]).min(PI);
     let lowest = reach.cos();

@@ -1,4 +1,4 @@
-//! What a turntable truly is: its limits, its controller's rates and its flaws.
+//! Truth of a turntable: its limits, its controller's rates and its flaws.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,14 +7,13 @@ use crate::plan::Limits;
 use crate::refusal::{Refusal, within};
 use crate::rotation::Vector;
 
-/// What the table truly is. Three numbers are those of the outer, the middle and the inner axis, unless
-/// said otherwise.
+/// Truth of the table. Three numbers belong to the outer, the middle and the inner axis, unless stated otherwise.
 ///
 /// The default is a good table of three axes: angles to a few arcseconds, rates to a few millionths.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TableTruth {
-    /// 3, or 2: no outer axis, and rates about the inner one alone.
+    /// 3; or 2: no outer axis, and rates only about the inner one.
     pub axes: u32,
     /// Lowest angle of the middle axis, degrees.
     pub middle_min_deg: f64,
@@ -26,25 +25,24 @@ pub struct TableTruth {
     pub max_acceleration_dps2: Vector,
     /// Rates of the moves from pose to pose.
     pub slew_dps: Vector,
-    /// Time from the end of a move to the dwell, s. Whether the load has come to rest by then is
-    /// [`Settling`]'s affair.
+    /// Time from the end of a move to the dwell, s. [`Settling`] determines whether the load has settled by then.
     pub settle_s: f64,
-    /// Ring-down, of every axis.
+    /// Ring-down of every axis.
     pub settling: Settling,
-    /// Tilt of each axis to and fro, once a turn, in a plane fixed to the part that carries it. (A tilt
-    /// that goes round with the axis would be a mounting error, and one that stands still a level error.)
+    /// Tilt of each axis back and forth, once per turn, in a plane fixed to the part that carries it. (A tilt that rotates with the axis would be a
+    /// mounting error, and a constant one a level error.)
     pub wobble_arcsec: Vector,
-    /// Outer to middle, and middle to inner axis: what the right angles have too much.
+    /// Excess of the angles over 90°: outer to middle, and middle to inner axis.
     pub nonorthogonality_arcsec: [f64; 2],
-    /// Outer axis off the vertical: turns about east and north.
+    /// Deviation of the outer axis from the vertical: rotations about east and north.
     pub level_arcsec: [f64; 2],
-    /// Board in the frame of the inner axis: rotation vector.
+    /// Orientation of the board in the frame of the inner axis: rotation vector.
     pub mounting_arcsec: Vector,
-    /// True rate over stated rate, less one, in dwells with a rate.
+    /// True over reported rate, minus one, in dwells with a rate.
     pub rate_scale_ppm: Vector,
-    /// True angle less stated angle is this times the sine of the stated angle: an eccentric disc.
+    /// True minus reported angle is this times the sine of the reported angle: an eccentric disc.
     pub encoder_arcsec: Vector,
-    /// The board's origin from the point where the axes meet, x, y, z of the board, mm.
+    /// Position of the board's origin relative to the intersection of the axes, x, y, z of the board, mm.
     pub offset_mm: Vector,
 }
 
@@ -71,7 +69,7 @@ impl Default for TableTruth {
 }
 
 impl TableTruth {
-    /// A table without any flaw, the board where its axes meet: it states what is true.
+    /// A table without flaws, with the board at the intersection of its axes: its reports are true.
     pub fn ideal() -> Self {
         Self {
             settling: Settling {
@@ -89,7 +87,7 @@ impl TableTruth {
         }
     }
 
-    /// What plans have to keep to.
+    /// Limits for plans.
     pub fn limits(&self) -> Limits {
         Limits {
             outer: self.axes == 3,
@@ -104,7 +102,7 @@ impl TableTruth {
         }
     }
 
-    /// Refuses what cannot be a table.
+    /// Refuses impossible values.
     pub fn check(&self) -> Result<(), Refusal> {
         if self.axes != 2 && self.axes != 3 {
             let problem = format!("`axes` is {}", self.axes);
@@ -115,7 +113,7 @@ impl TableTruth {
             damping,
             fraction,
         } = self.settling;
-        // Ten degrees is no flaw of a table any more, but a board may be mounted any way.
+        // More than ten degrees is not a flaw of a table, but a board may be mounted in any orientation.
         let (flaw, any) = ([-36e3, 36e3], [-648e3, 648e3]);
         let ranges: [(&str, &[f64], [f64; 2]); 15] = [
             ("middle_min_deg", &[self.middle_min_deg], [-360.0, 0.0]),

@@ -1,4 +1,4 @@
-//! What the sensors do over temperature, against curves and branches written out here.
+//! The sensors over temperature, against curves and branches written out here.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use mimu_rig::unit::Unit;
 const DEG_PER_H: f64 = std::f64::consts::PI / 180.0 / 3600.0;
 const MG: f64 = 9.80665e-3;
 
-/// A unit without noise, filters, rails or heat of its own, whose dies are at the chamber's temperature: 1 raw per SI.
+/// A unit without noise, filters, rails or self-heating, whose dies have the chamber's temperature: 1 raw per SI.
 const PLAIN: &str = "format = \"mimu-rig/1\"
 [unit]
 supply_error_ppm = 0
@@ -54,7 +54,7 @@ fn truth(curves: &str, seed: u64) -> RigTruth {
     RigTruth::resolve(&RigFile::parse(&source).unwrap(), seed).unwrap()
 }
 
-/// Steps of a second: the lags of a hundredth are over.
+/// Steps of one second: the lags of 0.01 s have settled.
 fn unit(curves: &str) -> Unit {
     Unit::new(&truth(curves, 1).unit, 1, 1.0)
 }
@@ -140,8 +140,8 @@ fn curves_count_from_25_c_when_nothing_else_is_given() {
 fn hysteresis_goes_by_the_path_of_the_temperature_and_not_by_its_rate() {
     let curves = "[curves.gyro]\nhysteresis_deg_per_h = [30, -60, 0]\nhysteresis_width_c = 8";
     let rest = motion([0.0; 3], [0.0; 3]);
-    // Up by 20 K, down by 4 (half the width: between the branches), down by 16 more, up by 2, and down by 2 again: a small
-    // loop within the play leaves nothing behind.
+    // Up by 20 K, down by 4 (half the width: between the branches), down by 16 more, up by 2, and down by 2 again: a small loop within the play
+    // leaves the state unchanged.
     let path = [0.0, 20.0, 16.0, 0.0, 2.0, 0.0];
     let branch = [0.0, 1.0, 0.0, -1.0, -0.5, -1.0];
     for steps in [1, 7, 400] {
@@ -180,11 +180,11 @@ fn a_bias_scatters_from_power_on_to_power_on_by_its_standard_deviation() {
             *s += r * r;
         }
     }
-    // Chi-square with 2000 degrees of freedom: 3.2 % one sigma of the variance.
+    // Chi-square with 2000 degrees of freedom: the sigma of the variance is 3.2 %.
     for s in squares {
         near(s / n as f64, 1.0, 4.0 * 0.032);
     }
-    // The truth of one power-on makes it again, and without the biases another seed is another power-on.
+    // The truth of one power-on reproduces it. Without the given biases, another seed is another power-on.
     let first = truth(curves, 5);
     let again = RigFile::parse(&Source::new("truth.toml", first.file.to_toml())).unwrap();
     assert_eq!(RigTruth::resolve(&again, 6).unwrap(), first);
@@ -218,7 +218,7 @@ fn the_noise_of_a_reading_follows_the_temperature_of_the_die() {
             }
             accel += pins.accel_v[1].powi(2) / f64::from(n);
         }
-        // 1.1 % one sigma of a standard deviation from 4000 readings.
+        // For 4000 readings, the sigma of a standard deviation is 1.1 %.
         for i in 0..3 {
             near(gyro[i].sqrt(), expected[i], 4.0 * 0.0112 * expected[i]);
         }
@@ -226,8 +226,7 @@ fn the_noise_of_a_reading_follows_the_temperature_of_the_die() {
     }
 }
 
-/// Reported temperature and bias of the x gyro (deg/h, 1 deg/h/K from 25 °C) late on a ramp of 2 K/min; and the lags
-/// that the truth gives.
+/// Lag of the reported temperature, and of the bias of the x gyro (1 deg/h/K from 25 °C), on a ramp of 2 K/min; and the lags according to the truth.
 fn late_on_a_ramp(thermal: &str) -> (f64, f64, [f64; 4]) {
     let curves = "[curves.gyro]\nbias_deg_per_h = [[0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]";
     let text = format!(
@@ -259,12 +258,12 @@ fn late_on_a_ramp(thermal: &str) -> (f64, f64, [f64; 4]) {
 #[test]
 fn a_die_may_be_behind_the_thermometer_or_ahead_of_it_by_a_lag_that_the_truth_gives() {
     for (thermal, lag_s) in [
-        // A thermometer on the board: the die is behind it by its own lag.
+        // A thermometer on the board: the die lags it by its own lag.
         (
             "temperature = \"board\" | board_lag_s = 300\ndie_lag_s = [150, 5, 5, 5]",
             150.0,
         ),
-        // One with a package of its own on the same board: the die leads.
+        // A thermometer with its own package on the same board: the die leads.
         (
             "temperature = \"board\"\ntemperature_lag_s = 200 | board_lag_s = 300\ndie_lag_s = [20, 5, 5, 5]",
             -180.0,
@@ -391,7 +390,7 @@ fn every_example_plan_over_temperature_is_one_that_its_bench_can_carry_out() {
         let rig = RigTruth::resolve(&rig, 1).unwrap();
         let run = record::samples(&plan, &rig, 1).unwrap();
         assert_eq!(plan.dwells(), dwells);
-        // The last breakpoint of the chamber is where the recording ends, within a round.
+        // The last breakpoint of the chamber is at the end of the recording, to within a round.
         let end_s = run.len() as f64 / plan.sample_rate_hz;
         let last = plan.chamber[plan.chamber.len() - 1][0];
         assert!((end_s - last).abs() < 152.0, "{end_s} {last}");

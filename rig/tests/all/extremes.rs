@@ -32,7 +32,7 @@ const TABLE: &str = "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier =
                      dwell_s = 0.2\nrepeat = 2\n[[step]]\nposes = 3\ndwell_s = 0.2\n";
 const HANDS: &str = "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\n[[step]]\nposes = 3\ndwell_s = 0.3\n";
 
-/// Where numbers stand in a TOML text without comments.
+/// Positions of the numbers in a TOML text without comments.
 fn numbers(text: &str) -> Vec<Range<usize>> {
     let mut found = Vec::new();
     let mut start = 0;
@@ -54,7 +54,7 @@ fn numbers(text: &str) -> Vec<Range<usize>> {
     found
 }
 
-/// Records a second; complaints must have the name of a file and a line.
+/// Records a second; error messages must name a file and a line.
 fn record(plan: &str, rig: &str) -> Result<usize, String> {
     let plan = Plan::parse(Source::new("PLAN.toml", plan))?;
     let file = RigFile::parse(&Source::new("RIG.toml", rig))?;

@@ -1,4 +1,4 @@
-//! Flaws of recordings: each does what its key says, and nothing else.
+//! Flaws of recordings: each has the effect of its key, and no other.
 
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
@@ -35,7 +35,7 @@ fn stamps_jitter_and_come_in_bursts_while_the_samples_stay_steady() {
         let largest = late_s.iter().copied().fold(0.0, f64::max);
         assert!((0.008..0.1).contains(&largest), "{flaws}{largest}");
     }
-    // Ten samples are stamped within a millisecond, when the last of them was taken.
+    // Ten samples are stamped within a millisecond, at the time of the last one.
     let burst: Vec<f64> = rows("stamp_burst = 10\n")
         .iter()
         .map(|r| r.stamp_s)
@@ -129,7 +129,7 @@ fn a_hand_that_settles_is_off_by_its_angle_and_at_rest_in_the_end() {
             scale(-1.0, b.instant.motion.rate),
         )));
     }
-    // 50 mrad about three axes in 2.5 s, at most 15/8 of the mean rate; after the pause the fastest part may be over.
+    // 50 mrad about three axes in 2.5 s, at most 15/8 of the mean rate; the pause may cover the fastest part.
     assert!((0.01..0.3).contains(&fastest), "{fastest}");
     let end = rows
         .iter()
@@ -149,7 +149,7 @@ fn an_upset_gyro_shows_a_rate_that_is_not_there_between_two_dwells() {
             off += 1;
         }
     }
-    // One turn of one to three seconds and its pauses; the part's own low-pass takes a moment to forget it.
+    // One turn of one to three seconds and its pauses; the part's low-pass takes a moment to settle.
     assert!((150..700).contains(&off), "{off}");
 }
 
@@ -163,7 +163,7 @@ fn the_building_sways_the_force_and_turns_nothing() {
         let sway = add(a.force, scale(-1.0, b.force));
         squares += dot(sway, sway);
     }
-    // Two sines of 2 mg amplitude: the effective value of both together is 2 mg.
+    // Two sines of 2 mg amplitude have a combined rms of 2 mg.
     let effective_mg = (squares / plain.len() as f64).sqrt() / 9.80665e-3;
     assert!((effective_mg - 2.0).abs() < 0.1, "{effective_mg}");
 }

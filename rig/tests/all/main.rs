@@ -1,6 +1,6 @@
 //! The bench against closed forms, data sheets and its own page.
 //!
-//! One binary, as linking one for each subject took longer than running it.
+//! One binary, because linking one for each subject took longer than running it.
 
 mod curves;
 mod effects;

@@ -1,4 +1,4 @@
-//! Noise against the Allan deviation that its coefficients state.
+//! Noise against the Allan deviation of its coefficients.
 
 use std::f64::consts::PI;
 
@@ -34,8 +34,8 @@ fn the_allan_deviation_shows_each_coefficient_as_stated() {
         walk,
     };
     type Expected = fn(f64) -> f64;
-    // What the variance may miss beside chance: nothing; twice the 0.5 % of the floor; 1/(2 m²), by which the sums
-    // of a random walk at whole steps exceed its integral.
+    // Systematic error of the variance besides chance: none; twice the 0.5 % of the floor; 1/(2 m²), by which the sums of a random walk at whole
+    // steps exceed its integral.
     let cases: [(Coefficients, Expected, f64); 3] = [
         (only(3.0, 0.0, 0.0), |tau| 9.0 / tau, 0.0),
         (only(0.0, 3.0, 0.0), |_| 9.0 * 2.0 * 2_f64.ln() / PI, 0.01),
@@ -101,7 +101,7 @@ fn white_noise_keeps_its_density_through_the_output_filter() {
     let mut filter = LowPass::of_bandwidth(40.0, dt);
     let samples: Vec<f64> = (0..2_000_000).map(|_| filter.step(noise.step())).collect();
     let (variance, dof) = allan(&samples, 2000);
-    // A lag of 4 ms takes 4/2000 · 3/2 of the variance at 2 s.
+    // A lag of 4 ms reduces the variance at 2 s by 4/2000 · 3/2.
     let sigma = (2.0 / dof[0]).sqrt();
     assert!(
         (variance * 2.0 - 1.0).abs() < 4.0 * sigma + 0.003,

@@ -1,4 +1,4 @@
-//! `docs/bench.md` against the code: every key, no other, and the defaults.
+//! `docs/bench.md` against the code: every key and no other, and the defaults.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -17,8 +17,7 @@ fn page() -> String {
     fs::read_to_string(path).unwrap()
 }
 
-/// Rows of the table behind the first line that begins with `heading`: keys in backticks in the first cell, and
-/// the other cells.
+/// Rows of the table after the first line that begins with `heading`: keys in backticks in the first cell, and the other cells.
 fn rows(page: &str, heading: &str) -> Vec<(Vec<String>, Vec<String>)> {
     let mut lines = page.lines().skip_while(|line| !line.starts_with(heading));
     assert!(lines.next().is_some(), "no {heading}");
@@ -27,7 +26,7 @@ fn rows(page: &str, heading: &str) -> Vec<(Vec<String>, Vec<String>)> {
         .take_while(|line| line.starts_with('|'))
         .skip(2)
         .map(|line| {
-            // A bar that is text has a backslash before it.
+            // A literal bar is escaped with a backslash.
             let line = line.trim_matches('|').replace("\\|", "¦");
             let mut cells = line.split('|').map(|c| c.trim().to_owned());
             let keys = cells.next().unwrap();
@@ -37,7 +36,7 @@ fn rows(page: &str, heading: &str) -> Vec<(Vec<String>, Vec<String>)> {
         .collect()
 }
 
-/// The keys that the reader knows, by its own complaint of one that it does not.
+/// The keys that the reader knows, from its own message about an unknown one.
 fn known(complaint: &str) -> BTreeSet<String> {
     let (_, list) = complaint
         .split_once(", expected ")

@@ -1,4 +1,4 @@
-//! Recordings: the same from the same truth, whole or not there, and the truth apart from them.
+//! Recordings: reproducible from the truth, complete or absent, and separate from the truth.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -20,7 +20,7 @@ const HANDS: &str = "format = \"mimu-plan/1\"\nsample_rate_hz = 250.0\ncarrier =
                      [[step]]\nposes = 5\ndwell_s = 1.0\n";
 const RIG: &str = "format = \"mimu-rig/1\"\ndraw_effects = 3\n[hands]\nheld = true\n";
 
-/// A folder to work in, with the plans and a rig file.
+/// A temporary folder with the plans and a rig file.
 struct Bench(TempDir);
 
 impl Bench {
@@ -59,7 +59,7 @@ impl Bench {
         String::from_utf8(output.stdout).unwrap()
     }
 
-    /// The one line of complaint of a run with exit status 1.
+    /// The one-line error message of a run with exit status 1.
     fn refused(&self, arguments: &str) -> String {
         let output = self.run(arguments);
         assert_eq!(output.status.code(), Some(1), "{output:?}");
@@ -94,7 +94,7 @@ fn the_truth_makes_the_same_samples_again_bit_by_bit() {
         let samples =
             |folder: &str| fs::read(bench.path().join(folder).join("samples.parquet")).unwrap();
         assert!(samples("first") == samples("second"));
-        // But for the name of the recording, the truth of the truth is itself.
+        // Apart from the name of the recording, the truth of the truth is the same file.
         let truth = |name: &str| {
             bench
                 .read(name)
@@ -276,7 +276,7 @@ fn nothing_is_overwritten_unasked_and_nothing_but_a_recording_ever() {
         "{complaint}"
     );
     assert_eq!(bench.read("table.toml"), TABLE);
-    // A rig file that somebody wrote has the format of a truth, and is none.
+    // A rig file written by hand has the format of a truth, but is not one.
     let complaint =
         bench.refused("table.toml --rig rig.toml --seed 2 -o new --truth rig.toml --replace");
     assert!(

@@ -1,4 +1,4 @@
-//! Rig files: what is drawn, what is written, what is refused.
+//! Rig files: drawn values, written values, refusals.
 
 use mimu_rig::catalog::sensors;
 use mimu_rig::converter::Converter;
@@ -22,7 +22,7 @@ fn truth(text: &str, seed: u64) -> RigTruth {
     RigTruth::resolve(&parse(text).unwrap(), seed).unwrap()
 }
 
-/// Turning a little, 1 g up.
+/// Rotating slowly, 1 g up.
 const MOTION: Motion = Motion {
     t_s: 0.0,
     attitude: Rotation::NONE,

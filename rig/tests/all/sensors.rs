@@ -12,7 +12,7 @@ use mimu_rig::rotation::{Rotation, dot};
 use mimu_rig::thermal::{Thermal, ThermalTruth};
 use mimu_rig::unit::Unit;
 
-/// Everything that is random in time switched off, and no filters.
+/// All random variation in time disabled, and no filters.
 const QUIET: &str = "
 [unit]
 temperature_noise_c = 0
@@ -55,7 +55,7 @@ fn still(rate: [f64; 3], force: [f64; 3]) -> Motion {
 fn a_low_pass_answers_a_step_with_an_exponential_and_a_ramp_with_its_lag() {
     let (tau, dt) = (0.1, 0.003);
     let mut filter = LowPass::new(tau, dt, 0.0);
-    // Straight between the steps, a jump is a ramp over one of them.
+    // The input is linear between the steps, so a jump is a ramp over one step.
     let first = filter.step(1.0);
     assert!((first - (1.0 - tau / dt * (1.0 - (-dt / tau).exp()))).abs() < 1e-14);
     for n in 1..200 {
@@ -124,7 +124,7 @@ fn on_a_ramp_the_dies_lag_by_the_sum_of_the_lags() {
     }
 }
 
-/// Hand-computed: 16 bits, 3.3 V, divider 0.65 for the gyros.
+/// Computed by hand: 16 bits, 3.3 V, divider 0.65 for the gyros.
 #[test]
 fn codes_are_rounded_and_end_at_the_range() {
     let text = "[converter]\nbits = 16\nreference_v = 3.3\nreference_error_ppm = 0\ngyro_divider = 0.65\nnoise_codes = 0\nraw_unit = \"count\"";
@@ -151,7 +151,7 @@ fn codes_are_rounded_and_end_at_the_range() {
         assert_eq!(readings.gyro, [gyro_code; 3], "{gyro}");
         assert_eq!(readings.accel, [accel_code; 3], "{accel}");
     }
-    // A reference 1 % high takes 1 % off the codes: 1.65/3.333 · 65536 = 32443.56.
+    // A reference that is 1 % high lowers the codes by 1 %: 1.65/3.333 · 65536 = 32443.56.
     let high = Pins {
         converter_reference_v: 3.333,
         ..pins(2.5, 1.65)
@@ -173,7 +173,7 @@ fn taking_out_the_reference_removes_its_drift() {
             converter.read(&unit.step(&still([0.5; 3], [9.8, 0.0, 0.0]), chamber_c))
         };
         let (cold, warm) = (at(20.0), at(30.0));
-        // 1e-3/K over 10 K makes the true reference larger and the reading smaller by so much.
+        // 1e-3/K over 10 K raises the true reference and lowers the reading by this share.
         for (c, w) in [(cold.gyro[1], warm.gyro[1]), (cold.accel[0], warm.accel[0])] {
             let change = c / w - 1.0;
             assert!(
@@ -187,7 +187,7 @@ fn taking_out_the_reference_removes_its_drift() {
 #[test]
 fn without_effects_a_unit_is_affine_to_the_converters_step() {
     for seed in 0..5 {
-        // Warming up, and in a changing chamber: neither matters.
+        // During warm-up and in a changing chamber: neither has an influence.
         let truth = truth(&format!("{QUIET}\n[converter]\nnoise_codes = 0\n"), seed);
         let mut unit = Unit::new(&truth.unit, seed, 1e-3);
         let mut converter = Converter::new(&truth.converter, &truth.unit, seed);

@@ -1,6 +1,6 @@
-//! What the firmware costs, counted on the emulated board: `cargo run -p mimu-board-tests --bin budget [-- --check]`.
+//! The cost of the firmware, counted on the emulated board: `cargo run -p mimu-board-tests --bin budget [-- --check]`.
 //!
-//! With `--check` a figure above `budget.toml` beside it is an error. Both images are built before; `make budget` does.
+//! With `--check` a figure above `budget.toml` is an error. Both images must be built before; `make budget` does this.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,19 +18,19 @@ use mimu_core::wire::{EFFECTS, Request};
 /// Cycles of the core in a millisecond.
 const CYCLES_PER_MS: f64 = 400e3;
 
-/// Cycles that an instruction takes, at least and at most: the core issues two at a time, and one that loads from RAM, which is behind two
-/// buses at half its clock and is not cached, waits for about ten (estimated; no board has been measured). With the instruction cache on,
-/// fetching adds little to that. The emulator counts instructions and knows no cycles.
+/// Cycles per instruction, lower and upper bound. The core issues two instructions at a time. A load from RAM takes about ten cycles, because the RAM
+/// is behind two buses at half the core's clock and is not cached (estimated; no board has been measured). With the instruction cache on, fetching
+/// adds little. The emulator counts instructions, not cycles.
 const CYCLES: [(&str, f64); 2] = [("load_lower_percent", 0.5), ("load_upper_percent", 10.0)];
 
-/// What the load figures are.
+/// Explanation of the load figures.
 const LOAD: &str = "load: counted instructions, of 400 MHz, at two a cycle (lower) and at ten cycles each (upper). \
                     Instructions are counted; cycles are estimated and not measured.";
 
-/// Limit of each effect that has none of its own.
+/// Limit for the effects without their own limit.
 const EACH: &str = "effect_instructions";
 
-/// Effects that run with every sample, and a term, as `tests/counted` runs them.
+/// Effects that are evaluated at every sample, and a term, in the order of `tests/counted`.
 fn effects() -> impl Iterator<Item = &'static str> {
     let runs = |id: &&str| {
         let of = |count: usize| DeviceEffect::<f32>::named(id, &[1e-4; 9][..count], None);
@@ -62,7 +62,7 @@ fn figures() -> Result<BTreeMap<String, f64>, String> {
             .ok_or("tests/counted runs less than is expected")
     };
     figures.insert("compensation_instructions".into(), next()?);
-    // Of a bank of three filters.
+    // For one filter of a bank of three.
     figures.insert("kalman_update_instructions".into(), next()? / 3.0);
     let none = next()?;
     let mut shared = 0.0_f64;
@@ -74,7 +74,7 @@ fn figures() -> Result<BTreeMap<String, f64>, String> {
     }
     figures.insert("no_effect_instructions".into(), none);
     figures.insert("effects_of_a_triad_instructions".into(), shared - none);
-    // Of an axis each.
+    // Without a converter's errors, with one axis, a triad, both triads.
     let (none, one, triad, both) = (next()?, next()?, next()?, next()?);
     let each = [one - none, (triad - none) / 3.0, (both - none) / 6.0];
     let each = each.into_iter().fold(0.0, f64::max);
@@ -108,7 +108,7 @@ fn figures() -> Result<BTreeMap<String, f64>, String> {
     Ok(figures)
 }
 
-/// Instructions between each pair of marks, less those of the empty pair.
+/// Instructions between each pair of marks, minus those of the empty pair.
 fn counted() -> Result<Vec<u64>, String> {
     let image = Image::read(&built("mimu-counted"))?;
     let (from, to) = (image.find("counted_from")?, image.find("counted_to")?);
@@ -149,7 +149,7 @@ fn report(figures: &BTreeMap<String, f64>, check: bool) -> Result<(), String> {
         let limit = limit.and_then(number);
         let limit = limit.ok_or_else(|| format!("{}: no number `{name}`", path.display()))?;
         println!("{name:<28} {measured:>10.1} {limit:>10.1}");
-        // Not a number is over it too.
+        // NaN exceeds the limit too.
         if !(measured <= limit) {
             over.push(name.as_str());
         }

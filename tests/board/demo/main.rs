@@ -1,7 +1,7 @@
-//! `make demo`: a unit with an effect that nobody declares, on the emulated board, and the wizard that calibrates it.
+//! `make demo`: a unit with an undeclared effect on the emulated board, and the wizard that calibrates it.
 //!
-//! `demo SEED FOLDER`: another seed is another unit and another effect. The image, the serial line, the turntable and the command are the
-//! real ones; only silicon and steel are computed. The folder is left for whoever wants to look.
+//! `demo SEED FOLDER`: another seed is another unit and another effect. The image, the serial line, the turntable's protocol and the command are the
+//! real ones; only the hardware is simulated. The folder is kept for inspection.
 
 use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
@@ -12,7 +12,7 @@ use mimu_rig::rig_file::RigTruth;
 use mimu_tests::blind::{is_listed, unit};
 use serde_json::Value;
 
-/// What may be wrong with a unit: effects that a table at one temperature can show, and two that the diagnosis has never heard of.
+/// Possible effects of the unit: those that a table at one temperature can show, and two that the diagnosis does not know.
 const EFFECTS: [&str; 9] = [
     "gyro_g_sensitivity",
     "accel_scale_quadratic",
@@ -45,9 +45,9 @@ fn demo(seed: u64, folder: &Path) -> Result<(), String> {
     let began = Instant::now();
     let effect = EFFECTS[(seed as usize + EFFECTS.len() - 1) % EFFECTS.len()];
     let mut file = unit(&[effect], seed);
-    // It has run for long: nobody wants to watch it warm up.
+    // It has been on for long: no warm-up.
     file.thermal.on_before_s = Some(f64::INFINITY);
-    // A quick table, of the kind that is sold for sensors of this size: what it saves on its way goes into longer dwells.
+    // A quick table, of the kind sold for sensors of this size: the time that it saves between dwells makes them longer.
     file.table.slew_dps = [240.0; 3];
     file.table.max_acceleration_dps2 = [1000.0; 3];
     file.table.settle_s = 0.3;

@@ -1,7 +1,7 @@
-//! What can go wrong in a session of the wizard, done to it on purpose: each ends in a calibration that holds the truth, or in a stop that
-//! says why. Prints a line for each.
+//! Faults and mistakes during a session of the wizard: each session must end with a calibration that contains the truth, or stop with a reason.
+//! Prints a line for each.
 //!
-//! `faults [NAME ...]`: all of them without names.
+//! `faults [NAME ...]`: without names, all of them.
 
 mod mistakes;
 mod run;
@@ -18,9 +18,9 @@ use mimu_board::commanded::Commanded;
 use run::Ended;
 use session::{Sitting, unit};
 
-/// Errors above these are a wrong calibration: several times what dwells of a second leave. deg/s, mg.
+/// Errors above these mean a wrong calibration: several times the errors from dwells of one second. deg/s, mg.
 const RIGHT: [f64; 2] = [0.3, 3.0];
-/// Kills of the command in one session.
+/// How often the command is killed in one session.
 const KILLS: usize = 50;
 
 type Scenario = fn(&Path) -> Result<Ended, String>;
@@ -96,7 +96,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Prints a line; whether nothing wrong is stored.
+/// Prints a line and returns whether nothing wrong is stored.
 fn report(name: &str, ended: &Ended) -> bool {
     let outcome = match (ended.stored, &ended.stopped) {
         (Some([gyro, accel]), _) => format!(
@@ -153,7 +153,7 @@ fn garbled(folder: &Path) -> Result<Ended, String> {
     sitting.end()
 }
 
-/// Something after every so many dwells, so many times.
+/// Does something after every few dwells, several times.
 fn now_and_then(
     folder: &Path,
     seed: u64,
@@ -162,7 +162,7 @@ fn now_and_then(
 ) -> Result<Ended, String> {
     let mut sitting = on_table(seed, folder)?;
     for k in 1..=times {
-        // Later ones strike verification and store too, where dwells are fewer.
+        // Later ones would also strike verification and store, which have fewer dwells.
         if !sitting.wait_for(|s| s.told("step") >= 2 * k)? {
             return Err(format!("it ended after {} of {times}", k - 1));
         }
@@ -198,7 +198,7 @@ fn supply(folder: &Path) -> Result<Ended, String> {
 fn killed(folder: &Path) -> Result<Ended, String> {
     let mut sitting = on_table(8, folder)?;
     let mut kills = 0;
-    // Instants that have nothing to do with what it does, a third of a second to three seconds after it was started.
+    // Times independent of its work, a third of a second to three seconds after each start.
     for k in 0..4 * KILLS {
         let wait = 0.3 + 2.7 * (k as f64 * 0.618_034).fract();
         std::thread::sleep(Duration::from_secs_f64(wait));
@@ -209,7 +209,7 @@ fn killed(folder: &Path) -> Result<Ended, String> {
             break;
         }
         kills += 1;
-        // Once in five it gets further, or no dwell would ever end.
+        // Once in five it gets further; otherwise no dwell would ever end.
         if kills % 5 == 0 {
             sitting.run()?;
             sitting.wait_for(|s| s.told("dwell") >= 1)?;
@@ -287,7 +287,7 @@ fn fidget(folder: &Path) -> Result<Ended, String> {
     sitting.end()
 }
 
-/// A person who has the faces, edges and corners of a box in an order of their own, and only then does what is asked.
+/// A person who first takes the faces, edges and corners of a box in their own order, and only then follows the requests.
 fn any_order(folder: &Path) -> Result<Ended, String> {
     let mut sitting = Sitting::new("hands", 13, folder, &["--fixture", "hands", "--dwell", "2"])?;
     sitting.run()?;
@@ -301,7 +301,7 @@ fn any_order(folder: &Path) -> Result<Ended, String> {
             }
         }
     }
-    // Who turns the unit during its self-test ends the session.
+    // Turning the unit during its self-test would end the session.
     sitting.wait_for(|s| s.told("step") > 0)?;
     let mut next = 0;
     while next < 4 * poses.len() {
@@ -330,7 +330,7 @@ fn hands(folder: &Path) -> Result<Ended, String> {
     sitting.end()
 }
 
-/// The same person with as many poses as planned, whatever is known already.
+/// The same person with all planned poses, even if fewer would suffice.
 fn hands_fixed(folder: &Path) -> Result<Ended, String> {
     let arguments = [&HANDS[..], &["--as-planned"]].concat();
     let mut sitting = Sitting::new("hands", 14, folder, &arguments)?;

@@ -1,5 +1,5 @@
-//! Mistakes of a person: axes that are wired or named otherwise, units and stamps that are others, flags that change, answers that come too
-//! early. What is stored holds the truth all the same, or one line says what is wrong.
+//! Mistakes of a person: wrongly wired or named axes, wrong units and time stamps, changed flags, answers given too early. The stored calibration
+//! must contain the truth all the same, or one line must name the mistake.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -11,10 +11,10 @@ use crate::session::{Sitting, unit};
 use crate::stored::half_widths;
 
 pub const BY_HAND: [&str; 4] = ["--fixture", "hands", "--dwell", "2"];
-/// Longest wait for a step that does not come, before a person does something else.
+/// Longest wait for a step before a person does something else.
 const PUZZLED: Duration = Duration::from_secs(12);
 
-/// Our board, in the hands of a person who does what is asked; its sensors are wired as `rewire` has it.
+/// Our board in the hands of a person who follows the requests; `rewire` changes the wiring of its sensors.
 fn our_board(
     folder: &Path,
     seed: u64,
@@ -32,7 +32,7 @@ fn our_board(
     sitting.run()?;
     let mut steps = 0;
     loop {
-        // A table is driven by the command itself.
+        // The command drives a table by itself.
         if fixture != "hands" {
             break;
         }
@@ -85,7 +85,7 @@ pub fn changed_flag(folder: &Path) -> Result<Ended, String> {
     sitting.end()
 }
 
-/// `yes` is typed at the start, and again without the supply turned off; then the supply is.
+/// `yes` is typed at the start, and again without the supply turned off; then the supply is turned off.
 pub fn early_yes(folder: &Path) -> Result<Ended, String> {
     let mut sitting = Sitting::new("table", 25, folder, &crate::TABLE)?;
     let path = folder.join("driver.toml");
@@ -117,7 +117,7 @@ pub fn early_yes(folder: &Path) -> Result<Ended, String> {
         sitting.wait_for(|s| s.told("stored") > 0)?;
         said.push(sitting.last_words("stored"));
     }
-    // Effects are not stored.
+    // The effects are declined.
     while sitting.wait_for(|s| s.last_words("question").contains("effects"))? {
         sitting.type_line("no")?;
         std::thread::sleep(Duration::from_millis(300));
@@ -127,7 +127,7 @@ pub fn early_yes(folder: &Path) -> Result<Ended, String> {
     Ok(ended)
 }
 
-/// The session of the documentation's example: a table at 250 deg/s with the flaws that tables have, the board beside its axes.
+/// The session of the documentation's example: a table at 250 deg/s with typical flaws, the board off its axes.
 pub fn table_250(folder: &Path) -> Result<Ended, String> {
     let truth = crate::session::on_real_table(26)?;
     let arguments = [

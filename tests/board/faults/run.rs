@@ -1,4 +1,4 @@
-//! The command `mimu wizard`, run and run again, and what has come of it.
+//! The command `mimu wizard`, started once or several times, and its results.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -9,17 +9,17 @@ use serde_json::Value;
 
 use crate::stored::{Truth, errors};
 
-/// Longest a session may take by the wall's clock.
+/// Longest time of a session by the wall clock.
 const LONGEST: Duration = Duration::from_secs(900);
 
-/// The command, which may be run more than once.
+/// The command, which may be started more than once.
 pub struct Run {
     pub folder: PathBuf,
-    /// As `--port` is given it.
+    /// Argument of `--port`.
     pub port: String,
-    /// As `--gravity` is given it.
+    /// Argument of `--gravity`.
     pub gravity: String,
-    /// Whether all questions are answered beforehand; else they are by what is typed.
+    /// Whether `--yes` answers all questions; otherwise typed lines do.
     pub yes: bool,
     pub arguments: Vec<String>,
     truth: Truth,
@@ -27,7 +27,7 @@ pub struct Run {
     began: Instant,
 }
 
-/// What has become of a session.
+/// Result of a session.
 pub struct Ended {
     pub seconds: f64,
     /// By the unit's clock, s, if anything was recorded.
@@ -36,7 +36,7 @@ pub struct Ended {
     pub thrown: u64,
     pub interrupted: usize,
     pub verdict: String,
-    /// Largest errors of what the device holds now, gyro (deg/s at 60 deg/s) and accelerometer (mg at 1 g), if it holds anything.
+    /// Largest errors of the device's present calibration, gyro (deg/s at 60 deg/s) and accelerometer (mg at 1 g), if there is one.
     pub stored: Option<[f64; 2]>,
     /// Why it stopped.
     pub stopped: Option<String>,
@@ -57,7 +57,7 @@ impl Run {
         }
     }
 
-    /// Starts the command, or starts it again.
+    /// Starts the command, for the first time or again.
     pub fn run(&mut self) -> Result<(), String> {
         let here = std::env::current_exe().map_err(|e| e.to_string())?;
         let log = std::fs::OpenOptions::new()
@@ -95,7 +95,7 @@ impl Run {
         written.map_err(|e| e.to_string())
     }
 
-    /// Ends the command by a signal, as Ctrl-C does; how long it took, s.
+    /// Ends the command by a signal like Ctrl-C; returns how long it took, s.
     pub fn interrupt(&mut self) -> Result<f64, String> {
         let child = self.child.as_mut().ok_or("no command runs")?;
         let signal = Command::new("kill")
@@ -107,12 +107,12 @@ impl Run {
         Ok(since.elapsed().as_secs_f64())
     }
 
-    /// What it is compared with.
+    /// The truth for comparison.
     pub fn truth(&self) -> &Truth {
         &self.truth
     }
 
-    /// The errors of the calibration that is stored now, in words.
+    /// The errors of the present stored calibration, in words.
     pub fn first_stored(&self) -> Result<String, String> {
         let [gyro, accel] = errors(&self.folder.join("session/calibration.toml"), &self.truth)?;
         let s = self.began.elapsed().as_secs_f64();
@@ -122,7 +122,7 @@ impl Run {
         ))
     }
 
-    /// Why it waited last.
+    /// Reason of its last wait.
     pub fn last_waiting(&self) -> String {
         let text = std::fs::read_to_string(self.folder.join("events.jsonl")).unwrap_or_default();
         let last = text
@@ -133,7 +133,7 @@ impl Run {
         event["why"].as_str().unwrap_or_default().to_owned()
     }
 
-    /// The words of the last event of a kind.
+    /// Text of the last event of a kind.
     pub fn last_words(&self, event: &str) -> String {
         let text = std::fs::read_to_string(self.folder.join("events.jsonl")).unwrap_or_default();
         let wanted = format!("{{\"event\":\"{event}\"");
@@ -145,14 +145,14 @@ impl Run {
         event["words"].as_str().unwrap_or_default().to_owned()
     }
 
-    /// How many events of a kind the running command has told.
+    /// Number of events of a kind from the running command.
     pub fn told(&self, event: &str) -> usize {
         let text = std::fs::read_to_string(self.folder.join("events.jsonl")).unwrap_or_default();
         let wanted = format!("{{\"event\":\"{event}\"");
         text.lines().filter(|l| l.starts_with(&wanted)).count()
     }
 
-    /// The pose that is asked for now, as the bench is told it.
+    /// The presently requested pose, as a command for the bench.
     pub fn asked_pose(&self) -> Result<String, String> {
         let text = std::fs::read_to_string(self.folder.join("events.jsonl")).unwrap_or_default();
         let last = text.lines().rfind(|l| l.starts_with("{\"event\":\"step\""));
@@ -164,7 +164,7 @@ impl Run {
         Ok(format!("MOVE {}", up.join(" ")))
     }
 
-    /// Waits until `ready`; `false` if the command has ended before.
+    /// Waits until `ready`; returns `false` if the command has ended before.
     pub fn wait_for(&mut self, ready: impl Fn(&Self) -> bool) -> Result<bool, String> {
         loop {
             if ready(self) {
@@ -182,7 +182,7 @@ impl Run {
         }
     }
 
-    /// Kills the command; `false` if it had ended before.
+    /// Kills the command; returns `false` if it had ended before.
     pub fn kill(&mut self) -> Result<bool, String> {
         let mut child = self.child.take().ok_or("no command runs")?;
         let ended = child.try_wait().map_err(|e| e.to_string())?.is_some();

@@ -10,7 +10,7 @@ use mimu_rig::table::TableTruth;
 use crate::run::{Ended, Run};
 use crate::stored::Truth;
 
-/// fang's unit, warmed up long ago, on a table without flaws on an Earth that does not turn: what is left is noise.
+/// fang's unit, long warmed up, on a table without flaws on an Earth that does not turn: the only remaining errors are noise.
 pub fn unit(seed: u64, fixture: &str) -> Result<RigTruth, String> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../rig/rigs/fang.toml");
     let mut file = RigFile::read(Path::new(path))?;
@@ -25,7 +25,7 @@ pub fn unit(seed: u64, fixture: &str) -> Result<RigTruth, String> {
     RigTruth::resolve(&file, seed)
 }
 
-/// The same on a table with the flaws of a good one, the board beside its axes, on an Earth that turns.
+/// The same on a table with the flaws of a good one, the board off its axes, on an Earth that turns.
 pub fn on_real_table(seed: u64) -> Result<RigTruth, String> {
     let mut file = unit(seed, "table")?.file;
     file.earth_rate = Some(true);
@@ -33,7 +33,7 @@ pub fn on_real_table(seed: u64) -> Result<RigTruth, String> {
     RigTruth::resolve(&file, seed)
 }
 
-/// A session beside a board of ours.
+/// A session with a board of ours.
 pub struct Sitting {
     pub board: Commanded,
     run: Run,
@@ -54,12 +54,12 @@ impl DerefMut for Sitting {
 }
 
 impl Sitting {
-    /// A board on a fixture, and no command yet.
+    /// A board on a fixture; the command is not yet started.
     pub fn new(fixture: &str, seed: u64, folder: &Path, more: &[&str]) -> Result<Self, String> {
         Self::with(fixture, &unit(seed, fixture)?, seed, folder, more)
     }
 
-    /// The same with a unit that is wired otherwise.
+    /// The same with a unit that is wired differently.
     pub fn with(
         fixture: &str,
         truth: &RigTruth,

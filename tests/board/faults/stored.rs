@@ -1,4 +1,4 @@
-//! What a calibration file says beside what the unit is. Shares nothing with the program that wrote it.
+//! Comparison of a calibration file with the truth of the unit. Shares no code with the program that wrote it.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub struct Forward {
     pub bias: Vector,
 }
 
-/// What a unit is: gyro, accelerometer, and whether its calibration has the accelerometer's own axes, as by hand.
+/// Truth of a unit: gyro, accelerometer, and whether its calibration uses the accelerometer's own axes, as by hand.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
     pub triads: [Forward; 2],
@@ -42,7 +42,7 @@ fn inverse(m: &Matrix) -> Matrix {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| columns[j][i] / determinant))
 }
 
-/// The axes that a calibration by hand is given in, by rows: x along the accelerometer's x, and the xy plane through its y.
+/// The axes of a calibration by hand, by rows: x along the accelerometer's x, and the xy plane through its y.
 fn own_axes(accel: &Matrix) -> Matrix {
     let unit = |a: Vector| a.map(|v| v / dot(a, a).sqrt());
     let x = unit(accel[0]);
@@ -52,13 +52,13 @@ fn own_axes(accel: &Matrix) -> Matrix {
 }
 
 impl Truth {
-    /// Of the bench's unit.
+    /// Truth of the bench's unit.
     pub fn of(truth: &RigTruth, by_hand: bool) -> Result<Self, String> {
         let unit = &truth.file.unit;
         let pins = unit
             .gyro_reference_v
             .ok_or("the unit has no reference pins")?;
-        // The firmware reads the gyros against the first one's reference pin, as if that were nominal.
+        // The firmware measures the gyros against the reference pin of the first, assuming its nominal voltage.
         let ratios = [2.5 / pins[0], 1.0];
         let affine = [&unit.gyro_affine, &unit.accel_affine];
         let mut triads = [Forward {
@@ -73,7 +73,7 @@ impl Truth {
         Ok(Self { triads, by_hand })
     }
 
-    /// Rows: axes of the calibration, in the body's.
+    /// Axes of the calibration in the body frame, by rows.
     fn axes(&self) -> Matrix {
         match self.by_hand {
             true => own_axes(&self.triads[1].matrix),
@@ -124,7 +124,7 @@ fn read(file: &Path) -> Result<[Table; 2], String> {
     both.ok_or_else(|| format!("{}: no matrices", file.display()))
 }
 
-/// Largest errors of a calibration file over inputs of full size along each axis, and none: deg/s, mg.
+/// Largest errors of a calibration file over zero input and full inputs along each axis: deg/s, mg.
 pub fn errors(file: &Path, truth: &Truth) -> Result<[f64; 2], String> {
     let tables = read(file)?;
     let axes = truth.axes();
@@ -138,7 +138,7 @@ pub fn errors(file: &Path, truth: &Truth) -> Result<[f64; 2], String> {
             for sign in [1.0, -1.0, 0.0] {
                 let input: Vector =
                     std::array::from_fn(|i| if i == axis { sign * size } else { 0.0 });
-                // In the body's axes, which the unit's truth is given in.
+                // In the body's axes, like the truth.
                 let body: Vector =
                     std::array::from_fn(|j| (0..3).map(|k| axes[k][j] * input[k]).sum());
                 let raw = times(&triad.matrix, body);
@@ -152,8 +152,8 @@ pub fn errors(file: &Path, truth: &Truth) -> Result<[f64; 2], String> {
     Ok([worst[0].to_degrees(), worst[1] * 1e3 / 9.80665])
 }
 
-/// How far each parameter of a calibration file is from the truth, in halves of its 95 % interval: gyro and accelerometer, C by rows and o.
-/// What is zero by the choice of axes is left out.
+/// Deviation of each parameter of a calibration file from the truth, in halves of its 95 % interval: gyro and accelerometer, C by rows and o.
+/// Parameters that the choice of axes makes zero are left out.
 pub fn half_widths(file: &Path, truth: &Truth) -> Result<[Vec<f64>; 2], String> {
     let tables = read(file)?;
     let axes = truth.axes();

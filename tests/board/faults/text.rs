@@ -1,5 +1,5 @@
-//! A board of another maker in the hands of a person who does what is asked: lines of text over TCP, in virtual time that goes faster than
-//! the clock on the wall. Its physics are its own: neither the bench's nor the program's.
+//! A board of another maker in the hands of a person who follows the requests: lines of text over TCP, in virtual time that is faster than the wall
+//! clock. Its physics are independent of the bench and of the program.
 
 use std::io::Write as _;
 use std::net::{TcpListener, TcpStream};
@@ -18,25 +18,25 @@ type Matrix = [[f64; 3]; 3];
 
 pub const GRAVITY: f64 = 9.793;
 const RATE_HZ: f64 = 100.0;
-/// How many times as fast as the clock on the wall.
+/// Virtual time over wall-clock time.
 const SPEED: f64 = 20.0;
-/// Between a step that is asked for and the hand that moves, s.
+/// Delay from a requested step to the motion of the hand, s.
 const REACTION_S: f64 = 0.6;
 
-/// After so long without a new step the person tries another pose, s.
+/// If no new step comes for this long, the person tries another pose, s.
 const PUZZLED_S: f64 = 40.0;
 
-/// A board, and what is wrong with it.
+/// A board and its faults.
 #[derive(Clone, Debug)]
 pub struct TextBoard {
     pub truth: Truth,
     /// Standard deviation of a sample, gyro and accelerometer, raw.
     pub noise: [f64; 2],
-    /// The numbers of a line are multiples of these, gyro and accelerometer.
+    /// Quantisation steps, gyro and accelerometer.
     pub steps: [f64; 2],
-    /// What the axis of a name reads: gyro and accelerometer.
+    /// What the axis of each name reads: gyro and accelerometer.
     pub wired: [Matrix; 2],
-    /// Of the accelerometer: part of its reading at gravity by which it errs as a cube.
+    /// Cubic error of the accelerometer, as a fraction of its reading at gravity.
     pub cubic: f64,
     /// Unit of its stamps, s.
     pub stamps_s: f64,
@@ -49,7 +49,7 @@ pub struct TextBoard {
 
 pub const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Numbers that look random.
+/// Pseudo-random numbers.
 pub struct Random(u64);
 
 impl Random {
@@ -57,7 +57,7 @@ impl Random {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d)
     }
 
-    /// From 0 to 1 (splitmix64).
+    /// Uniform from 0 to 1 (splitmix64).
     pub fn even(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -72,7 +72,7 @@ impl Random {
 }
 
 impl TextBoard {
-    /// An ordinary one: scale factors within 2 %, axes within a degree, an MPU-6050's noise and counts.
+    /// An ordinary board: scale factors within 2 %, axes within a degree, the noise and counts of an MPU-6050.
     pub fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
         let mut triad = |scale: f64, bias: f64| Forward {
@@ -101,7 +101,7 @@ impl TextBoard {
 
     fn line(&self, t_s: f64, rate: Vector, force: Vector, random: &mut Random) -> String {
         let mut numbers = Vec::new();
-        // As the lines have them: accelerometer, gyro.
+        // In the order of the lines: accelerometer, gyro.
         for k in [1, 0] {
             let input = [rate, force][k];
             let Forward { matrix, bias } = &self.truth.triads[k];
@@ -149,7 +149,7 @@ fn transposed(m: &Matrix) -> Matrix {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[j][i]))
 }
 
-/// Rodrigues: by a rotation vector.
+/// Rotation by a rotation vector (Rodrigues).
 fn rotation(v: Vector) -> Matrix {
     let angle = v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let (s, c) = match angle < 1e-9 {
@@ -161,7 +161,7 @@ fn rotation(v: Vector) -> Matrix {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| f64::from(u8::from(i == j)) + s * k[i][j] + c * kk[i][j]))
 }
 
-/// A turn of the hand, from rest to rest, along one rotation vector in the body.
+/// A turn by hand, from rest to rest, along one rotation vector in the body frame.
 struct Turn {
     from: Matrix,
     by: Vector,
@@ -170,7 +170,7 @@ struct Turn {
 }
 
 impl Turn {
-    /// From the attitude `from` (body to world) to one in which `up` of the body points up, held as well as a hand does.
+    /// From the attitude `from` (body to world) to one in which `up` of the body points up, to the accuracy of a hand.
     fn to(from: Matrix, up: Vector, begin_s: f64, random: &mut Random) -> Self {
         let held: Vector = std::array::from_fn(|i| up[i] + 0.04 * random.normal());
         let size = held.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -181,7 +181,7 @@ impl Turn {
         let sine = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
         let cosine: f64 = held.iter().zip(&now).map(|(a, b)| a * b).sum();
         let angle = sine.atan2(cosine);
-        // Over a half turn any axis across does.
+        // For a half turn any perpendicular axis will do.
         let axis = match sine > 1e-3 {
             true => axis.map(|x| x / sine),
             false if held[0].abs() < 0.7 => unit([0.0, -held[2], held[1]]),
@@ -195,7 +195,7 @@ impl Turn {
         }
     }
 
-    /// Share of the way that is done, and its rate of change, 1/s: a quintic without jerk at its ends.
+    /// Completed fraction of the way, and its rate of change, 1/s: a quintic without jerk at its ends.
     fn share(&self, t_s: f64) -> [f64; 2] {
         let x = ((t_s - self.begin_s) / self.lasts_s).clamp(0.0, 1.0);
         let done = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x);
@@ -209,7 +209,7 @@ fn unit(v: Vector) -> Vector {
     v.map(|x| x / size)
 }
 
-/// The number of steps that were asked for, and the direction of the last.
+/// Number of requested steps, and the direction of the last.
 fn asked(events: &Path) -> (usize, Option<Vector>) {
     let text = std::fs::read_to_string(events).unwrap_or_default();
     let steps = text
@@ -230,7 +230,7 @@ fn asked(events: &Path) -> (usize, Option<Vector>) {
     (steps.count(), up)
 }
 
-/// A board that writes, until it is dropped.
+/// A board that writes lines until it is dropped.
 pub struct Writing {
     pub port: String,
     end: Arc<AtomicBool>,
@@ -282,7 +282,7 @@ fn write(board: &TextBoard, seed: u64, events: &Path, listener: &TcpListener, en
         }
         let (count, up) = asked(events);
         let now_s = board.speed * began.elapsed().as_secs_f64();
-        // Run anew, the command begins its file of events anew.
+        // When the command is started again, it rewrites its file of events.
         if count < begun {
             begun = 0;
         }
@@ -295,7 +295,7 @@ fn write(board: &TextBoard, seed: u64, events: &Path, listener: &TcpListener, en
             turn = Some(Turn::to(attitude, up, k as f64 / RATE_HZ, &mut random));
             (begun, due) = (count, None);
         }
-        // Who is asked for nothing else and sees no dwell end turns it to some other pose.
+        // If no new request comes and no dwell ends, the person turns the board to another pose.
         if turn.is_none() && due.is_none() && begun > 0 && now_s > turned_s + PUZZLED_S {
             let any = [0.0; 3].map(|_| random.normal());
             turn = Some(Turn::to(

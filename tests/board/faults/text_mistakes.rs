@@ -1,4 +1,4 @@
-//! Mistakes with a board that writes lines of text: axes, units, stamps and columns that are others than is said, and lines that are lost.
+//! Mistakes with a board that writes lines of text: axes, units, time stamps and columns that differ from the declared ones, and lost lines.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ const X_FOR_Y: [[f64; 3]; 3] = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0
 const BY_HAND: [&str; 4] = ["--fixture", "hands", "--dwell", "2"];
 const TEXT: [&str; 4] = ["--text", "t_us,ax,ay,az,gx,gy,gz", "--device", "plane-7"];
 
-/// A board of text in the hands of a person.
+/// A board with text lines in the hands of a person.
 pub fn text(
     folder: &Path,
     seed: u64,
@@ -66,7 +66,7 @@ pub fn text_gyro_swapped(folder: &Path) -> Result<Ended, String> {
     wired(folder, 35, [X_FOR_Y, IDENTITY])
 }
 
-/// Readings in g and rad/s that are said to be in SI.
+/// Readings in g and rad/s that are declared as SI.
 pub fn text_in_g(folder: &Path) -> Result<Ended, String> {
     let mut board = TextBoard::new(36);
     for (triad, by) in board
@@ -129,7 +129,7 @@ pub fn text_garbled(folder: &Path) -> Result<Ended, String> {
     )
 }
 
-/// Steps larger than the noise: at rest every channel is constant.
+/// Quantisation steps larger than the noise: at rest every channel is constant.
 pub fn text_coarse(folder: &Path) -> Result<Ended, String> {
     let board = TextBoard {
         noise: [0.5, 1.5],
@@ -158,7 +158,7 @@ pub fn text_columns_swapped(folder: &Path) -> Result<Ended, String> {
     Ok(ended)
 }
 
-/// An accelerometer whose readings err as a cube, by 2 % at gravity.
+/// An accelerometer with a cubic error, 2 % at gravity.
 pub fn text_cubic(folder: &Path) -> Result<Ended, String> {
     text_to_end(
         folder,
@@ -171,7 +171,7 @@ pub fn text_cubic(folder: &Path) -> Result<Ended, String> {
     )
 }
 
-/// A finished session, run again.
+/// A finished session, started again.
 pub fn text_again(folder: &Path) -> Result<Ended, String> {
     let (_writing, mut run) = text(folder, 44, TextBoard::new(44), &TEXT)?;
     run.wait_for(|_| false)?;
@@ -189,7 +189,7 @@ pub fn text_again(folder: &Path) -> Result<Ended, String> {
     Ok(ended)
 }
 
-/// Seven units, and how many of their parameters are within their intervals.
+/// Seven units, and how many of their parameters are inside their intervals.
 pub fn text_units(folder: &Path) -> Result<Ended, String> {
     let (mut all, mut inside, mut worst) = (0, 0, 0.0_f64);
     let mut last = None;

@@ -1,4 +1,4 @@
-//! The host's end of the serial line, for tests: calls and what the device sends, in virtual time.
+//! The host's end of the serial line, for tests: calls and received messages, in virtual time.
 
 use mimu_board::running::Board;
 use mimu_core::wire::{
@@ -8,15 +8,15 @@ use mimu_core::wire::{
 
 use crate::MS;
 
-/// Longest virtual time that an answer may take, ms: erasing a sector takes 1 to 2 s.
+/// Longest virtual time for an answer, ms: erasing a sector takes 1 to 2 s.
 const PATIENCE_MS: u64 = 10_000;
 
-/// What came of a call.
+/// Result of a call.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Answer {
-    /// It was done, and the reply carries nothing.
+    /// Done, with an empty reply.
     Done,
-    /// It was not done.
+    /// Not done.
     Refused(Refusal),
     /// Part of the stored calibration: length of the whole, and the part.
     Stored(u32, Vec<u8>),
@@ -27,13 +27,13 @@ pub enum Answer {
         /// Why the device started.
         start: String,
     },
-    /// How the sensors answered.
+    /// Result of the self-test.
     SelfTest(SelfTest),
     /// Any other reply, as text.
     Other(String),
 }
 
-/// A sample as it came in.
+/// A received sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sample {
     /// Milliseconds since sampling began.
@@ -51,16 +51,16 @@ pub struct Conversation {
     answers: Vec<(u16, Answer)>,
     /// Samples of the raw stream since they were last taken.
     pub samples: Vec<Sample>,
-    /// Samples and batches that the device says it has lost, by the last batch.
+    /// Samples and batches that the device has lost, according to the last batch.
     pub lost: (u32, u32),
-    /// Head of the last raw batch, and the temperatures by the TEMP pins in it, °C.
+    /// Head of the last raw batch, and its temperatures of the TEMP pins, °C.
     pub last: Option<(BatchHead, [f32; 3])>,
-    /// Every byte that comes, where one has put a list here to keep them.
+    /// Every received byte, if a test has put a list here.
     pub kept: Option<Vec<u8>>,
 }
 
 impl Conversation {
-    /// With a board that runs already or will.
+    /// With a board that runs already or will run.
     pub fn new(board: Board) -> Self {
         Self {
             board,
@@ -74,18 +74,18 @@ impl Conversation {
         }
     }
 
-    /// Frames that came garbled.
+    /// Number of garbled frames.
     pub fn garbled(&self) -> u32 {
         self.decoder.garbled()
     }
 
-    /// Runs for so much virtual time, ns, and takes in what comes.
+    /// Runs for a virtual duration, ns, and processes what arrives.
     pub fn run_for(&mut self, ns: u64) {
         self.board.run_for(ns).unwrap();
         self.listen();
     }
 
-    /// Takes in what has come.
+    /// Processes what has arrived.
     pub fn listen(&mut self) {
         for (_, byte) in self.board.receive() {
             if let Some(kept) = &mut self.kept {
@@ -142,7 +142,7 @@ impl Conversation {
         Some(self.answers.remove(at).1)
     }
 
-    /// Asks and waits.
+    /// Sends a request and waits for the answer.
     ///
     /// # Panics
     ///
@@ -173,7 +173,7 @@ impl Conversation {
         panic!("no greeting in {PATIENCE_MS} ms of virtual time");
     }
 
-    /// Sends a calibration, all but the commit.
+    /// Sends a calibration without the commit.
     pub fn upload(&mut self, bytes: &[u8]) {
         let begin = Request::UploadBegin {
             length: bytes.len() as u32,
@@ -190,7 +190,7 @@ impl Conversation {
         }
     }
 
-    /// The calibration that the device uses, byte by byte; `None` if it has none.
+    /// The calibration in use, byte by byte; `None` if there is none.
     pub fn download(&mut self) -> Option<Vec<u8>> {
         let mut all = Vec::new();
         loop {

@@ -1,11 +1,11 @@
-//! The firmware's release image on the emulated board, looked at as a whole.
+//! The firmware's release image on the emulated board, tested as a whole.
 //!
 //! | where                | what                                                                                 |
 //! |----------------------|--------------------------------------------------------------------------------------|
 //! | [`conversation`]     | the host's end of the serial line                                                    |
-//! | [`mod@traces`], `traces/` | what the device sent of every kind of step, which `core` computes again         |
+//! | [`mod@traces`], `traces/` | the device's output in each kind of step, which `core` computes again           |
 //! | `tests/all/`         | sampling, the line, restarts, cuts of the supply, the pseudo-terminal                |
-//! | `budget/`            | what the firmware costs, against `budget.toml`                                       |
+//! | `budget/`            | cost of the firmware, against `budget.toml`                                          |
 
 pub mod conversation;
 pub mod traces;
@@ -20,10 +20,10 @@ use mimu_board::schematic::Volts;
 /// A millisecond of virtual time, ns.
 pub const MS: u64 = 1_000_000;
 
-/// Time after which the firmware samples, ns: the converter's calibration takes 42 ms of it.
+/// Time after which the firmware samples, ns: 42 ms of it are the converter's calibration.
 pub const STARTED: u64 = 100 * MS;
 
-/// The release image: what `MIMU_FIRMWARE` names, or what was built last into the target directory.
+/// The release image: the one that `MIMU_FIRMWARE` names, or the last one built into the target directory.
 ///
 /// # Panics
 ///
@@ -37,7 +37,7 @@ pub fn image() -> Image {
     }
 }
 
-/// Where the release build of a program for the target is.
+/// Path of the release build of a program for the target.
 pub fn built(name: &str) -> PathBuf {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
     let target = std::env::var_os("CARGO_TARGET_DIR")
@@ -45,7 +45,7 @@ pub fn built(name: &str) -> PathBuf {
     target.join("thumbv7em-none-eabihf/image").join(name)
 }
 
-/// A board with the release image behind voltages that do not change.
+/// A board with the release image at constant voltages.
 pub fn still(volts: Volts) -> Board {
     Board::new(&image(), Front::Still(volts)).unwrap()
 }

@@ -1,9 +1,8 @@
-//! Traces of the device: what it has sent, byte by byte, with the calibration that it held, kept in `tests/traces` and computed
-//! again by `core`.
+//! Traces of the device: its output, byte by byte, and the calibration in use. They are kept in `tests/traces` and computed again by `core`.
 //!
-//! A trace is two files. `NAME.wire`: all bytes of the line from the first call on, as received. `NAME.calibration`: the stored
-//! calibration ([`mimu_core::stored`]). The compensated stream is in the trace, and so are the reports of the Kalman banks: what
-//! `core` makes of the raw stream is compared with what the device's processor has made of it, bit by bit.
+//! A trace is two files. `NAME.wire`: all bytes of the line from the first call on, as received. `NAME.calibration`: the stored calibration
+//! ([`mimu_core::stored`]). A trace contains the compensated stream and the reports of the Kalman banks. `core` computes both from the raw stream,
+//! and they are compared bit by bit with the results of the device's processor.
 
 mod replay;
 
@@ -33,20 +32,19 @@ use crate::{MS, STARTED, image};
 pub struct Step {
     /// Name of its files.
     pub name: &'static str,
-    /// What is done to the unit, from `carrier` on.
+    /// Motion of the unit, from `carrier` on.
     plan: &'static str,
-    /// Stored on the device.
+    /// The calibration stored on the device.
     calibration: fn() -> Vec<u8>,
-    /// Stretches that are streamed: how many, how long, how long not in between, ms. What lies in between would make a trace of
-    /// several seconds too large to keep.
+    /// Streamed segments: number, length, and pause between them, ms. Without pauses a trace of several seconds would be too large to keep.
     stretches: (u32, u64, u64),
     /// The banks run, and the compensated stream is not sent.
     banks: bool,
 }
 
-/// Variances that the banks are told, V².
+/// Variances given to the banks, V².
 const NOISE: [f32; 3] = [1.2e-5; 3];
-/// Inputs that they are told: rad/s, m/s².
+/// Inputs given to them: rad/s, m/s².
 const INPUTS: [[f32; 3]; 2] = [[0.0, 0.0, 1.745_329_3], [0.0, 0.0, 9.793]];
 /// Sizes of their diffuse priors.
 const SPANS: [f32; 2] = [1.745_329_3, 9.793];
@@ -77,7 +75,7 @@ pub const STEPS: [Step; 6] = [
         banks: false,
     },
     Step {
-        // The gyros warm up after power-on by some degrees, through several nodes, which the dies follow late.
+        // After power-on the gyros warm up by some degrees, through several nodes; the dies lag.
         name: "temperature",
         plan: "carrier = \"table\"\nlead_in_s = 0.3\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 20.0\n",
         calibration: nodes,
@@ -147,7 +145,7 @@ fn stored(temps: &[f64], lags_s: Option<PerSensor<f32>>, effects: &[DeviceEffect
         if temps.len() == 1 {
             return Node::constant(temp_c as f32, model(warmth));
         }
-        // Derivatives by the difference over a kelvin.
+        // Derivatives from the difference over one kelvin.
         let (before, after) = (model(warmth - 0.5), model(warmth + 0.5));
         Node {
             temp_c: temp_c as f32,
@@ -186,8 +184,8 @@ fn nodes() -> Vec<u8> {
     stored(&temps, Some([5.0, 9.0].into()), &[])
 }
 
-/// One of every kind of law. Without lags, whose state when the stream begins is not on the line, and without the warm-up, whose
-/// exponential is the PC's library's here, and may differ from the device's in the last bit.
+/// One effect of every kind of law. Lags are left out, because their state at the start of the stream is not on the line. The warm-up is left out,
+/// because its exponential comes from the PC's library here and may differ from the device's in the last bit.
 fn with_effects() -> Vec<u8> {
     let effects = [
         DeviceEffect::named(
@@ -239,7 +237,7 @@ fn path(name: &str, end: &str) -> PathBuf {
 }
 
 impl Trace {
-    /// Reads one that is kept.
+    /// Reads a stored trace.
     ///
     /// # Panics
     ///
@@ -255,7 +253,7 @@ impl Trace {
         }
     }
 
-    /// Keeps it.
+    /// Stores it.
     pub fn write(&self, name: &str) {
         fs::write(path(name, "wire"), &self.wire).unwrap();
         fs::write(path(name, "calibration"), &self.calibration).unwrap();
@@ -270,7 +268,7 @@ impl Step {
         let plan = Plan::parse(Source::new(self.name, format!("{head}{}", self.plan))).unwrap();
         let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../rig/rigs/fang.toml");
         let truth = RigTruth::resolve(&RigFile::read(rig.as_ref()).unwrap(), 7).unwrap();
-        // The motion begins with the second start, when the calibration is there.
+        // The motion begins with the second start, when the calibration is stored.
         let rest = Front::Still(Volts::GROUND);
         let mut device = Conversation::new(Board::new(&image(), rest).unwrap());
         device.greeting();
@@ -284,7 +282,7 @@ impl Step {
         device.greeting();
         device.run_for(STARTED);
         device.kept = Some(Vec::new());
-        // For how long it has had its power, from which the effects count.
+        // Asks for the time since power-on, on which the effects depend.
         device.ask(Request::Hello);
         let stream = Request::Stream {
             raw: true,
@@ -309,7 +307,7 @@ impl Step {
 }
 
 fn start_banks(device: &mut Conversation) {
-    // A batch before the first sample that a bank takes in.
+    // Waits for a batch before the first sample that a bank processes.
     device.run_for(2 * BATCH as u64 * MS);
     for (i, sensor) in Sensor::BOTH.into_iter().enumerate() {
         let prior = Prior::Diffuse { span: SPANS[i] };

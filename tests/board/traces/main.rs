@@ -1,12 +1,11 @@
-//! Records the traces anew from the release image, after a change that is meant to compute otherwise, or of the protocol; the change
-//! then shows in what is committed.
+//! Records the traces again from the release image, after an intended change of the computation or the protocol. The change then shows in the commit.
 //!
 //! ```text
 //! cargo build -p mimu-firmware --profile image --target thumbv7em-none-eabihf
 //! cargo run -p mimu-board-tests --bin traces [NAME...]
 //! ```
 //!
-//! Names choose among the steps. A program and not a test: the tests of a night must leave what they compare with as it is.
+//! Names select steps. This is a program and not a test, because nightly tests must not change their references.
 
 use mimu_board_tests::traces::STEPS;
 

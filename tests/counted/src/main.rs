@@ -1,7 +1,7 @@
-//! What the device computes with a sample, each between two marks, for the emulator to count instructions.
+//! The device's computations for a sample, each between two marks, so that the emulator can count instructions.
 //!
-//! The functions are those that the firmware calls, of `mimu_core::single`, compiled there; nothing is inlined from here.
-//! `cargo run -p mimu-board-tests --bin budget` runs it, and knows the order.
+//! These are the firmware's own functions, of `mimu_core::single`, compiled there; nothing is inlined into this crate.
+//! `cargo run -p mimu-board-tests --bin budget` runs this program and relies on its order.
 #![no_std]
 #![no_main]
 
@@ -17,13 +17,13 @@ use mimu_core::{PerSensor, Sensor};
 use nalgebra::{Matrix3, Vector3};
 use panic_halt as _;
 
-/// In front of what is counted. Not the same as the other, or the compiler makes one of them.
+/// Precedes the counted code. It must differ from [`counted_to`], or the compiler merges the two.
 #[inline(never)]
 fn counted_from() {
     black_box(1);
 }
 
-/// Behind it.
+/// Follows the counted code.
 #[inline(never)]
 fn counted_to() {
     black_box(2);
@@ -57,7 +57,7 @@ fn main() -> ! {
     let noise = Vector3::repeat(1e-3);
     let mut bank = Bank::diffuse(&noise, 10.0);
 
-    // What the marks cost by themselves.
+    // The cost of the marks.
     between(|| ());
     between(|| single::compensate(&model, &raw));
     between(|| single::update(&mut bank, &si.accel, &raw.accel, &noise));
@@ -69,27 +69,27 @@ fn main() -> ! {
     let none = || black_box(Effects::of(PerSensor::both(directions)));
     let remove = |all: &Effects<f32, ROOM>| {
         let mut state = State::new(1000.0);
-        // The first sample is evaluated twice.
+        // For the first sample, the effects are evaluated twice.
         single::remove(all, &mut state, &si);
         between(|| single::remove(all, &mut state, &si));
     };
     remove(&none());
     let term = DeviceEffect::term(Sensor::Gyro, 1, 1e-3, &TERM);
-    // Those that run with every sample.
+    // Effects that are evaluated at every sample.
     let fast =
         |effect: &Result<DeviceEffect<f32>, EffectError>| matches!(effect, Ok(e) if !e.is_slow());
     let named = EFFECTS.iter().map(|id| named(id)).filter(fast);
     for effect in named.chain([term]) {
         let mut all = none();
         let Ok(effect) = effect else { continue };
-        // Alone, it pays for what all of a triad share; the second shows what each costs.
+        // The first push includes the cost that all effects of a triad share; the second shows the cost of one more.
         for _ in 0..2 {
             if all.push(effect).is_ok() {
                 remove(&all);
             }
         }
     }
-    // Without any, with one axis of a triad, with all of it, and with both.
+    // Without code errors, with those of one axis, of a triad, and of both triads.
     let mut all = none();
     let clean = |all: &Effects<f32, ROOM>| between(|| single::without_code_errors(all, &raw));
     clean(&all);
@@ -99,7 +99,7 @@ fn main() -> ! {
         (Sensor::Accel, 0..3),
     ] {
         for axis in axes {
-            // Of each axis its own.
+            // A different value for each axis.
             let weight = 1.65 + 0.1 * axis as f32;
             if let Ok(code) =
                 DeviceEffect::code(sensor, Some(axis), &[1e-4; 9], weight, 0.01 * weight)
@@ -114,7 +114,7 @@ fn main() -> ! {
     }
 }
 
-/// Variables of a term, as many as there can be.
+/// Variables of a term, the maximum number.
 const TERM: [Variable; 3] = [Variable::RateX, Variable::ForceY, Variable::ForceZ];
 
 fn named(id: &str) -> Result<DeviceEffect<f32>, EffectError> {

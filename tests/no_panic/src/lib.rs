@@ -1,8 +1,7 @@
-//! Everything of `mimu-core` in the precision of the device, as functions that a compiler has to generate.
+//! All functions of `mimu-core` in the device's precision, instantiated so that a compiler must generate them.
 //!
-//! `check.sh` compiles this and everything that it uses for the target, and follows every call and every address in the assembly from
-//! these functions on: none may lead out of it, but to a few functions that are known not to panic. A function that is missing here
-//! is not looked at.
+//! `check.sh` compiles this crate and its dependencies for the target. From these functions it follows every call and every address in the assembly;
+//! none may leave it, except to a few functions that are known not to panic. A function that is missing here is not checked.
 #![no_std]
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
@@ -32,7 +31,7 @@ pub fn compensation(model: &Compensation<f32>, raw: &Sample<f32>) -> Sample<f32>
     model.apply(raw)
 }
 
-/// [`DeviceEffect::named`]: with it all that the table of effects refers to.
+/// [`DeviceEffect::named`], and with it everything that the table of effects refers to.
 #[inline(never)]
 pub fn effect_named(
     id: &str,
@@ -148,7 +147,7 @@ pub fn effects_new(models: &Compensation<f64>) -> Option<Effects<f32, 8>> {
     Effects::new(models)
 }
 
-/// [`Effects::of`], which the device calls when it is given a calibration, and [`State::gap`].
+/// [`Effects::of`], which the device calls when it receives a calibration, and [`State::gap`].
 #[inline(never)]
 pub fn effects_of(of: PerSensor<Directions<f32>>, state: &mut State<f32, 8>) -> Effects<f32, 8> {
     state.gap();
@@ -218,13 +217,13 @@ pub fn stored_trim(
     stored::trim(bytes, add, trimmed_s)
 }
 
-/// [`encode`] of what a device sends.
+/// [`encode`] for messages that a device sends.
 #[inline(never)]
 pub fn wire_send(message: &Message<'_>, out: &mut [u8; MAX_FRAME]) -> Result<usize, EncodeError> {
     encode(message, out)
 }
 
-/// [`encode`] of what a host sends.
+/// [`encode`] for messages that a host sends.
 #[inline(never)]
 pub fn wire_ask(call: &Call<'_>, out: &mut [u8; MAX_FRAME]) -> Result<usize, EncodeError> {
     encode(call, out)
@@ -269,7 +268,7 @@ pub fn wire_effects() -> u32 {
     effects_of_this_build()
 }
 
-/// [`Compensator::state`], [`Compensator::take_over`], [`Compensator::follow`] and the rest of its state, as a device goes on with another
+/// [`Compensator::state`], [`Compensator::take_over`], [`Compensator::follow`] and its other state, as when a device continues with another
 /// calibration.
 #[inline(never)]
 pub fn compensator_follow(
@@ -304,7 +303,7 @@ pub fn readme_program(
     readme::calibrate(calibration, 1000.0, samples.iter().copied(), out)
 }
 
-/// What a device does with every sample: sums to volts, all of the calibration at the temperature of the batch, bytes of both streams.
+/// The device's work for every sample: sums to volts, the whole calibration at the temperature of the batch, bytes of both streams.
 #[inline(never)]
 pub fn sample_path(
     sums: &Sums,
@@ -317,7 +316,7 @@ pub fn sample_path(
     (RawBatch::pack(sums), CompensatedBatch::pack(&sample))
 }
 
-/// The same without effects: compensation proper, whose instructions are counted.
+/// The same without effects: the compensation alone, whose instructions are counted.
 #[inline(never)]
 pub fn sample_compensation(at: &table::State<f32>, raw: &Sample<f32>) -> Sample<f32> {
     single::compensate(&at.model, raw)

@@ -1,4 +1,4 @@
-//! Estimators that must agree, and models that must be each other's inverse.
+//! Estimators that must agree, and models that must be inverse to each other.
 
 use mimu::estimate::Observation;
 use mimu::estimate::known_input::{inverse_form, kalman, least_squares, opposite_rates};
@@ -9,7 +9,7 @@ use mimu_rig::random::Random;
 use mimu_tests::bench;
 use nalgebra::{SVector, Vector3};
 
-/// A gyro triad drawn by `random`, 2 mV of noise in a sample.
+/// A gyro triad drawn by `random`, with 2 mV of noise in a sample.
 fn unit(random: &mut Random) -> Ideal {
     let model = bench::gyro(random);
     Ideal {
@@ -26,7 +26,7 @@ fn noiseless(unit: Ideal) -> Ideal {
     }
 }
 
-/// Dwells of a rate table: each axis both ways at several rates, oblique axes, and rest. `n` samples each.
+/// Dwells of a rate table: each axis in both directions at several rates, oblique axes, and rest. `n` samples each.
 fn on_a_table(unit: &Ideal, n: u32, random: &mut Random) -> Vec<Observation> {
     let mut inputs = vec![Vector3::zeros(); 3];
     for axis in 0..3 {
@@ -74,7 +74,7 @@ fn kalman_filter_with_a_diffuse_prior_agrees_with_least_squares_to_rounding() {
         let mut random = Random::new(seed, "unit");
         let unit = unit(&mut random);
         let observations = on_a_table(&unit, 1000, &mut random);
-        // With independent errors, and with a wander of the size of the noise that all dwells share.
+        // With independent errors, and with wander that all dwells share and that is as large as the noise.
         let sigma = observations[0].variance.x.sqrt();
         let slow = Slow {
             instability: sigma,
@@ -104,8 +104,8 @@ fn kalman_filter_with_a_diffuse_prior_agrees_with_least_squares_to_rounding() {
         "largest difference over 200 units: output {:.1e}, covariance {:.1e} relative",
         worst[0], worst[1]
     );
-    // Readings of 2.5 V in f64 are rounded to 4e-16; the design's condition is below 5. The covariance
-    // also holds the excess variance, which both iterate to 1e-6 where it is not zero.
+    // Readings of 2.5 V in f64 are rounded to 4e-16; the design's condition is below 5. The covariance also contains the extra white variance. Both
+    // methods iterate it to 1e-6 if it is not zero.
     assert!(worst[0] < 1e-13, "output: {:e}", worst[0]);
     assert!(worst[1] < 1e-5, "covariance: {:e}", worst[1]);
 }
@@ -118,7 +118,7 @@ fn forward_and_inverse_model_agree_on_the_compensated_output() {
         let unit = unit(&mut random);
         let observations = on_a_table(&noiseless(unit), 1, &mut random);
         let forward = least_squares(&observations, None).unwrap();
-        // Without noise, regressing either way must give the same calibration.
+        // Without noise, both directions of regression must give the same calibration.
         for inverse in [inverse_form(&observations), opposite_rates(&observations)] {
             worst = worst.max(apart(
                 &forward.triad,
@@ -126,7 +126,7 @@ fn forward_and_inverse_model_agree_on_the_compensated_output() {
                 &observations,
             ));
         }
-        // And so must going there and back by the matrices alone.
+        // The matrices alone must lead there and back as well.
         let x = Vector3::from_fn(|_, _| random.within(5.0));
         let back = forward
             .triad
@@ -154,7 +154,7 @@ fn physical_quantities_make_the_forward_model_again() {
     }
 }
 
-/// Sensors soldered on in any orientation, left-handed ones and ones that point backwards included.
+/// Sensors mounted in any orientation, including left-handed triads and sensors that point backwards.
 #[test]
 fn exact_quantities_make_the_forward_model_again_in_any_mounting() {
     for seed in 0..500 {
@@ -173,7 +173,7 @@ fn exact_quantities_make_the_forward_model_again_in_any_mounting() {
     }
 }
 
-/// A converter so coarse that a sensor keeps its code within dwells.
+/// A converter so coarse that a sensor's code is constant within dwells.
 #[test]
 fn a_channel_without_noise_is_fitted_by_filter_and_least_squares_alike() {
     let unit = unit(&mut Random::new(3, "unit"));
@@ -186,7 +186,7 @@ fn a_channel_without_noise_is_fitted_by_filter_and_least_squares_alike() {
     assert!(apart(&batch.triad, &recursive.triad, &observations) < 1e-12);
 }
 
-/// Small and exact angles differ by products of angles: at 3 % each by about 1e-3, and no more.
+/// Small and exact angles differ by products of angles: for angles of 3 %, by about 1e-3 at most.
 #[test]
 fn small_angles_are_exact_ones_to_first_order() {
     for seed in 0..50 {
@@ -208,9 +208,8 @@ fn small_angles_are_exact_ones_to_first_order() {
     }
 }
 
-/// The direction of a misalignment angle, against a drawing: with θz > 0 the sensors are turned by θz about z seen
-/// from the body, so that a rate about the body's x shows as +θz on the sensor y and one about y as -θz on the sensor x
-/// (fang (12), first column and first row).
+/// The sign of a misalignment angle, against a drawing: θz > 0 turns the sensors by θz about z as seen from the body. A rate about the body's x then
+/// reads +θz on the sensor y, and one about y reads -θz on the sensor x (fang (12), first column and first row).
 #[test]
 fn a_positive_misalignment_about_z_shows_x_on_the_sensor_y_positive() {
     let angle: f64 = 0.01;
@@ -234,7 +233,7 @@ fn a_positive_misalignment_about_z_shows_x_on_the_sensor_y_positive() {
     );
 }
 
-/// xu's form regresses on the noisy side; its covariance must still be that of its scatter.
+/// xu's form regresses on the noisy side; its covariance must still equal the scatter of its results.
 #[test]
 fn covariance_of_the_inverse_form_is_the_scatter_of_its_results() {
     const RUNS: u64 = 2000;
@@ -258,11 +257,11 @@ fn covariance_of_the_inverse_form_is_the_scatter_of_its_results() {
         let n = RUNS as f64;
         for i in 0..12 {
             let scatter = squares[i] / n - (sum[i] / n).powi(2);
-            // The median, in which the noise that is taken for excess now and then is not.
+            // The median is used, because the noise of some runs is taken for extra white variance.
             let mut claims: Vec<f64> = claimed.iter().map(|c| c[i]).collect();
             claims.sort_by(f64::total_cmp);
             let ratio = (claims[claims.len() / 2] / scatter).sqrt();
-            // 2000 runs know a sigma to 1.6 %; four times that.
+            // 2000 runs determine a sigma to 1.6 %; the tolerance is four times that.
             assert!(
                 (0.93..1.07).contains(&ratio),
                 "{name}, parameter {i}: claimed over found {ratio:.3}"

@@ -1,5 +1,5 @@
-//! Errors and intervals of the estimators on units whose truth is known: a 95 % interval must contain it in 95 % of
-//! the cases, parameter by parameter.
+//! Errors and intervals of the estimators on units whose truth is known: a 95 % interval must contain the truth in 95 % of the cases, for each
+//! parameter.
 
 use mimu::estimate::known_input::{
     inverse_form, kalman, least_squares, opposite_rates, six_positions,
@@ -21,7 +21,7 @@ use mimu_tests::coverage::{
 };
 use nalgebra::Vector3;
 
-/// Every parameter within 93 to 97 %, and what so many runs scatter by: 4 sigmas, as up to 60 parameters are looked at.
+/// Every parameter within 93 to 97 %, plus a margin for the limited number of runs: 4 sigmas, because up to 60 parameters are tested.
 fn judge(tally: &Tally) {
     let [mean, low, high] = tally.summary();
     println!(
@@ -48,7 +48,7 @@ fn judge(tally: &Tally) {
     );
 }
 
-/// Dwells of 1000 samples under known rates: the faces both ways, and rest.
+/// Dwells of 1000 samples at known rates: each axis in both directions, and rest.
 fn on_a_table(unit: &Ideal, random: &mut Random) -> Vec<Observation> {
     let rates = [-5.0, -2.0, 2.0, 5.0];
     let turns = (0..3).flat_map(|axis| rates.map(|r| Vector3::ith(axis, r)));
@@ -65,10 +65,10 @@ fn on_a_table(unit: &Ideal, random: &mut Random) -> Vec<Observation> {
         .collect()
 }
 
-/// Recordings of each kind in every run of the tests: an interval that holds the truth in 85 % of the cases is seen.
+/// Recordings of each kind in every run of the tests: enough to detect an interval that contains the truth in only 85 % of the cases.
 const FEW: u64 = 200;
 
-/// And in a night; `make papers` takes 1000.
+/// The same for the nightly tests; `make papers` uses 1000.
 const MANY: u64 = 400;
 
 #[test]
@@ -76,7 +76,7 @@ fn intervals_hold_the_truth_where_the_input_is_known() {
     with_a_table(FEW, Dwells::ByLot).iter().for_each(judge);
 }
 
-/// Parameters, and delays of the filters of the bench.
+/// Tests the parameters, and the delays against the filters of the bench.
 fn turning_inputs(runs: u64) {
     let (tallies, delays) = with_turning_inputs(runs);
     tallies.iter().for_each(judge);
@@ -100,7 +100,7 @@ fn intervals_hold_the_truth_where_inputs_move_within_dwells() {
     turning_inputs(24);
 }
 
-/// Rates known to 0.3 %, which is twenty times the noise of a scale factor here, and to 0.01 %, which is below it.
+/// Rates known to 0.3 %, twenty times the noise of a scale factor here, and to 0.01 %, which is below it.
 fn record_players(runs: u64) {
     for rate_error in [0.003, 0.0001] {
         println!("rates known to {} %", 100.0 * rate_error);
@@ -131,7 +131,8 @@ fn intervals_of_many_hold_the_truth_where_the_input_is_known() {
     with_a_table(MANY, Dwells::ByLot).iter().for_each(judge);
 }
 
-/// Without the noise of the unit at rest, down to 90 %: what neighbouring dwells share of the wander is in no interval.
+/// Dwells in the listed order. Without the noise of the unit at rest the share drops to 90 %, because the intervals then lack the wander that
+/// neighbouring dwells share.
 #[test]
 fn intervals_hold_the_truth_of_dwells_that_share_the_wander_where_it_is_known() {
     with_a_table(FEW, Dwells::AsListedWithNoise)
@@ -160,7 +161,7 @@ fn intervals_of_many_hold_the_truth_where_only_gravity_is_known() {
     by_hand(MANY, true).iter().for_each(judge);
 }
 
-/// A table that repeats its rates to 0.1 % only, or a bias that wanders: more than the noise says, and the intervals must know.
+/// A table that repeats its rates only to 0.1 %, or a bias that wanders: dwells scatter more than the noise, and the intervals must include this.
 #[test]
 fn intervals_hold_the_truth_where_dwells_scatter_more_than_the_noise() {
     type Estimator = fn(&[Observation]) -> Result<Estimated, Failure>;
@@ -211,8 +212,7 @@ fn options(holdout_blocks: usize) -> Options {
     }
 }
 
-/// Held-out figures are about new data: on a unit with nothing but noise they must be a little above the noise floor,
-/// and those in sample a little below.
+/// On a unit with nothing but noise, held-out errors must be slightly above the noise floor, and errors in sample slightly below.
 #[test]
 fn held_out_error_of_a_perfect_model_is_the_noise_and_that_of_the_parameters() {
     let plan = bench::hand_plan(40);
@@ -223,7 +223,7 @@ fn held_out_error_of_a_perfect_model_is_the_noise_and_that_of_the_parameters() {
         let mut random = Random::new(seed, "unit");
         let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
         let mut file = bench::clean(gyro, accel);
-        // Wander is more than the noise within dwells, and not what this is about.
+        // Wander exceeds the noise within dwells and would hide the ratios tested here.
         for axes in [&mut file.unit.gyro_axes, &mut file.unit.accel_axes] {
             axes.instability_si = Some([0.0; 3]);
             axes.walk_si = Some([0.0; 3]);
@@ -240,13 +240,13 @@ fn held_out_error_of_a_perfect_model_is_the_noise_and_that_of_the_parameters() {
         ratios[0], ratios[1]
     );
     for [in_sample, held_out] in ratios {
-        // 40 poses, 9 parameters: √(31/40) = 0.88 in sample; held out each block of 10 is predicted by 30.
+        // 40 poses, 9 parameters: √(31/40) = 0.88 in sample. Held out, each block of 10 is predicted from the other 30.
         assert!((0.75..1.0).contains(&in_sample), "{in_sample}");
         assert!((1.0..1.5).contains(&held_out), "{held_out}");
     }
 }
 
-/// A sensor clipped where its axis points up: those dwells are left out, the rest is as good as without them.
+/// A sensor clips when its axis points up. Those dwells are left out, and the fit of the rest is not degraded.
 #[test]
 fn a_saturated_dwell_is_found_and_left_out() {
     let mut random = Random::new(5, "unit");
@@ -258,7 +258,7 @@ fn a_saturated_dwell_is_found_and_left_out() {
     file.unit.accel_axes.high_raw = Some(rail);
     let prepared = bench::recorded(&bench::hand_plan(30), &file, 5);
     let found = prepared.dwells.rails[5].high.expect("a rail");
-    // To a sigma of the sensor's noise, 247 µg/√Hz at 100 Hz and 80 mV per m/s².
+    // To one sigma of the sensor's noise: 247 µg/√Hz at 100 Hz and 80 mV per m/s².
     assert!((found - rail).abs() < 2e-3, "{found} for {rail}");
     let faults = prepared
         .dwells
@@ -269,7 +269,7 @@ fn a_saturated_dwell_is_found_and_left_out() {
     assert!((1..8).contains(&saturated), "{saturated}");
     let fitted = fit(prepared, options(0)).unwrap();
     let accel = fitted.sensor(Sensor::Accel).unwrap();
-    // Tight enough to see a clipped dwell: its mean is off by up to 0.03 V, or 0.4 m/s².
+    // Tight enough to detect a clipped dwell: the error of its mean is up to 0.03 V, or 0.4 m/s².
     assert!(
         accel.rms() < 2.0 * accel.noise_floor(),
         "{} {}",
@@ -280,7 +280,7 @@ fn a_saturated_dwell_is_found_and_left_out() {
     assert!(fitted.warnings.iter().any(told), "{:?}", fitted.warnings);
 }
 
-/// Dwell means of correlated noise scatter by more than sigma over the root of n, and the Allan deviation knows.
+/// If noise is correlated, dwell means scatter by more than sigma over the root of n. The Allan deviation must predict this.
 #[test]
 fn noise_of_a_dwell_mean_is_that_of_correlated_noise() {
     let (rate_hz, dwell_s): (f64, f64) = (100.0, 10.0);
@@ -294,8 +294,7 @@ fn noise_of_a_dwell_mean_is_that_of_correlated_noise() {
     };
     let mut writer = Writer::create(&path, columns, SampleFormat::Parquet, false).unwrap();
     let mut batch = Batch::default();
-    // First-order Gauss-Markov noise of 0.5 s: a mean over 10 s scatters by σ √(2·0.5/10), ten times as much as
-    // σ/√1000.
+    // First-order Gauss-Markov noise with 0.5 s: a mean over 10 s scatters by σ √(2·0.5/10), ten times σ/√1000.
     let (keep, dwells) = ((-1.0 / (0.5 * rate_hz)).exp(), 200);
     let drive = f64::sqrt(1.0 - keep * keep);
     let mut state = [0.0; 3];
@@ -333,7 +332,7 @@ fn noise_of_a_dwell_mean_is_that_of_correlated_noise() {
         "scatter of 10 s means {scatter:.3}, claimed {claimed:.3}, theory {theory:.3}, white {:.3}",
         1.0 / (dwell_s * rate_hz).sqrt()
     );
-    // The longest octave within a dwell is 3.2 s, and what lies beyond is extrapolated.
+    // The longest octave within a dwell is 3.2 s; longer times are extrapolated.
     assert!(
         (0.8..1.25).contains(&(claimed / scatter)),
         "{claimed} {scatter}"

@@ -1,4 +1,4 @@
-//! Diagnosis of units whose truth is known, and of recordings by other people. All of the first is `make blind`.
+//! Diagnosis of units whose truth is known, and of recordings by other people. `make blind` runs the complete study of the former.
 
 use mimu::diagnose::decision::Against;
 use mimu::diagnose::search::Alternative;
@@ -40,7 +40,7 @@ fn eight_clean_units_are_told_to_be_clean() {
 }
 
 fn clean(seeds: u64) {
-    // Of all the 200 of `make blind` at most two may not be.
+    // `make blind` allows two of its 200 units not to be clean.
     for case in cases(&[], seeds) {
         assert_eq!(case.verdict, "clean", "{case:?}");
     }
@@ -98,7 +98,7 @@ fn unexplained(seeds: u64) {
         "x_accel_creep",
         "x_gyro_magnetic",
         "x_gyro_saturation_recovery",
-        // Fine bits of a gyro's codes follow the turns about the other axes.
+        // The fine bits of a gyro's code correlate with the turns about the other axes.
         "x_supply_coupling",
     ] {
         for case in cases(&[id], seeds) {
@@ -121,7 +121,7 @@ fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
     let recorded = bench::recorded(&plan, &file, 3);
     let noise = bench::noise_file(&file, 3, recorded.condensed.period_s);
     let mut found = diagnose(recorded.with_noise(&noise).unwrap().into(), options()).unwrap();
-    // What it can be taken for has no dwell planned to tell it apart, and is said and drawn all the same.
+    // No dwell is planned that would distinguish the added alternative; text and drawings must still be made.
     for accepted in found
         .sensors
         .iter_mut()
@@ -173,8 +173,8 @@ fn a_step_at_a_reading_is_left_over_against_the_reading_or_named_an_error_by_the
     assert!(by_reading > 0);
 }
 
-/// The table turns about axes that point up and never down, so that the square of a force looks like a little scale factor and
-/// misalignment: an affine model that does not know of it bends, and with it the directions that its products are made with.
+/// The table's axes point up and never down, so the square of a force resembles a small scale factor and misalignment. An affine model that lacks the
+/// square is distorted, and so are the directions of its products.
 #[test]
 fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
     let seed = 1;
@@ -188,7 +188,7 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
     let accepted = found.sensors.iter().flat_map(|s| &s.decision.accepted);
     let one = accepted.last().unwrap();
     for (axis, mg_per_g2) in [50.0, -40.0, 30.0].into_iter().enumerate() {
-        // 1 mg/g² is 1e-3/9.80665 of 1/(m/s²).
+        // 1 mg/g² is 1e-3/9.80665 in 1/(m/s²).
         let (truth, sigma) = (
             mg_per_g2 * 1e-3 / 9.806_65,
             one.covariance[(axis, axis)].sqrt(),
@@ -203,7 +203,7 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
     }
 }
 
-/// A drift of data sheets would not be seen in three minutes; these units drift by a little more.
+/// A drift of data-sheet size would not be seen in three minutes; these units drift slightly more.
 #[test]
 fn what_describes_a_weak_drift_by_hand_is_named_with_the_drift() {
     for (id, grade) in [
@@ -229,7 +229,7 @@ fn the_published_xsens_session_has_a_gyro_that_feels_force() {
     let found = diagnosed(fit);
     assert_eq!(found.verdict, Verdict::Explained);
     let ids: Vec<String> = found.effects.iter().map(|e| e.candidate.id()).collect();
-    // Nothing for the accelerometer: its higher-order terms do not hold out.
+    // Nothing for the accelerometer: its higher-order terms fail on held-out dwells.
     assert_eq!(ids, ["gyro_g_sensitivity"]);
     let gyro = found
         .sensors

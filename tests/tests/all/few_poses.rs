@@ -1,4 +1,4 @@
-//! Sessions as people make them: thirteen poses, ten on a fixture, six faces; with a dwell that was knocked, or right and alone.
+//! Typical sessions of users: thirteen poses, ten on a fixture, six faces; with a disturbed dwell, or with a correct dwell that no other confirms.
 
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::prepared::Prepared;
@@ -16,16 +16,16 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 const THIRTEEN: &str = include_str!("../../../rig/plans/thirteen.toml");
 const FIXTURE: &str = include_str!("../../../rig/plans/fixture.toml");
 
-/// A digital part without wander, so that its null is the bias of the session.
+/// A digital part without wander, so its zero offset is the bias of the session.
 const QUIET: &str = "format = \"mimu-rig/1\"\n[unit]\ngyro = \"MPU6050-gyro\"\naccel = \"MPU6050-accel\"\n\
     [unit.gyro_axes]\ninstability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n\
     [unit.accel_axes]\ninstability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n[thermal]\non_before_s = inf\n";
 
-/// The same part with a package that remembers which way it was last stressed: what dwells scatter by beside their noise.
+/// The same part with a package that remembers the direction of the last stress: its dwells scatter by more than their noise.
 const STRESSED: &str = "format = \"mimu-rig/1\"\n[unit]\ngyro = \"MPU6050-gyro\"\naccel = \"MPU6050-accel\"\n\
     [thermal]\non_before_s = inf\n[[effect]]\nid = \"x_accel_stress_hysteresis\"\nmg = [1.0, 1.0, 1.0]\nplay_g = 0.3\n";
 
-/// A recording in memory, and what is true of it.
+/// A recording in memory, and its truth.
 struct Session {
     manifest: Manifest,
     samples: Batch,
@@ -84,7 +84,7 @@ impl Session {
         }
     }
 
-    /// Readings in SI, by what is true of the part but for its misalignments.
+    /// Readings converted to SI with the true scale factors and biases, but without the misalignments.
     fn in_si(mut self) -> Self {
         self.manifest.raw_unit = RawUnit::Si;
         let axes = self
@@ -102,7 +102,7 @@ impl Session {
         self
     }
 
-    /// How many of the accelerometer's scale factors and biases `fit` has within its intervals, and how many there are.
+    /// How many of the accelerometer's scale factors and biases are inside the intervals of `fit`, and their number.
     fn inside(&self, fit: &Fit) -> [u32; 2] {
         let found = fit.sensor(Sensor::Accel).expect("recorded");
         let physical = found.estimated.triad.physical(mimu::triad::Angles::Exact);
@@ -128,7 +128,7 @@ impl Session {
 
 #[test]
 fn a_right_dwell_that_the_few_others_happen_not_to_predict_is_kept() {
-    // Of 120 sessions these are the four in which one used to be left out, as 5 to 21 sigma off.
+    // Of 120 sessions, these four used to lose a dwell as an outlier of 5 to 21 sigma.
     for seed in [34, 64, 84, 116] {
         let session = Session::of(THIRTEEN, STRESSED, seed);
         let found = session.fit().expect("thirteen poses");
@@ -146,7 +146,7 @@ fn a_knocked_dwell_is_left_out_and_what_that_changes_is_said_unless_it_is_to_be_
     let left_out = &found.prepared.dwells.left_out;
     assert_eq!(left_out.len(), 1, "{left_out:?}");
     assert_eq!(left_out[0].from, 3);
-    // The force that was added, to what its prediction is uncertain by.
+    // The added force, to within the uncertainty of its prediction.
     assert!((left_out[0].error - 0.3).abs() < 0.05, "{left_out:?}");
     let [held, all] = session.inside(&found);
     assert!(held + 1 >= all, "{held} of {all}");
@@ -178,7 +178,7 @@ fn a_knocked_dwell_is_left_out_and_what_that_changes_is_said_unless_it_is_to_be_
 
 #[test]
 fn the_only_dwell_at_its_end_of_an_axis_is_kept_however_wrong() {
-    // Without the last pose little tells the bias of x from its scale factor.
+    // Without the last pose, the bias of x is hardly distinguished from its scale factor.
     for force in [0.1, 0.5] {
         let mut session = Session::of(THIRTEEN, QUIET, 5);
         session.knock(12, force);
@@ -196,7 +196,7 @@ fn the_turns_between_ten_poses_of_a_fixture_determine_what_their_magnitudes_leav
     let (mut held, mut all) = (0, 0);
     for seed in 1..=8 {
         let session = Session::of(FIXTURE, QUIET, seed);
-        // Two have a dwell split by a knock and too few turns for it.
+        // Two seeds have a dwell that is split by a knock, and then too few turns.
         let Ok(found) = session.fit() else { continue };
         let accel = found.sensor(Sensor::Accel).expect("recorded");
         let z = accel
@@ -204,7 +204,7 @@ fn the_turns_between_ten_poses_of_a_fixture_determine_what_their_magnitudes_leav
             .triad
             .physical(mimu::triad::Angles::Exact)
             .scale[2];
-        // By magnitudes alone it is 2 to 3 %, and that by the noise alone.
+        // From magnitudes alone the interval is 2 to 3 %, from noise alone.
         assert!(z.interval < 0.008 * z.value, "seed {seed}: {z:?}");
         let [inside, count] = session.inside(&found);
         held += inside;
@@ -216,7 +216,7 @@ fn the_turns_between_ten_poses_of_a_fixture_determine_what_their_magnitudes_leav
 
 #[test]
 fn a_scale_factor_that_the_poses_leave_open_is_refused_with_the_pose_that_is_missing() {
-    // Without a gyro there are no turns to help, and of a tip by 12 degrees the intervals are wider than the scale factor.
+    // Without a gyro there are no turns. With a tilt of 12 degrees the intervals are wider than the scale factor.
     let mut session = Session::of(&FIXTURE.replace("0.577", "0.21"), QUIET, 3);
     for column in &mut session.samples.raw[..3] {
         column.clear();
@@ -242,7 +242,7 @@ fn readings_in_si_are_judged_as_they_came_beside_every_fit() {
             .any(|w| w.to_string().contains("does not improve the readings"));
         assert_eq!(better, !warned, "{}: {came}", sensor.sensor);
     }
-    // What the readings err by, of the samples themselves: misalignments do not change the magnitude at a face.
+    // The error of the samples themselves: misalignments do not change the magnitude at a face.
     let accel = found.sensor(Sensor::Accel).expect("recorded");
     let dwells = &found.prepared.dwells.list;
     let squares = accel.residuals.iter().map(|r| {
@@ -274,7 +274,7 @@ fn a_clock_that_runs_twice_as_fast_is_asked_about() {
 #[test]
 fn a_channel_whose_step_is_coarser_than_its_noise_is_not_stuck() {
     let mut session = Session::of(THIRTEEN, QUIET, 4);
-    // 0.3 deg/s a step, where the noise of a sample is 0.03.
+    // Quantisation step of 0.3 deg/s; the noise of a sample is 0.03 deg/s.
     for value in session.samples.raw[..3].iter_mut().flatten() {
         *value = (*value / 20.0).round() * 20.0;
     }
@@ -358,7 +358,7 @@ fn a_dwell_that_turns_through_gravity_without_a_known_force_is_no_noise() {
     };
     let found = fit(prepared, options).expect("seven poses");
     let accel = found.sensor(Sensor::Accel).expect("recorded");
-    // 400 µg/√Hz over four seconds are 1 mm/s²; the swing of gravity made it 1.5 m/s².
+    // 400 µg/√Hz over four seconds are 1 mm/s²; taken for noise, the swing of gravity was 1.5 m/s².
     assert!(accel.noise_floor() < 5e-3, "{}", accel.noise_floor());
 
     let (manifest, mut batch) = turning_through_gravity();
@@ -387,7 +387,7 @@ fn six_positions_off_level_have_intervals_as_wide_as_their_misfit() {
     for up in faces {
         plan += &format!("[[step]]\nup = {up:?}\ndwell_s = 4.0\n");
     }
-    // By hand, a few degrees off; whoever levels them believes they are level.
+    // By hand, a few degrees off level; the manifest declares them level.
     let mut session = Session::of(&plan, QUIET, 3);
     let found = session.prepared();
     session.manifest.reference = Reference::Table;

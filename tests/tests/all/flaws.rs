@@ -1,4 +1,4 @@
-//! Flaws of real recordings, from the bench: each is found, and the calibration is as good as without it.
+//! Flaws of real recordings, made by the bench: each is detected, and the calibration is as good as without it.
 
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
@@ -12,7 +12,7 @@ use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
 
-/// A rig of 16 bits, whose scale factors of the gyros are 3600 counts per rad/s.
+/// A 16-bit rig whose gyro scale factors are 3600 counts per rad/s.
 fn rig(rest_of_rig: &str) -> RigFile {
     let rig = format!(
         "format = \"mimu-rig/1\"\nearth_rate = false\n{rest_of_rig}\n[unit]\ngyro = \"MPU6050-gyro\"\naccel = \"MPU6050-accel\"\n\
@@ -39,7 +39,7 @@ fn scale_error(fit: &Fit) -> f64 {
     off.fold(0.0, f64::max)
 }
 
-/// Five times what the recording without a flaw gives at most.
+/// Five times the largest error without a flaw.
 const FINE: f64 = 1e-3;
 
 #[test]
@@ -74,7 +74,7 @@ fn a_violent_shake_is_clipped_and_its_turn_left_out_by_name() {
     );
 }
 
-/// In the noise of analog parts a turn of 0.7 deg/s hides: among 38 rests, three of them trebled the error of the gyro.
+/// In the noise of analog parts a turn of 0.7 deg/s goes unnoticed: three such rests among 38 tripled the error of the gyro.
 #[test]
 fn a_rest_that_turns_evenly_is_no_dwell() {
     let mut random = Random::new(7, "unit");

@@ -1,9 +1,9 @@
-//! Several sessions of one unit diagnosed together: what the file does to another session. All of it is `blind joint`.
+//! Several sessions of one unit diagnosed together: the effect of the file on another session. `blind joint` runs the complete study.
 
 use mimu_tests::joint::{Set, case};
 
-/// Five sessions from power-on of a unit that warms up. The bits of a converter once added up to minus the reading here, which the scale factor
-/// makes up for: the file erred by 1 m/s², and by 0.01 m/s² without effects.
+/// Five sessions from power-on of a unit that warms up. The bits of a converter once added up to minus the reading here, and the scale factor
+/// compensated for it: the file had an error of 1 m/s², against 0.01 m/s² without effects.
 #[test]
 fn a_file_with_effects_is_no_worse_on_another_session_than_one_without() {
     let case = case(&Set::of_warm_up(5, 6));

@@ -1,4 +1,4 @@
-//! Estimators and diagnosis over the whole path of a recording: from the virtual bench, and from real units.
+//! Estimators and diagnosis from recording to result, on the virtual bench and on real units.
 
 mod agreement;
 mod coverage;

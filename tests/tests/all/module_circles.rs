@@ -1,7 +1,7 @@
 //! Modules depend on each other in one direction.
 //!
-//! At every level of a crate's tree the siblings form no circle, where whatever is below a sibling counts as that sibling. A module and
-//! the one that it stands in may know each other: what a child takes from its parent is a name that the parent's other children share.
+//! Among the siblings at each level of a crate's tree there is no cycle; everything below a sibling counts as that sibling. A module and its parent
+//! may refer to each other, because the names that a child takes from its parent are shared by all children.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -43,14 +43,14 @@ fn files(folder: &Path, module: &Module, all: &mut Vec<(Module, PathBuf)>) {
     }
 }
 
-/// Text without comments and without unit tests, which stand last.
+/// Text without comments and without the unit tests, which are at the end.
 fn code(text: &str) -> String {
     let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
     let lines = code.lines().map(|l| l.split("//").next().unwrap());
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// All paths of the tree that `text` begins with, `a::{b, c::d}` as `a::b` and `a::c::d`, each behind `before`; and what follows.
+/// All paths of the tree that `text` begins with, `a::{b, c::d}` as `a::b` and `a::c::d`, each appended to `before`; and the rest of the text.
 fn paths<'a>(text: &'a str, before: &Module, out: &mut Vec<Module>) -> &'a str {
     let text = text.trim_start();
     if let Some(mut rest) = text.strip_prefix('{') {
@@ -79,7 +79,7 @@ fn paths<'a>(text: &'a str, before: &Module, out: &mut Vec<Module>) -> &'a str {
     }
 }
 
-/// What `module` mentions by `crate::` and `super::`, from the crate's root.
+/// Paths that `module` mentions by `crate::` and `super::`, from the crate's root.
 fn mentioned(module: &Module, code: &str) -> Vec<Module> {
     let mut out = Vec::new();
     for start in ["crate::", "super::"] {
@@ -104,7 +104,7 @@ fn mentioned(module: &Module, code: &str) -> Vec<Module> {
     out
 }
 
-/// Of each parent module, which of its children mention which.
+/// For each parent module, which of its children mention which.
 type Edges = BTreeMap<Module, BTreeMap<String, BTreeSet<String>>>;
 
 fn edges(files: &[(Module, String)]) -> Edges {
@@ -112,7 +112,7 @@ fn edges(files: &[(Module, String)]) -> Edges {
     let mut edges = Edges::new();
     for (from, code) in files {
         for mut to in mentioned(from, code) {
-            // An item's own name is no module.
+            // The last part may be an item and not a module.
             while !to.is_empty() && !known.contains(&to) {
                 to.pop();
             }
@@ -126,7 +126,7 @@ fn edges(files: &[(Module, String)]) -> Edges {
     edges
 }
 
-/// A circle among siblings, if there is one.
+/// A cycle among siblings, if there is one.
 fn circle(edges: &BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
     fn walk(
         at: &str,

@@ -1,4 +1,4 @@
-//! From a recording that cannot show an effect, or tell two apart, to the one that does: the bench carries out what is planned.
+//! From a recording that cannot show an effect, or cannot distinguish two, to the planned one that can; the bench carries out the plan.
 
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::effects;
@@ -61,8 +61,8 @@ fn plan(diagnosis: &Diagnosis, targets: &[Target]) -> String {
     answer.plan(&setup, None, 100.0)
 }
 
-/// A first recording leaves the effect of `id` not excited; the recipe for it finds it and nothing else of the sensor, each
-/// coefficient within three sigmas of `truth`, SI: 1 in 120 sets of three is farther off by chance.
+/// A first recording does not excite the effect `id`. The planned recording shows it and nothing else of the sensor, each coefficient within three
+/// sigmas of `truth`, SI: 1 in 120 sets of three exceeds this by chance.
 fn shown_by_the_next(id: &str, unit: &RigFile, rates_dps: &[f64], seed: u64, truth: [f64; 3]) {
     let first = diagnosed(&first_plan(rates_dps), unit, seed);
     let open: Next = next(&first);
@@ -96,15 +96,14 @@ fn shown_by_the_next(id: &str, unit: &RigFile, rates_dps: &[f64], seed: u64, tru
 fn a_cubic_that_low_rates_cannot_show_is_found_by_the_next_experiment() {
     let sizes = [0.3, -0.25, 0.35];
     let unit = unit("gyro_scale_cubic", "dps_at_300dps", sizes);
-    // deg/s at 300 deg/s, over the cube of that.
+    // deg/s at 300 deg/s, over the cube of that rate.
     let truth = sizes.map(|s: f64| s.to_radians() / 300f64.to_radians().powi(3));
     shown_by_the_next("gyro_scale_cubic", &unit, &[10.0, 20.0], 1, truth);
 }
 
 #[test]
 fn an_accelerometer_s_cubic_that_six_faces_cannot_show_is_found_by_the_next_experiment() {
-    // The size of data sheets. A diagnosis divides by the scale factor that it found without the effect, so that a cubic of 15 mg/g³ comes
-    // out smaller by 1.5 %.
+    // Data-sheet size. A diagnosis divides by the scale factor that it found without the effect, so a cubic of 15 mg/g³ comes out 1.5 % too small.
     let sizes = [5.0, -4.0, 6.0];
     let unit = unit("accel_scale_cubic", "mg_per_g3", sizes);
     let truth = sizes.map(|s| s * 9.80665e-3 / 9.80665f64.powi(3));
@@ -113,7 +112,7 @@ fn an_accelerometer_s_cubic_that_six_faces_cannot_show_is_found_by_the_next_expe
 
 #[test]
 fn a_scale_factor_by_temperature_that_a_room_cannot_show_is_found_by_the_next_experiment() {
-    // Not a bias: what the unit warms up by itself in five minutes shows one of these already.
+    // Not a bias: five minutes of the unit's own warm-up already show that.
     let sizes = [350.0, -300.0, 400.0];
     let unit = unit("gyro_thermal_scale", "ppm_per_c", sizes);
     let truth = sizes.map(|s: f64| 1e-6 * s);
@@ -122,7 +121,7 @@ fn a_scale_factor_by_temperature_that_a_room_cannot_show_is_found_by_the_next_ex
 
 #[test]
 fn two_effects_that_one_rate_confuses_are_told_apart_by_the_next_experiment() {
-    // At ±150 deg/s and rest a square is an asymmetry.
+    // At ±150 deg/s and rest, a square and an asymmetry are the same.
     for (id, seed) in [("gyro_scale_quadratic", 3), ("gyro_scale_asymmetry", 4)] {
         let unit = unit(id, "dps_at_300dps", [0.6, -0.5, 0.7]);
         let first = diagnosed(&first_plan(&[150.0]), &unit, seed);

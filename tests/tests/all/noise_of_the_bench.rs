@@ -1,4 +1,4 @@
-//! Noise coefficients of units on the virtual bench, through their filters and converters, by what `mimu allan` computes.
+//! Noise coefficients that `mimu allan` computes for units of the virtual bench, through their filters and converters.
 
 use mimu::quantity::Sensor;
 use mimu::survey::{Options, Part, Survey, survey};
@@ -12,8 +12,8 @@ use mimu_rig::record::{Output, write};
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_tests::bench;
 
-/// N, B and K in SI of every gyro and every accelerometer, such that half an hour shows all three: flicker takes over from white
-/// noise at two seconds, and the random walk from flicker at six.
+/// N, B and K in SI of every gyro and every accelerometer, chosen so that half an hour shows all three: flicker exceeds white noise from two seconds
+/// on, and the random walk exceeds flicker from six.
 const TRUTH: [[f64; 3]; 2] = [[1.2e-3, 1.3e-3, 6e-4], [2.3e-3, 2.4e-3, 1.1e-3]];
 
 /// Half an hour at rest at 100 Hz.
@@ -72,7 +72,7 @@ fn white_noise_bias_instability_and_random_walk_are_within_their_intervals() {
         }
     }
     println!("of 36 channels N, B, K told {told:?}, inside {inside:?}; Q or R: {strange:?}");
-    // 95 % of 36 are 34; fewer than 30 have a probability of 3e-3.
+    // The expected number is 34 of 36 (95 %); fewer than 30 have a probability of 3e-3.
     for (i, term) in terms.into_iter().enumerate() {
         assert!(told[i] >= 34, "{term:?} told {}", told[i]);
         assert!(inside[i] + 6 >= told[i], "{term:?} inside {}", inside[i]);

@@ -1,5 +1,4 @@
-//! What a fit and a diagnosis say of recordings whose temperature ramps: the noise floor, the warning, and what is found. The truth is the
-//! bench's.
+//! Fit and diagnosis of recordings with temperature ramps: the noise floor, the warning and the effects found. The bench knows the truth.
 
 use std::sync::Arc;
 
@@ -20,7 +19,7 @@ const OPTIONS: Options = Options {
     only: None,
 };
 
-/// Six faces at rest and rates both ways, over and over, while the chamber goes through `chamber_c`.
+/// Six faces at rest and rates in both directions, repeated, while the chamber goes through `chamber_c`.
 fn plan(rounds: u32, dwell_s: f64, chamber_c: &[[f64; 2]]) -> String {
     let mut plan = format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\nrounds = {rounds}\nlead_in_s = 5.0\nchamber_c = {chamber_c:?}\n"
@@ -48,7 +47,7 @@ fn unit(seed: u64) -> RigFile {
     file
 }
 
-/// The same, whose biases follow the temperature, degrees per hour per kelvin and mg per kelvin.
+/// The same with biases that follow the temperature.
 fn thermal(seed: u64) -> RigFile {
     let mut file = unit(seed);
     let line = |slope: f64| [0.0, slope, 0.0, 0.0];
@@ -69,7 +68,7 @@ fn a_drift_with_a_temperature_that_ramps_is_not_taken_for_noise() {
     for seed in [1, 2, 3] {
         let still = floors(bench::recorded(&ramp, &unit(seed), seed));
         let drifting = floors(bench::recorded(&ramp, &thermal(seed), seed));
-        // 2 mg/K over a kelvin of a dwell is 20 mm/s², the noise of its mean below 1.
+        // 2 mg/K over one kelvin per dwell is 20 mm/s²; the noise of a dwell mean is below 1 mm/s².
         for (a, b) in still.iter().zip(&drifting) {
             assert!((b / a - 1.0).abs() < 0.02, "{still:?} {drifting:?}");
         }
@@ -78,8 +77,7 @@ fn a_drift_with_a_temperature_that_ramps_is_not_taken_for_noise() {
 
 #[test]
 fn at_a_constant_temperature_the_noise_floor_is_that_of_two_successive_means() {
-    // The thermometer alone makes the difference between the two variances: one that is not there, and one that shows a constant
-    // temperature, with its own noise.
+    // Only the thermometer could make the two variances differ: none, and one that shows a constant temperature with its own noise.
     let constant = plan(3, 20.0, &[[0.0, 25.0]]);
     for seed in [1, 2, 3] {
         let with = bench::recorded(&constant, &unit(seed), seed);
@@ -123,8 +121,8 @@ fn a_diagnosis_that_accepted_thermal_effects_does_not_say_that_the_model_has_no_
     assert!(said(&none)[0].ends_with("but the model does not depend on temperature"));
 }
 
-/// Cubics of bias and scale factor, and dies behind the thermometer by 150 s, from -20 to 70 °C and back: 43 rounds take 6000 s. 20 rounds
-/// show the way up only, on which a lag is a bias, and the held-out blocks reject it.
+/// Cubics of bias and scale factor, and dies that lag the thermometer by 150 s, from -20 to 70 °C and back: 43 rounds take 6000 s. 20 rounds would
+/// show only the way up. There a lag looks like a bias, and the held-out blocks reject it.
 #[test]
 fn what_is_found_from_the_data_does_not_keep_out_a_lag_and_what_is_significant_is_rejected_with_a_reason()
  {

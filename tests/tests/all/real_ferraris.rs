@@ -1,4 +1,4 @@
-//! Two sessions by Ferraris' method (six faces, three full turns by hand) with what imucal publishes for them.
+//! Two sessions by Ferraris' method (six faces, three full turns by hand) with the calibrations that imucal publishes for them.
 //!
 //! imucal's model goes from SI to raw: accelerometer `K_a R_a f + b_a`, gyro `K_g R_g w + K_ga f + b_g`, w in deg/s.
 
@@ -52,7 +52,7 @@ fn inputs(turn_deg: Option<f64>) -> String {
     text
 }
 
-/// imucal's calibration as it stands in its JSON files.
+/// imucal's calibration as in its JSON files.
 struct Published {
     accel: Affine<f64>,
     gyro: Affine<f64>,
@@ -60,7 +60,7 @@ struct Published {
 }
 
 impl Published {
-    /// `turn_sign`: -1 where imucal took turns of +360 degrees for -360, its default, and R_g is minus what it should be.
+    /// `turn_sign`: -1 if imucal took turns of +360 degrees for -360, its default; R_g then has the wrong sign.
     fn read(path: &Path, turn_sign: f64) -> Self {
         let text = std::fs::read_to_string(path).expect("it stands beside the recording");
         let json: serde_json::Value = serde_json::from_str(&text).expect("it is JSON");
@@ -94,13 +94,13 @@ impl Part {
     }
 }
 
-/// One session: what mimu is given, and what imucal made of it.
+/// One session: mimu's recording and imucal's calibration.
 struct Session {
     foreign: Foreign<'static>,
     parts: Vec<Part>,
     turn_deg: f64,
     published: Published,
-    /// Holds the files that the test has written.
+    /// Keeps the files of the test.
     _folder: TempDir,
 }
 
@@ -124,7 +124,7 @@ fn temporary() -> TempDir {
     TempDir::new().expect("there is a temporary folder")
 }
 
-/// The session in which every sample has the name of its part. Raw counts.
+/// The session whose samples are labelled with the name of their part. Raw counts.
 fn annotated() -> Option<Session> {
     let data = data_set("imucal_ferraris")?;
     let file = data.join("annotated_session.csv");
@@ -149,7 +149,7 @@ fn annotated() -> Option<Session> {
         }));
     }
     let foreign = Foreign {
-        // The parts stand in the order of their names, so the running number of a sample is no time.
+        // The parts are sorted by name, so the running number of a sample is not a time.
         files: vec![(file, "step,-,accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z")],
         rate_hz: Some(rate_hz),
         gravity_mps2: GRAVITY,
@@ -166,12 +166,12 @@ fn annotated() -> Option<Session> {
     })
 }
 
-/// The uninterrupted session with its list of parts. It is in m/s² and deg/s by the data sheet; the calibration that was
-/// published for it is for the counts of a converter with 2048 counts per g and 32768 counts for 2000 deg/s.
+/// The uninterrupted session with its list of parts. Its samples are in m/s² and deg/s by the data sheet; the published calibration is for counts of
+/// a converter with 2048 counts per g and 32768 counts for 2000 deg/s.
 const TO_COUNTS: [f64; 2] = [2048.0 / GRAVITY, 32768.0 / 2000.0];
 const SESSION_RATE_HZ: f64 = 102.4;
 
-/// Its samples in counts, time by the sample rate.
+/// Its samples in counts; the sample rate gives the time.
 fn session_samples(file: &Path) -> Samples {
     let rows = numbers(file);
     let triple = |r: &[f64], from: usize, scale: f64| {
@@ -315,12 +315,12 @@ fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases()
             &ours.matrix,
             &theirs.matrix,
         );
-        // Six opposite inputs are an orthogonal design, in which least squares takes the same differences as imucal. What is left
-        // is weighting: the faces' lengths give their means variances that differ by some 0.1 % of the excess variance, and
-        // that much of a residual of up to 17 counts on 2g.
+        // Six opposite inputs are an orthogonal design, for which least squares uses the same differences as imucal. Only the weights differ: the
+        // lengths of the faces make the variances of the means differ by some 0.1 % of the extra white variance, which acts on a residual of up to 17
+        // counts on 2 g.
         let worst = (ours.matrix - theirs.matrix).amax();
         assert!(worst < 2e-3, "{worst} counts per m/s^2");
-        // imucal takes the bias of a sensor from the pair along it alone, least squares from all three pairs.
+        // imucal takes the bias of a sensor only from the pair along its axis, least squares from all three pairs.
         let triad = &fit.sensor(Sensor::Accel).expect("fitted").estimated.triad;
         println!(
             "{:>24}bias: mimu    +-95 %    imucal   by pairs x, y, z",
@@ -338,11 +338,11 @@ fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases()
                 "", theirs.offset[i], pairs[0], pairs[1], pairs[2]
             );
             assert!((pairs[i] - theirs.offset[i]).abs() < 1e-6, "{pairs:?}");
-            // Weighted as above, so within the same 0.1 % of what the pairs scatter by.
+            // Weighted as above, so within 0.1 % of the scatter of the pairs.
             let spread = pairs.iter().fold(0.0, |m: f64, p| m.max((p - b).abs()));
             let mean = pairs.iter().sum::<f64>() / 3.0;
             assert!((b - mean).abs() < 2e-3 * spread, "{b} for {mean}");
-            // Pairs that disagree by 26 counts leave any of them uncertain by as much, and the interval must say so.
+            // Pairs that disagree by 26 counts leave each of them uncertain by as much, and the interval must include this.
             assert!((b - theirs.offset[i]).abs() < interval, "{b} +- {interval}");
         }
     });
@@ -372,16 +372,16 @@ fn turns_give_imucals_gyro_once_its_term_in_specific_force_is_added_back() {
             published.gyro.offset.y,
             published.gyro.offset.z
         );
-        // Weighted by their lengths as long as noise explains them, as here, the rests give the mean of all their samples, which is
-        // imucal's bias. Otherwise they are weighted evenly, and differ by up to their scatter, which is what sigma says.
+        // If noise explains the scatter of the rests, as here, they are weighted by length, and their mean over all samples is imucal's bias.
+        // Otherwise all rests have the same weight, and the difference is up to their scatter, which sigma includes.
         let triad = &fit.sensor(Sensor::Gyro).expect("fitted").estimated.triad;
         for i in 0..3 {
             let sigma = triad.forward_covariance[(9 + i, 9 + i)].sqrt();
             let off = (ours.offset[i] - published.gyro.offset[i]).abs();
             assert!(off < sigma, "{off} with a sigma of {sigma}");
         }
-        // Three turns determine nine numbers, so both reproduce the mean reading of each turn; mimu's as P w + b, imucal's with
-        // K_ga f more. Anything beyond rounding would be another duration of the turn or another bias.
+        // Three turns determine nine numbers, so both reproduce the mean reading of each turn: mimu as P w + b, imucal with the additional term K_ga
+        // f. A difference beyond rounding would mean another duration of the turn or another bias.
         let (mut term, mut largest) = (Matrix3::zeros(), 0.0_f64);
         for (axis, letter) in ["x", "y", "z"].iter().enumerate() {
             let part = session.part(&format!("{letter}_rot"));
@@ -414,8 +414,8 @@ fn turns_give_imucals_gyro_once_its_term_in_specific_force_is_added_back() {
             share.to_degrees(),
             1e3 * at_1g / scale
         );
-        // What the model without K_ga turns into scale factor and misalignment stays far below what turns by hand are good for:
-        // their axes are up to 1.5 degrees off.
+        // The model without K_ga turns that term into scale factor and misalignment. The error is far below that of turns by hand, whose axes are up
+        // to 1.5 degrees off.
         assert!(share.to_degrees() < 0.05, "{term}");
     });
 }
@@ -453,7 +453,7 @@ fn moves_between_faces_that_no_fit_has_seen_are_predicted_as_well_as_by_imucal()
             .collect(),
         ..samples.clone()
     };
-    // The gyro against its own accelerometer, and against the other's, to tell the two sensors' shares apart.
+    // The gyro with its own accelerometer and with the other one, to separate the contributions of the two sensors.
     let columns = [
         ("mimu", samples.direction_errors(&rows, &ours[0], &ours[1])),
         (
@@ -484,14 +484,14 @@ fn moves_between_faces_that_no_fit_has_seen_are_predicted_as_well_as_by_imucal()
     for ((name, _), rms) in columns.iter().zip(&all) {
         println!("{rms:8.3} rms {name}");
     }
-    // Known from imucal's own program, with its own integration of the same rows: 0.729.
+    // 0.729 is the result of imucal's own program, with its own integration of the same rows.
     assert!((all[1] - 0.729).abs() < 0.002, "{} deg", all[1]);
-    // The two calibrations differ by a bias of the accelerometer of 3 counts, 0.08 degrees of direction, so that much either way is
-    // chance; the degree between x_p and x_a is in the sensors or the hand.
+    // The two calibrations differ by an accelerometer bias of 3 counts, 0.08 degrees of direction, so differences of that size are chance. The degree
+    // between x_p and x_a comes from the sensors or the hand.
     assert!(all[0] < all[1] + 0.08, "{} deg", all[0]);
 }
 
-/// The session of six faces and three turns as one by hand, whose columns are named so.
+/// The session of six faces and three turns as a recording by hand, with these columns.
 fn by_hand(columns: &'static str) -> Option<mimu_recording::error::Result<Fit>> {
     let data = data_set("imucal_ferraris")?;
     let foreign = Foreign {
@@ -511,8 +511,8 @@ fn six_faces_taken_for_poses_by_hand_are_refused_with_what_they_lack_where_no_gy
     let Some(fit) = by_hand("sample,-,-,-,accel_x,accel_y,accel_z") else {
         return;
     };
-    // Six faces up to a degree or two give six numbers: scale factors and biases. The three non-orthogonalities hang
-    // on those degrees, and repeating a face adds none.
+    // Six faces, accurate to a degree or two, determine six numbers: scale factors and biases. The three non-orthogonalities depend on these small
+    // deviations, and repeated faces add nothing.
     let error = fit.expect_err("it lacks slanted poses");
     println!("{error}");
     for name in ["C_yx", "C_zx", "C_zy", "undetermined", "add poses"] {
@@ -533,7 +533,7 @@ fn with_the_turns_between_them_six_faces_by_hand_have_the_scale_factors_and_bias
     let physical = found.estimated.triad.physical(mimu::triad::Angles::Exact);
     let data = data_set("imucal_ferraris").expect("it was there");
     let published = Published::read(&data.join("legacy_calibration_pre_2.0.json"), 1.0).accel;
-    // Of the counts that imucal was given, 2048 are a g.
+    // imucal's input has 2048 counts per g.
     let counts = 2048.0 / GRAVITY;
     for i in 0..3 {
         let scale = published.matrix.row(i).norm() / counts;
@@ -543,8 +543,8 @@ fn with_the_turns_between_them_six_faces_by_hand_have_the_scale_factors_and_bias
             "{:.5} ± {:.5} {scale:.5}   {:.4} ± {:.4} {bias:.4} m/s²",
             s.value, s.interval, b.value, b.interval
         );
-        // imucal takes the faces to be level: of a degree off, a scale factor errs by 1.5e-4, and a bias by 1.5 mm/s² and what
-        // the two ends of an axis differ by.
+        // imucal takes the faces to be level. A degree off level changes a scale factor by 1.5e-4, and a bias by 1.5 mm/s² plus the difference
+        // between the two ends of an axis.
         assert!((s.value - scale).abs() < 5e-4, "{} {scale}", s.value);
         assert!((b.value - bias).abs() < 5e-3, "{} {bias}", b.value);
     }

@@ -64,7 +64,7 @@ const PUBLISHED: [[f64; 5]; 21] = [
     [-0.074, 0.069, -0.079, 0.015, 0.075],
 ];
 
-/// What the program that belongs to the publication computes from the same files at its last revision.
+/// Results of the publication's own program, in its last revision, for the same files.
 const PROGRAM: [[f64; 5]; 21] = [
     [0.3595, 0.4661, 0.3791, 0.2614, 0.2454],
     [0.3108, 0.4780, 0.3493, 0.4438, 0.2844],
@@ -91,9 +91,8 @@ const PROGRAM: [[f64; 5]; 21] = [
 
 const UNITS: std::ops::Range<usize> = 0..5;
 
-/// The largest difference between the published table and what its own program computes, by kind of parameter: it
-/// predates the correction of an index that overwrote residuals, and its gyro biases are multiples of 0.001 rad/s.
-/// accelerometer s, m, b; gyro s, m, b, eps, three of each.
+/// The largest difference between the published table and the program's results, by kind of parameter: accelerometer s, m, b; gyro s, m, b, eps,
+/// three of each. The table was made before an index error that overwrote residuals was corrected, and its gyro biases are multiples of 0.001 rad/s.
 const IRREPRODUCIBLE: [f64; 7] = [0.022, 0.0126, 0.002, 0.024, 0.0214, 0.0319, 0.0142];
 
 fn column(table: &[[f64; 5]; 21], unit: usize) -> Parameters {
@@ -228,11 +227,10 @@ fn accelerometers_agree_with_the_published_ones_and_gyros_where_the_table_can_be
             if far && k < 9 {
                 outside.push((unit, NAMES[k]));
             }
-            // The program leaves 0.1 deg of each turn unexplained (rms), which over its 22 turns, of which a third sees a
-            // parameter well, is 0.04 deg or 0.06 % of it; three of that and mimu's own 0.1 are 0.2. Unit 1 is
-            // out of the question: the program takes six samples for a dwell, with 0.9 deg left in the turns before
-            // and after it. Biases: mimu's are those of seventy seconds at rest, the program's
-            // those of the turns alone, with 0.1 deg left in 2.5 s each.
+            // The program leaves 0.1 deg of each turn unexplained (rms). Over its 22 turns, a third of which determine a parameter well, this gives
+            // 0.04 deg or 0.06 % of it; three times that and mimu's own 0.1 make 0.2. Unit 1 is excluded: the program takes six samples for a dwell,
+            // and the turns before and after it have residuals of 0.9 deg. Biases: mimu's come from seventy seconds at rest, the program's from the
+            // turns alone, with residuals of 0.1 deg in 2.5 s each.
             if k >= 9 && unit != 1 {
                 let limit = if (15..18).contains(&k) { 0.06 } else { 0.2 };
                 let off = (program * sigma).abs();
@@ -244,8 +242,8 @@ fn accelerometers_agree_with_the_published_ones_and_gyros_where_the_table_can_be
         "\noutside the interval and the table's irreproducibility: accel {} of 45, gyro {gyro_outside} of 60",
         outside.len()
     );
-    // The accelerometer's residual is noise, so the intervals hold as they stand: 2 of 45 are expected outside 95 %, and the
-    // two estimates have most of their samples in common.
+    // The accelerometer's residual is noise, so the intervals are valid: 2 of 45 are expected outside 95 %, and the two estimates share most of their
+    // samples.
     assert!(outside.len() <= 2, "{outside:?}");
 }
 
@@ -297,11 +295,11 @@ fn on_the_same_rests_sizes_of_gravity_are_closer_than_by_the_published_program()
             rate[2],
         );
         for (a, b) in angle.iter().zip(&by_quaternions) {
-            // Two integrations of the same samples: mimu's begins and ends at the limits of its blocks, up to a sample off
-            // at no more than 0.1 deg/s, and takes the coning between samples.
+            // Two integrations of the same samples: mimu's begins and ends at block limits, up to a sample off at no more than 0.1 deg/s, and
+            // includes the coning between samples.
             assert!((a - b).abs() < 0.005, "{a} and {b} deg");
         }
-        // In sample on both sides: an estimator that cannot do this is not minimizing.
+        // Both errors are in sample: an estimator that cannot beat this does not minimise.
         assert!(
             size[0] < size[2] && size[0] < size[1] && rate[0] < rate[2],
             "unit {unit}"
@@ -309,13 +307,13 @@ fn on_the_same_rests_sizes_of_gravity_are_closer_than_by_the_published_program()
     }
 }
 
-/// A rest that two units have in common: the rows of both, and the row of both in its middle.
+/// A rest that two units share: the row ranges of both, and the middle row of both.
 struct Common {
     rows: [std::ops::Range<usize>; 2],
     middle: [usize; 2],
 }
 
-/// The files begin and end together, so the same share of the rows is the same instant; at rest some tenths of a second do not matter.
+/// The files begin and end together, so the same fraction of the rows is the same instant; at rest some tenths of a second do not matter.
 fn common(rests: [&[std::ops::Range<usize>]; 2], lengths: [usize; 2]) -> Vec<Common> {
     let ratio = lengths[1] as f64 / lengths[0] as f64;
     rests[0]
@@ -334,7 +332,7 @@ fn common(rests: [&[std::ops::Range<usize>]; 2], lengths: [usize; 2]) -> Vec<Com
         .collect()
 }
 
-/// Rotation that takes the directions `b` to the directions `a`, by least squares (Wahba).
+/// Rotation from the directions `b` to the directions `a`, by least squares (Wahba).
 fn mounting(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> UnitQuaternion<f64> {
     let sum: Matrix3<f64> = a.iter().zip(b).map(|(a, b)| a * b.transpose()).sum();
     let svd = sum.svd(true, true);
@@ -343,7 +341,7 @@ fn mounting(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_matrix(&(u * proper * v))
 }
 
-/// The five units lay on one board. What they say of its rotations must agree, heading included, and no calibration was fitted to that.
+/// The five units were fixed to one board, so their estimates of its rotations must agree, heading included; no calibration used this.
 #[test]
 fn units_on_one_board_agree_better_on_its_rotations_than_by_the_published_calibrations() {
     let mut units = Vec::new();
@@ -428,7 +426,7 @@ fn units_on_one_board_agree_better_on_its_rotations_than_by_the_published_calibr
             names[k], rotation[k], angle[k], gravity[k]
         );
     }
-    // The angle of a rotation depends on no mounting and on no accelerometer, so that it is the gyros that are compared.
+    // The angle of a rotation depends on neither mounting nor accelerometer, so this compares the gyros.
     assert!(
         rotation[0] < rotation[2] && rotation[2] < rotation[1],
         "{rotation:?}"

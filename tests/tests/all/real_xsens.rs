@@ -1,6 +1,6 @@
 //! The Xsens recording that came with IMU-TK (Tedaldi, Pretto, Menegatti, ICRA 2014), held by hand.
 //!
-//! Known answers: what IMU-TK itself computes from these files, in sample and with the same four blocks of dwells held out.
+//! Expected values: the results of IMU-TK for these files, in sample and with the same four blocks of dwells held out.
 
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
@@ -49,7 +49,7 @@ fn the_dwells_of_a_recording_by_hand_are_found() {
         accel.residuals.len(),
         gyro.residuals.len()
     );
-    // IMU-TK finds 38 too, at each of its thresholds from 5 to 9; every dwell but the first ends a turn.
+    // IMU-TK also finds 38, at each of its thresholds from 5 to 9. Every dwell but the first ends a turn.
     assert_eq!((accel.residuals.len(), gyro.residuals.len()), (38, 37));
 }
 
@@ -75,8 +75,8 @@ fn errors_in_sample_and_on_held_out_blocks_are_below_those_of_imu_tk() {
         1e3 * accel.noise_floor(),
         gyro.noise_floor().to_degrees()
     );
-    // In sample the limit is IMU-TK's own figure. Held out it is what the accelerometer has been seen to reach with little to spare
-    // (1.56 mm/s^2; IMU-TK, given dwell means in place of its samples, reaches 1.57), and what just beats IMU-TK for the gyro.
+    // In sample the limit is IMU-TK's own figure. Held out, the limit for the accelerometer is just above its present error (1.56 mm/s²; IMU-TK,
+    // given dwell means in place of its samples, reaches 1.57). For the gyro it is just below IMU-TK's error.
     assert!(size[0] <= 1.1 && size[1] <= 1.6, "{size:?} mm/s^2");
     assert!(
         angle[0] <= IMU_TK_DEG[0] && angle[1] <= 0.60,
@@ -143,7 +143,7 @@ fn parameters_agree_with_those_of_imu_tk_in_its_own_frame() {
         (squares[1] / 12.0_f64).sqrt(),
     ];
     println!("rms {accel:.2} sigmas (accel), {gyro:.2} sigmas (gyro); {far} of 21 outside");
-    // Who is right about the gyro's bias? IMU-TK takes the first rest for it, mimu all of them.
+    // Which gyro bias is right? IMU-TK takes it from the first rest, mimu from all rests.
     let inverse = |k: &[f64], t: Matrix3<f64>, b: &[f64]| {
         let matrix = t * Matrix3::from_diagonal(&Vector3::from_column_slice(k).map(f64::recip));
         Affine {
@@ -170,8 +170,8 @@ fn parameters_agree_with_those_of_imu_tk_in_its_own_frame() {
         );
     }
     assert!(mimu.rest_rps < imu_tk.rest_rps && mimu.direction_rad < imu_tk.direction_rad);
-    // Both have the same samples, so nine of nine within 95 % would be no surprise; one outside is chance, two are not. The gyro's
-    // biases are left out, being defined otherwise.
+    // Both use the same samples, so all nine within 95 % would be expected. One outside is chance, two are not. The gyro's biases are left out,
+    // because their definitions differ.
     let outside = |from: usize| {
         let nine = from..from + 9;
         nine.filter(|&k| off[k].abs() * ours[k].1 > ours[k].2)

@@ -1,4 +1,4 @@
-//! A gyro on a record player: what mimu makes of good recordings, and what it says of bad ones.
+//! A gyro on a record player: results from good recordings, and messages for bad ones.
 
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
@@ -29,7 +29,7 @@ fn turntable(rates: &str, error: f64) -> Turntable {
     Turntable::new(&rates, error)
 }
 
-/// The steps of a plan that `kept` takes, by number.
+/// The steps of a plan that `kept` selects by number.
 fn steps(plan: &str, kept: impl Fn(usize) -> bool) -> String {
     let mut steps = plan.split("[[step]]");
     let head = steps.next().expect("a head").to_owned();
@@ -78,7 +78,7 @@ fn dwells_that_nobody_numbered_are_found_and_given_their_rates() {
     };
     let prepared = Prepared::read(&recording, found, |_| ()).expect("readable");
     let rated = RatedDwells::of(&prepared).expect("rated");
-    // The bench's table turns on at 60 deg/s between its rates, and stands still for a while after them.
+    // The bench's table slews at 60 deg/s between its rates and then rests for a while.
     assert!(rated.rests.len() >= 14, "{}", rated.rests.len());
     for rate in 0..2 {
         assert_eq!(rated.rate_of.iter().filter(|r| **r == rate).count(), 14);
@@ -106,7 +106,7 @@ fn the_error_of_the_rates_is_printed_and_in_the_intervals_and_no_number_of_dwell
         "{}",
         said(&rough)
     );
-    // Two rates with independent errors: their mean is known better by √2 at most.
+    // For two rates with independent errors, the mean improves by √2 at most.
     assert!(
         (0.006..0.0105).contains(&relative(&rough)),
         "{}",
@@ -184,7 +184,7 @@ fn rates_that_contradict_each_other_are_said_and_readings_in_si_tell_33_rpm_from
     );
     let text = fit_text(&FitResult::of(&fit), false);
     assert!(text.contains("next: correct the rates"), "{text}");
-    // A unit that reports rad/s, about: 5 mV/(deg/s) about 2.5 V.
+    // A unit that reports approximately rad/s: 5 mV/(deg/s) about 2.5 V.
     let plan = steps(&bench::record_player_plan(14, [0.0; 2], SEED), |i| {
         i % 3 < 2
     });

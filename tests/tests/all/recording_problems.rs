@@ -1,4 +1,4 @@
-//! What is wrong with a recording is one typed list, first in the text, a line for each kind.
+//! The problems of a recording form one typed list, which comes first in the text, one line per kind.
 
 use mimu::fit::{Fit, Options, fit};
 use mimu::recording_problem::RecordingProblem;
@@ -60,7 +60,7 @@ fn a_face_that_no_pose_had_up_is_named() {
 #[test]
 fn an_offset_that_no_part_has_and_a_wrong_unit_are_said() {
     let mut prepared = bench::recorded(&bench::hand_plan(30), &unit(), SEED);
-    // Volts that are said to be m/s²: 1.65 V at rest, 0.08 V for a m/s².
+    // Volts declared as m/s²: 1.65 V at rest, 0.08 V per m/s².
     prepared.manifest.raw_unit = RawUnit::Si;
     let fit = fit(prepared, Options::default()).expect("a fit");
     let found = ids(&fit);
@@ -80,7 +80,7 @@ fn the_list_is_first_and_a_summary_has_at_most_25_lines_of_100_columns() {
         let [summary, all] = [false, true].map(|verbose| fit_text(&result, verbose));
         println!("{summary}");
         assert!(summary.lines().count() <= 25, "{summary}");
-        // Sentences stand on one line each, tables keep to the columns.
+        // A sentence is one line; tables keep to the columns.
         let sentences = ["  - ", "warning:", "next:", "verdict:"];
         for line in summary
             .lines()

@@ -1,6 +1,6 @@
 //! Diagnosis of several recordings of one unit, and of one that was never turned.
 //!
-//! Between recordings a unit is switched off: its biases are others after it, and nothing may be made of that.
+//! Between recordings a unit is switched off, so its biases change; this must not be taken for an effect.
 
 use mimu::diagnose::rejected::Reason;
 use mimu::diagnose::{Diagnosis, Recordings, Verdict, diagnose};
@@ -20,7 +20,7 @@ const OPTIONS: Options = Options {
     only: None,
 };
 
-/// A session of the unit `file`: noise and order by `seed`, the biases moved by 15 mV (3 deg/s) and 20 mV (25 mg).
+/// A session of the unit `file`: the seed determines noise and order, and the biases move by 15 mV (3 deg/s) and 20 mV (25 mg).
 fn session(file: &RigFile, seed: u64) -> Prepared {
     let mut file = file.clone();
     for (k, (model, by)) in [
@@ -90,7 +90,7 @@ fn two_recordings_know_an_effect_better_than_one_by_the_root_of_two() {
             .clone()
     };
     let ratio = (sigmas(&alone).trace() / sigmas(&both).trace()).sqrt();
-    // The wander that each session has is of its own: exactly the root of two but for how often each pose was taken.
+    // Each session has its own wander. The ratio is exactly the root of two, apart from how often each pose was taken.
     assert!((1.3..1.55).contains(&ratio), "{ratio}");
 }
 
@@ -104,7 +104,7 @@ fn a_second_recording_bears_an_effect_out_or_refuses_it() {
     assert!(second.shows);
     assert!(second.rms_after < second.rms_before && second.rms_after < 1.3 * gyro.noise_floor);
 
-    // What one session alone has, like a fixture that bends, is no property of the unit.
+    // An effect in one session only, such as a fixture that bends, is not a property of the unit.
     let mut other = file.clone();
     other.effect.clear();
     let refuted = judged_by(session(&file, 71), session(&other, 72));
@@ -144,7 +144,7 @@ fn cooling() -> Option<Prepared> {
         rate_hz: Some(50.0),
         gravity_mps2: 9.804,
         raw_unit: RawUnit::Si,
-        // Halved, as its authors do; 172 counts a degree, from an origin that nobody recorded.
+        // Halved, as its authors do; 172 counts per degree, from an unrecorded origin.
         scales: &["t_s=0.001", "gyro=0.5", "temp_c=0.0058139535"],
         inputs: None,
     };
@@ -205,7 +205,7 @@ fn ten_poses_by_hand_leave_nothing_to_find_in_an_accelerometer() {
     let found = diagnose(prepared.into(), OPTIONS).expect("a diagnosis");
     assert!(found.effects.is_empty(), "{:?}", ids(&found));
     let accel = &found.sensors[1].decision;
-    // One of the ten is too short; nine poses, nine parameters.
+    // One of the ten is too short; nine poses determine nine parameters.
     assert_eq!(accel.rows, [9, 9]);
     assert!(
         accel

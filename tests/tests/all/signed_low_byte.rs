@@ -1,4 +1,4 @@
-//! A firmware on the bench that takes the low byte of a reading for a signed number: its readings are refused, and nobody else's.
+//! A firmware on the bench that takes the low byte of a reading for a signed number: its readings are refused, and only those.
 
 use mimu::fit::{Method, Options, fit};
 use mimu::prepared::Prepared;
@@ -52,7 +52,7 @@ fn an_import_that_mends_the_low_byte_gives_the_calibration_of_the_same_unit_with
     sound.effect.clear();
     let plan = bench::hand_plan(20);
     for seed in 1..=3 {
-        // Both come in through the same door: an import gives samples their times.
+        // Both recordings are imported, because an import assigns times to the samples.
         let imported = |file: &RigFile, columns: &[&str]| {
             let folder = bench::written(&plan, file, seed);
             let recording = Recording::open(&folder.path().join("recording")).unwrap();
@@ -81,7 +81,7 @@ fn an_import_that_mends_the_low_byte_gives_the_calibration_of_the_same_unit_with
             );
             assert_eq!(a.forward_covariance, b.forward_covariance);
         }
-        // Of a sensor that is not mended the fault stays, and is refused as before.
+        // In a sensor that is not mended, the fault remains and is refused as before.
         let refused = fit(imported(&faulty, &["gyro"]), OPTIONS)
             .unwrap_err()
             .to_string();

@@ -1,4 +1,4 @@
-//! The noise of the unit at rest in the hands of the other commands.
+//! The noise of the unit at rest, as used by the other commands.
 
 use mimu::fit::{Method, Options, fit};
 use mimu::noise::noise_file::NoiseFile;
@@ -77,7 +77,7 @@ fn wander_between_the_dwells_is_in_the_noise_floor() {
         let walk = channel.n.as_ref().unwrap().value;
         channel.k.as_mut().unwrap().value = walk;
     }
-    // A walk that is K = N/s: K² T/6 on the average over a session of length T, and T is 22 dwells and the moves.
+    // With a random walk K = N/s, its variance averages K² T/6 over a session of length T; T is 22 dwells and the moves.
     let dwells = &prepared.dwells.list;
     let session_s = dwells.last().unwrap().last_s - dwells[0].start_s;
     let stated = gyro_floor(prepared.with_noise(&noise).unwrap());
@@ -144,7 +144,7 @@ fn the_useful_dwell_is_where_the_curve_is_within_five_per_cent_of_its_least() {
         let least = (0..6000)
             .map(|i| noise.sigma(1.002_f64.powi(i)))
             .fold(f64::INFINITY, f64::min);
-        // Where only a floor is left, it is approached and never reached.
+        // If only a floor is left, it is approached but never reached.
         let least = if noise.k > 0.0 {
             least
         } else {

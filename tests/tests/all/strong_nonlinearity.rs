@@ -1,4 +1,4 @@
-//! Units by hand that bend by far more than data sheets say: nothing but gravity's size tells by how much, and it is not linear in it.
+//! Units by hand with nonlinearities far above data-sheet size. Only the magnitude of gravity determines them, and it is not linear in them.
 
 use mimu::diagnose::{Verdict, diagnose};
 use mimu::fit::{Method, Options};
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 const G: f64 = 9.806_65;
 const SEEDS: u64 = 8;
 
-/// Mean square of the turns of a unit over that of noise and of the errors that the directions of gravity are said to have.
+/// Mean square of the turn residuals over that expected from noise and from the reported errors of the directions of gravity.
 fn turns(seed: u64) -> f64 {
     let mut random = Random::new(seed, "cubic");
     let mg: [f64; 3] = std::array::from_fn(|_| {
@@ -47,8 +47,8 @@ fn turns(seed: u64) -> f64 {
         let [value, sigma] = [one.effect.values[axis], one.covariance[(axis, axis)].sqrt()];
         let [value, sigma] = [value, sigma].map(|v| v * 1e3 * G * G);
         println!("  {axis}: {mg:.2} mg/g³, found {value:.2} ± {sigma:.2}");
-        // The device evaluates an effect twice. The square of the slope at 1 g, 0.8 % at 3 %, is the share that this leaves, as a seventh
-        // power of the force, and the cube nearest to that has up to twice its size.
+        // The device evaluates an effect twice. The square of the slope at 1 g, 0.8 % at 3 %, is the share that remains. It is a seventh power of the
+        // force, and the nearest cubic is up to twice its size.
         let left = 2.0 * (3.0 * mg * 1e-3).powi(2) * mg.abs();
         assert!((value - mg).abs() < 4.0 * sigma + left, "seed {seed}");
     }

@@ -1,5 +1,5 @@
-//! Temperature in fit and diagnosis: sweeps that no affine model follows, intervals of lags, matrices that are given, one pose, and the
-//! time since power-on. The truth is the bench's.
+//! Temperature in fit and diagnosis: sweeps that no affine model follows, intervals of lags, given matrices, one pose, and the time since power-on.
+//! The bench knows the truth.
 
 use mimu::warning::Warning;
 use std::fmt::Write as _;
@@ -27,7 +27,7 @@ const OPTIONS: Options = Options {
 
 type Step = ([f64; 3], f64);
 
-/// A plan of `steps`, body axis up and rate in deg/s, of `dwell_s` at 50 Hz, while the chamber goes through `chamber_c`.
+/// A plan of `steps` (body axis up, rate in deg/s), each `dwell_s` long at 50 Hz, while the chamber goes through `chamber_c`.
 fn plan(steps: &[Step], dwell_s: f64, chamber_c: &[[f64; 2]]) -> String {
     let mut plan = format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = 50.0\ncarrier = \"table\"\nlead_in_s = 5.0\nchamber_c = {chamber_c:?}\n"
@@ -61,7 +61,7 @@ fn randomised(mut steps: Vec<Step>, seed: u64) -> Vec<Step> {
     steps
 }
 
-/// A unit whose thermometer is on its dies, warmed up and without heat of its own: what it lags by is the effect's.
+/// A warmed-up unit whose thermometer is on its dies and that does not heat itself: the only lag is the effect's.
 fn unit(effects: &[&str], seed: u64) -> RigFile {
     let mut random = Random::new(seed, "unit");
     let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
@@ -108,7 +108,7 @@ fn ids(diagnosis: &Diagnosis) -> Vec<String> {
         .collect()
 }
 
-/// 80 °C up and back while poses at rest go on, and six rates at the end: the bias moves by as much as the rates.
+/// 80 °C up and down during poses at rest, with six rates at the end: the bias changes by as much as the rates.
 fn chamber(seed: u64) -> Prepared {
     let mut steps: Vec<Step> = Vec::new();
     for _ in 0..10 {
@@ -133,7 +133,7 @@ fn a_sweep_that_moves_the_bias_by_more_than_the_rates_is_fitted_and_its_effect_i
     let prepared = chamber(1);
     let fitted = fit(prepared.clone(), OPTIONS).expect("a fit");
     let gyro = fitted.sensor(Sensor::Gyro).expect("recorded");
-    // More than the share of the inputs from which on readings follow nothing.
+    // The warning shows that the residuals exceed the share of the inputs above which readings count as unrelated.
     let warned = gyro.warnings.iter().map(Warning::to_string);
     let mut warned = warned.filter(|w| w.contains("a model without temperature"));
     assert!(warned.next().is_some(), "{:?}", gyro.warnings);
@@ -154,7 +154,7 @@ fn a_sweep_that_moves_the_bias_by_more_than_the_rates_is_fitted_and_its_effect_i
 
 #[test]
 fn a_sweep_whose_readings_follow_no_input_is_refused_though_they_follow_the_temperature() {
-    // Rates that were written to the wrong dwells, and a gyro that reads nothing but its temperature.
+    // Rates assigned to the wrong dwells, and a gyro that reads only its temperature.
     let mut shuffled = chamber(2);
     let inputs: Vec<[f64; 6]> = shuffled.dwells.list.iter().map(|d| d.reference).collect();
     let n = inputs.len();
@@ -186,7 +186,7 @@ fn a_sweep_whose_readings_follow_no_input_is_refused_though_they_follow_the_temp
     }
 }
 
-/// How often intervals held the truth: lags, coefficients, and coefficients by the covariance for the lag found.
+/// How often intervals contained the truth: lags, coefficients, and coefficients by the covariance conditional on the found lag.
 #[derive(Debug, Default)]
 struct Held {
     lags: [u32; 2],
@@ -200,7 +200,7 @@ fn count(into: &mut [u32; 2], held: bool) {
     into[1] += 1;
 }
 
-/// A unit that lags by 20 to 110 s, on a table while the chamber warms by 20 °C and cools again.
+/// A unit with a lag of 20 to 110 s, on a table while the chamber warms by 20 °C and cools again.
 fn lagging(seed: u64) -> (RigFile, Prepared) {
     let file = unit(&["gyro_thermal_lag"], seed);
     let file = with(file, "dps_per_c", vec![0.15, -0.1, 0.12]);
@@ -264,7 +264,7 @@ fn share([held, of]: [u32; 2]) -> f64 {
 fn intervals_of_a_lag_and_of_its_coefficients_hold_the_truth() {
     let held = lags(8);
     assert!(held.unknown <= 1, "{held:?}");
-    // Of eight three are missed once in two hundred times, and of twenty-four five.
+    // Three misses of eight have a probability of 1 in 200, and so have five of twenty-four.
     assert!(
         share(held.lags) >= 0.75 && share(held.coefficients) >= 0.8,
         "{held:?}"
@@ -284,7 +284,7 @@ fn of_more_units_intervals_of_a_lag_hold_the_truth_in_93_to_97_of_a_hundred() {
             "{held:?}"
         );
     }
-    // By the covariance for the lag found they do not.
+    // With the covariance conditional on the found lag they do not.
     assert!(share(held.conditional) < 0.9, "{held:?}");
 }
 
@@ -323,7 +323,7 @@ fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
     );
 }
 
-/// A calibration of `file` by a short recording at one temperature.
+/// A calibration of `file` from a short recording at one temperature.
 fn short(file: &RigFile, seed: u64) -> Calibration {
     let plan = plan(&faces(&[-60.0, 60.0]), 1.5, &[[0.0, 25.0]]);
     let fitted = fit(recorded(&plan, file, seed), OPTIONS).expect("a fit");

@@ -12,10 +12,10 @@ use rayon::prelude::*;
 const G: f64 = 9.80665;
 /// deg/s per g: rows are axes that err.
 const SENSITIVITY: [[f64; 3]; 3] = [[0.2, 0.1, 0.05], [0.02, -0.15, 0.0], [0.1, 0.0, 0.1]];
-/// The board beside the point where the table's axes meet, mm.
+/// Position of the board relative to the intersection of the table's axes, mm.
 const BESIDE_MM: [f64; 3] = [2.0, -3.0, 5.0];
 
-/// A unit with a g-sensitivity, beside the centre of a table without other flaws.
+/// A unit with a g-sensitivity, off the centre of a table without other flaws.
 fn found(seed: u64) -> Diagnosis {
     let mut random = Random::new(seed, "unit");
     let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
@@ -74,7 +74,7 @@ fn g_sensitivity_and_a_lever_arm_are_named_where_gravity_turns_through_the_unit(
 
 #[test]
 fn noise_of_blocks_makes_no_effect_of_a_clean_unit_whose_inputs_turn() {
-    // Read by their own noisy block means, the bits of a gyro's code passed for an effect here.
+    // When the block means, with their noise, determined the bits of a gyro's code, those passed for an effect here.
     let case = case_on(&turning_plan(0), &[], 0);
     assert_eq!(case.verdict, "clean", "{case:?}");
 }
@@ -85,7 +85,7 @@ fn a_force_that_is_read_with_the_rate_across_it_is_suggested_for_every_axis() {
     let case = case_on(&turning_plan(1), &["x_accel_rotation_coupling"], 1);
     assert_eq!(case.verdict, "unexplained", "{case:?}");
     for (error, one, other) in [("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y")] {
-        // Of a rate along the force the product is the same either way.
+        // If the rate is along the force, both products are equal.
         let either = [(one, other), (other, one)]
             .map(|(rate, force)| format!("term:accel_{error}~rate_{rate}*force_{force}: "));
         let suggested = |r: &String| {
@@ -119,7 +119,7 @@ fn intervals_of_coefficients_hold_the_truth_where_gravity_turns_through_the_unit
             Sensor::BOTH[k],
             100.0 * inside
         );
-        // Four sigmas of so many, as if they were independent.
+        // Four sigmas for this number of coefficients, as if they were independent.
         let margin = 4.0 * (0.07 * 0.93 / n).sqrt();
         assert!((0.93 - margin..0.97 + margin).contains(&inside), "{inside}");
     }

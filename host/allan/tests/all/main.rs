@@ -1,4 +1,4 @@
-//! Deviations, intervals and models against published answers and noise that other code makes.
+//! Deviations, intervals and models against published results and against noise made by other code.
 
 mod model;
 mod spectrum;

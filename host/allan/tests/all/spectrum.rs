@@ -42,8 +42,8 @@ fn add_line(rates: &mut [f64], hz: f64, rms: f64, seed: u64) {
     }
 }
 
-/// Adds what a structure of resonance `hz` does when it is shaken at random: amplitude and phase wander, and the density is a
-/// Lorentzian, `width_hz` wide at half its height.
+/// Adds the response of a structure with resonance `hz` to random excitation: amplitude and phase wander, and the density is a Lorentzian, `width_hz`
+/// wide at half its height.
 fn add_bump(rates: &mut [f64], hz: f64, width_hz: f64, rms: f64, seed: u64) {
     let mut random = Random::new(seed, "bump");
     let keep = (-PI * width_hz * DT_S).exp();
@@ -56,13 +56,13 @@ fn add_bump(rates: &mut [f64], hz: f64, width_hz: f64, rms: f64, seed: u64) {
     }
 }
 
-/// The least that 95 % of `runs` fall to once in a thousand times.
+/// The smallest count of `runs` at 95 %; fewer occur once in a thousand times.
 fn least(runs: usize) -> usize {
     let n = runs as f64;
     (0.95 * n - 3.1 * (0.05 * 0.95 * n).sqrt()).floor() as usize
 }
 
-/// Of so many runs of pure noise, in how many something is set aside.
+/// Number of runs of pure noise in which something is set aside.
 fn with_lines(of: [f64; 3], samples: usize, runs: u64) -> usize {
     let has_lines = |seed: &u64| {
         let before = noise(of, samples, *seed);
@@ -74,7 +74,7 @@ fn with_lines(of: [f64; 3], samples: usize, runs: u64) -> usize {
     (0..runs).into_par_iter().filter(has_lines).count()
 }
 
-/// Of so many runs with a steady line, in how many the interval holds its effective value.
+/// Number of runs with a steady line in which the interval contains its rms.
 fn steady_line(rms: f64, runs: u64) -> usize {
     let held = |seed: &u64| {
         let mut rates = noise([1.0, 0.3, 0.05], SAMPLES, *seed);
@@ -84,7 +84,7 @@ fn steady_line(rms: f64, runs: u64) -> usize {
             *rate += 1e3 + 1e-4 * i as f64;
         }
         let found = set_aside(&mut rates, DT_S, 0.95);
-        // One run in two hundred also has a false one.
+        // One run in two hundred also has a false line.
         assert!(!found.lines.is_empty() && !found.remains, "{found:?}");
         let line = &found.lines[0];
         // The frequency of a sinusoid of amplitude A is known to √(6/T)/(π A T) Hz beside N = 1 (Rife and Boorstyn 1974); one that is
@@ -100,7 +100,7 @@ fn steady_line(rms: f64, runs: u64) -> usize {
     (0..runs).into_par_iter().filter(held).count()
 }
 
-/// Of so many runs with a bump, in how many the interval of the white band holds N.
+/// Number of runs with a bump in which the interval of the white band contains N.
 fn beside_bump(width_hz: f64, rms: f64, runs: u64) -> usize {
     let held = |seed: &u64| {
         let mut rates = noise([1.0, 0.3, 0.05], SAMPLES, *seed);
@@ -119,7 +119,7 @@ fn beside_bump(width_hz: f64, rms: f64, runs: u64) -> usize {
     (0..runs).into_par_iter().filter(held).count()
 }
 
-/// Of so many runs behind two poles, in how many the interval of the white band holds N.
+/// Number of runs behind two poles in which the interval of the white band contains N.
 fn behind_filter(corner_hz: f64, runs: u64) -> usize {
     let held = |seed: &u64| {
         let mut rates = noise([1.0, 0.1, 0.0], SAMPLES, *seed);
@@ -131,7 +131,7 @@ fn behind_filter(corner_hz: f64, runs: u64) -> usize {
                 *rate = state;
             }
         }
-        // The edge of the filter's band is no bump.
+        // The edge of the filter's band is not taken for a bump.
         assert!(set_aside(&mut rates.clone(), DT_S, 0.95).lines.is_empty());
         let white = white_band(&rates, DT_S, &[], 0.95).unwrap();
         // It may end early, where a misfit by chance leaves its end out: N is then less well known, and the interval says so.
@@ -142,7 +142,7 @@ fn behind_filter(corner_hz: f64, runs: u64) -> usize {
     (0..runs).into_par_iter().filter(held).count()
 }
 
-/// Width (Hz) and rms of bumps at 0.56 Hz, N = 1: of a building hardly damped, of one well damped, and a third of its frequency wide.
+/// Width (Hz) and rms of bumps at 0.56 Hz, N = 1: a building with little damping, one with strong damping, and a width of a third of its frequency.
 const BUMPS: [[f64; 2]; 3] = [[0.01, 10.0], [0.05, 3.0], [0.2, 3.0]];
 
 #[test]
@@ -223,7 +223,7 @@ fn a_line_that_is_set_aside_leaves_the_coefficients_of_the_noise_beneath() {
         .collect();
     let n = |k: usize| models.iter().filter_map(move |m| m[k].get(Term::N).ok());
     let held = |k| n(k).filter(|c| c.lower <= 1.0 && 1.0 <= c.upper).count();
-    // With the line in it N is lost: that is what it is set aside for.
+    // With the line in the data N is lost, which is why it is set aside.
     assert!(held(0) < 10, "{}", held(0));
     assert!(held(1) >= least(runs as usize), "{}", held(1));
     for (line, plain) in n(1).zip(n(2)) {

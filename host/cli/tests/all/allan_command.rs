@@ -1,4 +1,4 @@
-//! The commands `mimu allan` and `mimu export`: what they write and what they refuse.
+//! The commands `mimu allan` and `mimu export`: their output and their refusals.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -25,7 +25,7 @@ fn refused(folder: &Path, arguments: &str) -> String {
     error
 }
 
-/// Everything that a command prints.
+/// Standard output of a successful command, with `--verbose` for `allan`.
 fn done(folder: &Path, arguments: &str) -> String {
     let verbose = match arguments.strip_prefix("allan ") {
         Some(rest) => &format!("allan --verbose {rest}"),
@@ -67,7 +67,7 @@ fn write(folder: &Path, rows: &[[f64; 7]]) {
     write_as(folder, "r", rows, None);
 }
 
-/// Writes a recording in SI into a folder of its own, with a temperature if it has one.
+/// Writes a recording in SI into a separate folder, with a temperature if there is one.
 fn write_as(folder: &Path, name: &str, rows: &[[f64; 7]], temp_c: Option<f64>) {
     let folder = folder.join(name);
     std::fs::create_dir_all(&folder).unwrap();
@@ -240,7 +240,7 @@ fn kalibr_gets_the_worst_axis_and_for_a_walk_that_was_not_seen_its_bound_or_what
     assert!(yaml.contains("rostopic: \"/a\"") && yaml.contains("given by hand"));
 }
 
-/// What is wrong with a row of some number.
+/// Spoils a row, given its number.
 type Spoil = fn(usize, &mut [f64; 7]);
 
 #[test]
@@ -391,7 +391,7 @@ fn a_short_knock_is_masked_and_counted_and_leaves_the_coefficients_as_they_are()
         .zip(after["channels"].as_array().unwrap())
     {
         assert_eq!(a["masked_samples"], 0);
-        // Two windows of a second: the one with the knock, and that in which the mean comes back.
+        // Two windows of one second: the one with the knock, and the one in which the mean returns.
         assert_eq!(b["masked_samples"], 200, "{b}");
         let n = |c: &serde_json::Value| c["n"]["value"].as_f64().unwrap();
         assert!((n(b) / n(a) - 1.0).abs() < 0.01, "{} {}", n(a), n(b));
@@ -403,7 +403,7 @@ fn a_short_knock_is_masked_and_counted_and_leaves_the_coefficients_as_they_are()
         ),
         "{said}"
     );
-    // One that leaves the unit in another pose is none that passes.
+    // A disturbance that leaves the unit in another pose is not a passing one.
     for row in &mut knocked[31_236..] {
         row[4] += 50.0 * N;
     }
@@ -453,7 +453,7 @@ fn the_longest_stretch_without_a_gap_or_an_empty_cell_is_used_and_told_of() {
         warnings.contains("before data row 5001") && warnings.contains("data row 1501"),
         "{warnings}"
     );
-    // By hand the end is chosen instead.
+    // `--from` selects the end instead.
     let json: serde_json::Value =
         serde_json::from_str(&done(folder.path(), "allan r --from 53 --json -")).unwrap();
     assert_eq!(json["channels"][0]["samples"], 1000);
@@ -511,7 +511,7 @@ fn a_swaying_building_is_set_aside_and_the_noise_beneath_is_exported() {
         let without = channel["adev_without_lines"].as_array();
         assert_eq!(without.is_some(), i == 3);
         let n = ["lower", "upper"].map(|e| channel["n"][e].as_f64().unwrap());
-        // 99.9 % of six: a tenth of the width of an interval of 95 % either way.
+        // A 99.9 % bound for six channels: a margin of a tenth of the width of a 95 % interval.
         assert!(n[0] < 1.005 * N && n[1] > 0.995 * N, "{i}: {n:?}");
     }
     let line = &json["channels"][3]["lines"][0];
@@ -561,7 +561,7 @@ fn the_sway_of_the_bench_is_found_in_both_level_axes_with_its_size() {
             squares += (volts / truth.unit.accel.axes[i - 3].sensitivity).powi(2);
             assert!((line["frequency_hz"].as_f64().unwrap() - 0.56).abs() < 1e-4);
         }
-        // The noise is the same to the last sample: so are the coefficients but for what a few frequencies are of all.
+        // The noise is the same, sample by sample. So the coefficients are equal, apart from the few frequencies that were removed.
         let [a, b] = [with, without].map(|c| c["n"]["value"].as_f64().unwrap());
         assert!((a / b - 1.0).abs() < 0.01, "{i}: {a} {b}");
     }
@@ -610,7 +610,7 @@ fn readings_in_volts_become_si_by_the_calibration_of_the_unit() {
     assert_eq!(raw["channels"][0]["unit"], "V");
     let si = done(folder.path(), &format!("{rest} --calibration cal.toml"));
     let si: serde_json::Value = serde_json::from_str(&si).unwrap();
-    // Twenty seconds behind a filter of 40 Hz; the converter adds some noise of its own.
+    // Twenty seconds behind a filter of 40 Hz; the converter adds its own noise.
     let mut outside = 0;
     for (i, sensor) in [(0, &truth.unit.gyro), (3, &truth.unit.accel)] {
         for axis in 0..3 {
@@ -627,7 +627,7 @@ fn readings_in_volts_become_si_by_the_calibration_of_the_unit() {
     assert!(error.contains("cal.toml, line"), "{error}");
 }
 
-/// A driver's SI may be off: the scale factors of the calibration are then not 1, and the noise of the readings is not that of the unit.
+/// A driver's SI may be inaccurate. The scale factors of the calibration then differ from 1, and the noise of the readings is not that of the unit.
 #[test]
 fn noise_of_readings_in_si_is_the_same_for_a_fit_with_and_without_a_calibration() {
     let folder = tempfile::tempdir().unwrap();
@@ -667,7 +667,7 @@ fn noise_of_readings_in_si_is_the_same_for_a_fit_with_and_without_a_calibration(
     }
 }
 
-/// With a calibration the file serves those who read volts as that without one does, and those who need SI as well.
+/// With a calibration, the file still serves commands that read volts, and also those that need SI.
 fn one_noise_file_serves_all(folder: &Path) {
     done(folder, "allan r --step 2 -o raw.toml");
     done(
@@ -678,7 +678,7 @@ fn one_noise_file_serves_all(folder: &Path) {
         let [raw, both] = ["raw", "both"].map(|n| {
             let text = done(folder, &format!("{command} --noise {n}.toml"));
             let text = text.replace(&format!("{n}.toml"), "the file");
-            // What is no better than chance may be listed or not: the digits of the two files decide.
+            // Terms at the level of chance may be listed or not, depending on the rounding in the two files.
             let lines = text.lines().filter(|line| !line.starts_with("  - "));
             lines.collect::<Vec<_>>().join("\n")
         });

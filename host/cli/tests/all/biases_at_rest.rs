@@ -1,4 +1,4 @@
-//! A file of biases over temperature, from a recording at rest: the formats of autopilots take it, and everything else refuses it by its name.
+//! A file of biases over temperature from a recording at rest: the autopilots' formats accept it, and all other commands refuse it by name.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -10,7 +10,7 @@ const GAIN: [f64; 2] = [0.344, 0.0306];
 const ZERO: [f64; 2] = [2.5, 1.65];
 const MIDDLE_C: f64 = 20.0;
 
-/// Biases in SI about 20 °C by powers of the temperature; the accelerometer's readings have gravity in them.
+/// Biases in SI about 20 °C by powers of the temperature; the accelerometer's include gravity.
 const BIAS: [[[f64; 4]; 3]; 2] = [
     [
         [0.01, -5e-4, 1e-6, 2e-7],
@@ -64,7 +64,7 @@ fn mimu(folder: &Path, arguments: &str) -> Output {
     command.args(arguments.split(' ')).output().unwrap()
 }
 
-/// The one line of a refusal.
+/// The refusal, which must be one line.
 fn refused(folder: &Path, arguments: &str, says: &[&str]) {
     let out = mimu(folder, arguments);
     let line = String::from_utf8(out.stderr).unwrap();
@@ -77,7 +77,7 @@ fn refused(folder: &Path, arguments: &str, says: &[&str]) {
     }
 }
 
-/// How the driver converts, as arguments.
+/// The driver's conversion, as arguments.
 fn driver() -> String {
     let [gyro, accel] = GAIN.map(f64::recip);
     format!(
@@ -107,7 +107,7 @@ fn exported(folder: &Path, format: &str) -> (BTreeMap<String, f64>, String) {
     (pairs.collect(), comments.join("\n"))
 }
 
-/// What is no share of single precision: 1e-7 of the largest value.
+/// Rounding of single precision: 1e-7 of the largest value.
 const ROUNDING: f64 = 2e-6;
 
 #[test]
@@ -159,7 +159,7 @@ fn ardupilot_gets_changes_alone_and_keeps_its_offsets() {
                 let d = temp_c - 35.0;
                 d * (k[0] + d * (k[1] + d * k[2]))
             };
-            // From its own calibration at 25 °C.
+            // By its own calibration at 25 °C.
             for temp_c in [-20.0, 3.0, 60.0] {
                 let change = cubic(temp_c) - cubic(25.0);
                 let truth = bias(sensor, axis, temp_c)[0] - bias(sensor, axis, 25.0)[0];
@@ -291,7 +291,7 @@ fn a_file_that_was_edited_or_is_not_enough_is_refused() {
     // A cubic over less than 10 K.
     std::fs::write(folder.join("biases.toml"), biases([20.0, 28.0], "V")).unwrap();
     refused(folder, &px4, &["less than 10 K", "wider range"]);
-    // Volts, and nobody says how many rad/s one is.
+    // Volts, without a conversion to rad/s.
     std::fs::write(folder.join("biases.toml"), &good).unwrap();
     for format in ["px4", "ardupilot"] {
         let without = format!("export {format} --calibration biases.toml -o out");

@@ -1,4 +1,4 @@
-//! The command `mimu design`: what it writes and what it refuses.
+//! The command `mimu design`: its output and its refusals.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -47,8 +47,8 @@ fn a_parameter_that_is_not_determined_has_no_sigma() {
 
 #[test]
 fn people_read_the_same_numbers_in_their_units() {
-    // Six faces: bias ± 1.96 σ/√6, scale factor ± 1.96 σ/(√2 g), P_xy the same in µrad. x² outside the model is √(4/3):
-    // noticed from 3.242 σ/√(4/3) over full scale.
+    // Six faces: bias ± 1.96 σ/√6, scale factor ± 1.96 σ/(√2 g), P_xy the same in µrad. The part of x² outside the model is √(4/3): noticed from
+    // 3.242 σ/√(4/3) over full scale.
     let text = |arguments: &str| {
         let all = format!("{arguments} --verbose");
         String::from_utf8(mimu(Path::new("."), &all).stdout).unwrap()
@@ -63,7 +63,7 @@ fn people_read_the_same_numbers_in_their_units() {
     ] {
         assert!(accel.contains(says), "{says}: {accel}");
     }
-    // At 300 deg/s, in deg/s and its share.
+    // At 300 deg/s: in deg/s, and as a fraction.
     let gyro = text("--scheme six-face --sensor gyro --sigma 0.001");
     for says in [
         "b_z ± 0.0458 deg/s",
@@ -157,7 +157,7 @@ fn a_lot_is_drawn_unless_the_order_is_given_and_says_its_price() {
     assert!(longer > 1.0 && shortest["moves_s"] == randomised["shortest_moves_s"]);
     let text = String::from_utf8(mimu(Path::new("."), "-n 9 --verbose").stdout).unwrap();
     assert!(text.contains(&format!("{longer:.1} s longer")), "{text}");
-    // The same dwells, in another order for another seed, and in the same for the same.
+    // The same dwells: in a different order for another seed, in the same order for the same seed.
     let sorted = |mut list: Vec<serde_json::Value>| {
         list.sort_by_key(ToString::to_string);
         list
@@ -184,7 +184,7 @@ fn a_comparison_leaves_out_and_names_the_schemes_out_of_reach() {
     );
     let designs = compared["designs"].as_array().unwrap();
     assert_eq!(designs.len(), 2);
-    // Within reach none beats the continuous optimum.
+    // Among these none exceeds the continuous optimum.
     for design in designs {
         assert!(design["d_efficiency"].as_f64().unwrap() < 1.0 + 1e-6);
     }

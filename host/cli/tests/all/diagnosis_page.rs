@@ -1,4 +1,4 @@
-//! The page of a diagnosis: what it draws is what the unit has, what it says is what the JSON says.
+//! The page of a diagnosis: its drawings against the unit, and its numbers against the JSON.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,7 +16,7 @@ use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use serde_json::Value;
 
-/// A name that would break a page that does not escape it.
+/// A name that would break a page without escaping.
 const DEVICE: &str = r#"<b>unit</b> & "7""#;
 /// Cubic of the gyros at 300 deg/s, deg/s.
 const CUBIC_DPS: [f64; 3] = [1.2, -0.9, 1.5];
@@ -47,7 +47,7 @@ fn plan() -> String {
     plan
 }
 
-/// Records a unit with white noise, of which `effect` is all that an affine model lacks.
+/// Records a unit with white noise, whose only error beyond an affine model is `effect`.
 pub fn record(folder: &Path, name: &str, effect: &str, seed: u64) {
     let still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n";
     let rig = format!(
@@ -56,7 +56,7 @@ pub fn record(folder: &Path, name: &str, effect: &str, seed: u64) {
     );
     let file = RigFile::parse(&Source::new("rig", rig)).unwrap();
     let plan = Plan::parse(Source::new("plan", plan())).unwrap();
-    // One unit, whatever the noise of the recording.
+    // The same unit for every noise seed.
     let truth = RigTruth::resolve(&file, 3).unwrap();
     let output = mimu_rig::record::Output::new(&folder.join(name), &plan).unwrap();
     mimu_rig::record::write(&plan, &truth, seed, &output).unwrap();
@@ -104,7 +104,7 @@ fn the_effect_that_is_drawn_is_the_one_that_the_unit_has() {
         };
         assert_eq!(abscissa.unit, "deg/s");
         let truth = |x: f64| size.to_radians() * (x.to_degrees() / 300.0).powi(3);
-        // Less the best straight line, which a scale factor and a bias take up.
+        // Minus the best straight line, which scale factor and bias absorb.
         let n = panel.points.len() as f64;
         let mean = |f: &dyn Fn(f64) -> f64| panel.points.iter().map(|p| f(p.x)).sum::<f64>() / n;
         let (mx, mt) = (mean(&|x| x), mean(&truth));
@@ -115,14 +115,14 @@ fn the_effect_that_is_drawn_is_the_one_that_the_unit_has() {
             .iter()
             .map(|p| ((p.partial - straightened(p.x)) / p.sigma).powi(2))
             .sum();
-        // 56 dwells; four parameters of the line are estimated beside it: 0.7 to 1.35 is three sigmas.
+        // 56 dwells, and four parameters estimated with the line: three sigmas are 0.7 to 1.35.
         assert!(
             (0.65..1.4).contains(&(chi2 / n)),
             "{}: {}",
             panel.title,
             chi2 / n
         );
-        // The band is of 95 %, and the whole curve errs as one: by three sigmas nowhere.
+        // The band is 95 %, and the errors of the whole curve are correlated: nowhere above three sigmas.
         for c in &panel.curve {
             assert!(
                 (c.value - straightened(c.x)).abs() < 1.6 * c.half + 1e-12,
@@ -139,10 +139,10 @@ fn the_effect_that_is_drawn_is_the_one_that_the_unit_has() {
             .iter()
             .map(|p| p.after.abs())
             .fold(0.0, f64::max);
-        // The largest of 56 residuals is three sigmas by itself, and the cubic less its best line some eight.
+        // The largest of 56 residuals of noise is at three sigmas; the cubic minus its best line is at some eight.
         assert!(most > 2.0 * left, "{}: {most} {left}", panel.title);
     }
-    // The residuals drawn are those that the figures are of.
+    // The drawn residuals are those of the figures.
     for k in 0..2 {
         let all = || picture.tracks.iter().flat_map(|t| &t.samples);
         let rms = |of: &dyn Fn(&mimu::diagnose::picture::Sample) -> f64| {
@@ -155,19 +155,19 @@ fn the_effect_that_is_drawn_is_the_one_that_the_unit_has() {
     assert!((last.held_out_rms / gyro.decision.held_out_rms[1] - 1.0).abs() < 1e-9);
 }
 
-/// Reading JSON may cost the last bit.
+/// Reading JSON may change the last bit.
 fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= 4.0 * f64::EPSILON * b.abs()
 }
 
-/// Text of an element and all within.
+/// Text of an element and its descendants.
 fn text(node: roxmltree::Node) -> String {
     node.descendants()
         .filter_map(|n| n.is_text().then(|| n.text()).flatten())
         .collect()
 }
 
-/// All numbers below `node`: value, what a person reads.
+/// All numbers below `node`: the value, and the text for people.
 fn numbers(node: roxmltree::Node) -> Vec<(f64, String)> {
     node.descendants()
         .filter(|n| n.tag_name().name() == "data")
@@ -228,7 +228,7 @@ fn numbers_of_the_page_are_those_of_the_json_and_are_read_in_its_units() {
             );
         }
     }
-    // The board sits off the table's axis, which an accelerometer feels.
+    // The board is off the table's axis, which an accelerometer senses.
     let effects = json["effects"].as_array().unwrap();
     let of_cubic = |e: &&Value| e["id"] == "gyro_scale_cubic";
     let effect = effects.iter().find(of_cubic).unwrap();
@@ -239,12 +239,12 @@ fn numbers_of_the_page_are_those_of_the_json_and_are_read_in_its_units() {
         seen(&effect[key], deg, "deg/s");
     }
     for coefficient in effect["coefficients"].as_array().unwrap() {
-        // ppm/(deg/s)²; of the standard deviation twice is shown.
+        // ppm/(deg/s)²; the page shows twice the standard deviation.
         seen(&coefficient["value"], 1e6 / (deg * deg), "");
         seen(&coefficient["sigma"], 2.0 * 1e6 / (deg * deg), "");
     }
     assert_eq!(checked, 20);
-    // And the other way: the table of errors has no number that the JSON has not.
+    // The other way round: every number in the table of errors is in the JSON.
     let table = document
         .descendants()
         .find(|n| n.tag_name().name() == "table")
@@ -296,7 +296,7 @@ fn the_page_needs_nothing_else_and_escapes_names() {
     assert!(!style.contains("url(") && !style.contains("@import"));
     let drawings = || named("svg").filter(|n| n.attribute("role").is_some());
     assert!(drawings().count() >= 8);
-    // Nothing but pixels in them: no number that is none.
+    // Drawings contain only pixel coordinates, without NaN.
     for path in named("path") {
         let d = path.attribute("d").unwrap();
         assert!(!d.contains("NaN") && !d.contains("inf"), "{d}");

@@ -1,4 +1,4 @@
-//! What `mimu diagnose` prints: a page of a terminal, and all the rest where it is asked for.
+//! Output of `mimu diagnose`: one terminal page, and the rest on request.
 
 use serde_json::Value;
 
@@ -53,7 +53,7 @@ fn a_diagnosis_of_an_effect_takes_at_most_25_lines_without_all() {
         for id in ids("effects") {
             assert!(short.contains(&format!("  + {id}: ")), "{name}: {id}");
         }
-        // What the short form counts, the others print.
+        // `--next` prints the plans that the short form only counts.
         let next = run(&["diagnose", name, "--next"]);
         let not_seen = ids("not_excited");
         let counted = format!("not seen at data-sheet size: {} effect", not_seen.len());

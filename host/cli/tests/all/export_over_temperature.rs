@@ -1,5 +1,5 @@
-//! `mimu export px4` and `ardupilot`: the files are evaluated by what the documentation of the two programs says that they do with
-//! their parameters, and compared with the unit that the calibration was written for.
+//! `mimu export px4` and `ardupilot`: the files are evaluated as the documentation of the two programs describes, and compared with the unit that the
+//! calibration was written for.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -10,10 +10,10 @@ use nalgebra::{Matrix3, Vector3};
 
 const G: f64 = 9.80665;
 const RANGE_C: [f64; 2] = [-20.0, 60.0];
-/// Where the calibration's one model holds, °C.
+/// Temperature of the calibration's single model, °C.
 const SETTLED_C: f64 = 20.0;
 const LAG_S: f64 = 60.0;
-/// Largest value of a bias of the gyro's x axis that is a fourth power over the range, rad/s.
+/// Largest value of a fourth-power bias of the gyro's x axis over the range, rad/s.
 const QUARTIC: f64 = 0.01;
 /// Slope of the bias of the accelerometer's z axis, m/s²/K.
 const STEADY_SLOPE: f64 = 2e-3;
@@ -22,7 +22,7 @@ const STEADY_SLOPE: f64 = 2e-3;
 struct Unit {
     gain: f64,
     zero: f64,
-    /// Share of the scale factor, per kelvin.
+    /// Relative change of the scale factor per kelvin.
     scale_per_k: f64,
     /// Bias in SI, by powers of T/40.
     bias: [[f64; 5]; 3],
@@ -70,7 +70,7 @@ impl Unit {
         (Matrix3::identity() * scale + across) * self.gain
     }
 
-    /// The bias is in the reading of its axis at the settled temperature: raw.
+    /// The bias as it enters the reading at the settled temperature, raw.
     fn raw_bias(&self, temp_c: f64) -> Vector3<f64> {
         self.bias_si(temp_c) * self.gain + Vector3::repeat(self.zero)
     }
@@ -141,7 +141,7 @@ fn export(folder: &Path, arguments: &str) -> Output {
     command.args(arguments.split(' ')).output().unwrap()
 }
 
-/// Exports with the driver's nominal conversion, and reads what was written: the parameters and the JSON.
+/// Exports with the driver's nominal conversion, and reads the output: the parameters and the JSON.
 fn exported(folder: &Path, arguments: &str) -> (BTreeMap<String, f64>, serde_json::Value) {
     write_calibration(folder);
     let nominal = "--calibration cal.toml --gyro-zero 2.5 --accel-zero 1.65 --json e.json";
@@ -156,8 +156,7 @@ fn exported(folder: &Path, arguments: &str) -> (BTreeMap<String, f64>, serde_jso
     (parameters(&text), serde_json::from_slice(&json).unwrap())
 }
 
-/// As pymavlink's mavparm reads a file: comments begin with a hash, a comma is a space, a line has two words, and the second
-/// is a number.
+/// As in pymavlink's mavparm: comments begin with a hash, a comma is a space, a line has two words, and the second is a number.
 fn parameters(text: &str) -> BTreeMap<String, f64> {
     let lines = text.lines().map(str::trim);
     let lines = lines.filter(|l| !l.is_empty() && !l.starts_with('#'));
@@ -175,8 +174,7 @@ fn parameters(text: &str) -> BTreeMap<String, f64> {
     pairs.collect()
 }
 
-/// PX4 User Guide, "Thermal Calibration and Compensation": a cubic of the temperature about TREF, which is held outside TMIN to TMAX and
-/// subtracted.
+/// PX4 User Guide, "Thermal Calibration and Compensation": subtracts a cubic of the temperature about TREF, which is clamped to TMIN to TMAX.
 fn px4(
     p: &BTreeMap<String, f64>,
     prefix: &str,
@@ -193,8 +191,8 @@ fn px4(
     reading - Vector3::from_fn(|axis, _| offset(axis))
 }
 
-/// Copter documentation, "IMU Temperature Calibration", and the parameter list: a cubic without a constant about 35 °C with coefficients in
-/// millionths, as it differs from that at the temperature where the offset was found; then the offset.
+/// Copter documentation, "IMU Temperature Calibration", and the parameter list: subtracts a cubic without a constant about 35 °C, with coefficients
+/// in millionths, relative to its value at the temperature where the offset was found; then the offset.
 fn ardupilot(
     p: &BTreeMap<String, f64>,
     short: &str,
@@ -214,19 +212,19 @@ fn ardupilot(
     })
 }
 
-/// What the driver makes of the reading of a unit at rest without input, SI, as the export takes it.
+/// The driver's reading of a unit at rest without input, SI, as the export assumes it.
 fn reading(unit: &Unit, temp_c: f64) -> Vector3<f64> {
     (unit.raw_bias(temp_c) - Vector3::repeat(unit.zero)) / unit.gain
 }
 
-/// Of what is no cubic, the largest part is in the nodes' interpolation: a ten thousandth of the quartic, and single precision.
+/// The largest deviation from a cubic is the interpolation between nodes: a ten thousandth of the quartic; and single precision.
 const INTERPOLATION: f64 = 1e-5;
 
 fn assert_biases_go(corrected: impl Fn(usize, f64, Vector3<f64>) -> Vector3<f64>) {
     for (k, unit) in [gyro(), accel()].iter().enumerate() {
         for temp_c in [-20.0, -14.3, 0.0, 17.0, 33.0, 48.9, 60.0] {
             let left = corrected(k, temp_c, reading(unit, temp_c));
-            // A fourth power less its best cubic is 8/35 of a Legendre polynomial.
+            // A fourth power minus its best cubic is 8/35 of a Legendre polynomial.
             let x = (temp_c - 20.0) / 40.0;
             let legendre = (35.0 * x.powi(4) - 30.0 * x * x + 3.0) / 8.0;
             let known = if k == 0 {
@@ -234,7 +232,7 @@ fn assert_biases_go(corrected: impl Fn(usize, f64, Vector3<f64>) -> Vector3<f64>
             } else {
                 0.0
             };
-            // Sums at even distances are not quite integrals.
+            // Sums at equal distances differ slightly from integrals.
             let tolerance = INTERPOLATION + 0.01 * known.abs();
             assert!(
                 (left[0] - known).abs() < tolerance,
@@ -245,7 +243,7 @@ fn assert_biases_go(corrected: impl Fn(usize, f64, Vector3<f64>) -> Vector3<f64>
                 "{k} {temp_c}: {left}"
             );
         }
-        // Outside the range the correction is held.
+        // Outside the range the correction is constant.
         let [hot, hotter] = [61.0, 90.0].map(|t| corrected(k, t, Vector3::zeros()));
         assert_eq!(hot, hotter);
     }
@@ -291,7 +289,7 @@ fn the_error_that_remains_is_that_of_scale_factors_cross_terms_and_lag() {
     let near = |found: f64, known: f64| {
         assert!((found / known - 1.0).abs() < 0.01, "{found} {known}");
     };
-    // 40 K on either side of where the program is calibrated; a line has its largest value over √3 as its rms.
+    // 40 K on either side of the calibration temperature of the program; the rms of a line is its largest value over √3.
     let most = 40.0 * 4e-4 * 100f64.to_radians();
     near(figure(0, "scale", "max"), most);
     near(figure(0, "scale", "rms"), most / 3f64.sqrt());
@@ -308,7 +306,7 @@ fn the_error_that_remains_is_that_of_scale_factors_cross_terms_and_lag() {
         figure(0, "bias", "rms"),
         QUARTIC * 8.0 / 35.0 / 3.0 / 3f64.sqrt(),
     );
-    // A minute late at 2 K/min: the largest slope of the accelerometer's biases, m/s²/K, is at the upper end of its y axis.
+    // A lag of a minute at 2 K/min: the largest slope of the accelerometer's biases, m/s²/K, is at the upper end of its y axis.
     let late = |t: f64| accel().bias_si(t)[1] - accel().bias_si(t - 2.0)[1];
     near(figure(1, "lag", "max"), late(60.0));
     let text = std::fs::read_to_string(folder.path().join("out.param")).unwrap();
@@ -345,9 +343,9 @@ fn what_cannot_be_exported_is_refused_with_what_to_do() {
         assert!(!folder.path().join("p.param").exists());
     };
     write_calibration(folder.path());
-    // 1.65 V are 54 m/s², which INS_ACCOFFS does not take.
+    // 1.65 V are 54 m/s², beyond the range of INS_ACCOFFS.
     refused("ardupilot -o p.param --gyro-zero 2.5", "--accel-zero");
-    // Counts where the sensor gives volts.
+    // Counts, but the sensor gives volts.
     refused(
         "px4 -o p.param --gyro-si-per-raw 0.001",
         "give its conversion",

@@ -1,4 +1,4 @@
-//! `mimu import` of what makers and people have: their layouts, and tables of means.
+//! `mimu import` of files from makers and users: their layouts, and tables of means.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -20,7 +20,7 @@ fn right(folder: &Path, arguments: &str) -> String {
     stdout
 }
 
-/// The one line that `arguments` are refused with.
+/// The one-line refusal of `arguments`.
 fn refused(folder: &Path, arguments: &str) -> String {
     let (done, _, stderr) = mimu(folder, arguments);
     let last = stderr.lines().last().unwrap_or_default().to_owned();
@@ -92,7 +92,7 @@ fn means(with_noise: bool) -> String {
     let noise = ["", ",sx,sy,sz,n"][usize::from(with_noise)];
     let mut table = format!("pose,ax,ay,az{noise}\n");
     for (i, up) in poses.iter().enumerate() {
-        // Nothing repeats exactly.
+        // Pseudo-noise, so that no value repeats exactly.
         let error = 0.4 * (2.4 * i as f64).sin();
         let raw = [50.0, 0.0, 0.0]
             .iter()
@@ -140,7 +140,7 @@ fn a_table_of_means_is_fitted_and_verified_and_everything_that_needs_samples_ref
         };
         assert!((value("scale", "y") / 800.0 - 1.0).abs() < 2e-4);
         assert!((value("bias", "x") - 50.0).abs() < 1.0);
-        // Other poses of a unit whose x has shifted by 8 counts since: 10 mm/s² along x, and 1/√3 of that on the corners.
+        // Other poses of a unit whose x has since shifted by 8 counts: 10 mm/s² along x, and 1/√3 of that on the corners.
         let corner = |signs: [f64; 3]| {
             let raw = signs.map(|s| s * 800.0 * 9.81 / 3_f64.sqrt());
             format!("{:.3},{:.3},{:.3}\n", raw[0] + 58.0, raw[1], raw[2])
@@ -176,7 +176,7 @@ fn a_table_of_means_is_fitted_and_verified_and_everything_that_needs_samples_ref
     }
 }
 
-/// Numbers from -0.5 to 0.5, evenly distributed.
+/// Numbers from -0.5 to 0.5, uniformly distributed.
 fn noise() -> impl FnMut() -> f64 {
     let mut state = 5_u64;
     move || {
@@ -187,7 +187,7 @@ fn noise() -> impl FnMut() -> f64 {
     }
 }
 
-/// A gyro that rests for 20 s before each of three turns of 360 degrees, and whose bias is another one each time.
+/// A gyro that rests for 20 s before each of three turns of 360 degrees, with a different bias each time.
 #[test]
 fn rests_between_turns_of_known_angle_show_the_noise_and_are_no_outliers() {
     let folder = tempfile::tempdir().unwrap();
@@ -198,7 +198,7 @@ fn rests_between_turns_of_known_angle_show_the_noise_and_are_no_outliers() {
         for (rows, rate) in [(2000, 0.0), (500, 72.0)] {
             let step = 2 * axis + usize::from(rate != 0.0);
             for _ in 0..rows {
-                // Even from -0.5 to 0.5: a standard deviation of 0.289 deg/s.
+                // Uniform from -0.5 to 0.5: a standard deviation of 0.289 deg/s.
                 let mut read = [0; 3].map(|_| bias + noise());
                 read[axis] += 1.01 * rate;
                 writeln!(log, "{step},{:.5},{:.5},{:.5}", read[0], read[1], read[2]).unwrap();
@@ -219,19 +219,19 @@ fn rests_between_turns_of_known_angle_show_the_noise_and_are_no_outliers() {
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     let floor = json["sensors"]["gyro"]["noise_floor"].as_f64();
     let floor = floor.expect("rests of 20 s show the noise").to_degrees();
-    // Of the means of 2000 and of 500 samples, as often each.
+    // Means of 2000 and of 500 samples, equally often.
     let expected = 0.289 * (0.5 * (1.0 / 2000.0 + 1.0 / 500.0_f64)).sqrt();
     assert!(
         (floor / expected - 1.0).abs() < 0.2,
         "{floor} and not {expected}"
     );
     let text = right(folder, "fit turns --verbose");
-    // The three turns are fitted exactly, and the rests differ by their biases: neither is far from the others.
+    // The three turns are fitted exactly, and the rests differ by their biases: neither is an outlier.
     assert!(!text.contains("times the median"), "{text}");
     assert!(text.contains("the residual exceeds the noise"), "{text}");
 }
 
-/// The readings of a unit on a face: factors 1.02, 0.98 and 1.01 and biases of 0.1, -0.2 and 0.05 m/s², the noise of `noise`.
+/// Readings of a unit on a face: factors 1.02, 0.98 and 1.01, biases of 0.1, -0.2 and 0.05 m/s², and `noise`.
 fn face(axis: usize, sign: f64, noise: &mut impl FnMut() -> f64) -> String {
     let mut force = [0.1, -0.2, 0.05];
     force[axis] += sign * 9.81 * [1.02, 0.98, 1.01][axis];
@@ -288,7 +288,7 @@ fn a_file_for_each_face_calibrates_the_accelerometer_and_says_why_there_is_no_gy
         .step_by(2)
         .zip([1.02, 0.98, 1.01])
     {
-        // 400 samples of 0.01 m/s² on each face: 0.0005 / 9.81 in a factor.
+        // 400 samples of 0.01 m/s² on each face give a factor to 0.0005 / 9.81.
         assert!(
             (found.parse::<f64>().unwrap() - truth).abs() < 3e-4,
             "{factors}"
@@ -326,7 +326,7 @@ fn a_file_for_each_face_calibrates_the_accelerometer_and_says_why_there_is_no_gy
         &format!("import --faces +w=x_up.csv {columns} --reference table -o bad"),
     );
     assert!(error.contains("is not a face"), "{error}");
-    // Slips of the keyboard.
+    // Typing errors.
     for (faces, says) in [
         (
             "+x= -x=x_down.csv",
@@ -361,7 +361,7 @@ fn flags_that_an_import_needs_are_named_where_it_is_refused() {
         error.contains("IMU instance 1") && error.contains("--instance"),
         "{error}"
     );
-    // Its unit is known, and what was undone is said.
+    // Its unit is known, and the output reports what was undone.
     let text = right(
         folder,
         &format!("import flight.bin --instance 0 --topic IMU {gravity} a"),

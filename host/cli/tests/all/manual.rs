@@ -1,4 +1,4 @@
-//! What comes with an installed command: manual and completions.
+//! Files of an installed command: manual and completions.
 
 use std::process::{Command, Output};
 

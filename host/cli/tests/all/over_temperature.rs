@@ -1,5 +1,5 @@
-//! `mimu verify` and `mimu apply` with a calibration over temperature, on a unit whose forward model is written out here: cubics of the
-//! temperature of dies that follow the thermometer late.
+//! `mimu verify` and `mimu apply` with a calibration over temperature, on a unit whose forward model is written here: cubics of the temperature of
+//! dies that lag the thermometer.
 
 use mimu::quantity::PerSensor;
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ use super::effects::{mimu, unit};
 const DWELLS: usize = 72;
 const RATE_HZ: f64 = 50.0;
 const ROWS: usize = 100;
-/// Lags of the dies of gyro and accelerometer, s, and the ramp of the thermometer, °C/s from 0 °C on.
+/// Lags of the dies of gyro and accelerometer, s, and the ramp of the thermometer, °C/s from 0 °C.
 const LAGS_S: [f64; 2] = [20.0, 8.0];
 const RAMP: f64 = 0.35;
 
@@ -45,7 +45,7 @@ fn thermometer_c(t_s: f64) -> f64 {
     RAMP * t_s
 }
 
-/// The lags' solutions for the ramp.
+/// Solutions of the lags for the ramp.
 fn dies_c(t_s: f64) -> [f64; 2] {
     LAGS_S.map(|lag_s| RAMP * (t_s - lag_s * (1.0 - (-t_s / lag_s).exp())))
 }
@@ -98,7 +98,7 @@ fn record(folder: &Path, ramp: bool) {
     std::fs::write(folder.join("samples.csv"), out).unwrap();
 }
 
-/// A node with the truth at a temperature, and its derivative by the difference of neighbours.
+/// A node with the truth at a temperature, and its derivative from neighbouring temperatures.
 fn node(temp_c: f64) -> TemperatureNode {
     let table = |sensor: usize| {
         let (c, o) = inverse(sensor, temp_c);
@@ -123,7 +123,7 @@ fn node(temp_c: f64) -> TemperatureNode {
     }
 }
 
-/// Fits the recording at 25 °C, and writes that calibration, and the same with the true curves.
+/// Fits the recording at 25 °C and writes this calibration, and the same with the true curves.
 fn calibrations(folder: &Path) {
     record(&folder.join("even"), false);
     let recording = Recording::open(&folder.join("even")).unwrap();
@@ -158,7 +158,7 @@ fn verified(folder: &Path, calibration: &str) -> serde_json::Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// Count and distance of the warning on temperatures.
+/// Number and distance in the warning about temperatures.
 fn outside(json: &serde_json::Value) -> (f64, f64) {
     let all: Vec<&str> = json["warnings"]
         .as_array()
@@ -199,7 +199,7 @@ fn curves_and_lag_leave_the_noise_and_the_model_of_one_temperature_does_not() {
         assert!(figure(&curves, "rms") < 2.0 * floor, "{curves}");
         assert!(figure(&one, "rms") > 50.0 * floor, "{one}");
     }
-    // Block by block, so within a block of either end.
+    // The count is by blocks, so it is accurate to a block at either end.
     let seconds = |inside: &dyn Fn(f64) -> bool| {
         let all = (0..DWELLS * ROWS).map(|k| k as f64 / RATE_HZ);
         all.filter(|t| !inside(*t)).count() as f64

@@ -1,4 +1,4 @@
-//! A calibration file is for people: it can be applied with the numbers in it and nothing else.
+//! A calibration file can be applied by hand, with only the numbers in it.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -47,7 +47,7 @@ fn fitted(folder: &Path) -> serde_json::Value {
     serde_json::from_str(&json).unwrap()
 }
 
-/// The numbers between the brackets after `key`, read as a person would: no TOML parser, no project code.
+/// The numbers between the brackets after `key`, read as by a person: without a TOML parser or project code.
 fn numbers(text: &str, section: &str, key: &str) -> Vec<f64> {
     let section = text.split(&format!("\n[{section}]\n")).nth(1).unwrap();
     let value = section.split(&format!("\n{key} = [")).nth(1).unwrap();
@@ -85,10 +85,10 @@ fn raw_readings_become_gravity_with_the_numbers_in_the_file_alone() {
             .map(|i| c[3 * i] * u[0] + c[3 * i + 1] * u[1] + c[3 * i + 2] * u[2] + o[i])
             .collect();
         let size = (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]).sqrt();
-        // What the fit says is left of this dwell, and nothing but rounding beside it.
+        // The residual of this dwell according to the fit, apart from rounding.
         let left = residual["value"][0].as_f64().unwrap();
         assert!((size - 9.80665 - left).abs() < 1e-11, "{size} {left}");
-        // And the way back gives the reading again.
+        // The way back gives the reading again.
         for i in 0..3 {
             let again = p[3 * i] * x[0] + p[3 * i + 1] * x[1] + p[3 * i + 2] * x[2] + b[i];
             assert!((again - u[i]).abs() < 1e-9 * u[i].abs(), "{again} {}", u[i]);

@@ -1,4 +1,4 @@
-//! What the README and the pages of the documentation show is what the command prints.
+//! The README and the documentation show the actual output of the command.
 
 use std::path::Path;
 use std::process::Command;
@@ -27,7 +27,7 @@ fn the_fit_in_the_readme_is_that_of_the_example() {
     );
 }
 
-/// A block below `<!-- mimu ARGUMENTS -->` is part of what that command prints; a first line with the command itself is left out.
+/// A block below `<!-- mimu ARGUMENTS -->` is part of that command's output; a first line with the command itself is ignored.
 #[test]
 fn what_the_page_of_designs_shows_is_what_the_command_prints() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

@@ -1,4 +1,4 @@
-//! The command `mimu thermal fit` on niu's unit and procedure, whose truth is the bench's.
+//! The command `mimu thermal fit` on niu's unit and procedure, with the bench's truth.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -20,7 +20,7 @@ fn done(folder: &Path, arguments: &str) -> String {
     String::from_utf8(out.stdout).unwrap()
 }
 
-/// niu's MTi-G in its chamber: one unit, and the noise of each seed.
+/// niu's MTi-G in its chamber: always the same unit; `noise` is the seed of the noise.
 fn record(folder: &Path, name: &str, noise: u64) {
     let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rig");
     record_plan(folder, name, noise, &rig.join("plans/niu-ramp.toml"));
@@ -49,7 +49,7 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
     let result: Value = serde_json::from_str(&fitted).unwrap();
     assert_eq!(result["format"], "mimu-thermal/1");
     assert_eq!(result["verdict"], "fitted");
-    // The dies' lags in `rigs/niu-mtig.toml`: 60 s of the gyros, 30 s of the accelerometer. An interval of 99.9 %, as there are two.
+    // The dies' lags in `rigs/niu-mtig.toml`: 60 s for the gyros, 30 s for the accelerometer. Intervals of 99.9 %, because there are two.
     for (sensor, truth) in [("gyro", 60.0), ("accel", 30.0)] {
         let found = &result["sensors"][sensor];
         let number = |key: &str| found["lag_s"][key].as_f64().unwrap();
@@ -67,7 +67,7 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
     assert_eq!(result["curves"].as_array().unwrap().len() % 2, 0);
     let calibration = std::fs::read_to_string(folder.join("cal.toml")).unwrap();
     assert!(calibration.contains("format = \"mimu-calibration/2\""));
-    // Half a minute apart, on ramps of 2 K/min: each has its own.
+    // Half a minute apart, on ramps of 2 K/min: each has its own lag.
     let calibration: toml::Table = calibration.parse().unwrap();
     let lag_s = |of: &str| calibration["temperature"]["dies"][of]["lag_s"].as_float();
     let [gyro_s, accel_s] = ["gyro", "accel"].map(|of| lag_s(of).unwrap());
@@ -97,7 +97,7 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
         .as_f64()
         .unwrap();
     assert!(values.contains(&lag), "the lag is on the page as in JSON");
-    // A report draws the same curves, scale factors and biases, with the intervals that the file holds.
+    // A report draws the same curves of scale factors and biases, with the intervals of the file.
     let nodes = calibration["temperature"]["node"].as_array().unwrap();
     let curve = |name: &str| {
         let mut all = result["curves"].as_array().unwrap().iter();
@@ -136,7 +136,7 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
     assert_eq!(page.matches(" band\"").count(), 0);
     assert!(page.contains("has no intervals at its nodes"));
 
-    // Summaries fit a terminal, sentences aside.
+    // Summaries fit a terminal, except for sentences.
     let fit = "thermal fit niu --verify again -o again.toml";
     for (short, verbose) in [
         (fit, "thermal fit niu --verify again --verbose"),
@@ -173,7 +173,7 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
     let same: Value = serde_json::from_str(&same).unwrap();
     assert_eq!(same["format"], "mimu-thermal-comparison/1");
 
-    // What a fit at one temperature leaves, beside it.
+    // The error after a fit at one temperature is shown beside it.
     done(folder, "fit niu -o one.toml");
     let left = |calibration: &str| -> f64 {
         let text = done(
@@ -199,7 +199,7 @@ fn what_is_no_recording_over_temperature_is_refused_and_nothing_is_written() {
     assert!(!folder.join("cal.toml").exists() && !folder.join("curves.svg").exists());
 }
 
-/// What a user of an autopilot does: poses at room temperature, and an hour or two at rest while the unit warms up and cools.
+/// The session of an autopilot's user: poses at room temperature, and an hour or two at rest while the unit warms up and cools.
 #[test]
 fn a_rest_ramp_upon_poses_at_room_temperature_halves_the_error_of_a_sweep_and_is_exported() {
     let folder = tempfile::tempdir().unwrap();
@@ -263,7 +263,7 @@ fn a_rest_ramp_upon_poses_at_room_temperature_halves_the_error_of_a_sweep_and_is
             let found = all.iter().find(of_sensor);
             found.unwrap_or_else(|| panic!("{source}: {all:?}")).clone()
         };
-        // Nobody has seen a scale factor at another temperature.
+        // No scale factor was measured at another temperature.
         for unknown in [
             "scale factors over temperature",
             "cross terms over temperature",
@@ -277,7 +277,7 @@ fn a_rest_ramp_upon_poses_at_room_temperature_halves_the_error_of_a_sweep_and_is
             .unwrap()
             .iter();
         let largest = largest.map(|h| h["largest"].as_f64().unwrap().abs());
-        // Readings in volts: what is left in SI is half of the difference by the program's scale factor, which is that of the calibration.
+        // Readings in volts: the error in SI is half of the difference times the program's scale factor, which is that of the calibration.
         let factors = cubics["conversion"]["si_per_raw"].as_array().unwrap();
         let known = largest
             .zip(factors)

@@ -1,4 +1,4 @@
-//! The command `mimu thermal plan`: what it writes is what the bench reads.
+//! The command `mimu thermal plan`: the bench reads its output.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -40,7 +40,7 @@ fn the_bench_reads_every_procedure_and_its_table_can_carry_it_out() {
         let least = chamber.iter().copied().fold(f64::INFINITY, f64::min);
         let most = chamber.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         assert_eq!((least, most), (-20.0, 60.0));
-        // It refuses rounds that take longer than they may, and poses out of reach.
+        // The bench refuses rounds that take too long, and poses out of reach.
         Table::new(&plan, &TableTruth::ideal()).unwrap();
     }
 }
@@ -58,7 +58,7 @@ fn a_soak_measures_at_the_end_of_every_set_point() {
         let begin = plan.lead_in_s + f64::from(round) * length;
         let set_point = -10.0 + 20.0 * f64::from(round);
         assert_eq!(plan.chamber_c(begin), set_point);
-        // Since the ramp has ended, at 2 K/min, the unit has had most of 45 minutes.
+        // After the end of the ramp, at 2 K/min, the unit has had most of 45 minutes.
         assert_eq!(plan.chamber_c(begin - 1800.0), set_point);
     }
     let hours = json["duration_s"].as_f64().unwrap() / 3600.0;
@@ -78,7 +78,7 @@ fn nius_cycle_is_the_published_one() {
     );
     let rests = plan.steps.iter().filter(|s| s.turn.is_none());
     assert!(rests.clone().count() == 8 && rests.clone().skip(1).all(|s| s.pose == Pose::Here));
-    // 152 s a cycle, niu 3.2, of which 3 h 50 min have some ninety.
+    // 152 s per cycle (niu 3.2): some ninety of them in 3 h 50 min.
     let rounds = f64::from(plan.rounds);
     let round_s = (json["duration_s"].as_f64().unwrap() - plan.lead_in_s) / rounds;
     assert!((round_s - 152.0).abs() < 0.1, "{round_s}");

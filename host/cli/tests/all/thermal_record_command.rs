@@ -1,4 +1,4 @@
-//! `mimu thermal record` against the firmware's release image on the emulated board, with its table and its chamber.
+//! `mimu thermal record` with the firmware's release image on the emulated board, with its table and its chamber.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ use serde_json::Value;
 use crate::wizard::bench::{Bench, unit};
 use crate::wizard::on_board::errors;
 
-/// Rates both ways about all axes, and a turn by an angle there and back, while the chamber goes from 12 to 25 °C.
+/// Rates in both directions about all axes, and a turn by an angle there and back, while the chamber goes from 12 to 25 °C.
 fn sweep() -> String {
     let mut plan = String::from(
         "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\ngravity_mps2 = 9.793\n\
@@ -44,7 +44,7 @@ fn sweep() -> String {
     plan
 }
 
-/// A unit that follows the chamber within seconds, on a brisk table: the whole takes a minute or two.
+/// A unit that follows the chamber within seconds, on a fast table: the test takes a minute or two.
 fn brisk(seed: u64) -> RigTruth {
     let mut truth = unit(seed);
     let mut file = truth.file.clone();
@@ -69,7 +69,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// Mean input of each dwell times its length in samples, and that length.
+/// For each dwell the mean input times the number of samples, and that number.
 type Inputs = BTreeMap<i32, ([f64; 6], f64)>;
 
 fn recorded(path: &Path) -> Inputs {
@@ -82,7 +82,7 @@ fn recorded(path: &Path) -> Inputs {
                 let (sum, count) = all.entry(*step).or_default();
                 *count += 1.0;
                 for (sum, column) in sum.iter_mut().zip(&batch.reference) {
-                    // At rest without a table there are none.
+                    // At rest without a table there are no inputs.
                     *sum += column.get(row).copied().unwrap_or(f64::NAN);
                 }
             }
@@ -93,7 +93,7 @@ fn recorded(path: &Path) -> Inputs {
     all
 }
 
-/// What the bench writes when it carries out the same plan by itself.
+/// The inputs that the bench writes when it carries out the same plan by itself.
 fn by_the_bench(plan: &str, truth: &RigTruth) -> Inputs {
     let plan = Plan::parse(Source::new("plan", plan)).unwrap();
     let mut all = Inputs::new();
@@ -139,7 +139,7 @@ fn a_plan_is_carried_out_and_its_recording_has_the_inputs_of_the_bench_and_is_fi
         let is_turn = matches!(step % 10, 7 | 9);
         for (axis, (wanted, input)) in wanted.iter().zip(input).enumerate() {
             match is_turn {
-                // The angle, whatever time the table takes; the force turns meanwhile, and is not stated.
+                // The angle, however long the table takes. The force rotates during a turn, so the reference is empty.
                 true if axis < 3 => {
                     let off = (wanted - input) / 1000.0;
                     assert!(off.abs() < 0.1, "turn {step}: {wanted} {input}");
@@ -159,7 +159,7 @@ fn a_plan_is_carried_out_and_its_recording_has_the_inputs_of_the_bench_and_is_fi
         );
     }
 
-    // The lag is given: within a minute of heating none is told from a slope.
+    // The lag is given, because a minute of heating does not distinguish it from a slope.
     let out = bench
         .mimu("thermal fit sweep --lag 1 -o cal.toml --json fit.json")
         .output()
@@ -168,17 +168,17 @@ fn a_plan_is_carried_out_and_its_recording_has_the_inputs_of_the_bench_and_is_fi
     let fit = json(&bench.path("fit.json"));
     let range = &fit["range_c"];
     println!("{told}\n{}", fit["sensors"]);
-    // By their own power the dies are warmer than the chamber.
+    // By self-heating the dies are warmer than the chamber.
     let span = range[1].as_f64().unwrap() - range[0].as_f64().unwrap();
     assert!((10.0..14.0).contains(&span), "{range}");
     let calibration = Calibration::read(&bench.path("cal.toml")).unwrap();
     let [gyro, accel] = errors(&calibration, &bench.truth);
     println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²");
-    // As of a session of the wizard: 18 dwells of 2.5 s in place of twelve of a second, and a slope over temperature besides.
+    // As for a session of the wizard: 18 dwells of 2.5 s instead of twelve of 1 s, but also a slope over temperature.
     assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
 }
 
-/// Waits until the command has written so many bytes of samples.
+/// Waits until the command has written this many bytes of samples.
 fn recording(bench: &Bench, name: &str, bytes: u64, child: &mut Child) {
     let since = Instant::now();
     let path = bench.path(name).join("samples.csv");
@@ -196,7 +196,7 @@ fn a_procedure_that_is_interrupted_or_loses_its_power_keeps_what_it_has_and_leav
     let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\nchamber_c = [[0.0, 40.0], [600.0, 60.0]]\n\
                 [[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 600.0\n";
     std::fs::write(bench.path("plan.toml"), plan).unwrap();
-    // The chamber alone: the unit lies still, and nobody moves it.
+    // Only the chamber: the unit lies still, and nothing moves it.
     let driver = std::fs::read_to_string(bench.path("driver.toml")).unwrap();
     let address = driver.lines().find(|l| l.starts_with("tcp")).unwrap();
     let (_, chamber) = driver.split_once("[chamber]").unwrap();
@@ -209,7 +209,7 @@ fn a_procedure_that_is_interrupted_or_loses_its_power_keeps_what_it_has_and_leav
         )
     };
     let mut child = spawned(&bench, &command("short"));
-    // Some five seconds: how many of them the chamber takes to get there goes by how busy this computer is.
+    // Some five seconds; the load of this machine determines how many of them the chamber needs for its temperature.
     recording(&bench, "short", 400_000, &mut child);
     let warm: f64 = bench.ask("CHAMBER?").parse().unwrap();
     assert!((40.0..45.0).contains(&warm), "{warm}");

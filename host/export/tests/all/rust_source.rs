@@ -1,4 +1,4 @@
-//! The module compiles without an allocator for the target, and computes what a device computes with the stored bytes, bit by bit.
+//! The module compiles for the target without an allocator, and computes bit by bit what a device computes with the stored bytes.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,7 +20,7 @@ fn main() {
 }
 ";
 
-/// A crate with the module of `calibration`, which has nothing else to depend on than `mimu-core`.
+/// A crate with the module of `calibration`; its only dependency is `mimu-core`.
 fn crate_of(calibration: &Calibration) -> PathBuf {
     let from = Sources {
         calibration: Some((calibration, "test")),
@@ -43,7 +43,7 @@ fn crate_of(calibration: &Calibration) -> PathBuf {
     );
     write("src/main.rs", MAIN.as_bytes());
     write("src/stream.rs", include_bytes!("stream.rs"));
-    // The versions that are tested, and no network.
+    // The tested versions, without network access.
     std::fs::copy(root.join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
     folder
 }

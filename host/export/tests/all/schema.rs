@@ -1,4 +1,4 @@
-//! The published schema is that of the types.
+//! The published schema equals the one generated from the types.
 
 #[test]
 fn the_schema_in_the_documentation_is_that_of_the_types() {

@@ -1,4 +1,4 @@
-//! Comparing calibrations: of units that did not change, hardly any parameter is named; what changed is, and by how much.
+//! Comparison of calibrations: for unchanged units hardly any parameter is named; a change is named with its size.
 
 use mimu::calibration::Calibration;
 use mimu::calibration::comparison::{Comparison, compare};
@@ -7,7 +7,7 @@ use mimu_rig::random::Random;
 /// Standard deviation of a bias, V.
 const SIGMA: f64 = 1e-3;
 
-/// A calibration of a gyro in volts whose biases are `bias`, with standard deviations of [`SIGMA`]; all else is exact.
+/// A calibration of a gyro in volts whose biases are `bias`, with standard deviations of [`SIGMA`]; all other parameters are exact.
 fn calibration(bias: [f64; 3], device: &str) -> Calibration {
     let o = bias.map(|b| -b);
     let nine = |v: f64| format!("{:?}", [[v; 3]; 3]);
@@ -29,7 +29,7 @@ fn calibration(bias: [f64; 3], device: &str) -> Calibration {
     Calibration::parse(&text, "made up").unwrap()
 }
 
-/// So many calibrations whose biases scatter by the uncertainty of the fit and, on x, by `moves` from one to the next.
+/// `count` calibrations whose biases scatter by the uncertainty of the fit and, on x, by `moves` from one to the next.
 fn compared(random: &mut Random, count: usize, moves: f64) -> Comparison {
     let mut one = || {
         let moved = moves * random.normal();
@@ -50,7 +50,7 @@ fn without_a_change_one_comparison_in_twenty_names_one() {
             let found = compared(&mut random, count, 0.0);
             found.parameters.iter().any(|p| p.changed)
         });
-        // 20 of 400 by the promise, with a standard deviation of 4.4.
+        // 20 of 400 are expected, with a standard deviation of 4.4.
         let named = named.count();
         assert!((7..=34).contains(&named), "{count}: {named}");
     }
@@ -67,7 +67,7 @@ fn the_repeatability_of_sixty_switch_ons_is_found() {
         .map(|p| p.name.as_str())
         .collect();
     assert_eq!(changed, ["bias x"]);
-    // A standard deviation of 60 values is known to 9 %; here the scatter of the fits is taken out of it as well.
+    // 60 values determine a standard deviation to 9 %; here the scatter of the fits is subtracted as well.
     let x = found
         .parameters
         .iter()

@@ -1,4 +1,4 @@
-//! Parts of a recording that nothing else determines are held out otherwise, or named, and no error of theirs is averaged in.
+//! Parts of a recording that no other dwell determines are held out differently, or named; their errors are not averaged in.
 
 use mimu::fit::Split;
 use mimu::quantity::Sensor;
@@ -25,7 +25,7 @@ fn recorded(ups: &[[f64; 3]]) -> Prepared {
     Prepared::of(manifest, &samples, mimu::signal::stillness::STILL_FACTOR).expect("readable")
 }
 
-/// Eighteen poses nearly along the axes: 3e-4 of a misalignment's slope is all that they show.
+/// Eighteen poses nearly along the axes: they show only 3e-4 of a misalignment's slope.
 fn along_the_axes() -> Vec<[f64; 3]> {
     let pose = |k: usize| {
         let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };

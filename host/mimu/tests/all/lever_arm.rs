@@ -1,5 +1,5 @@
-//! An accelerometer beside the axis of a table, against physics written here: the force that no reference says bends no parameter, and the
-//! intervals hold the truth.
+//! An accelerometer off the axis of a table, against physics written here: the force that the reference lacks does not bias the parameters, and the
+//! intervals contain the truth.
 
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
@@ -18,7 +18,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(&b).map(|(a, b)| a * b).sum()
 }
 
-/// Dwells of two seconds: all faces turned both ways at 250 deg/s, and corners at rest. `arm`: from the axis to the sensor, m.
+/// Dwells of two seconds: all faces turned in both directions at 250 deg/s, and corners at rest. `arm`: from the axis to the sensor, m.
 fn recording(arm: [f64; 3], seed: u64) -> Samples {
     let mut state = seed;
     let mut noise = || {
@@ -93,7 +93,7 @@ fn a_board_five_millimetres_beside_the_axis_is_calibrated_as_well_as_one_on_it()
         outside += u32::from(worst > 1.5);
         bias[0] += off(&plain).1 / 20.0;
         bias[1] += with / 20.0;
-        // What the arm does is no error of the sensor.
+        // The arm's force is not counted as an error of the sensor.
         assert!(known.sensor(Sensor::Accel).unwrap().rms() < 5e-3);
         assert!(plain.sensor(Sensor::Accel).unwrap().rms() > 0.02);
     }
@@ -110,7 +110,7 @@ fn a_mounting_that_is_known_to_an_angle_widens_what_it_turns_and_no_bias() {
     let triad = fit.sensor(Sensor::Accel).unwrap().estimated.triad.clone();
     let wider = triad.clone().mounted(1e-2).forward_estimates();
     let (yaw, row) = (1e-2_f64, MATRIX[0]);
-    // Turned by an angle about z, the frame's x and y of the first sensor become these.
+    // Rotated by an angle about z, x and y of the first sensor become these.
     let turned = [
         row[0] * yaw.cos() + row[1] * yaw.sin(),
         row[1] * yaw.cos() - row[0] * yaw.sin(),

@@ -1,4 +1,4 @@
-//! Estimators and designs against answers that come from elsewhere.
+//! Estimators and designs against independently known answers.
 
 mod comparison;
 mod design;

@@ -26,11 +26,11 @@ impl Noise {
     }
 }
 
-/// A unit: what it reads is `matrix · input + bias`, some milliseconds later.
+/// A unit whose readings are `matrix · input + bias`, some milliseconds later.
 struct Unit {
     matrix: [[f64; 3]; 3],
     bias: [f64; 3],
-    /// Behind the input, s.
+    /// Delay behind the input, s.
     delay: [f64; 3],
     /// Standard deviation of a sample.
     sigma: f64,
@@ -60,7 +60,7 @@ const ACCEL: Unit = Unit {
 /// Angle and rate about an axis at a time.
 type Turn = fn(f64) -> [f64; 2];
 
-/// To and fro by half a turn, five seconds a time: up to 226 deg/s.
+/// Back and forth by half a turn, with a period of five seconds: up to 226 deg/s.
 fn swing(t: f64) -> [f64; 2] {
     let w = 2.0 * std::f64::consts::PI * 0.2;
     let size = std::f64::consts::PI;
@@ -73,25 +73,25 @@ fn whirl(t: f64) -> [f64; 2] {
     [rate * t, rate]
 }
 
-/// Rate and force in body axes, turned about the level body axis `axis`, where the next axis points up at first.
+/// Rate and force in body axes, rotated about the level body axis `axis`; the next axis points up at first.
 fn input(turn: Turn, axis: usize, t: f64) -> [[f64; 3]; 2] {
     let [angle, about] = turn(t);
     let (mut rate, mut force) = ([0.0; 3], [0.0; 3]);
     rate[axis] = about;
-    // The body goes one way, and up goes the other way in it.
+    // The body turns one way, so up turns the other way in it.
     force[(axis + 1) % 3] = G * angle.cos();
     force[(axis + 2) % 3] = -G * angle.sin();
     [rate, force]
 }
 
-/// What the accelerometer errs by, m/s², by rate and force.
+/// Error of the accelerometer, m/s², as a function of rate and force.
 type Error = fn([[f64; 3]; 2]) -> [f64; 3];
 
 fn none(_: [[f64; 3]; 2]) -> [f64; 3] {
     [0.0; 3]
 }
 
-/// Six faces at rest, 3 s each, then twice a turn of 10 s about each axis. The reference goes `pace` times as fast as the truth.
+/// Six faces at rest, 3 s each, then two turns of 10 s about each axis. The reference is `pace` times as fast as the truth.
 fn recorded(turn: Turn, error: Error, pace: f64, seed: u64) -> Prepared {
     let mut samples = Samples::default();
     let mut noise = Noise(seed);
@@ -166,7 +166,7 @@ fn a_unit_that_swings_about_level_axes_is_calibrated_by_the_reference_of_every_i
             count += 1.0;
         }
     }
-    // 240 errors: an rms of one is known to 5 %.
+    // 240 errors determine an rms of one to 5 %.
     let rms = (sum / count).sqrt();
     assert!((0.8..1.2).contains(&rms), "rms error of {rms} sigma");
 }

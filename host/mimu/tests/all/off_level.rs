@@ -1,4 +1,4 @@
-//! Six faces that were not level: least squares and six positions say so in the same words, and of level ones least squares says nothing.
+//! Six faces that were not level: least squares and six positions report this in the same words; for level faces least squares reports nothing.
 
 use mimu::fit::{Method, Options, fit};
 use mimu::signal::stillness::STILL_FACTOR;
@@ -8,11 +8,11 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 const G: f64 = 9.80665;
 
-/// What an accelerometer is that lies on six faces, three seconds each, 80 mV per m/s², misaligned by some degrees.
+/// An accelerometer on six faces, three seconds each, 80 mV per m/s², misaligned by some degrees.
 struct Unit {
     /// Standard deviation of the tilts of a face, rad.
     tilt: f64,
-    /// Square of each axis, per m/s².
+    /// Quadratic coefficient of each axis, per m/s².
     square: f64,
 }
 
@@ -57,7 +57,7 @@ const SAYS: [&str; 2] = [
     " deg rms: level the faces, or use only the magnitude of gravity (reference = \"gravity\")",
 ];
 
-/// The angle that is said, deg.
+/// The reported angle, deg.
 fn said(warnings: &[String]) -> Option<f64> {
     let off_level = warnings.iter().find_map(|w| w.strip_prefix(SAYS[0]))?;
     off_level.strip_suffix(SAYS[1])?.parse().ok()
@@ -74,9 +74,9 @@ fn faces_off_level_are_named_in_the_same_words_by_least_squares_and_by_six_posit
         assert!(said(&warnings(&tilted, seed, Method::SixPositions)).is_some());
         angles.extend(said(&warnings(&tilted, seed, Method::LeastSquares)));
     }
-    // Three degrees of freedom are left of six faces: now and then they show next to nothing of the tilts.
+    // Six faces leave three degrees of freedom, so sometimes they show hardly anything of the tilts.
     assert!(angles.len() >= 28, "{angles:?}");
-    // A tilt has two parts across the force.
+    // A tilt has two components perpendicular to the force.
     let rms = (angles.iter().map(|a| a * a).sum::<f64>() / angles.len() as f64).sqrt();
     assert!((2.2..3.6).contains(&rms), "{rms}");
 }

@@ -1,4 +1,4 @@
-//! A calibration file with curves over temperature: read, checked, written, and evaluated against Hermite pieces written out here.
+//! A calibration file with curves over temperature: read, checked, written, and evaluated against Hermite polynomials written here.
 
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
@@ -68,7 +68,7 @@ fn curves_are_read_and_written_again_without_a_loss() {
     let gyro = temperature.nodes[2].gyro.as_ref().unwrap();
     assert_eq!(gyro.C.as_flattened(), &numbers[..9]);
     assert_eq!(gyro.slope_o[..], slopes[9..]);
-    // As the layout is shown to people.
+    // In the layout that the documentation shows.
     assert!(written.contains("\n[[temperature.node]]\n"), "{written}");
     assert!(written.contains("\n[temperature.node.gyro]\n"), "{written}");
     assert!(read.limits() == Some([-8.0, 58.5]));
@@ -88,7 +88,7 @@ fn a_calibration_without_curves_is_written_as_before() {
     }
 }
 
-/// Value of a piece in Hermite's basis, and of its tangents outside.
+/// Value of a Hermite polynomial between nodes, and of its tangents outside.
 fn expected(of: impl Fn(f64) -> [f64; 2], t: f64) -> f64 {
     let (first, last) = (NODES[0], NODES[3]);
     if t < first || t > last {

@@ -1,4 +1,4 @@
-//! Recordings at rest of a unit whose biases drift far: what of them is used, and what the report says of the rest.
+//! Recordings at rest of a unit with large drifts: which parts are used, and the report about the rest.
 
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
@@ -16,7 +16,7 @@ const GRAVITY: f64 = 9.80665;
 /// Standard deviation of a sample: 0.046 deg/s, 2 mg.
 const NOISE: [f64; 2] = [8e-4, 0.02];
 
-/// A unit on a desk: the times of its samples, its thermometer, and what moves its readings beside the temperature.
+/// A unit on a desk: the times of its samples, its thermometer, and changes of its readings besides the temperature.
 struct Desk {
     duration_s: f64,
     temp_c: fn(f64) -> f64,
@@ -92,7 +92,7 @@ impl Desk {
     }
 }
 
-/// The curves of the gyro hold the biases that the simulation had, to a hundredth of a degree per second, over the whole range.
+/// The curves of the gyro contain the biases of the simulation, to 0.01 deg/s, over the whole range.
 fn assert_biases(result: &ThermalResult) {
     for (axis, name) in ["gyro_bias_x", "gyro_bias_y", "gyro_bias_z"]
         .iter()
@@ -200,7 +200,7 @@ fn a_recording_that_is_mostly_shaken_is_refused_unless_it_is_declared_to_be_at_r
 
 #[test]
 fn axes_that_want_other_lags_leave_the_lag_undetermined() {
-    // The bias of y follows the temperature two minutes late, the others at once.
+    // The bias of y lags the temperature by two minutes; the others follow at once.
     let desk = Desk {
         temp_c: there_and_back,
         added: |t| {
@@ -244,7 +244,7 @@ fn errors_far_beyond_the_noise_are_no_fit() {
 
 #[test]
 fn a_hysteresis_that_crosses_itself_is_seen_in_its_largest_and_its_rms() {
-    // Heating is above cooling in the cold and below it in the warm, by up to 0.1 deg/s.
+    // In the cold heating is above cooling, in the warm below it, by up to 0.1 deg/s.
     let desk = Desk {
         temp_c: there_and_back,
         added: |t| {

@@ -1,4 +1,4 @@
-//! Curves over temperature from recordings of a unit whose curves are known, and recordings that are refused.
+//! Curves over temperature from recordings of a unit with known curves, and recordings that are refused.
 
 mod at_rest;
 mod base;

@@ -1,4 +1,4 @@
-//! What a planned procedure is predicted to determine, against what follows on paper.
+//! Predictions for a planned procedure, against calculations by hand.
 
 use mimu::plan::design::budget::DwellNoise;
 use mimu::readable::STANDARD_GRAVITY as G;

@@ -1,4 +1,4 @@
-//! Recordings that say nothing of temperature, or the wrong thing: each is refused with what is wrong and what to do.
+//! Recordings with missing or misleading temperatures: each is refused with the problem and the remedy.
 
 use mimu::{Manifest, Samples};
 use mimu_thermal::joint::{Choice, estimate};
@@ -7,7 +7,7 @@ use mimu_thermal::warning::Warning;
 use crate::session;
 use crate::simulation::Experiment;
 
-/// What the recording is refused with once `change` was made to it.
+/// The refusal of the recording after `change`.
 fn refusal(change: impl FnOnce(&mut Manifest, &mut Samples)) -> String {
     let (mut manifest, mut samples) = Experiment::ramp(60.0, false).record(1);
     change(&mut manifest, &mut samples);

@@ -39,15 +39,15 @@ pub const COMMANDS: [(&str, &str); 25] = [
     ("TRUTH?", ""),
 ];
 
-/// What is at hand beside the board and its port.
+/// State of the bench beside the board and its port.
 #[derive(Debug)]
 pub(super) struct Desk {
     seed: u64,
-    /// Closed: motions are allowed.
+    /// The interlock is closed: motions are allowed.
     interlock: bool,
     /// Since when the supply is off, ns.
     off_ns: Option<u64>,
-    /// Number of cuts and resets so far: each tears the word in flight differently.
+    /// Number of cuts and resets so far; each interrupts the word in flight differently.
     torn: u64,
 }
 
@@ -71,7 +71,7 @@ impl Desk {
 enum Problem {
     /// The bench refuses the command and continues.
     Refused(String),
-    /// The bench cannot go on.
+    /// The bench cannot continue.
     Broken(String),
 }
 
@@ -119,7 +119,7 @@ impl<'a> Line<'a> {
         })
     }
 
-    /// The argument `k`, where there is one, a number within a range.
+    /// The argument `k`, if present: a number within a range.
     fn number(&self, k: usize, [low, high]: [f64; 2]) -> Result<Option<f64>, Problem> {
         let Some(word) = self.arguments.get(k) else {
             return Ok(None);
@@ -134,13 +134,13 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// As [`Line::number`], of an argument that is there.
+    /// As [`Line::number`], for a mandatory argument.
     fn required(&self, k: usize, range: [f64; 2]) -> Result<f64, Problem> {
-        // Arguments were counted.
+        // The number of arguments was checked before.
         Ok(self.number(k, range)?.unwrap_or(range[0]))
     }
 
-    /// The first argument, a whole number up to a highest one.
+    /// The first argument, an integer up to `most`.
     fn count(&self, most: u32) -> Result<u32, Problem> {
         let x = self.required(0, [0.0, f64::from(most)])?;
         match x.fract() == 0.0 {
@@ -176,10 +176,10 @@ impl Served {
         }
     }
 
-    /// The value that was asked for; empty where none was.
+    /// The requested value; empty if none was requested.
     fn carry_out(&mut self, line: &Line<'_>) -> Result<String, Problem> {
         let done = Ok(String::new());
-        // Beyond any centrifuge.
+        // More than any centrifuge.
         let rate = || Ok::<f64, Problem>(line.required(0, [-36e3, 36e3])?.to_radians());
         match line.name.as_str() {
             "*IDN?" => return self.identity(),
@@ -210,7 +210,7 @@ impl Served {
             "INTERLOCK" => {
                 self.desk.interlock = line.switch()?;
                 if !self.desk.interlock {
-                    // Like an opened door, it stops a table; a plan continues.
+                    // Like an opened door, this stops a table; a plan continues.
                     let stop = |front: &mut Front, ns| front.command(ns, Command::Stop);
                     let _ = self.board.front(stop)?;
                 }
@@ -229,7 +229,7 @@ impl Served {
                 self.at_front(move |front, ns| front.command(ns, Command::Fidget(every)))?;
             }
             "CHAMBER" => {
-                // What a plan may ask of it; a degree a millisecond is a jump.
+                // The range of a plan; without a limit on the rate, a degree in a millisecond is a jump.
                 let to_c = line.required(0, [-100.0, 200.0])?;
                 let per_min = line.number(1, [1e-3, 6e4])?;
                 let rate = per_min.map(|c| c / 60.0);
@@ -260,7 +260,7 @@ impl Served {
                     self.waiting.clear();
                 }
             },
-            // The list of commands determines what arrives here.
+            // Only names from the list of commands arrive here.
             name => return refused(format!("`{name}`: not done")),
         }
         done
@@ -275,7 +275,7 @@ impl Served {
         Ok(format!("mimu-bench,{carrier},{},1", self.desk.seed))
     }
 
-    /// Asks what is in front of the pins for something that it may refuse.
+    /// Calls a function of the front end that may refuse.
     fn at_front<T: Send + 'static>(
         &mut self,
         act: impl FnOnce(&mut Front, u64) -> Result<T, String> + Send + 'static,
@@ -314,7 +314,7 @@ impl Served {
         self.moved(Command::Move { up, heading })
     }
 
-    /// Does what leaves a flash word or a sector in between, and keeps that in the file as well.
+    /// Interrupts a flash operation, and writes the incomplete word or sector to the file.
     fn tearing(
         &mut self,
         tear: impl FnOnce(&mut Board, u64) -> Result<(), String>,
@@ -342,7 +342,7 @@ impl Served {
 
     fn switch_on(&mut self) -> Result<(), String> {
         if let Some(off_ns) = self.desk.off_ns.take() {
-            // The part has to see that it was off.
+            // The part must notice that it was off.
             self.board.run_to(off_ns + SLICE_NS)?;
             self.board.restore_supply()?;
         }
@@ -354,10 +354,10 @@ fn bit(on: bool) -> Result<String, Problem> {
     Ok(u8::from(on).to_string())
 }
 
-/// A number with so many decimals at most.
+/// A number with at most so many decimals.
 fn rounded(x: f64, decimals: i32) -> String {
     let by = 10f64.powi(decimals);
-    // Zero has no sign.
+    // Avoids a negative zero.
     ((x * by).round() / by + 0.0).to_string()
 }
 
@@ -382,7 +382,7 @@ impl Board {
         })
     }
 
-    /// Which bytes are garbled on their way to the device.
+    /// Decides which bytes are garbled on their way to the device.
     fn seed_line(&mut self, seed: u64) -> Result<(), String> {
         self.with(move |s| {
             s.session.board_mut().part.serial().errors_mut().seed = seed;

@@ -20,7 +20,7 @@ fn mimu_board() -> Command {
     command
 }
 
-/// Ends with the test, however that ends.
+/// Ends the process when the test ends, in whatever way.
 struct Running(Child);
 
 impl Drop for Running {
@@ -60,7 +60,7 @@ fn port_and_control_are_printed_on_a_line_each_and_a_plan_gives_all_but_its_step
     stream.shutdown(std::net::Shutdown::Write).unwrap();
     let mut answers = String::new();
     stream.read_to_string(&mut answers).unwrap();
-    // The first face that a person takes.
+    // The person begins with this face.
     assert_eq!(answers, "mimu-bench,hands,7,1\n0 0 -1 NaN\n");
     assert!(link.exists());
     let mut stderr = running.0.stderr.take().unwrap();

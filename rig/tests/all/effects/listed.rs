@@ -95,7 +95,7 @@ fn accelerometer_nonlinearities_are_powers_and_products_of_the_forces() {
 fn in_a_centrifuge_each_accelerometer_axis_feels_its_own_arm() {
     let effect = "id = \"accel_size_effect\"\narms_mm = [[10, 0, 0], [0, 20, 0], [30, 0, 5]]";
     let mut pair = Pair::new(effect, 1e-2);
-    // About z, steady: inward with ω² r, that is against the arm.
+    // Steady rotation about z: the centrifugal force ω² r points outwards, so the specific force points inwards, against the arm.
     let w = 10.0;
     let (_, accel) = pair.step(&motion(0.0, [0.0, 0.0, w], [0.0, 0.0, G]), 25.0);
     close(
@@ -247,7 +247,7 @@ fn a_mismatched_bit_adds_its_error_wherever_it_is_set() {
     ] {
         let volts = (code + 0.2) * GYRO_LSB;
         let rate = (volts - axis.null) / axis.sensitivity;
-        // Along the axis itself, so that the pin has the voltage that is meant.
+        // Along the axis itself, so that the pin has exactly the intended voltage.
         let (with, without) = pair.pins(
             &motion(0.0, axis.direction.map(|d| d * rate), [0.0; 3]),
             25.0,
@@ -258,7 +258,7 @@ fn a_mismatched_bit_adds_its_error_wherever_it_is_set() {
     }
 }
 
-/// Difference that an effect makes to the outputs of the three gyros where the first reads a code, in codes.
+/// Difference that an effect makes to the outputs of the three gyros when the first reads a code, in codes.
 fn by_code(effect: &str, code: f64) -> [f64; 3] {
     let rig = "format = \"mimu-rig/1\"\n[unit.gyro_axes]\nwhite_si = [0, 0, 0]\ninstability_si = [0, 0, 0]\n\
                walk_si = [0, 0, 0]\nbandwidth_hz = [inf, inf, inf]\n[converter]\nreference_error_ppm = 0\n";
@@ -288,7 +288,7 @@ fn each_converter_has_errors_and_codes_of_its_own() {
     let effect = format!(
         "id = \"gyro_converters\"\nbit_errors_lsb = {errors}\nadded_codes = [1000, 2000, 65536]"
     );
-    // 32767 + 1000 has the top bit, 32767 + 2000 not the second, and 32767 the second and third.
+    // 32767 + 1000 has the top bit set, 32767 + 2000 not the second, and 32767 the second and third.
     for (code, expected) in [
         (32_767.0, [8.0, 0.0, 2.0]),
         (31_000.0, [0.0, 0.0, 2.0]),
@@ -301,7 +301,7 @@ fn each_converter_has_errors_and_codes_of_its_own() {
     }
 }
 
-/// What a firmware makes of a 16-bit code whose low byte it takes for a signed number.
+/// A firmware's reading of a 16-bit code whose low byte it takes for a signed number.
 fn misread(code: i16) -> f64 {
     let [high, low] = code.to_be_bytes().map(|b| f64::from(b as i8));
     256.0 * high + low

@@ -37,13 +37,13 @@ board_heating_c = 0
 die_heating_c = [0, 0, 0, 0]
 ";
 
-/// Axes exactly along the body's.
+/// Axes exactly along the body's axes.
 const STRAIGHT: &str = "directions = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n";
 
-/// Step of a 16-bit converter at the pins of the gyros: 3.3 V through 0.65.
+/// Quantisation step of a 16-bit converter at the pins of the gyros: 3.3 V through 0.65.
 const GYRO_LSB: f64 = 3.3 / 0.65 / 65536.0;
 
-/// The same unit with the effect and without, noise and all.
+/// The same unit with and without the effect, including the noise.
 struct Pair {
     truth: RigTruth,
     with: Unit,
@@ -80,7 +80,7 @@ impl Pair {
         )
     }
 
-    /// What the effect adds, at the inputs: rad/s and m/s².
+    /// Error that the effect adds at the inputs: rad/s and m/s².
     fn step(&mut self, motion: &Motion, chamber_c: f64) -> ([f64; 3], [f64; 3]) {
         let (with, without) = self.pins(motion, chamber_c);
         let unit = &self.truth.unit;
@@ -133,7 +133,7 @@ fn an_effect_of_size_zero_changes_nothing_at_all() {
             );
             m.angular_acceleration = [1.0, 2.0, 3.0];
             let expected = clean.step(&m, 30.0 + t);
-            // A power of two has no zero: see their own tests.
+            // A power of two cannot be zero; these have their own tests.
             let by_power = spec.id == "x_code_stuck_bit" || spec.id.ends_with("_sign_extension");
             if !by_power {
                 assert_eq!(zero.step(&m, 30.0 + t), expected, "{}", spec.id);
@@ -146,7 +146,7 @@ fn an_effect_of_size_zero_changes_nothing_at_all() {
 
 #[test]
 fn an_effect_leaves_the_noise_as_it_was() {
-    // Noise, filters and rails as they come; what is left after the effect's own part is rounding.
+    // Default noise, filters and rails: apart from the effect itself, only rounding remains.
     let effect = "id = \"gyro_bias_drift\"\ndps_per_hour = [3600, 0, 0]";
     let mut pair = Pair::of(
         "format = \"mimu-rig/1\"\n[unit.gyro_axes]\nbandwidth_hz = [inf, inf, inf]",

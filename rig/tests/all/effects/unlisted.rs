@@ -1,4 +1,4 @@
-//! Effects that stand on no list.
+//! Effects that estimators do not know.
 
 use std::f64::consts::TAU;
 
@@ -84,7 +84,7 @@ fn vibration_is_rectified_by_its_mean_square_above_the_corner() {
             mean = std::array::from_fn(|i| mean[i] + gyro[i] / f64::from(count));
         }
     }
-    // Half the square of 2 g, through a first-order high-pass: f²/(f² + fc²) = 25/26. Gravity is not in it.
+    // Half the square of 2 g, through a first-order high-pass: f²/(f² + fc²) = 25/26. Gravity is excluded.
     close(
         mean,
         [0.1, 0.2, -0.1].map(|c| c * DPS * 2.0 * 25.0 / 26.0),
@@ -123,7 +123,7 @@ fn a_magnetic_bias_follows_the_heading() {
         (180.0, [0.0, -0.2, -0.45]),
     ] {
         let mut m = motion(0.0, [0.0; 3], [0.0; 3]);
-        // Body x turned from east towards north.
+        // Body x rotated from east towards north.
         m.attitude = Rotation::about([0.0, 0.0, 1.0], heading * DPS);
         close(
             pair.step(&m, 25.0).0,

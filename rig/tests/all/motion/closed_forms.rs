@@ -8,7 +8,7 @@ use mimu_rig::rotation::{Rotation, norm, scale};
 
 use super::assert_near;
 
-/// A place where the Earth does not turn.
+/// A place on an Earth without rotation.
 fn standstill(gravity: f64) -> Place {
     Place {
         rotation: 0.0,
@@ -16,8 +16,7 @@ fn standstill(gravity: f64) -> Place {
     }
 }
 
-/// Classical coning: body z describes a cone of half-angle `a`, `frequency` rad/s, and the body does not
-/// turn about the vertical with it.
+/// Classical coning: body z describes a cone of half-angle `a` at `frequency` rad/s, without a rotation of the body about the vertical.
 fn cone(a: f64, frequency: f64, t: f64) -> Frame {
     let turn = |sign: f64| Jet {
         value: sign * frequency * t,
@@ -32,8 +31,8 @@ fn cone(a: f64, frequency: f64, t: f64) -> Frame {
 
 #[test]
 fn coning_has_a_steady_axial_rate_beside_the_one_that_goes_round() {
-    // w = (-W sin a sin Wt, W sin a cos Wt, -W (1 - cos a)): the tilt is about the body
-    // direction (cos Wt, sin Wt, 0), and the rate across is at a right angle to it.
+    // w = (-W sin a sin Wt, W sin a cos Wt, -W (1 - cos a)): the tilt is about the body direction (cos Wt, sin Wt, 0), and the transverse rate is
+    // perpendicular to it.
     let (a, frequency) = (0.01_f64, TAU * 50.0);
     for t in [0.0, 0.0013, 0.0171] {
         let body = cone(a, frequency, t);
@@ -48,8 +47,7 @@ fn coning_has_a_steady_axial_rate_beside_the_one_that_goes_round() {
 
 #[test]
 fn a_cone_makes_the_axial_rate_add_up_to_its_solid_angle_while_the_attitude_comes_back() {
-    // Goodman and Robinson 1958: over one turn of the cone the integral of the axial rate is the solid
-    // angle within.
+    // Goodman and Robinson 1958: over one turn of the cone, the integral of the axial rate is the enclosed solid angle.
     let (a, frequency) = (0.2_f64, TAU * 3.0);
     let n = 200_000;
     let dt = TAU / frequency / f64::from(n);
@@ -69,9 +67,8 @@ fn a_cone_makes_the_axial_rate_add_up_to_its_solid_angle_while_the_attitude_come
 
 #[test]
 fn a_pendulum_feels_gravity_and_its_swing_along_the_rod_and_nothing_across() {
-    // Rod of length L from a pivot, body z along the rod to the pivot, swing about x: L φ'' = -g sin φ, and
-    // from the energy L φ'² / 2 = g (cos φ - cos φ0). The point mass hangs freely, so that across the rod
-    // it feels nothing.
+    // Rod of length L from a pivot, body z along the rod towards the pivot, swing about x: L φ'' = -g sin φ, and from the energy L φ'² / 2 = g (cos φ
+    // - cos φ0). The point mass hangs freely, so it senses nothing across the rod.
     let (g, length, start) = (9.81, 0.7, 1.2_f64);
     let place = standstill(g);
     for phi in [1.2_f64, 0.9, 0.3, 0.0, -0.5, -1.2] {

@@ -1,4 +1,4 @@
-//! Tables and people that are told what to do while they do it.
+//! Tables and people that get commands while they move.
 
 use mimu_rig::command::{Command, Commanded};
 use mimu_rig::hands::{Hands, HandsTruth};
@@ -27,7 +27,7 @@ fn dps(rate: f64) -> f64 {
     rate.to_radians()
 }
 
-/// A carrier and how far it has gone, in steps of H.
+/// A table or a person, and its progress in steps of H.
 struct Course<'a> {
     carrier: &'a mut dyn Commanded,
     steps: u64,
@@ -68,7 +68,7 @@ impl<'a> Course<'a> {
         self.carrier.command(self.t_s(), command).unwrap();
     }
 
-    /// Until it is done with what it was told. How long that took, s.
+    /// Runs until the command is done. Returns how long that took, s.
     fn wait(&mut self) -> f64 {
         let began_s = self.t_s();
         while self.carrier.busy(self.t_s()) {
@@ -78,13 +78,13 @@ impl<'a> Course<'a> {
         self.t_s() - began_s
     }
 
-    /// Neither attitude nor rate jumps: from one instant to the next the attitude changes by the rate, and the rate
-    /// by no more than such an angular acceleration (rad/s²) makes of it.
+    /// Checks that neither attitude nor rate jumps: from one time to the next, the attitude changes by the rate, and the rate by at most this angular
+    /// acceleration (rad/s²).
     fn is_continuous(&self, acceleration: f64) {
         for pair in self.motions.windows(2) {
             let [a, b] = [pair[0], pair[1]];
             let (axis, angle) = (a.attitude.inverse() * b.attitude).axis_angle();
-            // The mean of both rates is off by h²/12 of the jerk or, at a corner, by h/2 of the jump of the acceleration.
+            // The error of the mean of both rates is h²/12 of the jerk or, at a corner, h/2 of the jump of the acceleration.
             let mean = scale(0.5, minus(a.rate, scale(-1.0, b.rate)));
             assert_near(scale(angle / H, axis), mean, H * acceleration + 1e-4);
             assert!(
@@ -100,7 +100,7 @@ impl<'a> Course<'a> {
 
 #[test]
 fn a_table_goes_where_it_is_told_and_stands_there_within_its_own_errors() {
-    // Mounting is 39 arcseconds, all the rest below 20.
+    // Mounting is 39 arcseconds, the rest below 20.
     for (truth, off) in [
         (TableTruth::ideal(), 1e-12),
         (TableTruth::default(), 60.0 * ARCSEC),
@@ -164,7 +164,7 @@ fn a_move_takes_as_long_and_ends_in_the_same_attitude_as_between_two_steps_of_a_
         up,
         heading: Some(30f64.to_radians()),
     });
-    // Both leave the first pose at 2 s, and the load swings alike.
+    // Both leave the first pose at 2 s, and the load swings equally.
     for _ in 0..4000 {
         let motion = course.step();
         let other = planned.at(motion.t_s).motion;
@@ -185,14 +185,14 @@ fn a_rate_is_about_up_whatever_the_pose_and_lasts_until_it_is_told_another_or_to
     let truth = TableTruth::default();
     let mut table = Table::commanded(&at_rest(), &truth).unwrap();
     let mut course = Course::new(&mut table);
-    // Told in the lead-in, and the rate within the move: each waits for the one before.
+    // The move is commanded in the lead-in, and the rate during the move: each waits for the previous one.
     course.tell(go([1.0, 0.0, 0.0]));
     course.tell(Command::Rate(dps(90.0)));
     course.wait();
     for wanted in [90.0, -45.0] {
         if wanted < 0.0 {
             course.tell(Command::Rate(dps(wanted)));
-            // 135 deg/s at 200 deg/s², and the time to settle.
+            // 135 deg/s at 200 deg/s², plus the settling time.
             let took = course.wait();
             assert!((took - 1.675).abs() < 2.0 * H, "{took}");
         }
@@ -203,7 +203,7 @@ fn a_rate_is_about_up_whatever_the_pose_and_lasts_until_it_is_told_another_or_to
             let earth = motion.attitude.inverse().turn(at_rest().place.earth_rate());
             sum = minus(sum, scale(-1.0 / n, minus(motion.rate, earth)));
         }
-        // Over a whole turn what is periodic in the angle is gone: left are the 5 ppm of the rate, and 40 arcseconds.
+        // Over a whole turn periodic errors of the angle cancel: the 5 ppm of the rate and 40 arcseconds remain.
         let up = scale(dps(wanted) * (1.0 + 5e-6), [1.0, 0.0, 0.0]);
         assert_near(sum, up, dps(90.0) * 60.0 * ARCSEC);
         assert!((norm(sum) / dps(wanted.abs()) - 1.0 - 5e-6).abs() < 1e-7);
@@ -232,12 +232,12 @@ fn no_command_makes_a_table_jump_whenever_it_comes() {
         go([0.0, 0.0, -1.0]),
     ];
     course.run(1.0);
-    // Times between that fall into ramps, moves, rest and constant rates.
+    // Times that fall into ramps, moves, rest and constant rates.
     for (k, command) in commands.iter().cycle().take(50).enumerate() {
         course.tell(*command);
         course.run(0.05 + 0.137 * ((k * k) % 17) as f64);
     }
-    // Three axes at 200 deg/s², each with a load that swings by a fifth, one upon the other at up to 150 deg/s.
+    // Three axes at 200 deg/s², each with a load that swings by a fifth, superposed at up to 150 deg/s.
     course.is_continuous(3.0 * 1.4 * dps(200.0) + 2.0 * dps(150.0) * dps(150.0));
 }
 
@@ -258,7 +258,7 @@ fn a_stop_ends_a_move_where_it_is_and_with_it_what_was_to_follow() {
     assert!(norm(motion.rate) < 1e-4);
     let up = course.carrier.position(course.t_s()).up;
     assert_near(motion.force, scale(G, up), 1e-9);
-    // Half a second of 60 deg/s, and the ramps' 9 degrees each.
+    // Half a second at 60 deg/s, and 9 degrees for each ramp.
     let tilt = up[2].acos().to_degrees();
     assert!((tilt - (0.5 * 60.0 + 9.0 + 9.0)).abs() < 0.2, "{tilt}");
 }
@@ -280,7 +280,7 @@ fn a_table_refuses_what_is_beyond_it_and_stays_as_it_was() {
     let up = [1.0, 0.0, 0.0];
     assert!(refused(Command::Move { up, heading }).contains("outer axis"));
     assert!(!table.busy(0.0));
-    // About the vertical only where the inner axis is upright.
+    // About the vertical only if the inner axis is upright.
     table.command(0.0, Command::Rate(dps(10.0))).unwrap();
     table.command(0.0, go(up)).unwrap();
     let refusal = table.command(0.0, Command::Rate(dps(10.0))).unwrap_err();
@@ -329,7 +329,7 @@ fn a_person_who_is_told_begins_like_one_with_a_plan_and_misses_every_pose_by_as_
         let cosine = dot(rest.force, *up) / norm(rest.force);
         misses += cosine.clamp(-1.0, 1.0).acos().powi(2);
     }
-    // About each of two level axes by 3 degrees; 120 squares are good to 13 %.
+    // 3 degrees about each of two level axes; 120 squares determine this to 13 %.
     let rms = (misses / n as f64 / 2.0).sqrt().to_degrees();
     assert!((2.2..3.8).contains(&rms), "{rms}");
 }
@@ -337,7 +337,7 @@ fn a_person_who_is_told_begins_like_one_with_a_plan_and_misses_every_pose_by_as_
 #[test]
 fn no_command_makes_a_hand_jump_whenever_it_comes() {
     let truth = HandsTruth {
-        // Long and large knocks, so that some commands fall into one.
+        // Long and large knocks, so that some commands coincide with one.
         jolt_probability: 1.0,
         jolt_s: 1.0,
         jolt_mrad: 30.0,
@@ -357,7 +357,7 @@ fn no_command_makes_a_hand_jump_whenever_it_comes() {
                 course.tell(Command::Stop);
             }
         }
-        // A turn of 180 degrees within a second has 18 rad/s² and its detour as much.
+        // A turn of 180 degrees within a second has 18 rad/s², and its detour as much.
         course.is_continuous(60.0);
     }
 }

@@ -28,13 +28,12 @@ fn an_axis_off_the_vertical_tilts_gravity_by_that_angle() {
         let (stated, g) = (stated_force.unwrap(), 9.793);
         let angle = norm(cross(motion.force, stated)).atan2(dot(motion.force, stated));
         assert!((angle - arcsec * ARCSEC).abs() < 1e-15);
-        // About east, so that north goes up: gravity's reaction gains a component along y.
+        // A rotation about east raises north: the reaction to gravity gets a component along y.
         assert_near(motion.force, [0.0, g * angle.sin(), g * angle.cos()], 1e-13);
     }
 }
 
-/// Largest difference between true and stated force (m/s²) and rate (rad/s, the Earth's taken out), over
-/// all of a plan that uses every axis.
+/// Largest difference between true and reported force (m/s²) and rate (rad/s, without the Earth's), over a plan that uses every axis.
 fn worst(truth: &TableTruth) -> [f64; 2] {
     let steps = "[[step]]\nup = [0.3, -0.5, 0.4]\ndwell_s = 1\n[[step]]\nup = [1, 0, 0.2]\nspin_dps = 90\ndwell_s = 4\n\
                  [[step]]\nup = [1, 1, 0]\nrate_dps = 90\nspin_dps = 1\ndwell_s = 4";
@@ -94,7 +93,7 @@ fn what_the_table_states_is_wrong_in_proportion_to_each_flaw() {
     for (name, flaw) in flaws {
         let (one, two) = (worst(&flaw(1.0)), worst(&flaw(2.0)));
         for i in 0..2 {
-            // A rate error moves no force; a tilt of the whole and an offset move no rate.
+            // A rate error does not change the force; a tilt of the whole table and an offset do not change the rate.
             if [("rate", 0), ("level", 1), ("offset", 1)].contains(&(name, i)) {
                 assert!(two[i] < 1e-10, "{name} {two:?}");
             } else {
@@ -126,8 +125,8 @@ fn a_stop_rings_at_the_drives_frequency_and_dies_out() {
         .unwrap();
     let earth = table.at(stop + 4.5).motion.rate[0];
     let mut table = Table::new(&plan(steps), &truth).unwrap();
-    // Peaks of the rate of the middle axis (body x throughout), after the stop: every 1/fd, each
-    // exp(-damping w / fd) of the one before, with fd the damped frequency.
+    // Peaks of the rate of the middle axis (body x) after the stop: every 1/fd, each exp(-damping w / fd) times the previous one, with fd the damped
+    // frequency.
     let rates: Vec<f64> = (0..10_000)
         .map(|k| table.at(stop + f64::from(k) * 1e-4).motion.rate[0] - earth)
         .collect();

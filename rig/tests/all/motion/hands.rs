@@ -37,7 +37,7 @@ fn rate_and_angular_acceleration_are_derivatives_of_the_attitude_with_all_flaws_
         settle_mrad: 50.0,
         turning_rests: 8,
         shake_turns: 2,
-        // The violent one has a jerk that the differences do not bear.
+        // A violent shake has a jerk that is too large for the numeric differences.
         shake_mrad: 5.0,
         ..FlawsTruth::default()
     };
@@ -53,7 +53,7 @@ fn rate_and_angular_acceleration_are_derivatives_of_the_attitude_with_all_flaws_
 
 #[test]
 fn force_by_hand_integrates_to_rest_and_to_the_way_that_the_board_went() {
-    // Put down always on the same spot, the board's origin moves by what the turn does to its lever.
+    // If the board is always put down on the same spot, its origin moves only by the rotation of its lever.
     let truth = HandsTruth {
         carry_mm: 0.0,
         lever_mm: [100.0, -50.0, 70.0],
@@ -170,7 +170,7 @@ fn a_person_takes_faces_then_edges_then_corners_and_misses_each_by_degrees() {
         last = instant.step;
     }
     assert_eq!(misses.len(), 26);
-    // 3 degrees about each of the two axes that tilt it: 4.2 degrees effective.
+    // 3 degrees about each of the two tilt axes: 4.2 degrees rms.
     let effective = (misses.iter().map(|m| m * m).sum::<f64>() / 26.0).sqrt();
     assert!(effective > 2.5 && effective < 6.0, "{effective}");
 }

@@ -22,8 +22,7 @@ fn assert_near(found: Vector, expected: Vector, tolerance: f64) {
     );
 }
 
-/// Rate from attitudes, and specific force from positions, by central differences around the middle of five
-/// instants.
+/// Rate from attitudes, and specific force from positions, by central differences around the middle of five times.
 struct Differences {
     h: f64,
     attitudes: [Rotation; 5],
@@ -31,12 +30,12 @@ struct Differences {
 }
 
 impl Differences {
-    /// Rate against inertial space, body axes, at one of the inner instants.
+    /// Rate against inertial space, body axes, at one of the inner times.
     fn rate(&self, i: usize) -> Vector {
         let [a, b] = [self.attitudes[i - 1], self.attitudes[i + 1]];
         let (axis, angle) = (a.inverse() * b).axis_angle();
         let ground = self.attitudes[i].inverse().turn(self.place.earth_rate());
-        // In the axes of the middle instant, to second order the same as in those of its neighbours.
+        // In the axes of the middle time, which to second order is the same as in those of its neighbours.
         add(scale(0.5 * angle / self.h, axis), ground)
     }
 
@@ -45,11 +44,11 @@ impl Differences {
     }
 }
 
-/// Compares a carrier with the numeric derivatives of its own attitude, but for where the angular
-/// acceleration jumps by more than `corner` (rad/s²) and has none. How many instants were compared.
+/// Compares the motion with the numeric derivatives of its own attitude, except where the angular acceleration jumps by more than `corner` (rad/s²)
+/// and is undefined. Returns the number of compared times.
 fn differentiate(carrier: &mut dyn Carrier, place: Place, corner: f64) -> usize {
-    // The second-order error of the rate is h²/6 of the jerk of some 100 rad/s³: 2e-7 rad/s. Where the jerk
-    // itself jumps, the angular acceleration is wrong by up to h times the jump: 2e-2 rad/s².
+    // The second-order error of the rate is h²/6 of the jerk of some 100 rad/s³: 2e-7 rad/s. If the jerk itself jumps, the error of the angular
+    // acceleration is up to h times the jump: 2e-2 rad/s².
     let h = 1e-4;
     let n = ((carrier.duration_s() - 0.1) / 0.0097) as usize;
     let mut compared = 0;

@@ -51,7 +51,7 @@ fn the_earth_turns_a_resting_board_by_its_rate_north_and_up() {
         assert_near(table.at(1.0).motion.rate, expected, 1e-18);
         assert_eq!(table.at(1.0).stated_rate, Some([0.0; 3]));
     }
-    // Any attitude: the component along up is the vertical one, and the size is the Earth's.
+    // At any attitude, the component along up is the vertical one, and the magnitude is the Earth's.
     let mut table = table(
         "[[step]]\nup = [1, -2, 0.5]\nheading_deg = 77\ndwell_s = 2",
         &TableTruth::ideal(),
@@ -72,8 +72,7 @@ fn a_centrifuge_pulls_the_board_to_its_axis_with_the_rate_squared_times_the_radi
         &truth,
     );
     let motion = first_dwell(&mut table).motion;
-    // The Earth adds its vertical rate to the table's. What moves east is lighter by 2 W cos(latitude) v,
-    // after Eötvös.
+    // The Earth's vertical rate adds to the table's. A body that moves east is lighter by 2 W cos(latitude) v (Eötvös effect).
     let latitude = 30.5_f64.to_radians();
     let rate = TAU + EARTH_RATE * latitude.sin();
     let east = TAU * 0.1 * motion.attitude.turn([0.0, 1.0, 0.0])[0];
@@ -82,7 +81,7 @@ fn a_centrifuge_pulls_the_board_to_its_axis_with_the_rate_squared_times_the_radi
         0.0,
         9.793 - 2.0 * EARTH_RATE * latitude.cos() * east,
     ];
-    // Left is the Earth's own centrifugal acceleration along the lever, 5e-10 m/s².
+    // What remains is the Earth's own centrifugal acceleration along the lever, 5e-10 m/s².
     assert_near(motion.force, expected, EARTH_RATE * EARTH_RATE * 0.1);
 }
 
@@ -197,7 +196,7 @@ fn a_table_without_outer_axis_spins_about_its_inner_axis_and_heads_only_upright(
         [0.0, 0.0, -50f64.to_radians()],
         1e-15,
     );
-    // The tilt axis turns both ways, so that all of the upper hemisphere is in reach.
+    // The tilt axis turns in both directions, so the whole upper hemisphere is in reach.
     let instant = first_dwell(&mut table(
         "[[step]]\nup = [-1, -1, 0.5]\ndwell_s = 2",
         &truth,
@@ -207,13 +206,13 @@ fn a_table_without_outer_axis_spins_about_its_inner_axis_and_heads_only_upright(
         scale(9.793 / 1.5, [-1.0, -1.0, 0.5]),
         1e-12,
     );
-    // The limit itself is a matter of the plan's test.
+    // The tests of the plan check the limit itself.
     assert!(Table::new(&plan("[[step]]\nup = [0, 0, -1]\ndwell_s = 2"), &truth).is_err());
 }
 
 #[test]
 fn a_board_that_stays_the_same_over_turns_of_any_number_is_the_same_to_rounding() {
-    // 300 s at 360 degrees a second: 1885 rad on the axis, then back to the first pose.
+    // 300 s at 360 deg/s: 1885 rad on the axis, then back to the first pose.
     let steps = "[[step]]\nup = [0, 0.6, 0.8]\ndwell_s = 1\n[[step]]\nup = [0, 0.6, 0.8]\nrate_dps = 360\ndwell_s = 300\n\
                  [[step]]\nup = [0, 0.6, 0.8]\ndwell_s = 1";
     let mut table = table(steps, &TableTruth::ideal());
@@ -240,8 +239,7 @@ fn many_poses_are_spread_evenly_over_what_the_table_reaches() {
         }
     }
     assert_eq!(ups.len(), 200);
-    // Each has its share of the area within 95 degrees, 2π(1 - cos 95°) / 200; its nearest neighbour is
-    // about the root of that away.
+    // Each has its share of the area within 95 degrees, 2π(1 - cos 95°) / 200; its nearest neighbour is at about the root of that.
     let lowest = ups.iter().map(|up| up[2]).fold(1.0, f64::min);
     assert!(lowest >= 95f64.to_radians().cos() && lowest < 92f64.to_radians().cos());
     let apart = (TAU * (1.0 - 95f64.to_radians().cos()) / 200.0).sqrt();

@@ -1,4 +1,4 @@
-//! Turns by an angle: what the recording numbers, and what it gives as their rate.
+//! Turns by an angle: their number in the recording, and their reported rate.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -10,14 +10,14 @@ use mimu_rig::table::{Table, TableTruth};
 use super::assert_near;
 use super::table::{plan, table};
 
-/// Instants of step `n`, every `dt_s`.
+/// States of step `n`, every `dt_s`.
 fn numbered(table: &mut Table, n: u32, dt_s: f64) -> Vec<Instant> {
     let count = (table.duration_s() / dt_s) as usize;
     let all: Vec<Instant> = (0..count).map(|k| table.at(k as f64 * dt_s)).collect();
     all.into_iter().filter(|i| i.step == Some(n)).collect()
 }
 
-/// Integral over the instants, by the trapezium rule.
+/// Integral over these times, by the trapezium rule.
 fn integral(instants: &[Instant], dt_s: f64) -> Vector {
     instants.windows(2).fold([0.0; 3], |sum, pair| {
         let rates = add(pair[0].stated_rate.unwrap(), pair[1].stated_rate.unwrap());
@@ -44,7 +44,7 @@ fn a_turn_is_numbered_from_rest_to_rest_and_its_rate_adds_up_to_its_angle() {
         ("middle", 90.0, [1.0, 0.0, 0.0]),
         ("outer", -90.0, [0.0, 0.0, -1.0]),
     ] {
-        // Errors of a rate are none of a turn by an angle, which the encoder ends.
+        // Rate errors do not affect a turn by an angle, because the encoder ends it.
         let truth = TableTruth {
             rate_scale_ppm: [500.0; 3],
             ..TableTruth::ideal()
@@ -98,7 +98,7 @@ fn rounds_repeat_all_steps_and_begin_when_they_are_due() {
             step.is_some_and(|s| s % 3 == 1)
         })
         .collect();
-    // The first instant of each turn.
+    // The first time of each turn.
     let firsts: Vec<f64> = started
         .iter()
         .enumerate()
@@ -107,7 +107,7 @@ fn rounds_repeat_all_steps_and_begin_when_they_are_due() {
         .collect();
     assert_eq!(firsts.len(), 3);
     assert!((firsts[0] - 1.0).abs() < 0.011);
-    // Back by 45 degrees at 60 deg/s with 200 deg/s² is 1.05 s, then 1 s to settle and 1 s of dwell.
+    // Back by 45 degrees at 60 deg/s with 200 deg/s² takes 1.05 s, then 1 s to settle and 1 s of dwell.
     for (round, first) in firsts.iter().enumerate().skip(1) {
         let due = 20.0 * round as f64 + 1.05 + 1.0 + 1.0;
         assert!((first - due).abs() < 0.011, "{first} {due}");
@@ -115,7 +115,7 @@ fn rounds_repeat_all_steps_and_begin_when_they_are_due() {
     assert_eq!(plan(&text).dwells(), 9);
 }
 
-/// niu's cycle, 3.2 and appendix A: each pose that it needs, both ways about each axis, and 152 s.
+/// niu's cycle, 3.2 and appendix A: its poses, both directions about each axis, and its duration of 152 s.
 #[test]
 fn niu_s_eight_steps_reach_five_poses_and_turn_both_ways_about_each_axis() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -1,4 +1,4 @@
-//! What is wrong with a plan by itself.
+//! Mistakes within a plan, independent of the table.
 
 use super::{Complaint, HEAD, STEP, assert_complaint, parse};
 
@@ -87,7 +87,7 @@ fn mistakes_in_the_head_are_named_with_their_line() {
         ),
     ];
     for (text, complaint) in cases {
-        // With a step where the head is what is wrong, so that the step's absence is not.
+        // If the mistake is in the head, a step is added, so that the missing step is not the error.
         let step = if text.contains("HEAD") && !text.ends_with("\n\n") {
             STEP
         } else {

@@ -28,8 +28,7 @@ fn a_plan_says_what_is_left_out() {
         (Samples::Parquet, CarriedBy::Table, true)
     );
     assert_eq!(plan.place.latitude_deg, 45.0);
-    // At 45 degrees, Moritz 2000 gives 9.806199203 for GRS 80, whose gravity is 1.4e-6 above that of WGS 84
-    // at the equator.
+    // At 45 degrees, Moritz 2000 gives 9.806199203 for GRS 80, whose gravity at the equator is 1.4e-6 above that of WGS 84.
     assert!((plan.place.gravity - 9.806_197_8).abs() < 1e-7);
     assert_eq!(plan.chamber_c(1e3), 25.0);
     assert_eq!(
@@ -70,7 +69,7 @@ fn the_chamber_is_linear_between_breakpoints_and_held_outside() {
     }
 }
 
-/// Beginning of the complaint, and words that the rest must have.
+/// Beginning of the error message, and words that the rest must contain.
 type Complaint = (&'static str, &'static str);
 
 fn assert_complaint(text: &str, (beginning, remedy): Complaint) {
@@ -144,7 +143,7 @@ fn what_the_table_cannot_do_is_refused_with_its_limit_and_the_line_of_the_plan()
         assert!(error.starts_with(beginning), "{error}");
         assert!(error.contains("; ") && !error.contains('\n'), "{error}");
     }
-    // The limits themselves can be done.
+    // The limits themselves are allowed.
     let edge = "up = [0, 0.99619469809, -0.08715574274]\nspin_dps = 400\ndwell_s = 1";
     Table::new(&parse(&format!("{HEAD}[[step]]\n{edge}\n")).unwrap(), &two).unwrap();
 }
@@ -186,7 +185,7 @@ fn files_that_are_no_plans_are_refused_by_name() {
         b"format = \"mimu-plan/1\"\ndevice = \"\xe4\"\n",
     )
     .unwrap();
-    // A hole: it takes no room, and no time to write.
+    // A sparse file: it takes no space on disk and no time to write.
     let large = fs::File::create(at("large.toml")).unwrap();
     large.set_len(1 << 40).unwrap();
     for (path, beginning) in [
@@ -219,7 +218,7 @@ fn the_plans_in_the_repository_can_be_carried_out() {
     assert!(plans.len() >= 3);
     for path in plans {
         let plan = Plan::read(&path).unwrap();
-        // One plan is made for the table of a paper, which stands in that paper's rig file.
+        // One plan needs the table of a paper, which is in that paper's rig file.
         let table = match path.ends_with("niu-ramp.toml") {
             true => {
                 let rig = path.with_file_name("../rigs/niu-mtig.toml");

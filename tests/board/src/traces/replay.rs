@@ -13,20 +13,20 @@ use nalgebra::Vector3;
 
 use super::{INPUTS, NOISE, SPANS, Trace};
 
-/// What a replay has compared.
+/// Numbers of compared values.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Replayed {
     /// Samples of the raw stream.
     pub raw: usize,
-    /// Compensated samples that are the device's, bit by bit.
+    /// Compensated samples that equal the device's bit by bit.
     pub compensated: usize,
-    /// Reports of banks that are the device's, bit by bit.
+    /// Reports of banks that equal the device's bit by bit.
     pub reports: usize,
 }
 
 /// Has `core` compute a trace again.
 ///
-/// Errors: the first frame, sample or report that is another.
+/// Errors: the first frame, sample or report that differs.
 pub fn replay(trace: &Trace) -> Result<Replayed, String> {
     let stored = stored::decode(&trace.calibration).map_err(|e| format!("calibration: {e:?}"))?;
     let mut twin = HostReference {
@@ -61,7 +61,7 @@ pub fn replay(trace: &Trace) -> Result<Replayed, String> {
             Message::Event(Event::Compensated(batch)) => {
                 let (head, samples) = raw.take().ok_or("a compensated batch without a raw one")?;
                 let device: Vec<_> = batch.values().map(|(_, s)| s).collect();
-                // The temperatures of the compensated batch are those of the dies.
+                // The compensated batch contains the temperatures of the dies.
                 let dies_c = batch.dies_c();
                 let same = BatchHead {
                     temp_c: head.temp_c,
@@ -73,7 +73,7 @@ pub fn replay(trace: &Trace) -> Result<Replayed, String> {
                 found.compensated += twin.compare(&head, dies_c, &samples, &device)?;
             }
             Message::Event(Event::Kalman(state)) => {
-                // The samples that it took in last come with the batch behind it.
+                // The last samples that it includes arrive with the next batch.
                 reports.push(state);
             }
             Message::Greeting { greeting, .. } => {
@@ -92,31 +92,30 @@ pub fn replay(trace: &Trace) -> Result<Replayed, String> {
     }
 }
 
-/// A message is encoded as the device has.
+/// Checks that encoding a message gives the device's bytes.
 fn same_bytes(message: &Message<'_>, bytes: &[u8]) -> Result<(), String> {
     let mut out = [0; MAX_FRAME];
     let length = encode(message, &mut out).map_err(|e| format!("{e:?}"))?;
-    // The zero in front of a frame is an empty frame to the decoder.
+    // To the decoder, the zero before a frame is an empty frame.
     match out[1..length] == *bytes {
         true => Ok(()),
         false => Err("the message is encoded otherwise".into()),
     }
 }
 
-/// The device's side, in single precision.
+/// The device's computation, in single precision.
 struct HostReference {
     stored: stored::Stored,
     state: State<f32, ROOM>,
-    /// Number of the sample at which it was followed last.
+    /// Number of the sample at the last temperature update.
     slow_at: Option<u32>,
-    /// At sample 0.
+    /// Time since power-on at sample 0.
     powered_for_ms: u32,
     next: Option<u32>,
 }
 
-/// Samples from which on a trace is compared where effects are removed. The angular acceleration is a difference to the sample before,
-/// which is not known of the first; and each sample is freed from the error that the one before had, of which a thousandth or
-/// less is left in the next.
+/// If effects are removed, the comparison starts at this sample of a segment. The angular acceleration is a difference to the previous sample, which
+/// is unknown for the first. Each sample is corrected with the error of the previous one, of which a thousandth or less remains in the next.
 const SETTLED: usize = 8;
 
 impl HostReference {
@@ -148,7 +147,7 @@ impl HostReference {
         Ok(compared)
     }
 
-    /// As the firmware does: batch after batch, since the time is a sum. Batches begin where the calibration came.
+    /// As the firmware does: batch after batch, because the time is a sum. Batches begin where the calibration came.
     fn follow(&mut self, head: &BatchHead, dies_c: PerSensor<f32>) {
         let begins = head.first % BATCH as u32;
         let mut at = self.slow_at.map_or(begins, |last| last + BATCH as u32);
@@ -168,7 +167,7 @@ impl HostReference {
     }
 }
 
-/// Runs a bank up to a report. `false` for one from before the first input, and for one behind the last batch.
+/// Updates a bank up to a report. Returns `false` for a report before the first input or after the last batch.
 fn same_report(device: &KalmanState, samples: &BTreeMap<u32, Sample<f32>>) -> Result<bool, String> {
     if device.updates == 0 {
         return Ok(false);

@@ -1,11 +1,10 @@
-//! The release image on the emulated board, whatever it sends: when it samples, what it samples, and what the
-//! emulator says of how it uses the part.
+//! The release image on the emulated board, apart from its messages: when it samples, what it samples, and the emulator's findings.
 
 use mimu_board::running::Board;
 use mimu_board::schematic::{HSE_HZ, Volts, WIRING};
 use mimu_board_tests::{MS, STARTED, image, still};
 
-/// Registers of DMA1's first stream (RM0433 15.5): what is left of the round, and where it writes.
+/// Registers of DMA1's first stream (RM0433 15.5): remaining transfers of the round, and its destination.
 const LEFT: u64 = 0x4002_0014;
 const RING: u64 = 0x4002_001C;
 
@@ -22,7 +21,7 @@ fn the_converter_is_paced_by_the_crystal_alone_20_conversions_a_millisecond() {
 
 #[test]
 fn each_place_of_the_ring_holds_the_code_of_its_own_pin() {
-    // Every input at a voltage of its own, those that nothing is wired to among them.
+    // A different voltage at every input, including unwired ones.
     let mut volts = Volts::GROUND;
     for (k, v) in volts.input.iter_mut().enumerate() {
         *v = 0.05 + 0.16 * k as f64;
@@ -45,14 +44,14 @@ fn each_place_of_the_ring_holds_the_code_of_its_own_pin() {
     }
 }
 
-/// Instructions of the image that set this bit of the configuration and control register, behind which stands a store, as the crate
-/// cortex-m writes them: `cpsid i`, a load, `orr.w` with the bit (ARMv7-M A7.7.92, A5.3.2).
+/// Instructions of the image that set this bit of the configuration and control register and then store it, as the crate cortex-m does: `cpsid i`, a
+/// load, `orr.w` with the bit (ARMv7-M A7.7.92, A5.3.2).
 fn that_set(board: &mut Board, bit: u32) -> Vec<u64> {
     const FLASH: u64 = 0x0800_0000;
     let size = image().sizes().flash as usize;
     let bytes = board.memory(FLASH, size).unwrap();
     let half = |at: usize| u32::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
-    // 1 << bit is 0x80 turned right by 39 - bit: its uppermost bit is `i`, then three, and the last stands before the 0x80.
+    // 1 << bit is 0x80 rotated right by 39 - bit. The uppermost bit of this number is `i`, then three bits follow, and the last precedes the 0x80.
     let turned = 39 - bit;
     let upper = 0xf040 | (turned >> 4) << 10;
     let lower = (turned >> 1 & 7) << 12 | (turned & 1) << 7;
@@ -116,11 +115,11 @@ fn after_the_reset_pin_and_after_a_power_cut_it_samples_again_in_step() {
     assert_eq!(board.findings().unwrap().broken, [""; 0]);
 }
 
-/// Registers of RCC (RM0433 8.7): oscillators; sources, dividers and multipliers of the PLLs; the source of USB's clock.
+/// Registers of RCC (RM0433 8.7): oscillators; sources, dividers and multipliers of the PLLs; clock source of USB.
 const RCC: u64 = 0x5802_4400;
 
-/// The third PLL is set as USB needs it in every image, and stopped in this one: full speed takes 48 MHz within 0.25 % (USB 2.0, 7.1.11), which the
-/// part's own oscillator does not have untrimmed.
+/// Every image configures the third PLL as USB needs it; this one has it stopped. Full speed needs 48 MHz within 0.25 % (USB 2.0, 7.1.11), and the
+/// part's own untrimmed oscillator is less accurate.
 #[test]
 fn the_clock_of_usb_is_48_mhz_of_the_debuggers_crystal() {
     let mut board = still(Volts::GROUND);
@@ -140,6 +139,6 @@ fn the_clock_of_usb_is_48_mhz_of_the_debuggers_crystal() {
     // DIVQ3EN; no fraction is added.
     assert_eq!((field(0x2c, 23, 1), field(0x2c, 8, 1)), (1, 0));
     assert_eq!(vco / (field(0x40, 16, 7) + 1), 48_000_000);
-    // Neither it nor the untrimmed oscillator runs for nothing here.
+    // Neither the PLL nor the untrimmed oscillator runs needlessly.
     assert_eq!((field(0, 28, 1), field(0, 12, 1)), (0, 0));
 }

@@ -1,4 +1,4 @@
-//! What the firmware costs against what it may.
+//! The cost of the firmware against its limits.
 
 use std::process::Command;
 

@@ -1,4 +1,4 @@
-//! The served bench under command, over TCP, as a program that drives a calibration finds it.
+//! The served bench under command, over TCP, as seen by a program that controls a calibration.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -21,10 +21,10 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 
 use super::power::calibration;
 
-/// Who gets no answer fails and does not hang.
+/// If no answer comes, the test fails and does not hang.
 const PATIENCE: Duration = Duration::from_secs(300);
 const G: f64 = 9.793;
-/// More than all errors of the table together: mounting 39 arcseconds, the rest below 20.
+/// More than the sum of all errors of the table: mounting 39 arcseconds, the rest below 20.
 const TABLE: f64 = 60.0 / 206_265.0;
 
 fn commanded(carrier: &str) -> Board {
@@ -37,11 +37,11 @@ fn commanded(carrier: &str) -> Board {
     Board::new(&image(), Front::commanded(&plan, &truth, 7).unwrap()).unwrap()
 }
 
-/// Serves a board while the test goes on, and gives it back.
+/// Serves a board during the test and returns it.
 fn serve(mut served: Served, test: impl FnOnce(&mut Client)) -> Served {
     let address = served.listen("127.0.0.1:0", 7).unwrap();
     let done = AtomicBool::new(false);
-    /// Ends the serving also where the test panics.
+    /// Ends the serving also if the test panics.
     struct End<'a>(&'a AtomicBool);
     impl Drop for End<'_> {
         fn drop(&mut self) {
@@ -100,7 +100,7 @@ impl Client {
         answer.split(' ').map(number).collect()
     }
 
-    /// Until what it is told is done. Both lines at once: they are answered at one instant.
+    /// Waits until a command is done. Both lines are sent at once, so that they are answered at one time.
     fn carry_out(&mut self, line: &str) {
         assert_eq!(self.ask(&format!("{line}\nBUSY?")), "OK", "{line}");
         let mut busy = String::new();
@@ -127,7 +127,7 @@ fn commands_are_answered_while_the_bench_stands_still_because_nobody_reads_the_p
         assert_eq!(client.ask("TIME?"), "0.000000000");
         client.tell("FIDGET 3");
         client.tell("HOLD ON");
-        // The next client, and one that says all at once and hangs up its end.
+        // The next client, and one that sends everything at once and closes its end.
         let mut other = Client::new(client.address);
         assert_eq!(other.ask("INTERLOCK?"), "1");
         other.tell("INTERLOCK 0");
@@ -170,7 +170,7 @@ fn commands_are_answered_while_the_bench_stands_still_because_nobody_reads_the_p
 fn a_table_goes_where_it_is_told_and_turns_as_fast_as_it_is_told() {
     let served = Served::new(commanded("table"), Pace::Fast, None).unwrap();
     serve(served, |client| {
-        // Without a supply the firmware takes no time of this machine.
+        // Without a supply the firmware takes no computing time.
         client.tell("POWER OFF");
         let _port = open(client.ask("PORT?"));
         client.carry_out("MOVE 2 0 0");
@@ -180,7 +180,7 @@ fn a_table_goes_where_it_is_told_and_turns_as_fast_as_it_is_told() {
         }
         assert_eq!(client.ask("POSITION?"), "1 0 0 0");
 
-        // By the right-hand rule: the body's z, then the tilt axis, which lies along x by then.
+        // Right-hand rule: about the body's z, then about the tilt axis, which is then along x.
         client.carry_out("TURN inner -90 45");
         assert_eq!(client.ask("POSITION?"), "0 1 0 0");
         client.carry_out("TURN middle -90 45");
@@ -203,7 +203,7 @@ fn a_table_goes_where_it_is_told_and_turns_as_fast_as_it_is_told() {
         assert!(client.refusal("RATE 500").contains("400"));
         assert!(client.refusal("FIDGET 3").contains("table"));
 
-        // An open interlock stops what moves, and nothing moves until it is closed.
+        // An open interlock stops the motion, and nothing moves until it is closed.
         client.carry_out("INTERLOCK 0");
         let rate = client.numbers("TRUTH?");
         assert!(rate[..3].iter().all(|x| x.abs() < 0.01), "{rate:?}");
@@ -222,13 +222,13 @@ fn a_table_goes_where_it_is_told_and_turns_as_fast_as_it_is_told() {
                 break c;
             }
         };
-        // A kelvin a second, told and asked for in between two looks at the clock.
+        // A rate of 1 K/s; both commands are processed in one poll, at one time of the clock.
         let after = client.numbers("TIME?")[0];
         assert!(c == 10.0 || after - before >= 40.0 - c, "{c} °C");
     });
 }
 
-/// Whoever has the port open.
+/// A program that has the port open.
 struct Host {
     port: File,
     decoder: Decoder,
@@ -249,7 +249,7 @@ impl Host {
         self.port.write_all(&frame[..length]).unwrap();
     }
 
-    /// Which call the next greeting answers; 0 is the device's own.
+    /// Id of the call that the next greeting answers; 0 means the device sent it by itself.
     fn greeting(&mut self) -> u16 {
         loop {
             let mut byte = [0];
@@ -275,12 +275,12 @@ fn the_line_is_garbled_and_unplugged_and_the_device_restarted_as_told() {
         assert_eq!(host.greeting(), 0);
         host.hello(1);
         assert_eq!(host.greeting(), 1);
-        // A byte of the answer is another one; the next answer is whole.
+        // One byte of the answer is garbled; the next answer is intact.
         client.tell("BURST 1");
         host.hello(2);
         host.hello(3);
         assert_eq!(host.greeting(), 3);
-        // Every byte, and then none: on the way to the device and from it.
+        // Every byte is garbled, and then none: to the device and from it.
         client.tell("GARBLE 1000000");
         host.hello(4);
         let now = client.numbers("TIME?")[0];

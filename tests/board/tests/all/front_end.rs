@@ -1,4 +1,4 @@
-//! What a calibration is tied to: the converter's calibration factors, and where the TEMP pins stand beside each other. The layout in flash is
+//! What a calibration depends on: the converter's calibration factors, and the offsets of the TEMP pins from their mean. The layout in flash is
 //! written out here.
 
 use mimu_board::flash::SECTOR;
@@ -16,11 +16,11 @@ use super::serial::{STREAM, at_rest};
 const CALFACT: u64 = 0x4002_20c4;
 const CALFACT2: u64 = 0x4002_20c8;
 
-/// Where the first slot is in bank 2, and the two words of flash in it that this is about.
+/// Position of the first slot in bank 2, and of the two flash words in it that are tested here.
 const SLOT: usize = 6 * SECTOR as usize;
 const KEPT: std::ops::Range<usize> = SLOT + 32..SLOT + 96;
 
-/// Bits of what is kept.
+/// Bits for the stored quantities.
 const CONVERTER: u32 = 1;
 const PINS: u32 = 2;
 
@@ -29,7 +29,7 @@ fn stores(device: &mut Conversation, bytes: &[u8]) {
     assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
 }
 
-/// Takes the supply away and gives it back, with these words of flash in the place of those that are there.
+/// Cycles the supply, with these flash words in place of the present ones.
 fn powered_again(device: &mut Conversation, kept: Option<&[u8]>) -> Option<u64> {
     let mut store = device.board.store().unwrap();
     if let Some(kept) = kept {
@@ -45,7 +45,7 @@ fn powered_again(device: &mut Conversation, kept: Option<&[u8]>) -> Option<u64> 
     }
 }
 
-/// The converter's factors are what the maker's reference manual has software save and write back (RM0433 25.4.8).
+/// The manufacturer's reference manual has software save these factors and write them back (RM0433 25.4.8).
 #[test]
 fn the_converter_goes_on_with_the_factors_that_were_kept_with_the_calibration() {
     let bytes = calibration(2, 3.5);
@@ -55,10 +55,10 @@ fn the_converter_goes_on_with_the_factors_that_were_kept_with_the_calibration() 
     stores(&mut device, &bytes);
     let kept = device.board.store().unwrap()[KEPT].to_vec();
     let known = u32::from_le_bytes(kept[..4].try_into().unwrap());
-    // Of the pins nothing is learnt yet.
+    // The offsets of the pins are not yet known.
     assert_eq!(known, CONVERTER);
 
-    // Factors as a real converter has them; those of the emulated one are zero.
+    // Factors as of a real converter; those of the emulated one are zero.
     let factors: [u32; 7] = [0x5a3, 0x2aaa_aaaa, 0x1555_5555, 7, 8, 9, 0x155];
     let mut words = [0; 64];
     let numbers = [CONVERTER].into_iter().chain(factors);
@@ -70,15 +70,15 @@ fn the_converter_goes_on_with_the_factors_that_were_kept_with_the_calibration() 
     assert_eq!(powered_again(&mut device, Some(&words)), Some(hash(&bytes)));
     device.run_for(STARTED);
     assert_eq!(device.board.register(CALFACT).unwrap(), 0x5a3);
-    // The last word that is written is the first one.
+    // The last word written is the first one.
     assert_eq!(device.board.register(CALFACT2).unwrap(), 0x2aaa_aaaa);
-    // And they are kept with the next calibration too, in the other slot.
+    // The next calibration, in the other slot, contains them too.
     stores(&mut device, &calibration(3, 3.5));
     let store = device.board.store().unwrap();
     let other = SECTOR as usize + KEPT.start..SECTOR as usize + KEPT.end;
     assert_eq!(store[other], words);
 
-    // A word that is not whole: the calibration is used all the same, by a converter that calibrates itself.
+    // An incomplete word: the calibration is used all the same, and the converter calibrates itself.
     let mut device = Conversation::new(still(at_rest(3.3)));
     device.greeting();
     device.run_for(STARTED);
@@ -89,7 +89,7 @@ fn the_converter_goes_on_with_the_factors_that_were_kept_with_the_calibration() 
     assert_eq!(device.board.register(CALFACT).unwrap(), 0);
 }
 
-/// A unit at rest at this temperature, whose gyros' references differ: its pins stand 6, -1 and -5 °C beside their mean.
+/// A unit at rest at this temperature. Its gyros' TEMP pins differ: they are 6, -1 and -5 °C from their mean.
 fn at(temp_c: f64) -> Volts {
     let mut volts = at_rest(3.3);
     for (axis, apart_c) in [6.0, -1.0, -5.0].into_iter().enumerate() {
@@ -110,7 +110,7 @@ fn wire(axis: usize) -> (Net, &'static str, usize) {
 fn a_temperature_pin_that_is_open_at_power_on_moves_the_temperature_by_nothing() {
     let mut device = Conversation::new(still(at(30.0)));
     device.greeting();
-    // They are learnt over ten seconds.
+    // The offsets are determined over ten seconds.
     device.run_for(STARTED + 10_100 * MS);
     stores(&mut device, &calibration(2, 3.5));
     let kept = &device.board.store().unwrap()[KEPT];
@@ -122,7 +122,7 @@ fn a_temperature_pin_that_is_open_at_power_on_moves_the_temperature_by_nothing()
         let found = f32::from_le_bytes(kept[at..at + 4].try_into().unwrap());
         assert!((found - apart_c).abs() < 0.1, "{found}");
     }
-    // Days later it is warmer, and the first pin is open, which without its offset moved the mean by -3 °C.
+    // Later it is warmer, and the first pin is open. Without the stored offsets, the mean would change by -3 °C.
     let mut open = at(40.0);
     open.input[wire(0).2] = 0.0;
     device.board.set_front(Front::Still(open)).unwrap();

@@ -1,4 +1,4 @@
-//! The stored calibration against a supply that is cut at any instant, and against a bit that flips.
+//! The stored calibration after a supply cut at any time, and after a bit flip.
 
 use std::path::Path;
 
@@ -16,12 +16,12 @@ use mimu_core::wire::{CHUNK, Call, Decoder, MAX_FRAME, Message, Refusal, Request
 use nalgebra::{Matrix3, Vector3};
 use plotters::prelude::*;
 
-/// A calibration of so many temperature nodes that no other number gives.
+/// A calibration with this many temperature nodes, distinct for each `scale`.
 pub fn calibration(nodes: u32, scale: f32) -> Vec<u8> {
     calibration_of(&stored::Origin::UNKNOWN, nodes, scale)
 }
 
-/// The same of a certain unit.
+/// The same for a certain unit.
 fn calibration_of(origin: &stored::Origin, nodes: u32, scale: f32) -> Vec<u8> {
     let affine = |k: u32| Affine {
         matrix: Matrix3::from_diagonal_element(scale + k as f32 * 0.001),
@@ -43,7 +43,7 @@ fn calibration_of(origin: &stored::Origin, nodes: u32, scale: f32) -> Vec<u8> {
     bytes
 }
 
-/// A device that holds the old calibration, and has answered that it does.
+/// A device with the old calibration, which it has confirmed.
 fn with_old(old: &[u8]) -> Conversation {
     let mut device = Conversation::new(still(Volts::GROUND));
     device.greeting();
@@ -52,18 +52,18 @@ fn with_old(old: &[u8]) -> Conversation {
     device
 }
 
-/// What happens in flash while the new calibration is uploaded and committed, ns.
+/// Timing of the flash operations while the new calibration is uploaded and committed, ns.
 struct Course {
     began: u64,
     committed: u64,
     done: u64,
-    /// Slices of time in which a word was programmed.
+    /// Time slices in which a word was programmed.
     words: Vec<u64>,
-    /// Slices of time in which a sector was erased.
+    /// Time slices in which a sector was erased.
     erasing: Vec<u64>,
 }
 
-/// Carries out the whole of it once.
+/// Carries out upload and commit once.
 fn course(old: &[u8], new: &[u8]) -> Course {
     let mut device = with_old(old);
     let began = device.board.standing().ns;
@@ -72,7 +72,7 @@ fn course(old: &[u8], new: &[u8]) -> Course {
     let id = device.send(Request::UploadCommit);
     let (mut words, mut erasing) = (Vec::new(), Vec::new());
     while device.answer(id).is_none() {
-        // Half the time that a word takes, so that none is missed.
+        // Half the programming time of a word, so that none is missed.
         device.run_for(MS / 20);
         let at = device.board.standing().ns;
         let operations = device.board.in_flight().unwrap();
@@ -96,7 +96,7 @@ fn course(old: &[u8], new: &[u8]) -> Course {
     }
 }
 
-/// Instants of the cuts: evenly over the whole and a little beyond, and evenly over the words.
+/// Times of the cuts: evenly over the whole and slightly beyond, and evenly over the words.
 fn instants(course: &Course, cuts: usize) -> Vec<u64> {
     let in_words = cuts / 2;
     let even = cuts - in_words;
@@ -104,7 +104,7 @@ fn instants(course: &Course, cuts: usize) -> Vec<u64> {
     let over_all = (0..even).map(|k| course.began + whole * k as u64 / (even as u64 - 1));
     let over_words = (0..in_words).map(|k| {
         let slice = course.words[k * (course.words.len() - 1) / (in_words - 1)];
-        // Not all in the same phase of a word.
+        // In different phases of a word.
         slice + (k as u64 * 7919) % (MS / 20)
     });
     let mut all: Vec<u64> = over_all.chain(over_words).collect();
@@ -112,7 +112,7 @@ fn instants(course: &Course, cuts: usize) -> Vec<u64> {
     all
 }
 
-/// Starts the device with what a cut has left, and asks what it holds.
+/// Starts the device with the contents after a cut, and asks for its calibration.
 fn after(device: &mut Conversation, store: Vec<u8>, seed: u64) -> (Option<u64>, Option<Vec<u8>>) {
     device.board.cut_supply(seed).unwrap();
     device.run_for(MS);
@@ -157,7 +157,7 @@ fn a_served_board_starts_with_the_calibration_that_its_file_holds() {
     assert_eq!(stored, Some(hash));
 }
 
-/// Starting the device after each takes seconds, since it polls while its converter calibrates.
+/// Each start of the device takes seconds, because it polls while its converter calibrates.
 #[test]
 fn whenever_the_supply_is_cut_the_old_or_the_new_calibration_is_there_whole() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("supply-cuts.svg");
@@ -171,21 +171,20 @@ fn at_each_of_300_instants_the_old_or_the_new_calibration_is_there_whole() {
     cut_at_instants(300, &path);
 }
 
-/// Cuts the supply at so many instants, half of them where words are programmed, which takes a hundredth of the time.
+/// Cuts the supply at `cuts` times. Half of them are during the programming of words, which takes a hundredth of the time.
 fn cut_at_instants(cuts: usize, drawn: &Path) {
     let (old, new) = (calibration(7, 3.5), calibration(16, 3.6));
     let course = course(&old, &new);
     assert!(!course.words.is_empty());
 
-    // The same once more: up to each instant it is the same run, and what flash would hold after a cut there does not
-    // depend on what comes later.
+    // The same run again. It is identical up to each cut, and the flash contents after a cut do not depend on later events.
     let mut device = with_old(&old);
     assert_eq!(device.board.standing().ns, course.began);
     device.upload(&new);
     assert_eq!(device.board.standing().ns, course.committed);
     let mut stores = Vec::new();
     let all = instants(&course, cuts);
-    // The upload itself changes nothing in flash: what a cut in it leaves is what is there at its end.
+    // The upload itself changes nothing in flash: the contents after a cut in it equal those at its end.
     let (uploading, committing): (Vec<u64>, Vec<u64>) =
         all.iter().partition(|&&at| at <= course.committed);
     for &at in &uploading {
@@ -198,7 +197,7 @@ fn cut_at_instants(cuts: usize, drawn: &Path) {
     }
     assert_eq!(stores.len(), cuts);
 
-    // Two boards, since most machines that run this have two cores.
+    // Two boards, because most machines that run this have two cores.
     let judge = |part: &[(u64, Vec<u8>)]| judge(&course, [&old, &new], part);
     let (first, second) = stores.split_at(stores.len() / 2);
     let outcomes = std::thread::scope(|scope| {
@@ -209,11 +208,11 @@ fn cut_at_instants(cuts: usize, drawn: &Path) {
     plot(&course, &outcomes, drawn);
 }
 
-/// Starts a device with what each cut has left, and looks what it holds: instants, and whether it is the new one.
+/// Starts a device with the contents after each cut. Returns the times and whether the device has the new calibration.
 ///
 /// # Panics
 ///
-/// If it is neither the old calibration nor the new one, or the wrong one of them.
+/// If it has neither the old calibration nor the new one, or the wrong one of them.
 fn judge(course: &Course, [old, new]: [&[u8]; 2], stores: &[(u64, Vec<u8>)]) -> Vec<(u64, bool)> {
     let hashes = [old, new].map(stored::hash);
     let mut device = Conversation::new(still(Volts::GROUND));
@@ -222,7 +221,7 @@ fn judge(course: &Course, [old, new]: [&[u8]; 2], stores: &[(u64, Vec<u8>)]) -> 
     let mut last: Option<&(u64, Vec<u8>)> = None;
     for cut in stores {
         let (at, store) = cut;
-        // While the flash does not change, what is there was looked at already.
+        // If the flash has not changed, the result is known already.
         if last.is_some_and(|last| last.1 == *store) {
             let is_new = outcomes.last().is_some_and(|o: &(u64, bool)| o.1);
             outcomes.push((*at, is_new));
@@ -252,7 +251,7 @@ fn judge(course: &Course, [old, new]: [&[u8]; 2], stores: &[(u64, Vec<u8>)]) -> 
     outcomes
 }
 
-/// Draws which calibration was there after the cut at each instant.
+/// Draws the calibration in use after the cut at each time.
 fn plot(course: &Course, outcomes: &[(u64, bool)], path: &Path) {
     let seconds = |at: u64| (at as f64 - course.began as f64) / 1e9;
     let span = |slices: &[u64]| Some([*slices.first()?, *slices.last()?].map(seconds));
@@ -295,7 +294,7 @@ fn plot(course: &Course, outcomes: &[(u64, bool)], path: &Path) {
             let drawn = chart
                 .draw_series([Rectangle::new(corners, color.mix(0.35).filled())])
                 .unwrap();
-            // The first panel has them all.
+            // The first panel has all legend entries.
             if k == 0 {
                 drawn.label(name).legend(move |(x, y)| {
                     Rectangle::new([(x, y - 5), (x + 14, y + 5)], color.mix(0.6).filled())
@@ -350,7 +349,7 @@ fn plot(course: &Course, outcomes: &[(u64, bool)], path: &Path) {
 fn a_calibration_of_another_unit_is_refused_and_nothing_is_erased_for_the_one_in_use() {
     let old = calibration(7, 3.5);
     let mut device = with_old(&old);
-    // The emulated part has the number 0, which is nobody's.
+    // The number of the emulated part is 0, which no real unit has.
     let origin = stored::Origin {
         unit_id: Some(*b"another-unit"),
         ..stored::Origin::UNKNOWN
@@ -394,7 +393,7 @@ fn a_bit_that_flips_in_the_stored_calibration_is_noticed() {
         .windows(bytes.len())
         .position(|window| window == bytes)
         .expect("the calibration is in flash as it was sent");
-    // Bits all over it: header, numbers, check.
+    // Bits in every part: header, numbers, CRC.
     for k in 0..4 {
         let at = STORE + (place + k * (bytes.len() - 1) / 3) as u64;
         device.board.flip(at, k as u32).unwrap();
@@ -414,7 +413,7 @@ fn a_bit_that_flips_in_the_stored_calibration_is_noticed() {
     assert_eq!(found, Some(hash), "the flips were taken back");
 }
 
-/// Samples go on and feed the watchdog while a sector is erased, so that nothing but a limit ends it.
+/// During the erase of a sector samples continue and feed the watchdog, so only a time limit can end it.
 #[test]
 fn flash_that_hangs_is_reported_and_the_old_calibration_stays_in_use() {
     let old = calibration(7, 3.5);
@@ -424,10 +423,10 @@ fn flash_that_hangs_is_reported_and_the_old_calibration_stays_in_use() {
     let began = device.board.standing().ns;
     let failed = Answer::Refused(Refusal::FlashFailed);
     assert_eq!(device.ask(Request::UploadCommit), failed);
-    // The longest that the data sheet has for a sector is 4 s (DS12110, table 140); the host waits for 15.
+    // The data sheet's maximum for a sector is 4 s (DS12110, table 140); the host waits for 15 s.
     let took = device.board.standing().ns - began;
     assert!((4_000 * MS..8_000 * MS).contains(&took), "{took} ns");
-    // It is refused at once as long as the operation has not ended, and nothing was restarted.
+    // While the operation has not ended, another upload is refused at once, and nothing restarts.
     let began = device.board.standing().ns;
     assert_eq!(device.ask(Request::UploadCommit), failed);
     assert!(device.board.standing().ns - began < 100 * MS);

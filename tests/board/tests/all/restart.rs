@@ -1,6 +1,6 @@
-//! The release image when its program goes wrong: it starts again by itself, samples, and says why it did.
+//! The release image when its program fails: it restarts by itself, samples, and reports the reason.
 //!
-//! The faults are put in the place of an instruction while the program runs, and taken away as soon as it has restarted.
+//! The faults replace an instruction while the program runs, and are removed as soon as it has restarted.
 
 use mimu_board::fault::Fault;
 use mimu_board::running::Board;
@@ -8,7 +8,7 @@ use mimu_board::schematic::Volts;
 use mimu_board_tests::{MS, STARTED, image, still};
 use mimu_core::wire::{Decoder, Greeting, Message, Start};
 
-/// What a greeting says of the start.
+/// The start as reported in a greeting.
 #[derive(Debug)]
 struct Greeted {
     /// `Start::Panic` and `Start::Fault` with their places.
@@ -24,7 +24,7 @@ impl Greeted {
     }
 }
 
-/// Has `look` see the greeting that the device sends by itself after a start.
+/// Calls `look` with the greeting that the device sends by itself after a start.
 fn greeted<T>(board: &mut Board, look: impl Fn(&Greeting<'_>) -> T) -> T {
     let mut decoder = Decoder::new();
     for _ in 0..1000 {
@@ -40,7 +40,7 @@ fn greeted<T>(board: &mut Board, look: impl Fn(&Greeting<'_>) -> T) -> T {
     panic!("no greeting in a second");
 }
 
-/// What that greeting says of the start.
+/// The start as reported in that greeting.
 fn greeting(board: &mut Board) -> Greeted {
     greeted(board, |greeting| Greeted {
         start: match greeting.start {
@@ -58,7 +58,7 @@ fn the_firmware_names_the_commit_that_it_was_built_from() {
     let firmware = greeted(&mut still(Volts::GROUND), |g| g.firmware.to_owned());
     let (version, commit) = match firmware.split_once('-') {
         Some((version, commit)) => (version, Some(commit)),
-        // Of sources in no repository.
+        // The sources were in no repository.
         None => (firmware.as_str(), None),
     };
     assert_eq!(version, env!("CARGO_PKG_VERSION"));
@@ -78,8 +78,8 @@ fn sampling() -> Board {
     board
 }
 
-/// Puts the fault there and runs until the part restarts: milliseconds until then, the cause as the part has it, and the greeting after
-/// it. The device has to sample in step again.
+/// Inserts the fault and runs until the part restarts. Returns the milliseconds until then, the cause according to the part, and the next greeting.
+/// The device must sample in step again.
 fn restarted(board: &mut Board, address: u64, fault: Fault) -> (u32, String, Greeted) {
     let before = board.restarts().unwrap().len();
     let replaced = board.inject(address, fault).unwrap();
@@ -108,8 +108,8 @@ fn task(name: &str) -> u64 {
     image().find(&inner).unwrap()
 }
 
-/// An instruction of the image from which on it panics: it loads the place of the panic, and calls the panic of a task that is polled
-/// after its end, which none is.
+/// Address of an instruction from which on the image panics: it loads the source location and calls the panic for a task that is polled after its
+/// end, which never happens.
 fn panics() -> u64 {
     const FLASH: u64 = 0x0800_0000;
     let image = image();
@@ -127,14 +127,14 @@ fn panics() -> u64 {
         let distance =
             sign << 24 | j(13) << 23 | j(11) << 22 | (upper & 0x3ff) << 12 | (lower & 0x7ff) << 1;
         let distance = (distance as i32) << 7 >> 7;
-        // R0 by its halves: MOVW, encoding T3 (A7.7.76), and MOVT (A7.7.79).
+        // The two halves of R0: MOVW, encoding T3 (A7.7.76), and MOVT (A7.7.79).
         let low = half(*at - 8) & 0xfbf0 == 0xf240 && half(*at - 6) & 0x8f00 == 0;
         let high = half(*at - 4) & 0xfbf0 == 0xf2c0 && half(*at - 2) & 0x8f00 == 0;
         let loads = low && high;
         let target = (FLASH + *at as u64 + 4).wrapping_add_signed(i64::from(distance));
         is_call && loads && target == panic
     };
-    // The place that it loads: of others' crates there are calls as well.
+    // The source location that it loads, because dependencies contain such calls as well.
     let of_firmware = |at: &usize| {
         let part = |upper: u32, lower: u32| {
             (upper & 0xf) << 12 | (upper >> 10 & 1) << 11 | (lower >> 12 & 7) << 8 | (lower & 0xff)
@@ -160,10 +160,10 @@ fn panics() -> u64 {
 #[test]
 fn a_program_that_stands_still_is_bitten_by_the_watchdog() {
     let mut board = sampling();
-    // Where samples are processed, then in the interrupt that takes them, which stops everything below it.
+    // In the task that processes samples, then in the interrupt that takes them, which blocks everything of lower priority.
     for (starts, name) in [(2, "process"), (3, "sample")] {
         let (ms, cause, greeted) = restarted(&mut board, task(name), Fault::Hang);
-        // Fed every 250 ms, first a quarter of a second after sampling has begun, and bites 2 s after the last time.
+        // The watchdog is fed every 250 ms, first a quarter of a second after the start of sampling, and resets 2 s after the last time.
         assert!((1650..=2010).contains(&ms), "{name}: after {ms} ms");
         assert!(cause.contains("IWDG"), "{name}: {cause}");
         assert_eq!(greeted.told(), ("Watchdog", starts));
@@ -179,7 +179,7 @@ fn a_fault_restarts_the_device_which_tells_the_instruction() {
     // UFSR.UNDEFINSTR (ARMv7-M B3.2.15).
     let start = format!("fault {at:#x} {:#x}", 1 << 16);
     assert_eq!(greeted.told(), (start.as_str(), 2));
-    // Of a next one it tells the next.
+    // The next fault is reported with its own address.
     let at = task("sample");
     let (_, _, greeted) = restarted(&mut board, at, Fault::Undefined);
     let start = format!("fault {at:#x} {:#x}", 1 << 16);
@@ -194,7 +194,7 @@ fn a_panic_restarts_the_device_which_tells_the_line() {
     assert_eq!(greeted.starts, 2);
     let place = greeted.start.strip_prefix("panic ").expect("a panic");
     let (file, line) = place.rsplit_once(':').unwrap();
-    // The file is one of the firmware's, and the line is one that it has.
+    // The file and the line exist in the firmware.
     let file = file
         .rsplit_once("firmware/")
         .expect("a file of the firmware")
@@ -202,13 +202,13 @@ fn a_panic_restarts_the_device_which_tells_the_line() {
     let path = format!("{}/../../firmware/{file}", env!("CARGO_MANIFEST_DIR"));
     let lines = std::fs::read_to_string(&path).unwrap().lines().count();
     assert!((1..=lines).contains(&line.parse().unwrap()), "{place}");
-    // The reset pin after it is not taken for the panic again.
+    // After a pin reset the old panic is not reported again.
     board.reset_by_pin(1).unwrap();
     let greeted = greeting(&mut board);
     assert_eq!(greeted.told(), ("ResetPin", 3));
 }
 
-/// How many times the part has been restarted, and that it was the watchdog each time.
+/// Number of restarts; checks that the watchdog caused each.
 fn bites(board: &mut Board) -> usize {
     let restarts = board.restarts().unwrap();
     assert!(
@@ -218,17 +218,17 @@ fn bites(board: &mut Board) -> usize {
     restarts.len()
 }
 
-/// Sampling is begun anew again and again there, and never comes.
+/// Sampling is started again and again, and never succeeds.
 #[test]
 fn a_converter_that_gives_no_sample_is_bitten_by_the_watchdog() {
     let mut board = sampling();
     board.stop_converter().unwrap();
-    // It may be fed once more for the samples before.
+    // The watchdog may be fed once more for earlier samples.
     board.run_for(2300 * MS).unwrap();
     assert_eq!(bites(&mut board), 1);
 }
 
-/// The emulated oscillator always starts; the program that waits for it for ever is one that stands still where it sets the clocks.
+/// The emulated oscillator always starts, so the program is stopped where it sets the clocks.
 #[test]
 fn a_program_that_waits_for_the_clocks_for_ever_is_bitten_by_the_watchdog() {
     let mut board = still(Volts::GROUND);
@@ -245,7 +245,7 @@ fn a_program_that_waits_for_the_clocks_for_ever_is_bitten_by_the_watchdog() {
     assert_eq!(greeting(&mut board).told(), ("Watchdog", 2));
 }
 
-/// As where the log itself is what has gone wrong, or the program has stopped in the middle of it.
+/// As if the log itself caused the failure, or the program stopped during a log.
 #[test]
 fn a_panic_is_told_also_if_the_log_of_it_faults() {
     let mut board = sampling();
@@ -266,10 +266,10 @@ fn a_panic_is_told_also_if_the_log_of_it_faults() {
     assert!(greeted.start.starts_with("panic "), "{}", greeted.start);
 }
 
-/// A debugger that was there and is gone leaves the log in the mode in which it waits.
+/// A debugger that has disconnected leaves the log in blocking mode.
 #[test]
 fn a_log_that_nobody_reads_does_not_stop_the_program() {
-    // The up channel of SEGGER's RTT behind 24 bytes of heading: name, buffer, size, written, read, flags.
+    // The up channel of SEGGER's RTT, after 24 bytes of header: name, buffer, size, written, read, flags.
     const SIZE: u64 = 24 + 8;
     let mut board = sampling();
     let rtt = image().address("_SEGGER_RTT").unwrap();
@@ -278,7 +278,7 @@ fn a_log_that_nobody_reads_does_not_stop_the_program() {
         u32::from_le_bytes(bytes.try_into().unwrap())
     };
     let (size, written) = (word(&mut board, SIZE), word(&mut board, SIZE + 4));
-    // Full: what comes next is where reading is to go on.
+    // Full: the write position is just before the read position.
     let read = (written + 1) % size;
     let block_if_full: u32 = 2;
     let bytes = [read, block_if_full].map(u32::to_le_bytes).concat();
@@ -296,7 +296,7 @@ fn time_since_power_on_goes_on_over_resets_and_is_unknown_once_its_record_is_los
     assert!((1..150).contains(&first), "{first}");
     board.run_to(3000 * MS).unwrap();
     board.reset_by_pin(1).unwrap();
-    // It is kept each 250 ms, and the start takes what the first has taken.
+    // It is stored every 250 ms, and the start takes as long as the first one.
     let second = greeting(&mut board);
     let after = second.powered_for_ms.unwrap();
     assert!((2750..3150).contains(&after), "{after}");
@@ -305,12 +305,12 @@ fn time_since_power_on_goes_on_over_resets_and_is_unknown_once_its_record_is_los
     let (ms, _, third) = restarted(&mut board, task("process"), Fault::Hang);
     let truth = before_ms as u32 + ms + first;
     let after = third.powered_for_ms.unwrap();
-    // What two resets have cost at most.
+    // The largest loss by two resets.
     assert!(
         (truth - 600..=truth + 300).contains(&after),
         "{after} of {truth}"
     );
-    // A write that a reset has torn.
+    // A write that a reset interrupted.
     let kept = image().find("restart7POWERED").unwrap();
     let byte = board.memory(kept, 1).unwrap()[0];
     board.set_memory(kept, vec![byte ^ 1]).unwrap();

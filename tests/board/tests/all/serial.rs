@@ -1,4 +1,4 @@
-//! The device behind its serial line: who it says it is, and the samples that it sends.
+//! The device behind its serial line: its identity and its samples.
 
 use std::path::Path;
 
@@ -43,7 +43,7 @@ fn in_ten_minutes_no_sample_is_lost_or_out_of_order() {
     stream_for(600);
 }
 
-/// Looks at every sample of so many seconds.
+/// Checks every sample of so many seconds.
 fn stream_for(seconds: u64) {
     let mut device = Conversation::new(still(Volts::GROUND));
     device.greeting();
@@ -59,12 +59,12 @@ fn stream_for(seconds: u64) {
             assert_eq!(number, expected);
             expected += 1;
         }
-        // The converter's clock is what spaces the samples: 20 conversions each, all of the same length.
+        // The converter's clock spaces the samples: 20 conversions each, all of the same length.
         let second = device.board.conversions().unwrap();
         assert_eq!(second.count, 20_000);
         assert_eq!((second.shortest_ns, second.longest_ns), (50_000, 50_000));
     }
-    // Less what is still on its way, two batches of twenty at most.
+    // Minus those still on their way, at most two batches of twenty.
     let taken = u64::from(expected - first);
     assert!(taken + 40 >= 1000 * seconds + 100, "{taken} samples");
     assert_eq!(device.lost, (0, 0));
@@ -96,7 +96,7 @@ fn the_raw_stream_holds_the_voltages_of_the_pins() {
     for Sample { number, sums } in &device.samples {
         for (k, &sum) in sums.gyro.iter().chain(&sums.accel).enumerate() {
             let (net, pin, input) = WIRING[k];
-            // The converter rounds down, and two conversions make a sum.
+            // The converter rounds down, and a sum has two conversions.
             let code = (volts.input[input] / volts.rail * 65_535.0 + 1e-6).floor();
             let off = f64::from(sum) - 2.0 * code;
             assert!(off.abs() <= 2.0, "{number}: {net:?} at {pin}: {off}");
@@ -122,13 +122,13 @@ fn a_unit_of_the_usual_parts_that_lies_still_passes_the_self_test() {
     device.run_for(STARTED);
     let result = self_test(&mut device);
     assert_eq!(result.passed, checks::ALL, "{result:?}");
-    // Without sensors nothing answers to it; the converter has its supply all the same.
+    // Without sensors nothing responds to the self-test; the converter still has its supply.
     device.board.set_front(Front::Still(Volts::GROUND)).unwrap();
     let result = self_test(&mut device);
     assert_eq!(result.passed, checks::SUPPLY, "{result:?}");
 }
 
-/// Pins of a unit at rest and 25 °C, at this supply of the converter, V.
+/// Pins of a unit at rest and 25 °C, with the converter's supply at `rail`, V.
 pub fn at_rest(rail: f64) -> Volts {
     let mut volts = Volts {
         rail,
@@ -150,7 +150,7 @@ fn the_self_test_tells_a_supply_a_reference_and_a_temperature_by_name() {
         let wire = WIRING.iter().find(|(of, ..)| *of == net);
         wire.expect("it is wired").2
     };
-    // No sensor heeds its inputs here.
+    // Fixed voltages do not respond to the self-test inputs.
     let mut supplies = checks::REFERENCE | checks::SUPPLY;
     supplies |= checks::TEMPERATURE.iter().sum::<u16>();
     let mut device = Conversation::new(still(at_rest(3.3)));
@@ -164,14 +164,14 @@ fn the_self_test_tells_a_supply_a_reference_and_a_temperature_by_name() {
     let (passed, result) = seen(at_rest(3.3));
     assert_eq!(passed, supplies, "{result:?}");
     assert!((result.supply_v - 3.3).abs() < 2e-3 && (result.reference_v - 2.5).abs() < 2e-3);
-    // A regulator that gives 0.3 V less; by the ratio to it the gyros' reference is right.
+    // A regulator that is 0.3 V low; relative to it, the gyros' reference is right.
     let (passed, result) = seen(at_rest(3.0));
     assert_eq!(passed, supplies & !checks::SUPPLY, "{result:?}");
     assert!((result.supply_v - 3.0).abs() < 2e-3, "{result:?}");
     let mut volts = at_rest(3.3);
     volts.input[input(Net::Reference(0))] = 2.35 * DIVIDER_RATIO;
     let (passed, result) = seen(volts);
-    // Temperatures are shares of it: all of them step by 19 °C, which no die does.
+    // Temperatures are fractions of it: all of them step by 19 °C, which dies cannot.
     let shares = checks::TEMPERATURE.iter().sum::<u16>();
     let expected = supplies & !checks::REFERENCE & !shares;
     assert_eq!(passed, expected, "{result:?}");
@@ -207,7 +207,7 @@ fn an_open_temperature_pin_is_flagged_within_two_batches_and_leaves_the_temperat
             assert!((head.temp_c - 25.0).abs() < 0.1, "{}", head.temp_c);
         }
     }
-    // As read it is there all the same: 5 V are 25 + 2.5 / 0.0084 °C, but for the 14 % that the filter lacks after two seconds.
+    // The reading itself is still sent: 5 V are 25 + 2.5 / 0.0084 °C, minus the 14 % that the filter lacks after two seconds.
     let (_, [x, y, z]) = device.last.unwrap();
     assert!(y > 200.0 && (x - 25.0).abs() < 0.1 && (z - 25.0).abs() < 0.1);
 }
@@ -223,10 +223,10 @@ fn a_garbled_line_costs_frames_and_nothing_else() {
         device.run_for(20 * MS);
         answered += u32::from(device.answer(id).is_some());
     }
-    // A call of 9 bytes or so arrives whole five times out of six.
+    // A call of about 9 bytes arrives intact five times out of six.
     assert!((120..200).contains(&answered), "{answered} of 200");
     device.board.garble(0).unwrap();
-    // What is left of a broken frame ends with the first zero of the next.
+    // The rest of a broken frame ends with the first zero of the next.
     let id = device.send(Request::Hello);
     device.run_for(20 * MS);
     assert!(device.answer(id).is_some());

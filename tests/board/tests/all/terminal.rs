@@ -1,4 +1,4 @@
-//! The emulated board behind its pseudo-terminal, as a program that opens serial ports finds it.
+//! The emulated board behind its pseudo-terminal, as seen by a program that opens serial ports.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -15,14 +15,14 @@ use mimu_core::wire::{Call, Decoder, MAX_FRAME, Message, Request, encode};
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 
-/// A device that never answers fails the test and does not hang it.
+/// If the device never answers, the test fails and does not hang.
 const PATIENCE: Duration = Duration::from_secs(300);
 
 #[test]
 fn a_call_through_the_terminal_is_answered_and_no_byte_is_lost() {
     let mut served = Served::new(still(Volts::GROUND), Pace::Fast, None).unwrap();
     let path = served.path().to_owned();
-    // Nobody has it open: time stands still.
+    // No program has it open: time stands still.
     for _ in 0..3 {
         served.step().unwrap();
     }
@@ -51,7 +51,7 @@ fn a_call_through_the_terminal_is_answered_and_no_byte_is_lost() {
                 }
             }
         };
-        // What the device says by itself shows that it listens.
+        // The device's own greeting shows that it listens.
         greeting_of(0);
         let mut frame = [0; MAX_FRAME];
         let call = Call {
@@ -115,6 +115,6 @@ fn the_command_that_the_page_of_the_bench_shows_is_served() {
     let rig = RigFile::read(&root.join(option("--unit"))).unwrap();
     let truth = RigTruth::resolve(&rig, seed).unwrap();
     let plan = Plan::read(&root.join(option("--plan"))).unwrap();
-    // A digital part has no voltage for the board's pins, and is refused here.
+    // A digital part has no voltages for the board's pins, and is refused here.
     Front::bench(&plan, &truth, seed).unwrap();
 }

@@ -1,4 +1,4 @@
-//! A few seconds of every kind of step, as the device has sent them: `core` computes the same from them, to the last bit.
+//! A few seconds of every kind of step as sent by the device: `core` computes the same from them, to the last bit.
 
 use mimu_board_tests::traces::{STEPS, Trace, replay};
 
@@ -24,7 +24,7 @@ fn core_computes_what_the_device_has_computed() {
 fn a_last_bit_that_changes_is_noticed() {
     for name in ["by-hand", "effects"] {
         let mut trace = Trace::read(name);
-        // C of the gyro in the first node: behind the header, the origin, the directions of both triads, range and lags, and the temperature.
+        // C of the gyro in the first node: after the header, the origin, the directions of both triads, range and lags, and the temperature.
         let at = 12 + 60 + 2 * 72 + 16 + 4;
         trace.calibration[at] ^= 1;
         let end = trace.calibration.len() - 4;
@@ -34,7 +34,7 @@ fn a_last_bit_that_changes_is_noticed() {
         assert!(problem.starts_with("sample"), "{problem}");
     }
     let mut trace = Trace::read("kalman");
-    // Somewhere on the line.
+    // In the middle of the recorded bytes.
     let middle = trace.wire.len() / 2;
     trace.wire[middle] ^= 1;
     assert!(replay(&trace).is_err());

@@ -1,5 +1,5 @@
-//! What rounding costs in long series. Rates are whole multiples of 2^-30, so that integers give the integral, and
-//! its differences and their sums, without any.
+//! The effect of rounding in long series. Rates are integer multiples of 2^-30, so integer arithmetic gives the integral, its differences and their
+//! sums exactly.
 
 use mimu_allan::curve::curve;
 use mimu_allan::deviation::{ALL_TERMS, Integrated};

@@ -1,4 +1,4 @@
-//! Running the command, and what may be said of its answer.
+//! Runs the command, and checks its answer.
 
 use std::fs;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::generator::*;
 
-/// What the command did.
+/// Result of the command.
 pub struct Run {
     pub status: Option<i32>,
     pub stdout: String,
@@ -29,8 +29,8 @@ pub fn mimu<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -
 }
 
 impl Run {
-    /// The line of a refusal, after checking that it is one and has its three parts. A command that has read the recording lists what is wrong
-    /// with it before, and a fit the dwells.
+    /// The line of a refusal, after checking that it is a refusal and has its three parts. A command that has read the recording first lists its
+    /// problems, and a fit also the dwells.
     pub fn refusal(&self) -> &str {
         let text = self.stderr.strip_suffix('\n').unwrap_or(&self.stderr);
         let (before, line) = text.rsplit_once('\n').unwrap_or(("", text));
@@ -63,7 +63,7 @@ impl Run {
                 .all(|p| !p.trim().is_empty()),
             "{line}"
         );
-        // A refusal prints no result: with `--json -` it prints itself.
+        // A refusal prints no result; with `--json -` it prints itself as JSON.
         if !self.stdout.is_empty() {
             let told: Value = serde_json::from_str(&self.stdout).expect(&self.stdout);
             assert_eq!(told["format"], "mimu-refusal/1", "{told}");
@@ -113,7 +113,7 @@ pub fn warned(result: &Value, words: &[&str]) {
     }
 }
 
-/// Distance of each parameter of `sensor` from the truth, in halves of its 95 % interval; and the largest.
+/// Distance of each parameter of `sensor` from the truth, in halves of its 95 % interval; returns the largest.
 pub fn distance(result: &Value, sensor: &str) -> f64 {
     let (p, b) = match sensor {
         "gyro" => (GYRO_P, GYRO_B),
@@ -133,7 +133,7 @@ pub fn distance(result: &Value, sensor: &str) -> f64 {
                 .unwrap();
             let number = |key: &str| found[key].as_f64().expect("a number");
             let half = 0.5 * (number("upper") - number("lower"));
-            // What is zero by the choice of frame has no interval.
+            // Parameters that the choice of frame makes zero have no interval.
             if truth != 0.0 || half > 0.0 {
                 worst = worst.max((number("value") - truth).abs() / half);
             } else {
@@ -159,7 +159,7 @@ pub fn right(result: &Value) {
     }
 }
 
-/// A folder with a recording in it.
+/// A folder that contains a recording.
 pub struct Place {
     pub folder: tempfile::TempDir,
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::generator::Samples;
 
-/// One way to damage a recording, and the words that the answer must have.
+/// One way to damage a recording, and words that the answer must contain.
 pub type Case = (
     &'static str,
     fn() -> Samples,

@@ -1,4 +1,4 @@
-//! Files, arguments and outputs as they should not be: damaged, missing, in the way, of another unit.
+//! Bad files, arguments and outputs: damaged, missing, occupied, of another unit.
 
 use std::fs;
 use std::path::Path;
@@ -157,7 +157,7 @@ fn an_output_that_cannot_be_written_is_refused_before_anything_appears() {
     };
     fit(&["-o", &below]).refused(&["file/x.toml", "cannot be created: not a directory"]);
     fit(&["-o", &good, "--json", &below]).refused(&["file/x.toml", "cannot be created"]);
-    // Folders that were made for a result go with it.
+    // Folders that were made for a result are removed with it.
     fit(&["-o", &new, "--json", &below]).refused(&["file/x.toml"]);
     fit(&["-o", &new, "--method", "kalman"]).refused(&["--method"]);
     fit(&["-o", &recording]).refused(&["rec", "directory"]);
@@ -166,7 +166,7 @@ fn an_output_that_cannot_be_written_is_refused_before_anything_appears() {
     let before = fs::read(&samples).unwrap();
     fit(&["-o", &samples.display().to_string()]).refused(&["samples.csv", "an input"]);
     assert_eq!(fs::read(&samples).unwrap(), before);
-    // The file system of the system itself, which refuses even its owner.
+    // The kernel's file system, which refuses even root.
     if Path::new("/proc/version").exists() {
         fit(&["-o", "/proc/cal.toml"]).refused(&["/proc/cal.toml"]);
     }

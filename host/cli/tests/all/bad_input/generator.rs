@@ -1,5 +1,5 @@
-//! Recordings by hand and on a table with known truth: their physics is written out here, and shares nothing with the program,
-//! so that a convention that both have wrong would show.
+//! Recordings by hand and on a table with known truth. Their physics is written here and shares nothing with the program: a wrong convention shared
+//! by both would otherwise go unnoticed.
 
 use std::f64::consts::PI;
 use std::fs;
@@ -12,8 +12,8 @@ pub type Matrix = [[f64; 3]; 3];
 pub const RATE_HZ: f64 = 100.0;
 pub const GRAVITY: f64 = 9.81;
 
-/// Raw readings (counts) of a perfect sensor's input: `u = P x + b`. The accelerometer's P is lower triangular, which
-/// makes the frame of a recording by hand (x along its x, y in the plane of its x and y) the frame here.
+/// Raw readings (counts) for a perfect sensor's input: `u = P x + b`. The accelerometer's P is lower triangular, so the frame of a recording by hand
+/// (x along its x, y in the plane of its x and y) is the frame here.
 pub const GYRO_P: Matrix = [
     [5020.0, 60.0, -35.0],
     [-48.0, 4910.0, 72.0],
@@ -43,7 +43,7 @@ pub fn inverse(m: &Matrix) -> Matrix {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| minor(j, i) / determinant))
 }
 
-/// Unit quaternion, w first: turns a vector of the body into that of the world.
+/// Unit quaternion, w first: rotates a vector from the body frame to the world frame.
 #[derive(Clone, Copy)]
 pub struct Attitude([f64; 4]);
 
@@ -103,14 +103,14 @@ impl Random {
     }
 }
 
-/// A recording before it is written, to be damaged.
+/// A recording in memory, to be damaged before it is written.
 #[derive(Clone)]
 pub struct Samples {
     pub manifest: Vec<(&'static str, String)>,
     pub names: Vec<String>,
-    /// Not a number is an empty cell.
+    /// NaN is an empty cell.
     pub rows: Vec<Vec<f64>>,
-    /// Rows of each dwell.
+    /// Row range of each dwell.
     pub dwells: Vec<Range<usize>>,
 }
 
@@ -198,7 +198,7 @@ impl Samples {
     }
 }
 
-/// Poses of 3 s that are held still, with smooth turns of 1.5 s between them.
+/// Poses of 3 s at rest, with smooth turns of 1.5 s between them.
 pub fn by_hand_at(poses: usize, seed: u64, axis: impl Fn(&mut Random) -> Vector) -> Samples {
     const POSE_S: f64 = 3.0;
     const TURN_S: f64 = 1.5;
@@ -239,7 +239,7 @@ pub fn by_hand() -> Samples {
     by_hand_at(20, 1, Random::direction)
 }
 
-/// Each axis up and down on a rate table, turning at five rates about the vertical.
+/// Each axis up and down on a rate table, at five rates about the vertical.
 pub fn on_table() -> Samples {
     on_table_at(&[-90.0, -30.0, 0.0, 30.0, 90.0], &[0, 1, 2])
 }

@@ -1,4 +1,4 @@
-//! What can be left out is, and named; the result is right.
+//! Bad data that can be left out is left out and named; the result is right.
 
 use super::answer::*;
 use super::damage::*;

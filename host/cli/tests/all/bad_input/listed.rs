@@ -1,11 +1,11 @@
-//! What is wrong with recordings is listed by the name of each, also where the command refuses them; and `--still` of a report.
+//! Problems of several recordings are listed under the name of each, also if the command refuses them; and `--still` of a report.
 
 use serde_json::Value;
 
 use super::answer::*;
 use super::generator::*;
 
-/// By hand, with so many pauses of half a second in different poses.
+/// By hand, with `gaps` gaps of half a second in different poses.
 fn with_gaps(seed: u64, poses: usize, gaps: usize) -> Samples {
     let mut samples = by_hand_at(poses, seed, Random::direction);
     for dwell in (0..gaps).rev() {
@@ -15,7 +15,7 @@ fn with_gaps(seed: u64, poses: usize, gaps: usize) -> Samples {
     samples
 }
 
-/// The lines of the list below its head, and the head.
+/// The head of the list, and its lines.
 fn listed(text: &str) -> (&str, Vec<&str>) {
     let mut lines = text.lines().skip_while(|l| !l.starts_with("problems of"));
     let head = lines.next().expect("a list");
@@ -65,7 +65,7 @@ fn each_of_several_recordings_is_named_with_what_is_wrong_with_it() {
     assert!(of(&good).is_empty(), "{problems:#?}");
     assert_eq!(lines.len(), problems.len());
 
-    // The same on the terminal of a report.
+    // The same in the terminal output of a report.
     let run = mimu(["report", &one, &good, "-o", &place.text("unit.html")]);
     let (head, lines) = listed(&run.stdout);
     assert_eq!(head, "problems of these recordings:", "{}", run.stdout);
@@ -73,7 +73,7 @@ fn each_of_several_recordings_is_named_with_what_is_wrong_with_it() {
         lines.iter().all(|l| l.contains(&samples(&one))),
         "{lines:?}"
     );
-    // One recording needs no name.
+    // A single recording is listed without its name.
     let run = mimu(["diagnose", &one]);
     let (head, lines) = listed(&run.stdout);
     assert_eq!(head, "problems of this recording:");
@@ -150,7 +150,7 @@ fn the_stillness_factor_of_a_report_reaches_its_diagnosis() {
     assert_ne!(usual, other, "the factor changes what is found");
     for (still, has, lacks) in [(&[][..], &usual, &other), (&asked[..], &other, &usual)] {
         let all = numbers(still);
-        // The parser of JSON may round the last digit otherwise.
+        // The JSON parser may round the last digit differently.
         let on_page = |figure: &f64| all.iter().any(|v| (v / figure - 1.0).abs() < 1e-12);
         for (has, lacks) in has.iter().zip(lacks) {
             assert!(on_page(has), "{still:?}: {has} is not on the page");

@@ -1,8 +1,7 @@
-//! The command on recordings as they should not be.
+//! The command on bad recordings.
 //!
-//! The contract: either exit status 1 and one line on standard error, `mimu: PLACE: PROBLEM; REMEDY`, or exit status
-//! 0 with a right result and, where something was wrong with the data, a warning that names it. Every case
-//! damages one of two recordings of `generator` in one way.
+//! The contract: either exit status 1 and one line on standard error, `mimu: PLACE: PROBLEM; REMEDY`; or exit status 0, a right result, and a warning
+//! that names any problem of the data. Every case damages one of two recordings of `generator` in one way.
 
 use std::f64::consts::PI;
 

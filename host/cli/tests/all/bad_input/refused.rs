@@ -1,4 +1,4 @@
-//! What cannot be right is refused, and leaves no file.
+//! Data that cannot be right is refused, and no file is left.
 
 use super::answer::*;
 use super::damage::*;

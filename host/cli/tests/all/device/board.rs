@@ -1,6 +1,6 @@
-//! The command against the firmware itself: the release image on the emulated board, with a unit of known truth at its pins.
+//! The command with the firmware itself: the release image on the emulated board, with a unit of known truth at its pins.
 //!
-//! The truth is the bench's: what the unit senses follows from the plan, what it reads from the published matrices of its rig file.
+//! The bench defines the truth: the inputs follow from the plan, the readings from the published matrices of its rig file.
 
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ use super::recording::rows;
 use super::{Place, Ran, command, mimu, start};
 
 pub const GRAVITY: f64 = 9.793;
-/// What the firmware takes the reference pin of a gyro to have (data sheet).
+/// Voltage of a gyro's reference pin as assumed by the firmware (data sheet).
 const NOMINAL_REFERENCE_V: f64 = 2.5;
 
 /// A board that runs while its port is open.
@@ -54,7 +54,7 @@ fn image() -> Image {
 }
 
 impl Bench {
-    /// Switched on, and past the greeting that it sends by itself.
+    /// Switched on; its own greeting has been received.
     fn new(front: Front) -> Self {
         let mut board = Board::new(&image(), front).unwrap();
         board.run_to(100_000_000).unwrap();
@@ -80,7 +80,7 @@ impl Bench {
         }
     }
 
-    /// A unit carried through a plan.
+    /// A unit moved through a plan.
     pub fn carried(plan: &str, truth: &RigTruth) -> Self {
         let plan = Plan::parse(Source::new("plan", plan)).unwrap();
         Self::new(Front::bench(&plan, truth, 7).unwrap())
@@ -95,7 +95,7 @@ impl Bench {
             .json()
     }
 
-    /// Ends it. Nothing was lost on the line, and no rule of the part's manual was broken.
+    /// Ends it. Checks that nothing was lost on the line, and that no rule of the part's manual was broken.
     pub fn end(mut self) {
         self.end.store(true, Ordering::Relaxed);
         let mut served = self.thread.take().unwrap().join().unwrap();
@@ -111,8 +111,8 @@ pub fn unit() -> RigTruth {
     RigTruth::resolve(&file, 7).unwrap()
 }
 
-/// What its readings are by the firmware's volts: those of the gyros relative to the first one's reference pin, those of the
-/// accelerometer relative to its supply, which is nominal in the rig file.
+/// Its forward model in the firmware's volts: gyros relative to the reference pin of the first, accelerometer relative to its supply, which is
+/// nominal in the rig file.
 pub fn forward(truth: &RigTruth) -> Forward {
     let matrix = |m: [[f64; 3]; 3]| Matrix3::from_fn(|i, j| m[i][j]);
     let unit = &truth.file.unit;
@@ -181,14 +181,14 @@ fn a_session_from_the_greeting_to_a_killed_recording() {
         passed.len() == 12 && passed.values().all(|on| on == true),
         "{tested}"
     );
-    // It lies on its back: what the two others would do in gravity nobody has seen.
+    // The unit lies on its back: this pose does not show the responses of the two other axes to gravity.
     assert_eq!(
         tested["accel_not_shown"],
         serde_json::json!(["x", "y"]),
         "{tested}"
     );
     assert!(tested["moved"].is_null(), "{tested}");
-    // What the bench's sensors do (data sheet: 0.27 V typically), by the firmware's volts.
+    // Responses of the bench's sensors (data sheet: 0.27 V typically), in the firmware's volts.
     assert!(off(&tested["gyro_st1_v"], Vector3::repeat(-0.27)) < 8e-3);
     assert!(off(&tested["gyro_st2_v"], Vector3::repeat(0.27)) < 8e-3);
 
@@ -200,7 +200,7 @@ fn a_session_from_the_greeting_to_a_killed_recording() {
     let distance = filtered["largest_distance_sigma"].as_f64().unwrap();
     assert!(distance < 0.05, "{distance}");
     for i in 0..3 {
-        // One input knows one combination: what the sensor reads under it.
+        // One input determines one combination: the sensor's reading under it.
         let mean: Vec<f64> = (0..4)
             .map(|k| filtered["device"][i]["mean"][k].as_f64().unwrap())
             .collect();
@@ -224,13 +224,13 @@ fn a_session_from_the_greeting_to_a_killed_recording() {
     ] {
         assert_eq!(counted["counters"][name], 0, "{name}: {counted}");
     }
-    // The stream that was asked for without a calibration.
+    // The request for a stream without a calibration.
     assert_eq!(counted["counters"]["refused"], 1);
     port_of_others(&bench, &place);
     bench.end();
 }
 
-/// Samples come one after the other, by their numbers and times.
+/// Checks that samples follow each other in number and time.
 fn raw_stream(bench: &Bench, place: &Place) {
     let ran = bench.run(place, &["device", "stream", "--for", "200ms"]);
     assert_eq!(ran.status, Some(0), "{}", ran.stderr);
@@ -255,7 +255,7 @@ fn raw_stream(bench: &Bench, place: &Place) {
     }
 }
 
-/// Up, down, and what the device makes of it.
+/// Uploads and downloads a calibration, and checks the device's results with it.
 fn calibration(bench: &Bench, place: &Place, models: &Forward) {
     let file = place.path("unit.toml");
     std::fs::write(&file, text_of(models, "V", "")).unwrap();
@@ -319,7 +319,7 @@ fn killed(bench: &Bench, place: &Place) {
         assert!(Instant::now() < until, "nothing was recorded");
         std::thread::sleep(Duration::from_millis(2));
     }
-    // Time stands still as soon as nobody has the port open.
+    // Time stands still as soon as no program has the port open.
     child.kill().unwrap();
     child.wait().unwrap();
     std::thread::sleep(Duration::from_millis(50));
@@ -353,7 +353,7 @@ fn killed(bench: &Bench, place: &Place) {
     assert_eq!(whole.t_s.len(), 500);
 }
 
-/// The same port while another program has it, and without permission.
+/// The same port while another program has it open, and without permission.
 fn port_of_others(bench: &Bench, place: &Place) {
     let held = serialport::new(&bench.port, 1_000_000)
         .open_native()
@@ -363,7 +363,7 @@ fn port_of_others(bench: &Bench, place: &Place) {
     let nobody_may = std::os::unix::fs::PermissionsExt::from_mode(0o000);
     std::fs::set_permissions(&bench.port, nobody_may).unwrap();
     let mut info = command(place, &["device", "info", "--port", &bench.port]);
-    // Root may open everything, and has to become somebody else; others need not.
+    // Root may open everything and must change its user; others need not.
     let as_nobody = info.current_dir("/").uid(65534).gid(65534).output();
     let said = match as_nobody {
         Ok(out) => String::from_utf8(out.stderr).unwrap(),
@@ -376,7 +376,7 @@ fn port_of_others(bench: &Bench, place: &Place) {
     assert!(said.contains("no permission to open the port"), "{said}");
 }
 
-/// Turned by hand all the time.
+/// Turned by hand without a pause.
 const TURNED: &str = "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 1000.0\ncarrier = \"hands\"\n\
      latitude_deg = 30.5\ngravity_mps2 = 9.793\nlead_in_s = 0.0\n[[step]]\nposes = 100\ndwell_s = 0.01\n";
 
@@ -384,7 +384,7 @@ const TURNED: &str = "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_ra
 fn a_self_test_of_a_unit_that_is_turned_and_one_of_open_pins_are_told_apart() {
     let place = Place::new();
     let mut truth = unit();
-    // Two turns or three within a self-test, each about an axis of its own: no two states see the same rates.
+    // Two or three turns within a self-test, about different axes: no two states have the same rates.
     truth.hands.turn_s = [0.4, 0.5];
     truth.hands.pause_s = [0.01, 0.02];
     let moving = Bench::carried(TURNED, &truth);
@@ -393,7 +393,7 @@ fn a_self_test_of_a_unit_that_is_turned_and_one_of_open_pins_are_told_apart() {
     assert!(told.stdout.contains("FAILED"), "{}", told.stdout);
     moving.end();
 
-    // Voltages that nothing changes: no sensor heeds its self-test pin.
+    // Fixed voltages: no sensor responds to its self-test pin.
     let mut volts = Volts::GROUND;
     for (k, (_, _, input)) in WIRING.into_iter().enumerate() {
         let of_accel = (3..6).contains(&k);

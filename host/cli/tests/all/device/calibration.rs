@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 /// Forward matrices (V per rad/s, V per m/s²) and biases (V) of gyro and accelerometer.
 pub type Forward = [(Matrix3<f64>, Vector3<f64>); 2];
 
-/// Some unit.
+/// An arbitrary unit.
 pub fn forward() -> Forward {
     let gyro = Matrix3::new(
         0.28, 0.002, -0.001, 0.003, 0.29, 0.001, -0.002, 0.001, 0.285,
@@ -35,7 +35,7 @@ pub fn text(raw_unit: &str, effects: &str) -> String {
     text_of(&forward(), raw_unit, effects)
 }
 
-/// The same of a certain unit.
+/// The same for a certain unit.
 pub fn text_of(forward: &Forward, raw_unit: &str, effects: &str) -> String {
     let mut out = format!(
         "format = \"mimu-calibration/1\"\ndevice = \"unit-7\"\ncreated = \"2026-01-01T00:00:00Z\"\ntool = \"by hand\"\n\

@@ -1,4 +1,4 @@
-//! Calibrations up and down, tests and comparisons.
+//! Uploads, downloads, tests and comparisons.
 
 use mimu_core::stored;
 use mimu_core::wire::{EFFECTS, Refusal, checks, flags};
@@ -7,7 +7,7 @@ use super::calibration::{EFFECTS as ALL_EFFECTS, forward};
 use super::peer::{Peer, Script};
 use super::{Place, mimu};
 
-/// The bytes that a device takes for this calibration file.
+/// The bytes that a device receives for this calibration file.
 fn uploaded(place: &Place, calibration: &str) -> Vec<u8> {
     let peer = Peer::new(Script::default());
     let arguments = [
@@ -47,7 +47,7 @@ fn a_calibration_arrives_whole_over_a_line_that_loses_and_garbles() {
     let held = peer.seen.lock().unwrap().stored.clone().unwrap();
     assert_eq!(result["hash"], format!("{:016x}", stored::hash(&held)));
 
-    // What arrived is the file's numbers: C by rows from the inverse of the hand-written P, little end first behind 232 bytes.
+    // The received bytes are the file's numbers: C by rows from the inverse of the hand-written P, little-endian after 232 bytes.
     let [(p, b), _] = forward();
     let c = p.try_inverse().unwrap();
     let float = |at: usize| f32::from_le_bytes(held[at..at + 4].try_into().unwrap());
@@ -274,14 +274,14 @@ fn a_warm_up_is_compared_by_the_time_since_power_on_that_the_device_tells() {
             "-",
         ];
         let result = mimu(&place, &arguments).json();
-        // The device adds up its time batch by batch, and the PC begins with the first that it hears, which on a busy machine is a later one.
+        // The device sums its time batch by batch. The PC begins with the first batch that it receives, which on a busy machine is a later one.
         let ulps = result["gyro"]["ulps"].as_u64().unwrap();
         assert!(ulps <= 4, "{powered_for_ms:?}: {result}");
         assert_eq!(result["holds"], true, "{powered_for_ms:?}: {result}");
     }
 }
 
-/// Of 0.1 rad/s, and 200 s.
+/// Of 0.1 rad/s, with a time constant of 200 s.
 const WARM_UP: &str = r#"
 [[effect]]
 id = "gyro_warm_up"
@@ -326,12 +326,12 @@ fn the_compensated_stream_is_compared_sample_by_sample() {
             // The same operations on the same numbers.
             assert_eq!(result[sensor]["ulps"], 0, "{result}");
             let double = result[sensor]["double"].as_f64().unwrap();
-            // Terms of up to 9 rad/s and 21 m/s² in numbers of 24 bits: rounding is there, and no more than that.
+            // Terms of up to 9 rad/s and 21 m/s² with 24 bits: there is rounding, and nothing else.
             assert!(double > 0.0 && double < 2e-5, "{result}");
         }
         assert_eq!(result["holds"], true);
     }
-    // Another calibration than the one it holds.
+    // A different calibration from the stored one.
     let held = uploaded(&place, &place.calibration("V", ALL_EFFECTS));
     let other = place.calibration("V", "");
     let peer = Peer::new(Script {
@@ -382,14 +382,14 @@ fn the_kalman_bank_is_compared_on_the_samples_that_it_took_in() {
         let of = |key: &str| inputs[i][key].as_u64().unwrap();
         of("last") - of("first") + 1
     };
-    // A second each, and what came until the device was told to stop.
+    // A second each, and the samples until the device received the stop.
     assert!(
         (1000..3000).contains(&taken(0)) && (1000..3000).contains(&taken(1)),
         "{result}"
     );
     let largest = result["largest_distance_sigma"].as_f64().unwrap();
     assert!(largest < 0.1, "{largest}");
-    // b + 9.81 P3 is the mean of what the script sends under the first input, whatever a bank makes of it.
+    // b + 9.81 P3 is the mean of the script's readings under the first input, independent of a bank.
     let mean: f64 = (inputs[0]["first"].as_u64().unwrap()..=inputs[0]["last"].as_u64().unwrap())
         .map(|n| f64::from(super::peer::sums(n as u32)[3]))
         .sum::<f64>()

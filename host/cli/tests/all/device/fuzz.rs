@@ -1,5 +1,5 @@
-//! The host's ear under whatever a line can carry: random bytes, flipped bits, cut, doubled and shuffled frames. It never panics and
-//! never stops hearing: a whole frame after all of that is heard.
+//! The host's receiver under everything that a line can carry: random bytes, flipped bits, cut, duplicated and reordered frames. It never panics and
+//! never stops receiving: an intact frame after all this is received.
 //!
 //! ```text
 //! MIMU_FUZZ_CASES=1000000 MIMU_FUZZ_SEED=2 cargo test --release -p mimu-cli --test all device::fuzz -- --nocapture
@@ -41,7 +41,7 @@ fn frame(message: &Message<'_>) -> Vec<u8> {
     out[..length].to_vec()
 }
 
-/// Frames of several kinds, one of them of a length that no device sends.
+/// Frames of several kinds, one of them longer than a device ever sends.
 fn frames() -> Vec<Vec<u8>> {
     let head = BatchHead {
         first: u32::MAX - 3,
@@ -137,7 +137,7 @@ fn no_bytes_make_the_ear_fail_or_deaf() {
                 end = Some(message);
             });
         };
-        // In pieces, as a port gives them.
+        // In segments, as a port delivers them.
         let middle = random.below(bytes.len() + 1);
         take(&mut ear, &bytes[..middle]);
         take(&mut ear, &bytes[middle..]);
@@ -204,7 +204,7 @@ fn damage_that_the_crc_does_not_see_makes_no_reader_of_a_stored_calibration_fail
         let mut random = Random(seed ^ case.wrapping_mul(0x2545_f491_4f6c_dd1d));
         let mut bytes = whole[..whole.len() - 4].to_vec();
         for _ in 0..1 + random.below(3) {
-            // Half of them where the counts and the effects are, which is little among so many numbers.
+            // Half of them among the counts and the effects, which are few bytes among so many numbers.
             let at = match random.below(4) {
                 0 => random.below(12),
                 1 => 336 + random.below(bytes.len().saturating_sub(336).max(1)),

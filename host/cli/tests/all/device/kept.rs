@@ -1,4 +1,4 @@
-//! Of which unit a calibration is, and the file that is fetched back from the device that keeps it.
+//! The unit that a calibration belongs to, and the file fetched back from the device.
 
 use super::calibration::{EFFECTS, text};
 use super::peer::{Peer, Script, UNIT_ID};
@@ -6,12 +6,12 @@ use super::{Place, Ran, mimu};
 
 const OTHER: &str = "ffeeddccbbaa998877665544";
 
-/// Number of the peer.
+/// Unit id of the peer.
 fn unit() -> String {
     UNIT_ID.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// A calibration file of the unit of this number.
+/// A calibration file for the unit with this id.
 fn of_unit(place: &Place, unit_id: &str) -> String {
     let path = place.path("of-unit.toml");
     let id = format!("unit_id = \"{unit_id}\"\ncreated");
@@ -80,13 +80,13 @@ fn what_is_fetched_and_stored_again_is_the_same_to_the_last_byte() {
     );
     assert!(!back.contains("sigma") && !back.contains("covariance ="));
 
-    // The device holds it: nothing is sent.
+    // The device has it already: nothing is sent.
     let again = ["upload", "back.toml", "--json", "-"];
     assert_eq!(device(&place, &peer, &again).json()["was_there"], true);
     assert_eq!(peer.count("UploadBegin"), 1);
     let said = device(&place, &peer, &["upload", "back.toml"]).stdout;
     assert!(said.contains("already stored"), "{said}");
-    // And another one, which does not, is sent the same.
+    // A device that does not have it receives the same bytes.
     let empty = Peer::new(Script::default());
     let twin = device(&place, &empty, &again).json();
     assert_eq!(
@@ -115,7 +115,7 @@ fn a_file_with_half_of_its_uncertainty_is_refused() {
     refused.refused(&["unit_id", "\"12\" is not a unit's number", "24 hexadecimal"]);
 }
 
-/// A calibration of an earlier layout, which no program reads any more.
+/// A calibration in an earlier layout, which no program reads any more.
 #[test]
 fn a_calibration_of_an_earlier_layout_is_refused_with_what_to_do() {
     let place = Place::new();
@@ -133,7 +133,7 @@ fn a_calibration_of_an_earlier_layout_is_refused_with_what_to_do() {
     assert!(!place.path("cal.bin").exists());
 }
 
-/// The calibration file of the unit with three nodes over temperature.
+/// The unit's calibration file with three nodes over temperature.
 fn over_temperature(place: &Place) -> String {
     let plain = of_unit(place, &unit());
     let text = std::fs::read_to_string(&plain).unwrap();

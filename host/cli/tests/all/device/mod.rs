@@ -1,5 +1,5 @@
-//! `mimu device` and `mimu record`, from their arguments to their exit status: against the firmware's release image on the emulated
-//! board ([`board`]), and against a device by script, which misbehaves as told. Both are behind pseudo-terminals.
+//! `mimu device` and `mimu record`, from their arguments to their exit status: with the firmware's release image on the emulated board ([`board`]),
+//! and with a scripted device, which can be told to misbehave. Both are behind pseudo-terminals.
 #![cfg(unix)]
 
 mod board;
@@ -39,7 +39,7 @@ impl Place {
     }
 }
 
-/// What the command did.
+/// Result of the command.
 struct Ran {
     status: Option<i32>,
     stdout: String,
@@ -74,7 +74,7 @@ impl Ran {
         serde_json::from_str(&self.stdout).unwrap()
     }
 
-    /// The line of a refusal, which has to hold these words.
+    /// The line of a refusal, which must contain these words.
     fn refused(&self, words: &[&str]) -> &str {
         let line = self.stderr.lines().last().unwrap_or_default();
         println!("    {line}");

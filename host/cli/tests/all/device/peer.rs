@@ -1,6 +1,6 @@
-//! A device by script at the other end of a pseudo-terminal: speaks the protocol as `core::wire` documents it, and misbehaves as told.
+//! A scripted device at the other end of a pseudo-terminal. It speaks the protocol documented in `core::wire`, and misbehaves on request.
 //!
-//! It knows nothing of the host's code. The readings that it sends are a formula ([`sums`]), so that a test can say what has to arrive.
+//! It shares no code with the host. Its readings follow a formula ([`sums`]), so a test can tell what must arrive.
 
 mod answers;
 mod samples;
@@ -24,7 +24,7 @@ pub const ACCEL_VOLTS: f32 = 2.518e-5;
 pub const TEMP_C: f32 = 31.25;
 pub const UNIT_ID: [u8; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0xab];
 
-/// Sums of codes of sample n: about 2.5 and 1.65 V, with something like noise.
+/// Sums of codes of sample n: about 2.5 and 1.65 V, with pseudo-noise.
 pub fn sums(n: u32) -> [u32; 6] {
     std::array::from_fn(|i| {
         let mixed = (n ^ 0x9e37_79b9_u32.wrapping_mul(i as u32 + 1)).wrapping_mul(0x85eb_ca6b);
@@ -33,23 +33,23 @@ pub fn sums(n: u32) -> [u32; 6] {
     })
 }
 
-/// What happens once, when a sample is due.
+/// An event that happens once, when a sample is due.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Act {
     /// Its batch is not sent.
     Drop,
-    /// A byte of the frame of its batch is another.
+    /// A byte in the frame of its batch is changed.
     Garble,
-    /// The device restarts: it counts from 0 again and has forgotten everything but its calibration.
+    /// The device restarts: it counts from 0 again and keeps only its calibration.
     Restart,
-    /// The port is gone.
+    /// The port disappears.
     Vanish,
-    /// The cable is pulled, and so long after it is back: the port, of the same name, is another. The device goes on meanwhile, or if it
-    /// has no power but from there it starts with it.
+    /// The cable is pulled, and plugged in again after `away_ms`: a different port of the same name. The device continues meanwhile, or starts then
+    /// if the cable is its only power.
     Unplug { away_ms: u64, powered: bool },
 }
 
-/// What answers at the port.
+/// Behaviour at the port.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Voice {
     /// A device.
@@ -58,7 +58,7 @@ pub enum Voice {
     Silence,
     /// Bytes of something else.
     Garbage,
-    /// Whole frames that are no greetings.
+    /// Intact frames that are not greetings.
     Stranger,
 }
 
@@ -71,25 +71,25 @@ pub struct Script {
     /// Whether it stores derivatives over temperature.
     pub curves: bool,
     pub stored: Option<Vec<u8>>,
-    /// Every so many answers one is lost, if not 0; and as many are garbled.
+    /// One answer in so many is lost, and one is garbled; 0 for none.
     pub losing: u32,
     pub refuse_commit: Option<Refusal>,
-    /// It restarts instead of taking the chunk of this offset, once.
+    /// It restarts instead of accepting the chunk at this offset, once.
     pub restart_at_chunk: Option<u32>,
-    /// By number of the sample since the stream began, in order: how long a program takes to begin does not matter then.
+    /// By sample number since the stream began, in order, so that the start-up time of a program does not matter.
     pub acts: Vec<(u32, Act)>,
-    /// Samples a millisecond.
+    /// Samples per millisecond.
     pub speed: f64,
-    /// Added to the compensated gyro x, rad/s: a device that computes wrongly.
+    /// Added to the compensated gyro x, rad/s: a computing error of the device.
     pub bent: f32,
     pub self_test_passed: u16,
-    /// Why it started.
+    /// Cause of its start.
     pub start: Start<'static>,
-    /// Name of the port in place of that of the terminal: one that stays as the terminal goes and another comes.
+    /// Name of the port, if it is not the terminal's: a constant name while terminals change.
     pub link: Option<PathBuf>,
-    /// Time since power-on when it began to sample.
+    /// Time since power-on at its first sample.
     pub powered_for_ms: Option<u32>,
-    /// Carried by all its batches.
+    /// Flags of all its batches.
     pub flags: u16,
 }
 
@@ -120,12 +120,12 @@ impl Default for Script {
     }
 }
 
-/// What the peer has seen, for tests to look at.
+/// Record of the peer for the tests.
 #[derive(Debug, Default)]
 pub struct Seen {
     /// Names of the requests.
     pub requests: Vec<String>,
-    /// The calibration that it holds.
+    /// The stored calibration.
     pub stored: Option<Vec<u8>>,
     /// Number of the next sample.
     pub next: u32,
@@ -188,7 +188,7 @@ impl Drop for Peer {
     }
 }
 
-/// A terminal, and the name that it is opened by.
+/// A terminal, and the name to open it by.
 fn open(link: Option<&Path>) -> (Terminal, String) {
     let (port, path) = Terminal::open();
     let Some(link) = link else {
@@ -201,19 +201,19 @@ fn open(link: Option<&Path>) -> (Terminal, String) {
 
 struct Device {
     port: Option<Terminal>,
-    /// When the port is back, and whether the device had power meanwhile.
+    /// When the port returns, and whether the device has power until then.
     back: Option<(Instant, bool)>,
     seen: Arc<Mutex<Seen>>,
     stop: Arc<AtomicBool>,
     script: Script,
     began: Instant,
     next: u32,
-    /// Raw and compensated.
+    /// Raw and compensated streams.
     streams: (bool, bool),
     /// First sample of the stream.
     streamed_from: Option<u32>,
     upload: Option<(usize, u64, Vec<u8>)>,
-    /// It may be of another unit.
+    /// A calibration of another unit is accepted.
     insists: bool,
     answers: u32,
     lost: u32,

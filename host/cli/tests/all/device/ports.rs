@@ -1,4 +1,4 @@
-//! Who is at the port, and what is said where nobody is, or somebody else.
+//! The device at the port, and the messages if there is none, or another one.
 
 use std::os::unix::process::CommandExt as _;
 
@@ -100,7 +100,7 @@ fn a_port_without_permission_is_told_apart() {
     let place = Place::new();
     let mut command = command(&place, &["device", "info", "--port", &path]);
     command.current_dir("/");
-    // Root may open everything, and has to become somebody else; others cannot, and need not.
+    // Root may open everything and must change its user; others cannot and need not.
     let nobody = 65534;
     let as_nobody = command.uid(nobody).gid(nobody).output();
     let arguments = ["device", "info", "--port", &path];
@@ -126,10 +126,10 @@ fn a_device_that_started_for_a_reason_of_a_later_version_is_talked_to_all_the_sa
         ..Greeting::default()
     };
     let mut later = payload(&Message::Greeting { id: 3, greeting });
-    // The variant, behind the length of the field: 5, of a fault with two numbers of a byte each.
+    // The variant, after the length of the field: 5, for a fault with two numbers of one byte each.
     let at = later.windows(4).position(|w| w == [3, 5, 7, 9]).unwrap();
     later[at + 1] = 42;
-    // And without the slots, as from a device that does not send them yet.
+    // Also without the slots, like a device that does not yet send them.
     let shorter = &later[..later.len() - 4];
     for payload in [&later[..], shorter] {
         let mut heard = Vec::new();

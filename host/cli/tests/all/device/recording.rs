@@ -1,4 +1,4 @@
-//! `mimu record`: gaps, restarts, kills, and a port that vanishes.
+//! `mimu record`: gaps, restarts, kills, and a port that disappears.
 
 use std::io::Write as _;
 use std::process::Stdio;
@@ -10,7 +10,7 @@ use mimu_recording::{Batch, Recording};
 use super::peer::{ACCEL_VOLTS, Act, GYRO_VOLTS, Peer, Script, TEMP_C, sums};
 use super::{Place, command, mimu, start};
 
-/// The same, with its inputs.
+/// All rows, including their inputs.
 fn all_rows(place: &Place, name: &str) -> (Recording, Batch) {
     let (recording, mut all) = rows(place, name);
     let read = recording.for_each_batch(
@@ -46,7 +46,7 @@ pub fn rows(place: &Place, name: &str) -> (Recording, Batch) {
     (recording, all)
 }
 
-/// Every row is what the script sends for the sample of its time, and times rise.
+/// Checks that every row is what the script sends for the sample at its time, and that times increase.
 fn check_rows(rows: &Batch) {
     for (i, t_s) in rows.t_s.iter().enumerate() {
         let n = (t_s * 1000.0).round();
@@ -55,7 +55,7 @@ fn check_rows(rows: &Batch) {
         let sums = sums(n as u32);
         for axis in 0..6 {
             let step = if axis < 3 { GYRO_VOLTS } else { ACCEL_VOLTS };
-            // To the last bit of what the device has sent, which is of single precision.
+            // To the last bit of the device's single-precision values.
             assert_eq!(
                 rows.raw[axis][i] as f32,
                 sums[axis] as f32 * step,
@@ -145,7 +145,7 @@ fn dwells_by_time_begin_and_end_with_their_sample_and_parquet_holds_the_same() {
     };
     let steps: Vec<i32> = (0..3000).map(expected).collect();
     assert_eq!(rows.step, steps);
-    // It is there already, and stays.
+    // The recording exists already, and is kept.
     let before = std::fs::read(place.path("rec/samples.parquet")).unwrap();
     mimu(&place, &fixed).refused(&["rec", "exists already"]);
     assert_eq!(
@@ -184,7 +184,7 @@ fn a_killed_recording_is_there_up_to_the_last_second() {
     let place = Place::new();
     let peer = Peer::new(Script::default());
     let mut child = start(&place, &["record", "--port", &peer.path, "-o", "rec"]);
-    // The moment does not matter: the rows are there when it is killed, or the file would not be as long.
+    // The time of the kill does not matter: the file is that long only if the rows are written.
     let until = Instant::now() + Duration::from_secs(60);
     let samples = place.path("rec/samples.csv");
     while std::fs::metadata(&samples).map_or(0, |m| m.len()) < 150_000 {
@@ -192,7 +192,7 @@ fn a_killed_recording_is_there_up_to_the_last_second() {
         std::thread::sleep(Duration::from_millis(5));
     }
     let sent = peer.seen.lock().unwrap().next;
-    // SIGKILL: nothing of the program runs any more.
+    // SIGKILL: no code of the program runs any more.
     child.kill().unwrap();
     child.wait().unwrap();
     let (recording, rows) = rows(&place, "rec");
@@ -204,7 +204,7 @@ fn a_killed_recording_is_there_up_to_the_last_second() {
     let warning = recording.warnings[0].to_string();
     assert!(warning.contains("unfinished"), "{warning}");
 
-    // A power failure may leave half a row, whose last number reads like a whole one.
+    // A power failure may leave half a row, whose last number looks complete.
     let whole = std::fs::read(&samples).unwrap();
     let end = whole.iter().rposition(|b| *b == b'\n').unwrap();
     let cut = whole[..end].iter().rposition(|b| *b == b'\n').unwrap() + 1;
@@ -215,7 +215,7 @@ fn a_killed_recording_is_there_up_to_the_last_second() {
     let lines = whole[..cut].iter().filter(|b| **b == b'\n').count();
     assert_eq!(fewer.t_s.len(), lines - 1);
 
-    // And the other commands take it.
+    // The other commands accept it.
     let out = mimu(&place, &["allan", "rec", "--json", "-"]);
     assert!(
         out.status == Some(0) || out.stderr.contains("; "),
@@ -270,7 +270,7 @@ fn a_recording_counts_from_power_on_over_a_reset_as_long_as_the_device_knows_it(
     let by_power = recorded(Start::PowerOn, Some(70));
     assert_eq!(by_power.power_on_s, Some(-0.07));
     assert_eq!(by_power.start_without_power_on(), None);
-    // The button does not cool the die.
+    // Pressing the button does not cool the die.
     let by_button = recorded(Start::ResetPin, Some(600_500));
     assert_eq!(by_button.power_on_s, Some(-600.5));
     assert_eq!(by_button.start_without_power_on(), None);
@@ -330,7 +330,7 @@ fn ctrl_c_ends_a_recording_and_does_not_cut_it() {
     assert_eq!(peer.count("Stop"), 1);
 }
 
-/// Records over a pulled cable.
+/// Records while the cable is pulled.
 fn unplugged(powered: bool) -> (Place, Peer, serde_json::Value) {
     let place = Place::new();
     let away_ms = 700;
@@ -353,7 +353,7 @@ fn a_recording_goes_on_after_the_cable_was_pulled_and_the_device_s_clock_measure
     assert_eq!(result["reconnected"], 1);
     assert_eq!(result["restarts"], serde_json::json!([]));
     let (recording, rows) = rows(&place, "rec");
-    // Every row is the sample of its time, also behind the gap.
+    // Every row is the sample of its time, also after the gap.
     check_rows(&rows);
     let [(before, after)] = gaps(&rows)[..] else {
         panic!("one gap: {:?}", gaps(&rows));
@@ -395,7 +395,7 @@ fn a_row_takes_no_more_bytes_than_its_numbers_have_digits() {
         .len();
     let each = bytes as f64 / 2000.0;
     println!("{each:.1} bytes a row");
-    // A time of 5 digits, a temperature of 5, six readings of up to 9 digits and a point, and what separates them.
+    // A time of 5 digits, a temperature of 5, six readings of up to 9 digits and a point, and the separators.
     assert!(each < 80.0, "{each}");
 }
 
@@ -486,7 +486,7 @@ fn a_table_of_inputs_is_taken_by_the_labels_of_its_rows_and_turns_at_the_end() {
         "-",
     ];
     let result = mimu(&place, &arguments).json();
-    // Of the last one nothing was recorded, which is told.
+    // Of the last one nothing was recorded, which is reported.
     let warning = result["warnings"][0].as_str().unwrap();
     assert!(warning.contains("face_down"), "{warning}");
     let (recording, rows) = all_rows(&place, "rec");

@@ -1,4 +1,4 @@
-//! The emulated board in a chamber, with a calibration over temperature that is made from the bench's truth; and its offsets trimmed.
+//! The emulated board in a chamber, with a calibration over temperature made from the bench's truth; and trimming its offsets.
 
 use std::fmt::Write as _;
 
@@ -13,10 +13,10 @@ use super::calibration::{Forward, text_of};
 /// Drifts of the gyros' biases, deg/s per °C, and their curvature, 1/°C.
 const DRIFT_DPS_PER_C: [f64; 3] = [0.1, -0.08, 0.05];
 const CURVATURE_PER_C: f64 = 0.01;
-/// The thermometer's filter, s: by so much the dies are ahead of what it says.
+/// Time constant of the thermometer's filter, s: the lead of the dies over its reading.
 const FILTER_S: f64 = 1.0;
 
-/// The unit of fang with biases that drift, on a board so light that a chamber sweeps it within seconds. All TEMP pins tell the truth.
+/// fang's unit with drifting biases, on a board so light that a chamber sweeps it within seconds. All TEMP pins are exact.
 fn drifting() -> RigTruth {
     let text = include_str!("../../../../../rig/rigs/fang.toml");
     let unit = "gyro_reference_v = [2.5, 2.5, 2.5]\nsupply_error_ppm = 0.0\n";
@@ -80,7 +80,7 @@ fn curves(models: &Forward) -> String {
     out
 }
 
-/// Means of gyro x, y, z over two seconds each, rad/s, with the temperature at the end, °C, and whether a flag says that it is outside.
+/// Means of gyro x, y, z over two seconds each, rad/s, with the temperature at the end, °C, and whether the out-of-range flag was set.
 fn means(csv: &str) -> Vec<([f64; 3], f64, bool)> {
     let rows: Vec<Vec<f64>> = csv
         .lines()
@@ -105,7 +105,7 @@ fn means(csv: &str) -> Vec<([f64; 3], f64, bool)> {
 #[test]
 fn the_device_follows_a_chamber_through_its_nodes_and_says_where_they_end() {
     let (place, truth) = (Place::new(), drifting());
-    // From 20 to 70 °C at 2 °C/s, once the calibration is there.
+    // From 20 to 70 °C at 2 °C/s, after the calibration is stored.
     let plan = AT_REST.replace(
         "lead_in_s",
         "chamber_c = [[0.0, 20.0], [6.0, 20.0], [31.0, 70.0]]\nlead_in_s",
@@ -120,7 +120,7 @@ fn the_device_follows_a_chamber_through_its_nodes_and_says_where_they_end() {
     let seen = means(&ran.stdout);
     for (gyro, temp_c, _) in &seen {
         for (axis, rate) in gyro.iter().enumerate() {
-            // Six sigmas of two seconds of 0.1 deg/s/√Hz; the drift is up to 5 deg/s, and 0.4 deg/s of it is within the filter's second.
+            // Six sigmas of two seconds of 0.1 deg/s/√Hz. The drift is up to 5 deg/s, of which 0.4 deg/s is within the filter's second.
             assert!(
                 rate.abs() < 7.5e-3,
                 "gyro {axis} at {temp_c} °C: {rate} rad/s"
@@ -154,7 +154,7 @@ fn the_device_follows_a_chamber_through_its_nodes_and_says_where_they_end() {
         "{checked}"
     );
 
-    // At 70 °C it is 10 °C outside the range, and 5 beyond the last node.
+    // 70 °C is 10 °C outside the range, and 5 °C beyond the last node.
     let ran = bench.run(&place, &["device", "stream", "compensated", "--for", "8s"]);
     let seen = means(&ran.stdout);
     let (_, temp_c, outside) = seen[seen.len() - 1];
@@ -172,7 +172,7 @@ fn the_device_follows_a_chamber_through_its_nodes_and_says_where_they_end() {
 fn a_trim_takes_out_the_offsets_that_have_drifted_and_keeps_everything_else() {
     let (place, truth) = (Place::new(), unit());
     let bench = Bench::carried(AT_REST, &truth);
-    // A calibration from when the biases were others, by this much.
+    // A calibration from a time when the biases differed by this much.
     let drifted = [
         Vector3::new(0.02, -0.01, 0.03),
         Vector3::new(0.1, 0.05, -0.2),
@@ -199,7 +199,7 @@ fn a_trim_takes_out_the_offsets_that_have_drifted_and_keeps_everything_else() {
     for i in 0..3 {
         let before = figure(&gyro_alone, "gyro", "before", i);
         let sigma = figure(&gyro_alone, "gyro", "sigma_before", i);
-        // Sigma is known within a quarter of 8 stretches; and the Earth turns.
+        // Sigma is determined to a quarter by 8 segments; and the Earth turns.
         assert!(
             (before - drifted[0][i]).abs() < 7.0 * sigma + 1e-4,
             "{gyro_alone}"
@@ -232,7 +232,7 @@ fn a_trim_takes_out_the_offsets_that_have_drifted_and_keeps_everything_else() {
             "{both}"
         );
     }
-    // In another pose than the one that is given nothing is stored.
+    // If the unit is in another pose than the given one, nothing is stored.
     let wrong = [
         "device",
         "trim",

@@ -1,7 +1,7 @@
-//! A pseudo-terminal in the place of a serial port.
+//! A pseudo-terminal that replaces a serial port.
 //!
-//! By `rustix` and not by `serialport`, whose pairs are inherited by every program that a test starts: a port that vanishes here would
-//! still be open there.
+//! It uses `rustix` instead of `serialport`: every program that a test starts inherits the pairs of `serialport`, so a port that disappears here
+//! would still be open there.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -11,7 +11,7 @@ use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-/// The side of the device.
+/// The device's side.
 pub struct Terminal(File);
 
 impl Terminal {
@@ -23,7 +23,7 @@ impl Terminal {
         unlockpt(&side).unwrap();
         let path = ptsname(&side, Vec::new()).unwrap().into_string().unwrap();
         fcntl_setfl(&side, fcntl_getfl(&side).unwrap() | OFlags::NONBLOCK).unwrap();
-        // The mode stays when the other side is closed. That it was open once makes the system tell from then on whether it is.
+        // The mode stays when the other side is closed. Opening it once lets the system report from then on whether it is open.
         let other = File::options().read(true).write(true).open(&path).unwrap();
         let mut mode = tcgetattr(&other).unwrap();
         mode.make_raw();
@@ -31,7 +31,7 @@ impl Terminal {
         (Self(File::from(side)), path)
     }
 
-    /// Waits 2 ms for one of these, and says which there are.
+    /// Waits up to 2 ms for these events, and returns those that occurred.
     fn wait(&self, what: PollFlags) -> PollFlags {
         let mut wanted = [PollFd::new(&self.0, what)];
         let timeout = Timespec {
@@ -41,24 +41,24 @@ impl Terminal {
         let _ = poll(&mut wanted, Some(&timeout));
         let is = wanted[0].revents();
         if is.contains(PollFlags::HUP) {
-            // Nobody has it open, which poll tells at once.
+            // No program has it open; poll returns at once in this case.
             std::thread::sleep(std::time::Duration::from_millis(2));
         }
         is
     }
 
-    /// Whether anybody has it open.
+    /// Whether any program has it open.
     pub fn is_open(&self) -> bool {
         !self.wait(PollFlags::OUT).contains(PollFlags::HUP)
     }
 
-    /// What was sent to it, after 2 ms at most.
+    /// Reads the bytes sent to it, waiting at most 2 ms.
     pub fn read(&mut self, into: &mut [u8]) -> usize {
         self.wait(PollFlags::IN);
         self.0.read(into).unwrap_or(0)
     }
 
-    /// Sends some of `bytes`, and returns how many: all of them are lost while nobody has it open.
+    /// Sends some of `bytes` and returns how many: all of them are lost while no program has it open.
     pub fn write(&mut self, bytes: &[u8]) -> usize {
         if self.wait(PollFlags::OUT).contains(PollFlags::HUP) {
             return bytes.len();

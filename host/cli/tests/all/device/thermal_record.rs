@@ -1,4 +1,4 @@
-//! `mimu thermal record` with a device by script, which lies with z up, and a table and a chamber that keep what they are told.
+//! `mimu thermal record` with a scripted device, which lies with z up, and a table and a chamber that record their commands.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -10,7 +10,7 @@ use mimu_recording::{Manifest, Recording, Reference};
 use super::peer::{Act, Peer, Script};
 use super::{Place, mimu, start};
 
-/// A table with a chamber behind a TCP address; it is busy for two questions after each motion.
+/// A table with a chamber behind a TCP address; it reports busy for two queries after each motion.
 struct Equipment {
     told: Arc<Mutex<Vec<String>>>,
 }
@@ -185,7 +185,7 @@ fn a_device_that_loses_its_power_ends_it_and_what_stands_is_kept() {
 #[test]
 fn samples_that_are_missing_from_a_turn_take_it_out_of_the_count() {
     let place = Place::new();
-    // The turn is the longest part by far: the table is busy for some tenths of a second by the PC's clock, each of ten seconds here.
+    // The turn is by far the longest part: the table is busy for some tenths of a second by the PC's clock, each of them ten seconds here.
     let acts = vec![
         (12_000, Act::Drop),
         (24_000, Act::Drop),

@@ -1,4 +1,4 @@
-//! `mimu apply`: a compensated recording next to the inputs that the bench gave.
+//! `mimu apply`: a compensated recording against the inputs of the bench.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub fn read(folder: &Path) -> (Recording, Batch) {
     (recording, all)
 }
 
-/// The largest error of the mean of a dwell against the input of the bench, rad/s and m/s².
+/// The largest error of a dwell mean against the bench's input, rad/s and m/s².
 fn worst(batch: &Batch) -> [f64; 2] {
     let rows = batch.len() / DWELLS;
     let mut worst = [0.0_f64; 2];
@@ -118,7 +118,7 @@ fn a_compensated_recording_is_the_input_of_the_bench_and_keeps_what_is_missing()
             .all(|axis| axis[500].is_finite() && axis[2000].is_nan())
     );
     assert!((batch.t_s[1010] - batch.t_s[1009] - 26.0 / RATE_HZ).abs() < 1e-9);
-    // Five sigmas of the mean of the shortest dwell, 75 samples, of the noisier axis; a hundredth of that is an empty cell.
+    // Five sigmas of the mean of the shortest dwell, 75 samples, for the noisier axis. An empty cell matters a hundred times less.
     let limit = [0, 1].map(|s| {
         let finest = forward(s)
             .0
@@ -128,7 +128,7 @@ fn a_compensated_recording_is_the_input_of_the_bench_and_keeps_what_is_missing()
         5.0 * NOISE[s] / finest / 75.0_f64.sqrt()
     });
     let clean = worst(&batch);
-    // A twelfth of the accelerometer's cubic, 0.03 m/s² at most, remains by the slope of the error that is removed.
+    // A twelfth of the accelerometer's cubic (at most 0.03 m/s²) remains, because the effect is evaluated with the erroneous reading.
     assert!(
         clean[0] < limit[0] && clean[1] < limit[1] + 1e-3,
         "{clean:?} {limit:?}"
@@ -137,7 +137,7 @@ fn a_compensated_recording_is_the_input_of_the_bench_and_keeps_what_is_missing()
     let affine = worst(&read(&path("affine")).1);
     assert!(affine[0] > 3e-3 && affine[1] > 0.02, "{affine:?}");
 
-    // What is compensated is no raw recording of this unit, and the raw readings are not to be lost.
+    // A compensated recording is not a raw recording of this unit, and the raw readings must not be lost.
     let (out, cal) = (text("out"), text("cal.toml"));
     let (done, refusal) = mimu(&["apply", &out, "--calibration", &cal, "-o", &text("again")]);
     assert!(!done && refusal.contains("raw unit is SI"), "{refusal}");

@@ -1,4 +1,4 @@
-//! Errors by the code: removed by block and by sample, and refused where their converters make no sense.
+//! Converter nonlinearity: removed from blocks and from samples, and refused if the converters make no sense.
 
 use mimu::calibration::Calibration;
 use mimu::effects;
@@ -17,7 +17,7 @@ use super::unit::{
     BIT_0_V, WORTH_V, ZERO_V, fitted, fitted_effect, prepared, record, write_recording,
 };
 
-/// Converters of the accelerometer, as the recording is made.
+/// Converters of the accelerometer, as in the recording.
 fn converters() -> FittedEffect {
     let effect = effects::by_id("accel_readout_code").unwrap();
     let mut candidate = Candidate::new(Sensor::Accel, CandidateKind::Effect(effect));
@@ -38,7 +38,7 @@ fn converters() -> FittedEffect {
 fn errors_by_the_code_are_taken_out_block_by_block_and_sample_by_sample() {
     let folder = tempfile::tempdir().unwrap();
     let [clean, coded] = ["clean", "coded"].map(|name| folder.path().join(name));
-    // The same noise to the last bit.
+    // The same noise, bit by bit.
     record(&clean, false, false);
     write_recording(&coded, false, true, false);
     let fit = fitted(&clean);
@@ -56,7 +56,7 @@ fn errors_by_the_code_are_taken_out_block_by_block_and_sample_by_sample() {
     )
     .unwrap();
     let device: Effects<f64, 8> = calibration.core_effects().unwrap();
-    // One to each axis, and the device has room for them.
+    // One for each axis, and the device has room for them.
     let image = Image::new(&calibration, "cal.toml").unwrap();
     assert_eq!(image.stored().unwrap().effect_count, 3);
     assert_eq!(image.effects, ["accel_readout_code"]);
@@ -68,7 +68,7 @@ fn errors_by_the_code_are_taken_out_block_by_block_and_sample_by_sample() {
         .collect();
     let mean = |block: &mimu::signal::blocks::Block| Vector3::from_fn(|i, _| block.raw[3 + i].mean);
     let blocks = |of: &Prepared| of.condensed.blocks.clone();
-    // Of the truth, V: what was put in, and what is left of it by block and by sample.
+    // Error against the truth, V: the error added, and the errors remaining by block and by sample.
     let [mut put, mut by_block, mut by_sample] = [(); 3].map(|()| Vec::new());
     let all = blocks(&fit.prepared).into_iter().zip(blocks(&coded_blocks));
     for ((truth, read), cleaned) in all.zip(blocks(&after)) {
@@ -99,8 +99,8 @@ fn errors_by_the_code_are_taken_out_block_by_block_and_sample_by_sample() {
         mean(&by_sample)
     );
     assert!(rms(&put) > 5e-4);
-    // Where a bit that is worth too little turns, the readings of some codes before and after are the same, and of five samples
-    // the share of the time is known to a fifth. One turn in the wrong place, or of the wrong sign, leaves more than all of this.
+    // Around the transition of a bit that is worth too little, some codes before and after have the same reading, and from five samples the fraction
+    // of time is known to a fifth. One transition in the wrong place, or of the wrong sign, would leave more than all of this.
     for left in [&by_block, &by_sample] {
         assert!(rms(left) < 0.12 * rms(&put), "{}", rms(left));
         assert!(mean(left) < 0.04 * rms(&put), "{}", mean(left));

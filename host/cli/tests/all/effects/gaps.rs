@@ -1,4 +1,4 @@
-//! Effects taken out of recordings that lack something: samples, a temperature, the time since power-on.
+//! Effects removed from recordings with missing data: samples, a temperature, the time since power-on.
 
 use std::sync::Arc;
 
@@ -15,10 +15,10 @@ use mimu_recording::RawUnit;
 
 use super::unit::{SAG, fitted, named, prepared, record};
 
-/// Of a warm-up.
+/// Time constant of the warm-up.
 const TIME_CONSTANT_S: f64 = 1200.0;
 
-/// A recording, and its calibration with effects, given by id and the value of all coefficients.
+/// A recording, and its calibration with effects, given by id, the value of each coefficient and their number.
 fn unit(effects: &[(&str, f64, usize)]) -> (Prepared, Calibration) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("recording");
@@ -60,13 +60,13 @@ fn samples_that_are_missing_from_the_other_triad_do_not_make_an_error() {
     }
     let after = fitted_effect(&holes, &calibration);
     for axis in 0..3 {
-        // A dwell shows one force: other blocks of it differ by noise, 2.5 mm/s² a sample of 9.8 m/s².
+        // A dwell has one force, so its blocks differ only by noise, 2.5 mm/s² per sample of 9.8 m/s².
         let off = |p: &Prepared| p.dwells.list[5].raw[axis].mean;
         let moved = (off(&whole) - off(&expected)).abs();
         assert!((off(&after) - off(&expected)).abs() < 1e-3 * moved);
         assert!(moved > 0.0);
     }
-    // Nothing at all in a dwell: it is left out, and said.
+    // A dwell without any samples is left out, and this is reported.
     let mut hole = whole.clone();
     for at in blocks {
         Arc::make_mut(&mut hole.condensed).blocks[at].raw[3..].fill(Moments::default());
@@ -90,7 +90,7 @@ fn a_lag_begins_at_the_first_temperature() {
     for block in &mut Arc::make_mut(&mut whole.condensed).blocks {
         block.temp_c = first;
     }
-    // At one temperature all the time there is no lag, whatever the temperature and when it was first read.
+    // At a constant temperature there is no lag, whatever the temperature and whenever it was first read.
     let mut late = whole.clone();
     for block in &mut Arc::make_mut(&mut late.condensed).blocks[..30] {
         block.temp_c.mean = f64::NAN;
@@ -144,7 +144,7 @@ fn what_goes_by_time_is_counted_from_power_on() {
         let settled = |s: f64| WARM_UP * (-s / TIME_CONSTANT_S).exp();
         let s = a.start_s + 0.5 * a.duration_s - first_s;
         let expected = settled(s) - settled(s + 600.0);
-        // Along the sensors' own directions, a few degrees from the body's.
+        // Along the sensors' own directions, a few degrees from the body axes.
         assert!(
             less.iter().all(|m| (m / expected - 1.0).abs() < 0.1),
             "{less} {expected}"

@@ -1,4 +1,4 @@
-//! The calibration that a device keeps, fetched: what every command makes of it.
+//! The calibration stored by a device, fetched back, as input of every command.
 
 use mimu::calibration::Calibration;
 use mimu::effects::candidate::{Candidate, CandidateKind};
@@ -12,7 +12,7 @@ use super::{every_effect, mimu};
 
 const CREATED: &str = "2026-01-01T00:00:00Z";
 
-/// The file that is fetched from the device that holds this one.
+/// The file fetched from a device that stores this calibration.
 fn fetched(calibration_file: &Calibration) -> (Image, Calibration) {
     let image = Image::new(calibration_file, "cal.toml").unwrap();
     let kept = calibration(&image.bytes, &calibration_file.device, "port").unwrap();
@@ -26,7 +26,7 @@ fn every_effect_is_fetched_as_it_was_sent() {
     let path = folder.path().join("recording");
     record(&path, false, true);
     let fit = fitted(&path);
-    // Converters of their own of two axes of the accelerometer, in place of one of all.
+    // Separate converters for two axes of the accelerometer, instead of one for all.
     let effect = mimu::effects::by_id("accel_readout_code").unwrap();
     let mut own = Candidate::new(Sensor::Accel, CandidateKind::Effect(effect));
     own.active = vec![first_of(0), first_of(2) + 3];

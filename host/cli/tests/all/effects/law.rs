@@ -1,4 +1,4 @@
-//! The device evaluates every effect as its data say, under any conditions.
+//! The device evaluates every effect according to its definition, for any inputs.
 
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, CandidateKind};
@@ -10,7 +10,7 @@ use mimu_core::compensation::Sample;
 use mimu_core::effects::{DeviceEffect, Directions, Effects, State};
 use nalgebra::{Matrix3, Vector3};
 
-/// Effects smaller than this drown in the rounding of the readings, rad/s or m/s².
+/// Smaller effects vanish in the rounding of the readings, rad/s or m/s².
 const ROUNDING: f64 = 1e-9;
 
 /// Random inputs of each effect.
@@ -24,8 +24,8 @@ fn random(seed: &mut u64) -> f64 {
     (*seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
-/// By so much of what data sheets say the inputs are as good as undisturbed: the device evaluates each law without the error of the sample
-/// before.
+/// At this fraction of the data-sheet size the inputs are practically undisturbed. This is needed because the device evaluates each law after
+/// removing the error of the previous sample.
 const SMALL: f64 = 1e-3;
 
 #[test]
@@ -87,7 +87,7 @@ fn every_effect_is_evaluated_by_the_device_as_its_data_say() {
             candidate.add_error(&at, parameter.unwrap_or(0.0), &values, &mut error);
             let of_host = directions.to_body * error;
             let off = (of_device - of_host).norm();
-            // A high power is next to nothing for some inputs.
+            // A high power is almost zero for some inputs.
             if of_host.norm() < ROUNDING {
                 continue;
             }

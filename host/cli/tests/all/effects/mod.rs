@@ -1,4 +1,4 @@
-//! Effects in a calibration: written, read, removed on the PC and by the device alike, and shown by `mimu verify`.
+//! Effects in a calibration: written, read, removed by the PC and the device alike, and shown by `mimu verify`.
 
 mod applied;
 mod codes;
@@ -28,7 +28,7 @@ use nalgebra::Vector3;
 
 use unit::{BIT_0_V, CUBIC, SAG, THERMAL, fitted, fitted_effect, named, record};
 
-/// All that is known by name, some of it with some of its coefficients only, and three terms; ten times what data sheets say.
+/// All named effects, some with only part of their coefficients, and three terms; at ten times data-sheet size.
 fn every_effect() -> Vec<FittedEffect> {
     let mut all: Vec<FittedEffect> = effects::all()
         .filter(|effect| effect.on_device() != OnDevice::Never)
@@ -48,6 +48,7 @@ fn every_effect() -> Vec<FittedEffect> {
                 .active
                 .iter()
                 .map(|k| {
+                    // Square roots: no sum of coefficients equals another, so the second look at a code never moves an error by exactly its size.
                     sign(*k) * effect.coefficients[*k].typical * (10.0 + 3.0 * (*k as f64).sqrt())
                 })
                 .collect();
@@ -91,7 +92,7 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
         assert_eq!(read.candidate.codes, written.candidate.codes);
     }
 
-    // Of a block the PC knows mean and scatter, from which bits follow another way.
+    // Effects of the code are left out: the PC derives the bits from mean and scatter of a block, which the device does not.
     let effects: Vec<FittedEffect> = every_effect()
         .into_iter()
         .filter(|e| !e.candidate.reads_code())
@@ -118,11 +119,11 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
                 accel: accel.apply(&raw(3)),
             }
         };
-        // No block follows the one before sample by sample: evaluated twice, as on the PC, and without an angular acceleration.
+        // Blocks are not successive samples: like the PC, evaluate twice and without an angular acceleration.
         state.gap();
         let by_device = device.remove(&mut state, &si(block));
         let (by_host, raw) = (si(clean), si(block));
-        // The same formula in another order: rounding.
+        // The same formula in another order: rounding only.
         assert!((by_device.gyro - by_host.gyro).norm() < 1e-12);
         assert!((by_device.accel - by_host.accel).norm() < 1e-12);
         moved[0] = moved[0].max((by_host.gyro - raw.gyro).norm());
@@ -131,14 +132,13 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
     assert!(moved[0] > 0.01 && moved[1] > 0.1, "{moved:?}");
 }
 
-/// What is of one recording alone, as where the die was when it began, the device has no room for.
+/// Effects specific to one recording, such as the state of the die at its beginning, are not stored on the device.
 #[test]
 fn every_effect_goes_into_the_bytes_of_a_device() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("recording");
     record(&path, false, true);
     let fit = fitted(&path);
-    // Of roots no sum is another, and a second look at a code never moves an error by just as much as it is.
     for effect in every_effect() {
         let id = effect.candidate.id();
         let text = Calibration::of(&fit, std::slice::from_ref(&effect), "2026-01-01T00:00:00Z")
@@ -191,12 +191,12 @@ fn every_effect_goes_into_the_bytes_of_a_device() {
             let plain = removed(&raw);
             let moved =
                 (by_double.gyro - plain.gyro).norm() + (by_double.accel - plain.accel).norm();
-            // Rounding, which an angular acceleration takes over 0.1 s.
+            // Rounding error; an angular acceleration is a difference over 0.1 s.
             beside += u32::from(off > 1e-3 * moved + 1e-4);
             most = most.max(moved);
         }
         assert!(most > 1e-5, "{id}: {most}");
-        // Codes are counted in single precision, to a thousandth of the finest bit: of three axes as many samples are on the other side.
+        // Codes are counted in single precision, to a thousandth of the finest bit: for three axes this fraction of the samples is on the other side.
         let allowed = if effect.candidate.reads_code() { 6 } else { 0 };
         assert!(beside <= allowed, "{id}: {beside} of 600");
     }
@@ -231,7 +231,7 @@ fn verifying_shows_the_error_with_the_effects_removed_and_left() {
         named("gyro_thermal_bias", &[0.0, 0.0, THERMAL, 0.0, 0.0, 0.0]),
         named("accel_scale_cubic", &[CUBIC; 3]),
     ];
-    // The affine part is that of the unit without flaws, and the effects are its flaws: only noise can be left.
+    // The affine part is that of the unit without flaws, and the effects are its flaws: only noise remains.
     let fit = fitted(&path("clean"));
     std::fs::write(
         path("cal.toml"),
@@ -287,7 +287,7 @@ fn verifying_shows_the_error_with_the_effects_removed_and_left() {
         "{refusal}"
     );
 
-    // Without effects nothing is said of them.
+    // Without effects there is no output about them.
     std::fs::write(
         path("cal.toml"),
         Calibration::of(&fit, &[], "2026-01-01T00:00:00Z")

@@ -1,4 +1,4 @@
-//! Effects in a calibration file that cannot be right, or that the device has no room for.
+//! Effects in a calibration file that cannot be right, or do not fit into the device.
 
 use mimu::calibration::Calibration;
 use mimu::effects;
@@ -107,7 +107,7 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
         .unwrap_err()
         .to_string();
     assert!(refusal.contains("there twice"), "{refusal}");
-    // The sag is by the force.
+    // The sag depends on the force.
     let from = text.find("\n[accel]").unwrap();
     let gyro_only = format!("{}\n[[effect]]{rest}", &text[..from]);
     let refusal = Calibration::parse(&gyro_only, "cal.toml")

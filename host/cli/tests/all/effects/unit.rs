@@ -1,4 +1,4 @@
-//! The unit of these tests, a recording of it, and effects to give it.
+//! The unit of these tests, a recording of it, and effects for it.
 
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, CandidateKind};
@@ -38,18 +38,18 @@ pub fn temp_c(t: f64) -> f64 {
     22.0 + 0.15 * t
 }
 
-/// Sag of the gyros, rad/s by m/s².
+/// Sag of the gyros, rad/s per m/s².
 pub const SAG: f64 = 4e-4;
-/// Cubic of the accelerometer, by (m/s²)².
+/// Cubic of the accelerometer, per (m/s²)².
 ///
-/// An effect is removed by the reading that errs: of the cubic's error, 0.03 m/s² at most, its slope of 0.9 % stays.
+/// The effect is evaluated with the erroneous reading: of the cubic's error, at most 0.03 m/s², its slope of 0.9 % remains.
 pub const CUBIC: f64 = 3e-5;
 /// Thermal bias of gyro z, rad/s/K.
 pub const THERMAL: f64 = 5e-4;
 
 /// Weight of bit 0 of the converters, V.
 pub const BIT_0_V: f64 = 1.6384;
-/// Bits of each converter of the accelerometer that are worth more than they say, V, three times what data sheets say and less.
+/// Bits of each converter of the accelerometer that are worth more than nominal, V, up to three times data-sheet size.
 pub const WORTH_V: [[(i32, f64); 3]; 3] = {
     let one = TYPICAL * BIT_0_V;
     [
@@ -58,10 +58,10 @@ pub const WORTH_V: [[(i32, f64); 3]; 3] = {
         [(0, -2.0 * one), (4, 3.0 * one), (7, -one)],
     ]
 };
-/// Readings of code 0, V: what has been subtracted is no multiple of anything.
+/// Readings of code 0, V: the subtracted value is not a multiple of a code.
 pub const ZERO_V: [f64; 3] = [-0.0713, -1.1234, -0.5061];
 
-/// What the converters of the accelerometer add to a reading of `u` of an axis, V.
+/// Error that the accelerometer's converters add to a reading `u` of an axis, V.
 pub fn worth(axis: usize, u: f64) -> f64 {
     let each = WORTH_V[axis].iter().map(|(bit, worth)| {
         let code = ((u - ZERO_V[axis]) / (BIT_0_V * 0.5_f64.powi(*bit))).floor();
@@ -74,7 +74,7 @@ pub fn worth(axis: usize, u: f64) -> f64 {
     each.sum()
 }
 
-/// Records the unit on a table, with its flaws or without; `temp` says whether temp_c is recorded.
+/// Records the unit on a table, with or without its flaws; `temp` says whether temp_c is recorded.
 pub fn record(folder: &Path, flawed: bool, temp: bool) {
     write_recording(folder, flawed, false, temp);
 }
@@ -94,7 +94,7 @@ pub fn write_recording(folder: &Path, flawed: bool, converted: bool, temp: bool)
     out.push_str("ref_rate_x_dps,ref_rate_y_dps,ref_rate_z_dps,");
     out.push_str("ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2\n");
     let mut seed = 7 + u64::from(flawed);
-    // Sum of twelve uniform numbers: near enough to normal.
+    // Sum of twelve uniform numbers: approximately normal.
     let mut normal = move || {
         let mut next = || {
             seed = seed
@@ -108,7 +108,7 @@ pub fn write_recording(folder: &Path, flawed: bool, converted: bool, temp: bool)
     for k in 0..DWELLS * rows {
         let (t, step) = (k as f64 / RATE_HZ, k / rows);
         let s = step as f64;
-        // Directions and rates that repeat late: by the golden angle.
+        // Directions and rates that repeat late: 2.4 rad is nearly the golden angle.
         let force = Vector3::new((2.4 * s).sin(), (2.4 * s).cos(), (0.9 * s).sin()).normalize() * G;
         let rate_dps = Vector3::new((1.3 * s).sin(), (1.7 * s).cos(), (2.9 * s).sin()) * 60.0;
         let mut inputs = [rate_dps.map(f64::to_radians), force];
@@ -159,7 +159,7 @@ pub fn fitted(folder: &Path) -> Fit {
     fit(prepared(folder), options).unwrap()
 }
 
-/// Known to within a hundredth.
+/// With an uncertainty of 1 %.
 pub fn fitted_effect(candidate: Candidate, parameter: f64, values: &[f64]) -> FittedEffect {
     FittedEffect {
         sigmas: values.iter().map(|v| 0.01 * v.abs()).collect(),

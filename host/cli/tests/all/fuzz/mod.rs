@@ -1,7 +1,7 @@
-//! Mutated recordings, manifests, calibrations and foreign files, all the way through the library.
+//! Mutated recordings, manifests, calibrations and foreign files, through the whole library.
 //!
-//! Every case ends in a result without a NaN, or in an error of one line with its three parts; never in a panic or a
-//! hang. A few seconds in an ordinary test run; longer by hand:
+//! Every case must end in a result without a NaN, or in a one-line error with its three parts, and never in a panic or a hang. An ordinary test run
+//! takes a few seconds; a longer run by hand:
 //!
 //! ```text
 //! MIMU_FUZZ_SECONDS=600 MIMU_FUZZ_SEED=2 cargo test --release -p mimu-cli --test all fuzz -- --nocapture
@@ -36,7 +36,7 @@ use mutation::*;
 
 const DEFAULT_SEED: u64 = 20_260_101;
 const DEFAULT_SECONDS: u64 = 12;
-/// A case takes some milliseconds; this long, it hangs.
+/// A case takes some milliseconds; after this time it counts as hanging.
 const HANG: Duration = Duration::from_secs(30);
 
 const MANIFEST: &str = r#"format = "mimu-recording/1"
@@ -53,7 +53,7 @@ turn_steps = [25]
 gyro = [-32768.0, 32767.0]
 "#;
 
-/// Readings of a sensor at `x`: another matrix for gyro and accelerometer, which is all that matters here.
+/// Readings of a sensor at `x`: with different matrices for gyro and accelerometer, which suffices here.
 fn reading(sensor: usize, x: [f64; 3], random: &mut Random) -> [i64; 3] {
     let scale = [5000.0, 1600.0][sensor];
     [0, 1, 2].map(|i| {
@@ -63,7 +63,7 @@ fn reading(sensor: usize, x: [f64; 3], random: &mut Random) -> [i64; 3] {
     })
 }
 
-/// Poses with turns about a changing axis between them, at 20 Hz. With `table`, the inputs are told.
+/// Poses with turns about changing axes, at 20 Hz. With `table`, the inputs are given.
 fn samples(table: bool) -> String {
     const POSE: usize = 30;
     const TURN: usize = 16;
@@ -92,7 +92,7 @@ fn samples(table: bool) -> String {
                 let size = angle * (1.0 - (2.0 * std::f64::consts::PI * part).cos())
                     / (TURN as f64 / 20.0);
                 rate = axis.map(|a| a * size);
-                // A direction that rests in the world turns by up × rate in the body.
+                // In the body frame, a direction that is fixed in the world changes by up × rate.
                 let step = rate.map(|r| r / 20.0);
                 let turned = [
                     up[1] * step[2] - up[2] * step[1],
@@ -131,7 +131,7 @@ fn samples(table: bool) -> String {
     out
 }
 
-/// Without the column `step`, so that dwells are looked for.
+/// Without the column `step`, so that dwells must be found.
 fn without_steps(text: &str) -> String {
     let line = |line: &str| {
         let cells = line.split(',').enumerate().filter(|(i, _)| *i != 1);
@@ -140,9 +140,9 @@ fn without_steps(text: &str) -> String {
     text.lines().map(line).collect()
 }
 
-/// What the cases start from.
+/// Inputs that the cases mutate.
 struct Seeds {
-    /// Samples with what is known of their input.
+    /// Samples, with the kind of reference.
     csv: Vec<(String, &'static str)>,
     parquet: Vec<(Vec<u8>, &'static str)>,
     calibration: String,
@@ -253,7 +253,7 @@ fn well_formed(error: &Error) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// Whether a fit is one of numbers, in itself and as people and programs see it.
+/// Whether all numbers of a fit are finite: in memory, in the text and in the JSON.
 fn numbers(fit: &Fit) -> std::result::Result<(), String> {
     let result = FitResult::of(fit);
     let json = serde_json::to_value(&result).map_err(|e| e.to_string())?;
@@ -286,7 +286,7 @@ fn numbers(fit: &Fit) -> std::result::Result<(), String> {
     }
 }
 
-/// Runs one case; what is wrong with its answer.
+/// Runs one case. Returns what is wrong with its answer.
 fn run(seeds: &Seeds, folder: &Path, random: &mut Random) -> std::result::Result<bool, String> {
     let (still, options) = (still_factor(random), options(random));
     let recording = folder.join("rec");
@@ -398,7 +398,7 @@ fn import_mutated(seeds: &Seeds, folder: &Path, random: &mut Random) -> Result<(
         columns.push(list(random, chosen)?);
     }
     if random.one_in(4) {
-        // Joined to another file in time.
+        // Joined by time to another file.
         let second = folder.join("second.txt");
         let (text, _) = &seeds.csv[0];
         fs::write(&second, mutate(text.as_bytes(), random)).unwrap();
@@ -469,8 +469,8 @@ fn environment(name: &str) -> Option<u64> {
     )
 }
 
-/// Ends the process when a case makes no progress: a thread that hangs cannot be stopped. It ends with the
-/// test that holds `case`: the tests beside it may run for longer than a case is allowed to.
+/// Ends the process when a case makes no progress, because a hanging thread cannot be stopped. It stops watching when the test that owns `case` ends:
+/// other tests may take longer than a case.
 fn watch(case: &Arc<AtomicU64>, seed: u64) {
     let case = Arc::downgrade(case);
     std::thread::spawn(move || {
@@ -500,7 +500,7 @@ fn no_mutation_ends_in_a_panic_a_hang_or_a_number_that_is_none() {
     watch(&current, seed);
     let default_hook = std::panic::take_hook();
     if only.is_none() {
-        // Readers catch the panics of their decoders, which would fill the screen.
+        // Readers catch the panics of their decoders; their output would fill the screen.
         std::panic::set_hook(Box::new(|_| {}));
     }
     let (start, mut case, mut accepted) = (Instant::now(), only.unwrap_or(0), 0_u64);

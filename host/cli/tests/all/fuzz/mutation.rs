@@ -1,4 +1,4 @@
-//! What is done to a text: bytes, lines, words and numbers are changed, by a generator of random numbers that is seeded.
+//! Mutations of a text: bytes, lines, words and numbers are changed by a seeded random generator.
 
 /// SplitMix64.
 pub struct Random(pub u64);
@@ -30,7 +30,7 @@ impl Random {
     }
 }
 
-/// What numbers, names and cells are replaced by.
+/// Replacements for numbers, names and cells.
 const ODD: &[&str] = &[
     "1e308",
     "-1e308",
@@ -158,7 +158,7 @@ fn mutate_lines(text: &mut Vec<u8>, random: &mut Random) {
     *text = lines.concat();
 }
 
-/// Words are what stands between separators: cells, keys and values.
+/// Words are separated by separators: cells, keys and values.
 fn words(text: &[u8]) -> Vec<(usize, usize)> {
     let mut all = Vec::new();
     let mut from = 0;
@@ -179,13 +179,13 @@ fn mutate_words(text: &mut Vec<u8>, random: &mut Random) {
     match random.below(6) {
         0..=2 => drop(text.splice(from..to, odd)),
         3 => {
-            // The same odd thing in a column, for a run of rows or for all of them.
+            // The same odd word in a column, for some rows or for all.
             let column = random.below(15);
             let (first, last) = (random.below(700), 1 + random.below(700));
             *text = edit_column(text, column, first..first + last, |_| odd.clone());
         }
         4 => {
-            // A column times a factor, or all of one value.
+            // A column multiplied by a factor, or set to one value.
             let column = random.below(15);
             let factor = *random.of(&[
                 &0.0, &-1.0, &1e-3, &1e3, &1e-12, &1e12, &1e25, &1e-30, &1e-300,
@@ -204,7 +204,7 @@ fn mutate_words(text: &mut Vec<u8>, random: &mut Random) {
     }
 }
 
-/// What a sensor, or a program in between, may well write.
+/// Values that a sensor, or a program in between, may well write.
 const NUMBERS: &[f64] = &[
     0.0,
     -0.0,
@@ -223,7 +223,7 @@ const NUMBERS: &[f64] = &[
     f64::NAN,
 ];
 
-/// Changes the numbers of a table and leaves it a table: what gets past the reader.
+/// Changes the numbers of a table but keeps it a table, so that it passes the reader.
 pub fn mutate_numbers(text: &str, random: &mut Random) -> Vec<u8> {
     let (header, body) = text.split_once('\n').unwrap();
     let parse = |line: &str| {
@@ -240,7 +240,7 @@ pub fn mutate_numbers(text: &str, random: &mut Random) -> Vec<u8> {
             1 => (from + 1 + length % 40).min(rows.len()),
             _ => (from + length).min(rows.len()),
         };
-        // Time and step are one column of two in fifteen, and worth more.
+        // Time and step are only two columns of fifteen, so they are chosen more often.
         let column = if random.one_in(8) {
             random.below(2)
         } else {

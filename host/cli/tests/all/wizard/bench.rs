@@ -1,4 +1,4 @@
-//! The firmware's release image on the emulated board, on a turntable or in hands that take commands, and the command beside it.
+//! The firmware's release image on the emulated board, on a turntable or in hands under command, and the command beside it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -10,7 +10,7 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::table::TableTruth;
 use serde_json::Value;
 
-/// A board that runs, in a folder that goes with it.
+/// A running board, in a folder that is removed with it.
 pub struct Bench {
     pub truth: RigTruth,
     board: Commanded,
@@ -32,7 +32,7 @@ fn image() -> Image {
     Image::read(&path).unwrap_or_else(|problem| panic!("{problem}"))
 }
 
-/// fang's unit, warmed up long ago, on a table without flaws on an Earth that does not turn: what is left is noise.
+/// fang's unit, long warmed up, on a table without flaws on an Earth that does not turn: the only remaining errors are noise.
 pub fn unit(seed: u64) -> RigTruth {
     let mut file = RigFile::read(&in_repository("rig/rigs/fang.toml")).unwrap();
     file.earth_rate = Some(false);
@@ -63,12 +63,12 @@ impl Bench {
         }
     }
 
-    /// Tells the bench something; it has to agree.
+    /// Sends the bench a command, which it must accept.
     pub fn tell(&mut self, line: &str) {
         self.board.tell(line).unwrap();
     }
 
-    /// Asks the bench something.
+    /// Sends the bench a query.
     pub fn ask(&mut self, line: &str) -> String {
         self.board.ask(line).unwrap()
     }
@@ -89,7 +89,7 @@ impl Bench {
         command
     }
 
-    /// The command, with what every session here has in common.
+    /// The command with the arguments that all sessions share.
     pub fn wizard(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
         command
@@ -112,7 +112,7 @@ impl Bench {
         command
     }
 
-    /// Waits until the running command has told of so many events of this kind; `false` if it has ended before.
+    /// Waits until the running command has reported so many events of this kind; returns `false` if it has ended before.
     pub fn heard(&self, child: &mut Child, event: &str, count: usize) -> bool {
         let wanted = format!("{{\"event\":\"{event}\"");
         let since = Instant::now();

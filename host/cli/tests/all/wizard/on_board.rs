@@ -1,12 +1,12 @@
-//! `mimu wizard` against the firmware's release image on the emulated board, on a turntable and in hands that it commands: what is killed,
-//! unplugged, garbled and moved ends in the right calibration or in a clear stop, and never in a wrong one that is stored.
+//! `mimu wizard` with the firmware's release image on the emulated board, on a turntable and in hands that it commands. Killed, unplugged, garbled
+//! and disturbed sessions end with the right calibration or with a clear message, and never store a wrong one.
 use super::bench::{Bench, in_repository, unit};
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_rig::rig_file::RigTruth;
 use mimu_rig::rotation::Vector;
 
-/// Twelve dwells of a second that determine both triads, little turned between them.
+/// Twelve dwells of a second that determine both triads, with little motion between them.
 fn short_plan(bench: &Bench) -> String {
     let mut plan =
         String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n");
@@ -26,14 +26,14 @@ fn short_plan(bench: &Bench) -> String {
     "plan.toml".into()
 }
 
-/// Largest error of the calibration over inputs of full size, beside the largest half-width of it: gyro (rad/s at 60 deg/s), accelerometer.
+/// Largest error of the calibration over inputs of full size: gyro (rad/s at 60 deg/s), accelerometer.
 pub fn errors(calibration: &Calibration, truth: &RigTruth) -> [f64; 2] {
     let unit = &truth.file.unit;
     let affine = [
         unit.gyro_affine.as_ref().unwrap(),
         unit.accel_affine.as_ref().unwrap(),
     ];
-    // The firmware reads the gyros against the first one's reference pin, as if that were nominal.
+    // The firmware measures the gyros against the reference pin of the first, assuming its nominal voltage.
     let ratio = [2.5 / unit.gyro_reference_v.unwrap()[0], 1.0];
     let size = [1.0, 9.793];
     Sensor::BOTH.map(|sensor| {
@@ -57,7 +57,7 @@ pub fn errors(calibration: &Calibration, truth: &RigTruth) -> [f64; 2] {
     })
 }
 
-/// What the sessions on this plan have in common.
+/// Arguments that the sessions on this plan share.
 fn on_table(plan: &str) -> [&str; 9] {
     [
         "--fixture",
@@ -136,9 +136,9 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
     let calibration = Calibration::read(&bench.path("session/calibration.toml")).unwrap();
     let [gyro, accel] = errors(&calibration, &bench.truth);
     println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²");
-    // A dwell of a second is good to 0.06 deg/s and 0.3 mg.
+    // Dwells of one second give 0.06 deg/s and 0.3 mg.
     assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
-    // The recording is one like any other.
+    // The recording is an ordinary one.
     let manifest =
         std::fs::read_to_string(bench.path("session/calibration/recording.toml")).unwrap();
     assert!(!manifest.contains("unfinished"), "{manifest}");

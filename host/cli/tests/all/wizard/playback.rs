@@ -1,4 +1,4 @@
-//! Lines of text into a pseudo-terminal, at a pace.
+//! Writes lines of text into a pseudo-terminal, at a given pace.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use crate::device::terminal::Terminal;
 
-/// A board that writes until it is dropped or has no more to say.
+/// A board that writes until it is dropped or has no more lines.
 pub struct Playback {
     path: String,
     end: Arc<AtomicBool>,
@@ -15,7 +15,7 @@ pub struct Playback {
 }
 
 impl Playback {
-    /// Writes so many lines a second, and waits where they are not taken.
+    /// Writes so many lines per second, and waits if they are not read.
     pub fn begin(lines: Vec<String>, per_second: f64) -> Self {
         let (mut terminal, path) = Terminal::open();
         let end = Arc::new(AtomicBool::new(false));
@@ -23,7 +23,7 @@ impl Playback {
         let write = move || {
             let mut began = None;
             for (k, line) in (0..).zip(&lines) {
-                // Before somebody listens nothing is said.
+                // It writes nothing until a program has the port open.
                 while began.is_none() && !ended.load(Ordering::Relaxed) {
                     if terminal.is_open() {
                         began = Some(Instant::now());
@@ -54,7 +54,7 @@ impl Playback {
         }
     }
 
-    /// What is opened like a serial port.
+    /// The path that is opened like a serial port.
     pub fn path(&self) -> &str {
         &self.path
     }

@@ -1,4 +1,4 @@
-//! A session at a port that somebody else holds: what comes is relayed with its times, and no port, thread or terminal is there.
+//! A session at a port that another program has open: its data is relayed with their times, without a port, thread or terminal.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -12,7 +12,7 @@ use mimu_wizard::turn::go_on;
 
 use super::text::{judge, lines};
 
-/// Sends on what it is told, and ends the session when it is told to.
+/// Relays events, and ends the session on request.
 struct Told {
     events: Sender<String>,
     wishes: Receiver<Wish>,
@@ -30,7 +30,7 @@ impl View for Told {
     }
 
     fn ask(&mut self, question: &Question) -> Option<bool> {
-        // What is played back is out of step once a pose was missed, and then poses come otherwise than they are asked for.
+        // Once a pose was missed, the playback is out of step, and poses come in another order than requested.
         Some(matches!(question, Question::GoOn(_)))
     }
 }
@@ -73,7 +73,7 @@ impl Relay {
         go_on(self.session.as_mut())
     }
 
-    /// Relays lines as they are written, a tenth of a second at a time, until the session ends or has told of so many dwells.
+    /// Relays the written lines, a tenth of a second at a time, until the session ends or has reported so many dwells.
     fn hear(
         &mut self,
         lines: &[String],
@@ -110,7 +110,7 @@ fn a_session_that_is_relayed_is_unplugged_stopped_and_gone_on_with_and_its_inter
     let mut relay = begin(&out);
     relay.send(0.0, Arrival::Opened);
     assert!(relay.hear(&lines, &mut at, 3).is_none());
-    // Unplugged for a second in the turn to the fourth.
+    // Unplugged for a second during the turn to the fourth dwell.
     relay.send(
         0.01 * at as f64,
         Arrival::Lost("the port has vanished".into()),

@@ -1,4 +1,4 @@
-//! The full screen on a pseudo-terminal: that it is there, and that the terminal is given back.
+//! The full screen on a pseudo-terminal: it appears, and the terminal is restored.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -16,7 +16,7 @@ use super::text::lines;
 const ENTERED: &str = "\x1b[?1049h";
 const LEFT: &str = "\x1b[?1049l";
 
-/// The wizard on a terminal of its own.
+/// The wizard on a separate terminal.
 struct Sitting {
     keys: File,
     other: File,
@@ -80,10 +80,10 @@ impl Sitting {
         }
     }
 
-    /// The end: what was seen, and whether the terminal is as it was.
+    /// Waits for the end. Returns the output, and whether the terminal was restored.
     fn end(mut self) -> (String, bool, Option<i32>) {
         let status = self.child.wait().unwrap();
-        // What was written last may be on its way on a busy machine.
+        // On a busy machine the last output may still be on its way.
         let mut patience = Duration::from_secs(2);
         while let Ok(text) = self.output.recv_timeout(patience) {
             self.seen.push_str(&text);

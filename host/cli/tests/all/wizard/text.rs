@@ -24,7 +24,7 @@ const GYRO: ([[f64; 3]; 3], [f64; 3]) = (
     ],
     [120.0, -210.0, 64.0],
 );
-/// Counts per m/s², and counts. Its x axis and its plane of x and y are what by hand is the frame.
+/// Counts per m/s², and counts. By hand, its x axis and its plane of x and y define the frame.
 const ACCEL: ([[f64; 3]; 3], [f64; 3]) = (
     [
         [1689.0, 0.0, 0.0],
@@ -34,7 +34,7 @@ const ACCEL: ([[f64; 3]; 3], [f64; 3]) = (
     [410.0, -385.0, 702.0],
 );
 
-/// The unit; its noise is white, so that nothing else is to be found in it.
+/// The unit; its noise is white, so a diagnosis finds nothing else.
 fn truth() -> RigTruth {
     let still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n";
     let rig = format!(
@@ -48,7 +48,7 @@ fn truth() -> RigTruth {
     RigTruth::resolve(&file, 3).unwrap()
 }
 
-/// The poses that the wizard asks for, and again: what it throws away comes once more.
+/// The poses that the wizard asks for, repeated: a discarded one comes again.
 fn plan() -> Plan {
     let first = first_steps(Fixture::Hands, 1.2, 100.0, 1);
     let then = verification(Fixture::Hands, &first, 1.2, 100.0);
@@ -61,8 +61,8 @@ fn plan() -> Plan {
     Plan::parse(Source::new("PLAN.toml", plan)).unwrap()
 }
 
-/// What the board writes, line by line: a greeting, its clock in microseconds and counts, with some lines lost and some cut.
-/// Not many: a turn with a sample missing cannot be integrated.
+/// The lines of the board: a greeting, its clock in microseconds, and counts. Some lines are lost and some truncated, but few, because a turn with a
+/// missing sample cannot be integrated.
 pub fn lines() -> Vec<String> {
     let (plan, truth) = (plan(), truth());
     let mut lines = vec!["MPU6050 OK\r\n".into(), "t,ax,ay,az,gx,gy,gz\r\n".into()];
@@ -86,7 +86,7 @@ pub fn lines() -> Vec<String> {
 #[test]
 fn a_board_that_writes_lines_ends_in_a_calibration_whose_intervals_hold_its_parameters() {
     let folder = tempfile::tempdir().unwrap();
-    // 100 lines a second by the board's clock, and 40 times as many.
+    // 100 lines per second by the board's clock, written 40 times faster.
     let playback = Playback::begin(lines(), 4000.0);
     let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
     command.current_dir(folder.path()).stdin(Stdio::null());
@@ -104,7 +104,7 @@ fn a_board_that_writes_lines_ends_in_a_calibration_whose_intervals_hold_its_para
     ]);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let child = child.spawn().unwrap();
-    // Poses that do not come are waited for without an end.
+    // The wizard waits without limit for poses that do not come.
     let id = rustix::process::Pid::from_child(&child);
     let (ended, end) = std::sync::mpsc::channel::<()>();
     std::thread::spawn(move || {
@@ -128,7 +128,7 @@ fn a_board_that_writes_lines_ends_in_a_calibration_whose_intervals_hold_its_para
     judge(&folder.path().join("out/calibration.toml"), &said);
 }
 
-/// Compares a calibration of the unit with the truth; `said` is shown where it misses it.
+/// Compares a calibration of the unit with the truth; `said` is shown if an interval misses it.
 pub fn judge(calibration: &Path, said: &str) {
     let made = Calibration::read(calibration).unwrap();
     assert_eq!(made.device, "plane-7");
@@ -159,7 +159,7 @@ pub fn judge(calibration: &Path, said: &str) {
             judge(table.o[i], table.interval_o.unwrap()[i], offset[i]);
         }
     }
-    // Of 21 intervals of 95 % five and more miss with a chance of 0.3 %.
+    // Of 21 intervals at 95 %, five or more miss with a probability of 0.3 %.
     assert!(inside + 4 >= all, "{inside} of {all}");
 }
 

@@ -1,7 +1,6 @@
 //! Optima by trial, independent of the code under test.
 
-/// Best value of `criterion` over points in a box, from many random starts by random steps that shrink: slow,
-/// and without a line of the code under test.
+/// Best value of `criterion` over points in a box, from many random starts by shrinking random steps: slow, and without any code under test.
 pub fn best(variables: usize, within: f64, criterion: impl Fn(&[f64]) -> f64) -> f64 {
     let mut state = 7_u64;
     let mut uniform = || {

@@ -1,4 +1,4 @@
-//! The search finds the optimum wherever it is known from elsewhere, and designs are judged as arithmetic does.
+//! The search finds optima that are known from elsewhere, and designs are judged as by hand calculation.
 
 mod brute_force;
 mod next_experiment;

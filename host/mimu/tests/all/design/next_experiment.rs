@@ -1,4 +1,4 @@
-//! Recipes that show effects: what they predict, and that they are no larger than they have to be.
+//! Recipes that show effects: their predictions, and that they are as small as possible.
 
 use mimu::effects;
 use mimu::plan::design::budget::DwellNoise;
@@ -39,7 +39,7 @@ fn answer(setup: &Setup, id: &str) -> Option<Answer> {
     smallest(setup, &[target(id)])
 }
 
-/// The experiment for the cubic of a gyro beside two rivals by name: one more in the list of effects does not change it.
+/// The experiment for the cubic of a gyro with two named rivals, so that further effects in the list do not change it.
 fn cubic(setup: &Setup) -> Option<Answer> {
     let rivals = ["gyro_scale_quadratic", "gyro_scale_asymmetry"];
     let target = Target {
@@ -68,7 +68,7 @@ fn every_error_that_is_none_of_a_converter_has_a_recipe_that_shows_it() {
 
 #[test]
 fn what_is_predicted_is_what_least_squares_gives() {
-    // Cubic of the x gyro beside bias, row of the matrix and, as a rival, the square; by the plan's attitudes and rates alone.
+    // Cubic of the x gyro, bias, row of the matrix and, as a rival, the square; only from the plan's attitudes and rates.
     let setup = setup();
     let answer = answer(&setup, "gyro_scale_cubic").unwrap();
     let alone = |rivals: &[&str]| {
@@ -112,7 +112,7 @@ fn the_size_is_the_smallest_that_is_enough_by_the_noise_of_the_unit() {
             let Experiment { recipe, size, .. } = answer.experiment;
             let ladder = recipe.course.sizes();
             let at = ladder.iter().position(|s| *s == size).unwrap();
-            // Alone, by its own sigma: enough here, and not one step below.
+            // Alone, with its own sigma: sufficient here, but not one step below.
             let share = |size| {
                 let experiment = Experiment::of(&setup, recipe, size);
                 target(id).predicted(&setup, &experiment).share
@@ -150,7 +150,7 @@ fn what_depends_on_time_begins_cold_and_what_depends_on_temperature_goes_up_and_
 
 #[test]
 fn what_a_fixture_cannot_show_has_no_recipe() {
-    // By hand a gyro has no known rate; on six faces products of two forces are always nothing.
+    // By hand a gyro has no known rate; on six faces the products of two forces are always zero.
     let by_hand = Setup {
         reference: Reference::Gravity,
         fixture: Fixture::Hand,

@@ -1,4 +1,4 @@
-//! Polynomials on the interval and the square: optima known for half a century.
+//! Polynomials on the interval and the square: optima that have been known for half a century.
 
 use mimu::plan::design::continuous::optimum;
 use mimu::plan::design::exchange;
@@ -73,8 +73,7 @@ impl Cube {
 
 #[test]
 fn quadratic_regression_on_an_interval_is_measured_at_both_ends_and_the_middle() {
-    // Gaffke and Krafft, J. R. Statist. Soc. B 44 (1982): any n, as equally often as it goes. Then det F'F is
-    // 4 n1 n2 n3.
+    // Gaffke and Krafft, J. R. Statist. Soc. B 44 (1982): for any n, as evenly as possible. Then det F'F is 4 n1 n2 n3.
     for (n, det) in [
         (3, 4.0),
         (4, 8.0),
@@ -97,7 +96,7 @@ fn quadratic_regression_on_an_interval_is_measured_at_both_ends_and_the_middle()
 
 #[test]
 fn cubic_regression_on_an_interval_is_measured_where_the_grid_has_no_point() {
-    // Guest (1958), Hoel (1958): the ends and the roots of P3', ±1/√5; det F'F is the square of Vandermonde's.
+    // Guest (1958), Hoel (1958): the ends and the roots of P3', ±1/√5; det F'F is the square of the Vandermonde determinant.
     let a = 0.2_f64.sqrt();
     let vandermonde = 2.0 * (2.0 * a) * (1.0 - a * a).powi(2);
     let (points, found) = Cube {
@@ -138,7 +137,7 @@ fn the_continuous_optimum_on_an_interval_has_guests_points_and_equal_weights() {
     }
 }
 
-/// Determinant of F'F of a list of points on the square, by the textbook formula.
+/// Determinant of F'F for points on the square, by the textbook formula.
 fn of_square(points: &[[f64; 2]]) -> f64 {
     let f = DMatrix::from_fn(points.len(), 6, |i, j| {
         let [x, y] = points[i];

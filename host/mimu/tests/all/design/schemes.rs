@@ -1,4 +1,4 @@
-//! Published schemes, and what a judgement says of them.
+//! Published schemes, and their judgements.
 
 use std::f64::consts::PI;
 
@@ -36,7 +36,7 @@ fn six_faces_are_d_optimal_and_fangs_nine_are_not() {
             (27.0_f64 / 256.0).powf(0.25),
             1e-6
         ));
-        // Nine dwells for every sensor halve the variance of its worst parameter and more.
+        // Nine dwells for every sensor reduce the variance of its worst parameter to less than half.
         let worst = |j: &Judgement| {
             j.parameters[..4]
                 .iter()
@@ -57,7 +57,7 @@ fn inflation_is_that_of_the_sigma_over_what_it_were_with_the_others_known() {
         let found = judged.parameters.iter().find(|p| p.parameter.name == name);
         assert!(close(found.unwrap().inflation, inflation, 1e-9), "{name}");
     }
-    // Orthogonal regressors: none.
+    // Orthogonal regressors: no inflation.
     let six = problem.judge(&Scheme::SixFace.settings(Sensor::Accel).unwrap(), 1.0);
     assert!(
         six.parameters
@@ -97,7 +97,7 @@ fn the_estimators_claim_the_sigmas_that_the_design_promised() {
             change: Vector3::zeros(),
         })
         .collect();
-    // Columns of C or P by rows, then o or b: known_input gives P, b; magnitude C, o.
+    // Columns of C or P by rows, then o or b: known_input gives P and b; magnitude gives C and o.
     let known = known_input::least_squares(&observations, None)
         .unwrap()
         .triad
@@ -137,7 +137,7 @@ fn six_faces_cannot_notice_cubes_and_products() {
     let model = Model::accel(Reference::Table, &Terms::default());
     let found = lack_of_fit::notices(&model, &settings);
     let of = |term: Term| found.iter().find(|n| n.term == term).unwrap();
-    // On faces x³ = x and xy = 0. x² is 1 on two and 0 on four: apart from the mean, 4/3 of its square is left.
+    // On faces x³ = x and xy = 0. x² is 1 on two faces and 0 on four: apart from the mean, 4/3 of its square remains.
     assert_eq!((of(Term::Cubic).noticed, of(Term::Cubic).size), (0, None));
     assert_eq!((of(Term::Cross).noticed, of(Term::Cross).size), (0, None));
     assert_eq!(of(Term::Quadratic).noticed, 3);
@@ -147,8 +147,7 @@ fn six_faces_cannot_notice_cubes_and_products() {
 
 #[test]
 fn published_schemes_are_worth_what_plain_arithmetic_makes_of_the_printed_tables() {
-    // det(F'F/n) of the positions as printed, by elimination, over that of the optimum, which the tests in `sphere`
-    // have in closed form.
+    // det(F'F/n) of the printed positions, by elimination, over that of the optimum, for which the tests in `sphere` have closed forms.
     let gyro = Model::gyro(&terms("affine"), Scheme::XuRates.rate_span());
     let gyro = Problem::gyro(gyro, Fixture::ThreeAxis, Rates::Any).unwrap();
     let known = accel(Reference::Table, "affine");
@@ -205,25 +204,24 @@ fn niu_and_xu_positions_are_as_published() {
     let (s, c) = (75_f64.to_radians().sin(), 75_f64.to_radians().cos());
     assert!((xu[20].up - Vector3::new(-c, s, 0.0)).norm() < 1e-12);
     assert_eq!(xu.len(), 33);
-    // Adjacent dwells of niu are a quarter turn apart, or a turn about the vertical.
+    // Successive dwells of niu differ by a quarter turn, or by a turn about the vertical.
     let niu = Scheme::Niu8.settings(Sensor::Accel).unwrap();
     for k in 0..8 {
         let angle = niu[k].up.angle(&niu[(k + 1) % 8].up);
         assert!(angle == 0.0 || (angle - PI / 2.0).abs() < 1e-12);
     }
     assert!(niu.iter().all(|s| s.up.z <= 0.0));
-    // 9 + 9 + 11 rates both ways, and rest three times.
+    // 9 + 9 + 11 rates in both directions, and rest three times.
     let rates = Scheme::XuRates.settings(Sensor::Gyro).unwrap();
     assert_eq!(rates.len(), 2 * 29 + 3);
     assert_eq!(rates.iter().filter(|s| s.rate == 0.0).count(), 3);
 }
 
-/// Poses, and turns as (body axis, sense, how that axis points).
+/// Poses, and turns as (body axis, sense, direction of that axis).
 type Cycle = Vec<([i32; 3], (usize, i32, i32))>;
 
-/// Every cycle of eight quarter turns on a table that tilts by -90, 0 or 90 degrees about a horizontal axis and turns about
-/// the unit's z without end, begun at tilt 0: for each the poses it holds, and its turns as (body axis, sense,
-/// how that axis points).
+/// Every cycle of eight quarter turns on a table that tilts by -90, 0 or 90 degrees about a horizontal axis and turns without limit about the unit's
+/// z, starting at tilt 0: for each its poses, and its turns as (body axis, sense, direction of that axis).
 fn cycles() -> Vec<Cycle> {
     fn go(tilt: i32, turn: i32, cycle: &mut Cycle, all: &mut Vec<Cycle>) {
         if cycle.len() == 8 {
@@ -232,7 +230,7 @@ fn cycles() -> Vec<Cycle> {
             }
             return;
         }
-        // The direction of the body that points up, z up at tilt 0; and the body axis along the tilt axis.
+        // The body direction that points up, z up at tilt 0; and the body axis along the tilt axis.
         let (c, s) = [(1, 0), (0, 1), (-1, 0), (0, -1)][turn as usize];
         let up = [tilt * s, tilt * c, i32::from(tilt == 0)];
         let (axis, points) = if c == 0 { (1, -s) } else { (0, c) };
@@ -255,7 +253,7 @@ fn cycles() -> Vec<Cycle> {
 #[test]
 fn every_cycle_that_fits_nius_words_holds_the_same_eight_poses() {
     let (mut fitting, mut as_built) = (0, 0);
-    // z down is up here: the table is the same upside down, with y turned about as well.
+    // Here z down is up: the table is the same upside down, with y reversed as well.
     let built: Vec<[i32; 3]> = Scheme::Niu8
         .settings(Sensor::Accel)
         .unwrap()
@@ -272,7 +270,7 @@ fn every_cycle_that_fits_nius_words_holds_the_same_eight_poses() {
         }
         fitting += 1;
         assert!(held([0, 0, 1]) == 4 && sides.iter().all(|s| held(*s) == 1));
-        // x and y point the same way in all their turns, as the appendix says. z cannot.
+        // x and y point in the same direction in all their turns, as in the appendix. z cannot.
         let ways = |axis| {
             let each = cycle.iter().filter(|(_, t)| t.0 == axis);
             each.map(|(_, t)| t.2)

@@ -15,7 +15,7 @@ use super::{accel, brute_force, close, gyro, terms};
 
 #[test]
 fn exchange_finds_what_looking_at_every_design_finds() {
-    // 126 and 210 designs; multisets of so few points, and a model with three blocks.
+    // 126 and 210 designs: multisets of few points, and a model with three blocks.
     let problem = accel(Reference::Table, "affine,cubic");
     for n in [5, 6] {
         let candidates: Vec<Setting> = problem
@@ -33,7 +33,7 @@ fn exchange_finds_what_looking_at_every_design_finds() {
             let weighted = design.iter().map(|&i| (i, 1.0));
             best =
                 best.max(Inverse::of(&rows, weighted).map_or(f64::NEG_INFINITY, |i| i.log_det()));
-            // The next multiset in lexical order.
+            // The next multiset in lexicographic order.
             let Some(k) = (0..n).rev().find(|k| design[*k] + 1 < candidates.len()) else {
                 break;
             };
@@ -50,8 +50,7 @@ fn exchange_finds_what_looking_at_every_design_finds() {
 
 #[test]
 fn the_affine_optimum_is_one_in_twenty_seven() {
-    // M = diag(1, 1/3, 1/3, 1/3): the trace over the sphere is fixed, and equal eigenvalues have the largest
-    // product.
+    // M = diag(1, 1/3, 1/3, 1/3): the trace over the sphere is constant, and the product of eigenvalues is largest if they are equal.
     for problem in [
         accel(Reference::Table, "affine"),
         gyro("affine", "..300"),
@@ -113,7 +112,7 @@ fn four_are_a_tetrahedron_and_six_an_octahedron() {
             }
         }
     }
-    // And of all octahedra that of the faces, which a fixture holds.
+    // Of all octahedra, it is the one of the faces, which a fixture holds.
     assert!(
         problem
             .best(6, 1)
@@ -125,13 +124,12 @@ fn four_are_a_tetrahedron_and_six_an_octahedron() {
 
 #[test]
 fn the_size_of_gravity_is_best_measured_all_over_the_sphere() {
-    // The optimum is invariant under rotation, so it has the moments of the whole sphere: E x² = 1/3, E x⁴ =
-    // 1/5, E x²y² = 1/15. Cross products 1/15, linear terms 1/3, squares det 4/675.
+    // The optimum is invariant under rotation, so it has the moments of the whole sphere: E x² = 1/3, E x⁴ = 1/5, E x²y² = 1/15. Cross products 1/15,
+    // linear terms 1/3, squares det 4/675.
     let uniform = 15_f64.powi(-3) * 3_f64.powi(-3) * 4.0 / 675.0;
     let problem = accel(Reference::Gravity, "affine");
     assert!(close(problem.optimum.log_det.exp(), uniform, 1e-6));
-    // Spherical 4-designs exist for 12, 14 and from 16 on, and not for 13 and 15 (Hardin and Sloane 1996). 12
-    // is the icosahedron.
+    // Spherical 4-designs exist for 12, 14 and from 16 on, but not for 13 and 15 (Hardin and Sloane 1996). 12 is the icosahedron.
     for n in [9, 10, 11, 12, 13, 14, 15, 16, 20] {
         let judged = problem.judge(&problem.best(n, 1).unwrap(), 1.0);
         let attains = (judged.d_efficiency - 1.0).abs() < 1e-6;
@@ -154,9 +152,8 @@ fn on_a_two_axis_table_every_setting_is_within_its_tilt() {
         best.iter()
             .all(|s| s.up.z >= 95_f64.to_radians().cos() - 1e-9)
     );
-    // Rotated about z the optimum stays one, so it is two rings or one and the pole. With weight w at z = t
-    // and 1 - w at the lowest h: one variance of z, (1-w)(1-h²)+w(1-t²) shared by x and y. On a scan of w and
-    // t:
+    // Rotated about z the optimum stays an optimum, so it is two rings, or one and the pole. With weight w at z = t and 1 - w at the lowest z = h:
+    // one variance of z; (1-w)(1-h²)+w(1-t²) is shared by x and y. A scan over w and t:
     let h = 95_f64.to_radians().cos();
     let mut known = 0.0_f64;
     for i in 1..2000 {
@@ -176,7 +173,7 @@ fn on_a_two_axis_table_every_setting_is_within_its_tilt() {
 
 #[test]
 fn the_size_of_gravity_on_a_two_axis_table_is_best_measured_on_rings() {
-    // Rotated about z the optimum stays one. Twelve points are a ring to polynomials of degree four.
+    // Rotated about z the optimum stays an optimum. For polynomials of degree four, twelve points are equivalent to a ring.
     let h = 95_f64.to_radians().cos();
     let of_rings = |x: &[f64]| {
         let mut m = DMatrix::<f64>::zeros(9, 9);
@@ -202,8 +199,8 @@ fn the_size_of_gravity_on_a_two_axis_table_is_best_measured_on_rings() {
 
 #[test]
 fn own_squares_are_best_measured_on_six_faces() {
-    // With shares of 1/6, M of a sensor has det 1/27 (1/3 - 1/9) = 2/243, and the variance function of all three is 10.5
-    // + 4.5 (x⁴ + y⁴ + z⁴), nowhere on the sphere above the number of parameters, 15.
+    // With shares of 1/6, M of a sensor has det 1/27 (1/3 - 1/9) = 2/243, and the variance function of all three is 10.5 + 4.5 (x⁴ + y⁴ + z⁴), which
+    // on the sphere never exceeds the number of parameters, 15.
     for problem in [
         accel(Reference::Table, "affine,quadratic"),
         gyro("affine,quadratic", "..300"),
@@ -222,8 +219,8 @@ fn own_squares_are_best_measured_on_six_faces() {
     }
 }
 
-/// Each term and each fixture, with a known input and without, of those that have an optimum and of those that have none; the
-/// other combinations are in the nightly run.
+/// Each term and each fixture, with and without a known input, among problems with and without an optimum; the nightly run has the other
+/// combinations.
 #[test]
 fn problems_have_an_optimum_that_designs_approach_or_name_what_they_cannot_tell_apart() {
     use Fixture::{Faces, ThreeAxis, TwoAxis};

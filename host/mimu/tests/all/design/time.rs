@@ -1,4 +1,4 @@
-//! Sequences and budgets of time.
+//! Sequences and time budgets.
 
 use mimu::plan::design::budget::{DwellNoise, Session};
 use mimu::plan::design::model::Setting;
@@ -56,7 +56,7 @@ fn a_budget_is_kept_and_more_of_it_helps() {
                 let judged = problem.judge(&way.settings, way.sigma);
                 assert!(close(judged.mean_sigma, way.mean_sigma, 1e-9));
                 assert!(budget.best.mean_sigma <= way.mean_sigma);
-                // All of its passes measure the same.
+                // All of its passes measure the same settings.
                 let count = |s: &Setting| way.settings.iter().filter(|t| *t == s).count();
                 assert!(way.settings.iter().all(|s| count(s) % way.passes == 0));
             }
@@ -65,7 +65,7 @@ fn a_budget_is_kept_and_more_of_it_helps() {
         }
     }
     assert!(several_passes);
-    // Shortest and randomised, of 2, 5 and 15 minutes.
+    // Shortest and randomised, for 2, 5 and 15 minutes.
     assert!(
         sigmas.windows(3).all(|s| s[2] < s[0]) && sigmas.chunks(2).all(|s| s[0] <= s[1]),
         "{sigmas:?}"
@@ -84,7 +84,7 @@ fn random_walk_bounds_the_dwell() {
         };
         session.spend(&problem, 1).unwrap().best.dwell_s
     };
-    // N²/T + K² T/3 is least at T = √3 N/K; but no dwell is shorter than a second.
+    // N²/T + K² T/3 is smallest at T = √3 N/K; but no dwell is shorter than a second.
     assert!(
         close(spent(5e-4), 2.0 * 3_f64.sqrt(), 1e-9),
         "{}",
@@ -93,9 +93,8 @@ fn random_walk_bounds_the_dwell() {
     assert!(close(spent(1.0), 1.0, 1e-12), "{}", spent(1.0));
 }
 
-/// True variance of the elements of a row of P over that which a fit claims from its residuals, averaged, where the noise of
-/// the dwells is a random walk of the bias: with V its covariance and A = (F'F)⁻¹F', `A V A'` over `(F'F)⁻¹ tr((I -
-/// H)V)/(n - 4)`.
+/// True variance of the elements of a row of P over the variance that a fit claims from its residuals, averaged, if the noise of the dwells is a
+/// random walk of the bias: with V its covariance and A = (F'F)⁻¹F', `A V A'` over `(F'F)⁻¹ tr((I - H)V)/(n - 4)`.
 fn true_over_claimed(settings: &[Setting]) -> f64 {
     let n = settings.len();
     let f = DMatrix::from_fn(n, 4, |i, j| {
@@ -131,7 +130,7 @@ fn in_an_order_by_lot_drift_is_scatter_that_a_fit_knows_of_and_in_the_shortest_o
 #[test]
 fn a_lot_leaves_no_dwell_out_and_no_place_to_chance_more_than_another() {
     let settings = accel(Reference::Table, "affine").best(5, 1).unwrap();
-    // How often each dwell stands at each place: 1/5 of 2000 lots, within five sigmas.
+    // How often each dwell is at each position: 1/5 of 2000 random orders, within five sigmas.
     let mut counts = [[0_u32; 5]; 5];
     for seed in 0..2000 {
         let drawn = randomised(&settings, seed);

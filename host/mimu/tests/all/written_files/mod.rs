@@ -1,4 +1,4 @@
-//! Files that version 0.1 wrote by hand, before serde did: they are read, and what is written now is read back to the last bit.
+//! Files written by version 0.1, before serde was used: they are still read, and today's output reads back to the last bit.
 
 use mimu::calibration::Calibration;
 use mimu::noise::noise_file::NoiseFile;

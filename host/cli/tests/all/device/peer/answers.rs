@@ -1,4 +1,4 @@
-//! Calls, and what is answered.
+//! Calls and their answers.
 
 use std::time::Instant;
 
@@ -17,7 +17,7 @@ impl Device {
     pub(super) fn greeting(&mut self, id: u16) {
         let held = self.seen.lock().unwrap().stored.clone();
         let stored = held.as_ref().map(|bytes| {
-            // One of another layout is kept by firmware of another version.
+            // A calibration in another layout may have been stored by another version of the firmware.
             let decoded = stored::decode(bytes).ok();
             let of = |number: fn(&stored::Stored) -> u8| decoded.as_ref().map_or(1, number);
             let origin = decoded.as_ref().map(|d| &d.origin);

@@ -1,4 +1,4 @@
-//! Samples, batch by batch, and what is made of them.
+//! Samples, batch by batch, and the streams computed from them.
 
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
