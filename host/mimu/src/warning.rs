@@ -143,7 +143,7 @@ pub enum Warning {
     NoRestsToFit(String),
     /// Angle between the axes and those that they are referred to, rad, and whether these are the table's.
     Turned(f64, bool),
-    /// Angle between the errors' forces and the given ones, rad rms.
+    /// Angle by which the dwells appear to be off level, rad rms.
     OffLevel(f64),
     /// Numbers of the calibration's unit and of the recording's.
     OtherUnit(String, String),

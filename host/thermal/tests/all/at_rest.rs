@@ -17,7 +17,7 @@ pub const JOINT: Options = Options {
     range_c: None,
 };
 
-/// The unit flat on a table while the temperature does what `experiment` says.
+/// The unit flat on a table while the temperature follows `experiment`.
 pub fn at_rest(experiment: &Experiment, seed: u64) -> (Manifest, Samples) {
     in_poses(experiment, seed, &[Vector3::z()])
 }
@@ -102,7 +102,7 @@ fn there_and_back_shows_the_biases_of_the_gyro_and_names_what_is_inseparable() {
     a_file_keeps_the_biases(&found);
 }
 
-/// The accelerometer's readings have gravity along z in them, by its scale factor at that temperature.
+/// The accelerometer's readings include gravity along z, times its scale factor at that temperature.
 fn a_file_keeps_the_biases(found: &ThermalFit) {
     assert!(found.is_biases_only());
     let written = found.biases("2026-01-01T00:00:00Z").unwrap();
@@ -156,8 +156,8 @@ fn a_cold_start_goes_one_way() {
     );
 }
 
-/// A unit in a freezer for half an hour, whose gyro x jumps by 100 and back by 60 times the noise of a row of 2.5 s, as those of one of the recordings
-/// that were judged from outside. `nudge`: what the accelerometer changes by with each, as a share of gravity.
+/// A unit in a freezer for half an hour, whose gyro x jumps by 100 and back by 60 times the noise of a row of 2.5 s, as in a real
+/// recording. `nudge`: change of the accelerometer at each jump, as a share of gravity.
 fn in_freezer(seed: u64, nudge: f64) -> (Manifest, Samples) {
     let freezer = Experiment {
         corners: vec![
@@ -174,7 +174,7 @@ fn in_freezer(seed: u64, nudge: f64) -> (Manifest, Samples) {
         let [first, second] = [430.0, 523.0].map(|at| f64::from(u8::from(samples.t_s[k] >= at)));
         samples.raw[0][k] += JUMPS[0] * first + JUMPS[1] * second;
         samples.raw[4][k] += GAIN[1] * GRAVITY * nudge * (first - 0.2 * second);
-        // Where it is nudged there are dwells, as where stillness finds them.
+        // A nudge separates dwells, as the search for stillness would.
         if nudge > 0.0 {
             samples.step[k] = (first + second) as i32;
         }
@@ -200,7 +200,7 @@ fn jumps_of_a_gyros_bias_at_rest_are_named_and_their_samples_kept_in_intervals_t
             for (jump, size) in [first, second].iter().zip(JUMPS) {
                 assert!((jump.change.x / size - 1.0).abs() < 0.1, "{jump:?}, {size}");
             }
-            // A nudge is no other pose of the gyro.
+            // For the gyro a nudge is not another pose.
             assert!(recorded.moved_s[0].is_empty());
             assert_eq!(recorded.moved_s[1].is_empty(), nudge == 0.0);
             let found = fit(vec![recorded], &[], JOINT).unwrap();
