@@ -220,7 +220,8 @@ impl Noise {
         Some(largest)
     }
 
-    /// Whether the variances of the means are known as they are, and not by that of their size.
+    /// Whether the variances of the means are known for each channel. If not, a fit to gravity uses the noise of the magnitude
+    /// ([`Noise::of_size`]).
     pub fn is_by_channel(&self, sensor: Sensor) -> bool {
         self.of_table.is_some() || self.is_stated(sensor)
     }

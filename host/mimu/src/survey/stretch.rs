@@ -72,7 +72,7 @@ impl Stretch {
         )
     }
 
-    /// The longest stretch of `t` without a gap; `first` is the row that it begins with.
+    /// The longest segment of `t` without a gap; `first` is the row of the first time.
     fn without_gap(
         t: &[f64],
         first: usize,
@@ -222,7 +222,7 @@ fn span(t: &[f64], from_s: Option<f64>, to_s: Option<f64>, place: &str) -> Resul
     .about(Argument::Stretch))
 }
 
-/// Temperature over a stretch.
+/// Temperature over a segment.
 pub(super) struct Temperature {
     /// Mean of the cells that are not empty, °C.
     pub mean_c: f64,

@@ -19,7 +19,7 @@ pub(super) struct Suitability {
     pub means: Vec<f64>,
     /// Largest step between the means of two quiet windows, raw.
     pub reach: f64,
-    /// Means of equal parts of the stretch, raw.
+    /// Means of equal parts of the segment, raw.
     pub levels: Vec<f64>,
 }
 
