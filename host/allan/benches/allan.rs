@@ -26,10 +26,10 @@ fn main() {
     six_channels();
 }
 
-/// Rates that are made or read, and taken in, at a time.
+/// Number of rates that are made or read, and integrated, at a time.
 const SLICE: usize = 1 << 16;
 
-/// White rates and a slow random walk, of a cheap generator: what is measured is not the noise.
+/// White rates and a slow random walk from a cheap generator: the quality of the noise does not matter here.
 fn generator() -> impl FnMut(&mut [f64]) {
     let (mut random, mut walk) = (0x6d69_6d75_u64, 0.0);
     move |slice| {
@@ -45,7 +45,7 @@ fn generator() -> impl FnMut(&mut [f64]) {
     }
 }
 
-/// The curve of `n` rates, and how long it took, from the rates in memory.
+/// The curve of `n` rates, and the time to compute it from rates in memory.
 fn curve(
     n: usize,
     mut next: impl FnMut(&mut [f64]),
@@ -135,7 +135,7 @@ fn curve_of_file(arguments: &[String]) {
     }
 }
 
-/// Most memory that this process has had, MB.
+/// Peak memory of this process, MB.
 fn peak_mb() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mark = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));

@@ -2,15 +2,13 @@
 //!
 //! # Terms that are left out
 //!
-//! Neighbouring differences of a long cluster are nearly the same number. Of a series of more than [`ALL_TERMS`]
-//! rates every s-th is taken, with s so that at least [`STARTS_PER_CLUSTER`] of them begin within a cluster and, of
-//! Allan and Hadamard, [`KEPT_TERMS`] are kept in all. What that costs in equivalent degrees of freedom is
-//! computed for every noise in `tests/all/vectors`: under 0.05 % for white rate noise and redder (alpha 0 to -4),
-//! which is all that an inertial sensor shows at such cluster lengths, and for any noise of the modified
-//! variance. For white and flicker phase noise, which forget from sample to sample, it does cost (up to a
-//! factor s for white, whose deviation is then still known to 0.6 %), and the edf of the point says so. With that
-//! rule the cost of a curve grows about as N from 1e6 samples on, however densely the times are spaced
-//! (`benches/allan.rs`).
+//! Neighbouring differences of a long cluster are nearly equal. In a series of more than [`ALL_TERMS`] rates only every s-th is used. At
+//! least [`STARTS_PER_CLUSTER`] of those begin within a cluster, and for Allan and Hadamard at least [`KEPT_TERMS`] are kept in all.
+//! `tests/all/vectors` computes the loss of equivalent degrees of freedom for every noise. It is under 0.05 % for white rate noise and
+//! redder (alpha 0 to -4), the only noises of an inertial sensor at such cluster lengths, and for any noise with the modified variance. For
+//! white and flicker phase noise, which are hardly correlated between samples, the loss is larger (up to a factor s for white, whose
+//! deviation is then still known to 0.6 %); the edf of the point includes it. With this rule the cost of a curve grows about as N from 1e6
+//! samples on, however densely the times are spaced (`benches/allan.rs`).
 
 use super::bounds::{self, Estimator};
 use super::deviation::{ALL_TERMS, BLOCK, Integrated, Plan, sums_of_squares};
@@ -19,19 +17,19 @@ use super::{Deviation, NotFinite, Point, Spacing};
 
 use rayon::prelude::*;
 
-/// Of a longer one, at least so many starts in every cluster length.
+/// In a series longer than [`ALL_TERMS`], at least this many differences begin within a cluster.
 pub const STARTS_PER_CLUSTER: usize = 64;
-/// Of a longer one, at least so many Allan and Hadamard differences.
+/// In a series longer than [`ALL_TERMS`], at least this many Allan and Hadamard differences are kept.
 pub const KEPT_TERMS: usize = 1 << 15;
-/// Averaging times that are done together: more would only hold more sums of tiles.
+/// Number of averaging times computed together: more would only need memory for more sums of tiles.
 const AT_A_TIME: usize = 256;
 
 /// Deviation of rates (any unit) at every averaging time of `spacing` that the series is long enough for, with
 /// bounds at `confidence` (between 0 and 1). Empty for fewer than two rates (three for [`Deviation::Hadamard`]).
 ///
 /// # Errors
-/// The first rate that is not a finite number. A gap must not be closed up or filled either: both put a step into
-/// the integral; give the longest stretch without one.
+/// The first rate that is not a finite number. Do not close or fill a gap: both put a step into the integral. Give the longest segment
+/// without a gap.
 pub fn curve(
     rates: &[f64],
     dt_s: f64,
@@ -147,7 +145,7 @@ impl Integrated {
     }
 }
 
-/// Every how many-th difference of clusters of `m` is used, for so many `points` of the integral.
+/// Step between the differences that are used, for clusters of `m` and this many `points` of the integral.
 fn stride(kind: Deviation, points: usize, m: usize) -> usize {
     if points <= ALL_TERMS + 1 {
         return 1;
@@ -155,8 +153,8 @@ fn stride(kind: Deviation, points: usize, m: usize) -> usize {
     let by_starts = m / STARTS_PER_CLUSTER;
     let stride = match kind {
         Deviation::Allan | Deviation::Hadamard => by_starts.min(kind.terms(points, m) / KEPT_TERMS),
-        // A term is cheap to skip to only from a kept sum. Nothing is lost with the rest: the mean over the cluster
-        // takes from phase noises, too, what they forget within it.
+        // Only a term at a kept sum is cheap to reach by skipping. The other terms add no information: the mean over the cluster correlates
+        // neighbouring terms of phase noise too.
         Deviation::Modified => by_starts / BLOCK * BLOCK,
     };
     stride.max(1)

@@ -8,8 +8,8 @@
 //! | Modified | the same, summed over m neighbouring j              | N - 3m + 2 | mean square over 2 m⁴    |
 //! | Hadamard | `x(j+3m) - 3 x(j+2m) + 3 x(j+m) - x(j)`             | N - 3m + 1 | mean square over 6 m²    |
 //!
-//! for N rates and cluster length m. The first line is fang (8), whose inner sum of rates over m samples is what
-//! the integral gives as one difference; the others are NIST SP 1065 (2008), sections 5.2.5 and 5.2.9.
+//! for N rates and cluster length m. The first line is fang (8), whose inner sum of rates over m samples is one difference of the integral;
+//! the others are NIST SP 1065 (2008), sections 5.2.5 and 5.2.9.
 
 mod differences;
 mod integrated;
@@ -21,5 +21,5 @@ pub use integrated::Integrated;
 pub(super) use squares::{Plan, Squares, sums_of_squares};
 pub(super) use window_sums::BLOCK;
 
-/// Of a series of up to so many rates all differences are used.
+/// In a series of up to this many rates all differences are used.
 pub const ALL_TERMS: usize = 1 << 20;

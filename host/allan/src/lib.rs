@@ -8,7 +8,7 @@
 //! | [`curve`]    | all of these at any averaging times                                        |
 //! | [`model`]    | N, B, K, Q and R fitted to the whole curve, with intervals                 |
 //! | [`variance`] | N, B and K alone, as the variance of a mean                                |
-//! | [`spectrum`] | lines and bumps that are no noise of the sensor, and the band in which it is white |
+//! | [`spectrum`] | lines and bumps that are not noise of the sensor, and the band in which it is white |
 
 pub mod bounds;
 pub mod curve;
@@ -25,7 +25,7 @@ use std::fmt;
 pub enum Deviation {
     /// Overlapping Allan, fang (8).
     Allan,
-    /// Modified Allan: tells white from flicker phase noise, that is quantization from what is just above it.
+    /// Modified Allan: distinguishes white from flicker phase noise, and so quantization from noise just above it.
     Modified,
     /// Overlapping Hadamard: blind to a linear drift.
     Hadamard,
@@ -84,9 +84,9 @@ impl std::error::Error for NotFinite {}
 pub enum Spacing {
     /// Powers of two of the sample period.
     Octave,
-    /// So many a decade, rounded to whole samples, each once.
+    /// This many per decade, rounded to whole samples, each once.
     PerDecade(usize),
-    /// These many samples.
+    /// These numbers of samples.
     Samples(Vec<usize>),
 }
 
@@ -99,7 +99,7 @@ pub struct Point {
     pub tau_s: f64,
     /// Deviation, unit of the series.
     pub deviation: f64,
-    /// Differences that were averaged over.
+    /// Number of differences in the mean.
     pub terms: usize,
     /// Power law of frequency noise `S(f) ~ f^alpha` found at this time: 0 white (N), -1 flicker (B), -2 random walk (K), 2
     /// white phase (Q).

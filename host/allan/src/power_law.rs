@@ -1,5 +1,5 @@
-//! Power law of the noise at one averaging time: Riley and Greenhall, "Power law noise identification using the lag 1
-//! autocorrelation", EFTF 2004, and Howe et al., PTTI 2000, where too few samples are left for it.
+//! Power law of the noise at one averaging time: Riley and Greenhall, "Power law noise identification using the lag 1 autocorrelation",
+//! EFTF 2004, and Howe et al., PTTI 2000, if too few samples remain for it.
 
 use super::Deviation;
 use super::deviation::{ALL_TERMS, Squares, difference, sums};
@@ -14,15 +14,14 @@ const ENOUGH_PAIRS: usize = 1 << 13;
 const ENOUGH_FOR_B1: usize = 4;
 /// With fewer cluster means than this, phase noise must be confirmed by R(n).
 const PHASE_NOISE_IS_PLAIN: usize = 256;
-/// Samples in a cluster that tell the two phase noises from white rates: their R(n) are 0.016, 0.20 and 0.50.
+/// Samples in a cluster that distinguish the two phase noises from white rates: their R(n) are 0.016, 0.20 and 0.50.
 const ENOUGH_FOR_R: usize = 64;
 
 /// Exponent of `S(f) ~ f^alpha` of the rates that dominates at clusters of `m`, from the integral `x`: 2 white
 /// phase, 1 flicker phase, 0 white rate, -1 flicker rate, -2 random walk of the rate, and for [`Deviation::Hadamard`]
 /// down to -4.
 ///
-/// With fewer than four cluster means nothing can be told; then -2, for which the bounds are the widest. 0 for a
-/// series that does not vary at all.
+/// With fewer than four cluster means the exponent is unknown; then -2, which gives the widest bounds. 0 for a constant series.
 pub fn power_law(x: &[f64], kind: Deviation, m: usize) -> i32 {
     // The reddest noise for which the variance exists.
     let reddest = 2 - 2 * kind.order() as i32;
@@ -63,8 +62,8 @@ fn by_lag_1(x: &[f64], m: usize, means: usize, most: usize) -> i32 {
 /// Lag 1 autocorrelation of `n` differences of the integral at every `m`-th sample; a pair of them has `TAPS` taps.
 /// `None` when they are all the same.
 ///
-/// Straight from the integral: at m = 1 a copy of the differences would double the memory of the whole analysis.
-/// Of more than [`ENOUGH_PAIRS`] pairs of a long series about so many are taken, evenly over it.
+/// Computed from the integral directly: at m = 1 a copy of the differences would double the memory of the whole analysis. If a long series
+/// has more than [`ENOUGH_PAIRS`] pairs, about that many are used, evenly spaced.
 fn lag_1<const TAPS: usize>(x: &[f64], m: usize, n: usize) -> Option<f64> {
     let offsets: [usize; TAPS] = std::array::from_fn(|i| i * m);
     let order = TAPS - 2;
@@ -82,14 +81,14 @@ fn lag_1<const TAPS: usize>(x: &[f64], m: usize, n: usize) -> Option<f64> {
         let z = difference(&taps[..TAPS - 1]) - mean;
         [z * (difference(&taps[1..]) - mean), z * z]
     });
-    // The last has no next, and belongs to the variance all the same.
+    // The last difference has no successor, but belongs to the variance.
     let last = lower(n) - lower(n - 1) - mean;
     let squares = squares + last * last;
     (squares > 0.0).then(|| products / squares)
 }
 
-/// Howe et al. 2000: the ratio B1 of the ordinary to the Allan variance of the cluster means. It is the same for
-/// both phase noises: 2 stands for either.
+/// Howe et al. 2000: the ratio B1 of the ordinary to the Allan variance of the cluster means. It is the same for both phase noises: 2 means
+/// either.
 ///
 /// N in B1 is the number of means. Stable32 takes the number of overlapping differences instead, as its outputs
 /// for a caesium clock show (71 of 71 exponents follow with that N, 7 with the means), which moves its limits so
@@ -100,8 +99,8 @@ fn by_variance_ratio(x: &[f64], kind: Deviation, m: usize, means: usize) -> i32 
     if alpha > -3 {
         return alpha;
     }
-    // Steeper than a random walk, or a drift, which the Hadamard variance does not see: differences are two powers
-    // less steep, and have no drift.
+    // Steeper than a random walk, or a drift, which cancels in the Hadamard variance: differences are two powers less steep and have no
+    // drift.
     let z: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();
     by_b1(&z, 1) - 2
 }
@@ -140,11 +139,11 @@ fn expected_b1(n: f64, mu: i32) -> f64 {
 /// `3.37/(1.04 + 3 ln(πn))` (NIST Technical Note 1337, table 2 of section A-6) and 1/2; limits are the geometric
 /// means.
 ///
-/// Without it, white rates pass for phase noise often enough, and that is worth up to m times the degrees of
-/// freedom: 95 % intervals of 8 means held the truth in 86 % of 1500 runs, with it in 95 %.
+/// Without this test white rates often pass for phase noise, which has up to m times the degrees of freedom: 95 % intervals of 8 means
+/// contained the truth in 86 % of 1500 runs, and with the test in 95 %.
 ///
-/// Taken on every so-many-th sample, for 64 in a cluster: skipping leaves white phase noise white, and a whole
-/// modified variance would cost as much as the curve.
+/// Computed from 64 samples per cluster: skipping leaves white phase noise white, and a modified variance of all samples would cost as much
+/// as the curve.
 fn by_modified_variance(x: &[f64], m: usize) -> i32 {
     let n = m.min(ENOUGH_FOR_R);
     let x: Vec<f64> = (0..x.len()).step_by(m / n).map(|i| x[i]).collect();

@@ -1,7 +1,7 @@
-//! Spectrum of a channel at rest: lines and bumps that are no noise of the sensor, and the band in which it is white.
+//! Spectrum of a channel at rest: lines and bumps that are not noise of the sensor, and the band in which it is white.
 //!
-//! An Allan variance is the spectrum seen through a filter an octave wide: a building that sways at 0.56 Hz bends it over a decade of
-//! averaging times, and what bends it cannot be told there. In the spectrum it is a few frequencies of ten thousand.
+//! An Allan variance is the spectrum through a filter an octave wide: a building that sways at 0.56 Hz bends it over a decade of averaging
+//! times, without showing the cause. In the spectrum the sway is a few frequencies of ten thousand.
 //!
 //! | module       | what                                                              |
 //! |--------------|-------------------------------------------------------------------|

@@ -1,4 +1,4 @@
-//! A diagnosis carried through: judged on another recording, with the effects that a calibration then holds and what to record next.
+//! A complete diagnosis: judged on another recording, with the effects for a new calibration and what to record next.
 
 use mimu_recording::error::{Error, Result};
 
@@ -15,17 +15,17 @@ use crate::warning::Warning;
 pub struct Diagnosed {
     /// What was found.
     pub diagnosis: Diagnosis,
-    /// The effects that the unit has: those of the calibration that was given, and those that were found.
+    /// The effects of the unit: those of the given calibration, and those that were found.
     pub effects: Vec<FittedEffect>,
     /// The experiments that would show what the recordings could not.
     pub next: Next,
-    /// All of it, as JSON has it.
+    /// The whole result, as written to JSON.
     pub result: DiagnosisResult,
     unit_id: Option<String>,
 }
 
 /// Finds the effects in `recordings`, and judges the calibration without and with them by the second recording, whose name is `second`.
-/// `given` is the name of the calibration that the recordings are diagnosed with; `created` is the time, RFC 3339.
+/// `given_name` is the name of the calibration that the recordings are diagnosed with; `created` is the time, RFC 3339.
 ///
 /// # Errors
 /// Those of [`diagnose`]; a given calibration with curves over temperature, or with an effect that was found anew.
@@ -93,13 +93,14 @@ impl Diagnosed {
     /// Those of [`Calibration::of`].
     pub fn calibration(&self, created: &str) -> Result<Calibration> {
         let mut made = Calibration::of(&self.diagnosis.after, &self.effects, created)?;
-        // An imported recording does not know the unit's number; that it is of the same unit was checked.
+        // An imported recording lacks the unit's number, but it was checked to be of the same unit.
         made.unit_id = made.unit_id.or(self.unit_id.clone());
         Ok(made)
     }
 }
 
-/// The effects that the unit is known to have. Those of a sensor that the recordings lack have no matrix in the new file.
+/// The effects that the unit is known to have. Those of a sensor that the recordings lack are dropped with a warning: the new file has no
+/// matrix for them.
 fn known(given: Option<&Calibration>, diagnosis: &mut Diagnosis) -> Vec<FittedEffect> {
     let Some(given) = given else {
         return Vec::new();

@@ -20,7 +20,7 @@ pub enum Fault {
     Turning,
     /// It errs by far more than the others predict.
     Outlying,
-    /// It turns about an axis that the accelerometer may be beside of.
+    /// It turns, and the accelerometer may be off the axis.
     Spinning,
     /// It turns at none of the known rates of the turntable.
     OtherRate,

@@ -6,13 +6,13 @@
 //! | [`signal`] | from samples to dwells and turns: blocks, rails, stillness, dwells; [`prepared`] is all of it for one recording |
 //! | [`noise`] | how well a dwell mean is known; [`survey`] finds it from a recording at rest, by the Allan deviation of [`mimu_allan`] |
 //! | [`estimate`], [`triad`] | the estimators, and what they estimate: both directions, covariances, physical quantities |
-//! | [`mod@fit`] | both triads, judged on what they have not seen; what cannot be right is refused |
+//! | [`mod@fit`] | both triads, judged on held-out data; impossible results are refused |
 //! | [`calibration`] | the file; [`calibration::verify`] judges it by another recording, [`calibration::apply`] compensates one |
 //! | [`effects`], [`diagnose`], [`mod@diagnosed`] | the effect behind a residual: found, added, proved on other data |
 //! | [`plan`] | experiments: [`plan::design`] chooses attitudes, rates and times, [`plan::next_experiment`] what to record next |
 //! | [`result`], [`warning`] | what the commands print and write as JSON |
 //!
-//! A recording from arrays, calibrated, and the calibration applied to a reading:
+//! Calibrate a recording from arrays, and apply the calibration to a reading:
 //!
 //! ```
 //! use mimu::{Manifest, Options, Prepared, RawUnit, Reference, Samples, Sensor, fit};

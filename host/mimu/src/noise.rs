@@ -1,8 +1,8 @@
 //! Noise of a dwell mean, from the Allan deviation within the dwells.
 //!
-//! A mean of n samples is not sigma/√n when the noise is correlated: the Allan variance at the length
-//! of the dwell is what two successive means differ by (fang (8), section 3). What wanders more slowly than a dwell lasts only a
-//! longer record at rest can tell: its noise file, and [`wander`].
+//! If the noise is correlated, the sigma of a mean of n samples is not sigma/√n. The Allan variance at the length of the dwell is how much
+//! two successive means differ (fang (8), section 3). Only a longer record at rest shows wander that is slower than a dwell: see its noise
+//! file, and [`wander`].
 
 pub mod noise_file;
 mod pool;
@@ -25,16 +25,16 @@ use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 
-/// Noise of one raw channel by a record at rest, at one temperature or several (fang, Table 5).
+/// Noise of one raw channel from a record at rest, at one temperature or several (fang, Table 5).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stated {
-    /// Temperature, °C, ascending, and the model there; of a single one the temperature does not count.
+    /// Temperature, °C, ascending, and the model there; a single model applies at all temperatures.
     nodes: Vec<(f64, AllanModel)>,
 }
 
 impl Stated {
-    /// The model at `temp_c`: between the temperatures of the records interpolated linearly in the variances, beyond them that of the
-    /// nearest. Where it is not known, that of the lowest.
+    /// The model at `temp_c`: interpolated linearly in the variances between the temperatures of the records, beyond them that of the
+    /// nearest. If `temp_c` is unknown, that of the lowest.
     fn at(&self, temp_c: f64) -> AllanModel {
         let k = self.nodes.partition_point(|n| n.0 <= temp_c);
         if k == 0 || k == self.nodes.len() {
@@ -56,8 +56,7 @@ impl Stated {
 pub struct ChannelNoise {
     /// The three terms fitted to the Allan variance.
     pub model: AllanModel,
-    /// The Allan variance itself, (averaging time in s, raw units squared), where the model does not fit it: noise that is
-    /// filtered, or a vibration.
+    /// The Allan variance itself, (averaging time in s, raw units squared), if the model does not fit it: filtered noise, or a vibration.
     pub curve: Option<Vec<(f64, f64)>>,
     /// Whether any dwell has shown it. If none has, its variance is 0 and means nothing.
     pub known: bool,
@@ -66,9 +65,9 @@ pub struct ChannelNoise {
 impl ChannelNoise {
     /// Variance of the mean over `tau_s`, raw units squared.
     ///
-    /// The model is preferred, as it averages over all octaves; but of noise with a correlation time of half a second its
-    /// rate random walk made the mean over 10 s four times too noisy. Where it does not fit, the measured curve is
-    /// followed, and beyond its end its last slope, from that of white noise to that of a random walk.
+    /// The model is preferred, because it averages over all octaves. If it does not fit, the measured curve is used: for noise with a
+    /// correlation time of half a second, the rate random walk of the model made the mean over 10 s four times too noisy. Beyond its end
+    /// the curve continues with its last slope, limited to those of white noise and of a random walk.
     pub fn variance(&self, tau_s: f64) -> f64 {
         let Some(curve) = &self.curve else {
             return self.model.variance(tau_s);
@@ -89,24 +88,24 @@ pub struct Noise {
     pub channels: [ChannelNoise; 6],
     /// Their noise from a record at rest, if it is used.
     stated: [Option<Stated>; 6],
-    /// Variances of a mean over a second, raw units squared, within the dwells and as a record at rest said, where it did not hold.
+    /// Variances of a mean over a second, raw units squared, within the dwells and from a record at rest, if the two contradict each other.
     other: [Option<[f64; 2]>; 6],
     /// From the first dwell to the end of the last, s.
     session: Span,
-    /// Of a table of means, whether it gives standard deviations for gyro and accelerometer: all that is known of the noise there.
+    /// For a table of means: whether it gives standard deviations for gyro and accelerometer, all that is known of the noise there.
     of_table: Option<[bool; 2]>,
 }
 
 /// Rate that counts as rest where the force is not known, rad/s: 0.1 deg/s turns gravity by 3 mm/s² in a dwell of ten seconds.
 const REST_RATE: f64 = 1.7e-3;
-/// Variance of an accelerometer over a dwell, times that which a quarter of the dwells keep below, from which on the unit turned in it.
+/// If the variance of an accelerometer over a dwell exceeds the lower quartile of all dwells by this factor, the unit turned in the dwell.
 const SWINGS: f64 = 25.0;
-/// Angle between the force of a tenth of a second and that of the dwell, rad, from which on the unit turned: 3 degrees, six times
-/// what hands sway by.
+/// If the force over a tenth of a second differs from that of the dwell by this angle, rad, the unit turned: 3 degrees, six times the sway
+/// of hands.
 const SWINGS_BY: f64 = 0.05;
 
-/// Which of `dwells` show the noise of the readings: those that stand still, or whose known input explains what the readings do.
-/// A dwell that turns through gravity without a known force does not: its swing of m/s² once made noise floors of 766 and 4000 mm/s².
+/// Which of `dwells` show the noise of the readings: those at rest, or whose known input explains the readings. A dwell that turns through
+/// gravity without a known force does not: its swing of several m/s² once made noise floors of 766 and 4000 mm/s².
 fn still<'a>(dwells: &[&'a Dwell], sensor: Sensor) -> Vec<&'a Dwell> {
     let accel = Sensor::Accel.channels();
     let limits: Vec<f64> = accel
@@ -132,12 +131,13 @@ fn still<'a>(dwells: &[&'a Dwell], sensor: Sensor) -> Vec<&'a Dwell> {
     dwells.iter().filter(stands).copied().collect()
 }
 
-/// A noise file whose variance of a mean over 1 s is off by this factor, up or down, is not that of this recording.
+/// If the variance of a mean over 1 s in a noise file is wrong by this factor, up or down, the file does not describe this recording.
 const ANOTHER_NOISE: f64 = 2.0;
 
 impl Noise {
     /// Pools the overlapping Allan variance within all usable dwells at rest or at a constant rate, the Hadamard variance where the
-    /// temperature ramps, and fits the model to it. Where no input stands, of what the readings do not follow of theirs; `rails` are those of the channels.
+    /// temperature ramps, and fits the model to it. If the input is constant in no dwell, the residuals of the readings about their moving
+    /// input are used; `rails` are those of the channels.
     pub fn within(dwells: &[Dwell], condensed: &Condensed, rails: &[Rails; 6]) -> Self {
         let mut channels: [ChannelNoise; 6] = Default::default();
         for sensor in Sensor::BOTH {
@@ -147,7 +147,8 @@ impl Noise {
                     let used: Vec<&Dwell> = of_sensor.filter(|d| !d.turn).collect();
                     let used = still(&used, sensor);
                     let usable = || used.iter().copied();
-                    // What another input does to the reading is no noise either, but a fit does not know it.
+                    // The moving input of the other sensor may affect the reading too, and a fit does not know how: dwells without any
+                    // motion are preferred.
                     let none_moves = usable().any(|d| d.moves == [false; 2]);
                     let stand = || {
                         usable().filter(|d| match none_moves {
@@ -189,8 +190,8 @@ impl Noise {
         }
     }
 
-    /// That of the means of a table: white, by the standard deviation and the number of samples of each. `known`: whether the table
-    /// gives any for gyro and accelerometer.
+    /// Noise of the means of a table: white, from the standard deviation and the number of samples of each. `known`: whether the table
+    /// gives standard deviations for gyro and accelerometer.
     pub fn of_table(known: [bool; 2]) -> Self {
         Self {
             of_table: Some(known),
@@ -208,7 +209,7 @@ impl Noise {
         }
     }
 
-    /// What a record at rest said of a channel, where it is used: of each term the largest over its temperatures.
+    /// The noise of a channel from a record at rest, if it is used: the largest of each term over the temperatures.
     pub fn largest_stated(&self, channel: usize) -> Option<AllanModel> {
         let nodes = self.stated[channel].as_ref()?.nodes.iter();
         let largest = nodes.fold(AllanModel::default(), |all, (_, node)| AllanModel {
@@ -219,13 +220,14 @@ impl Noise {
         Some(largest)
     }
 
-    /// Whether the variances of the means are known as they are, and not by that of their size.
+    /// Whether the variances of the means are known for each channel. If not, a fit to gravity uses the noise of the magnitude
+    /// ([`Noise::of_size`]).
     pub fn is_by_channel(&self, sensor: Sensor) -> bool {
         self.of_table.is_some() || self.is_stated(sensor)
     }
 
-    /// Takes the noise of `file` in place of that within the dwells; a channel whose dwells are not as noisy as the file says
-    /// keeps its own, and is told of.
+    /// Uses the noise of `file` instead of that within the dwells. A channel whose dwells contradict the file keeps its own noise, with a
+    /// warning.
     ///
     /// Errors: the file has no scale factor to the unit of the readings, or lacks a channel.
     pub fn state(
@@ -245,8 +247,8 @@ impl Noise {
             let raw = manifest.raw_unit.to_string();
             let mut nodes = Vec::new();
             for channel in file.channel.iter().filter(|k| k.name == name) {
-                // Readings in SI have scale factors too, and a file with them is of the calibrated unit: of 0.51 the noise is twice that
-                // of the readings.
+                // Readings in SI have scale factors too. A file with a scale factor is in the calibrated unit: if the factor is 0.51, its
+                // noise is twice that of the readings.
                 let unit = match manifest.raw_unit {
                     RawUnit::Si if channel.raw_unit.as_ref() != Some(&raw) => {
                         Sensor::BOTH[c / 3].unit()
@@ -295,8 +297,8 @@ impl Noise {
         Ok(())
     }
 
-    /// Noise of the size of specific force, m/s², as `accel` gives it: what a fit to the magnitude of gravity sees. A unit that
-    /// creeps on its support tilts, which shows in the channels and not in the size.
+    /// Noise of the magnitude of specific force after the calibration `accel`, m/s²: the noise in a fit to the magnitude of gravity. A unit
+    /// that creeps on its support tilts, which changes the channels but not the magnitude.
     pub fn of_size(dwells: &[Dwell], condensed: &Condensed, accel: &Affine<f64>) -> ChannelNoise {
         let from = Sensor::Accel.channels().start;
         let force = |b: &Block| {
@@ -304,7 +306,7 @@ impl Noise {
             let all = (0..3).all(|i| b.raw[from + i].n > 0);
             all.then(|| accel.apply(&raw))
         };
-        // Of a unit that turns the magnitude changes by what the calibration errs, which is no noise.
+        // If the unit turns, the magnitude changes with the errors of the calibration, which are not noise.
         let turns = |d: &Dwell| {
             let up = accel.apply(&d.raw_mean(Sensor::Accel)).normalize();
             let blocks = condensed.blocks[d.blocks.clone()].iter().filter_map(force);
@@ -316,13 +318,13 @@ impl Noise {
         within(still, condensed, |b| force(b).map(|f| f.norm()))
     }
 
-    /// Whether a record at rest says the noise of all channels of `sensor`.
+    /// Whether a record at rest gives the noise of all channels of `sensor`.
     pub fn is_stated(&self, sensor: Sensor) -> bool {
         self.stated[sensor.channels()].iter().all(Option::is_some)
     }
 
-    /// Channel `c`, where the dwells are noisier than a record at rest said: by how much, as the standard deviation of a mean over a
-    /// second, raw; and how many times as noisy as it said.
+    /// If the dwells of channel `c` are noisier than its record at rest: the excess, as the standard deviation of a mean over a second,
+    /// raw, and the ratio of the two standard deviations.
     pub fn beyond_stated(&self, c: usize) -> Option<(f64, f64)> {
         let [within, stated] = self.other[c]?;
         let more = within > stated;
@@ -337,8 +339,8 @@ impl Noise {
         }
     }
 
-    /// Variances of the mean reading of `sensor` over `dwell`, raw units squared; where a record at rest says how it wanders,
-    /// of the mean less that of the session.
+    /// Variances of the mean reading of `sensor` over `dwell`, raw units squared; if a record at rest gives the wander, those of the mean
+    /// minus that of the session.
     pub fn of_mean(&self, sensor: Sensor, dwell: &Dwell) -> Vector3<f64> {
         let from = sensor.channels().start;
         if self.of_table.is_some() {
@@ -358,8 +360,8 @@ impl Noise {
         })
     }
 
-    /// What the mean readings of `sensor` over `dwells` share of its wander, raw units squared, axis by axis: part of the
-    /// variances of [`Noise::of_mean`]. `None` where no record at rest says anything of it.
+    /// Covariances of the mean readings of `sensor` over `dwells` because of its wander, raw units squared, axis by axis: part of the
+    /// variances of [`Noise::of_mean`]. `None` if no record at rest gives the wander.
     pub fn wander(&self, sensor: Sensor, dwells: &[Dwell]) -> Option<[DMatrix<f64>; 3]> {
         let from = sensor.channels().start;
         let stated = || self.stated[from..from + 3].iter().flatten();
@@ -371,7 +373,7 @@ impl Noise {
         Some(std::array::from_fn(|i| match &self.stated[from + i] {
             None => DMatrix::zeros(dwells.len(), dwells.len()),
             Some(stated) => {
-                // A noise whose size depends on temperature: each mean has a separate amplitude.
+                // The noise depends on temperature, so each mean has a separate amplitude.
                 let of = |part: fn(&mut AllanModel) -> &mut f64| {
                     let amplitude: Vec<f64> = dwells
                         .iter()

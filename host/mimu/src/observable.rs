@@ -1,10 +1,10 @@
-//! What observations that share their noise are of.
+//! The quantity of observations that share their noise.
 
 use std::fmt;
 
 use crate::quantity::AXES;
 
-/// What observations that share their noise are of.
+/// The quantity of observations that share their noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Observable {
     /// Means of an axis (0..3) over dwells.
@@ -40,7 +40,7 @@ impl fmt::Display for Observable {
     }
 }
 
-/// A group, with the index of its recording where there are several.
+/// A group of observations, with the index of its recording if there are several.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StratumName(pub Observable, pub Option<usize>);
 

@@ -1,4 +1,4 @@
-//! The parameters of a triad: what each is of, its name and its unit.
+//! The parameters of a triad: kind, name and unit.
 
 use std::fmt;
 
@@ -17,7 +17,7 @@ pub enum ParameterKind {
     Scale,
     /// Bias.
     Bias,
-    /// Bias with what gravity adds to it in the one pose of a recording.
+    /// Bias plus the contribution of gravity, in a recording with a single pose.
     BiasAndGravity,
     /// Package misalignment.
     Misalignment,
@@ -30,7 +30,7 @@ pub enum ParameterKind {
 pub struct TriadParameter(pub ParameterKind, pub usize);
 
 impl ParameterKind {
-    /// The kinds that people know.
+    /// The physical kinds.
     pub const PHYSICAL: [Self; 4] = [
         Self::Scale,
         Self::Bias,
@@ -52,7 +52,7 @@ impl ParameterKind {
 }
 
 impl TriadParameter {
-    /// Axis, or the two axes that it is between; of the inverse model its name.
+    /// Axis, or the pair of axes; for the inverse model the name of the element.
     pub fn axis(self) -> String {
         let Self(kind, k) = self;
         match kind {
@@ -84,7 +84,7 @@ impl Serialize for TriadParameter {
     }
 }
 
-/// All parameters of a triad with their units, in the order of lists: the inverse model, then what people know.
+/// All parameters of a triad with their units, in the order in which they are listed: the inverse model, then the physical parameters.
 pub fn parameters(
     triad: &Triad,
     sensor: Sensor,

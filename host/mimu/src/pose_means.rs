@@ -1,7 +1,7 @@
-//! Tables of means made ready for a fit, without any samples behind them.
+//! Prepares tables of means for a fit, without samples.
 //!
-//! A mean is what a dwell comes to, so a row is a dwell: its noise is what the table says of it, and nothing is judged that only samples
-//! show (stillness, rails, stuck channels). What goes by time is not known: turns, drifts, and how a bias wanders.
+//! Each row is a dwell, with the noise that the table gives. Nothing is judged that only samples show (stillness, rails, stuck channels).
+//! Time-dependent quantities are unknown: turns, drifts and bias wander.
 
 use crate::noise::Noise;
 use crate::prepared::Prepared;
@@ -15,8 +15,8 @@ use mimu_recording::{Column, PoseMean, PoseMeans, Reference};
 impl Prepared {
     /// The dwells of a table of means, ready for [`fit`](fn@crate::fit::fit) and for nothing else.
     ///
-    /// The variance of a mean is that of its samples over their number, as of white noise; zero where the table does not say, and then
-    /// the scatter about the fit is the only noise there is.
+    /// The variance of a mean is that of its samples over their number, as for white noise. If the table does not give it, it is zero, and
+    /// the scatter about the fit is the only known noise.
     ///
     /// Errors: those of the manifest.
     pub fn of_means(means: &PoseMeans) -> Result<Self> {
@@ -93,7 +93,7 @@ fn dwell(i: usize, pose: &PoseMean, period_s: f64, has_raw: &[bool; 6]) -> Dwell
         *rate = rate.to_radians();
     }
     Dwell {
-        // A table has fewer rows than that by far.
+        // A table has far fewer rows than an i32 counts.
         step: i as i32,
         first_row: i as u64,
         rows,
@@ -147,7 +147,7 @@ fn knows_noise(pose: &PoseMean, sensor: Sensor) -> bool {
     own.all(|c| !pose.deviation[c].is_nan())
 }
 
-/// What a person should know of the table.
+/// The warnings about the table.
 fn warnings(list: &[Dwell], means: &PoseMeans, has_raw: &[bool; 6]) -> Vec<Warning> {
     let mut warnings = Vec::new();
     for sensor in Sensor::BOTH {

@@ -1,4 +1,4 @@
-//! A recording made ready for estimation: condensed, its dwells found, their noise measured.
+//! A recording prepared for estimation: condensed, its dwells found, their noise measured.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ use mimu_recording::{Batch, Manifest, Recording, Reference};
 pub struct Prepared {
     /// Its manifest.
     pub manifest: Manifest,
-    /// What one pass left of it, which copies of the recording share until one changes it: four hours at 1 kHz are 85 to 225 MB.
+    /// Its samples, condensed. Copies of the recording share them until one changes them: four hours at 1 kHz are 85 to 225 MB.
     pub condensed: Arc<Condensed>,
     /// Its dwells.
     pub dwells: Dwells,
@@ -40,7 +40,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Reads `recording` and finds its dwells. `progress` is told the share that is read.
+    /// Reads `recording` and finds its dwells. `progress` receives the share that is read.
     pub fn read(
         recording: &Recording,
         finding: impl Into<Finding>,
@@ -53,7 +53,8 @@ impl Prepared {
         Self::of_condensed(manifest, condensed, finding.into(), place)
     }
 
-    /// Finds the dwells of `samples` in memory. `finding`: a factor alone is [`crate::signal::stillness::STILL_FACTOR`] or another.
+    /// Finds the dwells of `samples` in memory. `finding`: a number alone is the factor of stillness, such as
+    /// [`crate::signal::stillness::STILL_FACTOR`].
     ///
     /// Errors: those of a recording on disk; columns of different lengths; no samples.
     pub fn of(manifest: Manifest, samples: &Batch, finding: impl Into<Finding>) -> Result<Self> {
@@ -120,7 +121,7 @@ impl Prepared {
         })
     }
 
-    /// With the noise that a record at rest has shown in place of that within the dwells. Errors: see [`Noise::state`].
+    /// Uses the noise of a record at rest instead of that within the dwells. Errors: see [`Noise::state`].
     pub fn with_noise(mut self, file: &NoiseFile) -> Result<Self> {
         if self.manifest.means {
             let problem = "a noise file gives the error of a mean over some seconds, and these means have no durations";
@@ -131,7 +132,7 @@ impl Prepared {
         Ok(self)
     }
 
-    /// Leaves dwells and turns out of the fit. They keep their places in the list of dwells; neither observations nor turns have them.
+    /// Excludes dwells and turns from the fit. They stay in the list of dwells, but observations and turns lack them.
     pub fn leave_out(&mut self, these: &[LeftOut]) {
         for dwell in these.iter().filter(|l| l.sensor == Sensor::Accel) {
             self.dwells.list[dwell.from].accel_fault = Some(Fault::Outlying);
@@ -144,15 +145,15 @@ impl Prepared {
         sensor.channels().all(|c| self.condensed.has_raw[c])
     }
 
-    /// With an accelerometer that may be beside the axis of a table by `sigma_m`, m, one standard deviation. Least squares and the Kalman bank then
-    /// know of the centripetal force, and judge the accelerometer by the dwells at rest, if there are any.
+    /// The accelerometer may be off the axis of a table by `sigma_m`, m, one standard deviation. Least squares and the Kalman bank then
+    /// allow for the centripetal force, and judge the accelerometer by the dwells at rest, if there are any.
     pub fn beside_axis(mut self, sigma_m: f64) -> Self {
         self.lever_arm_m = sigma_m;
         self
     }
 
-    /// Without the dwells of the accelerometer in which a table turns it, if it has others: where it is beside the axis they have a
-    /// centripetal force that no reference says.
+    /// Excludes the dwells in which a table turns the accelerometer, if there are others: off the axis they contain a centripetal force
+    /// that no reference gives.
     pub fn accel_at_rest(mut self) -> Self {
         let usable = |d: &Dwell| d.accel_fault.is_none() && d.input(Sensor::Accel).is_some();
         if self.dwells.list.iter().any(|d| usable(d) && !d.spins()) {
@@ -163,7 +164,7 @@ impl Prepared {
         self
     }
 
-    /// Usable dwells of `sensor`; where there is a table, those with a known input.
+    /// Usable dwells of `sensor`; if there is a table, those with a known input.
     pub fn observations(&self, sensor: Sensor) -> Vec<Observation> {
         let table = self.manifest.reference == Reference::Table;
         let usable = self
@@ -171,7 +172,7 @@ impl Prepared {
             .list
             .iter()
             .enumerate()
-            // A turn of known angle is no pose.
+            // A turn of known angle is not a pose.
             .filter(|(_, d)| d.fault(sensor).is_none() && (table || !d.turn));
         usable
             .filter_map(|(i, d)| {
@@ -224,7 +225,7 @@ impl Prepared {
             let used = weighted.filter(|(_, w)| **w != 0.0);
             used.map(|(b, w)| w * b.raw[from + k].mean).sum()
         });
-        // White noise has the variance of the mean, as the weights have a mean square of one; what is slower than the weights is not in it.
+        // White noise has the variance of the mean, because the weights have a mean square of one. Noise slower than the weights cancels.
         let tau_s = contrast.half_period_s;
         let variance = Vector3::from_fn(|k, _| {
             let of_half = self.noise.variance(from + k, tau_s, dwell.temp_c);
@@ -239,7 +240,7 @@ impl Prepared {
         })
     }
 
-    /// What the dwells in which the known input of `sensor` moves show of it beside their means.
+    /// What dwells show beyond their means if the known input of `sensor` moves within them.
     pub fn within_dwells(&self, sensor: Sensor) -> Vec<Observation> {
         let contrasts = self.contrasts();
         let moving = contrasts
@@ -253,7 +254,7 @@ impl Prepared {
         Earth::at(self.manifest.latitude_deg)
     }
 
-    /// Dwells in which the gyro is at rest, with what the Earth turns it by; `accel` says where up is.
+    /// Dwells in which the gyro is at rest, with the Earth's rate; `accel` gives the direction up.
     pub fn rest(&self, accel: &Affine<f64>) -> Vec<Rest> {
         let earth = self.earth();
         let rest = |o: Observation| {
@@ -275,20 +276,20 @@ impl Prepared {
         observations.filter(rests).map(rest).collect()
     }
 
-    /// When the power came, on the clock of the recording, s: what the manifest says, or the first sample.
+    /// Time of the power-on on the clock of the recording, s: from the manifest, or else that of the first sample.
     pub fn power_on_s(&self) -> f64 {
         let first = || self.condensed.blocks.first().map_or(0.0, |b| b.start_s);
         self.manifest.power_on_s.unwrap_or_else(first)
     }
 
-    /// Middle of its dwells, s: what is found without regard to time belongs to it.
+    /// Mean time of its dwells, s: estimates that ignore time apply to it.
     pub fn middle_s(&self) -> f64 {
         let each = self.dwells.list.iter();
         let sum: f64 = each.map(|d| d.start_s + 0.5 * d.duration_s).sum();
         sum / self.dwells.list.len().max(1) as f64
     }
 
-    /// Variances of the size of specific force over each of `poses` by noise, (m/s²)².
+    /// Noise variances of the magnitude of specific force in each of `poses`, (m/s²)².
     pub fn size_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
         if self.noise.is_by_channel(Sensor::Accel) {
             let size = |o: &Observation| {
@@ -304,7 +305,7 @@ impl Prepared {
             .collect()
     }
 
-    /// Standard deviations of the same, for people: not a number where nothing shows the noise.
+    /// Standard deviations of the same, for people; not a number if the noise is unknown.
     pub fn size_floors(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
         let by_channel = self.noise.is_by_channel(Sensor::Accel);
         let known = match by_channel {
@@ -318,7 +319,7 @@ impl Prepared {
             .collect()
     }
 
-    /// `floor`, a figure by the noise of `sensors`; not a number where nothing shows that.
+    /// `floor`, a figure from the noise of `sensors`; not a number if that is unknown.
     pub(crate) fn if_noise_known(&self, sensors: &[Sensor], floor: f64) -> f64 {
         match sensors.iter().all(|s| self.noise.is_known(*s)) {
             true => floor,
@@ -326,7 +327,7 @@ impl Prepared {
         }
     }
 
-    /// Turns between usable dwells, with the directions of gravity by `accel`; also how many could not be used and why.
+    /// Turns between usable dwells, with the directions of gravity by `accel`; also a warning for each turn that cannot be used.
     pub fn turns(&self, accel: &Affine<f64>) -> (Vec<Turn<'_>>, Vec<Warning>) {
         let increments = &self.condensed.increments;
         let usable: Vec<usize> = (0..self.dwells.list.len())
@@ -362,7 +363,7 @@ impl Prepared {
                 if blocks.iter().any(|b| rails.touched_by(&b.raw[c])) {
                     return Some(Fault::Saturated(c));
                 }
-                // Hands do not keep a code for a tenth of a second.
+                // In a turn by hand no code lasts for a tenth of a second.
                 let chance = self.dwells.longest_run[c];
                 let stuck = |m: &crate::signal::blocks::Moments| {
                     m.m2 == 0.0 && m.n > 3 && f64::from(m.n) > chance
@@ -444,7 +445,7 @@ impl Prepared {
             .collect()
     }
 
-    /// A failure of an estimator, with the place and with the dwells that it had to do without.
+    /// The error for a failure of an estimator, with the place and the dwells that were not used.
     pub(crate) fn refused(&self, failure: Failure, sensor: Sensor) -> Error {
         let unused = self.dwells.unused(sensor);
         let undetermined = matches!(failure, Failure::Undetermined { .. });
@@ -458,7 +459,7 @@ impl Prepared {
         self.with_steps_as_given(error, sensor)
     }
 
-    /// `error`, with the remedy that the dwells of the `step` column are taken as they are, where `sensor` lacks some that were judged.
+    /// `error`; if dwells of `sensor` are not used because they are not still, with the remedy to take the `step` column as given.
     pub(crate) fn with_steps_as_given(&self, error: Error, sensor: Sensor) -> Error {
         if !self.dwells.are_judged_not_still(sensor) {
             return error;
@@ -471,7 +472,7 @@ impl Prepared {
     }
 }
 
-/// Takes the pauses between joined files out of the gaps: nothing is missing there.
+/// Removes the pauses between joined files from the gaps: no samples are missing there.
 fn without_joins(condensed: &mut Condensed) {
     let period_s = condensed.period_s;
     let pairs = condensed.blocks.windows(2);

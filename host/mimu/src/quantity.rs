@@ -8,7 +8,7 @@ pub use mimu_core::{PerSensor, Sensor};
 /// Names of the axes.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Serialises what there is for each sensor: one that is absent has no key.
+/// Serialises the sensors that are present; an absent one has no key.
 pub fn present<T: Serialize, S: Serializer>(
     sensors: &PerSensor<Option<T>>,
     serializer: S,
@@ -16,7 +16,7 @@ pub fn present<T: Serialize, S: Serializer>(
     serializer.collect_map(sensors.present())
 }
 
-/// What an error figure is about; a file has [`Figure::description`].
+/// The quantity of an error figure; a file contains [`Figure::description`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Figure {
     /// Compensated dwell mean minus known input, over dwells and axes: SI of the sensor.
@@ -49,7 +49,7 @@ impl Figure {
         matches!(self, Self::GravitySize | Self::RateSize)
     }
 
-    /// What it is about, as a sentence fragment.
+    /// The quantity, as a sentence fragment.
     pub fn description(self) -> &'static str {
         match self {
             Self::Input => "compensated dwell mean minus known input, over dwells and axes",
@@ -89,7 +89,7 @@ pub fn scale_unit(raw: RawUnit, si: &str) -> String {
     }
 }
 
-/// `value` as `digits` significant digits leave it; what a file is to hold to no more than is known.
+/// `value` rounded to `digits` significant digits, for files that should contain no more digits than are known.
 pub fn rounded(value: f64, digits: usize) -> f64 {
     let text = format!("{value:.*e}", digits.saturating_sub(1));
     text.parse().unwrap_or(value)
@@ -100,7 +100,7 @@ pub fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
-    // Rounded first: 0.0099998, which time stamps make of 0.01, would have one more. What has no decimals keeps all its digits.
+    // Rounded first: otherwise 0.0099998, which time stamps make of 0.01, would have one digit more. Whole numbers keep all their digits.
     let value = match value.abs() < 100.0 {
         true => rounded(value, 3),
         false => value,
@@ -128,7 +128,7 @@ pub fn plus_minus(value: f64, half: f64) -> String {
     format!("{value:.digits$} ± {half:.digits$}")
 }
 
-/// A time as a person says it.
+/// A time in the unit that people use for it.
 pub fn duration(s: f64) -> String {
     match s {
         s if s < 120.0 => format!("{} s", significant(s)),
@@ -146,7 +146,7 @@ pub fn minutes(seconds: f64) -> String {
     }
 }
 
-/// A probability of chance. Nobody's noise is Gaussian farther out than one in a million.
+/// A p-value. No real noise is known to be Gaussian beyond one in a million.
 pub fn p_value(p: f64) -> String {
     match p {
         p if p < 1e-6 => "p < 1e-6".into(),
@@ -163,7 +163,7 @@ pub fn plural(n: u64, noun: &str) -> String {
     }
 }
 
-/// `value` as a person writes it: a file may hold "-0", which is 0.
+/// `value`, with -0 written as 0.
 pub fn unsigned_zero(value: f64) -> f64 {
     value + 0.0
 }

@@ -1,7 +1,7 @@
-//! From SI, which files have, to what data sheets use, which people read. Nothing else converts units for people.
+//! Converts SI, which files contain, to the units of data sheets, which people read. No other module converts units for people.
 //!
-//! One SI unit is read differently by what it measures: rad/s is deg/s as an error of rate and deg/h as a bias instability. Hence a
-//! function for each kind of quantity.
+//! The unit depends on the quantity: rad/s becomes deg/s for an error of rate and deg/h for a bias instability. Each kind of quantity
+//! therefore has a function.
 
 use std::borrow::Cow;
 
@@ -16,7 +16,7 @@ const HOUR: f64 = 3600.0;
 const ROOT_HOUR: f64 = 60.0;
 const MG: f64 = 1e3 / STANDARD_GRAVITY;
 
-/// A unit that people read, and the way there.
+/// A unit that people read, and the factor to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Readable {
     /// Factor from SI to it.
@@ -43,13 +43,13 @@ const ANGLE: Entry = ("rad", DEG, "deg");
 const RATE: Entry = ("rad/s", DEG, "deg/s");
 const FORCE: Entry = ("m/s^2", 1e3, "mm/s²");
 
-/// Of an error of a unit's output, or an angle: deg, deg/s, mm/s².
+/// For an error of a unit's output, or an angle: deg, deg/s, mm/s².
 pub fn error(si: &str) -> Readable {
     find(si, &[ANGLE, RATE, FORCE])
 }
 
 impl Figure {
-    /// Factor from SI, and unit, in which a person reads the figure of `sensor`.
+    /// Factor from SI, and unit, in which people read the figure of `sensor`.
     pub fn readable(self, sensor: Sensor) -> (f64, &'static str) {
         let (_, factor, unit) = match (self, sensor) {
             (Self::Direction, _) => ANGLE,
@@ -60,8 +60,8 @@ impl Figure {
     }
 }
 
-/// Of a scale factor (raw per SI), a bias (raw, or SI of a unit that reports SI) or an angle of a triad: mV/(deg/s), mV/g, deg/s, mg,
-/// deg. Volts and counts stay.
+/// For a scale factor (raw per SI), a bias (raw, or SI if the unit reports SI) or an angle of a triad: mV/(deg/s), mV/g, deg/s, mg, deg.
+/// Volts and counts stay.
 pub fn parameter(si: &str) -> Readable {
     find(
         si,
@@ -77,7 +77,7 @@ pub fn parameter(si: &str) -> Readable {
     )
 }
 
-/// Of a coefficient of an effect: deg/s/g, ppm, ppm/K, mg/g² and the like.
+/// For a coefficient of an effect: deg/s/g, ppm, ppm/K, mg/g² and the like.
 pub fn coefficient(si: &str) -> Readable {
     const G: f64 = STANDARD_GRAVITY;
     find(
@@ -105,7 +105,7 @@ pub fn coefficient(si: &str) -> Readable {
     )
 }
 
-/// Of a deviation or a coefficient of a noise model, the usual unit first: deg/√h and deg/s/√Hz, deg/h, m/s/√h and µg/√Hz, mg and so on.
+/// For a deviation or a coefficient of a noise model, the usual unit first: deg/√h and deg/s/√Hz, deg/h, m/s/√h and µg/√Hz, mg and so on.
 pub fn noise(si: &str) -> Vec<Readable> {
     let first = find(
         si,
@@ -133,7 +133,7 @@ pub fn noise(si: &str) -> Vec<Readable> {
     }
 }
 
-/// By the entry of `si` in `table`; where there is none, as it is but for the signs that files do without.
+/// The entry of `si` in `table`. Without one the unit is unchanged, except for signs that files spell out (√, ²).
 fn find(si: &str, table: &[Entry]) -> Readable {
     if let Some(&(_, factor, unit)) = table.iter().find(|(name, ..)| *name == si) {
         return Readable {
@@ -159,7 +159,7 @@ fn find(si: &str, table: &[Entry]) -> Readable {
 mod tests {
     use super::*;
 
-    /// That `si` is written as `text`.
+    /// Asserts that `si` is written as `text`.
     fn reads(readable: &Readable, si: f64, text: &str) {
         assert_eq!(readable.write(si), text);
     }

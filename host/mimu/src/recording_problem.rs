@@ -1,8 +1,7 @@
 //! What is wrong with a recording: one line for each kind, for every command that judges one.
 //!
-//! Most problems are seen while the recording is read or its dwells are judged, and are in a [`Warning`] with their figures. What only a
-//! fit shows,
-//! an offset that no accelerometer has or a pose that was never held, is looked for here.
+//! Most problems appear while the recording is read or its dwells are judged, as a [`Warning`] with figures. This module looks for what
+//! only a fit shows: an implausible offset of an accelerometer, or a missing pose.
 
 use std::fmt;
 
@@ -16,9 +15,9 @@ use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::warning::Warning;
 use mimu_recording::RawUnit;
 
-/// Offset of an accelerometer that no data sheet allows, g: those of MEMS parts end at 0.15.
+/// Offset of an accelerometer beyond any data sheet, g: those of MEMS parts allow up to 0.15.
 const LARGEST_OFFSET_G: f64 = 0.5;
-/// Samples a second below which the turns of hands are too fast: between two samples at 20 Hz a hand at 200 deg/s changes its rate by a third.
+/// Sample rate below which turns by hand are too fast, Hz: between two samples at 20 Hz a hand at 200 deg/s changes its rate by a third.
 const SLOW_HZ: f64 = 40.0;
 /// Temperatures at which boards are used, °C.
 const USUAL_C: std::ops::RangeInclusive<f64> = -60.0..=150.0;
@@ -26,9 +25,9 @@ const USUAL_C: std::ops::RangeInclusive<f64> = -60.0..=150.0;
 /// What is wrong with a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RecordingProblem {
-    /// Readings of an axis of the accelerometer that are off by so much, g.
+    /// An axis of the accelerometer, and its offset, g.
     Offset(usize, f64),
-    /// Samples a second of a recording in which the unit is turned by hand.
+    /// Sample rate of a recording in which the unit is turned by hand, Hz.
     SlowForTurns(f64),
     /// Lowest and highest temperature, °C.
     Temperatures(f64, f64),
@@ -36,11 +35,11 @@ pub enum RecordingProblem {
     MissingPoses(String),
     /// Samples that were lost between the device and the PC.
     LostSamples(u64),
-    /// What was seen of one kind while the recording was read and its dwells were judged; at least one.
+    /// Warnings of one kind from reading the recording and judging its dwells; at least one.
     Seen(Seen, Vec<Warning>),
 }
 
-/// Kinds of what is seen without a fit.
+/// Kinds of problems that appear without a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seen {
     /// Readings are not in their declared unit.
@@ -51,7 +50,7 @@ pub enum Seen {
     Rails,
     /// Dwells or turns with readings at a rail.
     Clipping,
-    /// Readings that are repeated, because the sensor is slower than the log or stands.
+    /// Repeated readings: the sensor is slower than the log, or stuck.
     HeldReadings,
     /// Time stamps at another rate than the recording's.
     Clock,
@@ -59,12 +58,12 @@ pub enum Seen {
     Gaps,
     /// Samples without a reading.
     EmptySamples,
-    /// Values of the thermometer that are no temperatures.
+    /// Values of the thermometer that cannot be temperatures.
     Temperatures,
 }
 
 impl Seen {
-    /// Kind of `warning`, if it is of a recording that something is wrong with.
+    /// Kind of `warning`, if it is about a problem of the recording.
     fn of(warning: &Warning) -> Option<Self> {
         Some(match warning {
             Warning::Of(_, warning) | Warning::Channel(_, warning) => return Self::of(warning),
@@ -114,12 +113,12 @@ pub struct OfRecording {
 }
 
 impl OfRecording {
-    /// All of a recording that was fitted.
+    /// All problems of a recording that was fitted.
     pub fn fitted(fit: &Fit) -> Vec<Self> {
         Self::named(&fit.prepared, RecordingProblem::of(fit))
     }
 
-    /// What is seen without a fit: of a recording that was refused, or that nothing is fitted to.
+    /// The problems that appear without a fit, of a recording that was refused or is not fitted.
     pub fn prepared(prepared: &Prepared) -> Vec<Self> {
         Self::named(prepared, RecordingProblem::without_fit(prepared))
     }
@@ -134,7 +133,7 @@ impl OfRecording {
 }
 
 impl RecordingProblem {
-    /// All of a recording that was fitted, those first that may spoil the whole of it.
+    /// All problems of a recording that was fitted; those that may spoil all of it come first.
     pub fn of(fit: &Fit) -> Vec<Self> {
         let prepared = &fit.prepared;
         let of_sensors = fit.sensors.iter().flat_map(|s| &s.warnings);
@@ -160,7 +159,7 @@ impl RecordingProblem {
         all
     }
 
-    /// Those that are seen without a fit.
+    /// The problems that appear without a fit.
     pub fn without_fit(prepared: &Prepared) -> Vec<Self> {
         let warnings = prepared.condensed.warnings.iter();
         let mut all = Self::seen(warnings.chain(&prepared.dwells.warnings));
@@ -168,7 +167,7 @@ impl RecordingProblem {
         all
     }
 
-    /// What of `warnings` is of a recording, kind by kind.
+    /// The `warnings` about problems of the recording, by kind.
     fn seen<'a>(warnings: impl Iterator<Item = &'a Warning>) -> Vec<Self> {
         let mut seen: Vec<(Seen, Vec<Warning>)> = Vec::new();
         for warning in warnings {
@@ -186,7 +185,7 @@ impl RecordingProblem {
             .collect()
     }
 
-    /// What the board's thermometer and its line to the PC show.
+    /// Problems of the board's thermometer and of its connection to the PC.
     fn of_board(prepared: &Prepared) -> Vec<Self> {
         let mut all = Vec::new();
         let blocks = prepared.condensed.blocks.iter().map(|b| b.temp_c.mean);
@@ -218,13 +217,13 @@ impl RecordingProblem {
 }
 
 impl Warning {
-    /// Whether it is among what is wrong with the recording, and need not be printed twice.
+    /// Whether it is also reported as a problem of the recording, and need not be printed twice.
     pub fn is_of_recording(&self) -> bool {
         Seen::of(self).is_some()
     }
 }
 
-/// Axes of an accelerometer whose offset no part has. The zero of a converter is anywhere, but that of signed counts and of SI is 0.
+/// Axes of an accelerometer with an implausible offset. A converter's zero may be anywhere, but that of signed counts and of SI is 0.
 fn offsets(fit: &Fit, accel: &SensorFit) -> Vec<RecordingProblem> {
     let prepared = &fit.prepared;
     let channels = || Sensor::Accel.channels();

@@ -1,7 +1,7 @@
-//! The noise of a recording at rest: which stretch of it, and each channel's curve and model.
+//! The noise of a recording at rest: selects a segment, and computes each channel's curve and model.
 //!
-//! One channel at a time: three hours at 1 kHz are 86 MB a channel, and the spectrum takes more beside them than the curves do. The next is
-//! read while the curves are computed.
+//! One channel is computed at a time: three hours at 1 kHz are 86 MB per channel, and the spectrum takes more memory in addition than the
+//! curves. The next channel is read while the curves are computed.
 
 mod ahead;
 mod columns;
@@ -52,11 +52,11 @@ pub struct Options {
 pub struct Channel {
     /// Its column.
     pub name: &'static str,
-    /// Sensor that it is of.
+    /// Its sensor.
     pub sensor: Sensor,
     /// Unit of its deviations.
     pub unit: Unit,
-    /// Why it has no noise: it is the same throughout, and nothing of it is computed.
+    /// Why it has no noise: it is constant, and nothing is computed from it.
     pub dead: Option<String>,
     /// Samples that it was computed from.
     pub samples: usize,
@@ -64,11 +64,11 @@ pub struct Channel {
     pub masked: Option<Masked>,
     /// Deviation over averaging time.
     pub curve: Vec<Point>,
-    /// Hadamard deviation, where a drift asks for it.
+    /// Hadamard deviation, if the curve shows a drift.
     pub hadamard: Option<Vec<Point>>,
-    /// Lines of its spectrum, which the model is without.
+    /// Lines of its spectrum, which the model excludes.
     pub spectrum: SetAside,
-    /// [`Channel::curve`] without them, where there are any.
+    /// [`Channel::curve`] without the lines, if there are any.
     pub without_lines: Option<Vec<Point>>,
     /// The noise model; `None` where the record has too few octaves for one.
     pub model: Option<NoiseModel>,
@@ -97,15 +97,16 @@ pub struct Survey {
     pub warnings: Vec<Warning>,
 }
 
-/// Share of the Allan variance at the longest time from which on a ramp is what the curve shows there.
+/// If a ramp makes more than this share of the Allan variance at the longest time, the curve shows a drift there.
 const RAMP_SHARE: f64 = 0.5;
 
-/// Computes the noise of `recording`, in SI where its raw unit is or where `calibration` has the scale factors.
+/// Computes the noise of `recording`, in SI if its raw unit is SI or `calibration` gives the scale factors.
 ///
-/// A channel in volts or counts is divided by the scale factor of its own axis and not mixed with the others into body axes:
-/// noise is the sensor's, and a misalignment of 1 % is 1e-4 of its variance.
+/// A channel in volts or counts is divided by the scale factor of its axis, without the rotation to body axes: the noise belongs to the
+/// sensor, and a misalignment of 1 % is 1e-4 of its variance.
 ///
-/// Errors: the stretch is too short, the unit moves, a channel is stuck for a time or all are throughout, time stamps that do not fit the rate.
+/// Errors: the segment is too short, the unit moves, a channel is stuck for a time, all channels are stuck throughout, or the time stamps
+/// do not fit the rate.
 pub fn survey(
     recording: &Recording,
     calibration: Option<&Calibration>,
@@ -164,7 +165,7 @@ pub fn survey(
         judged.push((i, values.suitability));
         let mut rates = values.rates;
         let dt_s = stretch.period_s;
-        // Kept are its curves, and not the integral, which is as long as the series.
+        // Only its curves are kept: the integral is as long as the series.
         let mut as_it_is = None;
         let spectrum = set_aside_after(&mut rates, dt_s, options.confidence, |rates| {
             as_it_is = Some(AsItIs::of(rates, dt_s, &options));
@@ -310,7 +311,7 @@ fn hadamard(integrated: &Integrated, options: &Options) -> Vec<Point> {
 }
 
 impl Channel {
-    /// The raw channel `i` before anything is computed of its `samples`.
+    /// The raw channel `i` before anything is computed from its `samples`.
     fn of(i: usize, unit: Unit, samples: usize) -> Self {
         Self {
             name: RAW_COLUMNS[i],
@@ -335,7 +336,8 @@ impl Channel {
         }
     }
 
-    /// Curve of the channel as it is, and model of it without its lines: of the curves with them, where there are any, and the integral without.
+    /// Computes the curve of the channel with its lines, and the model without them. `as_it_is` are the curves with lines, if there are
+    /// any; `without_lines` is the integral without them.
     fn analyse(
         &mut self,
         as_it_is: Option<&AsItIs>,
@@ -368,10 +370,10 @@ impl Channel {
         self.read_white_band(without_lines.dt_s(), options.confidence);
     }
 
-    /// N from the spectrum, where the Allan curve is bent at its short end and the model does not show it, or not as it is.
+    /// Takes N from the spectrum if the Allan curve is bent at its short end, where the model shows N wrongly or not at all.
     fn read_white_band(&mut self, dt_s: f64, confidence: f64) {
         let Some(model) = &mut self.model else { return };
-        // Of a bump its slopes are left, which are below twice the floor each and move the whole curve.
+        // The slopes of a bump remain: below twice the floor, but they move the whole curve.
         let bump = self.spectrum.lines.iter().any(|l| l.width_hz.is_some());
         let shortened = model.range_s[0] > 1.5 * dt_s;
         if model.get(Term::N).is_ok() && model.excess.is_none() && !shortened && !bump {
@@ -392,13 +394,13 @@ impl Channel {
                 });
                 self.n_band_hz = Some(band);
             }
-            // Neither shows it: the curve's bound may come from where a filter has bent it.
+            // Neither shows N: the curve's bound may come from times at which a filter has bent it.
             (None, Err(unseen)) => unseen.raise(white.interval[1]),
             (None, Ok(_)) => {}
         }
     }
 
-    /// Warns where the long end is a drift's, and adds what the Hadamard deviation shows without it.
+    /// Warns if the long end of the curve shows a drift, and adds the Hadamard deviation, which cancels a drift.
     fn judge_drift(
         &mut self,
         hadamard: impl FnOnce() -> Vec<Point>,

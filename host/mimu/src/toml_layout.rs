@@ -6,19 +6,19 @@ use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value};
 /// Text of `file` below a header of comments. Numbers have all their digits, so that they are read back exactly.
 ///
 /// # Panics
-/// If `file` is no table of values that TOML has: a matter of its type, and not of its numbers.
+/// If the type of `file` is not a table of TOML values. Its numbers do not matter.
 pub fn to_toml(header: &str, file: &impl Serialize) -> String {
     let document = toml_edit::ser::to_document(file).expect("a table of numbers and strings");
     let laid_out = table(inline(document));
     format!("{header}{}", DocumentMut::from(laid_out))
 }
 
-/// The serializer leaves it open which tables are inline; here all are.
+/// The serializer may return some tables inline; here all are.
 fn inline(document: DocumentMut) -> InlineTable {
     document.into_table().into_inline_table()
 }
 
-/// A table with a head of its own, and so are the tables in it; an array of tables has one for each.
+/// A table with a header; the tables in it, and those of an array of tables, have one each.
 fn table(from: InlineTable) -> Table {
     let mut out = Table::new();
     for (key, value) in from {
@@ -38,7 +38,7 @@ fn table(from: InlineTable) -> Table {
     out
 }
 
-/// An entry of an array of tables: what it holds is on a line each, but for a table with arrays in it, which has a head of its own.
+/// An entry of an array of tables: each value is on one line, except a table that contains arrays, which has a header.
 fn entry(from: InlineTable) -> Table {
     let mut out = Table::new();
     for (key, value) in from {
@@ -57,7 +57,7 @@ fn holds_tables(array: &Array) -> bool {
     !array.is_empty() && array.iter().all(Value::is_inline_table)
 }
 
-/// Rows of a matrix and of an array of tables on a line each, numbers as short as they are read back exactly.
+/// Puts each row of a matrix or of an array of tables on a line, and writes numbers as short as they are read back exactly.
 fn laid_out(value: Value) -> Value {
     match value {
         // Display writes 1e-12 as 0.000000000001; Debug does not.

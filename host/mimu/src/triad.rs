@@ -27,7 +27,7 @@ pub fn affine(parameters: &SVector<f64, 12>) -> Affine<f64> {
     }
 }
 
-/// The other direction of an affine model: of `y = A x + b` it is `x = A⁻¹ y - A⁻¹ b`. `None` if A is singular.
+/// The other direction of an affine model: for `y = A x + b` it is `x = A⁻¹ y - A⁻¹ b`. `None` if A is singular.
 pub fn invert(model: &Affine<f64>) -> Option<Affine<f64>> {
     let matrix = model.matrix.try_inverse()?;
     Some(Affine {
@@ -66,8 +66,8 @@ pub fn directions(inverse: &Affine<f64>) -> Option<(Matrix3<f64>, Vector3<f64>, 
     Some((unit, scale, forward))
 }
 
-/// Forward model of a triad, SI to raw: `u = P x + b`, fang (15), (17). A type of its own, so that it is not taken for the
-/// inverse one, which has the same twelve numbers.
+/// Forward model of a triad, SI to raw: `u = P x + b`, fang (15), (17). A separate type, so that it cannot be confused with the inverse
+/// model, which also has twelve numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forward {
     /// P, raw per SI. Row: sensor. Column: axis of the body frame.
@@ -77,7 +77,7 @@ pub struct Forward {
 }
 
 impl Forward {
-    /// Raw reading under the `input` (SI, body frame).
+    /// Raw reading for the `input` (SI, body frame).
     pub fn apply(&self, input: &Vector3<f64>) -> Vector3<f64> {
         self.matrix * input + self.bias
     }
@@ -104,15 +104,15 @@ impl Forward {
 pub struct Part {
     /// Covariance of matrix by rows, then offset or bias.
     pub covariance: Covariance,
-    /// Degrees of freedom that its size was found with; infinite where the noise was known beforehand.
+    /// Degrees of freedom from which its size was estimated; infinite if the noise was known beforehand.
     pub dof: f64,
 }
 
-/// Half of a 95 % interval around an estimate whose error is the sum of independent ones: the variance of each, and
-/// the degrees of freedom that it is known with.
+/// Half of a 95 % interval around an estimate whose error is the sum of independent `contributions`: the variance of each, and its degrees
+/// of freedom.
 ///
-/// The degrees of freedom of the sum are Welch and Satterthwaite's. One factor for all parameters, that of the group with
-/// the fewest, made xu's offsets hold the truth in all of the runs.
+/// The degrees of freedom of the sum are those of Welch and Satterthwaite. With one factor for all parameters, that of the group with the
+/// fewest, the intervals of xu's offsets contained the truth in all runs.
 pub fn half_width_95(contributions: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (mut variance, mut doubt) = (0.0, 0.0);
     for (v, dof) in contributions {
@@ -129,8 +129,8 @@ pub fn half_width_95(contributions: impl Iterator<Item = (f64, f64)>) -> f64 {
 
 /// Half of a 95 % interval in sigmas, of Student's distribution.
 fn students_factor(dof: f64) -> f64 {
-    // From 100 degrees on the first terms of Abramowitz and Stegun (26.7.5): exact to 3e-6 there, and the library's search
-    // does not end where there are many more.
+    // From 100 degrees on, the first terms of Abramowitz and Stegun (26.7.5) are exact to 3e-6; the library's search does not end for many
+    // more.
     if dof < 100.0 {
         StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |t| t.inverse_cdf(0.975))
     } else {
@@ -154,7 +154,7 @@ pub struct Triad {
     pub forward: Forward,
     /// Covariance of P by rows, then b.
     pub forward_covariance: Covariance,
-    /// What `forward_covariance` is the sum of.
+    /// The parts that add up to `forward_covariance`.
     forward_parts: Vec<Part>,
 }
 
@@ -167,7 +167,7 @@ pub fn slope(along: &Vector3<f64>, u: &Vector3<f64>) -> SVector<f64, 12> {
 }
 
 impl Triad {
-    /// Variance by the error of the inverse model, of what has the derivatives `by` its twelve parameters.
+    /// Variance, from the error of the inverse model, of a quantity whose derivatives by the twelve parameters are `by`.
     pub fn variance(&self, by: &SVector<f64, 12>) -> f64 {
         by.dot(&(self.inverse_covariance * by)).max(0.0)
     }
@@ -199,8 +199,8 @@ impl Triad {
         })
     }
 
-    /// With axes that the frame may be turned against by small angles of this standard deviation, rad, about each: how a unit is mounted on a
-    /// table no dwell shows, and it turns gyro and accelerometer alike.
+    /// Adds an unknown rotation of the frame with this standard deviation, rad, about each axis. No dwell shows how a unit is mounted on a
+    /// table; the mounting rotates gyro and accelerometer alike.
     pub fn mounted(mut self, sigma_rad: f64) -> Self {
         let mut covariance = Covariance::zeros();
         for axis in 0..3 {
@@ -218,7 +218,7 @@ impl Triad {
         self
     }
 
-    /// What the covariance of C and o is the sum of.
+    /// The parts that add up to the covariance of C and o.
     pub fn inverse_parts(&self) -> Vec<Part> {
         let j = inversion_jacobian(&self.inverse.matrix, &self.inverse.offset);
         self.forward_parts.iter().map(|p| p.seen_by(&j)).collect()
@@ -268,7 +268,7 @@ impl Triad {
         let scale = self.forward.matrix.norm();
         let mut jacobian = SMatrix::<f64, 12, 12>::zeros();
         for k in 0..12 {
-            // Central differences with steps of 1e-4: off by their square, 1e-9 of the slope.
+            // Central differences with steps of 1e-4: their error is of second order, 1e-9 of the slope.
             let step = if k < 9 { 1e-4 * scale } else { scale.max(1e-6) };
             let (mut up, mut down) = (at, at);
             up[k] += step;
@@ -300,7 +300,7 @@ pub struct Estimate {
 }
 
 impl Part {
-    /// The same in other parameters, of which `jacobian` holds the derivatives by these.
+    /// The same in other parameters, whose derivatives by these are `jacobian`.
     pub fn seen_by(&self, jacobian: &Covariance) -> Self {
         Self {
             covariance: jacobian * self.covariance * jacobian.transpose(),
@@ -324,7 +324,7 @@ pub enum Angles {
     Exact,
 }
 
-/// The forward model as a person understands it: `P = K Mo Mp`.
+/// The forward model as physical quantities: `P = K Mo Mp`.
 ///
 /// # Conventions
 ///
@@ -365,9 +365,9 @@ impl Physical {
                 (p.diagonal(), theta, beta)
             }
             Angles::Exact => {
-                // P = L Q: Q' R' is the QR factorization of P'. The signs of the sensors are free, but Q has to be a
-                // rotation for its angles to mean anything: of the four choices that make it one, the one with the
-                // smallest turn. A sensor mounted backwards then has a negative scale factor.
+                // P = L Q, by the QR factorization of P' = Q' L'. The signs of the sensors are free, but Q must be a rotation for its
+                // angles to have a meaning. Of the four choices of signs that make it one, the smallest rotation is taken. A sensor mounted
+                // backwards then has a negative scale factor.
                 let qr = p.transpose().qr();
                 let (mut q, mut l) = (qr.q().transpose(), qr.r().transpose());
                 let choices = (0..8u8)
@@ -405,7 +405,7 @@ impl Physical {
         out
     }
 
-    /// Forward model `P, b` that these quantities describe: the way back, for checking by hand.
+    /// Forward model `P, b` of these quantities, the inverse of the decomposition: for checks by hand.
     pub fn forward(&self) -> Forward {
         let value = |e: &[Estimate; 3]| Vector3::from_fn(|i, _| e[i].value);
         let (theta, beta) = (value(&self.misalignment), value(&self.non_orthogonality));

@@ -1,7 +1,7 @@
-//! Which dwells of a recording turned at which rate of the turntable, where only its magnitude is known.
+//! Finds which dwells of a recording turned at which rate of the turntable, if only its magnitude is known.
 //!
-//! The manifest says it of the steps that a person named. Of the others the readings show it: those at rest are the bias, and those at a rate
-//! lie at a distance from it that is the rate times about one scale factor.
+//! The manifest gives the rates of the steps that a person named. The readings show those of the others: at rest they are the bias, and at
+//! a rate their distance from the bias is the rate times a scale factor, which is about the same for all axes.
 
 use nalgebra::Vector3;
 
@@ -17,30 +17,32 @@ use mimu_recording::{RawUnit, Turntable};
 
 /// Half of a 95 % interval of a normal variable, in sigmas.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
-/// Standard deviations by which readings are expected off: at rest, over the largest rate, where a bias wanders; at a rate, over it, by scale factors
-/// that differ from axis to axis.
+/// Expected standard deviations of the readings. At rest, relative to the largest rate: the bias wanders. At a rate, relative to it: scale
+/// factors differ from axis to axis.
 const REST_SIGMA: f64 = 0.02;
 const RATE_SIGMA: f64 = 0.06;
-/// Squared sigmas that a dwell at none of the rates counts.
+/// Cost of a dwell at none of the rates, in squared sigmas.
 const AT_NONE: f64 = 9.0;
-/// Mean of the squared sigmas from which on the readings show no rates.
+/// If the mean of the squared sigmas reaches this, the readings do not show the rates.
 const UNLIKE: f64 = 4.0;
-/// Fewest dwells that are taken for rests: one alone may as well be a turn, as those about perpendicular axes are at two distances from it.
+/// Fewest dwells that are accepted as rests. A single one may be a turn, because turns about perpendicular axes are at two distances from
+/// it.
 const FEWEST_RESTS: f64 = 2.0;
-/// Share of its rate by which a dwell may be off in a fit of all: beyond, it turned at another rate. 33 1/3 and 45 rpm are 26 % apart.
+/// Largest deviation of a dwell from its rate in a fit of all, as a share of the rate; beyond it, the dwell turned at another rate. 33 1/3
+/// and 45 rpm are 26 % apart.
 const OTHER_RATE: f64 = 0.1;
-/// Scale factors of readings in SI, over one, among which the dwells are assigned: wider than any part, so that a wrong rate is seen in the fit.
+/// Range of scale factors of readings in SI in which dwells are assigned: wider than that of any part, so that the fit shows a wrong rate.
 const SCALE_IN_SI: [f64; 2] = [0.5, 2.0];
 
-/// How many dwells may be at none of the rates, for each that is at one. With more of them the rates are not those that were given: of a unit that turned at
-/// 200 and 270 deg/s, as often at either, and of which 200 was given, either half is at it as well as the other.
+/// Largest number of dwells at none of the rates, per dwell at a rate. With more of them the given rates are wrong. For example, if a unit
+/// turned as often at 200 as at 270 deg/s and only 200 is given, either half fits that rate.
 const MOST_AT_NONE: f64 = 0.6;
 
-/// At what a dwell turned.
+/// The rate at which a dwell turned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Class {
     Rest,
-    /// By index.
+    /// At the rate with this index.
     Rate(usize),
     Other,
 }
@@ -56,17 +58,17 @@ pub struct RatedDwells {
     pub turning: Vec<Observation>,
     /// Index of the rate of each of them.
     pub rate_of: Vec<usize>,
-    /// Dwells at rest, where nothing but the Earth turns the gyro.
+    /// Dwells at rest, where only the Earth turns the gyro.
     pub rests: Vec<Rest>,
     /// Indices of the dwells that turned at another rate.
     pub others: Vec<usize>,
 }
 
 impl RatedDwells {
-    /// Of a recording whose reference is the rate of a turntable.
+    /// For a recording whose reference is the rate of a turntable.
     ///
     /// # Errors
-    /// A step that is named and is not there; readings that do not show which dwell has which rate.
+    /// A named step does not exist, or the readings do not show which dwell has which rate.
     pub fn of(prepared: &Prepared) -> Result<Self> {
         let none = Turntable {
             rates_dps: Vec::new(),
@@ -98,7 +100,7 @@ impl RatedDwells {
                     rate_of.push(rate);
                 }
                 Class::Other => others.push(o.dwell),
-                // The Earth's rate lies anywhere in the frame of a gyro whose axes are not known yet.
+                // The axes of the gyro are not known yet, so the Earth's rate may have any direction in its frame.
                 Class::Rest => rests.push(Rest {
                     dwell: o.dwell,
                     raw: o.raw,
@@ -108,7 +110,7 @@ impl RatedDwells {
                 }),
             }
         }
-        // About the vertical the Earth's rate adds to the turntable's, by 2e-5 of 200 deg/s: all dwells have the same error of it.
+        // About the vertical the Earth's rate adds to the turntable's, by 2e-5 of 200 deg/s: an error that all dwells share.
         let slowest = rates.first().copied().unwrap_or(f64::INFINITY);
         Ok(Self {
             rate_sigma: (turntable.rate_error / NORMAL_95).hypot(earth::RATE / slowest),
@@ -125,8 +127,8 @@ impl RatedDwells {
         self.rate_of.iter().map(|r| self.rates[*r])
     }
 
-    /// Sets the turning dwells aside for the accelerometer, which beside the axis feels a centripetal force there that nothing says, and those at another
-    /// rate for both sensors; what to say of these.
+    /// Excludes the turning dwells for the accelerometer, which senses an unknown centripetal force off the axis, and those at another rate
+    /// for both sensors. Returns the warning about the latter.
     pub fn set_aside(&self, prepared: &mut Prepared) -> Option<Warning> {
         let turning = self.turning.iter().map(|o| o.dwell);
         for dwell in turning.chain(self.others.iter().copied()) {
@@ -142,7 +144,7 @@ impl RatedDwells {
         (!names.is_empty()).then_some(Warning::DwellsNotUsed(names, Fault::OtherRate, None))
     }
 
-    /// Refuses a dwell that turns at another rate than its own by a fit of all; `fitted` are their magnitudes, rad/s.
+    /// Refuses a dwell whose rate in a fit of all dwells differs from its given rate; `fitted` are the fitted magnitudes, rad/s.
     pub(crate) fn refuse_other_rate(&self, prepared: &Prepared, fitted: &[f64]) -> Result<()> {
         let off = |i: usize| (fitted[i] / self.rates[self.rate_of[i]] - 1.0).abs();
         let worst = (0..fitted.len()).max_by(|a, b| off(*a).total_cmp(&off(*b)));
@@ -215,10 +217,10 @@ fn unclear(prepared: &Prepared, rates: &[f64]) -> Error {
     Error::new(format!("{}, gyro", prepared.place), problem, remedy).about(Argument::TurntableRates)
 }
 
-/// At what each of the `observations` turned, where the readings show it; `given` are those that are known.
+/// The rate at which each of the `observations` turned, if the readings show it; `given` are the known ones.
 ///
-/// Each reading is tried as the bias, and each distance from it as each of the rates; where there is one rate only, the readings may also all be at
-/// it, about the centre of their sphere. What fits best is taken.
+/// Each reading is tried as the bias, and each distance from it as each of the rates. If there is only one rate, all readings may also be
+/// at it, on a sphere about the bias. The best fit is taken.
 fn assigned(
     observations: &[Observation],
     rates: &[f64],
@@ -230,7 +232,7 @@ fn assigned(
     let off = |share: f64, class: Class| match class {
         Class::Rest => (share / REST_SIGMA).powi(2),
         Class::Rate(k) => ((share * largest / rates[k] - 1.0) / RATE_SIGMA).powi(2),
-        // A table that turns on slowly, or a hand that turns it.
+        // A table that still turns slowly, or that a hand turns.
         Class::Other => AT_NONE,
     };
     let nearest = |share: f64| {
@@ -315,7 +317,7 @@ mod tests {
         [0.0, 1.0, -1.0],
     ];
 
-    /// At what dwells with these rates, deg/s, in each direction turned, where 200 and 270 deg/s, or the first of them, are known.
+    /// The classes found for dwells at these rates, deg/s, in each direction; the first `known` of 200 and 270 deg/s are given.
     fn found(dps: &[f64], known: usize) -> Option<Vec<Class>> {
         let rates = [200f64.to_radians(), 270f64.to_radians()];
         let all = DIRECTIONS.iter();
@@ -347,7 +349,7 @@ mod tests {
     fn turns_at_one_rate_without_rests_are_all_at_that_rate_and_of_two_rates_nothing_shows_which() {
         assert_eq!(found(&[200.0], 1), Some(vec![Class::Rate(0); 8]));
         assert_eq!(found(&[200.0], 2), None);
-        // As often at a rate that was not given as at the one that was.
+        // As often at a rate that was not given as at the given one.
         assert_eq!(found(&[0.0, 200.0, 270.0], 1), None);
         assert_eq!(found(&[0.0, 0.0, 200.0, 270.0], 1), None);
     }

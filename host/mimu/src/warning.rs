@@ -1,4 +1,4 @@
-//! What a person should know of a recording, a fit or a verdict, by kind.
+//! Warnings about a recording, a fit or a verdict, by kind.
 
 mod words;
 
@@ -13,28 +13,28 @@ use serde::{Serialize, Serializer};
 use crate::fault::Fault;
 use crate::quantity::{Sensor, normal_gravity};
 
-/// What local gravity may differ from normal gravity at sea level by, m/s²: up to 5500 m of height take 0.017 away, and 400 m of depth add 0.001;
-/// anomalies of the Earth's field make 0.003 either way (they reach 0.005 on a few peaks and islands).
+/// Range of the difference of local gravity from normal gravity at sea level, m/s²: heights of up to 5500 m subtract 0.017, and depths of
+/// 400 m add 0.001. Anomalies of the Earth's field are up to 0.003 either way (0.005 on a few peaks and islands).
 const GRAVITY_OFF_MPS2: [f64; 2] = [-0.020, 0.005];
 
-/// What a person should know. JSON has the sentence.
+/// What a person should know. JSON contains it as a sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Warning {
     /// One about a sensor.
     Of(Sensor, Box<Warning>),
     /// One about a channel.
     Channel(&'static str, Box<Warning>),
-    /// What the reader of a recording remarked.
+    /// A warning from reading a recording.
     Reading(mimu_recording::Warning),
-    /// Rate of the time stamps, Hz, by how many per cent it is off the rate that the manifest gives, and that one.
+    /// Rate of the time stamps, Hz, its difference in per cent from the rate in the manifest, and that rate, Hz.
     RateOff(f64, f64, f64),
-    /// Gaps, what is missing in all, s, and the first data row after one.
+    /// Gaps, the missing time in all, s, and the first data row after one.
     Gaps(u64, f64, u64),
     /// Rows that repeat the row before.
     Repeated(u64),
     /// Samples of a channel that are empty or not a number.
     Empty(u64, &'static str),
-    /// Samples of the thermometer that are no temperatures.
+    /// Samples of the thermometer that cannot be temperatures.
     NoTemperatures(NoTemperatures),
     /// A channel without noise, and how it shows.
     Dead(String),
@@ -42,25 +42,25 @@ pub enum Warning {
     Held(Sensor, Held, f64),
     /// Dwells that were cut at their ends, and by how much in all, s.
     DwellsCut(u64, f64),
-    /// Dwells that are poses of the accelerometer and no rests of the gyro.
+    /// Dwells that are poses of the accelerometer but not rests of the gyro.
     SlowTurns(Vec<String>),
     /// Dwells that are not used, and why: for both sensors alike or for one.
     DwellsNotUsed(Vec<String>, Fault, Option<Sensor>),
     /// Samples within dwells at a rail.
     Clipped(u64),
-    /// A dwell that is not used for a sensor, as an effect cannot be removed from it.
+    /// A dwell that is not used for a sensor, because an effect cannot be removed from it.
     DwellWithEffect(i32, Sensor, Fault, String),
     /// How often a channel reads a value at the end of a converter, and that value.
     EndOfConverter(u64, f64),
-    /// Whether the highest value is a rail or the lowest, which one, how often it comes in a row, and how often by chance.
+    /// Whether the highest value is a rail or the lowest, that value, how often it occurs in a row, and how often chance explains.
     RunAtEnd(bool, f64, f64, f64),
     /// Whether the noise ends at the highest values or the lowest, and from which one on.
     CalmEnd(bool, f64),
     /// Gravity that no height explains, m/s², and the latitude, degrees.
     Gravity(f64, f64),
-    /// Readings in SI that are so many times their input (with their biases where they were taken at rest), and the likely cause.
+    /// Readings in SI: whether they are at rest (and include biases), how many times their input they are, and the likely cause.
     NotSi(bool, f64, &'static str),
-    /// Rate, rad/s, that a gyro reads at rest and no bias reaches.
+    /// Reading of a gyro at rest, rad/s, that is larger than any bias.
     Turning(f64),
     /// Calibrated rate at rest, rad/s rms, by which dwells differ.
     Restless(f64),
@@ -72,7 +72,7 @@ pub enum Warning {
     MeansWithoutNoise,
     /// Means whose noise is taken to be white.
     WhiteMeans,
-    /// Rows of a table that lack the mean of an axis, of so many.
+    /// Number of rows of a table that lack the mean of an axis, and of all rows.
     MeansMissing(usize, usize),
     /// A gyro in a table of means whose only reference is gravity.
     MeansOfTurns,
@@ -84,7 +84,7 @@ pub enum Warning {
     NoInput(String),
     /// All dwells have one input.
     OneInput,
-    /// Turns by hand that are taken as exact.
+    /// Given turns that are assumed to be exact.
     ExactTurns,
     /// Dwells whose input moves, and the method that uses their means alone.
     MeansAlone(u64, &'static str),
@@ -92,16 +92,17 @@ pub enum Warning {
     NoTurn,
     /// A dwell that is not used for the accelerometer: its error, m/s², against what the others predict, and the same in sigmas.
     DwellLeftOut(i32, f64, f64),
-    /// A dwell that is kept for the accelerometer though it is suspect: its error, m/s², the parameter that the others leave open, and how
-    /// many times as wide its interval would be.
+    /// A dwell that is kept for the accelerometer though it is suspect: its error, m/s², the parameter that the others hardly determine,
+    /// and how many times as wide its interval would be without the dwell.
     DwellKept(i32, f64, &'static str, f64),
     /// A turn, from dwell to dwell, that is not used: its error, rad, against what the others predict, and the same in sigmas.
     TurnLeftOut(i32, i32, f64, f64),
-    /// A turn that is kept though it is suspect: the parameter that the others leave open, and how many times as wide its interval would be.
+    /// A turn that is kept though it is suspect: the parameter that the others hardly determine, and how many times as wide its interval
+    /// would be without the turn.
     TurnKept(i32, i32, String, f64),
     /// A turn that cannot be integrated: by the fault of a channel, or because samples are missing.
     TurnNotUsed(i32, i32, Option<Fault>),
-    /// Direction of gravity after a turn, rad from where it is predicted.
+    /// Angle between gravity after a turn and its prediction, rad.
     WideTurn(f64),
     /// As many parameters as residuals.
     NoResiduals,
@@ -123,13 +124,14 @@ pub enum Warning {
     NotHeldOut(bool, Vec<usize>, String),
     /// One dwell in so many is held out in place of blocks, and why.
     Interleaved(usize, Box<Warning>),
-    /// Parameters that what was left out changes, of so many, and the largest changes.
+    /// Number of parameters that leaving out dwells or turns changes, of all parameters, and the largest changes.
     LeftOutChanges(usize, usize, Vec<String>),
-    /// Errors as the readings came and calibrated, and their unit; whether the latter is held out; where they do not decide, their number.
+    /// Errors of the uncalibrated and the calibrated readings, and their unit; whether the latter are held out; their number if they do not
+    /// decide.
     NoBetter([f64; 2], &'static str, bool, Option<usize>),
-    /// Directions near which no pose is, and the errors there and in the poses, m/s².
+    /// Directions without a pose nearby, and the errors there and in the poses, m/s².
     UnseenPoses(Vec<String>, f64, f64),
-    /// Shares of the known inputs that models without and with temperature leave, and the mean temperature, °C.
+    /// Shares of the readings that models without and with temperature leave unexplained, and the mean temperature, °C.
     FollowsTemperature(f64, f64, f64),
     /// Dwells, or else turns, that are outliers; the largest error, its unit, and its ratio to the median.
     Outliers(bool, Vec<String>, f64, &'static str, f64),
@@ -141,7 +143,7 @@ pub enum Warning {
     NoRestsToFit(String),
     /// Angle between the axes and those that they are referred to, rad, and whether these are the table's.
     Turned(f64, bool),
-    /// Angle of the known forces off those that were given, rad rms.
+    /// Angle by which the dwells appear to be off level, rad rms.
     OffLevel(f64),
     /// Numbers of the calibration's unit and of the recording's.
     OtherUnit(String, String),
@@ -156,55 +158,56 @@ pub enum Warning {
     NoTemperature,
     /// The recording has nothing to judge a sensor by.
     NothingToJudge,
-    /// Worse than the readings as they came, or else than their mean scale factor and bias.
+    /// Worse than the uncalibrated readings, or else than their mean scale factor and bias.
     Worse(bool),
-    /// Errors that do not tell whether the calibration is better than that; of turns or else of dwells.
+    /// Number of errors that do not show whether the calibration is better; whether they are of turns, or else of dwells; compared with
+    /// what, as in [`Self::Worse`].
     Undecided(u64, bool, bool),
     /// A calibration that lacks a sensor of the recording.
     NotCalibrated(Sensor),
     /// A calibration whose uncertainty is not known.
     Uncertain,
-    /// A recording that cannot judge the calibration, by its name where there are several, and why.
+    /// A recording that cannot judge the calibration, with its name if there are several, and why.
     NotJudged(Option<String>, Error),
-    /// An effect of the given calibration that is not in the new one, as its sensor is not recorded.
+    /// An effect of the given calibration that is missing in the new one, because its sensor is not recorded.
     EffectLost(String, Sensor),
     /// Lines of the spectrum that are not steady.
     UnsteadyLines,
     /// Range of the temperature that a channel follows, °C, and the correlation.
     FollowsChamber(f64, f64),
-    /// Share of a drift in the variance at a cluster time, s.
+    /// Share of a drift in the variance at an averaging time, s.
     Drifts(f64, f64),
-    /// First data row with an empty cell; length of the stretch that is used, s, and its first data row.
+    /// First data row with an empty cell; length of the segment that is used, s, and its first data row.
     EmptyCells(usize, f64, usize),
     /// Samples that are masked, their share, and the instant of the first, s.
     Disturbed(u64, f64, f64),
     /// Windows in which the unit moves, of so many; their length, s; the first instant, s, and the channel.
     Moves([usize; 2], f64, f64, &'static str),
-    /// Gaps, the first one, s, and the data row after it; length of the stretch that is used, s, and its beginning, s.
+    /// Gaps, the first one, s, and the data row after it; length of the segment that is used, s, and its beginning, s.
     LongestStretch(u64, f64, usize, f64, f64),
 }
 
 impl Warning {
-    /// It, about `sensor`.
+    /// This warning, about `sensor`.
     pub(crate) fn of(self, sensor: Sensor) -> Self {
         Self::Of(sensor, Box::new(self))
     }
 
-    /// A warning where gravity, m/s², cannot be that of the latitude, degrees. Nothing in a recording shows which of the two is wrong: every scale factor of
-    /// an accelerometer calibrated by gravity is in proportion to it, and residuals stay as they are. The Earth's rate, which the latitude sets, differs by
-    /// less than the bias of a gyro wanders.
+    /// A warning if gravity, m/s², is impossible at the latitude, degrees. Nothing in a recording shows which of the two is wrong: the
+    /// scale factors of an accelerometer calibrated by gravity are proportional to it, and the residuals do not change. A wrong latitude
+    /// also changes the Earth's rate, but by less than the bias wander of a gyro.
     pub fn of_gravity(gravity_mps2: f64, latitude_deg: f64) -> Option<Self> {
         let off = gravity_mps2 - normal_gravity(latitude_deg);
         let [least, most] = GRAVITY_OFF_MPS2;
         (off < least || off > most).then_some(Self::Gravity(gravity_mps2, latitude_deg))
     }
 
-    /// It, about channel `c`.
+    /// This warning, about channel `c`.
     pub(crate) fn of_channel(self, c: usize) -> Self {
         Self::Channel(RAW_COLUMNS[c], Box::new(self))
     }
 
-    /// Whether `other` is of the same kind, about the same sensor, with the same cause: then one of the two need be printed.
+    /// Whether `other` is of the same kind, about the same sensor, with the same cause: then only one of the two need be printed.
     pub fn is_like(&self, other: &Self) -> bool {
         let same = discriminant(self) == discriminant(other);
         same && match (self, other) {
@@ -218,7 +221,7 @@ impl Warning {
         }
     }
 
-    /// The dwell that has to be kept for it to go, if it is of one that was left out.
+    /// If the warning is about a dwell or turn that was left out: the dwell to keep, so that it is used.
     pub fn left_out(&self) -> Option<i32> {
         match self {
             Self::DwellLeftOut(step, ..) | Self::TurnLeftOut(_, step, ..) => Some(*step),
@@ -237,7 +240,8 @@ impl Serialize for Warning {
 mod tests {
     use super::*;
 
-    /// Measured values: Denver (EGM2008 and absolute gravimetry, 1609 m), La Paz (3640 m), Paris, and the two that a session took one for the other.
+    /// Measured values of Denver (EGM2008 and absolute gravimetry, 1609 m), La Paz (3640 m) and Paris; and normal gravity at the equator
+    /// and the poles.
     #[test]
     fn gravity_of_high_places_is_plausible_and_that_of_another_latitude_is_not() {
         for (gravity, latitude_deg) in [

@@ -1,9 +1,9 @@
-//! Curves of the biases from a unit at rest, upon its calibration at one temperature: that which warming up an autopilot gives, with scale
-//! factors and misalignments from poses at room temperature.
+//! Adds bias curves of a unit at rest to its calibration at one temperature. The curves come from the warm-up of an autopilot, for example;
+//! scale factors and misalignments come from poses at room temperature.
 //!
 //! At rest the readings are `u(T) = P(T) x + b(T)` with an input x that is unknown and constant. If P is that of the calibration at all
-//! temperatures, then `b(T) = b(T0) + u(T) - u(T0)`, and x is not needed: `o(T) = o(T0) - C (u(T) - u(T0))`. What P over temperature does to
-//! gravity in the pose of the recording is counted as bias, which is wrong in other poses by up to twice that.
+//! temperatures, then `b(T) = b(T0) + u(T) - u(T0)`, and x is not needed: `o(T) = o(T0) - C (u(T) - u(T0))`. The effect of P's temperature
+//! dependence on gravity in the recorded pose is counted as bias. In other poses this is wrong by up to twice the effect.
 
 use mimu::calibration::{Calibration, reference_node};
 use mimu::quantity::{PerSensor, Sensor};
@@ -16,10 +16,10 @@ use crate::curves::TriadCurves;
 use crate::fit::{ThermalFit, range};
 use crate::nodes::{Inverse, fewest, physical, with_lags};
 
-/// The dies have to have been this near to the temperature of the calibration, K.
+/// The dies must have been this near to the temperature of the calibration, K.
 const NEAR_C: f64 = 1.0;
 
-/// Bias curves of one triad with what they are added to.
+/// Bias curves of one triad, and the model that they are added to.
 struct Based<'a> {
     curves: &'a TriadCurves,
     model: Affine<f64>,
@@ -66,8 +66,8 @@ impl Based<'_> {
     }
 }
 
-/// The calibration over temperature of a unit whose biases `fit` has followed at rest and which `base` is the calibration of, at one
-/// temperature; made at `created` (RFC 3339).
+/// The calibration over temperature of a unit, from the bias curves `fit` at rest and the calibration `base` at one temperature; made at
+/// `created` (RFC 3339).
 ///
 /// # Errors
 /// A base that is of another unit, of other readings, without a temperature or far from those of the recording, over temperature itself, or
@@ -98,7 +98,7 @@ pub fn calibration(fit: &ThermalFit, base: &Calibration, created: &str) -> Resul
     };
     let nodes = fewest(of, based.as_ref().map(Option::is_some), range_c)?;
     let mut temperature = with_lags(&fit.joint, range_c, nodes);
-    // The errors are raw: across the axes C is a hundredth.
+    // The errors are raw. Cross terms of C, about a hundredth, are neglected.
     for (sensor, based) in based.present() {
         let own = based.model.matrix.diagonal();
         temperature.dies[sensor].hysteresis = fit.hysteresis(sensor, own.into());
@@ -109,7 +109,7 @@ pub fn calibration(fit: &ThermalFit, base: &Calibration, created: &str) -> Resul
     base.with_curves(temperature, temp_c, triads, created)
 }
 
-/// Refuses a base that the curves cannot be added to; its temperature, °C.
+/// Refuses a base that the curves cannot be added to; returns its temperature, °C.
 fn check(fit: &ThermalFit, base: &Calibration) -> Result<f64> {
     let first = &fit.sessions[0];
     let refuse = |problem: String, remedy: &str| {

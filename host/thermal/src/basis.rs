@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 pub const SLOPE_SPAN: f64 = 10.0;
 /// Smallest span, K, that determines curvature.
 pub const CURVATURE_SPAN: f64 = 20.0;
-/// Spacing of the knots, K, that is aimed at: a cubic piece over it follows what sensors do, and the penalty does the rest.
+/// Intended spacing of the knots, K: a cubic piece over it follows the curves of sensors, and the penalty smooths the rest.
 const KNOT_SPACING: f64 = 8.0;
 const MOST_INTERVALS: usize = 20;
 
@@ -24,7 +24,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// The richest that a span of `kelvin` allows of a spline.
+    /// The richest shape that a span of `kelvin` allows.
     pub fn allowed(kelvin: f64) -> Self {
         match kelvin {
             k if k < SLOPE_SPAN => Self::Constant,
@@ -34,7 +34,7 @@ impl Shape {
     }
 }
 
-/// Functions of a die's temperature that a curve is a sum of. Outside the range the curve goes on along its slope.
+/// Functions of a die's temperature that a curve is a sum of. Outside the range the curve continues along its slope.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Basis {
     shape: Shape,
@@ -159,8 +159,8 @@ impl Basis {
         }
     }
 
-    /// What is penalised: integrals over the range of products of second derivatives, 1/K³, and of fourth derivatives, 1/K⁷, the latter
-    /// by differences of the coefficients. The first leaves a line free, the second a cubic. Zero for what is no spline.
+    /// The penalties: integrals over the range of products of second derivatives, 1/K³, and of fourth derivatives, 1/K⁷, the latter by
+    /// differences of the coefficients. The first leaves a line free, the second a cubic. Zero for other shapes than splines.
     pub fn penalties(&self) -> [DMatrix<f64>; 2] {
         let n = self.len();
         let mut second = DMatrix::zeros(n, n);

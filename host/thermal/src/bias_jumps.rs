@@ -1,4 +1,4 @@
-//! Jumps of a gyro's bias while the unit lies where it lies: a die under stress lets go. They are no moves of the unit, and no row is left out for them.
+//! Jumps of a gyro's bias while the unit does not move: the stress in a die relaxes. No row is left out for them.
 
 use nalgebra::Vector3;
 
@@ -6,9 +6,9 @@ use crate::row::Row;
 
 /// Rows on each side whose mean is a level: ten seconds.
 const LEVEL_ROWS: usize = 4;
-/// A jump is so many times as large as what levels usually differ by beside their trend, and
+/// A jump is this many times as large as the usual difference between levels without their trend, and
 const JUMP_SIGMAS: f64 = 10.0;
-/// larger than what the trend itself does from one to the other, which bends.
+/// larger than the change by the trend from one level to the other, because trends bend.
 const JUMP_TRENDS: f64 = 1.0;
 /// From a median absolute deviation to a standard deviation.
 const OF_MEDIAN: f64 = 1.4826;
@@ -16,9 +16,9 @@ const OF_MEDIAN: f64 = 1.4826;
 /// A jump of the bias.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BiasJump {
-    /// Middle of the time from the last row before to the first behind, s.
+    /// Middle of the time from the last row before to the first after, s.
     pub at_s: f64,
-    /// Change of the reading beside its trend, raw.
+    /// Change of the reading without its trend, raw.
     pub change: Vector3<f64>,
 }
 
@@ -29,13 +29,13 @@ fn level(rows: &[Row]) -> (f64, Vector3<f64>) {
     (time, rows.iter().map(|r| r.raw).sum::<Vector3<f64>>() / n)
 }
 
-/// Jumps in the rows of a gyro, but for those at which the unit was put into another pose, `moved_s`.
+/// Jumps in the rows of a gyro, except at the times `moved_s`, when the unit was put into another pose.
 pub(crate) fn find(rows: &[Row], moved_s: &[f64]) -> Vec<BiasJump> {
     let reach = 2 * LEVEL_ROWS;
     if rows.len() < 4 * reach {
         return Vec::new();
     }
-    // Of each boundary: the jump, what the trend does there, and the former over its standard deviation in levels.
+    // For each boundary: its row, the jump, the change by the trend, and the jump over its standard deviation in levels.
     let mut boundaries = Vec::new();
     for k in reach..=rows.len() - reach {
         let parts = [k - reach, k - LEVEL_ROWS, k, k + LEVEL_ROWS];
@@ -69,7 +69,7 @@ pub(crate) fn find(rows: &[Row], moved_s: &[f64]) -> Vec<BiasJump> {
             at_s: 0.5 * (from + to),
             change: boundary.1,
         };
-        // The boundaries around a jump have some of it.
+        // The boundaries around a jump contain part of it.
         match jumps.last_mut().filter(|last| k - last.0 < reach) {
             Some(last) if last.1 >= size => {}
             Some(last) => *last = (k, size, jump),

@@ -1,4 +1,4 @@
-//! Biases over temperature of a unit that only lay still, as a file: what the formats of autopilots need, and no calibration.
+//! Biases over temperature of a unit at rest, as a file: it serves the formats of autopilots, but is not a calibration.
 
 use mimu::calibration::Origin;
 use mimu::calibration::thermal_biases::{BiasNode, RestOfUnit, RestReading, ThermalBiases};
@@ -29,7 +29,7 @@ impl ThermalFit {
         }
         let range_c = range(&self.joint);
         let curves = self.joint.curves.as_ref();
-        // Nodes hold an affine model, of which the offset is used: a reading is smooth in the same way.
+        // Nodes contain an affine model, of which only the offset is used: a reading is as smooth.
         let of = |sensor: Sensor, temp_c: f64| {
             let curves = self.joint.curves[sensor].as_ref()?;
             let [value, slope] = curves.forward(temp_c).map(|forward| Affine {

@@ -1,4 +1,4 @@
-//! Estimators that others use, for comparison: each takes the die to be as warm as the thermometer.
+//! Estimators that others use, for comparison: each assumes that the die has the temperature of the thermometer.
 
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Argument, Error, Result};
@@ -27,9 +27,9 @@ pub enum Classic {
     Nodes,
     /// The ramp of niu: every cycle of the scheme by itself, cubics through them.
     RampNiu,
-    /// Soak, fang section 4.4: one fit a plateau; all 18 scalars of a triad's six poses.
+    /// Soak, fang section 4.4: one fit per plateau; all 18 scalars of a triad's six poses.
     Soak,
-    /// The same by fang (33), (34) as printed: one scalar a pose, misalignments taken from elsewhere.
+    /// The same by fang (33), (34) as printed: one scalar per pose, misalignments taken from elsewhere.
     SoakAsPrinted,
 }
 
@@ -45,7 +45,7 @@ impl Classic {
     }
 }
 
-/// Curves of `sensor` by `classic`; `None` where it was not recorded.
+/// Curves of `sensor` by `classic`; `None` if it was not recorded.
 ///
 /// # Errors
 /// Too few temperatures at which the inputs determine everything.
@@ -111,7 +111,7 @@ fn by_temperature(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
         .collect()
 }
 
-/// Stretches in which the temperature stands, whether it has settled or not.
+/// Segments in which the temperature is constant, whether the dies have settled or not.
 fn plateaus(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
     let fastest = fastest(session);
     let rows = session.rows[sensor].iter();
@@ -168,9 +168,9 @@ fn mean(rows: &[&Row], of: impl Fn(&Row) -> bool) -> Option<(Vector3<f64>, Vecto
     (n > 0.0).then(|| (raw / n, input / n, n))
 }
 
-/// niu (a.7) to (a.10), reconstructed from the text around them, as the equations are not in it: biases from rest, the Earth's rate
-/// taken off by the known input; scale factors and cross terms from turns both ways. Poses are not known from the gyro alone, so all
-/// rests are averaged where niu pairs opposite ones.
+/// niu (a.7) to (a.10), reconstructed from the surrounding text, which lacks the equations: biases from rest, the Earth's rate subtracted
+/// by the known input; scale factors and cross terms from turns both ways. The gyro alone does not show poses, so all rests are averaged,
+/// while niu pairs opposite ones.
 fn gyro_of_cycle(rows: &[&Row]) -> Option<Numbers> {
     let (bias, earth, n) = mean(rows, |r| r.input.norm() < REST)?;
     let (mut numbers, mut variances) = ([0.0; 12], [0.0; 12]);

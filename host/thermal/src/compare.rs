@@ -16,7 +16,7 @@ const COUNT: usize = 33;
 pub struct Comparison {
     /// `mimu-thermal-comparison/1`.
     pub format: &'static str,
-    /// Temperatures of the dies that both are for, °C.
+    /// Temperatures of the dies that both cover, °C.
     pub range_c: [f64; 2],
     /// Lags of the dies of gyro and accelerometer in the two, s; null where a calibration has none.
     pub lags_s: [Option<[f64; 2]>; 2],
@@ -41,7 +41,7 @@ pub struct Difference {
     pub rms: f64,
     /// The largest, and where it is, °C.
     pub largest: [f64; 2],
-    /// Root mean square in standard deviations of both; null where a calibration does not say how well it is known.
+    /// Root mean square in standard deviations of both; null if a calibration has no standard deviations.
     pub sigmas: Option<f64>,
 }
 

@@ -1,7 +1,7 @@
-//! How much of the recordings the curves rest on.
+//! How much of the recordings the curves use.
 //!
-//! What is not at rest, clipped or too short is left out of a fit, and if that is much, the curves hold for less than a person takes them
-//! for.
+//! Readings that are not at rest, clipped or too short are left out of a fit. If they are many, the curves represent less than a person
+//! would think.
 
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
@@ -16,10 +16,10 @@ const BIN_K: f64 = 1.0;
 /// Shares of the samples and of the temperatures of a recording at rest that a fit needs.
 const FEWEST_SAMPLES: f64 = 0.5;
 const FEWEST_TEMPERATURES: f64 = 0.7;
-/// Below this share a person is to know.
+/// Below this share there is a warning.
 const MOST: f64 = 0.9;
 
-/// What the curves of `sensor` rest on in `sessions`; `None` if they have no rows of it.
+/// The part of `sessions` that the curves of `sensor` use; `None` if they have no rows of it.
 pub fn of(sessions: &[Session], sensor: Sensor) -> Option<Used> {
     let bin = |t: f64| (t / BIN_K).floor() as i64;
     let (mut recorded, mut used) = (Vec::new(), Vec::new());
@@ -55,8 +55,8 @@ pub fn of(sessions: &[Session], sensor: Sensor) -> Option<Used> {
     })
 }
 
-/// Refuses recordings at rest of which too little is used; a warning for each sensor where much is left out. With a table, what is between
-/// its poses is left out by design.
+/// Refuses recordings at rest of which too little is used; warns for each sensor of which much is left out. With a table, readings between
+/// its poses are left out by design.
 pub fn check(sessions: &[Session], warnings: &mut Vec<Warning>) -> Result<()> {
     if sessions.iter().all(|s| s.reference == Reference::Table) {
         return Ok(());

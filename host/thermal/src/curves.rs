@@ -13,11 +13,11 @@ pub struct LagFit {
     pub fit: TriadFit,
     /// Likelihood of the lag; those of all sum to one.
     pub likelihood: f64,
-    /// Its share in the curves; those of all sum to one. The likelihood, unless the curves have to be those of one lag.
+    /// Its share in the curves; those of all sum to one. It equals the likelihood, unless the curves must be those of one lag.
     pub share: f64,
 }
 
-/// Curves of one triad. Their covariance is that about them over all lags that the data allow.
+/// Curves of one triad. Their covariance includes all lags that the data allow.
 #[derive(Debug, Clone)]
 pub struct TriadCurves {
     problem: Problem,
@@ -30,7 +30,7 @@ pub struct TriadCurves {
 type Twelve = SVector<f64, 12>;
 
 impl TriadCurves {
-    /// Of `fits`.
+    /// From `fits`.
     pub fn new(problem: Problem, fits: Vec<LagFit>, range_c: [f64; 2]) -> Self {
         Self {
             problem,
@@ -39,7 +39,7 @@ impl TriadCurves {
         }
     }
 
-    /// Of one estimate, as where the lag is known.
+    /// From one estimate, for a known lag.
     pub fn of_one(problem: Problem, fit: TriadFit, range_c: [f64; 2]) -> Self {
         let (likelihood, share) = (1.0, 1.0);
         let only = LagFit {
@@ -71,7 +71,7 @@ impl TriadCurves {
         sum.map(|s| forward(&s))
     }
 
-    /// Covariance of the forward model at `temp_c`, in the order of [`mimu::triad::vector`]: of the noise, and of the lag.
+    /// Covariance of the forward model at `temp_c`, in the order of [`mimu::triad::vector`], from the noise and from the lag.
     pub fn covariance(&self, temp_c: f64) -> Covariance {
         let numbers = |of: &LagFit| self.numbers(&of.fit, temp_c, false);
         let each: Vec<Twelve> = self.fits.iter().map(numbers).collect();
@@ -85,7 +85,7 @@ impl TriadCurves {
         covariance
     }
 
-    /// Calibration at `temp_c` of the die, with its covariance. `None` where P is singular or not estimated.
+    /// Calibration at `temp_c` of the die, with its covariance. `None` if P is singular or not estimated.
     pub fn triad(&self, temp_c: f64) -> Option<Triad> {
         if self.biases_only() {
             return None;
@@ -114,13 +114,13 @@ impl TriadCurves {
         (0..3).map(of_axis).fold(1.0, f64::max)
     }
 
-    /// Smoothness that the likeliest lag was found with.
+    /// Smoothness at the likeliest lag.
     pub fn smoothness(&self) -> Option<Smoothness> {
         let likelier = |a: &&LagFit, b: &&LagFit| a.likelihood.total_cmp(&b.likelihood);
         Some(self.fits.iter().max_by(likelier)?.fit.smoothness)
     }
 
-    /// Scale factors at `temp_c`, raw per SI: norms of the rows of P; ones where only biases are estimated.
+    /// Scale factors at `temp_c`, raw per SI: norms of the rows of P; ones if only biases are estimated.
     pub fn scale(&self, temp_c: f64) -> Vector3<f64> {
         match self.triad(temp_c) {
             Some(triad) => triad.physical(Angles::Exact).scale.map(|s| s.value).into(),
@@ -128,12 +128,12 @@ impl TriadCurves {
         }
     }
 
-    /// Bias of the session k, in its first pose, over that of the first, raw.
+    /// Bias of a session in its first pose, minus that of the first session, raw.
     pub fn session_offset(&self, session: usize) -> Vector3<f64> {
         self.pose_offset(session, 0)
     }
 
-    /// The same after so many moves of the unit.
+    /// The same after this many moves of the unit.
     pub fn pose_offset(&self, session: usize, moves: usize) -> Vector3<f64> {
         let mut offset = Vector3::zeros();
         let mut rows = self.problem.rows.iter();
@@ -196,7 +196,7 @@ impl TriadCurves {
         [gain * change, gain * gain * variance.max(0.0)]
     }
 
-    /// Standard deviation that the smoothness of `kind` leaves a curve to depart from a line over the range; zero for a line.
+    /// Standard deviation of a curve's departure from a line over the range, by the smoothness of `kind`; zero for a line.
     pub fn departure(&self, kind: CurveKind) -> f64 {
         let span = self.range_c[1] - self.range_c[0];
         let mean: f64 = self
@@ -238,7 +238,7 @@ impl TriadCurves {
         out
     }
 
-    /// Covariance by noise for one lag: the axes are independent.
+    /// Covariance from noise for one lag: the axes are independent.
     fn within(&self, fit: &TriadFit, temp_c: f64) -> Covariance {
         let problem = &self.problem;
         let mut out = Covariance::zeros();

@@ -13,7 +13,7 @@ use crate::session::Session;
 use crate::smoothness::{self, Penalties, Smoothness, TriadFit};
 use crate::thermometer::{Die, Start};
 
-/// Rounds of noise and smoothness in turn, where the bias wanders: each is found with the other.
+/// Rounds in which noise and smoothness are estimated in turn, if the bias wanders: each depends on the other.
 const ROUNDS: usize = 4;
 
 /// One triad with all that does not depend on the lag.
@@ -23,8 +23,8 @@ pub(crate) struct Evaluator<'a> {
     penalties: Penalties,
     pub(crate) noise: [AxisNoise; 3],
     smoothness: Smoothness,
-    /// Whether the smoothness is that of the lag which it was found at. Found anew at each lag it stops a little beside its best, by another
-    /// part of the criterion each time, and that noise of the profile left intervals that held the lag in 78 of 100 runs.
+    /// Whether the smoothness of one lag is kept for all. Estimated anew at each lag, it stops slightly off its best, by a different amount
+    /// of the criterion each time. With that noise in the profile, the intervals contained the lag in only 78 of 100 runs.
     settled: bool,
     known: Vec<(f64, Option<TriadFit>)>,
 }
@@ -95,7 +95,7 @@ impl<'a> Evaluator<'a> {
         Some(fit)
     }
 
-    /// Forgets what was estimated, as where sessions begin otherwise.
+    /// Discards the estimates, for example if sessions begin differently.
     pub(crate) fn forget(&mut self) {
         self.known.clear();
     }
@@ -111,7 +111,7 @@ impl<'a> Evaluator<'a> {
         criterion
     }
 
-    /// For each axis the lag that it wants by itself, of those that were tried, and what its criterion loses at `lag_s`.
+    /// For each axis its best lag among those tried, and the loss of its criterion at `lag_s`.
     pub(crate) fn by_axis(&self, lag_s: f64) -> Option<[(f64, f64); 3]> {
         let tried = || {
             let each = self.known.iter();
@@ -126,7 +126,7 @@ impl<'a> Evaluator<'a> {
         Some([of(0)?, of(1)?, of(2)?])
     }
 
-    /// Noise with the curves at `lag_s`.
+    /// Estimates the noise with the curves at `lag_s`.
     fn learn_noise(&mut self, lag_s: f64, starts: &[Start]) {
         self.known.clear();
         let dies = self.dies(lag_s, starts);
@@ -149,8 +149,8 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// The noise of `axis` with the wander of its bias that a record at rest states, where the recording shows less: of what is slower than
-    /// itself it shows hardly anything.
+    /// The noise of `axis`. If a record at rest gives more bias wander than the recording shows, that wander is used: a recording hardly
+    /// shows wander slower than itself.
     fn with_stated(&self, axis: usize) -> AxisNoise {
         let found = self.noise[axis];
         let channel = self.problem.sensor.channels().start + axis;
@@ -164,20 +164,20 @@ impl<'a> Evaluator<'a> {
             })
     }
 
-    /// Finds noise and smoothness at `lag_s`, and keeps them for all lags. The noise too: what a wrong lag leaves of an accelerometer over a
-    /// ramp is far beyond its noise.
+    /// Finds noise and smoothness at `lag_s`, and keeps them for all lags. The noise is kept too, because an accelerometer's residuals over
+    /// a ramp with a wrong lag far exceed its noise.
     pub(crate) fn settle(&mut self, lag_s: f64, starts: &[Start]) {
         self.settled = false;
         self.learn_noise(lag_s, starts);
         self.known.clear();
-        // Twice: the second begins where the first ended, and goes on.
+        // Twice: the second continues where the first ended.
         for _ in 0..2 {
             let _ = self.evaluate(lag_s, starts);
         }
         self.settled = true;
     }
 
-    /// Curves averaged over the lags of `profile`; those of no lag where none is applied, with their covariance over all lags.
+    /// Curves averaged over the lags of `profile`; if no lag is applied, the curves without lag, with the covariance over all lags.
     pub(crate) fn curves(
         mut self,
         profile: &Profile,
@@ -189,7 +189,7 @@ impl<'a> Evaluator<'a> {
             self.criterion(0.0, starts);
             0.0
         });
-        // Another sensor may have told the lag, and this one seen none of them yet.
+        // If another sensor determined the lag, this one has not evaluated these lags yet.
         for (lag, _) in profile.weights.iter().filter(|w| w.1 > 0.0) {
             self.criterion(*lag, starts);
         }
@@ -216,7 +216,7 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// Temperatures of the thermometer that rows were taken at, with those of a die that leads by as much as any.
+/// Range of temperatures of the rows, by the thermometer and by a die with the largest lead.
 fn range_of_rows(sessions: &[Session], sensor: Sensor) -> [f64; 2] {
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     for session in sessions {

@@ -1,4 +1,4 @@
-//! Whether known inputs tell the scale factors, cross terms and biases of a triad apart.
+//! Whether known inputs distinguish the scale factors, cross terms and biases of a triad.
 
 use mimu::quantity::{AXES, Sensor};
 use mimu_recording::error::{Error, Result};
@@ -6,7 +6,7 @@ use nalgebra::{Matrix4, Vector3, Vector4};
 
 /// Smallest eigenvalue of the correlation of inputs and bias that determines all of them.
 const SMALLEST_EIGENVALUE: f64 = 1e-5;
-/// The same of inputs that need no others beside them: six faces have 1.
+/// The same for inputs that suffice without others: six faces have 1.
 const WELL_APART: f64 = 0.1;
 
 /// Smallest eigenvalue of the correlation of three inputs and a bias, and its direction, by their sums of products.
@@ -21,7 +21,7 @@ fn weakest(gram: &Matrix4<f64>) -> (f64, Vector4<f64>) {
     (eigen.eigenvalues[weakest], along)
 }
 
-/// Whether these inputs tell all scale factors, cross terms and biases well apart.
+/// Whether these inputs distinguish all scale factors, cross terms and biases well.
 pub fn tells_apart(inputs: impl Iterator<Item = Vector3<f64>>) -> bool {
     let products = inputs.map(|x| {
         let x = x.push(1.0);

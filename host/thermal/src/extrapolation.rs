@@ -1,4 +1,4 @@
-//! Whether curvature is there or a drift in time: what a fit to the first two thirds of a recording says of the last one.
+//! Whether there is curvature or a drift in time: a fit to the first two thirds of a recording predicts the last one.
 
 use mimu::quantity::Sensor;
 
@@ -9,8 +9,8 @@ use crate::session::Session;
 /// Share of the time that is fitted.
 const FITTED: f64 = 2.0 / 3.0;
 
-/// Rms of the last third of the readings, over their standard deviations by noise, by straight lines and by curves that were fitted to
-/// the rest. `None` where the first two thirds determine no slope.
+/// Rms error of the last third of the readings, relative to their noise, for straight lines and for curves that were fitted to the rest.
+/// `None` if the first two thirds determine no slope.
 pub fn compare(sessions: &[Session], lag_s: Option<f64>) -> Option<[f64; 2]> {
     let split = |s: &Session| s.thermometer.start_s() + FITTED * s.thermometer.duration_s();
     let mut first = sessions.to_vec();
@@ -28,7 +28,7 @@ pub fn compare(sessions: &[Session], lag_s: Option<f64>) -> Option<[f64; 2]> {
                 .basis(crate::regression::CurveKind::Bias)
                 .shape()
         });
-        // A span too short for curvature has fitted lines twice.
+        // If the span is too short for curvature, both fits are lines.
         let rich = shape == Shape::Line || same.into_iter().all(|s| s == shape);
         rich.then(|| last_third(sessions, &joint, &split)).flatten()
     };

@@ -41,30 +41,30 @@ impl Estimator {
     }
 }
 
-/// What a fit is to do.
+/// Options of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Estimator.
     pub estimator: Estimator,
     /// A lag that is known, s; none to estimate it.
     pub lag_s: Option<f64>,
-    /// Temperatures that the curves have to cover, °C.
+    /// Temperatures that the curves must cover, °C.
     pub range_c: Option<[f64; 2]>,
 }
 
-/// Rms of the errors over that by noise from which on the curves do not describe the readings. A bias that wanders, as all do, reaches 3 to 4
-/// in the means of half a minute.
+/// If the rms of the errors exceeds that from noise by this factor, the curves do not describe the readings. Bias wander, which all sensors
+/// have, reaches 3 to 4 in the means of half a minute.
 const MISFIT: f64 = 10.0;
 
 /// Whether the recording distinguishes lag and slope, and the curves describe the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FitVerdict {
-    /// Heating and cooling, or plateaus, tell them apart.
+    /// Heating and cooling, or plateaus, distinguish lag and slope.
     Fitted,
-    /// They cannot be told apart: the temperature goes one way only.
+    /// They cannot be distinguished: the temperature goes one way only.
     OneWay,
-    /// The errors of the dwells that were fitted are far beyond noise.
+    /// The errors of the fitted dwells far exceed the noise.
     Misfit,
 }
 
@@ -84,26 +84,26 @@ impl FitVerdict {
 pub struct Judged {
     /// Errors of the dwells that the curves were fitted to.
     pub errors: Vec<DwellError>,
-    /// Errors of dwells that they had not seen.
+    /// Errors of dwells that were held out.
     pub held_out: Option<Vec<DwellError>>,
-    /// Of the latter where there are any, else of the former.
+    /// Bins of the held-out errors if there are any, else of the fitted ones.
     pub bins: Vec<Bin>,
-    /// What heating and cooling differ by after the lag.
+    /// Difference between heating and cooling after the lag.
     pub hysteresis: Option<Vec<Hysteresis>>,
-    /// Rms of the same, biases of a verifying session taken off; none without one.
+    /// Rms of the held-out errors, minus the biases of a verifying session; none without one.
     pub without_session_bias: Option<f64>,
 }
 
 /// Curves over temperature, judged.
 #[derive(Debug, Clone)]
 pub struct ThermalFit {
-    /// Curves, lag and noise. Of an estimator of the literature the lag is given as zero.
+    /// Curves, lag and noise. For an estimator of the literature the lag is zero.
     pub joint: Joint,
     /// The recordings.
     pub sessions: Vec<Session>,
-    /// As asked for.
+    /// As requested.
     pub options: Options,
-    /// Whether lag and slope are told apart.
+    /// Whether lag and slope are distinguished, and the curves describe the readings.
     pub verdict: FitVerdict,
     /// Figures of the triads: SI, raw where only biases are estimated.
     pub judged: PerSensor<Option<Judged>>,
@@ -160,7 +160,7 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
     })
 }
 
-/// The joint estimate; where the temperature goes one way only, curvature has to prove itself by extrapolation.
+/// The joint estimate. If the temperature goes one way only, curvature is used only if it extrapolates better than straight lines.
 fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<Warning>) -> Result<Joint> {
     let choice = |shape| Choice {
         shape,
@@ -305,14 +305,14 @@ fn judge(
 }
 
 impl Judged {
-    /// Errors of the dwells that were held out where there are any, else of those that were fitted.
+    /// Errors of the held-out dwells if there are any, else of the fitted ones.
     pub fn shown(&self) -> &[DwellError] {
         self.held_out.as_ref().unwrap_or(&self.errors)
     }
 }
 
 impl ThermalFit {
-    /// Rms and largest of what heating and cooling differ by, axis by axis, times `si`, as a calibration file holds them.
+    /// Rms and largest difference between heating and cooling, axis by axis, times `si`, as in a calibration file.
     pub(crate) fn hysteresis(&self, sensor: Sensor, si: [f64; 3]) -> Option<[[f64; 3]; 2]> {
         let judged = self.judged[sensor].as_ref()?;
         let all = judged.hysteresis.as_ref()?;

@@ -14,17 +14,17 @@ use crate::suitability::{Spans, check_alike, check_speed};
 use crate::thermometer::{Die, Start};
 use crate::warning::Warning;
 
-/// A best lag farther than this, s, from that which the smoothness was found at has it found anew.
+/// If the best lag differs by more than this, s, from that at which the smoothness was estimated, the smoothness is estimated anew.
 const SETTLED_S: f64 = 0.5;
-/// Drop in deviance that tells the lags of gyro and accelerometer apart: one degree of freedom at 1 %.
+/// Drop in deviance that distinguishes the lags of gyro and accelerometer: one degree of freedom at 1 %.
 const TWO_LAGS: f64 = 6.63;
-/// What the axes lose by one lag, in deviance, from which on they contradict each other, and by how much, s, the lags that they want differ
-/// then: five degrees of freedom at 1e-5, as noise that is not quite that of the model makes the deviance larger.
+/// The axes contradict each other if a common lag costs more than this in deviance and their separate lags differ by more than this, s. The
+/// limit is that of five degrees of freedom at 1e-5, because noise that deviates from the model increases the deviance.
 const CONTRADICT: f64 = 30.0;
 const CONTRADICT_S: f64 = 10.0;
-/// An axis that loses less is content.
+/// An axis that loses less agrees with the common lag.
 const CONTENT: f64 = 6.63;
-/// Start of the record: so much lag times slope, K, for a lag of a minute makes it worth asking what the die was like.
+/// If the start of a session with a lag of a minute depends on the die's state by more than this, K, both states are tried.
 const START_OFFSET_K: f64 = 0.2;
 
 /// How the curves are estimated.
@@ -49,13 +49,13 @@ impl Choice {
 pub struct Joint {
     /// Curves; none of a triad that was not recorded.
     pub curves: PerSensor<Option<TriadCurves>>,
-    /// Likelihoods of the lags: that of both together, unless the data tell the two apart.
+    /// Likelihoods of the lags: that of both together, unless the data distinguish the two.
     pub profiles: PerSensor<Profile>,
-    /// Whether the temperature goes one way only, so that lag and slope cannot be told apart.
+    /// Whether the temperature goes one way only, so that lag and slope cannot be distinguished.
     pub one_way: bool,
-    /// Drop in deviance by two lags against one, where they are told apart.
+    /// Drop in deviance of two lags against one, if they are distinguished.
     pub apart: Option<f64>,
-    /// Lowest and highest lag, s, that axes want by themselves, where one lag contradicts them.
+    /// Lowest and highest separate lag of the axes, s, if a common lag contradicts them.
     pub contradicted: PerSensor<Option<[f64; 2]>>,
     /// Noise of the rows.
     pub noise: PerSensor<Option<[AxisNoise; 3]>>,
@@ -79,13 +79,13 @@ impl Joint {
         (determined || profile.is_given()).then_some(profile.lag)
     }
 
-    /// Lag that the curves of `sensor` are for, s: zero where none is applied. Curves for another lag than that which is applied to them
-    /// would be wrong on the very ramp that they come from.
+    /// Lag for which the curves of `sensor` are estimated, s: zero if none is applied. Curves used with another lag would be wrong even on
+    /// the ramp from which they were estimated.
     pub fn applied_s(&self, sensor: Sensor) -> f64 {
         self.lag(sensor).map_or(0.0, |lag| lag.value)
     }
 
-    /// Temperatures of the die of `sensor` in `sessions` by the lag that is applied.
+    /// Temperatures of the die of `sensor` in `sessions` with the applied lag.
     pub fn dies(&self, sessions: &[Session], sensor: Sensor) -> Vec<Die> {
         let lag = self.applied_s(sensor);
         let each = sessions.iter().zip(&self.starts);
@@ -116,7 +116,7 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
     }
     let evaluator = |sensor| Evaluator::new(sessions, sensor, shape);
     let mut triads = [evaluator(Sensor::Gyro)?, evaluator(Sensor::Accel)?];
-    // A bias that jumps while the temperature moves looks like a lag of minutes: then the accelerometer alone tells it.
+    // A bias that jumps while the temperature moves looks like a lag of minutes: then the accelerometer alone determines the lag.
     let jumps = sessions.iter().any(|s| !s.bias_jumps.is_empty());
     let telling = usize::from(jumps && triads[Sensor::Accel as usize].is_some());
     let mut starts = vec![Start::Settled; sessions.len()];
@@ -158,7 +158,7 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
         starts,
         warnings,
     };
-    // Where lag and slope cannot be told apart, none is applied, and none refuses.
+    // If lag and slope cannot be distinguished, no lag is applied, and none is checked.
     for (_, profile) in joint.profiles.iter().filter(|_| !one_way) {
         check_speed(sessions, &profile.lag, span)?;
     }
@@ -177,7 +177,7 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
     Ok(joint)
 }
 
-/// A first lag with white noise, and how each session began: the likelihood chooses.
+/// Chooses, by the likelihood, a first lag with white noise and how each session began.
 fn rough_lag(
     triads: &mut [Option<Evaluator<'_>>],
     starts: &mut [Start],
@@ -218,8 +218,8 @@ fn total(triads: &mut [Option<Evaluator<'_>>], lag_s: f64, starts: &[Start]) -> 
     each.map(|t| t.criterion(lag_s, starts)).sum()
 }
 
-/// The lags of gyro and accelerometer: one for both, or one for each where the likelihood tells them apart and knows either; then the drop
-/// in deviance too.
+/// The lags of gyro and accelerometer: one for both, or one for each if the likelihood distinguishes and determines them; then also the
+/// drop in deviance.
 fn lags(
     triads: &mut [Option<Evaluator<'_>>],
     starts: &[Start],
@@ -248,8 +248,8 @@ fn lags(
     Ok(([both.clone(), both], None))
 }
 
-/// Lowest and highest lag that the axes of `triads` want by themselves, if those contradict the one of `profile`. All axes of a die have its
-/// lag: if they do not agree, it is something else that bends them, and what is best for all of them is no lag.
+/// Lowest and highest separate lag of the axes of `triads`, if they contradict that of `profile`. All axes of a die share its lag. If they
+/// disagree, something else bends the curves, and the best common value is not a lag.
 fn contradiction(triads: &[Option<Evaluator<'_>>], profile: &Profile) -> Option<[f64; 2]> {
     if profile.is_given() || !profile.lag.is_determined() {
         return None;

@@ -1,4 +1,5 @@
-//! How well curves compensate a recording: errors of the dwells, by temperature, heating and cooling apart, over the noise.
+//! How well curves compensate a recording: errors of the dwells, by temperature, separately for heating and cooling, compared with the
+//! noise.
 
 use std::cmp::Ordering;
 
@@ -28,13 +29,13 @@ const PIECES: usize = 10;
 /// Error of one dwell.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct DwellError {
-    /// Number of its recording, from 0: of those that verify where there are any, else of those that were fitted.
+    /// Number of its recording, from 0: among the verifying ones if there are any, else among the fitted ones.
     pub recording: usize,
     /// Its middle, s of its recording.
     pub middle_s: f64,
     /// Mean temperature of the die, °C.
     pub die_c: f64,
-    /// What the temperature does.
+    /// Direction of the temperature.
     #[serde(rename = "temperature")]
     pub way: Way,
     /// Compensated mean minus known input, x, y, z, SI.
@@ -54,7 +55,7 @@ fn three<S: Serializer>(error: &Vector3<f64>, to: S) -> Result<S::Ok, S::Error> 
 pub struct Judging<'a> {
     /// Its number, from 0.
     pub recording: usize,
-    /// It.
+    /// The recording.
     pub session: &'a Session,
     /// The triad.
     pub sensor: Sensor,
@@ -62,13 +63,12 @@ pub struct Judging<'a> {
     pub die: &'a Die,
     /// The curves.
     pub curves: &'a TriadCurves,
-    /// Whether it is one of those that the curves were fitted to, whose bias offsets are known and taken off.
+    /// Whether the curves were fitted to it: then its bias offsets are known and subtracted.
     pub fitted: bool,
 }
 
 impl Judging<'_> {
-    /// Errors of all dwells. Where only biases were estimated, of pieces of half a minute, and raw: readings minus what the curves
-    /// give for them, in that pose.
+    /// Errors of all dwells. If only biases were estimated, raw errors of pieces of half a minute: readings minus the curves, in that pose.
     pub fn errors(&self) -> Vec<DwellError> {
         self.errors_of(|_| true)
     }
@@ -125,7 +125,7 @@ impl Judging<'_> {
     }
 }
 
-/// Variance of one sample, mean of the axes, by differences of neighbouring rows: the slope of the temperature is not in them.
+/// Variance of one sample, mean of the axes, from differences of neighbouring rows, which the slope of the temperature hardly affects.
 fn sample_variance(rows: &[(&Row, Vector3<f64>)]) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
     for pair in rows.windows(2) {
@@ -189,7 +189,7 @@ pub fn bins(errors: &[DwellError]) -> Vec<Bin> {
     each.collect()
 }
 
-/// What is left between heating and cooling after the lag: hysteresis, reported and never fitted.
+/// Remaining difference between heating and cooling after the lag: hysteresis, which is reported but never fitted.
 #[derive(Debug, Clone, Serialize)]
 pub struct Hysteresis {
     /// Axis.
@@ -204,13 +204,13 @@ pub struct Hysteresis {
     pub largest: f64,
     /// Half of its 95 % interval, SI.
     pub largest_half_width: f64,
-    /// Middle of the bin of it, °C of the die.
+    /// Middle of that bin, °C of the die.
     pub largest_at_c: f64,
-    /// [`Self::rms`] as a difference of temperature, K, by the mean slope of the bias; null where the bias is not seen to have one.
+    /// [`Self::rms`] as a difference of temperature, K, by the mean slope of the bias; null if the bias shows no slope.
     pub kelvin: Option<f64>,
 }
 
-/// Standard deviations by which a bias changes over the range where it has a slope.
+/// A bias has a slope if it changes over the range by more than this many standard deviations.
 const SLOPE_SIGMAS: f64 = 3.0;
 
 /// Difference between heating and cooling of each axis, over the bins that have both.
@@ -260,7 +260,8 @@ pub fn hysteresis(errors: &[DwellError], curves: &TriadCurves) -> Option<Vec<Hys
     (0..3).map(of).collect()
 }
 
-/// Errors of the dwells of `sensor`, each by curves that had not seen it: four parts of the time in turn, lag, noise and smoothness kept.
+/// Errors of the dwells of `sensor`, each by curves without it: four parts of the time are held out in turn; lag, noise and smoothness are
+/// kept.
 pub fn held_out(
     sessions: &[Session],
     joint: &Joint,

@@ -3,9 +3,9 @@
 //! | in order of use | what |
 //! |---|---|
 //! | [`thermometer`] | the thermometer of a recording, and the temperature of a die that follows it |
-//! | [`excitation`] | whether inputs tell all parameters apart |
+//! | [`excitation`] | whether inputs distinguish all parameters |
 //! | [`session`] | a recording as means of some seconds with their known input |
-//! | [`coverage`], [`used`] | how much of the recordings these are |
+//! | [`coverage`], [`used`] | how much of the recordings is used |
 //! | [`basis`] | the functions of temperature that a curve is a sum of |
 //! | [`regression`] | the readings of a triad as a linear regression |
 //! | [`smoothness`], [`noise`] | its variance components: how smooth the curves are, how the readings are disturbed |
@@ -13,15 +13,15 @@
 //! | [`suitability`] | recordings that are refused |
 //! | `evaluator`, [`joint`] | one triad at any lag; both, and their lags: the estimate |
 //! | [`curves`], [`nodes`] | its result at any temperature, and in a calibration file |
-//! | [`base`], [`biases`] | curves of the biases upon a calibration at one temperature, and alone |
-//! | [`path`] | whether a recording comes back to temperatures that it has been at |
-//! | [`judge`] | errors of dwells, by temperature, heating and cooling apart |
+//! | [`base`], [`biases`] | curves of the biases, added to a calibration at one temperature, and alone |
+//! | [`path`] | whether a recording returns to earlier temperatures |
+//! | [`judge`] | errors of dwells, by temperature, separately for heating and cooling |
 //! | [`classic`], [`points`] | estimators of the literature, for comparison |
-//! | [`mod@fit`], [`extrapolation`] | one of them, judged; whether curvature is there at all |
+//! | [`mod@fit`], [`extrapolation`] | curves by one of the estimators, judged; whether there is curvature at all |
 //! | [`mod@compare`] | two calibrations, curve by curve |
 //! | [`plan`] | procedures in chamber and table, and how well the curves are known afterwards |
-//! | [`result`] | what was found, which JSON is |
-//! | [`warning`] | what a person should know of it |
+//! | [`result`] | the result, as written to JSON |
+//! | [`warning`] | warnings for people |
 
 pub mod base;
 pub mod basis;

@@ -1,5 +1,5 @@
-//! The nodes of a calibration file: inverse models and their derivatives at temperatures of the dies, between which a device follows
-//! cubic Hermite pieces.
+//! The nodes of a calibration file: inverse models and their derivatives at temperatures of the dies, between which a device interpolates
+//! by cubic Hermite pieces.
 
 use mimu::calibration::{DieTable, NodeTable, OverTemperature, TemperatureNode};
 use mimu::quantity::{PerSensor, Sensor};
@@ -15,9 +15,9 @@ use crate::profile::Lag;
 /// Most nodes of a file.
 const MOST: usize = 16;
 const FEWEST: usize = 3;
-/// Error of the pieces between the nodes over the standard deviation, at most.
+/// Largest error of the pieces between the nodes, relative to the standard deviation.
 const SHARE_OF_SIGMA: f64 = 0.05;
-/// Temperatures between two nodes at which that is looked at.
+/// Number of temperatures between two nodes at which the error is checked.
 const BETWEEN: usize = 4;
 
 /// An inverse model at one temperature of the dies.
@@ -66,9 +66,9 @@ pub fn over_temperature(joint: &Joint) -> Result<OverTemperature> {
 /// `nodes` with the range and the lags of `joint`.
 pub fn with_lags(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) -> OverTemperature {
     let given = joint.profiles.gyro.is_given();
-    // A lag that is given as none is none.
+    // A given lag of zero counts as no lag.
     let of = |sensor: Sensor| joint.lag(sensor).filter(|l| !given || l.value != 0.0);
-    // The device follows nothing shorter than a sample.
+    // The device does not follow a lag shorter than a sample.
     let followed = |lag: Lag| match lag.value.abs() < LEAST_LAG_S {
         true => 0.0,
         false => lag.value,
@@ -88,7 +88,7 @@ pub fn with_lags(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) 
     }
 }
 
-/// As few nodes, evenly over the range, as keep the Hermite error of C and o below a twentieth of their standard deviations, or sixteen.
+/// The fewest evenly spaced nodes that keep the Hermite error of C and o below a twentieth of their standard deviations, at most sixteen.
 /// `of`: the model of a sensor at a temperature of the dies, for those that it `has`.
 ///
 /// # Errors
@@ -135,7 +135,7 @@ fn nodes(
     (0..count).map(node).collect()
 }
 
-/// C, o and their derivatives at `temp_c`: of `u = P x + b` they are `C = P⁻¹`, `C' = -C P' C`, `o = -C b`, `o' = -C' b - C b'`.
+/// C, o and their derivatives at `temp_c`: for `u = P x + b` they are `C = P⁻¹`, `C' = -C P' C`, `o = -C b`, `o' = -C' b - C b'`.
 pub fn inverse(curves: &TriadCurves, temp_c: f64) -> Option<[Affine<f64>; 2]> {
     let [model, slope] = curves.forward(temp_c);
     let matrix = Forward::inverse(&model)?;

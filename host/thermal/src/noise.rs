@@ -1,6 +1,6 @@
-//! Noise of the rows of an axis: white noise from within the dwells, and the slow wander of the bias from what the curves leave.
+//! Noise of the rows of an axis: white noise from within the dwells, and the slow wander of the bias from the residuals of the curves.
 //!
-//! Means of neighbouring rows are not independent where the bias wanders, and intervals that take them for independent are too narrow.
+//! If the bias wanders, means of neighbouring rows are correlated. Intervals that assume independence are too narrow.
 
 use nalgebra::Vector3;
 
@@ -9,21 +9,21 @@ use crate::smoothness::{Penalties, Smoothness, solve, times};
 
 /// Correlation times that are tried, s. The longest is a random walk over most recordings.
 const CORRELATION_S: [f64; 4] = [40.0, 200.0, 1000.0, 10_000.0];
-/// What a single process has to lower the deviance by further than flicker noise does: a record of an hour or two sees little of what is slower,
-/// and says nothing against it.
+/// Drop in deviance that a single process needs beyond that of flicker noise: a record of an hour or two hardly shows slower wander, and
+/// cannot exclude it.
 const SINGLE: f64 = 6.0;
-/// Flicker noise, which the bias of a MEMS sensor has. A single process that fits its minutes misses its hours, and with them what a bias is
-/// uncertain by.
+/// Flicker noise, as in the bias of a MEMS sensor. A single process that fits its minutes misses its hours, and so the uncertainty of a
+/// bias.
 const FLICKER: (usize, f64) = (MOST_PARTS, LONGEST_S);
 /// Variances of the wander over that of a row, in steps of a factor of ten and then of refinement.
 const RATIOS: [f64; 6] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
-/// Largest ratio that is tried, where the largest of these is the best: a bias that jumps by a hundred times the noise of a row.
+/// Largest ratio that is tried, if the largest of [`RATIOS`] is the best: a bias that jumps by a hundred times the noise of a row.
 const LARGEST_RATIO: f64 = 1e4;
-/// What wander has to lower the deviance by: two parameters at the price of Akaike's criterion.
+/// Least drop in deviance for wander: two parameters at the price of Akaike's criterion.
 const DEVIANCE: f64 = 4.0;
 
-/// White noise of rows of weight 1, SI², by the differences of neighbouring rows of a dwell, in which nothing else moves. `None` where no dwell
-/// has two.
+/// White noise of rows of weight 1, SI², from the differences of neighbouring rows of a dwell, in which nothing else moves. `None` if no
+/// dwell has two.
 pub fn white(problem: &Problem) -> Option<[f64; 3]> {
     let (mut sum, mut n) = (Vector3::zeros(), 0.0);
     for pair in problem.rows.windows(2) {
@@ -37,7 +37,7 @@ pub fn white(problem: &Problem) -> Option<[f64; 3]> {
     (n > 0.0).then(|| [0, 1, 2].map(|k| (sum[k] / n).max(f64::MIN_POSITIVE)))
 }
 
-/// Noise of `axis` at the die temperatures `dies`, where the curves are as smooth as `smoothness`; `before` is the noise found so far.
+/// Noise of `axis` at the die temperatures `dies`, for curves with this `smoothness`; `before` is the noise found so far.
 ///
 /// The restricted likelihood of the variance and the correlation time of the wander, with the white variance profiled out.
 pub fn estimate(
@@ -86,7 +86,7 @@ pub fn estimate(
             attempt(ratio, correlation_s, parts);
         }
     }
-    // A bias that jumps goes farther.
+    // A bias that jumps needs larger ratios.
     let mut largest = RATIOS[RATIOS.len() - 1];
     while attempt(0.0, 1.0, 1).1 >= largest && largest < LARGEST_RATIO {
         let (_, ratio, correlation_s, parts, _) = attempt(0.0, 1.0, 1);
@@ -102,7 +102,7 @@ pub fn estimate(
                 [1.0, factor],
                 [1.0, 1.0 / factor],
             ] {
-                // Flicker noise has no time of its own.
+                // Flicker noise has no single correlation time.
                 let b = if parts == 1 { b } else { 1.0 };
                 attempt(ratio * a, correlation_s * b, parts);
             }

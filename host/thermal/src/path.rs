@@ -1,4 +1,4 @@
-//! What a recording does with the temperature: one way, or there and back.
+//! The path of the temperature in a recording: one way, or there and back.
 
 use serde::Serialize;
 
@@ -7,17 +7,17 @@ use crate::thermometer::Die;
 
 /// Bins of temperature over the range of a record.
 const BINS: usize = 16;
-/// Slower than this share of the fastest ramp the temperature stands.
+/// If the temperature changes more slowly than this share of the fastest ramp, it counts as constant.
 const STANDS: f64 = 0.1;
-/// Share of the range that has to be heated through and cooled through.
+/// Least share of the range through which the unit must be heated and cooled.
 const BOTH_WAYS: f64 = 0.25;
-/// Share of the range over which the temperature stands somewhere: a soak needs no way back.
+/// Or least share of the range in which the temperature is constant: a soak needs no way back.
 const SOAKED: f64 = 0.5;
-/// Instants of a record that are looked at, s apart.
+/// Spacing of the instants at which a record is evaluated, s.
 const EVERY_S: f64 = 10.0;
 
-/// Half of the time over which a slope is taken, s, or this share of the record where that is longer: within less a coarse or noisy
-/// thermometer shows slopes that are none.
+/// Half of the time over which a slope is taken, s, or this share of the record if that is longer: over less a coarse or noisy thermometer
+/// shows false slopes.
 const AROUND_S: f64 = 30.0;
 const AROUND_SHARE: f64 = 0.01;
 
@@ -39,7 +39,7 @@ fn between(session: &Session, from_s: f64, to_s: f64) -> f64 {
     (thermometer.at(to).0 - thermometer.at(from).0) / (to - from).max(1.0)
 }
 
-/// Whether the temperature stands before or behind `t_s`: at the end of a soak the slope around an instant has the next ramp in it.
+/// Whether the temperature is constant before or after `t_s`: at the end of a soak the slope around an instant includes the next ramp.
 pub fn stands(session: &Session, fastest: f64, t_s: f64) -> bool {
     let half = half(session);
     let sides = [[t_s - half, t_s], [t_s, t_s + half]];
@@ -47,7 +47,7 @@ pub fn stands(session: &Session, fastest: f64, t_s: f64) -> bool {
     slopes[0].min(slopes[1]) < STANDS * fastest
 }
 
-/// What a temperature does.
+/// Direction of a temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Way {
@@ -59,7 +59,7 @@ pub enum Way {
     Heating,
 }
 
-/// What the temperature of a recording does at `t_s`, by the slope that is usual for it.
+/// Direction of the temperature at `t_s`; `fastest` is the slope of the recording's ramp.
 pub fn direction(session: &Session, fastest: f64, t_s: f64) -> Way {
     match slope(session, t_s) {
         slope if slope.abs() < STANDS * fastest => Way::Standing,
@@ -78,7 +78,7 @@ pub fn fastest(session: &Session) -> f64 {
     slopes[slopes.len() * 9 / 10]
 }
 
-/// Whether lag and slope cannot be told apart, because no session comes back to temperatures that it has been at, nor stands at several.
+/// Whether lag and slope cannot be distinguished, because no session returns to earlier temperatures or is constant at several.
 pub fn is_one_way(sessions: &[Session], dies: &[Die]) -> bool {
     sessions.iter().zip(dies).all(|(s, die)| one_way(s, die))
 }

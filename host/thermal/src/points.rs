@@ -43,7 +43,7 @@ pub fn curves(sensor: Sensor, points: &[Point], shape: Shape) -> Option<TriadCur
         taken_off: 0.0,
     };
     let normals = [0, 1, 2].map(|axis| normal(&problem, axis, points));
-    // The penalty only decides where points are missing: as little as data sheets allow.
+    // The penalty matters only where points are missing. It is the weakest that data sheets allow.
     let penalties = Penalties::of(&problem);
     let fit: TriadFit = fixed(&problem, &penalties, &normals, &largest(&problem))?;
     Some(TriadCurves::of_one(problem, fit, range_c))

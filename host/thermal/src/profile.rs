@@ -18,8 +18,8 @@ const REACH: i32 = 4;
 /// A lag known worse than this, s, is averaged over the lags that the search began with.
 const WIDE_S: f64 = 25.0;
 const REFINEMENTS: usize = 12;
-/// Grids about the best lag: the parabola through the lags that the search began with, 15 s apart, is none of a likelihood of seconds, and left
-/// best lags on those lags and intervals half and twice as wide. From points a standard deviation apart both are right.
+/// Number of grids about the best lag. A parabola through the first lags, 15 s apart, does not describe a likelihood that is seconds wide:
+/// best lags stayed on those lags, with intervals half or twice as wide. With points a standard deviation apart both are right.
 const GRIDS: usize = 4;
 
 /// A lag with its 95 % interval, s.
@@ -54,12 +54,12 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Whether the lag was given and not estimated.
+    /// Whether the lag was given instead of estimated.
     pub fn is_given(&self) -> bool {
         self.points.len() == 1
     }
 
-    /// Of `criterion`, minus twice the logarithm of the likelihood of a lag, over the whole range; `None` where it is nowhere finite.
+    /// From `criterion`, minus twice the logarithm of the likelihood of a lag, over the whole range; `None` if it is nowhere finite.
     pub fn of(mut criterion: impl FnMut(f64) -> Option<f64>) -> Option<Self> {
         let mut points: Vec<(f64, f64)> = LAGS
             .iter()
@@ -113,7 +113,7 @@ impl Profile {
             }
         }
         match spread.filter(|s| *s < WIDE_S) {
-            // What is far away may still be likely: another mode.
+            // A distant lag may still be likely: another mode.
             Some(spread) if !grid.is_empty() => {
                 let reach = (f64::from(REACH) + 0.5) * spread;
                 grid.extend(points.iter().filter(|p| (p.0 - best.0).abs() > reach));
@@ -123,7 +123,7 @@ impl Profile {
             _ => grid.clone_from(&points),
         }
         Some(Self {
-            // Not from all points: those of the refinement lie so close together that what rounds one bends the line through them.
+            // Not from all points: those of the refinement are so close together that the rounding of one bends the parabola through them.
             lag: interval(&grid, best.0),
             weights: weights(&grid, best.1),
             criterion: best.1,
@@ -131,7 +131,7 @@ impl Profile {
         })
     }
 
-    /// Of a lag that is given.
+    /// For a given lag.
     pub fn fixed(lag_s: f64, criterion: f64) -> Self {
         Self {
             lag: Lag {
@@ -153,7 +153,7 @@ fn insert(points: &mut Vec<(f64, f64)>, point: (f64, f64)) {
     }
 }
 
-/// Vertex of the parabola through the best point and its neighbours, and by how much it promises to be better.
+/// Vertex of the parabola through the best point and its neighbours, and the improvement that it predicts.
 fn vertex(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let best = (0..points.len()).min_by(|a, b| points[*a].1.total_cmp(&points[*b].1))?;
     if best == 0 || best + 1 >= points.len() {
@@ -170,7 +170,7 @@ fn vertex(points: &[(f64, f64)]) -> Option<(f64, f64)> {
 }
 
 /// Standard deviation by the curvature at `best`, from the nearest points at which the criterion has risen by that of two standard
-/// deviations: from smaller rises it would be as uncertain as the smoothness that each point was found with.
+/// deviations: smaller rises would make it as uncertain as the smoothness at each point.
 fn sigma(points: &[(f64, f64)], best: (f64, f64)) -> Option<f64> {
     let estimate = |p: &(f64, f64)| {
         let rise = p.1 - best.1;

@@ -1,8 +1,8 @@
 //! The readings of a triad as a linear regression, once the temperature of the die is known.
 //!
 //! `u_j = Σ_i P_ji(T) x_i + b_j(T) + b_js + noise` for the axis j in the session s: every P_ji and b_j is a sum of functions of the die's
-//! temperature ([`Basis`]), and the first session has no offset b_js of its own. Readings are scaled by a first affine fit, so that the
-//! same curve of any sensor has the same size: biases in SI, the rest as ratios.
+//! temperature ([`Basis`]), and the first session has no offset b_js. Readings are scaled by a first affine fit, so that the same curve of
+//! any sensor has the same size: biases in SI, the rest as ratios.
 
 use mimu::quantity::Sensor;
 use mimu_allan::model::FLOOR;
@@ -14,7 +14,7 @@ use crate::basis::{Basis, Shape};
 use crate::excitation;
 use crate::session::Session;
 
-/// What a curve is the temperature dependence of; its smoothness is estimated for each of these.
+/// The parameter whose temperature dependence a curve is; smoothness is estimated for each kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CurveKind {
     /// Bias.
@@ -35,7 +35,7 @@ impl CurveKind {
 pub struct ProblemRow {
     /// Its session.
     pub session: usize,
-    /// Number of its bias offset: 0 of the first power-on in its first pose.
+    /// Number of its bias offset: 0 for the first power-on in its first pose.
     pub offset: usize,
     /// Middle, s of its session.
     pub middle_s: f64,
@@ -43,7 +43,7 @@ pub struct ProblemRow {
     pub weight: f64,
     /// Known input, SI; zero where only biases are estimated.
     pub input: Vector3<f64>,
-    /// Reading minus [`Problem::null`], over [`Problem::gain`], minus so much of the input as [`Problem::taken_off`] says.
+    /// Reading minus [`Problem::null`], over [`Problem::gain`], minus the share [`Problem::taken_off`] of the input.
     pub reading: Vector3<f64>,
     /// Number of the dwell in its session.
     pub step: i32,
@@ -68,26 +68,26 @@ pub struct Problem {
     pub biases_only: bool,
     /// Samples of the row of weight 1.
     pub samples: f64,
-    /// Share of its own input that is taken off the reading of an axis beforehand, 1 or 0: scale factors are then estimated from there. With
-    /// all of gravity in them the squares of the readings were 1e11 times the noise, and what rounding left of their difference to those of the
-    /// curves made steps of several units in the likelihood of a lag.
+    /// Share of its input that is subtracted from the reading of an axis beforehand, 1 or 0: scale factors are then estimated relative to
+    /// it. With gravity included, the squares of the readings were 1e11 times the noise, and the rounding errors of their difference from
+    /// those of the curves made steps of several units in the likelihood of a lag.
     pub taken_off: f64,
 }
 
 /// A curve of one axis among the columns of its regression.
 #[derive(Debug, Clone, Copy)]
 pub struct Part {
-    /// Input that multiplies it; none of a bias.
+    /// Input that multiplies it; none for a bias.
     pub input: Option<usize>,
-    /// What it is.
+    /// Its kind.
     pub kind: CurveKind,
     /// Its first column.
     pub from: usize,
 }
 
 impl Problem {
-    /// Of the rows of `sensor` in `sessions`, with curves of `shape` over the temperatures `range`. `biases_only` where the input is
-    /// not known.
+    /// From the rows of `sensor` in `sessions`, with curves of `shape` over the temperatures `range`. `biases_only` if the input is not
+    /// known.
     ///
     /// # Errors
     /// An experiment whose inputs do not determine every parameter.
@@ -192,7 +192,7 @@ impl Problem {
         curves.collect()
     }
 
-    /// Number of columns of `axis`: its curves, then the bias offsets but the first.
+    /// Number of columns of `axis`: its curves, then the bias offsets except the first.
     pub fn columns(&self, axis: usize) -> usize {
         let curves: usize = self
             .parts(axis)
@@ -228,11 +228,11 @@ impl Problem {
     }
 }
 
-/// Processes whose sum is flicker noise, and most that a wander is the sum of.
+/// Number of processes whose sum is flicker noise: the most of which a wander is the sum.
 pub const MOST_PARTS: usize = 4;
 /// Longest correlation time of flicker noise, s: beyond most recordings.
 pub const LONGEST_S: f64 = 10_000.0;
-/// Their correlation times are apart by this factor: so near that the sum has the spectrum of flicker noise between the ends, to a few per cent.
+/// Factor between their correlation times: so small that the sum has the spectrum of flicker noise between the ends, to a few per cent.
 const APART: f64 = 5.0;
 
 /// Noise of one axis: white noise of the rows, and a bias that wanders.
@@ -250,32 +250,32 @@ pub struct AxisNoise {
 }
 
 impl AxisNoise {
-    /// By the density N, the bias instability B and the random walk K of data sheets and Allan curves; a row of weight 1 is `row_s` long.
+    /// From the density N, the bias instability B and the random walk K of data sheets and Allan curves; a row of weight 1 is `row_s` long.
     pub fn of_densities([n, b, k]: [f64; 3], row_s: f64) -> Self {
         // A process of variance v for each factor r of correlation times has the density v / (f ln r); flicker noise has B² / (π f).
         let of_flicker = b * b * APART.ln() / std::f64::consts::PI;
         Self {
             white: n * n / row_s,
-            // A random walk has gone so far, in the mean, over the longest time.
+            // The mean variance of a random walk over the longest time.
             wander: MOST_PARTS as f64 * of_flicker + 0.5 * k * k * LONGEST_S,
             correlation_s: LONGEST_S,
             parts: MOST_PARTS,
         }
     }
 
-    /// The wander of the bias that a record at rest states, raw: over the `gain` of the axis, raw per SI.
+    /// The bias wander that a record at rest gives, raw, divided by the `gain` of the axis, raw per SI.
     pub fn stated_wander(model: &AllanModel, gain: f64) -> Self {
         let (b, k) = ((model.flicker / FLOOR).sqrt(), (3.0 * model.walk).sqrt());
         Self::of_densities([0.0, b / gain, k / gain], 1.0)
     }
 }
 
-/// Normal equations of one axis, of rows whose noise was made white with a variance of one.
+/// Normal equations of one axis, from rows that were whitened to a variance of one.
 #[derive(Debug, Clone)]
 pub struct Normal {
-    /// Of the columns.
+    /// Products of the columns.
     pub gram: DMatrix<f64>,
-    /// Of columns and reading.
+    /// Products of the columns with the reading.
     pub with: DVector<f64>,
     /// Sum of squares of the readings.
     pub squares: f64,
@@ -286,7 +286,7 @@ pub struct Normal {
 }
 
 impl Normal {
-    /// Of `axis` of `problem` with its rows at the die temperatures `dies`; rows that `used` refuses are left out.
+    /// For `axis` of `problem` with its rows at the die temperatures `dies`, without the rows that `used` refuses.
     pub fn of(
         problem: &Problem,
         axis: usize,
@@ -384,7 +384,7 @@ struct Wander {
     /// Variance of each process.
     variance: f64,
     correlation_s: [f64; MOST_PARTS],
-    /// Of each process, by column.
+    /// State of each process, by column.
     state: [Vec<f64>; MOST_PARTS],
     covariance: [[f64; MOST_PARTS]; MOST_PARTS],
 }
@@ -401,7 +401,7 @@ impl Wander {
         }
     }
 
-    /// Another power-on.
+    /// Begins another power-on.
     fn begin(&mut self) {
         self.state.iter_mut().for_each(|s| s.fill(0.0));
         self.covariance = std::array::from_fn(|i| {
@@ -415,7 +415,7 @@ impl Wander {
         });
     }
 
-    /// Time passes.
+    /// Propagates over `dt_s`.
     fn pass(&mut self, dt_s: f64) {
         let keep = self.correlation_s.map(|tau| (-dt_s / tau).exp());
         for (k, state) in self.state.iter_mut().enumerate() {
@@ -429,7 +429,7 @@ impl Wander {
         }
     }
 
-    /// Writes what is expected of each column, with its sign turned.
+    /// Writes the expectation of each column, with the opposite sign.
     fn expected(&self, out: &mut [f64]) {
         out.fill(0.0);
         for state in &self.state {
@@ -437,7 +437,7 @@ impl Wander {
         }
     }
 
-    /// Takes in the innovations of a row with this white variance; returns their variance.
+    /// Updates with the innovations of a row with this white variance; returns their variance.
     fn update(&mut self, innovation: &[f64], white: f64) -> f64 {
         let seen = self.covariance.map(|row| row.iter().sum::<f64>());
         let total = seen.iter().sum::<f64>() + white;

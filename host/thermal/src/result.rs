@@ -50,24 +50,24 @@ pub struct RecordingResult {
     pub samples: String,
     /// SHA-256 of them.
     pub sha256: String,
-    /// Biases of this power-on over those of the first, gyro x, y, z, accelerometer x, y, z; raw.
+    /// Biases of this power-on minus those of the first, gyro x, y, z, accelerometer x, y, z; raw.
     pub bias_offset_raw: [f64; 6],
 }
 
 /// Figures of one triad.
 #[derive(Debug, Clone, Serialize)]
 pub struct SensorResult {
-    /// Unit of the figures: SI, that of the readings where only biases are estimated.
+    /// Unit of the figures: SI, or that of the readings if only biases are estimated.
     pub unit: String,
-    /// What of the recordings is used.
+    /// The part of the recordings that is used.
     pub used: Option<Used>,
     /// Compensated dwell means minus known input, over dwells and axes, rms; null where the input is not known.
     pub rms: Option<f64>,
     /// The same of data that were held out; null where none were.
     pub held_out_rms: Option<f64>,
-    /// The same with the biases of the verifying recording taken off; null without one.
+    /// The same minus the biases of the verifying recording; null without one.
     pub held_out_rms_without_session_bias: Option<f64>,
-    /// What noise alone would give, the slope over temperature removed; null where the input is not known.
+    /// Rms from noise alone, the slope over temperature removed; null where the input is not known.
     pub noise_floor: Option<f64>,
     /// Time constant of the die behind the thermometer, s, negative where it leads; null with [`Self::lag_reason`].
     pub lag_s: Option<Lag>,
@@ -75,13 +75,13 @@ pub struct SensorResult {
     pub lag_reason: Option<String>,
     /// What is inseparable in the curves of this sensor; null where nothing is.
     pub inseparable: Option<&'static str>,
-    /// What an error is of: `dwells`, or `pieces` of 30 s where only biases are estimated. Bins and errors call both dwells.
+    /// The segments that errors belong to: `dwells`, or `pieces` of 30 s if only biases are estimated. Bins and errors call both dwells.
     pub judged_by: &'static str,
     /// Errors by temperature, of the held-out data where there are any.
     pub bins: Vec<Bin>,
     /// The dwells behind these errors, in the order of time.
     pub dwells: Vec<DwellError>,
-    /// What heating and cooling differ by after the lag; null where they share no temperature.
+    /// Difference between heating and cooling after the lag; null if they share no temperature.
     pub hysteresis: Option<Vec<Hysteresis>>,
 }
 
@@ -264,7 +264,7 @@ fn at(
     }
 }
 
-/// Biases where nothing else is estimated; of the accelerometer with what gravity adds in the one pose.
+/// Biases, if nothing else is estimated; those of the accelerometer include the contribution of gravity in the one pose.
 fn biases(
     curves: &TriadCurves,
     sensor: Sensor,

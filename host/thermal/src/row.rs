@@ -1,11 +1,11 @@
-//! What the curves are fitted to: means of stretches within a dwell.
+//! Rows, to which the curves are fitted: means of segments within a dwell.
 
 use nalgebra::Vector3;
 
-/// Mean of a stretch within one dwell.
+/// Mean of a segment within one dwell.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
-    /// Middle of the stretch, s.
+    /// Middle of the segment, s.
     pub middle_s: f64,
     /// Number of samples.
     pub samples: f64,
@@ -18,7 +18,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// Takes the samples of `other` in.
+    /// Adds the samples of `other`.
     pub(crate) fn join(&mut self, other: &Self) {
         let samples = self.samples + other.samples;
         let share = other.samples / samples;

@@ -19,30 +19,30 @@ use crate::warning::Warning;
 const ROW_S: f64 = 2.5;
 /// Shortest row, s: the rest of a dwell.
 const SHORTEST_S: f64 = 0.5;
-/// Fewest samples of a shorter one, which is all of a burst.
+/// Fewest samples of a shorter row, if it is a whole burst.
 const FEWEST_IN_BURST: f64 = 4.0;
-/// A change between two dwells is a move if it is larger than so many times that between neighbouring rows, with so many times the largest
-/// drift: being taken for one costs six numbers, and a move that is missed bends the curves.
+/// A change between two dwells is a move if it exceeds this many times the change between neighbouring rows plus this many times the
+/// largest drift. A false move costs six parameters, and a missed one bends the curves.
 const MOVED_SIGMAS: f64 = 6.0;
 const MOVED_DRIFTS: f64 = 2.0;
-/// Rows that a drift is taken over: half a minute.
+/// Rows over which a drift is computed: half a minute.
 const DRIFT_ROWS: usize = 12;
-/// A change of the specific force by less than this share of it moves no gyro's bias: of 0.2 deg/s/g, the largest g-sensitivity of data sheets, 0.02 deg/s.
-/// An offset there would take up what is a jump of the bias, and hide it: one of 0.5 deg/s came with a change of the force by 0.05.
+/// A change of the specific force by a smaller share hardly moves a gyro's bias: by 0.02 deg/s at 0.2 deg/s/g, the largest g-sensitivity of
+/// data sheets. An offset there would absorb a jump of the bias and hide it: one of 0.5 deg/s came with a change of the force by 0.05.
 const TILTED: f64 = 0.1;
 /// Slower than this, rad/s, a unit is at rest.
 const RATE: f64 = 0.02;
 /// Longest dwell with a moving input, s, that is taken as one mean.
 const LONGEST_MOVE_S: f64 = 60.0;
 
-/// A recording made ready for curves over temperature.
+/// A recording prepared for curves over temperature.
 #[derive(Debug, Clone)]
 pub struct Session {
     /// Path of the samples, for messages.
     pub place: String,
     /// Unit that was recorded.
     pub device: String,
-    /// Its own number, where it is known.
+    /// Its number, if it is known.
     pub unit_id: Option<String>,
     /// Unit of the readings.
     pub raw_unit: RawUnit,
@@ -60,7 +60,7 @@ pub struct Session {
     pub rows: PerSensor<Vec<Row>>,
     /// Samples of the recording.
     pub samples: f64,
-    /// Noise of the six channels at rest, raw, where a noise file states it.
+    /// Noise of the six channels at rest, raw, if a noise file gives it.
     pub stated: [Option<AllanModel>; 6],
     /// Where the input is not known: times, s, at which the unit was put into another pose, as it matters to gyro and accelerometer.
     pub moved_s: [Vec<f64>; 2],
@@ -73,7 +73,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Of `prepared`.
+    /// From `prepared`.
     ///
     /// # Errors
     /// Those of the thermometer; means without samples.
@@ -144,12 +144,12 @@ impl Session {
 /// Another pose.
 struct Move {
     at_s: f64,
-    /// Change of the reading of the accelerometer over its size.
+    /// Change of the accelerometer's reading over its magnitude.
     share: f64,
 }
 
-/// Times between two dwells at which what the accelerometer shows changes by more than its noise and the drift of the temperature do: the
-/// pose is another one there, and with it what gravity adds to the biases.
+/// Times between two dwells at which the accelerometer's reading changes by more than noise and the drift with temperature: the pose
+/// changes there, and with it the contribution of gravity to the biases.
 fn moves(rows: &[Row]) -> Vec<Move> {
     let within = rows.windows(2).filter(|p| p[0].step == p[1].step);
     let changes: Vec<Vector3<f64>> = within.map(|p| p[1].raw - p[0].raw).collect();
@@ -201,11 +201,11 @@ fn rows(prepared: &Prepared, sensor: Sensor) -> Vec<Row> {
     }
     let usable = prepared.dwells.list.iter();
     let usable: Vec<&Dwell> = usable.filter(|d| d.fault(sensor).is_none()).collect();
-    // What an input does within a dwell is read late or early by some milliseconds. Over a whole turn of the gyro that cancels; of a
-    // force that turns it does not.
+    // Readings of an input that moves within a dwell are late or early by some milliseconds. Over a whole turn that cancels for the gyro,
+    // but not for a rotating force.
     let stands = usable.iter().any(|d| !d.moves(sensor) && !d.turn);
-    // A turning unit feels a centripetal force, by an arm that no reference knows: 2 mm at 50 deg/s are 1.5 mm/s², four times what curves
-    // through rest alone leave. Rates are needed only where the poses at rest do not tell everything apart.
+    // A turning unit senses a centripetal force from an unknown lever arm: 2 mm at 50 deg/s are 1.5 mm/s², four times the residuals of
+    // curves through rest alone. Rates are needed only if the poses at rest do not distinguish everything.
     let at_rest = |d: &&Dwell| d.reference[..3].iter().map(|r| r * r).sum::<f64>() < RATE * RATE;
     let forces = usable
         .iter()
@@ -236,7 +236,7 @@ fn of_dwell(prepared: &Prepared, sensor: Sensor, dwell: &Dwell, length_s: f64) -
         after_gap: dwell.blocks.start == 0,
         ..Open::default()
     };
-    // Two at least, as noise is what they differ by.
+    // At least two, because their differences show the noise.
     let least = match length_s.is_finite() && dwell.duration_s >= 2.0 * SHORTEST_S {
         true => 2.0,
         false => 1.0,
@@ -281,7 +281,7 @@ fn of_dwell(prepared: &Prepared, sensor: Sensor, dwell: &Dwell, length_s: f64) -
 struct Open {
     /// Whether samples are missing before it.
     after_gap: bool,
-    /// Whether it goes on where a row ended.
+    /// Whether it continues where a row ended.
     rest: bool,
     rows: f64,
     time: f64,
@@ -303,7 +303,7 @@ impl Open {
         });
     }
 
-    /// The row, unless it is too short or its input is to be known and is not; `gap`: samples are missing after it.
+    /// The row, unless it is too short or its input should be known but is not; `gap`: samples are missing after it.
     fn close(&mut self, condensed: &Condensed, step: i32, gap: bool) -> Option<Row> {
         let open = std::mem::take(self);
         let known = condensed.has_reference.iter().any(|r| *r);

@@ -1,10 +1,10 @@
 //! How smooth the curves of a triad are: restricted maximum likelihood (REML).
 //!
-//! A curve is a line plus a function that bends: its second derivative has the variance τ² per kelvin, which is the Bayesian reading of
-//! the penalty ∫f''²/τ² (Wahba 1978), and so has its fourth derivative one of its own. With the first alone a sensor whose curves are
-//! cubics, as most are nearly, gets curves that waver about them: the error of the biases was 1.6 times its bound, where it is 1.2 times
-//! with both. The variances are estimated for each [`CurveKind`] of a triad from all of its axes, by the fixed point of Fellner and Schall as
-//! Wood and Fasiolo (2017) give it, within what data sheets allow.
+//! A curve is a line plus a function that bends. The second derivative of that function has the variance τ² per kelvin, which is the
+//! Bayesian interpretation of the penalty ∫f''²/τ² (Wahba 1978). Its fourth derivative has another variance. Most sensors have nearly cubic
+//! curves, and with the first variance alone the estimates waver about them: the error of the biases was 1.6 times its bound, and is 1.2
+//! times with both. The variances are estimated for each [`CurveKind`] of a triad from all of its axes, by the fixed point of Fellner and
+//! Schall in the form of Wood and Fasiolo (2017), within the limits of data sheets.
 
 use mimu::quantity::Sensor;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -15,11 +15,11 @@ use crate::regression::{CurveKind, Normal, Problem};
 /// Departure from a line over 100 K that no data sheet of a MEMS sensor exceeds: bias (SI), scale factor, cross terms (ratios).
 const GYRO_DEPARTURE: [f64; 3] = [0.05, 0.05, 0.02];
 const ACCEL_DEPARTURE: [f64; 3] = [0.5, 0.02, 0.02];
-/// Below these shares of the largest variances a curve is a line, or a cubic, to all digits that matter: a penalty that is stiffer by
-/// many more orders of magnitude than the other leaves nothing of that one's digits.
+/// Smallest variances, as shares of the largest: there a curve is a line, or a cubic, to all digits that matter. If one penalty were
+/// stiffer than the other by many more orders of magnitude, rounding would erase the other.
 const NONE: [f64; 2] = [1e-10, 1e-8];
-/// Steps of the fixed point from anywhere, and from the smoothness of a lag nearby. The criterion is at its minimum there, so that what the
-/// last step leaves counts squared.
+/// Steps of the fixed point from any start, and from the smoothness of a nearby lag. The criterion is at its minimum there, so the
+/// remaining error enters only squared.
 pub const ITERATIONS: [usize; 2] = [60, 20];
 const TOLERANCE: f64 = 5e-2;
 
@@ -34,13 +34,13 @@ pub fn times(smoothness: &Smoothness, factor: f64) -> Smoothness {
 /// Largest variances that data sheets allow.
 pub fn largest(problem: &Problem) -> Smoothness {
     let departure = match (problem.sensor, problem.biases_only) {
-        // Raw readings of unknown scale: their own range bounds what they can depart by.
+        // The scale of raw readings is unknown: their range bounds the departure.
         (_, true) => [range(problem); 3],
         (Sensor::Gyro, _) => GYRO_DEPARTURE,
         (Sensor::Accel, _) => ACCEL_DEPARTURE,
     };
-    // The integral of a random walk that is zero at both ends has the variance τ² L³/48 or less in between. What the fourth derivative
-    // adds is bounded far above that: a bend within a tenth of the range is no cubic.
+    // The integral of a random walk that is zero at both ends has the variance τ² L³/48 or less in between. The contribution of the fourth
+    // derivative has a far higher bound: a bend within a tenth of the range is not a cubic.
     departure.map(|d| [48.0 * d * d / 1e6, 48.0 * d * d / 1e6 / 1e4])
 }
 
@@ -67,9 +67,9 @@ pub struct AxisFit {
 /// Estimates of a triad for one lag.
 #[derive(Debug, Clone)]
 pub struct TriadFit {
-    /// Of the three axes.
+    /// Estimates of the three axes.
     pub axes: [AxisFit; 3],
-    /// Smoothness that they were found with.
+    /// Smoothness with which they were estimated.
     pub smoothness: Smoothness,
     /// Minus twice the logarithm of the likelihood, up to a constant, for comparing lags.
     pub criterion: f64,
@@ -77,14 +77,14 @@ pub struct TriadFit {
     pub by_axis: [f64; 3],
 }
 
-/// What is penalised, one pair of matrices a kind, and the same without the lines that are free.
+/// The penalties, one pair of matrices per kind, and the same without the free lines.
 pub struct Penalties {
     whole: [[DMatrix<f64>; 2]; 3],
     bending: [[DMatrix<f64>; 2]; 3],
 }
 
 impl Penalties {
-    /// Of the bases of `problem`.
+    /// From the bases of `problem`.
     pub fn of(problem: &Problem) -> Self {
         let whole = CurveKind::ALL.map(|kind| problem.basis(kind).penalties());
         let bending = CurveKind::ALL.map(|kind| {
@@ -103,7 +103,7 @@ impl Penalties {
         Self { whole, bending }
     }
 
-    /// Precision that a curve of kind `k` has by itself.
+    /// Prior precision of a curve of kind `k`.
     fn precision(&self, k: usize, variances: &[f64; 2]) -> DMatrix<f64> {
         &self.whole[k][0] / variances[0] + &self.whole[k][1] / variances[1]
     }
@@ -133,7 +133,7 @@ fn log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
 pub struct Solved {
     /// Coefficients.
     pub coefficients: DVector<f64>,
-    /// Sum of squares of what they leave of the readings, with the penalty.
+    /// Sum of squares of the residuals, plus the penalty.
     pub left: f64,
     /// The other terms of minus twice the logarithm of the restricted likelihood.
     pub determinants: f64,
@@ -172,7 +172,8 @@ pub fn solve(
     })
 }
 
-/// Best smoothness for `normals`, begun at `start` and looked for in so many steps, and the estimates with it. `None` if the rows do not determine them.
+/// Best smoothness for `normals`, searched from `start` in at most `iterations` steps, and the estimates with it. `None` if the rows do not
+/// determine them.
 pub fn fit(
     problem: &Problem,
     penalties: &Penalties,
@@ -229,8 +230,8 @@ pub fn fixed(
 
 /// Logarithm of the determinant of the information on the lines that are free.
 ///
-/// It is taken out of the criterion: a die that lags sees a smaller range, on which slopes per kelvin are known less well, and a flat
-/// prior on these would count that in favour of a long lag. Prior to the data, all changes over the range are alike.
+/// It is removed from the criterion. A die that lags covers a smaller range, over which slopes per kelvin are less certain, and a flat
+/// prior on slopes would count that in favour of a long lag. Instead all changes over the range are equally likely a priori.
 fn of_lines(problem: &Problem, axis: usize, normal: &Normal) -> Option<f64> {
     let parts = problem.parts(axis);
     let free: usize = parts
@@ -256,7 +257,7 @@ fn of_lines(problem: &Problem, axis: usize, normal: &Normal) -> Option<f64> {
     Some(log_det(&Cholesky::new(information)?))
 }
 
-/// One step of the fixed point: variances times what the curves bend by, over what they would be free to bend by.
+/// One step of the fixed point: the bending of the curves over their degrees of freedom to bend.
 fn step(
     problem: &Problem,
     penalties: &Penalties,

@@ -9,10 +9,11 @@ use crate::profile::Lag;
 use crate::session::Session;
 use crate::warning::Warning;
 
-/// The die may lag behind by this share of the range at most; beyond, a first-order lag that is a tenth off shifts curves by kelvins.
+/// Largest difference between die and thermometer, as a share of the range. Beyond it, a first-order lag with an error of a tenth shifts
+/// curves by kelvins.
 const BEHIND_SHARE: f64 = 0.25;
 
-/// Temperatures farther apart than this, K, are not neighbours: what biases do over them is a curve's to say, and no noise's.
+/// Temperatures farther apart than this, K, leave a gap: the change of the biases across it is a matter of curves, not of noise.
 const GAP_K: f64 = 3.0;
 
 /// Refuses recordings of two units, or of different readings.
@@ -49,10 +50,10 @@ pub fn check_alike(sessions: &[Session]) -> Result<()> {
     Ok(())
 }
 
-/// What `sessions` show of the temperature, each for itself: after every power-on the biases are others, and what they do over
-/// temperature is seen within a session only.
+/// The temperatures of each session separately: after every power-on the biases differ, so only a single session shows their change over
+/// temperature.
 pub struct Spans {
-    /// Lowest and highest temperature of each session, °C, by the lower end.
+    /// Lowest and highest temperature of each session, °C, sorted by the lower end.
     stretches: Vec<[f64; 2]>,
 }
 
@@ -63,7 +64,7 @@ fn widen(range: &mut [f64; 2], t: f64) {
 }
 
 impl Spans {
-    /// Of the rows of `sessions`.
+    /// From the rows of `sessions`.
     pub fn of(sessions: &[Session]) -> Self {
         let mut stretches: Vec<[f64; 2]> = sessions
             .iter()
@@ -116,7 +117,8 @@ impl Spans {
         gaps
     }
 
-    /// Refuses recordings in which no session shows a slope: by what the column has, what of it is used, and what a single session has.
+    /// Refuses recordings in which no session shows a slope: the error compares the span of the column, of the dwells that are used, and of
+    /// a single session.
     pub fn check(&self, sessions: &[Session], warnings: &mut Vec<Warning>) -> Result<()> {
         let words = |[low, high]: [f64; 2]| match low <= high {
             true => format!("{} K ({low:.1} to {high:.1} °C)", significant(high - low)),

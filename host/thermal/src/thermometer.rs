@@ -9,20 +9,20 @@ use mimu_recording::error::{Argument, Error, Result};
 const STEP_S: f64 = 1.0;
 /// Width (one sigma) of the smoothing, s, where the thermometer is fine enough.
 const SMOOTHING_S: f64 = 5.0;
-/// Longest stretch without a temperature, s, that is interpolated: at 5 K/min the rate of the fastest chambers, 1 K.
+/// Longest time without a temperature, s, that is interpolated: at 5 K/min the rate of the fastest chambers, 1 K.
 const LONGEST_GAP_S: f64 = 12.0;
-/// A thermometer that is not constant for longer than this, s, does not stick.
+/// A thermometer that is constant for less than this, s, does not stick.
 const SHORTEST_STUCK_S: f64 = 60.0;
-/// It sticks when it is constant for this many times as long as it usually is.
+/// It sticks if it is constant for this many times as long as usual.
 const STUCK_FACTOR: f64 = 50.0;
 /// Smallest change within a second, K, that can be a jump.
 const SMALLEST_JUMP: f64 = 0.5;
-/// So long after power-on, s, nothing is a jump: a die warms by kelvins within seconds, by its own power.
+/// For this long after power-on, s, nothing counts as a jump: self-heating warms a die by kelvins within seconds.
 const POWERED_UP_S: f64 = 60.0;
-/// A jump is this many times what all but one second in two hundred change by.
+/// A jump is this many times the change that only one second in two hundred exceeds.
 const JUMP_FACTOR: f64 = 12.0;
 
-/// Refuses temperatures that are none: curves over the rest would be those of the samples that happen to look like some.
+/// Refuses values that cannot be temperatures: curves over the rest would come from samples that only happen to look plausible.
 fn check_possible(found: &NoTemperatures, place: &str) -> Result<()> {
     let Some(problem) = found.problem() else {
         return Ok(());
@@ -39,12 +39,12 @@ pub struct Thermometer {
     start_s: f64,
     temp_c: Vec<f64>,
     slope: Vec<f64>,
-    /// Whether it begins with the power, so that dies and thermometer begin alike.
+    /// Whether it begins at the power-on, so that dies and thermometer begin at the same temperature.
     from_power_on: bool,
 }
 
 impl Thermometer {
-    /// Of `condensed`, whose samples are at `place`; `power_on_s` as in the manifest.
+    /// From `condensed`, whose samples are at `place`; `power_on_s` as in the manifest.
     ///
     /// # Errors
     /// Temperatures that are missing, jump or stick.
@@ -66,7 +66,7 @@ impl Thermometer {
         check_gaps(&condensed.blocks, &place)?;
         check_stuck(&known, &place)?;
         let mut series = Self::evenly(&known, first.start_s, last.last_s);
-        // Where nobody knows when the power came, the beginning may have been it.
+        // If the power-on is unknown, it may have been at the beginning.
         check_jumps(&series, power_on_s.unwrap_or(first.start_s), &place)?;
         series.from_power_on = power_on_s.is_some_and(|p| first.start_s - p < LONGEST_GAP_S);
         series.smooth(smoothing(&known));
@@ -154,7 +154,7 @@ impl Thermometer {
         extremes(&self.temp_c)
     }
 
-    /// Begin of the record, s.
+    /// Beginning of the record, s.
     pub fn start_s(&self) -> f64 {
         self.start_s
     }
@@ -164,10 +164,10 @@ impl Thermometer {
         (self.temp_c.len() - 1) as f64 * STEP_S
     }
 
-    /// Temperature of a die that follows the thermometer with the time constant `lag_s`, or leads it where that is negative.
+    /// Temperature of a die that follows the thermometer with the time constant `lag_s`, or leads it if that is negative.
     ///
     /// `lag · dT_die/dt + T_die = T_thermometer` for a positive one; `T_die = T_thermometer + |lag| · dT_thermometer/dt` for a negative
-    /// one, with the slope of the smoothed thermometer. `start` says how it begins.
+    /// one, with the slope of the smoothed thermometer. `start` is its state at the beginning.
     pub fn die(&self, lag_s: f64, start: Start) -> Die {
         if lag_s <= 0.0 {
             let led = self.temp_c.iter().zip(&self.slope);
@@ -201,12 +201,12 @@ impl Thermometer {
     }
 }
 
-/// What a die was like when the record began.
+/// State of a die when the record began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// As warm as the thermometer: after a soak, or as the power came.
+    /// At the temperature of the thermometer: after a soak, or at the power-on.
     Settled,
-    /// Behind by lag times slope: the ramp had been going for long.
+    /// Behind by lag times slope: the ramp had lasted for long.
     OnRamp,
 }
 
@@ -257,7 +257,7 @@ fn missing(place: &str, problem: &str) -> Error {
     Error::new(place, problem, remedy)
 }
 
-/// Refuses samples without a temperature for longer than can be interpolated. Where the recording has no samples, none is missing.
+/// Refuses samples without a temperature for longer than can be interpolated. Pauses of the recording do not count.
 fn check_gaps(blocks: &[Block], place: &str) -> Result<()> {
     let runs = blocks.chunk_by(|a, b| a.temp_c.mean.is_nan() == b.temp_c.mean.is_nan());
     let without = runs.filter(|run| run[0].temp_c.mean.is_nan());

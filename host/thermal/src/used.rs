@@ -1,15 +1,15 @@
-//! What of the recordings a sensor's curves rest on, in numbers and in words.
+//! The part of the recordings that a sensor's curves use, in numbers and in words.
 
 use serde::Serialize;
 
-/// What of the recordings a sensor's curves rest on.
+/// The part of the recordings that a sensor's curves use.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Used {
     /// Share of the samples.
     pub samples: f64,
     /// Share of the temperatures of the thermometer, in steps of a kelvin.
     pub temperatures: f64,
-    /// Lowest and highest temperature of the thermometer at what is used, °C.
+    /// Lowest and highest temperature of the thermometer in that part, °C.
     pub used_c: [f64; 2],
     /// Lowest and highest temperature of the thermometer, °C.
     pub recorded_c: [f64; 2],
@@ -19,7 +19,7 @@ impl Used {
     /// In one line.
     pub fn words(&self) -> String {
         let percent = |share: f64| match share {
-            // What is nearly all is not all.
+            // Nearly all is not shown as all.
             share if share < 1.0 => (100.0 * share).min(99.9),
             _ => 100.0,
         };

@@ -1,4 +1,4 @@
-//! What a person should know of curves over temperature, by kind; only readers get the sentences.
+//! Warnings about curves over temperature, by kind. The sentences are for people only.
 
 use std::fmt;
 
@@ -12,22 +12,22 @@ use crate::used::Used;
 /// Jumps of a bias that are named at most.
 const NAMED: usize = 3;
 
-/// What a person should know. JSON has the sentence.
+/// What a person should know. JSON contains it as a sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Warning {
-    /// What was found while a recording was read and its dwells were chosen.
+    /// A warning from reading a recording and choosing its dwells.
     Recording(mimu::warning::Warning),
     /// How often the unit was put into another pose of the gyro, and of the accelerometer; the first time of the latter, s.
     Moved([usize; 2], f64),
     /// Jumps of the gyro's bias, and the unit of the readings.
     BiasJumps(Vec<BiasJump>, RawUnit),
-    /// How much of the recordings a sensor's curves rest on.
+    /// How much of the recordings a sensor's curves use.
     Coverage(Sensor, Used),
     /// Temperatures that no recording crosses, °C.
     NotCrossed([f64; 2]),
-    /// Temperatures, K, that are too few for curvature.
+    /// Span of temperatures, K, that is too small for curvature.
     StraightLines(f64),
-    /// How many times as far as straight lines curves miss the last third of the recordings.
+    /// Error of curves in the last third of the recordings, relative to that of straight lines.
     CurvatureRefused(f64),
     /// The noise of the unit at rest is not known.
     WithoutNoise,

@@ -9,20 +9,19 @@ const J_MAX: usize = 100;
 /// Meaning of a sample of the integral.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sampling {
-    /// The integral at an instant, as the sum of rates is.
+    /// The integral at an instant, such as the sum of rates.
     Instants,
-    /// Its mean over a sample period, as GR have it for a measured phase (and Stable32 for rates too). Neighbours
-    /// are then more alike: for white rates and m = 1 GR give 782 degrees of freedom to 999 differences, where
-    /// 1000 independent rates have 666.
+    /// Its mean over a sample period, as GR assume for a measured phase (and Stable32 for rates too). Neighbours are then more correlated:
+    /// for white rates and m = 1 GR give 782 degrees of freedom for 999 differences; 1000 independent rates have 666.
     Means,
 }
 
 /// How a variance was estimated from a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Estimator {
-    /// Which differences.
+    /// Kind of the differences.
     pub kind: Deviation,
-    /// Of which samples.
+    /// Meaning of the samples.
     pub sampling: Sampling,
     /// Cluster length, samples.
     pub m: usize,
@@ -44,11 +43,10 @@ impl Estimator {
     /// Equivalent degrees of freedom of the variance for noise with exponent `alpha` (2 to -2; to -4 for
     /// [`Deviation::Hadamard`]); at least 1.
     ///
-    /// With every difference used, the combined algorithm of GR, as Stable32 has it; otherwise the sum that it
-    /// approximates, GR (13).
+    /// If every difference is used, this is the combined algorithm of GR, as in Stable32; otherwise the sum that it approximates, GR (13).
     ///
     /// # Panics
-    /// When the variance does not exist for `alpha`, or the algorithm has no such noise.
+    /// If the variance does not exist for `alpha`, or the algorithm lacks such noise.
     pub fn edf(&self, alpha: i32) -> f64 {
         let d = self.kind.order();
         assert!(
@@ -66,12 +64,11 @@ impl Estimator {
         } else {
             self.combined(alpha, d)
         };
-        // One square is one degree of freedom, and more of them are never less: what falls below is the
-        // approximation.
+        // One square has one degree of freedom, and more squares never have less: a smaller value is an error of the approximation.
         (1.0 / inverse).max(1.0)
     }
 
-    /// Over one sample it is the Allan variance, of which GR's continuous mean over the cluster knows nothing.
+    /// Over one sample it equals the Allan variance, to which GR's continuous mean over the cluster does not apply.
     fn modified(&self) -> bool {
         self.kind == Deviation::Modified && self.m > 1
     }
@@ -102,7 +99,7 @@ impl Estimator {
         (1.0 + 2.0 * shared) / terms
     }
 
-    /// The combined algorithm of GR: by terms for few, by a fit for many, by fewer terms in between.
+    /// The combined algorithm of GR: term by term for few terms, by a fit for many, by fewer terms in between.
     fn combined(&self, alpha: i32, d: usize) -> f64 {
         let (s, r) = (self.m as f64, self.terms as f64 / self.m as f64);
         let modified = self.modified();
@@ -111,7 +108,7 @@ impl Estimator {
             return basic_sum(self.terms, s, filter, alpha, d);
         }
         let flicker_phase = alpha == 1 && !modified;
-        // Of flicker phase noise, s_z(0) still grows with the number of samples in a cluster: GR, table 3.
+        // For flicker phase noise, s_z(0) still grows with the number of samples in a cluster: GR, table 3.
         let at_zero = match (flicker_phase, d) {
             (false, _) => None,
             (true, 2) => Some(15.23 + 12.0 * s.ln()),

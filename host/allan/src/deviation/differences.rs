@@ -5,11 +5,11 @@ use std::ops::Range;
 /// Independent partial sums in the inner loop: breaks the chain of additions (a latency of 3 to 4 cycles each) and
 /// fills the vector registers.
 const LANES: usize = 8;
-/// Terms that are summed before they are added to the rest. Rounding then grows with the block and with the number
-/// of blocks, not with their product.
+/// Number of terms that are summed before they are added to the rest. Rounding then grows with the block and with the number of blocks, not
+/// with their product.
 const BLOCK: usize = 4096;
 
-/// The zeroth to third difference of as many samples more one, equally far apart.
+/// The zeroth to third difference of one to four equally spaced samples.
 ///
 /// # Panics
 /// For any other number of samples.
@@ -24,8 +24,8 @@ pub fn difference(samples: &[f64]) -> f64 {
     }
 }
 
-/// Sums of `f` over every `stride`-th of `positions` of the stencil `offsets`, from the first: `f` is handed the
-/// samples at position plus each offset.
+/// Sums of `f` over every `stride`-th of `positions` of the stencil `offsets`, from the first: `f` receives the samples at position plus
+/// each offset.
 ///
 /// # Panics
 /// When the last position plus the largest offset is beyond the end of `x`.

@@ -1,25 +1,24 @@
-//! The running integral of a series of rates, taken in as they come.
+//! The running integral of a series of rates, slice by slice.
 
 use rayon::prelude::*;
 
 use crate::NotFinite;
 use crate::bounds::Sampling;
 
-/// Samples that are summed by themselves before they are added to the integral.
+/// Number of samples that are summed separately before they are added to the integral.
 const CHUNK: usize = 4096;
-/// Samples of a longer slice that are taken in at a time.
+/// Number of samples of a longer slice that are integrated at a time.
 const SLICE: usize = 1 << 16;
 
 /// A series integrated over time, ready for differences of any length.
 ///
-/// A reference is taken off the rates first. Second and third differences do not see it, but a gravity of 9.8 m/s²
-/// under noise of 1e-3 m/s² would fill the digits of the integral with its ramp: 1e9 after 1e8 samples, whose
-/// last digit is 1e-7.
+/// A reference is subtracted from the rates first. It cancels in second and third differences, but gravity of 9.8 m/s² with noise of 1e-3
+/// m/s² would use up the digits of the integral: its ramp reaches 1e9 after 1e8 samples, with a last digit of 1e-7.
 #[derive(Debug, Clone)]
 pub struct Integrated {
     /// Integral at the sample borders: one more than there are rates.
     x: Vec<f64>,
-    /// Mean of the first slice of rates; it only has to be near theirs.
+    /// Mean of the first slice of rates; it need only be near the mean of all.
     reference: Option<f64>,
     end: Sum,
     dt_s: f64,
@@ -27,7 +26,7 @@ pub struct Integrated {
 }
 
 impl Integrated {
-    /// Of no rates yet, which will be `dt_s` apart.
+    /// Without rates yet; they will be `dt_s` apart.
     pub fn empty(dt_s: f64) -> Self {
         Self {
             x: vec![0.0],
@@ -38,7 +37,7 @@ impl Integrated {
         }
     }
 
-    /// Integrates rates (any unit) that are `dt_s` apart, in their place: three hours at 1 kHz are 86 MB once.
+    /// Integrates rates (any unit) that are `dt_s` apart, in place: three hours at 1 kHz take 86 MB only once.
     ///
     /// # Errors
     /// The first rate that is not a finite number.
@@ -72,10 +71,10 @@ impl Integrated {
         Ok(integrated)
     }
 
-    /// Takes in the rates (any unit) that come next. Slices are best long: 1e4 samples keep the processor busy.
+    /// Integrates the next rates (any unit). Long slices are best: 1e4 samples keep the processor busy.
     ///
     /// # Errors
-    /// The first rate that is not a finite number; nothing of the slice is then taken in.
+    /// The first rate that is not a finite number; then nothing of the slice is integrated.
     pub fn push(&mut self, rates: &[f64]) -> Result<(), NotFinite> {
         self.refuse_not_finite(rates)?;
         let reference = match self.reference {
@@ -124,7 +123,7 @@ impl Integrated {
         &self.x
     }
 
-    /// Rates that it is of.
+    /// Number of rates.
     pub fn samples(&self) -> usize {
         self.x.len() - 1
     }
@@ -134,13 +133,13 @@ impl Integrated {
         self.dt_s
     }
 
-    /// What the integral's samples stand for.
+    /// Meaning of the integral's samples.
     pub(crate) fn sampling(&self) -> Sampling {
         self.sampling
     }
 
-    /// What a difference of the integral over one sample is divided by to be a rate: rates are summed over
-    /// samples, a phase is an integral over seconds.
+    /// Divisor that turns a difference of the integral over one sample into a rate: rates are summed over samples, a phase is an integral
+    /// over seconds.
     pub(crate) fn step(&self) -> f64 {
         match self.sampling {
             Sampling::Instants => 1.0,
@@ -168,12 +167,12 @@ impl Integrated {
     }
 }
 
-/// About the mean of `rates`, which rounding moves by parts in 1e12.
+/// The mean of `rates`, with a rounding error of parts in 1e12.
 fn mean(rates: &[f64]) -> f64 {
     chunk_sums(rates, 0.0).into_iter().sum::<f64>() / rates.len() as f64
 }
 
-/// Sums of chunks of the rates less a reference.
+/// Sums of chunks of the rates minus a reference.
 fn chunk_sums(rates: &[f64], reference: f64) -> Vec<f64> {
     let sum = |chunk: &[f64]| -> f64 {
         let mut lanes = [0.0; 8];
@@ -188,8 +187,8 @@ fn chunk_sums(rates: &[f64], reference: f64) -> Vec<f64> {
     rates.chunks(CHUNK).map(sum).collect()
 }
 
-/// A sum with what rounding loses carried along (Neumaier 1974): 1e8 samples are 24 000 chunks, and an error at a
-/// border would be a step in every cluster after it.
+/// A sum with compensation of rounding errors (Neumaier 1974): 1e8 samples are 24 000 chunks, and an error at a border would be a step in
+/// every cluster after it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sum {
     sum: f64,
@@ -197,7 +196,7 @@ struct Sum {
 }
 
 impl Sum {
-    /// Adds to it, and gives what it was before.
+    /// Adds `part`, and returns the sum before it.
     fn add(&mut self, part: f64) -> f64 {
         let Self { sum, lost } = *self;
         let next = sum + part;

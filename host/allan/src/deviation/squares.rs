@@ -8,11 +8,11 @@ use super::super::Deviation;
 use super::differences::{difference, sums};
 use super::window_sums::WindowSums;
 
-/// Positions that all clusters are done at before the next: with what clusters of [`NEAR`] reach beyond, 350 KB of
-/// doubles, for a second-level cache.
+/// Number of positions in a tile, for which all clusters are computed before the next tile. With the reach of clusters of [`NEAR`] it is
+/// 350 KB of doubles, for a second-level cache.
 const TILE: usize = 1 << 15;
-/// Shorter clusters than this are done in tiles. Differences of longer ones are so far apart
-/// (`STARTS_PER_CLUSTER`) that a line of cache would be read for each from a tile too.
+/// Shorter clusters are computed in tiles. Differences of longer ones are so far apart (`STARTS_PER_CLUSTER`) that each would read a
+/// separate cache line from a tile too.
 const NEAR: usize = 4096;
 
 /// What is computed at one averaging time.
@@ -20,9 +20,9 @@ const NEAR: usize = 4096;
 pub struct Plan {
     /// Cluster length.
     pub m: usize,
-    /// Every so-many-th difference is used.
+    /// One difference in this many is used.
     pub stride: usize,
-    /// Differences that there are.
+    /// Number of all differences.
     pub all: usize,
 }
 
@@ -79,8 +79,7 @@ pub fn sums_of_squares(x: &[f64], kind: Deviation, plans: &[Plan]) -> Vec<f64> {
     sums
 }
 
-/// Sums for all plans, a tile after the other: the series comes from memory once for all clusters, and not once for
-/// each. `part` is handed the start of the tile.
+/// Sums for all plans, tile by tile, so that the series is read from memory once for all clusters. `part` receives the start of the tile.
 fn tiled(plans: &[Plan], part: impl Fn(usize) -> Vec<f64> + Sync + Send) -> Vec<f64> {
     let end = plans.iter().map(|plan| plan.all).max().unwrap_or(0);
     let tiles: Vec<Vec<f64>> = (0..end).into_par_iter().step_by(TILE).map(part).collect();

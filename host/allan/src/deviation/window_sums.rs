@@ -1,9 +1,9 @@
 //! Sums of the integral over windows of any length, for the modified Allan variance.
 //!
-//! Its term is a sum of m neighbouring second differences, which by windows of m is
-//! `W(j+2m) - 2 W(j+m) + W(j)` and moves on by one third difference: O(N) for any m. What moves on also collects
-//! rounding, and could neither begin in the middle nor skip ahead; so the integral's own running sum is kept
-//! at every 64th sample (3 % more memory), and a term anywhere costs four look-ups and at most 252 additions.
+//! Its term is a sum of m neighbouring second differences. With windows of m it is `W(j+2m) - 2 W(j+m) + W(j)`, and the next term adds one
+//! third difference: O(N) for any m. Such updates accumulate rounding errors, and can neither begin in the middle nor skip ahead. The
+//! running sum of the integral is therefore kept at every 64th sample (3 % more memory), and any term costs four look-ups and at most 252
+//! additions.
 
 use std::ops::Range;
 
@@ -11,9 +11,9 @@ use super::differences::difference;
 
 /// Samples from one kept running sum to the next.
 pub const BLOCK: usize = 64;
-/// Runs of terms that are moved on at the same time: one alone waits for its own additions.
+/// Number of runs of terms that are updated at the same time: a single one would wait for its own additions.
 const RUNS: usize = 4;
-/// Terms in a run, after which it begins afresh.
+/// Number of terms in a run; the next run starts from the kept sums again.
 const RUN: usize = 1024;
 
 /// A series with its running sum at every 64th sample.
@@ -63,8 +63,7 @@ impl<'a> WindowSums<'a> {
     fn term(&self, m: usize, j: usize) -> f64 {
         let x = self.x;
         if m <= BLOCK {
-            // No dearer than the windows, whose sums of 64 samples round at 64 times the integral and would show
-            // here.
+            // As cheap as the windows. Their sums of 64 samples have 64 times the rounding error of the integral, which would show here.
             let second = |i: usize| difference(&[x[i], x[i + m], x[i + 2 * m]]);
             return (j..j + m).map(second).sum();
         }

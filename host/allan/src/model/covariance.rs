@@ -1,10 +1,10 @@
 //! Covariance of the points of overlapping Allan and Hadamard curves, for a mixture of power-law noises.
 //!
-//! A point is the mean square of differences of the integral x of the rates over all t of the record. Of Gaussian noise the
-//! covariance of two such means is twice the mean of the squared cross-covariance of the two series (Isserlis), and that follows
-//! from the generalized covariance of x: Greenhall and Riley (2003) for one averaging time, here for every pair. Quantization is
-//! uniform and not Gaussian, which makes its mean squares steadier: by Isserlis alone its 95 % intervals covered in 99 % of the
-//! runs of `tests/all/model.rs`.
+//! A point is the mean square of differences of the integral x of the rates over all t of the record. For Gaussian noise the covariance of
+//! two such means is twice the mean of the squared cross-covariance of the two series (Isserlis). That follows from the generalized
+//! covariance of x: Greenhall and Riley (2003) for one averaging time, here for every pair. The errors of quantization are uniform instead
+//! of Gaussian, which makes their mean squares steadier: with Isserlis alone its 95 % intervals contained the truth in 99 % of the runs of
+//! `tests/all/model.rs`.
 
 use rayon::prelude::*;
 
@@ -20,7 +20,7 @@ const GRADING: i64 = 8;
 /// Fourth cumulant of a uniform distribution over the square of its variance.
 const UNIFORM: f64 = -1.2;
 
-/// For each pair of points, what is independent of the sizes of the noises.
+/// For each pair of points, the part of the covariance that does not depend on the amplitudes of the noises.
 ///
 /// Units of the sample period throughout; each process is normalized to an Allan variance of 1 at τ = 1.
 #[derive(Debug, Clone)]
@@ -29,7 +29,7 @@ pub(super) struct Covariances {
     pairs: Vec<Pair>,
 }
 
-/// Of two points.
+/// A pair of points.
 #[derive(Debug, Clone)]
 struct Pair {
     /// Covariance of the points for amplitudes k and l.
@@ -49,7 +49,7 @@ impl Covariances {
         Self { points, pairs }
     }
 
-    /// The points that they are of.
+    /// The points.
     pub fn points(&self) -> &[Differences] {
         &self.points
     }
@@ -92,12 +92,12 @@ impl Pair {
     /// Sums over all lags in a record of `n` samples.
     fn new(i: Differences, j: Differences, n: usize) -> Self {
         let (count_i, count_j) = (i.count(n) as i64, j.count(n) as i64);
-        // Reversed in time the differences are the same but for a sign: lags on one side of that at which their centres meet
-        // stand for those on the other.
+        // Reversed in time the differences only change sign: lags on one side of that at which their centres meet also represent those on
+        // the other.
         let apart = i.span() as i64 - j.span() as i64;
         let centre = apart.div_euclid(2) + apart.rem_euclid(2);
-        // Beyond a few lengths only the flicker's covariance is left, falling as 1/lag²; of short differences in a long record
-        // it would drown in rounding errors.
+        // Beyond a few lengths only the flicker's covariance remains, which falls as 1/lag². For short differences in a long record it
+        // would be lost in rounding errors.
         let near = (2 * (i.span() + j.span())).max(256 * i.m.min(j.m));
         let end = (count_j - 1 - centre).min(near as i64);
         let mut kinks = vec![0, -centre, count_j - count_i - centre];

@@ -1,4 +1,4 @@
-//! What the points of a curve are: mean squares of differences of the integral of the rates.
+//! The points of a curve: mean squares of differences of the integral of the rates.
 
 /// Terms of the Allan variance: 1/τ², 1/τ, 1, τ, τ².
 pub(super) const TERMS: usize = 5;
@@ -7,12 +7,12 @@ pub(super) const PHASE: usize = 0;
 /// τ²: the ramp.
 pub(super) const RAMP: usize = 4;
 
-/// Which differences.
+/// Order of the differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Order {
     /// Allan variance.
     Second,
-    /// Hadamard variance, which a ramp is no part of.
+    /// Hadamard variance, in which a ramp cancels.
     Third,
 }
 

@@ -1,4 +1,4 @@
-//! Amplitudes of the terms of a noise model from a curve, with what they are known to.
+//! Amplitudes of the terms of a noise model from a curve, with their covariance.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::covariance::{Covariances, PROCESSES};
 use super::differences::{Differences, Order, PHASE, RAMP, TERMS};
 
-/// Share of itself to which the curve is trusted, whatever its degrees of freedom: a ramp without noise has infinitely many.
+/// Least relative error of the curve, whatever its degrees of freedom: a ramp without noise has infinitely many.
 const NUMERICS: f64 = 1e-7;
 
 /// Points of a curve: those of `covariances` in `range`, in units of the sample period.
@@ -17,7 +17,7 @@ pub(super) struct Curve<'a> {
     pub y: Vec<f64>,
     /// Which points they are.
     pub range: Range<usize>,
-    /// Of all points that a record of this length has.
+    /// Covariances of all points of a record of this length.
     pub covariances: &'a Covariances,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Fitted {
     pub a: [f64; TERMS],
     /// Covariance of the amplitudes in the order of `terms`.
     pub covariance: DMatrix<f64>,
-    /// -2 ln of the likelihood, but for a constant of the curve.
+    /// -2 ln of the likelihood, except for a constant of the curve.
     pub deviance: f64,
     /// Sum of the squares of the decorrelated residuals.
     pub chi2: f64,
@@ -44,10 +44,10 @@ impl Fitted {
     }
 }
 
-/// Sizes and covariance of the points for some amplitudes.
+/// Expected values and covariance of the points for given amplitudes.
 struct Spread {
     mu: Vec<f64>,
-    /// Of the relative covariance.
+    /// Cholesky factor of the relative covariance.
     root: Cholesky<f64, Dyn>,
     /// Relative variances of the points.
     relative: Vec<f64>,
@@ -76,7 +76,7 @@ impl Curve<'_> {
         self.points().iter().filter(allan).count()
     }
 
-    /// Forgets the shortest time.
+    /// Removes the shortest time.
     pub fn drop_shortest(&mut self) {
         self.y.pop();
         self.range.end -= 1;
@@ -145,16 +145,16 @@ impl Curve<'_> {
         Some((&covariance * white.tr_mul(&y), covariance))
     }
 
-    /// Fits `terms`; `None` where one of them would be negative, which only that of 1/τ² may be.
+    /// Fits `terms`; `None` if one of them would be negative. Only the term in 1/τ² may be.
     ///
-    /// The covariance is that of the fitted model and iterated with it: with weights from the measured values the low ones
-    /// would count more than the high ones.
+    /// The covariance is that of the fitted model, and is iterated with it. With weights from the measured values the low ones would count
+    /// more than the high ones.
     pub fn fit(&self, terms: &[usize]) -> Option<Fitted> {
         if terms.is_empty() || terms.len() > self.y.len() {
             return None;
         }
         let mut a = [0.0; TERMS];
-        // Whatever it can be at most: the term alone through its lowest point.
+        // Start from half the largest possible amplitude: that of the term alone through its lowest point.
         for &k in terms {
             let most = |(d, y): (&Differences, &f64)| y / d.basis()[k];
             let all = self.points().iter().zip(&self.y).map(most);
@@ -167,7 +167,7 @@ impl Curve<'_> {
             let mut change: f64 = 0.0;
             for (i, &k) in terms.iter().enumerate() {
                 let sigma = covariance[(i, i)].sqrt();
-                // A step beyond zero goes a tenth of the way there: it may turn round.
+                // Instead of a step beyond zero, the amplitude falls to a tenth: it may recover.
                 next[k] = match solution[i] > 0.0 || k == PHASE {
                     true => solution[i],
                     false => 0.1 * a[k],
@@ -196,9 +196,9 @@ impl Curve<'_> {
 
     /// Chi-square and deviance.
     ///
-    /// The cube root of a mean square is as good as normal down to two degrees of freedom (Wilson and Hilferty 1931); the
-    /// roots are taken to be jointly normal with the correlations of the points. The points themselves are not: of three degrees of
-    /// freedom one value in fifty is 2.8 sigmas high, and would call for a random walk.
+    /// The cube root of a mean square is nearly normal down to two degrees of freedom (Wilson and Hilferty 1931). The roots are assumed to
+    /// be jointly normal with the correlations of the points. The points themselves are not normal: with three degrees of freedom one value
+    /// in fifty is 2.8 sigmas high, and would require a random walk.
     fn deviance(&self, spread: &Spread) -> Option<(f64, f64)> {
         let n = self.y.len();
         let mut logs = 0.0;
@@ -207,7 +207,7 @@ impl Curve<'_> {
             logs += (2.0 / 3.0) * spread.mu[i].ln() + variance.ln();
             ((self.y[i] / spread.mu[i]).cbrt() - (1.0 - variance)) / variance.sqrt()
         });
-        // Decorrelated by the root of the correlations.
+        // Decorrelated by the factor of the correlations.
         let sigma = DVector::from_fn(n, |i, _| spread.relative[i].sqrt());
         let white = spread
             .root
@@ -219,13 +219,13 @@ impl Curve<'_> {
         Some((chi2, chi2 + correlation + logs))
     }
 
-    /// Standard deviation and skewness of the estimate of `term` among `terms` where `a` is true, times √`excess`.
+    /// Standard deviation and skewness of the estimate of `term` among `terms` if the true amplitudes are `a`.
     fn error_at(&self, a: &[f64; TERMS], terms: &[usize], term: usize) -> Option<(f64, f64)> {
         let spread = self.spread(a)?;
         let (white, covariance) = self.information(&spread, terms)?;
         let row = terms.iter().position(|k| *k == term)?;
-        // The estimate is a weighted sum of decorrelated points. The first of them is the longest, a chi-square of few degrees
-        // of freedom; the others are what each next one adds, and have the skewness of theirs.
+        // The estimate is a weighted sum of decorrelated points. The first of them is the longest, a chi-square of few degrees of freedom.
+        // Each other one is the part that the next point adds, with the skewness of that point.
         let weights = white * covariance.column(row);
         let sigma = weights.norm();
         let third: f64 = (0..weights.len())
@@ -234,11 +234,11 @@ impl Curve<'_> {
         Some((sigma, third / sigma.powi(3)))
     }
 
-    /// End of the confidence interval of `term`: the amplitude at which the estimate would be the quantile of probability
-    /// `p`, given by its normal deviate `z`; `None` where that is nowhere above zero.
+    /// End of the confidence interval of `term`: the true amplitude for which the estimate would be the quantile with the normal deviate
+    /// `z`; `None` if no amplitude above zero is.
     ///
-    /// The error at the hypothesis counts and not that at the estimate, and it is skew: a coefficient read from three degrees of
-    /// freedom has a chi-square interval, one that is a small share of its points nearly a symmetric one.
+    /// The error is that at the hypothesis instead of the estimate, and it is skew: a coefficient from three degrees of freedom has a
+    /// chi-square interval, and one that is a small share of its points a nearly symmetric one.
     pub fn end(&self, fitted: &Fitted, term: usize, z: f64, excess: f64) -> Option<f64> {
         let row = fitted.terms.iter().position(|k| *k == term)?;
         let estimate = fitted.a[term];
@@ -282,8 +282,8 @@ impl Curve<'_> {
         Some(0.5 * (ends[0] + ends[1]))
     }
 
-    /// `term`, which is not in `fitted`, estimated beside it where it is in fact absent. A negative amplitude counts as zero: a
-    /// bound from it would be the lower the less the model fits.
+    /// Estimates `term`, which is not in `fitted`, in addition to its terms, with the covariance of `fitted`. A negative amplitude counts
+    /// as zero: otherwise a bound would be lower if the model fits worse.
     pub fn beside(&self, fitted: &Fitted, term: usize) -> Option<Fitted> {
         let mut terms = fitted.terms.clone();
         terms.push(term);
@@ -297,7 +297,7 @@ impl Curve<'_> {
         Some(beside)
     }
 
-    /// Standard deviation of the estimate of `term`, which is not in `fitted`, where its amplitude is `a`.
+    /// Standard deviation of the estimate of `term`, which is not in `fitted`, if its amplitude is `a`.
     pub fn error_of(&self, fitted: &Fitted, term: usize, a: f64) -> Option<f64> {
         let mut terms = fitted.terms.clone();
         terms.push(term);
@@ -307,8 +307,8 @@ impl Curve<'_> {
     }
 }
 
-/// Quantile of a gamma distribution with mean 0, variance 1 and a skewness (Pearson's type III), where the normal
-/// distribution has its at `z` (Wilson and Hilferty).
+/// Quantile of a gamma distribution with mean 0, variance 1 and skewness `skew` (Pearson's type III), at the probability of the normal
+/// deviate `z` (Wilson and Hilferty).
 fn standard_gamma(z: f64, skew: f64) -> f64 {
     if skew.abs() < 1e-6 {
         return z;

@@ -27,21 +27,20 @@ pub struct Estimator {
 
 /// Averaging factors of the Allan curve that a model is fitted to: octaves up to a quarter of the record, and half of it.
 ///
-/// What lies between the octaves repeats them: every sample is in every one of the difference series. It would only make the
-/// covariance of the points nearly singular. The half is a single difference, but the only one that goes through the whole
-/// record: to squares of shorter ones a random walk there and back again is a ramp. Of 1000 ramps that are hard to see ("N, weak R" in
-/// `tests/all/model.rs`) 457 were told with it and 35 without.
+/// Times between the octaves would repeat their information, because every difference series contains every sample: they would only make
+/// the covariance of the points nearly singular. Half of the record gives a single difference, but the only one over the whole record: the
+/// squares of shorter ones do not distinguish a ramp from a random walk that goes and returns. Of 1000 weak ramps ("N, weak R" in
+/// `tests/all/model.rs`) 457 were found with it and 35 without.
 pub fn allan_factors(samples: usize) -> Vec<usize> {
     octaves(samples)
         .chain((samples >= 4).then_some(samples / 2))
         .collect()
 }
 
-/// Averaging factors of the Hadamard curve that a model is fitted to besides: the three longest octaves that the record holds
-/// six times.
+/// Averaging factors of the Hadamard curve that a model is also fitted to: the three longest octaves that fit six times into the record.
 ///
-/// Of the terms only the ramp is no part of them. Without them 376 of the same ramps were told; and of 1000 random walks that are
-/// hard to see ("N, weak K") 384, and 431 with them.
+/// They contain all terms except the ramp. Without them 376 of the same ramps were found. Of 1000 weak random walks ("N, weak K") 384 were
+/// found without them, and 431 with them.
 pub fn hadamard_factors(samples: usize) -> Vec<usize> {
     let mut all: Vec<usize> = octaves(samples).filter(|m| 6 * m <= samples).collect();
     all.split_off(all.len().saturating_sub(3))
@@ -97,7 +96,7 @@ impl Estimator {
                 Order::Third => at(hadamard, point.m)?,
             };
             match point.order {
-                // Of a ramp without noise the third differences are rounding errors.
+                // The third differences of a ramp without noise are rounding errors.
                 Order::Third if !(deviation > ROUNDING * second) => {
                     whole.y.clear();
                     whole.range.start = index + 1;
@@ -123,7 +122,7 @@ impl Estimator {
                 return Err(Unseen { at_most: None, why });
             }
             let instead = selection.instead_of(term);
-            // What is in a model that does not fit may be there to mend it.
+            // A term of a model that does not fit may only compensate the misfit.
             let k = term as usize;
             let misfit = selection.excess.sqrt() * best.sigma(k);
             let shown = selection.excess == 1.0 || best.a[k] > SEEN * misfit;

@@ -9,24 +9,23 @@ use super::terms::Term;
 /// Sigmas at which a coefficient is shown.
 pub(super) const SEEN: f64 = 3.0;
 
-/// A term has to lower the deviance by this to be in the model: 2.8 standard deviations, 0.5 %.
+/// A term must lower the deviance by this to be in the model: 2.8 standard deviations, 0.5 %.
 const TERM_DEVIANCE: f64 = 8.0;
-/// Models whose deviance, with [`TERM_DEVIANCE`] for each term, is within this of the best are not ruled out (a further term
-/// whose significance is between 10 % and 0.5 %): the intervals hold theirs too. A term that one of them replaces by another is not
-/// told.
+/// Models whose deviance, with [`TERM_DEVIANCE`] for each term, is within this of the best are plausible (an additional term with a
+/// significance between 10 % and 0.5 %): the intervals include theirs. If one of them replaces a term by another, the term is not reported.
 const PLAUSIBLE: f64 = 5.3;
-/// The same for what replaces a ramp: a random walk too weak to be seen drifts as far by chance. Of 1000 in white noise 46 were told to
-/// be ramps at [`PLAUSIBLE`], and 25 at this.
+/// The same for models that replace a ramp: a random walk too weak to be seen drifts as far by chance. Of 1000 in white noise 46 were
+/// reported as ramps with [`PLAUSIBLE`], and 25 with this.
 const RAMP_PLAUSIBLE: f64 = 8.0;
 /// The shortest times are left out until the misfit has at least this probability.
 const FITS: f64 = 1e-3;
-/// Shortest time used, in time constants of the filter that the curve shows. The term in 1/τ² stands for it to `4 exp(-τ/T)` of itself
-/// only, and at 4 T the misfit, though still not significant, moved N by three of its sigmas.
+/// Shortest time used, in time constants of the filter that the curve shows. The term in 1/τ² represents it only to `4 exp(-τ/T)` of
+/// itself. At 4 T the misfit was not significant yet, but moved N by three of its sigmas.
 const FILTER_TIMES: f64 = 8.0;
-/// Points of the Allan curve that must be left.
+/// Points of the Allan curve that must remain.
 pub(super) const FEWEST: usize = 6;
 
-/// A model with what choosing goes by.
+/// A model with its cost.
 struct Choice {
     /// Deviance, and [`TERM_DEVIANCE`] for each term.
     cost: f64,
@@ -35,9 +34,9 @@ struct Choice {
 
 /// The models that a curve allows.
 pub(super) struct Selection<'a> {
-    /// What is left of the curve.
+    /// The part of the curve that is used.
     pub curve: Curve<'a>,
-    /// Misfit over its expectation where no model fits, else 1.
+    /// Misfit over its expectation if no model fits, else 1.
     pub excess: f64,
     /// Whether shorter times were left out.
     pub shortened: bool,
@@ -46,7 +45,7 @@ pub(super) struct Selection<'a> {
 }
 
 impl<'a> Selection<'a> {
-    /// Leaves out the shortest times where no model fits. `None` if there is none even for the [`FEWEST`] longest.
+    /// Leaves out the shortest times if no model fits. `None` if there is no model even for the [`FEWEST`] longest.
     pub fn of(mut curve: Curve<'a>) -> Option<Self> {
         let mut least: Option<Self> = None;
         let mut shortened = false;
@@ -82,12 +81,12 @@ impl<'a> Selection<'a> {
         }
     }
 
-    /// The cheapest.
+    /// The model with the lowest cost.
     pub fn best(&self) -> &Fitted {
         &self.choices[0].fitted
     }
 
-    /// Those that are not ruled out, the best first.
+    /// The plausible models, the best first.
     pub fn plausible(&self) -> Vec<&Fitted> {
         self.within(PLAUSIBLE).collect()
     }
@@ -102,13 +101,13 @@ impl<'a> Selection<'a> {
             .map(|c| &c.fitted)
     }
 
-    /// The best that does without `term`.
+    /// The best model without `term`.
     pub fn without(&self, term: Term) -> Option<&Fitted> {
         let mut fitted = self.choices.iter().map(|c| &c.fitted);
         fitted.find(|m| !m.terms.contains(&(term as usize)))
     }
 
-    /// Letters of the terms that some model has in the place of `term`, or it in the place of.
+    /// Terms that may replace `term`, or that it may replace, in a plausible model compared with the best.
     pub fn instead_of(&self, term: Term) -> Vec<Term> {
         let (k, best) = (term as usize, self.best());
         let mut terms = Vec::new();
@@ -143,9 +142,9 @@ impl<'a> Selection<'a> {
 
 /// All subsets of the terms that fit, cheapest first.
 ///
-/// Where shorter times were left out, all with the term in 1/τ²: whatever it is that bends the curve there, of what forgets within a
-/// short time that is what remains at longer ones. Left to the significance of what remains, N behind a filter was outside its
-/// intervals in 35 of 200 runs.
+/// If shorter times were left out, all subsets include the term in 1/τ²: whatever bends the curve there, if its correlation time is short,
+/// this term is what remains of it at longer times. When the term had to be significant, N behind a filter was outside its intervals in 35
+/// of 200 runs.
 fn choices(curve: &Curve, shortened: bool) -> Vec<Choice> {
     let mut choices: Vec<Choice> = (1..1usize << TERMS)
         .filter(|subset| !shortened || subset & (1 << PHASE) != 0)

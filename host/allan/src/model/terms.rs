@@ -21,7 +21,7 @@ pub struct Coefficient {
 /// A coefficient that the curve does not show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unseen {
-    /// Upper end of the confidence interval, in the unit of its [`Term`]; `None` where nothing of the curve tells it.
+    /// Upper end of the confidence interval, in the unit of its [`Term`]; `None` if the curve gives none.
     pub at_most: Option<f64>,
     /// Why it is not shown.
     pub why: Reason,
@@ -36,10 +36,9 @@ pub enum Reason {
     Hidden,
     /// Models without the term fit the curve as well.
     Small {
-        /// Terms that these have in its place; none where the term is simply small.
+        /// Terms that these have in its place; none if the term is simply small.
         instead: Vec<Term>,
-        /// Seconds of record beyond the present ones that would show a term of half the upper end; `None` where a longer record does not
-        /// help.
+        /// Additional length of the record that would show a term of half the upper end, s; `None` if a longer record does not help.
         longer_s: Option<f64>,
     },
     /// The curve is bent, and the spectrum, which gives a higher upper end, does not show the term either.
@@ -118,9 +117,9 @@ pub struct NoiseModel {
     pub filtered: bool,
     /// Shortest and longest averaging time that it was fitted to, s.
     pub range_s: [f64; 2],
-    /// Misfit over its expectation, where the terms do not describe the curve: the intervals are √ of it wider.
+    /// Misfit over its expectation, if the terms do not describe the curve: the intervals are wider by its square root.
     pub excess: Option<f64>,
-    /// Of the terms in [`basis`].
+    /// Amplitudes of the terms, as in [`basis`].
     pub(super) amplitudes: [f64; TERMS],
     pub(super) dt_s: f64,
 }
@@ -139,18 +138,17 @@ impl NoiseModel {
         }
     }
 
-    /// Allan deviation of the model at `tau_s`, unit of the channel. Below [`NoiseModel::range_s`] it need not be what was
-    /// measured.
+    /// Allan deviation of the model at `tau_s`, unit of the channel. Below [`NoiseModel::range_s`] it may differ from the measurement.
     pub fn deviation(&self, tau_s: f64) -> f64 {
         let terms = basis(tau_s / self.dt_s);
         let variance: f64 = terms.iter().zip(&self.amplitudes).map(|(b, a)| b * a).sum();
         variance.max(0.0).sqrt()
     }
 
-    /// Averaging time from which on none is better by more than 5 %, s: what a dwell is good for (fang, section 3, finds 20 s).
+    /// Shortest averaging time whose deviation is within 5 % of the best, s: a longer dwell gains little (fang, section 3, finds 20 s).
     ///
-    /// Not the minimum itself: about it the curve is flat, and without a random walk there is none. `None` where longer
-    /// was still better at the longest time that was fitted to.
+    /// The minimum itself is not used: about it the curve is flat, and without a random walk there is none. `None` if the deviation still
+    /// decreases at the longest fitted time.
     pub fn useful_average_s(&self) -> Option<f64> {
         let [from, to] = self.range_s;
         let times = || {
@@ -161,7 +159,7 @@ impl NoiseModel {
             .map(|t| self.deviation(t))
             .fold(f64::INFINITY, f64::min);
         let rises = self.amplitudes[Term::K as usize] + self.amplitudes[RAMP] > 0.0;
-        // Beyond the fitted times only what is certain there counts: a floor, which stays.
+        // Beyond the fitted times only a constant floor is certain.
         let least = match rises {
             true if inside < self.deviation(to) => inside,
             true => return None,

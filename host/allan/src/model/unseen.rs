@@ -1,4 +1,4 @@
-//! What a record says of a term that it does not show.
+//! Bounds for a term that a record does not show.
 
 use super::covariance::Covariances;
 use super::differences::Differences;
@@ -25,7 +25,7 @@ impl Estimator {
                 },
             };
         };
-        // A longer record has more of the long times only.
+        // A longer record only adds long times.
         let longer_s = match (term, selection.without(term)) {
             (Term::Q | Term::N, _) | (_, None) => None,
             // A quarter of the variance, which is half the coefficient.
@@ -37,8 +37,8 @@ impl Estimator {
         }
     }
 
-    /// How much longer a record than that of `curve` has to be for a term of amplitude `a` beside those of `without` to be [`SEEN`] times its
-    /// own sigma, s.
+    /// Additional length that the record of `curve` needs for a term of amplitude `a`, in addition to those of `without`, to reach [`SEEN`]
+    /// sigmas, s.
     fn longer_s(
         &self,
         curve: &Curve,
@@ -55,7 +55,7 @@ impl Estimator {
             [2, 4, 8].map(table).into()
         });
         let sigmas = |covariances: &Covariances| {
-            // What is too short for the model stays so.
+            // Times that are too short for the model remain so.
             let used = |d: &&Differences| d.m as f64 >= curve.shortest();
             let curve = Curve {
                 y: Vec::new(),

@@ -1,10 +1,10 @@
-//! Bands of a series brought down to the floor of its spectrum.
+//! Reduces bands of a series to the floor of its spectrum.
 
 use realfft::num_complex::Complex;
 
 use super::transform::Transform;
 
-/// A band that is brought down.
+/// A band that is reduced.
 pub(super) struct Cut<'a> {
     /// Its ends, Hz.
     pub ends_hz: [f64; 2],
@@ -12,15 +12,15 @@ pub(super) struct Cut<'a> {
     pub gain: Box<dyn Fn(f64) -> f64 + 'a>,
 }
 
-/// Takes off `rates` the share `1 - gain` of every frequency within the bands of `cuts`; elsewhere they stay as they are.
+/// Removes the share `1 - gain` of every frequency within the bands of `cuts` from `rates`; other frequencies do not change.
 ///
-/// The phases are kept, and so of a bump that rises above the floor what belongs to the floor is still there: a notch would leave a
-/// hole in the noise. All bands at once, as the transforms of the whole series are what it costs.
+/// The phases are kept, so the part of a bump that belongs to the floor remains: a notch would leave a hole in the noise. All bands are
+/// reduced at once, because the transforms of the whole series are the main cost.
 pub(super) fn flatten(rates: &mut [f64], dt_s: f64, cuts: &[Cut]) {
     if cuts.is_empty() {
         return;
     }
-    // Without the straight line through both ends, which would be a step where the series ends.
+    // Without the straight line through both ends, which would be a step at the end of the series.
     let (first, last) = (rates[0], rates[rates.len() - 1]);
     let slope = (last - first) / (rates.len() - 1) as f64;
     let mut off = Transform::of(rates, [first, slope]);

@@ -1,8 +1,8 @@
-//! What a spectrum would be at each frequency if nothing stood out there.
+//! The floor of a spectrum: its level at each frequency without lines and bumps.
 
 /// Frequency at the near end of a window over that of the floor, a quarter of an octave, and at its far end, an octave and a half. With
-/// windows up to the frequency itself and half as far a bump of a third of its frequency was its own floor, and was found in 3 of 40
-/// records in which it stood 14 times above.
+/// windows up to the frequency itself and half as far, a bump as wide as a third of its frequency raised its own floor: it was found in 3
+/// of 40 records, although it was 14 times as high as the floor.
 const NEAR: f64 = 1.19;
 pub(super) const REACH: f64 = 2.83;
 /// First bin that has a floor: below it there are too few bins for the window beneath.
@@ -17,8 +17,8 @@ const FEWEST: usize = 3;
 pub(super) struct Level {
     /// The floor itself: between the medians of both sides, on a straight line over logarithms.
     pub between: f64,
-    /// The higher of it and of both medians. Only what exceeds this stands out: at the edge of a filter's band the spectrum stands
-    /// above the line between both sides, and on the slope of a random walk above one of them.
+    /// The highest of it and both medians. Only what exceeds this stands out: at the edge of a filter's band the spectrum stands above the
+    /// line between both sides, and on the slope of a random walk above one of them.
     pub highest: f64,
     /// Bins of the smaller window.
     pub bins: f64,
@@ -32,7 +32,7 @@ pub(super) struct Floor {
 }
 
 impl Floor {
-    /// Of densities by bin, each of `dof` degrees of freedom.
+    /// From densities by bin, each of `dof` degrees of freedom.
     pub fn of(power: &[f64], dof: f64) -> Self {
         let last = power.len().saturating_sub(2);
         // Median of a chi-square over its mean (Wilson and Hilferty).

@@ -10,18 +10,18 @@ use super::welch::{BIN_OVERLAP, NOISE_BINS, Welch, fast_length};
 
 /// Probability that anything is found in noise, over all bins of all resolutions.
 const FALSE_ALARM: f64 = 1e-3;
-/// Less above the floor is left alone, however significant: with a thousand degrees of freedom the bend of a filter is, too. It would
-/// bend a curve by less than its intervals show.
+/// A smaller ratio to the floor is ignored, however significant: with a thousand degrees of freedom even the bend of a filter is
+/// significant. It would bend a curve by less than its intervals.
 const LEAST_RATIO: f64 = 2.0;
-/// Segments of the finest resolution are this part of the series.
+/// The series is this many times as long as a segment of the finest resolution.
 pub(super) const FINEST: usize = 4;
-/// Each resolution is so many times coarser than the one before.
+/// Each resolution is this many times coarser than the next finer one.
 const COARSER: usize = 8;
 /// Samples of the shortest segment.
 const SHORTEST: usize = 256;
 /// Significant bins that are this near to each other are one band.
 const GAP: usize = 3;
-/// Bins above half of the peak from which a band is wider than the window makes a line.
+/// A band with this many bins above half of its peak is wider than a line through the window.
 const RESOLVED: usize = 4;
 
 /// Frequencies that stand out together.
@@ -29,7 +29,7 @@ const RESOLVED: usize = 4;
 pub(super) struct Band {
     /// Resolution that shows it, an index into the spectra that were searched.
     pub level: usize,
-    /// Its bins, with what of it is not significant by itself.
+    /// Its bins, including those that are not significant by themselves.
     pub bins: RangeInclusive<usize>,
     /// The highest.
     pub peak: usize,
@@ -70,7 +70,7 @@ impl Resolution {
     fn significant(&self, chance: f64) -> Vec<usize> {
         let Welch { power, dof, .. } = &self.welch;
         let stands_out = |bin: &usize| {
-            // No higher than the highest of its levels is the floor between.
+            // A cheaper test first: the floor between is at most the highest level.
             if !(self.ratio(*bin) > LEAST_RATIO) {
                 return false;
             }
@@ -92,7 +92,8 @@ impl Resolution {
         let significant = self.significant(chance);
         let mut bands: Vec<Band> = Vec::new();
         for bins in significant.chunk_by(|a, b| b - a <= GAP) {
-            // What lies within the band before belongs to it, and is not followed out of it again: the slopes of a bump hold thousands.
+            // Bins within the previous band belong to it, and the band is not extended from them again: the slopes of a bump contain
+            // thousands.
             let inside = bands.pop_if(|band| bins[0] <= *band.bins.end());
             let next = self.band(level, bins, inside.as_ref());
             match bands
@@ -127,8 +128,8 @@ impl Resolution {
             >= RESOLVED
     }
 
-    /// The band around significant bins: as far as the mean of three is above the floor by more than it scatters. `inside`: the band that they
-    /// begin in.
+    /// The band around significant bins: it extends while the mean of three bins exceeds the floor by more than its scatter. `inside`: the
+    /// band in which they begin.
     fn band(&self, level: usize, bins: &[usize], inside: Option<&Band>) -> Band {
         let last = self.welch.power.len() - 2;
         let power = &self.welch.power;
@@ -185,8 +186,8 @@ pub(super) struct Search {
 impl Search {
     /// Of `rates` at steps of `dt_s`. `None` where they are too few for a spectrum.
     ///
-    /// A line is best seen at the finest resolution, where it is highest, and a broad bump at one that is as broad: it is taken
-    /// from the coarsest that shows it wider than a line.
+    /// A line shows best at the finest resolution, where it is highest. A broad bump shows best at a resolution of its width: it is taken
+    /// from the coarsest one that shows it wider than a line.
     pub fn of(rates: &[f64], dt_s: f64) -> Option<Self> {
         let mut lengths = Vec::new();
         let mut length = fast_length(rates.len() / FINEST);

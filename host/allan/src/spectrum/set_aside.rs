@@ -10,15 +10,15 @@ use super::transform::Transform;
 use super::welch::{BIN_OVERLAP, Welch};
 use super::white::{White, of_spectrum};
 
-/// Searches until nothing is found: beside a strong line a weak one is found without it.
+/// Largest number of searches, which end when nothing is found. A weak line next to a strong one is found after that is removed.
 const ROUNDS: usize = 4;
-/// Part of a band's power that a sinusoid has to hold to be taken off as one.
+/// Least share of a band's power in a sinusoid for it to be subtracted as one.
 const STEADY: f64 = 0.3;
-/// A sinusoid with more than this fraction of the band's power was not seen there.
+/// A sinusoid with more than this multiple of the band's power does not belong to the band.
 const MUCH: f64 = 2.0;
-/// Part of its power that a line may have beside a sinusoid and still is steady, or twice what the noise makes of the power.
+/// Largest share of a steady line's power outside its sinusoid, or twice the relative error of the power from noise, if that is larger.
 const BESIDE_IT: f64 = 0.1;
-/// Standard deviations of its amplitude by which a sinusoid exceeds what the noise has.
+/// Least amplitude of a sinusoid, in standard deviations of the noise's amplitude.
 const CERTAIN: f64 = 4.0;
 
 /// A series without its lines.
@@ -28,34 +28,33 @@ pub struct SetAside {
     pub lines: Vec<Line>,
     /// Lowest and highest frequency that was searched, Hz; `None` for a series too short for a spectrum.
     pub searched_hz: Option<[f64; 2]>,
-    /// Whether something still stands out, which could not be brought down.
+    /// Whether something still stands out that could not be removed.
     pub remains: bool,
     /// Spectrum of the residual, at the finest resolution.
     finest: Option<Welch>,
 }
 
 impl SetAside {
-    /// [`super::white_band`] of the series that is left, whose samples are `dt_s` apart, without a look at it; `None` too where it was too short
-    /// for a search.
+    /// [`super::white_band`] of the residual series (samples `dt_s` apart), from its stored spectrum; `None` also if it was too short for a
+    /// search.
     pub fn white_band(&self, dt_s: f64, confidence: f64) -> Option<White> {
         of_spectrum(self.finest.as_ref()?, dt_s, &self.lines, confidence)
     }
 
-    /// Lets go of the spectrum, 8 MB for three hours at 1 kHz; [`Self::white_band`] has nothing to go by afterwards.
+    /// Drops the spectrum, 8 MB for three hours at 1 kHz; afterwards [`Self::white_band`] returns `None`.
     pub fn without_spectrum(mut self) -> Self {
         self.finest = None;
         self
     }
 }
 
-/// Finds the lines and bumps of `rates` (any unit, `dt_s` apart) and takes them off: a steady line as a sinusoid, anything else
-/// by bringing its band down to the floor. Where there are none the series stays as it is, to the bit. Intervals have the
-/// probability `confidence`.
+/// Finds the lines and bumps of `rates` (any unit, `dt_s` apart) and removes them: a steady line as a sinusoid, anything else by reducing
+/// its band to the floor. Without any, no bit of the series changes. Intervals have the probability `confidence`.
 pub fn set_aside(rates: &mut [f64], dt_s: f64, confidence: f64) -> SetAside {
     set_aside_after(rates, dt_s, confidence, |_| {})
 }
 
-/// [`set_aside`] that hands `before` the series once, if it is going to be changed.
+/// [`set_aside`] that calls `before` once with the series, if it is going to be changed.
 pub fn set_aside_after(
     rates: &mut [f64],
     dt_s: f64,
@@ -91,7 +90,7 @@ pub fn set_aside_after(
     }
 }
 
-/// Takes all bands that a search has found off.
+/// Removes all bands that a search has found.
 fn remove(rates: &mut [f64], dt_s: f64, search: &Search, confidence: f64, lines: &mut Vec<Line>) {
     let all: Vec<Excess> = search
         .bands
@@ -104,7 +103,7 @@ fn remove(rates: &mut [f64], dt_s: f64, search: &Search, confidence: f64, lines:
         let resolution = &search.resolutions[band.level];
         let (line, sinusoid) = describe(&whole, dt_s, resolution, band, excess, confidence);
         match sinusoid {
-            // A band beside that of a strong line finds the same one: what it is without the line, the next search shows.
+            // A band next to that of a strong line finds the same line; the next search shows what remains without it.
             Some(sinusoid)
                 if steady
                     .iter()
@@ -125,7 +124,7 @@ fn remove(rates: &mut [f64], dt_s: f64, search: &Search, confidence: f64, lines:
     flatten(rates, dt_s, &cuts);
 }
 
-/// What a band is, and the sinusoid that holds most of it, if one does. `whole` is the transform of the series.
+/// The line of a band, and the sinusoid that makes up most of it, if one does. `whole` is the transform of the series.
 fn describe(
     whole: &Transform,
     dt_s: f64,
@@ -162,7 +161,7 @@ fn describe(
             line.width_hz = None;
             line.rms = (sinusoid.power() - noise).max(0.0).sqrt();
             let z = Normal::standard().inverse_cdf(0.5 + 0.5 * confidence);
-            // Of the effective value, 1/√2 of the amplitude.
+            // That of the effective value: 1/√2 of that of the amplitude.
             let sigma = (0.5 * noise).sqrt();
             line.interval = [-z, z].map(|z| (line.rms + z * sigma).max(0.0));
         }
@@ -170,7 +169,7 @@ fn describe(
     (line, sinusoid)
 }
 
-/// Adds a line; what was found of one in a later round is left of it, and the rest of it was reported then.
+/// Adds a line. What a later round finds at a known line is its residual; the line itself was reported before.
 fn add(lines: &mut Vec<Line>, line: Line) {
     let same = |other: &&mut Line| {
         line.band_hz[0] < other.band_hz[1] && other.band_hz[0] < line.band_hz[1]
@@ -178,7 +177,7 @@ fn add(lines: &mut Vec<Line>, line: Line) {
     match lines.iter_mut().find(same) {
         None => lines.push(line),
         Some(first) => {
-            // A sinusoid that leaves something behind was not steady, and the sum of both is known as well as both.
+            // A sinusoid with a residual was not steady, and the sum has the uncertainty of both.
             if first.width_hz.is_none() {
                 let both = (first.rms.powi(2) + line.rms.powi(2)).sqrt();
                 let ends = [0, 1].map(|i| {
@@ -195,7 +194,7 @@ fn add(lines: &mut Vec<Line>, line: Line) {
     }
 }
 
-/// What of a band is above the floor.
+/// The part of a band above the floor.
 struct Excess {
     df_hz: f64,
     first: usize,
@@ -222,7 +221,7 @@ impl Excess {
         let sum = |of: fn(&[f64; 2]) -> f64| bins.iter().map(of).sum::<f64>();
         let (all, beneath) = (sum(|b| b[0]), sum(|b| b[1]));
         let squares = sum(|b| b[0] * b[0]);
-        // The least power that a bin of the peak's height holds: rounding must leave a mean square above zero.
+        // At least a thousandth of the power, so that rounding leaves a mean square above zero.
         let power = (all - beneath).max(1e-3 * all);
         Self {
             df_hz: welch.df_hz,
@@ -246,7 +245,7 @@ impl Excess {
         })
     }
 
-    /// Frequency with so much of the excess below it, Hz.
+    /// Frequency with this share of the excess below it, Hz.
     fn quantile_hz(&self, share: f64) -> f64 {
         let above = |b: &[f64; 2]| (b[0] - b[1]).max(0.0);
         let all: f64 = self.bins.iter().map(above).sum();
@@ -262,7 +261,7 @@ impl Excess {
         (self.first as f64 + 0.5 * (self.bins.len() - 1) as f64) * self.df_hz
     }
 
-    /// Factor that brings the amplitude at a frequency down to the floor.
+    /// Factor that reduces the amplitude at a frequency to the floor.
     fn gain(&self, frequency_hz: f64) -> f64 {
         let at = frequency_hz / self.df_hz - self.first as f64;
         let last = self.bins.len() - 1;

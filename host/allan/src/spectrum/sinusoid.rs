@@ -1,8 +1,8 @@
 //! A steady line: amplitude, phase and frequency by least squares over the bins around it.
 //!
-//! The transform of a sinusoid that is cut off at both ends is known in closed form, so that a few dozen bins of the whole series are all
-//! that a line takes: passes over the series made ten times as many samples cost a hundred times as much. The 32 bins on either side hold
-//! 99.4 % of its power, and of the noise only what is as strong as around the line.
+//! The transform of a sinusoid that is cut off at both ends is known in closed form, so a line takes only a few dozen bins of the whole
+//! series. (With passes over the series, ten times as many samples cost a hundred times as much.) The 32 bins on either side contain 99.4 %
+//! of its power, and only noise as strong as around the line.
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -11,9 +11,9 @@ use super::transform::Transform;
 
 /// Bins on either side of the highest that are fitted.
 const BESIDE: usize = 32;
-/// Steps of the refinement: from within a tenth of the resolution each squares the error.
+/// Steps of the refinement: within a tenth of the resolution each squares the error.
 const STEPS: usize = 6;
-/// Samples after which a phasor that is turned sample by sample is set anew.
+/// Number of samples after which a phasor that is rotated sample by sample is computed anew.
 const PHASOR: usize = 1024;
 
 /// `cos` and `sin` amplitudes of a line, phase zero in the middle of the series.
@@ -26,8 +26,8 @@ pub(super) struct Sinusoid {
     sin: f64,
 }
 
-/// A series as lines are fitted to it: its transform without the straight line that fits best, of which a ramp would be left beside a line of
-/// few periods.
+/// The transform of a series for the fit of lines: without the straight line that fits best, because a ramp would disturb a line of few
+/// periods.
 pub(super) fn transform(rates: &[f64]) -> Transform {
     let n = rates.len() as f64;
     let middle = middle(rates.len());
@@ -42,8 +42,8 @@ pub(super) fn transform(rates: &[f64]) -> Transform {
 }
 
 impl Sinusoid {
-    /// The one of the most power within `half_width_hz` of `near_hz` in the series that `whole` is the [`transform`] of. `None` where least
-    /// squares find none in there.
+    /// The strongest sinusoid within `half_width_hz` of `near_hz`; `whole` is the [`transform`] of the series. `None` if least squares find
+    /// none there.
     pub fn fit(whole: &Transform, dt_s: f64, near_hz: f64, half_width_hz: f64) -> Option<Self> {
         let step = whole.step();
         let df_hz = step / (std::f64::consts::TAU * dt_s);
@@ -52,7 +52,7 @@ impl Sinusoid {
         let within = bin(near_hz - half_width_hz)..=bin(near_hz + half_width_hz);
         let power = |k: &usize| whole.bins[*k].norm_sqr();
         let peak = within.max_by(|a, b| power(a).total_cmp(&power(b)))?;
-        // Between the highest bin and the higher of its neighbours, where the ratio of both amplitudes has the line.
+        // Start between the highest bin and the higher of its neighbours, by the ratio of their amplitudes.
         let of = |k: usize| whole.bins[k.min(last)].norm();
         let [below, at, above] = [of(peak - 1), of(peak), of(peak + 1)];
         let start = match above > below {
@@ -67,7 +67,7 @@ impl Sinusoid {
         };
         let bins = peak.saturating_sub(BESIDE).max(1)..=(peak + BESIDE).min(last);
         for round in 0..=STEPS {
-            // At first the amplitudes alone: without them there is no slope by frequency.
+            // At first the amplitudes alone: without them there is no derivative by frequency.
             line = line.refine(whole, bins.clone(), round > 0)?;
         }
         line.frequency_hz = line.step / step * df_hz;
@@ -75,7 +75,7 @@ impl Sinusoid {
         (stays && line.cos.is_finite() && line.sin.is_finite()).then_some(line)
     }
 
-    /// Whether it is `other`, as far as `samples` that are `dt_s` apart tell two lines apart.
+    /// Whether `samples` that are `dt_s` apart do not distinguish it from `other`.
     pub fn is(&self, other: &Self, dt_s: f64, samples: usize) -> bool {
         (self.frequency_hz - other.frequency_hz).abs() * dt_s * (samples as f64) < 1.0
     }
@@ -103,7 +103,7 @@ impl Sinusoid {
             let [near, far] = [angle - self.step, angle + self.step].map(|a| kernel(a, n));
             let of_cos = 0.5 * (near[0] + far[0]);
             let of_sin = -0.5 * (near[0] - far[0]);
-            // By the frequency, in half-lengths of the series, so that all three columns are of one size.
+            // Derivative by the frequency, in half-lengths of the series, so that all three columns have the same size.
             let slope = match by_frequency {
                 true => [
                     -0.5 * self.cos * (near[1] - far[1]),
@@ -140,7 +140,7 @@ impl Sinusoid {
 /// Transform of `n` ones about their middle at `angle`, rad a sample, and its derivative: `sin(n a/2) / sin(a/2)`.
 fn kernel(angle: f64, n: f64) -> [f64; 2] {
     let half = 0.5 * angle;
-    // The series about zero, where both are a quotient of nothing by nothing.
+    // The series expansion about zero, where both quotients are 0/0.
     if (half * n).abs() < 1e-4 {
         return [n, -angle * n * (n * n - 1.0) / 12.0];
     }
@@ -152,13 +152,13 @@ fn middle(samples: usize) -> f64 {
     0.5 * (samples as f64 - 1.0)
 }
 
-/// Takes lines off the series that they were fitted to.
+/// Subtracts lines from the series that they were fitted to.
 pub(super) fn subtract(lines: &[Sinusoid], rates: &mut [f64]) {
     let middle = middle(rates.len());
     let parts = rates.par_chunks_mut(PHASOR).enumerate();
     parts.for_each(|(part, rates)| {
         for line in lines {
-            // Turned from one sample to the next, and set anew in each part.
+            // Rotated from one sample to the next, and computed anew in each part.
             let start = (part * PHASOR) as f64 - middle;
             let (mut s, mut c) = (start * line.step).sin_cos();
             let (ds, dc) = line.step.sin_cos();

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 
-/// Fourier transform of a series, padded with zeros to a length of which a transform is fast: of 10 801 000 samples, in which 1543 is a
-/// factor, it takes as long as of three times as many.
+/// Fourier transform of a series, padded with zeros to a length with a fast transform. That of 10 801 000 samples, which have the factor
+/// 1543, takes as long as that of three times as many.
 pub(super) struct Transform {
     /// Bins from zero up.
     pub bins: Vec<Complex<f64>>,
@@ -17,7 +17,7 @@ pub(super) struct Transform {
 }
 
 impl Transform {
-    /// Of `rates` without the line `first + slope i`.
+    /// Transforms `rates` without the line `first + slope i`.
     pub fn of(rates: &[f64], [first, slope]: [f64; 2]) -> Self {
         let length = smooth(rates.len());
         let transform = RealFftPlanner::new().plan_fft_forward(length);
@@ -26,7 +26,7 @@ impl Transform {
         input.extend(each.map(|(i, rate)| rate - (first + slope * i as f64)));
         input.resize(length, 0.0);
         let mut bins = transform.make_output_vec();
-        // Refused only for buffers of another length than its own.
+        // Fails only for buffers of the wrong length.
         let _ = transform.process(&mut input, &mut bins);
         Self {
             bins,
@@ -35,7 +35,7 @@ impl Transform {
         }
     }
 
-    /// Back to the padded series, in units of the transform: times its length.
+    /// The padded series, times its length.
     pub fn inverse(mut self) -> Vec<f64> {
         let transform = RealFftPlanner::new().plan_fft_inverse(self.length);
         let mut output = transform.make_output_vec();

@@ -5,15 +5,15 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 use realfft::RealFftPlanner;
 
-/// Bins of a Hann window's own noise bandwidth.
+/// Noise bandwidth of a Hann window, bins.
 pub(super) const NOISE_BINS: f64 = 1.5;
 /// Variance of a mean of neighbouring bins behind a Hann window, over that of as many independent ones: `1 + 2 (4/9 + 1/36)`.
 pub(super) const BIN_OVERLAP: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
 /// Squared correlation of the periodograms of segments that overlap by half, behind a Hann window.
 const SEGMENT_OVERLAP: f64 = 1.0 / 36.0;
 
-/// Longer segments are transformed one after the other: a second copy of those of three hours at 1 kHz would take 60 MB, and the other
-/// core has the other resolutions to do.
+/// Longer segments are transformed one after the other: a second copy of those of three hours at 1 kHz would take 60 MB, and the other core
+/// computes the other resolutions.
 const LONG: usize = 1 << 19;
 
 /// Mean periodogram of segments that overlap by half, each without its mean and behind a Hann window.
@@ -28,13 +28,13 @@ pub(super) struct Welch {
 }
 
 impl Welch {
-    /// Of `rates` (any unit) that are `dt_s` apart, in segments of `length`, which is even and not longer than they are.
+    /// From `rates` (any unit) that are `dt_s` apart, in segments of `length`, which is even and not longer than they are.
     pub fn of(rates: &[f64], dt_s: f64, length: usize) -> Self {
         let hop = length / 2;
         let segments = (rates.len() - length) / hop + 1;
         let transform = RealFftPlanner::new().plan_fft_forward(length);
         let window = Hann::of(length);
-        // Two sums, or one, whatever the machine has: the same digits everywhere.
+        // The number of sums does not depend on the machine, so the digits are the same everywhere.
         let sums = |of: std::ops::Range<usize>| {
             let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
             let mut scratch = transform.make_scratch_vec();
@@ -42,7 +42,7 @@ impl Welch {
             for segment in of {
                 let part = &rates[segment * hop..segment * hop + length];
                 window.apply(part, &mut input);
-                // Refused only for buffers of another length than its own.
+                // Fails only for buffers of the wrong length.
                 let _ = transform.process_with_scratch(&mut input, &mut output, &mut scratch);
                 for (sum, bin) in sum.iter_mut().zip(&output) {
                     *sum += bin.norm_sqr();
@@ -71,14 +71,14 @@ impl Welch {
     }
 }
 
-/// A Hann window that is computed as it goes: kept, it would be as long as the longest segment.
+/// A Hann window that is computed on the fly: stored, it would be as long as the longest segment.
 struct Hann {
     /// Cosine and sine of the first [`TURNED`] samples.
     turned: Vec<[f64; 2]>,
     length: usize,
 }
 
-/// Samples after which its phase is set anew.
+/// Number of samples after which its phase is computed anew.
 const TURNED: usize = 512;
 /// Independent partial sums: one sum waits for its own additions, four cycles each.
 const LANES: usize = 8;
@@ -103,7 +103,7 @@ impl Hann {
         let chunks = to.chunks_mut(TURNED).zip(part.chunks(TURNED));
         for (k, (to, part)) in chunks.enumerate() {
             let (sin, cos) = (TAU * (k * TURNED) as f64 / n).sin_cos();
-            // Each by the sum of angles, and not from the one before: for the vector unit, with which it takes a fifth of the time.
+            // Each from a sum of angles instead of its predecessor: the vector unit then takes a fifth of the time.
             for ((to, rate), [c, s]) in to.iter_mut().zip(part).zip(&self.turned) {
                 *to = (0.5 - 0.5 * (cos * c - sin * s)) * (rate - mean);
             }
@@ -111,7 +111,7 @@ impl Hann {
     }
 }
 
-/// Sum of `values` minus `reference` each.
+/// Sum of `values`, each minus `reference`.
 fn sum_over(values: &[f64], reference: f64) -> f64 {
     let mut lanes = [0.0; LANES];
     let (rows, rest) = values.as_chunks::<LANES>();
@@ -123,7 +123,7 @@ fn sum_over(values: &[f64], reference: f64) -> f64 {
     lanes.iter().sum::<f64>() + rest.iter().map(|value| value - reference).sum::<f64>()
 }
 
-/// The longest even length up to `most` of which a transform is fast: powers of two, and three times them.
+/// The longest even length up to `most` with a fast transform: powers of two, and three times them.
 pub(super) fn fast_length(most: usize) -> usize {
     let power = 1 << most.max(2).ilog2();
     match 3 * power / 2 <= most && power > 2 {

@@ -1,7 +1,7 @@
 //! N from the band in which a spectrum is flat.
 //!
-//! An Allan curve shows white noise where it falls as 1/√τ. Behind a slow filter, or above a strong flicker noise, it hardly does; the
-//! spectrum, which has every frequency by itself, is flat in between all the same.
+//! An Allan curve shows white noise where it falls as 1/√τ. Behind a slow filter, or above a strong flicker noise, it hardly does. The
+//! spectrum resolves every frequency, and is still flat in between.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
@@ -12,30 +12,30 @@ use super::welch::{BIN_OVERLAP, Welch, fast_length};
 
 /// Means of the spectrum in an octave.
 const PER_OCTAVE: f64 = 6.0;
-/// Bins of the lowest mean, and its first: below, the window mixes in the mean of the segment.
+/// Least number of bins in a mean. The lowest mean begins at bin 2: below, the window mixes in the mean of the segment.
 const FEWEST_BINS: usize = 4;
-/// Means that must be left.
+/// Least number of means that must remain.
 const FEWEST: usize = 10;
-/// Of these, where the spectrum is white.
+/// Least number of these in which the spectrum is white.
 const FEWEST_WHITE: usize = 6;
 /// Samples of the shortest segment.
 const SHORTEST: usize = 64;
-/// Misfit below this probability leaves ends out.
+/// If the misfit has a lower probability, the ends are left out.
 const FITS: f64 = 1e-3;
-/// What a further term must lower the deviance by, and what is then not ruled out: as in the model of the Allan curve.
+/// Least drop in deviance for another term, and margin of the plausible models: as in the model of the Allan curve.
 const TERM_DEVIANCE: f64 = 8.0;
 const PLAUSIBLE: f64 = 5.3;
-/// A filter may take this share of N² at the upper end: up to there the square of the frequency stands for it. At 0.3 N behind a filter
-/// of first order came out 0.9 % low, two thirds of its standard deviation.
+/// Largest share of N² that a filter may remove at the upper end: up to there the square of the frequency represents it. At 0.3, N behind a
+/// filter of first order was 0.9 % too low, two thirds of its standard deviation.
 const BENT: f64 = 0.1;
-/// Standard deviations of itself at which N² is seen.
+/// N² is seen if it exceeds this many of its standard deviations.
 const SEEN: f64 = 3.0;
 
-/// Terms of a density: white, flicker, random walk, and what grows with the square of the frequency, or falls with it.
+/// Terms of a density: white, flicker, random walk, and one that grows or falls with the square of the frequency.
 const TERMS: usize = 4;
 const BEND: usize = 3;
 
-/// White noise by the spectrum.
+/// White noise from the spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct White {
     /// N, unit/√Hz.
@@ -44,7 +44,7 @@ pub struct White {
     pub sigma: f64,
     /// Ends of its confidence interval.
     pub interval: [f64; 2],
-    /// Band in which it is more than half of the density, Hz; `None` where there is none, and only the upper end says something.
+    /// Band in which it is more than half of the density, Hz; if `None`, only the upper end has a meaning.
     pub band_hz: Option<[f64; 2]>,
 }
 
@@ -65,9 +65,9 @@ struct Fitted {
     deviance: f64,
 }
 
-/// N of `rates` (any unit, `dt_s` apart), with an interval of probability `confidence`. The bands of `lines` have no say, and as much
-/// on both sides of each: what is left of a bump's slopes there would pass for flicker noise. `None` where the spectrum is of no such
-/// noise in any band, or too short.
+/// N of `rates` (any unit, `dt_s` apart), with an interval of probability `confidence`. The bands of `lines` are excluded, and as much on
+/// both sides of each: the remaining slopes of a bump would pass for flicker noise there. `None` if the spectrum fits such noise in no
+/// band, or is too short.
 pub fn white_band(rates: &[f64], dt_s: f64, lines: &[Line], confidence: f64) -> Option<White> {
     let length = fast_length(rates.len() / FINEST);
     if length < SHORTEST {
@@ -76,7 +76,7 @@ pub fn white_band(rates: &[f64], dt_s: f64, lines: &[Line], confidence: f64) -> 
     of_spectrum(&Welch::of(rates, dt_s, length), dt_s, lines, confidence)
 }
 
-/// [`white_band`] of the spectrum of `rates` in segments of a [`FINEST`]th of them.
+/// [`white_band`] from the spectrum of a series, in segments of a [`FINEST`]th of it.
 pub(super) fn of_spectrum(
     welch: &Welch,
     dt_s: f64,
@@ -90,7 +90,7 @@ pub(super) fn of_spectrum(
     let out: Vec<[f64; 2]> = lines.iter().map(beside).collect();
     let means = means(welch, dt_s, &out);
     let z = Normal::standard().inverse_cdf(0.5 + 0.5 * confidence);
-    // The widest band that the terms describe; of two as wide the one that goes down further, where the slow terms are told.
+    // The widest band that the terms describe; of two equally wide ones, that with lower frequencies, which show the slow terms.
     for less in 0..=means.len().checked_sub(FEWEST)? {
         for low in 0..=less {
             let part = &means[low..means.len() - (less - low)];
@@ -147,7 +147,7 @@ fn means(welch: &Welch, dt_s: f64, out: &[[f64; 2]]) -> Vec<Mean> {
     means
 }
 
-/// The models of a part of the spectrum; `shortened` if higher frequencies were left out, of which the bend is what remains.
+/// The models of a part of the spectrum; `shortened`: higher frequencies were left out, and the bend remains of them.
 fn fit(means: &[Mean], shortened: bool, z: f64) -> Option<White> {
     let mut models: Vec<Fitted> = (0..1usize << (TERMS - 1))
         .map(|set| (0..TERMS).filter(move |k| *k == 0 || set & (1 << (k - 1)) != 0))
@@ -194,7 +194,7 @@ fn fit(means: &[Mean], shortened: bool, z: f64) -> Option<White> {
     })
 }
 
-/// Maximum likelihood of gamma-distributed means by iterated weights; `None` where a term other than the bend would be negative.
+/// Maximum likelihood of gamma-distributed means by iterated weights; `None` if a slow term would be negative.
 fn solve(means: &[Mean], terms: &[usize]) -> Option<Fitted> {
     let n = means.len();
     let mut mu: Vec<f64> = means.iter().map(|m| m.density).collect();
@@ -221,7 +221,7 @@ fn solve(means: &[Mean], terms: &[usize]) -> Option<Fitted> {
         variance = inverse[(0, 0)] / (scale[0] * scale[0]);
         for (mu, mean) in mu.iter_mut().zip(means) {
             let next: f64 = a.iter().zip(&mean.basis).map(|(a, b)| a * b).sum();
-            // A step to nowhere goes part of the way.
+            // A step to zero or below is shortened.
             *mu = next.max(0.1 * *mu);
         }
         if (a[0] - before[0]).abs() < 1e-6 * variance.sqrt() {

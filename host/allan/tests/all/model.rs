@@ -1,4 +1,4 @@
-//! Whether the intervals of the noise model cover the truth as often as claimed, on noise made by other code.
+//! Whether the intervals of the noise model contain the truth as often as they claim, on noise made by other code.
 
 use mimu_allan::Point;
 use mimu_allan::model::{
@@ -31,10 +31,10 @@ impl Truth {
     }
 }
 
-/// Steps of the generator in a sample. Its flicker noise is correct from ten steps on, and its random walk is 0.5/m² too strong at m steps. If no
-/// white noise hides the shortest times, this must be less than the intervals of 1 %. The number is odd, because the generator redraws its slow
-/// processes every 2^k steps: with 32 all were redrawn between samples, the Allan variance of one sample was 1.7 % too high, and the intervals of B
-/// alone covered it in 78 % of the runs.
+/// Steps of the generator per sample. Its flicker noise is correct from ten steps on; its random walk is 0.5/m² too strong at m steps. If
+/// no white noise hides the shortest times, that must be less than the intervals of 1 %. The number is odd, because the generator redraws
+/// its slow processes every 2^k steps: with 32 all were redrawn between samples, the Allan variance of one sample was 1.7 % too high, and
+/// the intervals of B alone contained it in 78 % of the runs.
 fn fine(of: &Truth) -> usize {
     if of.n > 0.0 { 9 } else { 31 }
 }
@@ -73,7 +73,7 @@ fn series(of: &Truth, dt_s: f64, seed: u64) -> Vec<f64> {
         .collect()
 }
 
-/// Fang (8), and the same with third differences, at the times that the model needs.
+/// Fang (8) as printed, and the same for third differences, at the times that the model needs.
 fn curves(rates: &[f64], dt_s: f64) -> [Vec<Point>; 2] {
     let n = rates.len();
     let mean = rates.iter().sum::<f64>() / n as f64;
@@ -130,7 +130,7 @@ fn covers(c: &Coefficient, truth: f64) -> bool {
     c.lower <= truth && truth <= c.upper
 }
 
-/// Whether the interval of a reported term, or the bound of an unreported one, contains the truth.
+/// Whether the interval of a term that is found, or the bound of one that is not, contains the truth.
 fn holds(model: &NoiseModel, term: Term, truth: f64) -> bool {
     match &model.coefficients[term as usize] {
         Ok(told) => covers(told, truth),
@@ -173,14 +173,14 @@ fn cases() -> Vec<(&'static str, Truth)> {
     .into()
 }
 
-/// With this number of runs the shares scatter by 0.5 %.
+/// With this many runs the shares scatter by 0.5 %.
 const RUNS: u64 = 2000;
 
-/// Of 2000 runs each, by `cargo test --release -p mimu --test all table_of_coverages -- --ignored --nocapture`: how many told the
-/// term, and in how many per cent of these the 95 % interval held the truth. What is told only where it happens to look large is held
-/// less often ("weak"); interval or bound together are right as stated.
+/// 2000 runs each, by `cargo test --release -p mimu-allan --test all table_of_coverages -- --ignored --nocapture`: how many found the term,
+/// and in how many per cent of these the 95 % interval contained the truth. The interval of a term that is found only if it happens to look
+/// large contains the truth less often ("weak"); interval and bound together are right as claimed.
 ///
-/// | noise | told | held, % | interval or bound, % |
+/// | noise | found | contained, % | interval or bound, % |
 /// |---|---|---|---|
 /// | N | N 2000 | N 94.9 | N 94.9 |
 /// | B | B 1999 | B 95.0 | B 95.0 |
@@ -198,7 +198,7 @@ const RUNS: u64 = 2000;
 /// | Q N B | Q 1989, N 1994, B 1999 | Q 94.9, N 94.7, B 94.9 | Q 94.9, N 94.7, B 94.9 |
 /// | Q N B K R | Q 1994, N 1999, B 1995, K 2000, R 2000 | Q 94.0, N 94.0, B 94.8, K 93.7, R 94.2 | Q 94.0, N 94.0, B 94.8, K 93.7, R 94.2 |
 ///
-/// A term that was not present was reported in at most 50 runs (B in "N, weak K"), and in at most 25 without a weak term.
+/// An absent term was found in 50 runs at most (B in "N, weak K"), and in 25 without a weak one.
 #[test]
 #[ignore = "nightly: 2000 runs of each case take minutes"]
 fn table_of_coverages() {
@@ -249,7 +249,7 @@ fn intervals_and_bounds_hold_the_truth() {
             }
             let right = models.iter().filter(|m| holds(m, term, known)).count();
             assert!(right >= 51, "{name}: {term:?} held in {right}");
-            // The ramp is near the detection limit of so short a record.
+            // The ramp is near the smallest that so short a record shows.
             let least = if term == Term::R { 30 } else { 55 };
             assert!(
                 told >= least || name.contains("weak"),
@@ -318,7 +318,7 @@ fn a_vibration_is_told_to_be_none_of_the_terms() {
 
 #[test]
 fn a_coefficient_that_is_not_seen_says_how_much_longer_to_record() {
-    // Of 20 records, longer by the reported time and with half the upper end, most show the term.
+    // Of 20 records that are longer by this time, with half the upper end as coefficient, most show it.
     let truth = Truth {
         n: 1.0,
         samples: 1 << 12,

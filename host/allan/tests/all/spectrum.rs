@@ -42,8 +42,8 @@ fn add_line(rates: &mut [f64], hz: f64, rms: f64, seed: u64) {
     }
 }
 
-/// Adds the response of a structure with resonance `hz` to random excitation: amplitude and phase wander, and the density is a Lorentzian, `width_hz`
-/// wide at half its height.
+/// Adds the response of a structure with the resonance `hz` to random shaking: amplitude and phase wander, and the density is a Lorentzian,
+/// `width_hz` wide at half its height.
 fn add_bump(rates: &mut [f64], hz: f64, width_hz: f64, rms: f64, seed: u64) {
     let mut random = Random::new(seed, "bump");
     let keep = (-PI * width_hz * DT_S).exp();
@@ -56,13 +56,13 @@ fn add_bump(rates: &mut [f64], hz: f64, width_hz: f64, rms: f64, seed: u64) {
     }
 }
 
-/// The smallest count of `runs` at 95 %; fewer occur once in a thousand times.
+/// A count of `runs` with a probability of 95 % falls below this once in a thousand times.
 fn least(runs: usize) -> usize {
     let n = runs as f64;
     (0.95 * n - 3.1 * (0.05 * 0.95 * n).sqrt()).floor() as usize
 }
 
-/// Number of runs of pure noise in which something is set aside.
+/// Number of `runs` of pure noise in which a line is found.
 fn with_lines(of: [f64; 3], samples: usize, runs: u64) -> usize {
     let has_lines = |seed: &u64| {
         let before = noise(of, samples, *seed);
@@ -74,7 +74,7 @@ fn with_lines(of: [f64; 3], samples: usize, runs: u64) -> usize {
     (0..runs).into_par_iter().filter(has_lines).count()
 }
 
-/// Number of runs with a steady line in which the interval contains its rms.
+/// Number of `runs` with a steady line in which the interval contains its effective value.
 fn steady_line(rms: f64, runs: u64) -> usize {
     let held = |seed: &u64| {
         let mut rates = noise([1.0, 0.3, 0.05], SAMPLES, *seed);
@@ -87,8 +87,8 @@ fn steady_line(rms: f64, runs: u64) -> usize {
         // One run in two hundred also has a false line.
         assert!(!found.lines.is_empty() && !found.remains, "{found:?}");
         let line = &found.lines[0];
-        // The frequency of a sinusoid of amplitude A is known to √(6/T)/(π A T) Hz beside N = 1 (Rife and Boorstyn 1974); one that is
-        // taken for unsteady, to the resolution of a quarter of the record.
+        // The frequency of a sinusoid of amplitude A is known to √(6/T)/(π A T) Hz with N = 1 (Rife and Boorstyn 1974); that of a line
+        // judged as unsteady, to the resolution of a quarter of the record.
         let t_s = SAMPLES as f64 * DT_S;
         let sigma_hz = (6.0 / t_s).sqrt() / (PI * 2f64.sqrt() * rms * t_s);
         let off = (line.frequency_hz - LINE_HZ).abs();
@@ -100,7 +100,7 @@ fn steady_line(rms: f64, runs: u64) -> usize {
     (0..runs).into_par_iter().filter(held).count()
 }
 
-/// Number of runs with a bump in which the interval of the white band contains N.
+/// Number of `runs` with a bump in which the interval of the white band contains N.
 fn beside_bump(width_hz: f64, rms: f64, runs: u64) -> usize {
     let held = |seed: &u64| {
         let mut rates = noise([1.0, 0.3, 0.05], SAMPLES, *seed);
@@ -119,7 +119,7 @@ fn beside_bump(width_hz: f64, rms: f64, runs: u64) -> usize {
     (0..runs).into_par_iter().filter(held).count()
 }
 
-/// Number of runs behind two poles in which the interval of the white band contains N.
+/// Number of `runs` behind two poles in which the interval of the white band contains N.
 fn behind_filter(corner_hz: f64, runs: u64) -> usize {
     let held = |seed: &u64| {
         let mut rates = noise([1.0, 0.1, 0.0], SAMPLES, *seed);
@@ -131,10 +131,10 @@ fn behind_filter(corner_hz: f64, runs: u64) -> usize {
                 *rate = state;
             }
         }
-        // The edge of the filter's band is not taken for a bump.
+        // The edge of the filter's band is not a bump.
         assert!(set_aside(&mut rates.clone(), DT_S, 0.95).lines.is_empty());
         let white = white_band(&rates, DT_S, &[], 0.95).unwrap();
-        // It may end early, where a misfit by chance leaves its end out: N is then less well known, and the interval says so.
+        // It may end early, if a misfit by chance leaves its end out: N is then less certain, and the interval includes that.
         let inside = |[_, to]: [f64; 2]| to < corner_hz;
         assert!(white.band_hz.is_none_or(inside), "{white:?}");
         white.interval[0] <= 1.0 && 1.0 <= white.interval[1]
@@ -223,7 +223,7 @@ fn a_line_that_is_set_aside_leaves_the_coefficients_of_the_noise_beneath() {
         .collect();
     let n = |k: usize| models.iter().filter_map(move |m| m[k].get(Term::N).ok());
     let held = |k| n(k).filter(|c| c.lower <= 1.0 && 1.0 <= c.upper).count();
-    // With the line in the data N is lost, which is why it is set aside.
+    // With the line N is wrong: this is why it is removed.
     assert!(held(0) < 10, "{}", held(0));
     assert!(held(1) >= least(runs as usize), "{}", held(1));
     for (line, plain) in n(1).zip(n(2)) {
@@ -284,8 +284,8 @@ fn wide_bumps_cost_a_few_times_what_noise_alone_does() {
     };
     let ((alone, none), (beside, found)) = (seconds(&plain), seconds(&bumps));
     assert!(none == 0 && found >= 3, "{none} {found}");
-    // Searches and transforms: up to ten times. Followed from each bin that stands out, or by each frequency beside each sample, it was
-    // more than a hundred.
+    // Searches and transforms take up to ten times as long. When bands were followed from each bin that stands out, or bins computed sample
+    // by sample, it was more than a hundred times.
     assert!(beside < 25.0 * alone, "{alone} s and {beside} s");
 }
 

@@ -1,4 +1,4 @@
-//! The noise file `mimu-noise/1`: what `mimu allan` found, for the commands that rest on it.
+//! The noise file `mimu-noise/1`: the result of `mimu allan`, for the commands that use it.
 
 use std::fmt;
 use std::path::Path;
@@ -28,11 +28,11 @@ pub struct NoiseFile {
     pub created: Option<String>,
     /// Samples a second.
     pub sample_rate_hz: f64,
-    /// Length of the record, s; of several, of the shortest.
+    /// Length of the record, s; of several records, that of the shortest.
     pub duration_s: f64,
     /// Probability of the intervals.
     pub confidence: f64,
-    /// Its channels; of records at several temperatures, each channel once for each.
+    /// Its channels; with records at several temperatures, each channel once for each temperature.
     pub channel: Vec<NoiseChannel>,
     /// Path, for messages.
     #[serde(skip)]
@@ -47,10 +47,10 @@ pub struct NoiseChannel {
     pub name: String,
     /// Unit of its coefficients and of the deviations that they describe.
     pub unit: String,
-    /// Unit of the readings, where a calibration made [`Self::unit`] of it.
+    /// Unit of the readings, if a calibration converted them to [`Self::unit`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub raw_unit: Option<String>,
-    /// Scale factor that did, [`Self::raw_unit`] per [`Self::unit`].
+    /// Scale factor of that calibration, [`Self::raw_unit`] per [`Self::unit`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale_factor: Option<f64>,
     /// Samples that it was computed from.
@@ -77,7 +77,7 @@ pub struct NoiseChannel {
     pub k_reason: Option<String>,
     /// Why there is no rate ramp.
     pub r_reason: Option<String>,
-    /// Upper end of the interval of a rate random walk that is not there: what a program that has to have one can take.
+    /// Upper end of the interval of a rate random walk that the record does not show, for programs that need a value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub k_at_most: Option<f64>,
 }
@@ -112,8 +112,8 @@ impl NoiseChannel {
         value.as_ref().ok_or(reason.as_deref().unwrap_or(unknown))
     }
 
-    /// N, B and K as Allan variance, in the unit of the channel squared. What the record did not show is none; quantization
-    /// and ramp are no noise of a mean.
+    /// N, B and K as Allan variance, in the unit of the channel squared. A coefficient that the record does not show is zero; quantization
+    /// and ramp are not noise of a mean.
     pub fn model(&self) -> AllanModel {
         let squared = |term| self.get(term).map_or(0.0, |c| c.value.powi(2));
         AllanModel {
@@ -125,9 +125,9 @@ impl NoiseChannel {
 }
 
 impl NoiseChannel {
-    /// [`Self::model`] in `unit` squared, be it the unit of the readings or of what a calibration made of them.
+    /// [`Self::model`] in `unit` squared, which is the unit of the readings or of the calibrated readings.
     ///
-    /// Errors: it is in another unit.
+    /// Errors: `unit` is another one.
     pub fn model_in(&self, unit: &str) -> std::result::Result<AllanModel, OtherUnit> {
         let model = self.model();
         if unit == self.unit {
@@ -170,7 +170,7 @@ impl NoiseChannel {
     }
 }
 
-/// A noise in another unit than the one that is wanted.
+/// The noise is in another unit than the requested one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OtherUnit {
     /// The unit that it is in.
@@ -187,7 +187,7 @@ impl OtherUnit {
     }
 }
 
-/// What a person has to know to use a noise file.
+/// Comment at the top of a noise file.
 const HEADER: &str = "\
 # Noise of an inertial unit at rest: sigma^2(tau) = 3 Q^2/tau^2 + N^2/tau + (2 ln 2/pi) B^2 + K^2 tau/3 + R^2 tau^2/2.
 # q quantization, n white noise, b bias instability, k rate random walk, r rate ramp, with a confidence interval each.

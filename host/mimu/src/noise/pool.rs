@@ -33,34 +33,34 @@ pub(super) fn block_s(condensed: &Condensed) -> (u32, f64) {
 /// Means of the blocks of one dwell, one after the other.
 pub(super) struct Series {
     pub means: Vec<f64>,
-    /// Whether the temperature ramps meanwhile: the reading then drifts along, evenly over so short a time, which is no noise.
+    /// Whether the temperature ramps meanwhile: the reading then drifts with it, linearly over so short a time, and the drift is not noise.
     pub ramps: bool,
 }
 
-/// A variance by the length of the means.
+/// A variance, for one length of the means.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     tau_s: f64,
     variance: f64,
-    /// Differences that share no sample, as the weight of the point.
+    /// Number of differences that share no sample: the weight of the point.
     count: f64,
     /// Which variance.
     kind: Differences,
 }
 
-/// What the means are compared by.
+/// The differences that a variance is computed from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Differences {
     /// Differences of two successive means, halved: the Allan variance.
     Allan,
-    /// Second differences of three, over six: the Hadamard variance, in which an even drift has no part.
+    /// Second differences of three, over six: the Hadamard variance, in which a linear drift cancels.
     Hadamard,
 }
 
 impl Differences {
     const BOTH: [Self; 2] = [Self::Allan, Self::Hadamard];
 
-    /// Means that one difference takes.
+    /// Number of means in one difference.
     fn means(self) -> usize {
         match self {
             Self::Allan => 2,
@@ -68,10 +68,10 @@ impl Differences {
         }
     }
 
-    /// What white noise, flicker floor and random walk of [`AllanModel`], at 1, make of it.
+    /// This variance of white noise, flicker floor and random walk of [`AllanModel`], each with the coefficient 1.
     ///
-    /// By Riley, Handbook of Frequency Stability Analysis (NIST SP 1065), the Hadamard variance of white noise is the Allan
-    /// variance, that of flicker noise ln(256/27)/2 where the other is 2 ln 2, and that of a random walk half of it.
+    /// By Riley, Handbook of Frequency Stability Analysis (NIST SP 1065), the Hadamard variance of white noise equals the Allan variance.
+    /// For flicker noise it is ln(256/27)/2 where the Allan variance is 2 ln 2, and for a random walk half the Allan variance.
     fn basis(self, tau_s: f64) -> [f64; 3] {
         match self {
             Self::Allan => [1.0 / tau_s, 1.0, tau_s],
@@ -87,8 +87,8 @@ impl Differences {
         model.white * white + model.flicker * flicker + model.walk * walk
     }
 
-    /// Sum of the squared differences of means over `m`, each so that it estimates the variance, and their number; `sums` are the running
-    /// sums of the series.
+    /// Sum of the squared differences of means over `m` blocks, each scaled to estimate the variance, and their number; `sums` are the
+    /// cumulative sums of the series.
     fn squares(self, sums: &[f64], m: usize) -> (f64, usize) {
         let terms = sums.len().saturating_sub(self.means() * m);
         let difference = |j: usize| match self {
@@ -104,7 +104,7 @@ impl Differences {
     }
 }
 
-/// Variances of one kind of series of means over `block_s`, by octave of the length.
+/// Variances of one `kind`, by octave of the averaging time, from the series that it applies to (means over `block_s`).
 fn points(kind: Differences, all: &[Series], block_s: f64) -> Vec<Point> {
     // Sum of squared differences, their number, and that of those which share no sample.
     let mut octaves: Vec<(f64, f64, f64)> = Vec::new();
@@ -156,7 +156,7 @@ pub(super) fn pooled(series: impl Iterator<Item = Series>, block_s: f64) -> Chan
         .iter()
         .flatten()
         .any(|p| p.count >= CURVE_DIFFERENCES && !fits(p));
-    // One curve, of what there is most of.
+    // One curve only: the kind of variance with more differences.
     let weight = |points: &[Point]| points.iter().map(|p| p.count).sum::<f64>();
     let [allan, hadamard] = &of_kinds;
     let most = match weight(allan) >= weight(hadamard) {
@@ -175,24 +175,23 @@ pub(super) fn pooled(series: impl Iterator<Item = Series>, block_s: f64) -> Chan
     }
 }
 
-/// A point of the Allan curve this many of its sigmas from the model refuses the model.
+/// If a point of the Allan curve is this many sigmas from the model, the model is rejected.
 const MISFIT_SIGMAS: f64 = 4.0;
-/// Points with fewer independent differences than this decide nothing: their variance is known to a half only.
+/// Points with fewer independent differences do not decide: their variance is known to a half only.
 const CURVE_DIFFERENCES: f64 = 8.0;
 
-/// A smaller variance is none: the square of its weight would overflow.
+/// A smaller variance is ignored: the square of its weight would overflow.
 const SMALLEST: f64 = 1e-100;
 
-/// What a further term must lower the deviance by: significant at 0.5 %.
+/// Least drop in deviance for another term: significant at 0.5 %.
 const TERM_DEVIANCE: f64 = 8.0;
 
 /// Fits the three terms to the points, none of them negative.
 ///
-/// A variance of n differences is gamma distributed, and that likelihood is maximized (iterated least squares, weighted by
-/// the model). Weights by the measured variance would let one small value from two differences outweigh a hundred.
-/// With three terms every subset can be tried. A term that does not lower the deviance by [`TERM_DEVIANCE`] is left out:
-/// taken whenever it is positive, the noise of the curve alone made the means of white noise a tenth too noisy (errors in
-/// sigmas of 0.88 where 1 is right).
+/// A variance of n differences is gamma distributed, and that likelihood is maximized (iterated least squares, weighted by the model).
+/// Weights by the measured variance would let one small value from two differences outweigh a hundred. With three terms every subset can be
+/// tried. A term that does not lower the deviance by [`TERM_DEVIANCE`] is left out. With every positive term included, the noise of the
+/// curve alone made the means of white noise a tenth too noisy (errors of 0.88 sigma instead of 1).
 fn fit(points: &[Point]) -> AllanModel {
     let points: Vec<_> = points.iter().filter(|p| p.variance > SMALLEST).collect();
     let mut best = (f64::INFINITY, AllanModel::default());
@@ -215,7 +214,7 @@ fn fit(points: &[Point]) -> AllanModel {
             for (mut row, w) in weighted.row_iter_mut().zip(weights.iter()) {
                 row *= *w;
             }
-            // Columns differ by the square of the longest time: scaled, or the smallest is lost.
+            // Columns differ by the square of the longest time; without scaling the smallest would be lost.
             let scale: Vec<f64> = weighted.column_iter().map(|c| c.norm()).collect();
             for (mut column, s) in weighted.column_iter_mut().zip(&scale) {
                 column /= *s;
@@ -310,7 +309,7 @@ mod tests {
         );
     }
 
-    /// Evenly distributed over a stretch of 1, mean 0.
+    /// Uniformly distributed over an interval of length 1, mean 0.
     fn uniform(state: &mut u64) -> f64 {
         *state = state
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -339,7 +338,7 @@ mod tests {
             pooled(series(ramps, 50, &mut next, slope).into_iter(), 0.1)
         };
         let still = found(true, 0.0);
-        // Variance of a block 1/12, and blocks of 0.1 s: 10 000 of them are known to 1.4 %.
+        // A block of 0.1 s has the variance 1/12, which 10 000 blocks determine to 1.4 %.
         let white = 0.1 / 12.0;
         assert!((still.model.white / white - 1.0).abs() < 0.06, "{still:?}");
         let drifting = found(true, 0.01);
@@ -347,7 +346,7 @@ mod tests {
             let ratio = drifting.variance(tau) / still.variance(tau);
             assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
         }
-        // By differences of two it is: 0.01 a block is 2 over the dwell, where the noise of its mean is 0.02.
+        // The Allan variance includes the drift: 0.01 per block is 2 over the dwell, and the noise of its mean is 0.02.
         assert!(found(false, 0.01).variance(20.0) > 100.0 * still.variance(20.0));
     }
 

@@ -1,8 +1,8 @@
-//! What two means share of a bias that wanders.
+//! Covariance of means of a bias that wanders.
 //!
-//! Flicker noise and a random walk have no variance of their own, only that of differences, and so no covariance
-//! until it is said what they are measured from. Here that is their mean over the session: it is what the bias
-//! of a calibration stands for, and nothing in the recording tells it from the rest of the bias.
+//! Flicker noise and a random walk have no finite variance, only their differences have one. A covariance therefore needs an origin. Here
+//! that is their mean over the session: the bias of a calibration contains it, and nothing in the recording distinguishes it from the rest
+//! of the bias.
 
 use nalgebra::DMatrix;
 
@@ -27,12 +27,11 @@ impl From<AllanModel> for Slow {
     }
 }
 
-/// A stretch of time: its beginning and its end, s.
+/// An interval of time: its beginning and its end, s.
 pub type Span = [f64; 2];
 
 impl Slow {
-    /// Generalized covariance of the means over two spans, unit²: exact for any sums of means whose weights add to zero, and
-    /// for those only.
+    /// Generalized covariance of the means over two spans, unit²: valid only in sums of means whose weights add to zero, and exact there.
     ///
     /// Between instants it is `-(B²/π) ln|t| - K²/2 |t|` (the transforms of the spectra), integrated twice here.
     fn between(&self, a: Span, b: Span) -> f64 {
@@ -48,7 +47,7 @@ impl Slow {
         sum / ((a[1] - a[0]) * (b[1] - b[0]))
     }
 
-    /// Covariance of the means over `spans`, each less the mean over the `session`, unit².
+    /// Covariance of the means over `spans`, each minus the mean over the `session`, unit².
     pub fn covariance(&self, spans: &[Span], session: Span) -> DMatrix<f64> {
         let with_all: Vec<f64> = spans.iter().map(|s| self.between(*s, session)).collect();
         let all = self.between(session, session);

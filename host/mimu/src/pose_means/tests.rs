@@ -1,4 +1,4 @@
-//! Means written here from `u = P a + b` and normal errors: the truth is that formula, and no code of the fit.
+//! The means are computed here from `u = P a + b` and normal errors, without any code of the fit.
 
 use crate::warning::Warning;
 use mimu_recording::{Columns, Manifest, PoseMean, PoseMeans, RawUnit, Reference};
@@ -14,7 +14,7 @@ const G: f64 = 9.81;
 const SD: f64 = 20.0;
 const AVERAGED: u64 = 100;
 
-/// Counts per m/s², lower triangular as the frame of a fit to gravity is, and counts.
+/// Matrix in counts per m/s², lower triangular like the frame of a fit to gravity, and bias in counts.
 fn truth() -> (Matrix3<f64>, Vector3<f64>) {
     let p = Matrix3::new(830.0, 0.0, 0.0, 11.0, 815.0, 0.0, -7.0, 4.0, 842.0);
     (p, Vector3::new(310.0, -120.0, 45.0))
@@ -77,7 +77,7 @@ fn options() -> Options {
     }
 }
 
-/// Share of the 95 % intervals that hold the truth, over `runs` tables.
+/// Share of the 95 % intervals that contain the truth, over `runs` tables.
 fn coverage(reference: Reference, error: f64, known: bool, runs: u64) -> f64 {
     let (p, b) = truth();
     let c = p.try_inverse().unwrap();
@@ -89,7 +89,7 @@ fn coverage(reference: Reference, error: f64, known: bool, runs: u64) -> f64 {
         let triad = &fitted.sensor(Sensor::Accel).unwrap().estimated.triad;
         for (i, estimate) in triad.inverse_estimates().iter().enumerate() {
             let truth = if i < 9 { c[(i / 3, i % 3)] } else { o[i - 9] };
-            // What is above the diagonal is zero by the choice of the frame.
+            // The frame is chosen so that elements above the diagonal are zero.
             if estimate.sigma > 0.0 {
                 all += 1;
                 held += usize::from((estimate.value - truth).abs() <= estimate.interval);
@@ -134,7 +134,7 @@ fn the_noise_of_a_mean_is_that_of_the_table_and_without_one_it_is_unknown_and_th
             .any(|w| w.to_string().contains("assumed to be white"))
     );
     let (floor, excess, warnings) = noise_floor(false);
-    // Not known, which is no zero.
+    // Unknown, not zero.
     assert!(floor.is_nan(), "{floor}");
     assert!((0.5..2.0).contains(&(excess.sqrt() / 2.0)), "{excess}");
     assert!(

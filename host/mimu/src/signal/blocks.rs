@@ -1,9 +1,8 @@
 //! A recording condensed to blocks of a tenth of a second, in one pass and bounded memory.
 //!
-//! Everything that an affine fit needs of fourteen million samples is their first two moments over
-//! short stretches, and for rotations the integral of the rate: 85 to 225 MB in place of 1.5 GB. What has to
-//! be known before a sample can be judged (where the rails are, what stillness means) is only known at the
-//! end, so a block also carries what is needed to take clipped samples out of its sums later.
+//! An affine fit needs only the first two moments of the samples over short segments, and for rotations the integral of the rate. For
+//! fourteen million samples that is 85 to 225 MB instead of 1.5 GB. The rails and the thresholds of stillness are only known at the end of
+//! the pass, so a block also carries what is needed to remove clipped samples from its sums later.
 
 use crate::quantity::Sensor;
 use crate::signal::increment::{Increment, Integrator};
@@ -14,21 +13,22 @@ use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Column, HeldReadings, NoTemperatures, RAW_COLUMNS, Recording};
 
-/// Length of a block, s. A tenth of the shortest dwell that is worth having; ten samples at 100 Hz.
+/// Length of a block, s: a tenth of the shortest usable dwell, ten samples at 100 Hz.
 const BLOCK_S: f64 = 0.1;
 /// Smallest number of samples in a full block, for slow recordings.
 const BLOCK_MIN_ROWS: usize = 4;
-/// A time step this many times the sample period is a gap.
+/// An interval between time stamps of this many sample periods is a gap.
 const GAP_PERIODS: f64 = 1.5;
-/// Odd time steps in more than this share of all rows are no gaps but another rate.
+/// If more than this share of the intervals is irregular, the sample rate is wrong. Intervals of whole periods are excluded.
 const GAP_SHARE: f64 = 0.02;
-/// The same of steps of whole periods: so much a radio may lose, of which an import has made the time regular.
+/// The same limit with intervals of whole periods included: a radio link may lose that many samples, and an import makes its time stamps
+/// regular.
 const LOSS_SHARE: f64 = 0.2;
-/// A step this near to a whole number of periods is one.
+/// Largest difference, in periods, of an interval from a whole number of periods.
 const WHOLE: f64 = 0.1;
-/// A longer step, in periods, is a pause of the logger, after which samples may begin at any instant.
+/// A longer interval, in periods, is a pause of the logger, after which samples may begin at any instant.
 const PAUSE: f64 = 8.0;
-/// After this many rows it is looked at whether blocks condense anything at all: what follows could fill the memory.
+/// After this many rows a recording is refused if its blocks hardly condense it: the rest could fill the memory.
 const LOOK_AFTER: u64 = 100_000;
 
 /// Moments of one raw channel over one block.
@@ -96,7 +96,7 @@ impl Moments {
         Self {
             n,
             mean,
-            // A constant is constant: its mean may round to a neighbour.
+            // The mean of a constant may be rounded, which would leave a variance.
             m2: if min == max { 0.0 } else { m2 },
             min,
             max,
@@ -108,14 +108,14 @@ impl Moments {
         }
     }
 
-    /// These moments without the samples at `low` and `high`, and how many those were.
+    /// These moments without the samples at the rails, and the number of those samples.
     pub fn without_rails(&self, rails: Rails) -> (Self, u32) {
         let mut kept = *self;
         let mut masked = 0;
         if rails.low.is_some_and(|rail| self.min < rail)
             || rails.high.is_some_and(|rail| self.max > rail)
         {
-            // Beyond a declared rail: which other samples are, the moments do not tell.
+            // Beyond a declared rail. The moments do not show how many samples are, so all are masked.
             (kept.n, masked) = (0, self.n);
             return (kept, masked);
         }
@@ -161,7 +161,7 @@ impl Rails {
     }
 }
 
-/// A reference or temperature channel over one block. Not a number where a sample has none.
+/// A reference or temperature channel over one block; not a number if any sample is missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
     /// Mean.
@@ -223,18 +223,18 @@ pub struct Block {
     pub temp_c: Level,
 }
 
-/// What one pass over a recording leaves.
+/// The result of one pass over a recording.
 #[derive(Debug, Clone)]
 pub struct Condensed {
     /// The blocks, in order.
     pub blocks: Vec<Block>,
-    /// The integrals of the gyro, in order; empty unless they were asked for.
+    /// The integrals of the gyro, in order; empty unless requested.
     pub increments: Vec<Increment>,
     /// Number of rows.
     pub rows: u64,
-    /// Step that the readings of each raw channel are multiples of, raw; `None` where they are not in steps.
+    /// Quantisation step of each raw channel, raw; `None` if none was found.
     pub reading_step: [Option<f64>; 6],
-    /// For each raw channel: pairs of samples that show a [low byte read as a signed number](crate::signal::signed_low_byte).
+    /// For each raw channel: the number of sample pairs that show a [low byte read as a signed number](crate::signal::signed_low_byte).
     pub signed_low_byte: [Option<u64>; 6],
     /// Which of the six raw channels the recording has.
     pub has_raw: [bool; 6],
@@ -250,7 +250,7 @@ pub struct Condensed {
     pub duplicates: u64,
     /// Samples of each raw channel that are not numbers.
     pub missing: [u64; 6],
-    /// Samples of the thermometer that are no temperatures.
+    /// Samples of the thermometer that cannot be temperatures.
     pub no_temperatures: NoTemperatures,
     /// SHA-256 of the samples file, hexadecimal.
     pub sha256: String,
@@ -259,8 +259,7 @@ pub struct Condensed {
 }
 
 impl Condensed {
-    /// Reads `recording` once. `integrate`: also integrate the gyro, as rotations need it.
-    /// `progress` is told the share that is done.
+    /// Reads `recording` once. `integrate`: also integrate the gyro, as rotations need it. `progress` receives the share that is done.
     pub fn read(recording: &Recording, integrate: bool, progress: impl Fn(f64)) -> Result<Self> {
         let place = recording.samples.display().to_string();
         let rate = recording.manifest.sample_rate_hz;
@@ -275,7 +274,7 @@ impl Condensed {
 
     /// Condenses samples in memory, `rate_hz` a second. `integrate`: also integrate the gyro, as rotations need it.
     ///
-    /// Refused is a column that is neither empty nor as long as the times.
+    /// Errors: a column is neither empty nor as long as the times.
     pub fn of(samples: &Batch, rate_hz: f64, integrate: bool) -> Result<Self> {
         let lengths = Column::all().map(|column| {
             let length = samples
@@ -315,13 +314,13 @@ struct Condenser {
     out: Condensed,
 }
 
-/// Statistics of the time steps.
+/// Statistics of the intervals between time stamps.
 #[derive(Default)]
 struct Steps {
     regular: u64,
     regular_s: f64,
     longer: u64,
-    /// Of `longer`, those of a whole number of periods, and pauses.
+    /// Those of `longer` that are a whole number of periods, or a pause.
     whole: u64,
     missing_s: f64,
     shorter: u64,
@@ -421,7 +420,7 @@ impl Condenser {
         Ok(())
     }
 
-    /// Whether row `i` says the same as the row before it in every raw channel.
+    /// Whether row `i` repeats the row before it in every raw channel.
     fn repeats_the_row_before(&self, batch: &Batch, i: usize) -> bool {
         (0..6).all(|c| {
             let column = &batch.raw[c];
@@ -429,7 +428,7 @@ impl Condenser {
                 0 => self.open.raw[c].last(),
                 _ => column.get(i - 1),
             };
-            // Empty cells are alike, though not equal.
+            // Two empty cells count as equal, although NaN never equals NaN.
             match (column.get(i), before) {
                 (Some(a), Some(b)) => a == b || a.is_nan() && b.is_nan(),
                 (a, b) => a == b,
@@ -458,7 +457,7 @@ impl Condenser {
         }
     }
 
-    /// Counts a time step; whether it is a gap.
+    /// Counts an interval between time stamps; returns whether it is a gap.
     fn count(&mut self, dt: f64, row: u64) -> bool {
         let steps = &mut self.steps;
         if dt > GAP_PERIODS * self.period_s {
@@ -541,7 +540,7 @@ impl Condenser {
         }
     }
 
-    /// Refuses time steps that mostly or often do not fit the rate.
+    /// Refuses a recording whose intervals between time stamps often do not fit the rate.
     fn check_rate(&self) -> Result<()> {
         let steps = &self.steps;
         let all = (steps.regular + steps.longer) as f64;
@@ -641,10 +640,10 @@ impl Condenser {
     }
 }
 
-/// A stretch of blocks, with its step if that is given.
+/// A range of blocks, with its step if that is given.
 pub(crate) type Stretch = (Option<i32>, std::ops::Range<usize>);
 
-/// Moments of several stretches taken together; extremes are not kept.
+/// Pooled moments of several blocks; extremes are not kept.
 pub(crate) fn pool(parts: impl Iterator<Item = Moments>) -> Moments {
     parts.fold(Moments::default(), |a, b| {
         let n = a.n + b.n;

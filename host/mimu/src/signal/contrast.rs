@@ -1,12 +1,12 @@
-//! What a dwell shows beside its mean, where a known input moves within it: contrasts.
+//! Contrasts: what a dwell shows beyond its mean if a known input moves within it.
 //!
-//! A table whose axis is level turns gravity through the accelerometer's axes. The mean of such a dwell says next to nothing; what says
-//! something is how the reading follows the reference. A contrast is a sum over the blocks of a dwell whose weights add to zero: the
-//! bias is not in it, and of what a bias wanders only the part that goes as fast as the input. The weights are functions of the known
-//! inputs alone, orthogonal and of mean square one: of white noise each contrast has a share of its own, as large as that of the mean of the
-//! dwell, and together with the mean they hold all that is linear in those functions. A turn at a constant rate has six, however
-//! long it lasts: sine and cosine of the angle, of twice and of three times it. As many short stretches of the dwell would be more rows
-//! and hold no more.
+//! A table with a level axis turns gravity through the accelerometer's axes. The mean of such a dwell shows almost nothing; the information
+//! is in how the reading follows the reference. A contrast is a sum over the blocks of a dwell with weights that add to zero. The bias
+//! cancels in it, and of the bias wander only the part as fast as the input remains. The weights are functions of the known inputs alone,
+//! orthogonal and with mean square one. The white noise of the contrasts is therefore independent, and as large as that of the mean of the
+//! dwell. Together with the mean, the contrasts contain everything that is linear in those functions. A turn at a constant rate has six
+//! contrasts, however long it lasts: sine and cosine of the angle, of twice and of three times the angle. Many short segments of the dwell
+//! would be more rows without more information.
 
 use nalgebra::{DVector, Vector3};
 
@@ -15,11 +15,11 @@ use crate::signal::blocks::Condensed;
 use crate::signal::course::Course;
 use crate::signal::dwell::Dwell;
 
-/// Most contrasts of a dwell. A tumble about two axes has more functions than that; those of the inputs themselves come first.
+/// Largest number of contrasts of a dwell. A tumble about two axes has more functions; those of the inputs themselves come first.
 const MOST: usize = 12;
-/// Part of a function that has to be its own for a contrast.
+/// Least part of a function that must be orthogonal to the earlier ones to make a contrast.
 const OF_ITS_OWN: f64 = 0.05;
-/// A function that moves by less than this share of its largest value stands.
+/// A function that varies by less than this share of its largest value counts as constant.
 const STANDS: f64 = 1e-3;
 
 /// A sum over the blocks of a dwell with weights that add to zero.
@@ -31,11 +31,11 @@ pub(crate) struct Contrast {
     pub weights: Vec<f64>,
     /// The same sum of the known input of gyro and accelerometer, SI, and of its rate of change; `None` where it is not known.
     pub known: [Option<[Vector3<f64>; 2]>; 2],
-    /// Mean time between changes of sign of the weights, s: noise that is slower is not in it.
+    /// Mean time between sign changes of the weights, s: slower noise cancels.
     pub half_period_s: f64,
 }
 
-/// Functions of the inputs of a block, in the order in which they are taken: the inputs, how they change, products of two, cubes.
+/// Functions of the inputs of a block, in the order in which they are used: the inputs, their rates of change, products of two, cubes.
 fn functions(course: &Course) -> Vec<DVector<f64>> {
     let n = course.blocks.len();
     let series = |kind: usize| {
@@ -54,7 +54,7 @@ fn functions(course: &Course) -> Vec<DVector<f64>> {
     all
 }
 
-/// The contrasts of `dwell`, the one of index `index`, in order of what they say; none where the input stands.
+/// The contrasts of `dwell`, whose index is `index`, in the order of the functions; none if the inputs are constant.
 pub(crate) fn contrasts(
     condensed: &Condensed,
     course: &Course,
@@ -64,7 +64,7 @@ pub(crate) fn contrasts(
     if !Sensor::BOTH.iter().any(|s| dwell.moves(*s)) {
         return Vec::new();
     }
-    // In units in which the mean over the samples is a scalar product.
+    // Scaled by this, the mean over the samples becomes a scalar product.
     let root = DVector::from_iterator(course.share.len(), course.share.iter().map(|s| s.sqrt()));
     let mut spanned = vec![root.clone()];
     for function in functions(course) {

@@ -1,7 +1,7 @@
 //! The course of a known input through a dwell, block by block, and whether it moves.
 //!
-//! Means of a block are as exact where the input moves as where it stands, as long as reading and reference are averaged over the same
-//! samples: a linear model maps the one mean to the other at any speed.
+//! If reading and reference are averaged over the same samples, block means are as exact for a moving input as for a constant one: a linear
+//! model maps one mean to the other at any speed.
 
 use std::ops::Range;
 
@@ -11,15 +11,15 @@ use crate::quantity::Sensor;
 use crate::signal::blocks::{Block, Condensed, Rails};
 use crate::signal::stillness::tolerance;
 
-/// With fewer blocks nothing is left of a regression on an input and its rate of change.
+/// Fewer blocks leave too few residuals after a regression on an input and its rate of change.
 const FEWEST_BLOCKS: usize = 12;
-/// Blocks that a rate of change is taken from: a polynomial of fourth order. Of a turn by 30 degrees a block it errs by 0.4 %, where a
-/// central difference errs by 5 %, and what a delay does to the reading goes by it.
+/// Number of blocks for a rate of change, by a polynomial of fourth order through them. In a turn by 30 degrees per block it errs by 0.4 %,
+/// a central difference by 5 %. The effect of a delay on the reading is computed from it.
 const OF_SLOPE: usize = 5;
-/// Share of its range in the dwell that an input may move by within a block: that of a turn by 50 degrees, where the rate of change of the
-/// block means errs by 2 %, and the mean of a square, which is taken for the square of the mean, by 6 %.
+/// Largest movement of an input within a block, as a share of its range in the dwell: that of a turn by 50 degrees. There the rate of
+/// change of the block means errs by 2 %, and the square of the mean, which replaces the mean of the square, by 6 %.
 const WITHIN_BLOCK: f64 = 0.4;
-/// A gap of this many block lengths has no rate of change.
+/// Across a gap of this many block lengths no rate of change is computed.
 const GAP_BLOCKS: f64 = 3.0;
 
 /// What the known input of a sensor does within a dwell.
@@ -27,9 +27,9 @@ const GAP_BLOCKS: f64 = 3.0;
 pub(crate) enum Motion {
     /// It is constant, or unknown.
     Stands,
-    /// It moves, and blocks follow it.
+    /// It moves slowly enough for the blocks to follow.
     Moves,
-    /// It moves, and blocks do not follow it.
+    /// It moves too fast for the blocks to follow.
     TooFast,
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn motion(blocks: &[Block], sensor: Sensor, spans: &[f64; 6]) -> Moti
         let high = levels().map(|l| l.mean).fold(f64::NEG_INFINITY, f64::max);
         let low = levels().map(|l| l.mean).fold(f64::INFINITY, f64::min);
         if high - low <= tolerance(c, spans) {
-            // A whole turn in every block: all means are alike, and no sample is.
+            // A whole turn in every block: the means are equal although the samples move.
             let within = levels().map(|l| l.max - l.min).fold(0.0, f64::max);
             if within > FAST_SPAN * tolerance(c, spans) {
                 return Motion::TooFast;
@@ -55,7 +55,7 @@ pub(crate) fn motion(blocks: &[Block], sensor: Sensor, spans: &[f64; 6]) -> Moti
             - levels().map(|l| l.min).fold(f64::INFINITY, f64::min);
         let mut within: Vec<f64> = levels().map(|l| l.max - l.min).collect();
         within.sort_by(f64::total_cmp);
-        // One block may hold the jerk of a ramp that ends.
+        // One block may contain the jerk at the end of a ramp.
         if within[within.len() * 9 / 10] > WITHIN_BLOCK * whole {
             return Motion::TooFast;
         }
@@ -64,15 +64,15 @@ pub(crate) fn motion(blocks: &[Block], sensor: Sensor, spans: &[f64; 6]) -> Moti
     found
 }
 
-/// An input whose means stand and whose samples move by this many tolerances turns within a block.
+/// If the block means are constant but the samples move by more than this many tolerances, the input turns within a block.
 const FAST_SPAN: f64 = 10.0;
 
 /// Known inputs through a dwell.
 #[derive(Debug, Clone)]
 pub(crate) struct Course {
-    /// Indices of the blocks: those without a sample masked.
+    /// Indices of the blocks without a masked sample.
     pub blocks: Vec<usize>,
-    /// Share of each in the samples of all.
+    /// Share of each block in all samples.
     pub share: Vec<f64>,
     /// Input of gyro and accelerometer, SI, and its rate of change; `None` where it is not known.
     pub of: [Option<[Vec<Vector3<f64>>; 2]>; 2],
@@ -125,8 +125,8 @@ impl Course {
         })
     }
 
-    /// What a straight regression of `values` (one for each block) on the input of `sensor` and its rate of change leaves; `None`
-    /// where it is not known.
+    /// Residuals of a linear regression of `values` (one for each block) on the input of `sensor` and its rate of change; `None` if the
+    /// input is unknown.
     pub fn unfollowed(&self, sensor: Sensor, values: &[f64]) -> Option<Vec<f64>> {
         let [input, change] = self.of[sensor as usize].as_ref()?;
         let n = values.len();
@@ -145,7 +145,7 @@ impl Course {
     }
 }
 
-/// `column` without what the orthonormal `spanned` say of it: twice, as once leaves rounding.
+/// The part of `column` that is orthogonal to the orthonormal `spanned`; projected twice, because once leaves rounding errors.
 fn across(spanned: &[DVector<f64>], column: &DVector<f64>) -> DVector<f64> {
     let basis = DMatrix::from_columns(spanned);
     let once = column - &basis * basis.tr_mul(column);

@@ -1,4 +1,4 @@
-//! Dwells: the stretches over which a reading is averaged.
+//! Dwells: the segments over which a reading is averaged.
 //!
 //! They are given by the `step` column, or found where all channels are still. Either way each is
 //! judged sensor by sensor: a reading at a rail, a stuck channel or a unit in motion would ruin the
@@ -20,15 +20,15 @@ use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Manifest, Reference};
 
-/// Variance of a given step over the median of all steps, at most; a fivefold standard deviation.
+/// Largest variance of a numbered dwell relative to the median of all: five times the standard deviation.
 const STEP_FACTOR: f64 = 25.0;
-/// Part of the variance of block means that the known input of a dwell may leave: errors of a tenth of the input are a diagnosis's to
-/// find; a reference of another dwell leaves all of it.
+/// Largest share of the variance of the block means that the known input of a dwell may leave unexplained. A diagnosis finds errors of a
+/// tenth of the input; the reference of another dwell explains nothing.
 const UNFOLLOWED: f64 = 0.02;
-/// Rate below which an accelerometer beside the axis feels nothing of it, rad/s (10 deg/s): 10 mm make 0.3 mm/s² of it.
+/// Rate below which an accelerometer off the axis senses almost no centripetal force, rad/s (10 deg/s): at 10 mm it is 0.3 mm/s².
 const SLOW: f64 = 0.175;
-/// Share of clipped samples from which on a mean is refused: below, it moves by less than a tenth
-/// of a standard deviation of one sample.
+/// A mean with a larger share of clipped samples is refused. A smaller share moves it by less than a tenth of a standard deviation of one
+/// sample.
 const CLIPPED_SHARE: f64 = 0.01;
 
 /// Mean of a raw channel over a dwell.
@@ -71,7 +71,7 @@ pub struct Dwell {
     pub turn: bool,
     /// Whether the known input of gyro and accelerometer moves within it.
     pub moves: [bool; 2],
-    /// Whether the gyro reads what no bias explains, as in a slow turn about the vertical: then it is no rest, and still a pose.
+    /// Whether no bias explains the gyro's reading, as in a slow turn about the vertical: then the dwell is a pose, but not a rest.
     pub turns_slowly: bool,
     /// Why it is not used for the gyro, if so.
     pub gyro_fault: Option<Fault>,
@@ -88,19 +88,18 @@ impl Dwell {
         }
     }
 
-    /// Whether a table turns the unit in it so fast that an accelerometer beside the axis would show it.
+    /// Whether a table turns the unit so fast that an accelerometer off the axis would show it.
     pub fn spins(&self) -> bool {
         self.input(Sensor::Gyro)
             .is_some_and(|rate| rate.norm() > SLOW)
     }
 
-    /// Whether the known input of `sensor` moves within it: then its mean is not all that it shows.
+    /// Whether the known input of `sensor` moves within it: then it shows more than its mean.
     pub fn moves(&self, sensor: Sensor) -> bool {
         self.moves[sensor as usize]
     }
 
-    /// Time over which the channels of `sensor` are averaged, s: masked samples are gone, and the mean is that of a shorter
-    /// dwell.
+    /// Time over which the channels of `sensor` are averaged, s: masked samples shorten it.
     pub fn averaged_s(&self, sensor: Sensor) -> f64 {
         let fewest = self.raw[sensor.channels()]
             .iter()
@@ -139,15 +138,15 @@ pub struct LeftOut {
     pub sigmas: f64,
 }
 
-/// Which dwells, and turns that end in them, a fit uses even where the others contradict them.
+/// The dwells, and turns that end in them, that a fit uses even if the others contradict them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum Keep {
-    /// None: what the others contradict is left out, and named.
+    /// None: what the others contradict is left out and named.
     #[default]
     Nothing,
     /// All.
     Everything,
-    /// Those of these steps.
+    /// Those with these numbers.
     Steps(Vec<i32>),
 }
 
@@ -172,13 +171,13 @@ impl Keep {
 pub struct Dwells {
     /// In order of time.
     pub list: Vec<Dwell>,
-    /// How they were found; `None` if the `step` column says.
+    /// How they were found; `None` if the `step` column gives them.
     pub detection: Option<Detection>,
     /// Rails of the six channels, as declared or as found.
     pub rails: [Rails; 6],
-    /// Longest run of equal samples that chance explains, of the six channels; infinite where nothing can be told.
+    /// Longest run of equal samples that chance explains, of the six channels; infinite if there is no such limit.
     pub longest_run: [f64; 6],
-    /// What a fit has left out of it.
+    /// What a fit has left out.
     pub left_out: Vec<LeftOut>,
     /// What a fit may not leave out.
     pub keep: Keep,
@@ -315,18 +314,19 @@ impl Dwells {
 }
 
 impl Dwells {
-    /// Whether dwells of the `step` column are not used for `sensor` because they are not still: taking the column as it is would use them.
+    /// Whether dwells of the `step` column are not used for `sensor` because they are not still; [`Steps::Given`] would use them.
     pub fn are_judged_not_still(&self, sensor: Sensor) -> bool {
         let not_still = |d: &Dwell| d.fault(sensor) == Some(Fault::NotStill);
         self.detection.is_none() && self.list.iter().any(not_still)
     }
 }
 
-/// Variance of a reading that changes between two codes, over the square of the step; at most a quarter.
+/// Limit for the variance of a reading that alternates between two codes, over the square of the quantisation step: a quarter at most, and
+/// a margin.
 const TWO_CODES: f64 = 0.3;
 
-/// Whether the `step` of channel `c` is coarser than its noise: where it changes within a dwell at all, it does so between two codes.
-/// Such a channel repeats one value through whole dwells, and is not stuck.
+/// Whether the quantisation `step` of channel `c` is coarser than its noise: if the channel changes within a dwell at all, it alternates
+/// between two codes. Such a channel repeats one value through whole dwells without being stuck.
 fn is_coarse(list: &[Dwell], step: Option<f64>, c: usize) -> bool {
     let Some(step) = step else { return false };
     let mut changing: Vec<f64> = list
@@ -402,7 +402,7 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
     }
 }
 
-/// A dwell that turns evenly is used for neither sensor.
+/// Excludes dwells that turn evenly, for both sensors.
 fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
     let usable = |d: &&Dwell| Sensor::BOTH.iter().all(|s| d.fault(*s).is_none());
     let judged: Vec<&Dwell> = list.iter().filter(usable).collect();
@@ -421,7 +421,7 @@ fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
     }
 }
 
-/// Marks the dwells that are no rest of the gyro, though they are poses of the accelerometer; what to say of them.
+/// Marks the dwells that are poses of the accelerometer but not rests of the gyro; returns the warning about them.
 fn mark_slow_turns(list: &mut [Dwell]) -> Option<Warning> {
     let usable = |d: &&mut Dwell| Sensor::BOTH.iter().all(|s| d.fault(*s).is_none());
     let mut usable: Vec<&mut Dwell> = list.iter_mut().filter(usable).collect();
@@ -446,11 +446,11 @@ fn mark_slow_turns(list: &mut [Dwell]) -> Option<Warning> {
     (!steps.is_empty()).then_some(Warning::SlowTurns(steps))
 }
 
-/// Finds the dwells whose known inputs move, and those where one moves too fast.
+/// Marks the dwells whose known inputs move; returns for which sensors of each dwell the input moves too fast.
 fn find_moving(list: &mut [Dwell], condensed: &Condensed) -> Vec<[bool; 2]> {
     let spans = reference_spans(condensed);
     let each = list.iter_mut().map(|dwell| {
-        // Of a turn of known angle only the mean rate is known.
+        // In a turn of known angle only the mean rate is known.
         if dwell.turn {
             return [false; 2];
         }
@@ -462,8 +462,8 @@ fn find_moving(list: &mut [Dwell], condensed: &Condensed) -> Vec<[bool; 2]> {
     each.collect()
 }
 
-/// Variance of the block means of each channel of `sensor` over `dwell`, raw units squared, and what of it its known input leaves; `None`
-/// where that does not move.
+/// Variance of the block means of each channel of `sensor` over `dwell`, raw units squared, and the part that the known input leaves
+/// unexplained; `None` if the input does not move.
 fn unfollowed(
     dwell: &Dwell,
     sensor: Sensor,
@@ -492,7 +492,7 @@ fn unfollowed(
     Some(out)
 }
 
-/// Finds out which dwells are no good for which sensor, by the longest run of equal samples and the rails of each channel.
+/// Sets the faults of the dwells for each sensor, given the longest run of equal samples and the rails of each channel.
 fn judge(
     list: &mut [Dwell],
     condensed: &Condensed,
@@ -510,7 +510,7 @@ fn judge(
             })
             .collect();
         for dwell in list.iter_mut() {
-            // A turn of known angle has a known mean rate, and is anything but still.
+            // A turn of known angle has a known mean rate, but is not still.
             let turn = dwell.turn;
             let followed = match given && channels().next().is_some() {
                 true => unfollowed(dwell, sensor, condensed, rails),
@@ -559,9 +559,9 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<Warning>) {
                 continue;
             };
             if matches!(fault, Fault::TooShort | Fault::Turning) && sensor == Sensor::Accel {
-                continue; // said once, for both
+                continue; // reported once, for both sensors
             }
-            // Whether a unit is still, and its input slow enough, is judged sensor by sensor.
+            // Stillness and the speed of the input are judged sensor by sensor.
             let by_sensor = matches!(fault, Fault::NotStill | Fault::TooFast);
             let whose = by_sensor.then_some(sensor);
             let name = manifest.step_name(dwell.step);

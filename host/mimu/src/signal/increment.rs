@@ -1,7 +1,7 @@
-//! The raw gyro, integrated over about 10 ms at a time, before anything of its calibration is known.
+//! The raw gyro, integrated over about 10 ms at a time, before its calibration is known.
 
-/// Longest stretch that one [`Increment`] integrates over, s: at 10 rad/s it turns by 0.1 rad, and
-/// what the second-order coning correction leaves is below 1e-5 rad.
+/// Longest time that one [`Increment`] integrates over, s: at 10 rad/s the unit turns by 0.1 rad, and the error of the second-order coning
+/// correction is below 1e-5 rad.
 const INCREMENT_S: f64 = 0.01;
 
 /// Integral of the raw gyro readings `u` over about 10 ms, from one sample instant to another, in a form that
@@ -56,7 +56,7 @@ impl Integrator {
         }
     }
 
-    /// Takes in a sample; an increment if one is complete.
+    /// Adds a sample; returns an increment if one is complete.
     pub fn push(&mut self, t: f64, u: [f64; 3], gap: bool) -> Option<Increment> {
         let (t0, u0) = self.before.replace((t, u))?;
         let dt = t - t0;
@@ -64,8 +64,7 @@ impl Integrator {
         if gap || !u.iter().chain(&u0).all(|x| x.is_finite()) {
             open.whole = false;
         }
-        // The rate runs straight from sample to sample: exact for its integral, and for its coning
-        // within one step dt²/6 u0 × u.
+        // The rate is taken as linear between samples. Its integral is then exact, and the coning within one interval is dt²/6 u0 × u.
         let within = cross(u0, u);
         let a0 = open.integral;
         let step = [0, 1, 2].map(|k| 0.5 * dt * (u0[k] + u[k]));

@@ -4,11 +4,11 @@ use mimu_recording::NoTemperatures;
 
 use crate::warning::Warning;
 
-/// Temperatures that there are, °C: those of the import. Not the narrower ones of the device: a thermometer whose origin nobody recorded may read
-/// 379 °C throughout, and shows all the same what follows it.
+/// Possible temperatures, °C, as in an import. The device's range is narrower: here a thermometer with an unknown offset may read 379 °C
+/// throughout and still show what follows temperature.
 const RANGE_C: std::ops::RangeInclusive<f64> = -273.15..=1000.0;
 
-/// Leaves empty what is no temperature among `temp_c`, of the times `t_s`, and counts it.
+/// Empties the cells of `temp_c` (at the times `t_s`) that cannot be temperatures, and counts them.
 pub(crate) fn leave_empty(
     temp_c: &mut [f64],
     t_s: impl IntoIterator<Item = f64>,
@@ -23,7 +23,7 @@ pub(crate) fn leave_empty(
     }
 }
 
-/// What a person should know of them.
+/// The warning about them, if there are any.
 pub(crate) fn warning(found: &NoTemperatures) -> Option<Warning> {
     (found.count > 0).then(|| Warning::NoTemperatures(found.clone()))
 }

@@ -9,14 +9,14 @@ use mimu_recording::{Manifest, RAW_COLUMNS};
 /// Natural logarithm of the odds against a run of equal samples by chance in the whole recording.
 const RUN_LOG_ODDS: f64 = 14.0;
 
-/// Longest run of equal samples that chance explains in channel `c`, from how often neighbours are
-/// equal where the channel works. `None`: they mostly are, and nothing can be told.
+/// Longest run of equal samples that chance explains in channel `c`, from how often neighbours are equal while the channel works. `None` if
+/// most are equal: then there is no limit.
 pub(crate) fn longest_run_by_chance(condensed: &Condensed, c: usize) -> Option<f64> {
     let odds = RUN_LOG_ODDS + (condensed.rows as f64).ln();
     share_of_repeats(condensed, c).map(|share| (1.0 + odds / -share.ln()).max(5.0))
 }
 
-/// How often neighbours are equal in channel `c`, in the middle one of its blocks. `None`: they mostly are.
+/// Share of equal neighbours in channel `c`, the median over its blocks. `None` if most are equal.
 fn share_of_repeats(condensed: &Condensed, c: usize) -> Option<f64> {
     let blocks = condensed.blocks.iter().map(|b| b.raw[c]);
     let mut shares: Vec<f64> = blocks
@@ -27,20 +27,20 @@ fn share_of_repeats(condensed: &Condensed, c: usize) -> Option<f64> {
     (share < 0.8).then_some(share)
 }
 
-/// Blocks in a row that have to be calm at an extreme.
+/// Number of successive blocks that must be calm at an extreme.
 const CALM_BLOCKS: usize = 3;
-/// Standard deviation of a calm block, times that of quiet ones: the quietest tenth of the blocks of this channel elsewhere, and the
-/// quietest twentieth of those of each other channel of the sensor, which are alike. (By itself neither will do: a gyro
-/// that is turned one way only rests at an end of its range, and elsewhere there is but motion.) Of ten
-/// samples of the same noise one block in four hundred is as calm, and three in a row one in sixty millions.
+/// Largest standard deviation of a calm block, relative to quiet ones. Quiet are the quietest tenth of the blocks of this channel away from
+/// the extremes, and the quietest twentieth of the blocks of each other channel of the sensor, whose noise is similar; the smaller value
+/// counts. (A gyro that is turned one way only rests at an end of its range: its other blocks all contain motion.) With ten samples of the
+/// same noise per block, one block in four hundred is as calm by chance, and three in a row one in sixty million.
 const CALM: f64 = 0.4;
 /// Share of the range that counts as near an extreme.
 const NEAR: f64 = 0.1;
 
-/// Where a channel comes to a calm end: a sensor at its own rail, of whose noise only the converter's is left. `sign` is
-/// 1 for the high end and -1 for the low one; the answer is the innermost value there.
+/// A calm extreme of a channel: the sensor is at its own rail, and only the converter's noise remains. `sign` is 1 for the high end and -1
+/// for the low one. Returns the innermost value there.
 ///
-/// Repeated values, the sign of a converter's rail, do not occur: at a rail of the sensor the converter still makes noise.
+/// Values do not repeat as at a converter's rail, because the converter still makes noise.
 fn calm_end(condensed: &Condensed, c: usize, sign: f64, range: [f64; 2]) -> Option<f64> {
     let [low, high] = range;
     let near = NEAR * (high - low);
@@ -61,7 +61,7 @@ fn calm_end(condensed: &Condensed, c: usize, sign: f64, range: [f64; 2]) -> Opti
         quiet = quiet.min(quantile(&mut deviations, 0.05)?);
     }
     let calm = |m: &Moments| deviation(m) < CALM * quiet && (m.mean - end).abs() < near;
-    // The outermost calm stretch: a pose near the end is calm at another value than the rail.
+    // The outermost calm segment: a pose near the end may be calm at another value than the rail.
     let stretches = blocks.chunk_by(|a, b| calm(a) && calm(b));
     let calm_stretches = stretches.filter(|s| s.len() >= CALM_BLOCKS && calm(&s[0]));
     let inner = |s: &[Moments]| {
@@ -72,20 +72,20 @@ fn calm_end(condensed: &Condensed, c: usize, sign: f64, range: [f64; 2]) -> Opti
         .map(inner)
         .max_by(|a, b| (sign * a).total_cmp(&(sign * b)))?;
     let spread = (end - widest).abs();
-    // An extreme that was passed in motion lies beyond any rail: what is calm inside of it is no rail.
+    // If motion went well beyond the calm value, that value is not a rail.
     (spread < 20.0 * CALM * quiet).then_some(widest)
 }
 
-/// Natural logarithm of the odds against an extreme that is by chance exactly where some converter ends.
+/// Natural logarithm of the odds against an extreme that coincides by chance with the end of some converter.
 const FULL_SCALE_LOG_ODDS: f64 = 8.0;
 
-/// Natural logarithm of the odds against `value` being an extreme by chance, of readings in multiples of `step`.
+/// Natural logarithm of the odds against `value` being an extreme by chance; readings are multiples of `step`.
 ///
-/// Almost all digital parts have 16 bits: a motion that ends at exactly one of their ends, of thousands of codes, was cut off there.
+/// Almost all digital parts have 16 bits. A motion over thousands of codes that ends exactly at an end of their range was clipped there.
 fn full_scale_log_odds(value: f64, step: Option<f64>) -> f64 {
     let codes = value / step.unwrap_or(1.0);
     let whole = codes.round();
-    // A factor of an import rounds in the last places.
+    // The scale factor of an import rounds the last digits.
     if (codes - whole).abs() > 1e-6 * whole.abs() {
         return 0.0;
     }
@@ -99,7 +99,7 @@ fn full_scale_log_odds(value: f64, step: Option<f64>) -> f64 {
     }
 }
 
-/// How often the extreme `value` comes: in all, and in a row.
+/// How often the extreme `value` occurs: in all, and in a row.
 fn count(moments: impl Iterator<Item = Moments>, value: f64) -> (u64, f64) {
     // Blocks are short: a run continues through blocks that contain only its value.
     let (mut all, mut longest, mut run) = (0, 0.0_f64, 0.0);
@@ -122,7 +122,7 @@ fn count(moments: impl Iterator<Item = Moments>, value: f64) -> (u64, f64) {
     (all, longest)
 }
 
-/// Whether the extreme `value` of channel `c` is a rail of the converter: the remark that says so.
+/// The warning that the extreme `value` of channel `c` is a rail of the converter, if it is one.
 fn converter_rail(condensed: &Condensed, c: usize, value: f64, high: bool) -> Option<Warning> {
     let moments = condensed.blocks.iter().map(|b| b.raw[c]);
     let (all, longest) = count(moments.filter(|m| m.n > 0), value);
@@ -130,15 +130,14 @@ fn converter_rail(condensed: &Condensed, c: usize, value: f64, high: bool) -> Op
     if full_scale > RUN_LOG_ODDS {
         return Some(Warning::EndOfConverter(all, value).of_channel(c));
     }
-    // Only the extreme is looked at, and not all runs of a recording, so that its length does not count.
+    // Only runs at the extreme are tested, so the length of the recording does not matter.
     let chance = 1.0 + (RUN_LOG_ODDS - full_scale) / -share_of_repeats(condensed, c)?.ln();
     (longest > chance)
         .then(|| Warning::RunAtEnd(high, value, longest, chance.floor()).of_channel(c))
 }
 
-/// Rails of the six channels: as declared, or where the largest or smallest
-/// value of a whole recording is repeated more often in a row than chance allows, is where a converter ends, or is as calm as no noise
-/// of the sensor is.
+/// Rails of the six channels, as declared or as found. The largest or smallest value of a recording is a rail if it repeats in a row more
+/// often than chance allows, if a converter ends there, or if readings there are calmer than the sensor's noise.
 pub(crate) fn find(
     condensed: &Condensed,
     manifest: &Manifest,
@@ -182,11 +181,11 @@ pub(crate) fn find(
     rails
 }
 
-/// Steps within which a coarse channel stays while the unit rests.
+/// Largest range of a coarse channel at rest, in quantisation steps.
 const AT_REST_STEPS: f64 = 3.0;
 
-/// The step of another channel of the sensor of `c`, where all of them stay within some steps: the unit was at rest and its converter is
-/// coarse.
+/// The largest quantisation step of the sensor's channels other than `c`, if each stays within a few steps: then the unit was at rest and
+/// its converter is coarse.
 fn coarse_step_at_rest(condensed: &Condensed, c: usize) -> Option<f64> {
     let others = (c / 3 * 3..c / 3 * 3 + 3).filter(|o| *o != c && condensed.has_raw[*o]);
     let mut largest = None;

@@ -2,13 +2,14 @@
 
 use crate::signal::blocks::Block;
 
-/// Change of the temperature over a dwell, over its standard error, from which on it ramps.
+/// If the temperature changes over a dwell by more than this many standard errors, it ramps.
 const RAMPS_SIGMAS: f64 = 5.0;
-/// Least change over a dwell that counts, K: of 0.1 K a bias of 0.1 deg/s/K makes 0.01 deg/s, which is what an analog gyro scatters by within a dwell.
+/// Least change over a dwell that counts, K. At 0.1 deg/s/K it moves a bias by 0.01 deg/s, as much as an analog gyro scatters within a
+/// dwell.
 const RAMPS_C: f64 = 0.1;
 
-/// Whether the temperature ramps within the dwell that `blocks` are, which lasts `duration_s`: by the slope of a line through them, against
-/// what they scatter about it.
+/// Whether the temperature ramps within the dwell of these `blocks`, which lasts `duration_s`: compares the slope of a line through them
+/// with their scatter about it.
 pub(crate) fn ramps(blocks: &[Block], duration_s: f64) -> bool {
     let known: Vec<(f64, f64)> = blocks
         .iter()

@@ -1,30 +1,30 @@
-//! The step that raw readings are multiples of, found from the readings themselves.
+//! The quantisation step of raw readings, found from the readings themselves.
 //!
-//! A converter gives whole codes. Where several are averaged the step is a fraction of one, and a scale to volts makes it any
-//! number; rounding in a text file blurs it. It is the greatest common divisor of the differences between neighbouring
-//! samples, to within that blur: of neighbours, because an error of the converter shifts whole ranges of codes against each other.
+//! A converter gives whole codes. If several are averaged, the step is a fraction of a code. A scale to volts makes it any number, and
+//! rounding in a text file blurs it. The step is the greatest common divisor of the differences between neighbouring samples, to within
+//! that blur. Only neighbours are compared, because converter nonlinearity shifts whole ranges of codes against each other.
 
-/// Differences that are kept of a channel.
+/// Number of differences kept for a channel.
 const KEPT: usize = 4096;
-/// Of a block, so that all of a recording is looked at.
+/// Number of differences taken from a block, so that all of a recording is sampled.
 const OF_A_BLOCK: usize = 4;
-/// Fewer tell nothing.
+/// Fewer differences do not determine a step.
 const FEWEST: usize = 64;
-/// Share of the differences that have to be multiples, to within [`BLUR`] steps: bits that turn between two samples spoil some, of
-/// a period of twenty times the noise one in twenty.
+/// Share of the differences that must be multiples, to within [`BLUR`] steps. A wrong bit spoils the differences between samples where it
+/// changes: one in twenty, if its period is twenty times the noise.
 const MULTIPLES: f64 = 0.85;
-/// Chance has two fifths of the differences within it.
+/// Largest distance from a multiple, in steps. By chance two fifths of the differences are within it.
 const BLUR: f64 = 0.2;
-/// The smallest differences seen are at most so many steps.
+/// The smallest differences are at most this many steps.
 const SMALLEST: u32 = 6;
-/// So many different ones of the smallest are tried: the first may be one that a bit has spoilt.
+/// Number of different smallest differences that are tried: a wrong bit may have spoilt the first.
 const TRIED: usize = 12;
 
 /// Takes the samples of a channel in a stream.
 #[derive(Debug, Clone)]
 pub struct StepFinder {
     differences: Vec<f64>,
-    /// One in so many blocks is taken.
+    /// One in this many blocks is used.
     every: u64,
     blocks: u64,
 }
@@ -50,7 +50,7 @@ impl StepFinder {
         self.differences
             .extend(moved.filter(|d| *d > 0.0 && d.is_finite()).take(OF_A_BLOCK));
         if self.differences.len() > KEPT {
-            // Every other block, in future and of the past.
+            // Keeps every other block, of those seen and of those to come.
             let mut index = 0_usize;
             self.differences.retain(|_| {
                 index += 1;
@@ -60,7 +60,7 @@ impl StepFinder {
         }
     }
 
-    /// The step, raw; `None` where readings are not in steps, or there are too few different ones to tell.
+    /// The step, raw; `None` if the readings have no step, or too few of them differ.
     pub fn find(mut self) -> Option<f64> {
         self.differences.sort_by(f64::total_cmp);
         if self.differences.len() < FEWEST {
@@ -81,11 +81,11 @@ impl StepFinder {
             .max_by(f64::total_cmp)
     }
 
-    /// The step near `guess` that the differences are multiples of.
+    /// The step near `guess` that the differences are multiples of, if they are.
     fn fits(&self, guess: f64) -> Option<f64> {
         let (mut of_both, mut of_squares, mut step) = (0.0, 0.0, guess);
         let mut multiples = 0;
-        // Small differences first: they make the step fine enough to count large ones by.
+        // Small differences first: they make the step exact enough to count the steps of large ones.
         for &d in &self.differences {
             let n = (d / step).round();
             if n > 0.0 && (d - n * step).abs() < BLUR * step {
@@ -132,7 +132,7 @@ mod tests {
         // Six decimals of volts in a text file.
         let found = step(|v| ((v / code).round() * code * 1e6).round() / 1e6).unwrap();
         assert!((found / code - 1.0).abs() < 1e-4, "{found}");
-        // A bit of 2048 codes that is worth 5.3 too much.
+        // The bit of 2048 codes is 5.3 codes too large.
         let wrong = |v: f64| {
             let whole = (v / code).round();
             let set = (whole as u32) & 2048 != 0;

@@ -1,23 +1,23 @@
-//! Whether a dwell that was found is a rest: a slow and even turn varies as little, and hides at the ends of many.
+//! Whether a dwell that was found is a rest. A slow, even turn varies as little as a rest, and many dwells have one at their ends.
 //!
-//! What is usual for the sensors is taken from the recording itself, robustly: noise, wander of the bias within dwells and from one to
-//! the next, g-sensitivity, tremor. Only what stands far out of that is left out.
+//! The recording itself shows what is usual for the sensors, by robust statistics: noise, wander of the bias within dwells and between
+//! them, g-sensitivity, tremor. Only what far exceeds that is left out.
 
 use std::ops::Range;
 
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Condensed, Stretch, pool, quantile};
 
-/// Blocks whose mean is compared with that of the middle: noise of a single block would hide a slow turn.
+/// Number of blocks whose mean is compared with that of the middle: the noise of a single block would hide a slow turn.
 const GROUP: usize = 3;
-/// Deviation of a group at an end from the middle of its dwell, at most, over what is usual in the middles. A straight drift over the
-/// dwell reaches 3.5 at the ends.
+/// Largest deviation of a group at an end from the middle of its dwell, relative to the usual deviation in the middles. A linear drift over
+/// the dwell reaches 3.5 at the ends.
 const AT_ENDS: f64 = 5.0;
-/// Deviation of a dwell from its neighbours, at most, over what is usual.
+/// Largest deviation of a dwell from its neighbours, relative to the usual one.
 const AMONG_DWELLS: f64 = 8.0;
-/// Trend beyond the first and the last dwells over that beside them: twice, for a warm-up that slows down within three dwells.
+/// Largest trend at the first and the last dwells, relative to that next to them: twice, for a warm-up that slows down within three dwells.
 const BEYOND: f64 = 2.0;
-/// Fewer dwells show nothing usual.
+/// Fewer dwells do not show what is usual.
 const FEWEST: usize = 7;
 /// From a median absolute deviation to a standard deviation.
 const OF_MEDIAN: f64 = 1.4826;
@@ -26,7 +26,7 @@ fn mean(condensed: &Condensed, blocks: Range<usize>, c: usize) -> f64 {
     pool(condensed.blocks[blocks].iter().map(|b| b.raw[c])).mean
 }
 
-/// Robust standard deviation of `deviations` about zero, and no less than a reading in steps or a rounding error gives.
+/// Robust standard deviation of `deviations` about zero, at least that of quantisation and rounding.
 fn usual(deviations: &[f64], condensed: &Condensed, c: usize) -> f64 {
     let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
     let scale = OF_MEDIAN * quantile(&mut sizes, 0.5).unwrap_or(0.0);
@@ -38,11 +38,12 @@ fn usual(deviations: &[f64], condensed: &Condensed, c: usize) -> f64 {
         .max(rounding)
 }
 
-/// Blocks at an end that are looked at, and half of those that they are compared with: twenty seconds. A dwell of an hour drifts.
+/// Largest number of blocks that are tested at an end, and half the number that they are compared with: twenty seconds, because a dwell of
+/// an hour drifts.
 const LONGEST_END: usize = 200;
 
-/// What the beginning and the end of a stretch are compared with: its middle half, of a long one the nearest part of it. `None` where it is
-/// too short to have ends.
+/// The ranges that the beginning and the end of a segment are compared with: its middle half; in a long segment, the nearest part of that.
+/// `None` if the segment is too short.
 fn middles(range: &Range<usize>) -> Option<[Range<usize>; 2]> {
     let quarter = (range.len() / 4).min(LONGEST_END);
     let half = (range.len() - 2 * quarter).min(2 * LONGEST_END);
@@ -54,7 +55,7 @@ fn middles(range: &Range<usize>) -> Option<[Range<usize>; 2]> {
     })
 }
 
-/// Means of the groups of `middle`, less that of all of it.
+/// Means of the groups of `middle`, minus the mean of all of it.
 fn in_middle(condensed: &Condensed, middle: &Range<usize>, c: usize) -> Vec<f64> {
     let whole = mean(condensed, middle.clone(), c);
     let starts = (middle.start..=middle.end - GROUP).step_by(GROUP);
@@ -63,8 +64,8 @@ fn in_middle(condensed: &Condensed, middle: &Range<usize>, c: usize) -> Vec<f64>
         .collect()
 }
 
-/// Walks the ends of the stretches in, from both sides, until gyro and accelerometer read what they do in the middle. The number of
-/// stretches that were cut, and of blocks in all.
+/// Trims the segments at both ends until gyro and accelerometer read what they read in the middle. Returns the number of segments that were
+/// cut, and of blocks removed.
 pub(crate) fn walk_in(stretches: &mut [Stretch], condensed: &Condensed) -> (u64, u64) {
     let (mut cut, mut blocks) = (vec![0_usize; stretches.len()], 0);
     let mut ends: Vec<[usize; 2]> = vec![[0; 2]; stretches.len()];
@@ -112,8 +113,8 @@ pub(crate) fn walk_in(stretches: &mut [Stretch], condensed: &Condensed) -> (u64,
     (cut.iter().filter(|c| **c > 0).count() as u64, blocks)
 }
 
-/// What a value is expected to be by its neighbours in time, and how far a trend may take it from there. Medians of three on each side, so that
-/// one more that strays misleads neither.
+/// The value that the neighbours in time predict, and how far a trend may move it from there. Both use medians of three on each side, so
+/// that another stray value does not mislead them.
 pub(crate) fn expected(values: &[f64], i: usize) -> (f64, f64) {
     let median = |range: Range<usize>| {
         let mut values = values[range].to_vec();
@@ -140,7 +141,7 @@ pub(crate) fn expected(values: &[f64], i: usize) -> (f64, f64) {
     }
 }
 
-/// What is judged of a dwell.
+/// The properties of a dwell that are judged.
 #[derive(Debug, Clone)]
 pub(crate) struct Rest {
     /// Its blocks.
@@ -153,8 +154,8 @@ pub(crate) struct Rest {
     pub ramps: bool,
 }
 
-/// Which of `dwells`, usable and in order of time, turn evenly and do not rest: their mean rate is none of the others', or the force
-/// rotates within them.
+/// Which of `dwells`, usable and in order of time, turn evenly instead of resting: their mean rate differs from that of the others, or the
+/// force rotates within them.
 pub(crate) fn turning(dwells: &[Rest], condensed: &Condensed) -> Vec<bool> {
     let n = dwells.len();
     let mut turning = vec![false; n];
@@ -168,7 +169,7 @@ pub(crate) fn turning(dwells: &[Rest], condensed: &Condensed) -> Vec<bool> {
         for i in 0..n {
             // A mean over less time has more noise.
             let mut longer = (typical_s / dwells[i].duration_s).max(1.0).sqrt();
-            // A bias that drifts with the temperature goes the further the longer it takes.
+            // A bias that drifts with the temperature moves further in a longer dwell.
             if dwells[i].ramps {
                 longer *= (dwells[i].duration_s / typical_s).max(1.0);
             }

@@ -1,19 +1,19 @@
-//! A firmware that puts each reading together from two bytes and takes the low one for a signed number.
+//! Finds readings of firmware that combines two bytes and treats the low one as signed.
 //!
-//! A reading whose low byte is 128 or more comes 256 counts low. The low byte itself is right, so that the reading shows the fault and how to undo
-//! it: from one sample to the next the error appears and goes as the low byte passes 128, and the readings jump by 256 counts where the
-//! signal moves by a few. As an effect of a calibration it stays out of reach: the jumps are in the noise of the dwells, from which the share
-//! of the time that a bit is set is found, and its coefficient erred by 40 to 64 counts of 256.
+//! A reading whose low byte is 128 or more is 256 counts too low. The low byte itself is right, so the fault can be undone. When the low
+//! byte passes 128, the error appears or disappears between two samples, and the readings jump by 256 counts while the signal moves by a
+//! few. A calibration could not fit this as an effect. It would take the share of time that a bit is set from the noise of the dwells,
+//! which contains the jumps: the coefficient was wrong by 40 to 64 counts of 256.
 
 use mimu_recording::signed_low_byte::undone;
 
 /// Fewer pairs of samples between which the error came or went prove nothing.
 const FEWEST: u64 = 12;
-/// Of all such pairs the fault brings nearly all nearer to each other when it is undone. Where it is absent, none of a quiet signal,
-/// and half of those of noise above a byte.
+/// Share of such pairs that must be nearer to each other when the fault is undone. If there is a fault, nearly all are. Otherwise none are
+/// in a quiet signal, and half of them if the noise exceeds a byte.
 const SHARE: f64 = 0.9;
-/// Counts from sample to sample beside such a pair from which on the signal moves too fast for it to say anything: of turns by hand at 100 Hz
-/// a step may be as long as a byte.
+/// If the signal moves by this many counts per sample next to a pair, it is too fast for the pair to count: in turns by hand at 100 Hz it
+/// may move by a whole byte.
 const FAST: f64 = 64.0;
 
 /// Takes the samples of a channel in a stream.
@@ -21,7 +21,7 @@ const FAST: f64 = 64.0;
 pub(crate) struct Finder {
     /// Up to three samples before the next one.
     before: Vec<f64>,
-    /// Pairs of neighbours, in a signal that moves slowly, of which one has a low byte of 128 or more, and the other has not.
+    /// Pairs of neighbours, in a slow signal, of which exactly one has a low byte of 128 or more.
     pairs: u64,
     /// Those that are nearer to each other when the fault is undone.
     nearer: u64,
@@ -55,7 +55,7 @@ impl Finder {
         }
     }
 
-    /// How many pairs of samples show the fault; `None` where it is absent, or readings are no whole counts.
+    /// Number of sample pairs that show the fault; `None` if it is absent, or the readings are not whole counts.
     pub fn find(&self) -> Option<u64> {
         let shown = self.nearer >= FEWEST && self.nearer as f64 > SHARE * self.pairs as f64;
         (shown && !self.fractions).then_some(self.nearer)
@@ -66,7 +66,7 @@ impl Finder {
 mod tests {
     use super::*;
 
-    /// 131 counts per deg/s at a rate that swings by 3 deg/s, with noise that a generator of its own makes.
+    /// 131 counts per deg/s at a rate that swings by 3 deg/s, with noise.
     fn signal(noise: f64) -> Vec<f64> {
         let mut state = 1_u32;
         let mut even = || {
@@ -77,7 +77,7 @@ mod tests {
         swing.map(|v| (v + noise * even()).round()).collect()
     }
 
-    /// As that firmware does: `(high << 8) + (int8_t)low`.
+    /// Reads like that firmware: `(high << 8) + (int8_t)low`.
     fn read(signal: &[f64]) -> Vec<f64> {
         let of = |v: &f64| {
             let [high, low] = (*v as i16).to_be_bytes();

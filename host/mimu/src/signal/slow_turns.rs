@@ -1,8 +1,8 @@
-//! Dwells in which the gyro reads what no bias explains: slow turns about the vertical, which the accelerometer does not show.
+//! Dwells in which no bias explains the gyro's reading: slow turns about the vertical, which the accelerometer does not show.
 //!
-//! At rest a gyro reads its bias and, by its g-sensitivity, something that is linear in the force. What the other dwells predict of a dwell
-//! by such a model is compared with what it reads: the studentised deletion residual. The mean of three contiguous neighbours, by which
-//! even turns are found ([`crate::signal::rest`]), holds the g-sensitivity in its scatter, and so lets turns of some tenths of a degree a second pass.
+//! At rest a gyro reads its bias and a term that is linear in the force, its g-sensitivity. The reading of each dwell is compared with the
+//! prediction of such a model from the other dwells: the studentised deletion residual. [`crate::signal::rest`] finds even turns by the
+//! median of three neighbours instead. Its scatter includes the g-sensitivity, so it misses turns of some tenths of a degree per second.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -12,16 +12,16 @@ use crate::signal::rest::expected;
 
 /// Bias, and the force along three axes.
 const PARAMETERS: usize = 4;
-/// Fewer dwells do not show what is usual beside so many parameters.
+/// With so many parameters, fewer dwells do not show what is usual.
 const FEWEST: usize = 12;
 /// Largest share of dwells that may be slow turns; beyond it, it is unknown which dwells are rests.
 const MOST: f64 = 0.25;
 /// Probability that any dwell of a recording at rest is mistaken for a turn because of noise.
 const FALSE_ALARM: f64 = 1e-3;
-/// And the least factor between a deviation and the scatter: biases wander from dwell to dwell, and their tails are longer than those of noise.
+/// Least limit on a deviation, in sigmas of the scatter: biases wander from dwell to dwell, and their tails are longer than those of noise.
 const SIGMAS: f64 = 6.0;
 
-/// Means of a dwell, and how long they are of, s.
+/// Means of a dwell, and its length.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reading {
     /// Raw channels.
@@ -46,13 +46,14 @@ pub(crate) fn find(readings: &[Reading]) -> Vec<bool> {
     let count = found.iter().filter(|slow| **slow).count();
     match count as f64 <= MOST * n as f64 {
         true => found,
-        // So many are no exceptions, but what the sensor does.
+        // So many cannot be exceptions: the sensor does this at rest.
         false => vec![false; n],
     }
 }
 
-/// Those that a channel shows. The quarter that fits least is taken out first, so that turns do not hide each other; what the rest then predicts
-/// comes back. A dwell that lies with its neighbours in time is a bias that drifts or warms up, and no turn.
+/// The slow turns that channel `c` shows. The quarter of the dwells that fits worst is removed first, so that turns do not hide each other.
+/// Dwells that the rest predicts are then restored. If a dwell agrees with its neighbours in time, its bias drifts or warms up, and it is
+/// not a turn.
 fn of_channel(readings: &[Reading], c: usize) -> Vec<usize> {
     let n = readings.len();
     let mut kept: Vec<usize> = (0..n).collect();
@@ -97,10 +98,10 @@ struct Fit {
     parameters: DVector<f64>,
     /// Inverse of the normal matrix.
     inverse: DMatrix<f64>,
-    /// Variance of a residual of a dwell of a second.
+    /// Variance of the residual of a dwell of one second.
     variance: f64,
     dof: f64,
-    /// What the forces are divided by.
+    /// Divisor of the forces.
     size: f64,
 }
 
@@ -140,7 +141,7 @@ impl Fit {
         })
     }
 
-    /// What a dwell reads beside the prediction, raw.
+    /// Reading of a dwell minus the prediction, raw.
     fn off(&self, reading: &Reading, c: usize) -> f64 {
         reading.mean[c] - row(reading, self.size).dot(&self.parameters)
     }
@@ -150,7 +151,7 @@ impl Fit {
         (self.variance / reading.duration_s).sqrt()
     }
 
-    /// Residual and leverage of a dwell, both for a second.
+    /// Residual of a dwell, scaled to one second, and its leverage.
     fn residual(&self, reading: &Reading, c: usize) -> (f64, f64) {
         let row = row(reading, self.size);
         let off = self.off(reading, c);
@@ -158,10 +159,10 @@ impl Fit {
         (off * reading.duration_s.sqrt(), leverage)
     }
 
-    /// Deletion residual of one that the fit is of, in standard deviations of the others.
+    /// Deletion residual of a dwell that was fitted, in standard deviations of the others.
     fn deleted(&self, reading: &Reading, c: usize) -> f64 {
         let (off, leverage) = self.residual(reading, c);
-        // What nothing else determines cannot be judged.
+        // If no other dwell predicts it, it cannot be judged.
         if leverage > 0.99 {
             return 0.0;
         }
@@ -170,13 +171,13 @@ impl Fit {
         (own / others.max(f64::MIN_POSITIVE)).sqrt()
     }
 
-    /// The same of one that it is not of.
+    /// The same for a dwell that was not fitted.
     fn predicted(&self, reading: &Reading, c: usize) -> f64 {
         let (off, leverage) = self.residual(reading, c);
         off.abs() / (self.variance * (1.0 + leverage)).sqrt()
     }
 
-    /// Deviation beyond which one of `n` dwells of three axes is no rest.
+    /// Deviation beyond which one of `n` dwells of three axes is not a rest.
     fn limit(&self, n: usize) -> f64 {
         let by_chance = FALSE_ALARM / (6.0 * n as f64);
         let t = StudentsT::new(0.0, 1.0, self.dof);
@@ -190,7 +191,7 @@ impl Fit {
 mod tests {
     use super::*;
 
-    /// Normal deviates by the sum of twelve, of a multiplicative generator.
+    /// Normal deviates: sums of twelve uniform ones from a linear congruential generator.
     fn normal(seed: u64) -> impl FnMut() -> f64 {
         let mut state = seed;
         move || {

@@ -8,29 +8,29 @@ use crate::signal::blocks::{Block, Condensed, Level, Stretch, pool, quantile};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, Reference};
 
-/// Length of the window whose variance decides on stillness, s. Long enough that a slow turn shows in the accelerometer: the
-/// force then runs straight by g ω, a variance of (g ω)²/12, which beside a noise of 7 mm/s² reaches [`STILL_FACTOR`] at
-/// 0.4 deg/s. Short enough for hands.
+/// Length of the window whose variance decides on stillness, s. It is long enough for a slow turn to show in the accelerometer: the force
+/// changes linearly by g ω, a variance of (g ω)²/12, which with a noise of 7 mm/s² reaches [`STILL_FACTOR`] at 0.4 deg/s. It is short
+/// enough for rests by hand.
 pub const WINDOW_S: f64 = 1.0;
 
 /// Left out at both ends of a dwell that was found, s: stillness begins and ends within a window.
 pub const GUARD_S: f64 = 0.2;
 
-/// Variance of a still window over the quietest, at most. Of six recordings by hand, all give the same number of dwells from
-/// 15 to 30 (38, and 22 five times); at 10 one has a fragment more, too short to be used; at 7 and 5 some are split.
-/// Below the plateau and not in it, as what is let in goes into the means.
+/// Largest variance of a still window, relative to the quietest ones. In six recordings by hand, all factors from 15 to 30 give the same
+/// number of dwells (38, and 22 five times). At 10 one recording has another fragment, too short to be used; at 7 and 5 some dwells are
+/// split. The factor is below that plateau, because motion that it admits would enter the means.
 pub const STILL_FACTOR: f64 = 10.0;
 
-/// What the gyro is allowed beyond that in recordings by hand with an accelerometer to watch as well. Hands tremble in angle:
-/// of 22 rests of each of five units, some had 50 to 230 times the quietest variance in the gyro while the accelerometer
-/// saw nothing, and without them the held-out error was threefold. The mean rate of a rest is what it turned by in all
-/// over its length, and the tremor leaves next to none.
+/// Additional factor for the gyro, in recordings by hand that have an accelerometer to show motion as well. Hands tremble in angle: of 22
+/// rests of each of five units, some had 50 to 230 times the quietest variance in the gyro while the accelerometer showed nothing. Without
+/// these rests the held-out error was three times as large. The mean rate of a rest is its total angle over its length, and tremor leaves
+/// almost no angle.
 const GYRO_TREMOR: f64 = 30.0;
 
 /// Where the dwells are taken from.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Steps {
-    /// The `step` column where there is one, and judged; found elsewhere.
+    /// The `step` column if there is one, with a test for stillness; otherwise found by stillness.
     #[default]
     AsRecorded,
     /// The `step` column, without a test for stillness.
@@ -109,7 +109,7 @@ pub(crate) fn find(
         // A noiseless simulation has no floor: then anything that varies at all is motion.
         floor[c] = quantile(&mut of_channel, 0.05).unwrap_or(0.0);
     }
-    // A hand that holds still trembles in angle and not in force.
+    // A hand at rest trembles in angle but hardly in force.
     let by_hand = manifest.reference == Reference::Gravity && condensed.has_raw[3];
     let gyro = if by_hand {
         GYRO_TREMOR * factor
@@ -141,7 +141,7 @@ pub(crate) fn find(
             still[i..i + width].fill(true);
         }
     }
-    // Two steps of a table may follow each other without a still window being disturbed.
+    // Two dwells of a table may follow each other without a disturbed window between them.
     let guard = (GUARD_S / block_s).round() as usize;
     let mut ranges = Vec::new();
     let mut start = None;
@@ -154,7 +154,7 @@ pub(crate) fn find(
         match (open, start) {
             (true, None) => start = Some(i),
             (false, Some(from)) => {
-                // At the ends of the recording nothing was set in motion.
+                // At the ends of the recording there is no motion to guard against.
                 let from = if from == 0 { 0 } else { from + guard };
                 let to = if i == blocks.len() {
                     i
@@ -181,15 +181,15 @@ pub(crate) fn find(
     Ok((ranges, detection))
 }
 
-/// Samples in so many bursts at least are a way of recording, and no loss of samples.
+/// This many bursts are a way of recording; fewer pauses are a loss of samples.
 const BURSTS: usize = 20;
-/// Longest burst and shortest pause between two, s, of most. Longer bursts show by themselves that they are still, and are dwells: taken
-/// together, 25 bursts of 5 s in a chamber that cools were four dwells whose noise was their drift.
+/// Largest median of the bursts, and smallest median of the pauses between them, s. Longer bursts show by themselves that they are still,
+/// and are separate dwells. Joined, 25 bursts of 5 s in a cooling chamber became four dwells whose noise was their drift.
 const BURST_S: f64 = 2.0;
 const PAUSE_S: f64 = 1.0;
 
-/// Whether samples were taken in short bursts, with pauses. A burst alone may be too short to show that it is still; with
-/// its neighbours it is as long as any.
+/// Whether samples were taken in short bursts, with pauses. A single burst may be too short to show that it is still; joined with its
+/// neighbours it is long enough.
 fn in_bursts(blocks: &[Block]) -> bool {
     let starts = (1..blocks.len()).filter(|i| blocks[*i].after_gap);
     let starts: Vec<usize> = [0].into_iter().chain(starts).collect();
@@ -246,22 +246,22 @@ fn windows(
         .collect()
 }
 
-/// Temperatures that differ by less than this, K, over all windows move no bias by more than hands do.
+/// If the temperature varies by less than this over all windows, K, it moves a bias by no more than hands do.
 const LEVELS_FROM_K: f64 = 5.0;
-/// Least width, K, and least number of windows (a minute of them) of the temperatures that have one level: a turn in between is the smaller
-/// part of them.
+/// Least width, K, and least number of windows (one minute) of a temperature bin with one level: a turn in a bin is then the smaller part
+/// of it.
 const LEVEL_K: f64 = 1.0;
 const LEVEL_WINDOWS: usize = 600;
-/// Deviations of the windows about their level that are still rest.
+/// Largest deviation of a window at rest from its level, in sigmas of all windows.
 const REACH_SIGMAS: f64 = 5.0;
 
-/// Mean readings of a channel that windows at rest have: about the median of those that vary little, by a margin and by five of their own
-/// deviations, which hold a drift of the bias.
+/// Range of a channel's mean reading in windows at rest: the median of the quiet windows, plus or minus a margin and five of their standard
+/// deviations, which include a drift of the bias.
 ///
 /// A turn about the vertical does not show in the accelerometer, and a slow one hardly in the variance of the gyro. A bias that follows the
-/// temperature looks like one; its level is that of the windows of the same temperature, which a turn does not share.
+/// temperature looks like such a turn, so each window is compared with others at the same temperature, from which only a turn differs.
 struct RateAtRest {
-    /// Temperature and median reading, by temperature; a single one without a temperature where that hardly changes.
+    /// Temperature and median reading, by temperature; a single pair if the temperature hardly changes.
     levels: Vec<(f64, f64)>,
     reach: f64,
 }
@@ -305,7 +305,7 @@ impl RateAtRest {
         rate
     }
 
-    /// On the straight line between the levels of the nearest temperatures, and on the line through the last two beyond them.
+    /// Interpolated linearly between the levels of the nearest temperatures; beyond them, extrapolated through the last two.
     fn level(&self, temp_c: f64) -> f64 {
         let [first, .., last] = self.levels.as_slice() else {
             return self.levels.first().map_or(0.0, |l| l.1);
@@ -325,7 +325,7 @@ impl RateAtRest {
     }
 }
 
-/// Largest less smallest value of each reference channel in the recording, by sensor.
+/// Largest minus smallest value of the reference channels in the recording; all axes of a sensor have that of the widest.
 pub(crate) fn reference_spans(condensed: &Condensed) -> [f64; 6] {
     let mut spans = [0.0; 6];
     for sensor in Sensor::BOTH {
@@ -347,14 +347,13 @@ pub(crate) fn reference_spans(condensed: &Condensed) -> [f64; 6] {
     spans
 }
 
-/// An input counts as constant while it moves by less than this share of its span: an encoder's noise,
-/// but no ramp of the table.
+/// An input counts as constant if it moves by less than this share of its span: this admits an encoder's noise, but no ramp of the table.
 const CONSTANT_SHARE: f64 = 2e-3;
 
-/// And always while it moves by less than this, deg/s or m/s²: where nothing moves, the span is that of the jitter.
+/// It always counts as constant if it moves by less than this, deg/s or m/s²: if nothing moves, the span is that of the jitter.
 const CONSTANT: [f64; 2] = [0.01, 1e-3];
 
-/// By how much reference channel `c` may move and stand, deg/s or m/s²; `spans` are those of [`reference_spans`].
+/// By how much reference channel `c` may move and still count as constant, deg/s or m/s²; `spans` are those of [`reference_spans`].
 pub(crate) fn tolerance(c: usize, spans: &[f64; 6]) -> f64 {
     (CONSTANT_SHARE * spans[c]).max(CONSTANT[c / 3])
 }

@@ -1,4 +1,4 @@
-//! Whether readings that claim to be in SI are: what they are at rest, and over known inputs, against what they measure.
+//! Whether readings that are declared as SI are in SI: compares them with what they measure, at rest and over known inputs.
 
 use mimu_recording::{Manifest, RawUnit, Reference};
 
@@ -12,8 +12,7 @@ const GAIN: f64 = 1.3;
 /// No gyro's bias is larger, rad/s: 40 deg/s, twice what the data sheet of an MPU-6050 allows.
 const LARGEST_BIAS: f64 = 0.7;
 
-/// What to say of readings that are `scale` times their input, and are to be in SI; `by_turns` where a gyro is judged by the angles that it is
-/// integrated to.
+/// The warning about readings that should be in SI and are `scale` times their input; `figure` is the figure of the fit that gave `scale`.
 pub(crate) fn wrong_gain(
     sensor: Sensor,
     scale: f64,
@@ -23,7 +22,7 @@ pub(crate) fn wrong_gain(
     said_of(sensor, false, scale, gravity_mps2, figure)
 }
 
-/// At rest the readings have their biases, so that the scale factors of a fit differ from it.
+/// As [`wrong_gain`], also for readings at rest: these include biases, so `scale` differs from the scale factors of a fit.
 fn said_of(
     sensor: Sensor,
     at_rest: bool,
@@ -52,7 +51,7 @@ fn said_of(
         Sensor::Gyro if figure == Figure::RateSize && rpm(270.0 / 200.0) => {
             "was the turntable at 45 rpm while the rate of 33 1/3 rpm is given?"
         }
-        // Over the turns the gyro is integrated: stamps that run twice as fast halve the scale factor.
+        // The gyro is integrated over the turns: time stamps that run twice as fast halve the scale factor.
         Sensor::Gyro if by_turns && (0.1..10.0).contains(&scale) => {
             "check the time stamps and the unit: if the stamps or the sample rate are wrong by this factor, so is every integrated angle"
         }
@@ -64,9 +63,9 @@ fn said_of(
     Some(Warning::NotSi(at_rest, scale, cause).of(sensor))
 }
 
-/// What to say of dwells at rest whose readings are to be in SI. Of inputs that are known a fit says it.
+/// Warnings about readings at rest that should be in SI. With known inputs the fit warns instead.
 pub(crate) fn at_rest(list: &[Dwell], manifest: &Manifest) -> Vec<Warning> {
-    // On a turntable most dwells of the gyro are no rests, and a fit judges its readings by the rates.
+    // On a turntable most dwells are not rests of the gyro, and a fit judges its readings by the rates.
     if manifest.reference != Reference::Gravity {
         return Vec::new();
     }
@@ -79,7 +78,7 @@ pub(crate) fn at_rest(list: &[Dwell], manifest: &Manifest) -> Vec<Warning> {
     of_sizes(Sensor::BOTH.map(usual), manifest)
 }
 
-/// What to say of readings of this size at rest, of gyro and accelerometer, that are to be in SI.
+/// Warnings about readings that should be in SI, from their magnitudes at rest (gyro, accelerometer).
 pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> Vec<Warning> {
     if manifest.raw_unit != RawUnit::Si {
         return Vec::new();
@@ -101,11 +100,11 @@ pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> 
         .collect()
 }
 
-/// Scatter of the calibrated rate at rest, rad/s, that no bias and no g-sensitivity reaches: 2 deg/s.
+/// A larger scatter of the calibrated rate at rest, rad/s, exceeds that of any bias and g-sensitivity: 2 deg/s.
 const RESTLESS: f64 = 0.035;
 
-/// What to say of dwells whose calibrated rates are `rms` about rest. A fit by turns knows the scale factor, of readings in counts as well: how
-/// large a bias is it cannot judge, as the null of a converter is anywhere, but from dwell to dwell a bias stays what it is.
+/// The warning about calibrated rates at rest that scatter by `rms`. A fit by turns knows the scale factor, also of readings in counts. It
+/// cannot judge the size of a bias, because a converter's null may be anywhere, but a bias is nearly the same in all dwells.
 pub(crate) fn restless(rms: f64) -> Option<Warning> {
     (rms > RESTLESS).then(|| Warning::Restless(rms).of(Sensor::Gyro))
 }

@@ -1,4 +1,4 @@
-//! One thing read while the one before is worked on.
+//! Reads the next item while the current one is processed.
 
 #[cfg(not(target_family = "wasm"))]
 use std::sync::mpsc::{channel, sync_channel};
@@ -9,8 +9,8 @@ use std::thread;
 use mimu_recording::error::Error;
 use mimu_recording::error::Result;
 
-/// Hands `read(0)`, `read(1)`, ... to `take`, `count` of them, each with a way to have the next read beside the work: it is called when there is
-/// memory for it, once for each. `place` names the file for the case that the reader panics.
+/// Passes `read(0)`, `read(1)`, ... to `take`, `count` of them. `take` calls the function that it also receives once per item, as soon as
+/// there is memory, to start the next read in parallel. `place` names the file in the error if the reader panics.
 #[cfg(not(target_family = "wasm"))]
 pub(super) fn ahead<T: Send>(
     place: &str,
@@ -23,13 +23,13 @@ pub(super) fn ahead<T: Send>(
     thread::scope(|scope| {
         let reader = scope.spawn(move || {
             for k in 0..count {
-                // Either is refused only when the receiver has given up.
+                // Either fails only if the receiver has given up.
                 if asked.recv().is_err() || sender.send(read(k)).is_err() {
                     break;
                 }
             }
         });
-        // Refused only when the reader has broken down, which its end tells.
+        // Fails only if the reader has panicked, which `join` reports.
         let next = || {
             let _ = ask.send(());
         };
@@ -49,7 +49,7 @@ pub(super) fn ahead<T: Send>(
     })
 }
 
-/// The same where there are no threads.
+/// The same without threads.
 #[cfg(target_family = "wasm")]
 pub(super) fn ahead<T>(
     _: &str,

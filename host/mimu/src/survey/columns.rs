@@ -6,7 +6,7 @@ use mimu_recording::{Column, Recording};
 /// Columns of a recording, each to be taken once.
 pub(super) struct Columns<'a> {
     recording: &'a Recording,
-    /// Of a CSV file, which cannot be read by columns.
+    /// The columns of a CSV file, which cannot be read one at a time.
     read: Vec<(Column, Vec<f64>)>,
 }
 

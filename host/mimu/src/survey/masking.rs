@@ -1,15 +1,15 @@
-//! Short disturbances of a channel at rest, which are masked: a door, a step on the floor, a few samples of a bus that failed.
+//! Masks short disturbances of a channel at rest: a door, a footstep, a few samples of a failed bus.
 
 use super::suitability::Suitability;
 
-/// Largest share of a channel that is masked. What is put in its place has the noise of the neighbours, so that N and B are off by about this
-/// share; more of it is a unit that was not at rest.
+/// Largest share of a channel that is masked. The replacement has the noise of the neighbours, so N and B are off by about this share. If
+/// more is disturbed, the unit was not at rest.
 const MOST: f64 = 0.01;
 
 /// What was masked of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Masked {
-    /// Samples that others were put in place of.
+    /// Number of samples that were replaced.
     pub samples: usize,
     /// Share of all samples of the channel.
     pub share: f64,
@@ -17,11 +17,11 @@ pub struct Masked {
     pub first_s: f64,
 }
 
-/// Puts into the disturbed windows of `raw` (samples `period_s` apart) what the quiet windows before them hold, moved onto the line between
-/// the levels on both sides: straight lines alone would take noise away.
+/// Replaces the disturbed windows of `raw` (samples `period_s` apart) by the quiet windows before them, shifted onto the line between the
+/// levels on both sides. Lines alone would remove noise.
 ///
-/// `None`, and nothing is changed, where nothing is disturbed, where it is too much, or where the level does not come back: a unit that was
-/// put down in another way.
+/// Returns `None` and changes nothing if nothing is disturbed, if too much is, or if the level does not return: the unit was then put down
+/// in another way.
 pub(super) fn mask(raw: &mut [f64], seen: &mut Suitability, period_s: f64) -> Option<Masked> {
     let window = seen.window;
     let runs = runs(&seen.moving);
@@ -32,7 +32,7 @@ pub(super) fn mask(raw: &mut [f64], seen: &mut Suitability, period_s: f64) -> Op
     }
     let quiet =
         |from: usize, to: usize| to <= seen.moving.len() && !seen.moving[from..to].contains(&true);
-    // As many quiet windows before each run as it has itself, and one behind it at least.
+    // Each run needs as many quiet windows before it as it has itself, and at least one after it.
     for run in &runs {
         let before = run.start.checked_sub(run.len())?;
         let returns = (seen.means.get(run.end)? - seen.means[run.start - 1]).abs();

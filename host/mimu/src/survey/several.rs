@@ -7,7 +7,7 @@ use mimu_recording::error::{Error, Result};
 
 /// The noise of each recording; see [`survey`].
 ///
-/// Errors: two recordings are of different units, or are the same one; of several, one has no temperature.
+/// Errors: two recordings are of different units or are the same one, or one of several has no temperature.
 pub fn survey_all(
     recordings: &[Recording],
     calibration: Option<&Calibration>,

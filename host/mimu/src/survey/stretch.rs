@@ -8,7 +8,7 @@ use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, Recording};
 
-/// Fewer have no five octaves up to a quarter of them, which a model needs beside their half.
+/// Least number of samples: a model needs five octaves of averaging time up to a quarter of the record, and half the record.
 pub(super) const FEWEST: usize = 64;
 
 /// Part of a recording.
@@ -27,11 +27,11 @@ pub enum Part {
     Step(i32),
 }
 
-/// A time step this many times the sample period is a gap.
+/// An interval between time stamps of this many sample periods is a gap.
 const GAP_PERIODS: f64 = 1.5;
-/// More gaps than this share of the rows are no gaps but another rate.
+/// If more than this share of the intervals are gaps, the sample rate is wrong.
 const GAP_SHARE: f64 = 0.02;
-/// Relative difference from the stated rate that is a slip, and one to be told of.
+/// Relative difference from the given rate that is refused, and that causes a warning.
 const RATE_OFF: [f64; 2] = [0.02, 1e-3];
 
 /// Rows without a gap.
@@ -41,7 +41,7 @@ pub(super) struct Stretch {
     pub rows: Range<usize>,
     /// Times of the first and last, s.
     pub span_s: [f64; 2],
-    /// Mean time step, s.
+    /// Mean interval between time stamps, s.
     pub period_s: f64,
 }
 
@@ -72,7 +72,7 @@ impl Stretch {
         )
     }
 
-    /// The longest stretch of `t` without a gap; `first` is the row that it begins with.
+    /// The longest segment of `t` without a gap; `first` is the row of the first time.
     fn without_gap(
         t: &[f64],
         first: usize,
@@ -222,7 +222,7 @@ fn span(t: &[f64], from_s: Option<f64>, to_s: Option<f64>, place: &str) -> Resul
     .about(Argument::Stretch))
 }
 
-/// Temperature over a stretch.
+/// Temperature over a segment.
 pub(super) struct Temperature {
     /// Mean of the cells that are not empty, °C.
     pub mean_c: f64,
@@ -230,7 +230,7 @@ pub(super) struct Temperature {
     means: Vec<f64>,
 }
 
-/// Means that a correlation with temperature is computed from: what is faster than a hundredth of the record is no chamber.
+/// Number of means for a correlation with temperature: a chamber is slower than a hundredth of the record.
 pub(super) const SEGMENTS: usize = 100;
 /// A smaller change is the temperature sensor's own noise, °C.
 const CHANGE_C: f64 = 0.2;
@@ -247,7 +247,7 @@ pub(super) fn temperature(temp_c: &[f64], rows: &Range<usize>) -> Option<Tempera
     })
 }
 
-/// Means of [`SEGMENTS`] equal parts; none of fewer samples.
+/// Means of [`SEGMENTS`] equal parts; empty if there are fewer samples.
 pub(super) fn segments(values: &[f64]) -> Vec<f64> {
     let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
     let length = values.len() / SEGMENTS;

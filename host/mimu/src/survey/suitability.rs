@@ -1,4 +1,4 @@
-//! Whether a channel is at rest and alive: only then is its Allan curve that of its noise.
+//! Whether a channel is at rest and alive: only then does its Allan curve show its noise.
 
 use super::stretch::{FEWEST, Part, Stretch, longest, segments};
 use crate::quantity::{duration, unsigned_zero};
@@ -8,7 +8,7 @@ use crate::warning::Warning;
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};
 
-/// What a channel looked like before it was integrated.
+/// Properties of a channel before it is integrated.
 #[derive(Debug, Clone)]
 pub(super) struct Suitability {
     /// Samples in a window.
@@ -19,7 +19,7 @@ pub(super) struct Suitability {
     pub means: Vec<f64>,
     /// Largest step between the means of two quiet windows, raw.
     pub reach: f64,
-    /// Means of equal parts of the stretch, raw.
+    /// Means of equal parts of the segment, raw.
     pub levels: Vec<f64>,
 }
 
@@ -30,8 +30,8 @@ impl Suitability {
         known.clone().sum::<f64>() / known.count() as f64
     }
 
-    /// Of a channel that begins `samples` later than the stretch: nothing is known before, and its means are of other times
-    /// than the temperature's.
+    /// For a channel that begins `samples` later than the segment: nothing is known before that, and its means no longer match those of the
+    /// temperature in time.
     pub fn begin_later(&mut self, samples: usize) {
         let windows = samples / self.window;
         self.moving.splice(0..0, vec![false; windows]);
@@ -40,17 +40,17 @@ impl Suitability {
     }
 }
 
-/// Samples that a variance needs to be told from the quietest.
+/// Least number of samples for a variance to be distinguished from the quietest.
 const FEWEST_IN_WINDOW: usize = 16;
 /// A jump between the means of two windows that is not noise: ten of their sigmas.
 const STEP_SIGMAS: f64 = 10.0;
 /// Natural logarithm of the odds against a run of equal samples by chance in the whole recording.
 const RUN_LOG_ODDS: f64 = 14.0;
-/// Shorter runs of equal samples are left to the noise of a coarse converter, s.
+/// Shorter runs of equal samples, s, are attributed to a converter coarser than the noise.
 const RUN_S: f64 = 0.5;
 
-/// Why a channel has no noise at all: it is the same throughout. One that sticks for a time is refused, as its samples before and after are
-/// two records.
+/// Why a channel has no noise at all: it is constant throughout. [`suitability`] refuses a channel that sticks for a time, because its
+/// samples before and after are two records.
 pub(super) fn dead(raw: &[f64]) -> Option<String> {
     let first = raw.first()?;
     let constant = raw.iter().all(|u| u == first);
@@ -109,7 +109,7 @@ pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Sui
         )
         .about(Argument::Stretch));
     }
-    // A converter coarser than the noise leaves some windows without any: half its step is the least that can be told.
+    // A converter coarser than the noise leaves some windows without variance: half a quantisation step is the least resolvable deviation.
     let least = if step.is_finite() {
         0.25 * step * step
     } else {
@@ -118,7 +118,7 @@ pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Sui
     let floor = quantile(&mut variances.clone(), 0.05)
         .unwrap_or(0.0)
         .max(least);
-    // A slow turn shows in no variance, but where it begins and ends the mean steps; a drift does not step.
+    // A slow turn does not show in the variance, but the mean jumps where it begins and ends; a drift does not jump.
     let mut steps: Vec<f64> = means.windows(2).map(|m| (m[1] - m[0]).abs()).collect();
     let sigma = 1.4826 * quantile(&mut steps.clone(), 0.5).unwrap_or(0.0);
     let reach = STEP_SIGMAS * sigma.max((floor / window as f64).sqrt());
@@ -141,8 +141,8 @@ fn seconds_in(s: f64) -> String {
     format!("{s:.2} s after the start of the segment")
 }
 
-/// Refuses a stretch in which the unit moves, and says where it does not. In a stretch that was chosen by hand it is a
-/// warning: a person may know better what a disturbance is.
+/// Refuses a segment in which the unit moves; the error names the longest rest. For a segment that a person chose this is only a warning:
+/// they may know better what a disturbance is.
 pub(super) fn refuse_motion(
     channels: &[(usize, Suitability)],
     stretch: &Stretch,
@@ -172,7 +172,7 @@ pub(super) fn refuse_motion(
     let rest = longest(windows, |k| !moves(k));
     let remedy = match rest.len() {
         0 => "record at rest".to_string(),
-        // The windows at both ends may hold some of the motion.
+        // The windows at both ends may contain some of the motion.
         _ => format!(
             "the longest rest is from {:.1} to {:.1} s",
             time(rest.start),

@@ -12,7 +12,7 @@ pub struct Unit {
     pub name: &'static str,
     /// Factor from a raw reading to it.
     pub per_raw: f64,
-    /// Unit of the raw readings, where a scale factor made [`Self::name`] of it.
+    /// Unit of the raw readings, if a scale factor converted them to [`Self::name`].
     pub scaled_from: Option<&'static str>,
 }
 
@@ -26,7 +26,7 @@ impl Unit {
         }
     }
 
-    /// SI unit of `sensor`, for readings in `raw` that a calibration with `scale_factor`, raw per SI unit, is given for.
+    /// SI unit of `sensor`, for readings in `raw` and a calibration with `scale_factor`, raw per SI unit.
     pub fn scaled(sensor: Sensor, raw: RawUnit, scale_factor: f64) -> Self {
         Self {
             name: sensor.unit(),

@@ -1,4 +1,4 @@
-//! The samples of a channel as they are computed with: a stretch without a gap, checked, short disturbances masked.
+//! The samples of a channel for the computation: a segment without a gap, checked, with short disturbances masked.
 
 use super::masking::{Masked, mask};
 use super::stretch::{FEWEST, Part, Stretch, longest};
@@ -26,8 +26,8 @@ pub(super) struct Values {
 }
 
 impl Values {
-    /// The samples of `stretch` in `unit`, checked; of a channel with empty cells the longest stretch without. A `part` that was chosen by hand is
-    /// taken as it is; otherwise short disturbances are masked.
+    /// The samples of `stretch` in `unit`, checked; if the channel has empty cells, its longest segment without any. A `part` that a person
+    /// chose is used as it is; otherwise short disturbances are masked.
     pub fn of(
         mut values: Vec<f64>,
         stretch: &Stretch,

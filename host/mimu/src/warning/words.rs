@@ -1,4 +1,4 @@
-//! Warnings in words: nothing but a reader is to know these sentences.
+//! Warnings in words. These sentences are for people; no code may depend on them.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ use super::Warning;
 use crate::fault::{Fault, SHORTEST_S};
 use crate::quantity::{Sensor, duration, normal_gravity, plural, significant};
 
-/// What would be open of `parameter` without a dwell or a turn.
+/// How uncertain `parameter` would be without a dwell or a turn.
 fn open(parameter: &str, grows: f64) -> String {
     match grows < 1e3 {
         true => format!(

@@ -1,7 +1,7 @@
 //! Procedures over temperature, planned: what the chamber and the table do, and how well every curve is known afterwards.
 //!
-//! The sigmas are those of the regression that the estimate solves ([`crate::regression`]), with one cubic or one line for each parameter in place of
-//! smooth splines, and with the temperature of the die taken for that of the chamber: how well a lag is determined is not predicted.
+//! The sigmas are those of the regression of the estimate ([`crate::regression`]), with one cubic or one line for each parameter instead of
+//! smooth splines. The die is assumed to have the temperature of the chamber, so the precision of a lag is not predicted.
 
 mod prediction;
 mod procedure;
@@ -63,7 +63,7 @@ pub struct Planned {
     pub dwells: usize,
     /// Predicted standard deviations.
     pub sensors: Vec<SensorPrediction>,
-    /// What it cannot tell apart.
+    /// What it cannot distinguish.
     pub inseparable: Vec<&'static str>,
     /// Noise of gyro and accelerometer that the prediction is for, SI.
     pub noise: [DwellNoise; 2],
@@ -143,7 +143,7 @@ const INSEPARABLE_AT_REST: [&str; 3] = [
     "warm-up since power-on, lag of the dies and slope over temperature: one ramp at one rate changes all three together; return at another rate, or soak and measure again",
 ];
 
-/// Refuses a span over which no such curve is determined; else its name.
+/// Refuses a span that does not determine such a curve; otherwise returns the name of the curve.
 fn check_span(kelvin: f64, shape: Shape) -> Result<&'static str> {
     let refuse = |least: f64, what: &str, remedy: &str| {
         let problem = format!("{} K: {what} needs {least} K", significant(kelvin));

@@ -9,12 +9,12 @@ use super::procedure::{Procedure, Schedule, Step};
 use crate::basis::Basis;
 use crate::regression::{AxisNoise, CurveKind, Normal, Part, Problem, ProblemRow};
 
-/// Longest row, s. Shorter ones say no more of noise that wanders over many minutes.
+/// Longest row, s. If the noise wanders over many minutes, shorter rows add no information.
 const ROW_S: f64 = 10.0;
-/// Standard gravity, m/s²: which gravity it is makes no difference to a prediction.
+/// Standard gravity, m/s²: a prediction does not depend on the local value.
 const GRAVITY: f64 = mimu::readable::STANDARD_GRAVITY;
 
-/// What is known of the curves of one triad.
+/// Predicted uncertainty of the curves of one triad.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensorPrediction {
     /// The triad.
@@ -25,7 +25,7 @@ pub struct SensorPrediction {
     pub at: [At; 3],
 }
 
-/// Standard deviations at one temperature, of the worst axis; `None` of what is not determined.
+/// Standard deviations at one temperature, of the worst axis; `None` if not determined.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct At {
     /// °C.
@@ -114,7 +114,7 @@ fn rows(request: &Request, schedule: &Schedule, sensor: Sensor) -> (Vec<ProblemR
     (rows, dies)
 }
 
-/// Mean input in a step, SI, without the rate of the Earth; `None` where the sensor is not evaluated. And whether it moves.
+/// Mean input in a step, SI, without the rate of the Earth; `None` if the sensor is not evaluated; and whether the input moves.
 fn input(step: &Step, sensor: Sensor) -> (Option<Vector3<f64>>, bool) {
     match (step, sensor) {
         (Step::Dwell { up, rate_dps, .. }, Sensor::Gyro) => {
@@ -127,12 +127,12 @@ fn input(step: &Step, sensor: Sensor) -> (Option<Vector3<f64>>, bool) {
             },
             Sensor::Gyro,
         ) => (Some(about * rate_dps.to_radians()), true),
-        // What turns against gravity within a row tells more of the table's timing than of the sensor.
+        // A turn against gravity within a row shows the timing of the table rather than the sensor.
         (Step::Turn { .. }, Sensor::Accel) => (None, true),
     }
 }
 
-/// Inverse of an information matrix whose columns have very different sizes; `None` of a singular one.
+/// Inverse of an information matrix whose columns have very different sizes; `None` if it is singular.
 fn inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let size = gram.diagonal().map(f64::sqrt);
     if size.iter().any(|s| !(*s > 0.0)) {
@@ -143,7 +143,7 @@ fn inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         gram[(i, j)] * scale[i] * scale[j]
     });
     let inverse = alike.cholesky()?.inverse();
-    // Rounding lets a singular matrix pass with variances as large as its condition.
+    // Rounding may let a singular matrix pass, with variances as large as its condition.
     let determined = inverse.diagonal().iter().all(|v| *v < 1e10);
     determined.then(|| {
         DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| {

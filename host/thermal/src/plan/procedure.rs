@@ -71,7 +71,7 @@ pub struct Schedule {
     pub chamber_c: Vec<[f64; 2]>,
     /// Time before the first round, s.
     pub lead_in_s: f64,
-    /// So often all steps are done.
+    /// Number of times that all steps are done.
     pub rounds: usize,
     /// From the beginning of a round to that of the next, s.
     pub round_s: f64,
@@ -90,7 +90,7 @@ const NIU_RAMPS_S: f64 = 0.05;
 const NIU_DPS: f64 = 10.0;
 
 impl Schedule {
-    /// Of a procedure.
+    /// The schedule of a procedure.
     ///
     /// # Errors
     /// Too few set points for the curves; soaks that are too short for their dwells.
@@ -167,7 +167,7 @@ fn soak(request: &Request) -> Result<Schedule> {
     })
 }
 
-/// Up, held, and down again, with as many rounds as go into it.
+/// Up, held, and down again, with as many rounds as fit.
 fn sweep(request: &Request, round: Round) -> Schedule {
     let [from, to] = request.range_c;
     let ramp_s = (to - from) / request.kelvin_per_min * 60.0;
@@ -226,7 +226,7 @@ fn rest_ramp(request: &Request) -> Schedule {
 fn faces_and_rates(request: &Request) -> Round {
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     let at_rest = axes.iter().flat_map(|up| [(*up, 0.0), (-up, 0.0)]);
-    // Turned about the vertical at one rate with the axis up and with it down: both ways in the body, and forces that stay balanced.
+    // Turned about the vertical at one rate with the axis up and with it down: this gives both directions in the body, and balanced forces.
     let rates = axes
         .iter()
         .flat_map(|up| [(*up, request.largest_dps), (-up, request.largest_dps)]);
@@ -255,14 +255,14 @@ fn faces_and_rates(request: &Request) -> Round {
     Round {
         steps: steps.collect(),
         times_s,
-        // To a whole second, with a second in hand for a table that is slower.
+        // To a whole second, plus a second for a slower table.
         length_s: t.ceil() + 1.0,
         waits: true,
     }
 }
 
-/// Eight positions and eight quarter turns. The order is not in niu's text; this one turns both ways about each axis and
-/// reaches the poses of its appendix, upside down: with z up in place of down it stays within 90 degrees of tilt, which every table has.
+/// Eight positions and eight quarter turns. niu's text does not give the order. This one turns both ways about each axis and reaches the
+/// poses of its appendix, upside down: with z up instead of down the tilt stays within 90 degrees, which every table allows.
 fn niu(request: &Request) -> Round {
     let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
     let rate_dps = NIU_DPS.min(request.largest_dps);

@@ -156,8 +156,8 @@ fn a_cold_start_goes_one_way() {
     );
 }
 
-/// A unit in a freezer for half an hour, whose gyro x jumps by 100 and back by 60 times the noise of a row of 2.5 s, as those of one of the recordings
-/// that were judged from outside. `nudge`: what the accelerometer changes by with each, as a share of gravity.
+/// A unit in a freezer for half an hour, whose gyro x jumps by 100 and back by 60 times the noise of a row of 2.5 s, as in a real
+/// recording. `nudge`: change of the accelerometer at each jump, as a share of gravity.
 fn in_freezer(seed: u64, nudge: f64) -> (Manifest, Samples) {
     let freezer = Experiment {
         corners: vec![
@@ -174,7 +174,7 @@ fn in_freezer(seed: u64, nudge: f64) -> (Manifest, Samples) {
         let [first, second] = [430.0, 523.0].map(|at| f64::from(u8::from(samples.t_s[k] >= at)));
         samples.raw[0][k] += JUMPS[0] * first + JUMPS[1] * second;
         samples.raw[4][k] += GAIN[1] * GRAVITY * nudge * (first - 0.2 * second);
-        // With nudges there are dwells, as stillness would find them: each nudge begins a new one.
+        // A nudge separates dwells, as the search for stillness would.
         if nudge > 0.0 {
             samples.step[k] = (first + second) as i32;
         }

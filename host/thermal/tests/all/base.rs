@@ -1,4 +1,4 @@
-//! Biases over temperature from a recording at rest, added to a calibration at one temperature.
+//! Biases over temperature from rest, added to a calibration at one temperature.
 
 use mimu::calibration::Calibration;
 use mimu::prepared::Prepared;

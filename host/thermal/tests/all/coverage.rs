@@ -1,4 +1,4 @@
-//! Recordings at rest of a unit with large drifts: which parts are used, and the report about the rest.
+//! Recordings at rest of a unit whose biases drift far: which part of them is used, and what the report says about the rest.
 
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
@@ -16,7 +16,7 @@ const GRAVITY: f64 = 9.80665;
 /// Standard deviation of a sample: 0.046 deg/s, 2 mg.
 const NOISE: [f64; 2] = [8e-4, 0.02];
 
-/// A unit on a desk: the times of its samples, its thermometer, and changes of its readings besides the temperature.
+/// A unit on a desk: the times of its samples, its thermometer, and what moves its readings apart from the temperature.
 struct Desk {
     duration_s: f64,
     temp_c: fn(f64) -> f64,
@@ -92,7 +92,7 @@ impl Desk {
     }
 }
 
-/// The curves of the gyro contain the biases of the simulation, to 0.01 deg/s, over the whole range.
+/// The curves of the gyro agree with the biases of the simulation to a hundredth of a degree per second, over the whole range.
 fn assert_biases(result: &ThermalResult) {
     for (axis, name) in ["gyro_bias_x", "gyro_bias_y", "gyro_bias_z"]
         .iter()
@@ -121,7 +121,7 @@ fn a_bias_that_drifts_with_the_temperature_is_no_even_turn() {
 
 #[test]
 fn bursts_of_less_than_a_second_are_used_like_longer_ones() {
-    // The coldest third in bursts of 0.8 s, the rest in such of 1.6 s, one every six seconds.
+    // The coldest third in bursts of 0.8 s, the rest in bursts of 1.6 s, one every six seconds.
     let desk = Desk {
         temp_c: there_and_back,
         recorded: |t| t % 6.0 < if there_and_back(t) < 12.0 { 0.8 } else { 1.6 },
@@ -160,8 +160,8 @@ fn a_turn_that_the_accelerometer_sees_is_still_left_out_while_the_temperature_ra
     assert!((0.5..0.76).contains(&used.samples), "{used:?}");
     let covers = |w: &Warning| matches!(w, Warning::Coverage(..));
     assert!(result.warnings.iter().any(covers));
-    // Sixty rests in two poses that gravity adds biases to: the curves are known to what their intervals say, and a turn of 2.4 deg/s in one
-    // row of a rest would be far beyond.
+    // Sixty rests in two poses, in which gravity contributes to the biases: the curves agree within their intervals. A turn of 2.4 deg/s in
+    // one row of a rest would be far outside.
     let curve = result.curve("gyro_bias_x").unwrap();
     for (k, t) in curve.temp_c.iter().enumerate() {
         let off = curve.value[k] - bias(*t)[0].to_radians();
@@ -174,7 +174,7 @@ fn a_turn_that_the_accelerometer_sees_is_still_left_out_while_the_temperature_ra
 
 #[test]
 fn a_recording_that_is_mostly_shaken_is_refused_unless_it_is_declared_to_be_at_rest() {
-    // Four fifths of each ten seconds something runs beside it.
+    // For four fifths of each ten seconds a machine next to it runs.
     let desk = Desk {
         temp_c: there_and_back,
         added: |t| {
@@ -268,7 +268,7 @@ fn a_hysteresis_that_crosses_itself_is_seen_in_its_largest_and_its_rms() {
 fn a_hysteresis_is_no_temperature_where_the_bias_has_no_slope() {
     let desk = Desk {
         temp_c: there_and_back,
-        // What the temperature does to gyro z, taken off again.
+        // Removes the effect of temperature on gyro z.
         added: |t| {
             let off = bias(there_and_back(t))[2];
             [0.0, 0.0, -off, 0.0, 0.0, 0.0]

@@ -1,4 +1,4 @@
-//! The estimates agree with the truth to within their intervals.
+//! Estimates agree with the truth within their uncertainty.
 
 use mimu::quantity::Sensor;
 use mimu_allan::variance::AllanModel;
@@ -25,7 +25,7 @@ fn errors(joint: &Joint, sensor: usize, temp_c: f64) -> [(f64, f64); 12] {
     })
 }
 
-/// Gyro and accelerometer are different packages in different places; only the data can show that one lag suits both.
+/// Gyro and accelerometer are different packages in different places: the data decide whether one lag serves both.
 #[test]
 fn dies_that_lag_by_different_times_each_have_their_own_lag_and_dies_alike_have_one() {
     for (lags_s, seed) in [([60.0, 25.0], 4), ([20.0, 50.0], 5), ([40.0, 40.0], 6)] {
@@ -147,7 +147,7 @@ fn biases_that_wander_widen_the_intervals_of_the_biases() {
     }
 }
 
-/// Noise slower than the recording shifts all of it; only a longer recording at rest shows by how much.
+/// Wander slower than the recording shifts all of it, and only a longer record at rest shows how much.
 #[test]
 fn the_noise_at_rest_widens_the_intervals_of_the_biases_by_what_it_says_and_nothing_else() {
     let recorded = session(Experiment::ramp(60.0, true).record(9)).unwrap();
@@ -172,7 +172,7 @@ fn the_noise_at_rest_widens_the_intervals_of_the_biases_by_what_it_says_and_noth
             assert!((bounds[0]..bounds[1]).contains(&sigma), "{sensor}: {sigma}");
             assert!(sigma > 3.0 * narrow[axis].1);
         }
-        // Rates and turned poses are measured within minutes, so they are not affected.
+        // Rates and turned poses determine these within minutes.
         for k in [0, 4, 8] {
             let ratio = wide[k].1 / narrow[k].1;
             assert!((0.8..2.0).contains(&ratio), "{sensor} {k}: {ratio}");

@@ -27,7 +27,7 @@ fn fitted(experiment: &Experiment, seed: u64, options: Options) -> ThermalFit {
     .unwrap()
 }
 
-/// Input that `calibration` gives for what the unit reads at `temp_c` of the die, minus the true one.
+/// Error of the input that `calibration` gives for the unit's reading at `temp_c` of the die.
 fn error_at(calibration: &Calibration, sensor: Sensor, temp_c: f64, input: &Vector3<f64>) -> f64 {
     let (matrix, bias) = truth(sensor as usize, temp_c);
     let inverse = calibration.inverse_at(sensor, temp_c).unwrap();
@@ -112,7 +112,7 @@ fn half_a_cycle_is_one_way_and_has_no_lag() {
     assert!(gyro.lag_s.is_none() && gyro.lag_reason.unwrap().contains("one way"));
     let file = half.calibration("2026-01-01T00:00:00Z").unwrap();
     assert!(file.temperature.unwrap().lags_s().is_none());
-    // Without a lag the curves are those that suit the ramp by its thermometer; how far dies may be off it is in their intervals.
+    // Without a lag the curves describe the ramp by its thermometer; the intervals include how far the dies may differ from it.
     let mut normal = 0.0;
     for sensor in [0, 1] {
         let curves = half.joint.curves[Sensor::BOTH[sensor]].as_ref().unwrap();
@@ -130,7 +130,7 @@ fn half_a_cycle_is_one_way_and_has_no_lag() {
         let [own, floor] = rms(&judged.errors);
         assert!(own < 1.5 * floor, "{sensor}: {own} {floor}");
     }
-    // A lag that is known by other means is applied, and stands in the file.
+    // A lag that is known by other means is applied and written to the file.
     let known = Options {
         lag_s: Some(60.0),
         ..JOINT

@@ -1,4 +1,4 @@
-//! Predictions for a planned procedure, against calculations by hand.
+//! Predictions for planned procedures against results derived by hand.
 
 use mimu::plan::design::budget::DwellNoise;
 use mimu::readable::STANDARD_GRAVITY as G;
@@ -32,8 +32,8 @@ fn near(found: f64, known: f64, within: f64) {
 fn a_soak_at_four_set_points_knows_at_each_what_its_own_dwells_give_and_between_them_what_lagrange_makes_of_it()
  {
     let found = plan(&request(Procedure::Soak)).unwrap();
-    // Twelve dwells of 20 s, each axis as often up as down and turned both ways: what is estimated is uncorrelated. Force along an axis
-    // is in four dwells, two of them at rest; rate about it in two.
+    // Twelve dwells of 20 s, each axis as often up as down and turned both ways: the estimates are uncorrelated. Four dwells have force
+    // along an axis, two of them at rest; two have a rate about it.
     let bias = WHITE.map(|n| n / (12.0 * 20f64).sqrt());
     let scale = [
         WHITE[0] / (50f64.to_radians() * 40f64.sqrt()),
@@ -48,7 +48,7 @@ fn a_soak_at_four_set_points_knows_at_each_what_its_own_dwells_give_and_between_
             near(at.cross.unwrap(), scale[k] * factor, 1e-6);
         }
     }
-    // An hour at each set point and ten minutes from one to the next; the last dwell ends with the last soak but for a second or two.
+    // An hour at each set point and ten minutes from one to the next; the last dwell ends a second or two before the last soak.
     assert!((found.duration_s - (4.0 * 3600.0 + 3.0 * 600.0)).abs() < 2.5);
 }
 
@@ -83,12 +83,12 @@ fn a_bias_that_wanders_is_known_no_better_than_it_wanders() {
         plan(&asked).unwrap().sensors[0].at[1]
     };
     let [steady, wanders] = [0.0, 1e-3].map(wandering);
-    // Flicker noise over three decades has the variance B² ln 1000 / π, 2.2 B². Five hours average out what is faster than an hour, and four
-    // coefficients are known no better than what is slower: a third of it at least, and less than all.
+    // Flicker noise over three decades has the variance B² ln 1000 / π, 2.2 B². Five hours average out what is faster than an hour. The
+    // slower wander limits the four coefficients: at least a third of the variance, and less than all.
     let share = (wanders.bias.unwrap() / 1e-3).powi(2) / (1000f64.ln() / std::f64::consts::PI);
     assert!((0.33..1.0).contains(&share), "{share}");
     assert!(wanders.bias > steady.bias.map(|s| 10.0 * s));
-    // Turns both ways within minutes see little of it.
+    // Turns both ways within minutes contain little of it.
     assert!(wanders.scale.unwrap() < 0.2 * wanders.bias.unwrap() / 50f64.to_radians());
 }
 

@@ -1,4 +1,4 @@
-//! Recordings with missing or misleading temperatures: each is refused with the problem and the remedy.
+//! Recordings without usable temperatures: each is refused with the problem and the remedy.
 
 use mimu::{Manifest, Samples};
 use mimu_thermal::joint::{Choice, estimate};
@@ -7,7 +7,7 @@ use mimu_thermal::warning::Warning;
 use crate::session;
 use crate::simulation::Experiment;
 
-/// The refusal of the recording after `change`.
+/// The error with which the recording is refused after `change`.
 fn refusal(change: impl FnOnce(&mut Manifest, &mut Samples)) -> String {
     let (mut manifest, mut samples) = Experiment::ramp(60.0, false).record(1);
     change(&mut manifest, &mut samples);
@@ -63,7 +63,7 @@ fn a_span_that_shows_no_slope_is_refused_with_what_is_needed() {
 
 #[test]
 fn a_column_that_spans_more_than_the_dwells_is_refused_with_both_spans_and_what_is_left_out() {
-    // Dwells in the first three minutes of a ramp of 80 K; behind them every row is in transit.
+    // Dwells in the first three minutes of a ramp of 80 K; after them every row is in transit.
     let said = refusal(|_, samples| samples.step[1800..].fill(-1));
     assert!(said.contains("the column spans 80"), "{said}");
     assert!(said.contains("the dwells that are used span 5."), "{said}");

@@ -1,4 +1,4 @@
-//! A soak: the temperature settles, is measured, and continues at once.
+//! A soak: the temperature is constant, is measured, and changes again at once.
 
 use mimu::quantity::Sensor;
 use mimu_thermal::classic::Classic;

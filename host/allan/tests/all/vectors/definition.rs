@@ -14,7 +14,7 @@ fn mean(rates: &[f64], from: usize, m: usize) -> f64 {
     rates[from..from + m].iter().sum::<f64>() / m as f64
 }
 
-/// Mean square of a list, over a divisor, to the root.
+/// Root of the mean square of a list over a divisor, and its length.
 fn root(terms: Vec<f64>, divisor: f64) -> (f64, usize) {
     let n = terms.len();
     let mean = terms.iter().map(|t| t * t).sum::<f64>() / n as f64;
@@ -119,7 +119,7 @@ fn a_series_that_does_not_vary_has_no_deviation_and_bounds_that_are_numbers() {
     }
 }
 
-/// Against the same differences, all of them: the error must be small next to that of the estimate.
+/// Compares with all differences: the error must be small compared with that of the estimate.
 #[test]
 fn differences_that_are_left_out_of_a_long_series_are_not_missed() {
     let mut random = Random(5);

@@ -57,7 +57,7 @@ fn edf(kind: Deviation, m: usize, stride: usize, terms: usize, alpha: i32) -> f6
     .edf(alpha)
 }
 
-/// Fewer terms than the combined algorithm of Greenhall and Riley sums one by one.
+/// So few terms that the combined algorithm of Greenhall and Riley sums them one by one.
 #[test]
 fn degrees_of_freedom_for_white_noise_are_those_of_its_covariances() {
     for kind in KINDS {
@@ -85,7 +85,7 @@ fn degrees_of_freedom_for_white_noise_are_those_of_its_covariances() {
     }
 }
 
-/// Where the combined algorithm of Greenhall and Riley has fits instead of sums.
+/// So many terms that the combined algorithm of Greenhall and Riley uses fits instead of sums.
 #[test]
 fn degrees_of_freedom_of_long_series_are_within_two_percent_of_those_of_their_covariances() {
     for kind in KINDS {
@@ -118,13 +118,13 @@ fn degrees_of_freedom_with_differences_left_out_are_those_of_their_covariances()
     }
 }
 
-/// What 64 starts in a cluster lose against 1024.
+/// Loss of 64 starts in a cluster against 1024.
 #[test]
 fn differences_left_out_cost_under_a_twentieth_of_a_percent_for_white_rates_and_redder() {
     let m = 1 << 16;
     for kind in KINDS {
         let reddest = if kind == Deviation::Hadamard { -4 } else { -2 };
-        // The mean over a cluster forgets phase noises, too, only with the cluster.
+        // After the mean over a cluster, phase noises are correlated over the cluster too.
         let bluest = if kind == Deviation::Modified { 2 } else { 0 };
         for clusters in [4, 10, 1000] {
             for alpha in reddest..=bluest {
@@ -155,7 +155,7 @@ fn white_rates_on_a_drift_are_white_to_the_hadamard_variance() {
     assert!(white[0] > 160 && white[1] > 100, "{white:?} of 200");
 }
 
-/// GR's sum loses all digits for clusters of more than 1e6, where ours is in samples.
+/// GR's sum loses all digits for clusters of more than 1e6, where ours computes in samples.
 #[test]
 fn flicker_phase_noise_in_long_clusters_keeps_its_digits() {
     for kind in [Deviation::Allan, Deviation::Hadamard] {
@@ -227,9 +227,8 @@ fn intervals_hold_the_true_deviation_as_often_as_they_say() {
     }
 }
 
-/// Flicker of the bench, whose floor is flat from 10 samples on; from 256 means down to 4. Of the density
-/// `B²/(2π f)` the variance is `B²/π` times 2 ln 2 (Allan), `ln(256/27)/2` (Hadamard) and `(27 ln 3 - 32 ln 2)/8`
-/// (modified).
+/// Flicker of the bench, whose floor is flat from 10 samples on; from 256 means down to 4. For the density `B²/(2π f)` the variance is
+/// `B²/π` times 2 ln 2 (Allan), `ln(256/27)/2` (Hadamard) and `(27 ln 3 - 32 ln 2)/8` (modified).
 #[test]
 fn intervals_hold_the_true_deviation_of_flicker_noise_as_often_as_they_say() {
     const RUNS: u32 = 2000;
@@ -260,7 +259,7 @@ fn intervals_hold_the_true_deviation_of_flicker_noise_as_often_as_they_say() {
     for (kind, held) in KINDS.into_iter().zip(held) {
         for (held, m) in held.into_iter().zip(CLUSTERS) {
             let share = f64::from(held) / f64::from(RUNS);
-            // Of four means the power law can hardly be told: 92.4 % (Allan), 97.2 % (modified), 93.7 % (Hadamard).
+            // Four means hardly show the power law: 92.4 % (Allan), 97.2 % (modified), 93.7 % (Hadamard).
             let expected = if m < 1024 { 0.93..0.97 } else { 0.92..0.98 };
             assert!(expected.contains(&share), "{kind:?} m {m}: {share}");
         }
@@ -275,7 +274,7 @@ fn expected(kind: Deviation, m: usize, walk: bool) -> f64 {
             response[i - 1] += response[i];
         }
     }
-    // The first weight is that of what all samples share, which the difference does not see.
+    // The first weight belongs to what all samples share, which cancels in the difference.
     let sum: f64 = response[1..].iter().map(|w| w * w).sum();
     let m = m as f64;
     match kind {

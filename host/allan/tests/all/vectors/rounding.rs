@@ -1,5 +1,5 @@
-//! The effect of rounding in long series. Rates are integer multiples of 2^-30, so integer arithmetic gives the integral, its differences and their
-//! sums exactly.
+//! Rounding errors in long series. Rates are whole multiples of 2^-30, so integers give the integral, its differences and their sums
+//! without rounding.
 
 use mimu_allan::curve::curve;
 use mimu_allan::deviation::{ALL_TERMS, Integrated};
@@ -18,7 +18,7 @@ fn rates(steps: &[i64]) -> Vec<f64> {
     steps.iter().map(|&s| s as f64 * UNIT).collect()
 }
 
-/// Sum of all before each, and of all.
+/// Sum of the parts before each, and of all.
 fn running(parts: impl IntoIterator<Item = i128>) -> Vec<i128> {
     let mut sum = 0;
     let mut sums = vec![0];
@@ -51,7 +51,7 @@ fn exact(steps: &[i64], kind: Deviation, point: &Point) -> f64 {
     (mean / divisor).sqrt() / m as f64
 }
 
-/// Largest relative error of a deviation, at clusters that are done in tiles and longer ones.
+/// Largest relative error of a deviation, at clusters that are computed in tiles and at longer ones.
 fn worst(steps: &[i64]) -> [f64; 3] {
     let spacing = Spacing::Samples(vec![1, 2, 10, 100, 3000, 20_000]);
     KINDS.map(|kind| {
@@ -118,7 +118,7 @@ fn noise_behind_a_slow_filter_costs_no_more_and_its_hadamard_deviation_one_in_1e
     assert!(hadamard < 1e-5, "{hadamard:.1e}");
 }
 
-/// The smoothest thing that is not on a line, without any noise.
+/// A ramp without noise: its integral is the smoothest that is not a line.
 #[test]
 fn a_ramp_costs_less_than_one_in_1e8_and_leaves_1e_4_of_it_to_the_hadamard_deviation() {
     let steps: Vec<i64> = (0..2 * ALL_TERMS as i64).map(|i| 1024 * i).collect();

@@ -14,13 +14,13 @@ struct Line {
     m: usize,
     terms: usize,
     alpha: i32,
-    /// 0 where the run was without bounds.
+    /// 0 if the run was without bounds.
     lower: f64,
     deviation: f64,
     upper: f64,
 }
 
-/// A record and whether it holds phase or rates.
+/// A record, and whether it contains phase or rates.
 struct Record {
     name: &'static str,
     file: &'static str,
@@ -102,7 +102,7 @@ fn samples(folder: &Path, record: &Record) -> Vec<f64> {
         .collect()
 }
 
-/// Ours at the times of `lines`.
+/// Our points at the times of `lines`.
 fn points(samples: &[f64], phase: bool, kind: Deviation, lines: &[Line]) -> Vec<Point> {
     let spacing = Spacing::Samples(lines.iter().map(|l| l.m).collect());
     let curve = if phase { curve_of_phase } else { curve };
@@ -158,9 +158,9 @@ fn deviations_at_all_times_agree_to_the_last_printed_digit() {
     }
 }
 
-/// Below 30 means Stable32 uses another N in the ratio B1 (see `bounds::power_law`). Above, three times of 555
-/// differ: at 113 and 463 samples of the quartz oscillator the exponent before rounding is -1.50 and -1.49; at
-/// 302 of the flicker, 33 means, the modified variance does not confirm phase noise, and rightly so.
+/// Below 30 means Stable32 uses another N in the ratio B1 (see `power_law`). Above, three times of 555 differ: at 113 and 463 samples of
+/// the quartz oscillator the exponent before rounding is -1.50 and -1.49; at 302 of the flicker, 33 means, the modified variance does not
+/// confirm phase noise, and rightly so.
 #[test]
 fn noise_is_identified_as_by_stable32_wherever_there_are_thirty_means() {
     let Some(folder) = folder() else { return };
@@ -240,8 +240,7 @@ fn assert_bounds(kind: Deviation, point: &Point, line: &Line, phase: bool) {
     };
     let edf = estimator.edf(line.alpha);
     let confidence = if edf > 100.0 { 0.68 } else { 0.682_689_5 };
-    // Stable32 seeks its quantiles until the tail is right to 1.5e-4, which moves a bound the more the fewer the
-    // degrees.
+    // Stable32 searches its quantiles until the tail is right to 1.5e-4. With fewer degrees this moves a bound more.
     let tolerance = if edf > 10.0 { 1e-4 } else { 2.5e-4 };
     let (lower, upper) = interval(point.deviation, edf, confidence);
     let error = (lower / line.lower - 1.0)
@@ -260,9 +259,9 @@ fn assert_bounds(kind: Deviation, point: &Point, line: &Line, phase: bool) {
     }
 }
 
-/// This run of Stable32 had rates of 1.00000001 and summed them as they are: at 2e4 the last digit of the sum is
-/// 3.6e-12, and the deviations come out 0.05 to 0.2 % away. Summed in that way ours does too; with the mean out
-/// first it agrees with the run on rates less their mean (above).
+/// This run of Stable32 had rates of 1.00000001 and summed them unchanged: at 2e4 the last digit of the sum is 3.6e-12, and the deviations
+/// are wrong by 0.05 to 0.2 %. Summed in that way ours are too. With the mean removed first they agree with the run on rates minus their
+/// mean (above).
 #[test]
 fn a_mean_that_is_left_in_costs_the_digits_that_it_cost_stable32() {
     let Some(folder) = folder() else { return };
