@@ -29,7 +29,8 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &str, again: Option<&s
         let line = before.rsplit('\n').next().unwrap_or_default();
         let whole_file = span == (0..text.len());
         // Only what a table lacks is an error of the whole table: its heading, or the whole file.
-        let missing = whole_file || (line.trim().is_empty() && text[before.len()..].starts_with('['));
+        let missing =
+            whole_file || (line.trim().is_empty() && text[before.len()..].starts_with('['));
         let remedy = match (again, missing) {
             (Some(again), true) => {
                 format!("the file is cut or was edited: copy it again, or {again}")
