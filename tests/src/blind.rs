@@ -89,7 +89,7 @@ pub fn unit(ids: &[&str], seed: u64) -> RigFile {
     with_effects(file, ids, seed)
 }
 
-/// `file` with the effects `ids`, sizes drawn as in [`unit`].
+/// `file` with the effects `ids`, sizes drawn as in [`unit()`].
 pub fn with_effects(mut file: RigFile, ids: &[&str], seed: u64) -> RigFile {
     file.effect = ids
         .iter()

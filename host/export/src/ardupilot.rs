@@ -1,8 +1,8 @@
 //! Parameters of ArduPilot.
 //!
-//! Before its own scale factors, ArduPilot subtracts `c(T) - c(CALTEMP)` and then OFFS from each axis of the readings, where `c = 1e-6 (k1 d + k2 d²
-//! + k3 d³)` with `d = T - 35 °C`. T is clamped to TMIN to TMAX, which lie within -70 to 80 °C. Source: Copter documentation, "IMU Temperature
-//! Calibration"; parameter list, INS_TCAL1_*.
+//! Before its own scale factors, ArduPilot subtracts `c(T) - c(CALTEMP)` and then OFFS from each axis of the readings, where
+//! `c = 1e-6 (k1 d + k2 d² + k3 d³)` with `d = T - 35 °C`. T is clamped to TMIN to TMAX, which lie within -70 to 80 °C. Source: Copter
+//! documentation, "IMU Temperature Calibration"; parameter list, INS_TCAL1_*.
 //!
 //! A calibration at one temperature becomes INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS (for the other units INS_ACC2OFFS, INS_ACC2SCAL, INS_GYR2OFFS
 //! and so on). ArduPilot computes `(accel - offset) * scale` and `gyro - offset` after the rotation of the sensor and before that of the board.
