@@ -27,7 +27,8 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &str, again: Option<&s
         let span = error.span().unwrap_or(0..text.len());
         let before = text.get(..span.start).unwrap_or_default();
         let line = before.rsplit('\n').next().unwrap_or_default();
-        let whole_file = span == (0..text.len());
+        let after = text.get(span.end..).unwrap_or_default();
+        let whole_file = span.start == 0 && after.trim().is_empty();
         // Only what a table lacks is an error of the whole table: its heading, or the whole file.
         let missing =
             whole_file || (line.trim().is_empty() && text[before.len()..].starts_with('['));

@@ -75,14 +75,16 @@ impl Device {
                 },
         };
         let held = self.seen.lock().unwrap().stored.clone();
-        if let (None, Some(bytes)) = (&self.calibrated, held) {
+        // As the firmware, it uses no calibration of another layout.
+        let held = held.and_then(|bytes| stored::decode(&bytes).ok());
+        if let (None, Some(stored)) = (&self.calibrated, held) {
             let effects = effects::State::new(1000.0);
             let (effects, powered_for_ms) = match self.script.powered_for_ms {
                 Some(ms) => (effects, ms),
                 None => (effects.long_after_power_on(), 0),
             };
             self.calibrated = Some(Calibrated {
-                stored: stored::decode(&bytes).unwrap(),
+                stored,
                 effects,
                 followed: 0_u32.wrapping_sub(powered_for_ms),
             });
