@@ -9,7 +9,7 @@ CARGO := cargo +$(TOOLCHAIN)
 FIRMWARE := $(CARGO) build --locked -p mimu-firmware --profile image --target $(TARGET)
 COUNTED := $(CARGO) build --locked -p mimu-counted --profile image --target $(TARGET)
 # All crates whose tests run on the PC. The Python extension module is tested from Python.
-ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic --exclude mimu-python
+ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 
 MDBOOK := 0.5.4
 LOWEST := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
@@ -42,15 +42,18 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests but the
 # A fresh build compiles each crate once, so intermediate results for incremental builds are not needed. The demo and the faults use the builds of the
 # tests: with another setting they would compile the workspace again.
 test $(STAGES) demo faults nightly: export CARGO_INCREMENTAL = 0
+# Tests of devices and of the wizard wait for answers more than they compute: four of them at a time leave two cores no pause.
+test run-tests: export RUST_TEST_THREADS = 4
+# Tests of Python use the extension module that `build-tests` has compiled; `make python` by itself builds and tests the wheel.
+test: export MIMU_LIBRARY = $(abspath $(or $(CARGO_TARGET_DIR),target))/debug/lib_mimu.so
 
 fmt:
 	$(CARGO) fmt --all --check
 
 clippy:
-	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked $(ON_PC) --exclude mimu-firmware --features mimu-tests/studies --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p mimu-recording --no-default-features -- -D warnings
 	$(CARGO) clippy --locked -p mimu-recording --no-default-features --target $(WEB_TARGET) -- -D warnings
-	$(CARGO) clippy --locked -p mimu-python -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --profile image --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --profile image --features usb --target $(TARGET) -- -D warnings
 
@@ -66,15 +69,14 @@ images:
 no-panic:
 	./tests/no_panic/check.sh $(CARGO)
 
+# With the libraries, so that the extension module for Python is built with the features that the tests need: no crate is compiled twice.
 build-tests:
-	$(CARGO) test --locked $(ON_PC) --no-run
+	$(CARGO) build --locked $(ON_PC) --lib --tests
 
 run-tests:
 	$(CARGO) test --locked $(ON_PC)
 
-# Built with the features that the extension module needs from shared crates, so that `python` does not compile them again.
-interop:
-	$(CARGO) build --locked -q -p mimu-cli -p mimu-python --bin mimu
+interop: build-tests
 	./tests/interop/run.sh target/debug/mimu
 
 DIST_TARGET ?= x86_64-unknown-linux-gnu

@@ -1,6 +1,6 @@
 //! Errors of the estimates over temperature, their bounds, and how often their intervals contain the truth: the table of `docs/thermal.md`.
 //!
-//! `cargo run --release -p mimu-tests --bin thermal -- RUNS`, or one of
+//! `cargo run --release -p mimu-tests --features studies --bin thermal -- RUNS`, or one of
 //!
 //! | command | what |
 //! |---|---|

@@ -78,7 +78,7 @@ fn a_program_with_the_module_computes_what_the_device_computes_bit_by_bit() {
         assert_eq!(device.effects.is_some(), over_temperature);
         cargo(
             &folder,
-            &["build", "--lib", "--target", "thumbv7em-none-eabihf"],
+            &["check", "--lib", "--target", "thumbv7em-none-eabihf"],
         );
     }
 }
