@@ -1,6 +1,6 @@
 //! Compares the compensated stream with this program's compensation of the raw stream, sample by sample.
 
-mod twin;
+mod host_reference;
 
 use std::time::{Duration, Instant};
 
@@ -9,15 +9,15 @@ use mimu_core::wire::Request;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::heard::{Event, Samples};
 use super::image::{Image, effects_of};
+use super::received::{Event, Samples};
 use super::session::Session;
+use host_reference::HostReference;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
-use twin::HostReference;
 
-pub use twin::rounding;
+pub use host_reference::rounding;
 
 /// Longest silence of a stream before the comparison fails.
 const SILENCE: Duration = Duration::from_secs(3);
@@ -89,7 +89,8 @@ pub fn check(
         return Err(Error::device(session.port(), problem, remedy));
     }
     let rate_hz = session.who().sample_rate_hz;
-    let mut twin = HostReference::new(calibration, &image, rate_hz, powered_for_ms, place)?;
+    let mut host_reference =
+        HostReference::new(calibration, &image, rate_hz, powered_for_ms, place)?;
     let wanted = (duration.as_secs_f64() * f64::from(session.who().sample_rate_hz)) as u64;
     let mut found = Checked {
         samples: 0,
@@ -118,7 +119,7 @@ pub fn check(
             Some(Event::Compensated(batch)) => {
                 let pair = raw.take().filter(|r| r.head.first == batch.head.first);
                 match pair.filter(|r| r.values.len() == batch.values.len()) {
-                    Some(raw) => twin.compare(&raw, &batch, &mut found),
+                    Some(raw) => host_reference.compare(&raw, &batch, &mut found),
                     None => found.unpaired += batch.values.len() as u64,
                 }
                 if found.unpaired > wanted.max(1000) {

@@ -9,7 +9,7 @@ use mimu_core::wire::{Capabilities, KalmanState, Prior, Request};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::heard::{Answer, Event};
+use super::received::{Answer, Event};
 use super::session::{PATIENCE, Session};
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};

@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use mimu_core::wire::{Refusal, Request};
 
-use super::heard::{Answer, Event, LineCount};
 use super::identity::Identity;
 use super::line::{ATTEMPTS, Line};
 use super::origin;
 use super::port::{Port, ports};
+use super::received::{Answer, Event, LineCount};
 use mimu_recording::error::{Argument, Error, Result};
 
 /// Longest wait for an answer without work. A frame takes 5 ms, and a frame of samples may be sent before it. With all attempts of a call, the wait
@@ -72,7 +72,7 @@ impl Session {
     fn greet(port: Port) -> Result<Self> {
         let mut line = Line::new(port);
         let Some(Answer::Greeting(who)) = line.ask(Request::Hello, PATIENCE)? else {
-            return Err(no_greeting(line.port.name(), &line.ear.count()));
+            return Err(no_greeting(line.port.name(), &line.receiver.count()));
         };
         let mut session = Self { line, who: *who };
         if !session.line.waiting.is_empty() {
@@ -95,7 +95,7 @@ impl Session {
 
     /// Counts of what was received so far.
     pub fn count(&self) -> LineCount {
-        self.line.ear.count()
+        self.line.receiver.count()
     }
 
     /// Calls that had to be repeated because no answer came.
@@ -142,7 +142,7 @@ impl Session {
                 format!(
                     "the device does not answer the request {purpose}, made {ATTEMPTS} times in {:.0} s ({} frames were garbled)",
                     wait.as_secs_f64() * f64::from(ATTEMPTS),
-                    self.line.ear.count().garbled
+                    self.line.receiver.count().garbled
                 ),
                 "check the cable, reset the board and run it again",
             )),

@@ -7,7 +7,7 @@ use mimu_core::wire::{BatchHead, Request};
 use serde::Serialize;
 
 use super::flagged::Flagged;
-use super::heard::{Event, LineCount};
+use super::received::{Event, LineCount};
 use super::session::Session;
 use mimu_recording::error::{Error, Result};
 

@@ -29,7 +29,7 @@ pub fn of_calibration(calibration: &Calibration, export: &Export) -> Vec<String>
             ));
         }
     }
-    lines.extend(said(export));
+    lines.extend(notes_and_remaining(export));
     lines
 }
 
@@ -51,7 +51,7 @@ pub fn of_biases(biases: &ThermalBiases, export: &Export) -> Vec<String> {
             biases.created, biases.recording.raw_unit
         ),
     ];
-    lines.extend(said(export));
+    lines.extend(notes_and_remaining(export));
     lines
 }
 
@@ -70,7 +70,7 @@ pub fn of_noise(noise: &NoiseFile, export: &Export) -> Vec<String> {
             noise.created.as_deref().unwrap_or("at an unknown date")
         ),
     ];
-    lines.extend(said(export));
+    lines.extend(notes_and_remaining(export));
     lines
 }
 
@@ -97,7 +97,7 @@ pub fn needs_calibrated(from: &Sources) -> Option<String> {
 }
 
 /// Lines after the first ones, for the file and the terminal.
-pub fn said(export: &Export) -> Vec<String> {
+pub fn notes_and_remaining(export: &Export) -> Vec<String> {
     let mut lines = export.formulas.clone();
     lines.extend(export.notes.iter().cloned());
     if !export.remaining.is_empty() {

@@ -31,12 +31,12 @@ pub struct Growing {
     csv: Option<CsvWriter>,
     columns: Columns,
     rows: u64,
-    disk: Option<Disk>,
+    disk: Option<SyncThread>,
 }
 
 /// The thread that syncs the file to disk. A sync may take longer than the port can buffer, which is some tenths of a second.
 #[derive(Debug)]
-struct Disk {
+struct SyncThread {
     stop: Sender<()>,
     thread: JoinHandle<std::io::Result<()>>,
 }
@@ -58,7 +58,7 @@ impl Growing {
         fs::create_dir_all(directory).map_err(|error| Error::io(directory, &error))?;
         let mut csv = CsvWriter::create(&directory.join(SampleFormat::Csv.file_name()), columns)?;
         csv.flush()?;
-        let disk = Disk::new(csv.file()).map_err(|error| Error::io(directory, &error))?;
+        let disk = SyncThread::new(csv.file()).map_err(|error| Error::io(directory, &error))?;
         let growing = Self {
             directory: directory.to_owned(),
             csv: Some(csv),
@@ -66,7 +66,7 @@ impl Growing {
             rows: 0,
             disk,
         };
-        growing.state(&Manifest {
+        growing.write_manifest(&Manifest {
             unfinished: true,
             ..manifest.clone()
         })?;
@@ -78,7 +78,7 @@ impl Growing {
     pub fn resume(directory: &Path, columns: Columns, rows: u64, bytes: u64) -> Result<Self> {
         let path = directory.join(SampleFormat::Csv.file_name());
         let csv = CsvWriter::append(&path, columns, bytes)?;
-        let disk = Disk::new(csv.file()).map_err(|error| Error::io(directory, &error))?;
+        let disk = SyncThread::new(csv.file()).map_err(|error| Error::io(directory, &error))?;
         Ok(Self {
             directory: directory.to_owned(),
             csv: Some(csv),
@@ -114,7 +114,7 @@ impl Growing {
             .as_ref()
             .is_some_and(|disk| disk.thread.is_finished())
         {
-            self.settle()?;
+            self.stop_syncing()?;
         }
         if let Some(csv) = &mut self.csv {
             csv.write(batch)?;
@@ -138,7 +138,7 @@ impl Growing {
         mut complete: Option<&mut dyn FnMut(&mut Batch)>,
         progress: impl Fn(f64),
     ) -> Result<()> {
-        self.settle()?;
+        self.stop_syncing()?;
         if self.rows == 0 {
             drop(self.csv.take());
             return fs::remove_dir_all(&self.directory)
@@ -152,7 +152,7 @@ impl Growing {
             ..manifest.clone()
         };
         if format == SampleFormat::Csv && complete.is_none() {
-            return self.state(&manifest);
+            return self.write_manifest(&manifest);
         }
         let recording = Recording::open(&self.directory)?;
         let mut writer = Writer::create(&self.directory, self.columns, format, true)?;
@@ -168,7 +168,7 @@ impl Growing {
     }
 
     /// Replaces the manifest.
-    fn state(&self, manifest: &Manifest) -> Result<()> {
+    fn write_manifest(&self, manifest: &Manifest) -> Result<()> {
         let io = |error: std::io::Error| Error::io(&self.directory, &error);
         let text = manifest.to_toml()?;
         let mut file = tempfile::Builder::new()
@@ -191,8 +191,8 @@ impl Growing {
     }
 
     /// Ends the syncing thread and returns its result.
-    fn settle(&mut self) -> Result<()> {
-        let Some(Disk { stop, thread }) = self.disk.take() else {
+    fn stop_syncing(&mut self) -> Result<()> {
+        let Some(SyncThread { stop, thread }) = self.disk.take() else {
             return Ok(());
         };
         drop(stop);
@@ -207,7 +207,7 @@ impl Growing {
     }
 }
 
-impl Disk {
+impl SyncThread {
     /// `None` if files are in memory: there is no disk to sync.
     fn new(file: &File) -> std::io::Result<Option<Self>> {
         if cfg!(target_family = "wasm") {
@@ -230,6 +230,6 @@ impl Disk {
 impl Drop for Growing {
     fn drop(&mut self) {
         // The result no longer matters: the recording was abandoned and stays unfinished.
-        let _ = self.settle();
+        let _ = self.stop_syncing();
     }
 }

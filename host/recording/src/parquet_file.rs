@@ -17,7 +17,7 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use super::batch::Batch;
 use super::cell::{self, Refusal, shorten};
 use super::columns::{Column, Layout};
-use super::in_order::{broke_down, in_order, worker_count};
+use super::in_order::{in_order, reader_panicked, worker_count};
 use super::strict_file::StrictFile;
 use crate::error::{Error, Result};
 
@@ -64,7 +64,7 @@ impl ParquetFile {
         let metadata = catch_unwind(AssertUnwindSafe(|| {
             ParquetMetaDataReader::new().parse_and_finish(&file)
         }))
-        .map_err(|_| broke_down(&place))?
+        .map_err(|_| reader_panicked(&place))?
         .map_err(|error| damaged(&place, &error))?;
         let mut rows = 0_u64;
         for group in metadata.row_groups() {

@@ -8,7 +8,7 @@ use mimu_device::{Event, Samples, Session, Started};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
 
-use crate::source::{Chunk, Heard, Source, Unit};
+use crate::source::{Chunk, Source, SourceEvent, Unit};
 
 /// Silence after which the device is asked to greet and stream again.
 const SILENCE: Duration = Duration::from_secs(2);
@@ -76,7 +76,7 @@ impl DeviceSource {
         }
     }
 
-    fn take(&mut self, samples: &Samples) -> Result<Heard> {
+    fn take(&mut self, samples: &Samples) -> Result<SourceEvent> {
         self.heard = Instant::now();
         let number = i64::from(samples.head.first);
         // After a restart of the count the elapsed time is unknown. It is only assumed to be positive.
@@ -102,7 +102,7 @@ impl DeviceSource {
             values.push(row);
         }
         self.next = tick + values.len() as u64;
-        Ok(Heard::Samples(Chunk {
+        Ok(SourceEvent::Samples(Chunk {
             tick,
             values,
             temp_c: shortest(samples.head.temp_c),
@@ -120,7 +120,7 @@ impl Source for DeviceSource {
         &self.unit
     }
 
-    fn next(&mut self) -> Result<Heard> {
+    fn next(&mut self) -> Result<SourceEvent> {
         if !self.streaming {
             self.session.begin_stream(RAW)?;
             (self.streaming, self.heard) = (true, Instant::now());
@@ -132,16 +132,16 @@ impl Source for DeviceSource {
                 self.powered_for_s = who.powered_for_ms.map(|ms| f64::from(ms) / 1000.0);
                 self.unit.start = (who.start != Started::PowerOn).then(|| who.start.to_string());
                 self.streaming = false;
-                Ok(Heard::Restarted(who.start.to_string()))
+                Ok(SourceEvent::Restarted(who.start.to_string()))
             }
-            Some(_) => Ok(Heard::Nothing),
+            Some(_) => Ok(SourceEvent::Nothing),
             None if self.heard.elapsed() > SILENCE => {
                 // It may have restarted, and its greeting may be lost.
                 self.session.hello()?;
                 self.streaming = false;
-                Ok(Heard::Nothing)
+                Ok(SourceEvent::Nothing)
             }
-            None => Ok(Heard::Nothing),
+            None => Ok(SourceEvent::Nothing),
         }
     }
 

@@ -355,7 +355,7 @@ pub(super) fn printed(unit: &str) -> String {
 /// Result of `mimu record`.
 pub fn record_text(summary: &RecordSummary) -> String {
     let mut out = String::new();
-    let s = &summary.standing;
+    let s = &summary.state;
     line!(
         out,
         "{}: {} samples from {:.3} to {:.3} s, {} missing in {} gaps, {:.2} °C",

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 
 use mimu_equipment::step::sketch;
-use mimu_wizard::event::{Event, Question, Standing, View, Wish};
+use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
 
 use super::answers::{Beforehand, Typed};
 use crate::report;
@@ -88,10 +88,10 @@ impl View for Lines {
         }
     }
 
-    fn show(&mut self, _: &Standing) {}
+    fn show(&mut self, _: &SessionState) {}
 
-    fn wish(&mut self) -> Option<Wish> {
-        self.typed.wish()
+    fn request(&mut self) -> Option<UserRequest> {
+        self.typed.request()
     }
 
     fn ask(&mut self, question: &Question) -> Option<bool> {

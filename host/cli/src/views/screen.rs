@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use mimu_recording::error::{Error, Result};
-use mimu_wizard::event::{Event, Question, Standing, View, Wish};
+use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event as keys;
 use ratatui::crossterm::event::{KeyCode, KeyEventKind, KeyModifiers};
@@ -68,7 +68,7 @@ pub(crate) struct Screen {
     /// Output of the events, if any.
     events: Option<Box<dyn Write>>,
     beforehand: Beforehand,
-    standing: Standing,
+    standing: SessionState,
     log: Vec<String>,
     question: Option<Question>,
     answer: Option<bool>,
@@ -110,7 +110,7 @@ impl Screen {
             stop,
             events,
             beforehand,
-            standing: Standing::default(),
+            standing: SessionState::default(),
             log: Vec::new(),
             question: None,
             answer: None,
@@ -166,20 +166,20 @@ impl View for Screen {
         self.draw();
     }
 
-    fn show(&mut self, standing: &Standing) {
+    fn show(&mut self, standing: &SessionState) {
         self.standing = standing.clone();
         self.draw();
     }
 
-    fn wish(&mut self) -> Option<Wish> {
+    fn request(&mut self) -> Option<UserRequest> {
         if self.stop.load(Ordering::Relaxed) {
-            return Some(Wish::Cancel);
+            return Some(UserRequest::Cancel);
         }
         while let Ok(key) = self.keys.try_recv() {
             match key {
-                Key::Cancel => return Some(Wish::Cancel),
-                Key::Redo => return Some(Wish::RedoLast),
-                Key::Skip => return Some(Wish::Skip),
+                Key::Cancel => return Some(UserRequest::Cancel),
+                Key::Redo => return Some(UserRequest::RedoLast),
+                Key::Skip => return Some(UserRequest::Skip),
                 // A key pressed before the question does not answer it.
                 Key::Yes | Key::No if self.question.is_none() => {}
                 Key::Yes | Key::No => self.answer = Some(key == Key::Yes),

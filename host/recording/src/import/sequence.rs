@@ -9,7 +9,7 @@ use std::path::Path;
 use super::faces::Face;
 use super::joined::JoinedFiles;
 use super::options::file_name;
-use super::place::Place;
+use super::sequence_position::SequencePosition;
 use super::step_inputs::StepInputs;
 use super::step_labels::StepLabels;
 use super::{ImportOptions, ImportSummary};
@@ -56,7 +56,7 @@ pub(super) fn import_sequence(
             origin_s = begun_s;
         }
         let behind_s = (begun_s - origin_s) as f64;
-        import.place = Some(Place::new(step as i32, behind_s, after_s));
+        import.place = Some(SequencePosition::new(step as i32, behind_s, after_s));
         let (writer, manifest, summary, columns) = match &mut open {
             Some(open) => open,
             None => {

@@ -154,7 +154,7 @@ impl TextTable {
         self.bytes as f64 / self.length.max(1) as f64
     }
 
-    /// Place of a line, for messages.
+    /// Position of a line, for messages.
     pub fn place(&self, row: u64) -> String {
         format!("{}, row {row}", self.path.display())
     }

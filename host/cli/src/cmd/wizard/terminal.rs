@@ -101,7 +101,7 @@ fn end_in_time(stop: Arc<AtomicBool>, ends: Duration, on_screen: bool) -> Result
 
 pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
-    let asked = args.asked()?;
+    let config = args.config()?;
     let wanted = args.wanted()?;
     let driver: Box<dyn Driver> = match args.drivers.as_slice() {
         [] => Box::new(Person),
@@ -155,7 +155,7 @@ pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
         }
     };
     let page = super::page(command_line);
-    let outcome = complete(carry_out(asked, wanted, driver, view.as_mut(), &page));
+    let outcome = complete(carry_out(config, wanted, driver, view.as_mut(), &page));
     // The terminal is restored before anything is printed to it.
     drop(view);
     let outcome = outcome?;

@@ -67,7 +67,7 @@ impl Bench {
         let thread = std::thread::spawn(move || {
             while !ended.load(Ordering::Relaxed) {
                 served.step().unwrap();
-                let ns = served.board().standing().ns;
+                let ns = served.board().state().ns;
                 clock.store(ns / 1_000_000, Ordering::Relaxed);
             }
             served
