@@ -1,6 +1,6 @@
 //! A session with a device: calls, each answered or refused, and events.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use mimu_core::wire::{Refusal, Request};
 
@@ -14,6 +14,8 @@ use mimu_recording::error::{Argument, Error, Result};
 /// Longest wait for an answer without work. A frame takes 5 ms, and a frame of samples may be sent before it. With all attempts of a call, the wait
 /// also covers a device that is still storing what an earlier program committed.
 pub(super) const PATIENCE: Duration = Duration::from_millis(1500);
+/// Longest silence of a stream.
+pub(super) const SILENCE: Duration = Duration::from_secs(3);
 
 /// An open line to a compatible device that has sent its greeting.
 #[derive(Debug)]
@@ -175,6 +177,23 @@ impl Session {
             self.who = (**who).clone();
         }
         Ok(event)
+    }
+
+    /// The next event of a stream, whose last samples came at `last`; `name` is "raw stream", for example. A restart or a silence of 3 s is an error.
+    pub(super) fn stream_event(&mut self, last: Instant, name: &str) -> Result<Option<Event>> {
+        let event = self.event()?;
+        let (problem, remedy) = match &event {
+            Some(Event::Started(_)) => (
+                "the device restarted meanwhile".into(),
+                "run it again; `mimu device info` shows the reset cause",
+            ),
+            None if last.elapsed() > SILENCE => (
+                format!("the {name} does not arrive"),
+                "reset the board and run it again",
+            ),
+            _ => return Ok(event),
+        };
+        Err(Error::device(self.port(), problem, remedy))
     }
 
     /// Starts a stream, and discards events from before its confirmation. They may be batches of an earlier stream, which a gap would follow.

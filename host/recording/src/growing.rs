@@ -5,7 +5,6 @@
 //! and a journal of another format would need its own program to be read.
 
 use std::fs::{self, File};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -17,6 +16,7 @@ use super::csv_writer::CsvWriter;
 use super::manifest::{MANIFEST_FILE, Manifest};
 use super::parents::{Parents, folder};
 use super::reader::Recording;
+use super::result_file::stage;
 use super::staging::{check_target, sync_directory};
 use super::writer::{SampleFormat, Writer};
 use crate::error::{Error, Result};
@@ -169,23 +169,7 @@ impl Growing {
 
     /// Replaces the manifest.
     fn write_manifest(&self, manifest: &Manifest) -> Result<()> {
-        let io = |error: std::io::Error| Error::io(&self.directory, &error);
-        let text = manifest.to_toml()?;
-        let mut file = tempfile::Builder::new()
-            .prefix(".recording")
-            .tempfile_in(&self.directory)
-            .map_err(io)?;
-        file.write_all(text.as_bytes()).map_err(io)?;
-        file.as_file().sync_all().map_err(io)?;
-        // Temporary files are private, but everybody who may read the folder may read the recording.
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt as _;
-            let mode = fs::Permissions::from_mode(0o644);
-            file.as_file().set_permissions(mode).map_err(io)?;
-        }
-        file.persist(self.directory.join(MANIFEST_FILE))
-            .map_err(|error| io(error.error))?;
+        stage(&self.directory.join(MANIFEST_FILE), manifest.to_toml()?)?.publish()?;
         sync_directory(&self.directory);
         Ok(())
     }

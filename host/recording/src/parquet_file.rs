@@ -129,17 +129,21 @@ impl ParquetFile {
             None => converted == ConvertedType::NONE,
             Some(kind) => matches!(kind, LogicalType::Integer { .. } | LogicalType::Unknown),
         };
-        let integer = matches!(
+        let unsigned = matches!(
             converted,
-            ConvertedType::INT_8
-                | ConvertedType::INT_16
-                | ConvertedType::INT_32
-                | ConvertedType::INT_64
-                | ConvertedType::UINT_8
+            ConvertedType::UINT_8
                 | ConvertedType::UINT_16
                 | ConvertedType::UINT_32
                 | ConvertedType::UINT_64
         );
+        let integer = unsigned
+            || matches!(
+                converted,
+                ConvertedType::INT_8
+                    | ConvertedType::INT_16
+                    | ConvertedType::INT_32
+                    | ConvertedType::INT_64
+            );
         let text = column.physical_type() == Physical::BYTE_ARRAY;
         let number = match column.physical_type() {
             Physical::DOUBLE | Physical::FLOAT => true,
@@ -157,13 +161,8 @@ impl ParquetFile {
                 "write it as DOUBLE, FLOAT, INT32 or INT64",
             ));
         }
-        let unsigned = matches!(
-            converted,
-            ConvertedType::UINT_8
-                | ConvertedType::UINT_16
-                | ConvertedType::UINT_32
-                | ConvertedType::UINT_64
-        ) || matches!(logical, Some(LogicalType::Integer(kind)) if !kind.is_signed);
+        let unsigned =
+            unsigned || matches!(logical, Some(LogicalType::Integer(kind)) if !kind.is_signed);
         Ok(Leaf {
             index,
             unsigned,

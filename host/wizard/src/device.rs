@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use mimu_core::wire::{Request, flags};
 use mimu_device::record::shortest;
-use mimu_device::{Event, Samples, Session, Started};
+use mimu_device::{Event, Identity, Samples, Session, Started};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
 
@@ -55,17 +55,16 @@ impl DeviceSource {
         told.extend(who.warnings.iter().cloned());
         let unit = Unit {
             id: who.unit_id.clone(),
-            name: format!("mimu-{}", who.unit_id),
+            name: mimu_device::unit_name(&who.unit_id),
             raw_unit: RawUnit::Volt,
             rate_hz: f64::from(who.sample_rate_hz),
             nominal: Some(mimu_device::nominal()),
             told,
             is_device: true,
-            start: (who.start != Started::PowerOn).then(|| who.start.to_string()),
+            start: unless_power_on(&who.start),
         };
-        let powered_for_s = who.powered_for_ms.map(|ms| f64::from(ms) / 1000.0);
         Self {
-            powered_for_s,
+            powered_for_s: powered_for_s(who),
             session,
             unit,
             streaming: false,
@@ -115,6 +114,14 @@ impl DeviceSource {
     }
 }
 
+fn powered_for_s(who: &Identity) -> Option<f64> {
+    who.powered_for_ms.map(|ms| f64::from(ms) / 1000.0)
+}
+
+fn unless_power_on(start: &Started) -> Option<String> {
+    (*start != Started::PowerOn).then(|| start.to_string())
+}
+
 impl Source for DeviceSource {
     fn unit(&self) -> &Unit {
         &self.unit
@@ -129,8 +136,8 @@ impl Source for DeviceSource {
             Some(Event::Raw(samples)) => self.take(&samples),
             Some(Event::Started(who)) => {
                 self.anew = true;
-                self.powered_for_s = who.powered_for_ms.map(|ms| f64::from(ms) / 1000.0);
-                self.unit.start = (who.start != Started::PowerOn).then(|| who.start.to_string());
+                self.powered_for_s = powered_for_s(&who);
+                self.unit.start = unless_power_on(&who.start);
                 self.streaming = false;
                 Ok(SourceEvent::Restarted(who.start.to_string()))
             }

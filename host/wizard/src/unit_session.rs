@@ -188,9 +188,9 @@ impl UnitSession {
         self.number = had.max().unwrap_or(0);
         self.banks = (config.by_device && part == Part::Calibration).then(|| match self.number {
             0 => DeviceBanks::default(),
-            _ => {
-                DeviceBanks::incomplete("the session was interrupted, so they lack the dwells before")
-            }
+            _ => DeviceBanks::incomplete(
+                "the session was interrupted, so they lack the dwells before",
+            ),
         });
         // Waiting events are from before this recording.
         while self.station.news()?.is_some() {}

@@ -14,6 +14,7 @@ use mimu_device::{
 macro_rules! line {
     ($out:expr, $($of:tt)*) => { let _ = writeln!($out, $($of)*); };
 }
+pub(super) use line;
 
 /// Result of `mimu device info`.
 pub fn info_text(result: &DeviceResult<&Identity>) -> String {

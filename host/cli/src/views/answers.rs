@@ -9,29 +9,9 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use mimu_recording::error::{Error, Result};
 use mimu_wizard::event::{Question, UserRequest};
 
-/// Answers given in advance: then the question is not asked.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Beforehand {
-    /// Whether to store effects that were found.
-    pub store_effects: Option<bool>,
-    /// Whether to store a calibration whose error is many times the noise.
-    pub store_rough: Option<bool>,
-    /// Whether to continue despite a problem such as a failed self-test.
-    pub go_on: Option<bool>,
-    /// Whether the user switches the supply off and on.
-    pub power_cycle: Option<bool>,
-}
-
-impl Beforehand {
-    /// The answer, if it was given.
-    pub(crate) fn answer(&self, question: &Question) -> Option<bool> {
-        match question {
-            Question::PowerCycled => self.power_cycle,
-            Question::StoreEffects(_) => self.store_effects,
-            Question::StoreRough(_) => self.store_rough,
-            Question::GoOn(_) => self.go_on,
-        }
-    }
+/// The answer of `--yes`: effects are stored. A large error is not stored, a problem ends the session, and nobody switches the supply.
+pub(crate) fn of_yes(question: &Question) -> bool {
+    matches!(question, Question::StoreEffects(_))
 }
 
 /// Lines from standard input, and Ctrl-C.

@@ -13,7 +13,7 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event as keys;
 use ratatui::crossterm::event::{KeyCode, KeyEventKind, KeyModifiers};
 
-use super::answers::Beforehand;
+use super::answers::of_yes;
 use super::lines::write_event;
 use super::picture::{LEAST, Shown, draw};
 use crate::report;
@@ -67,7 +67,7 @@ pub(crate) struct Screen {
     stop: Arc<AtomicBool>,
     /// Output of the events, if any.
     events: Option<Box<dyn Write>>,
-    beforehand: Beforehand,
+    yes: bool,
     standing: SessionState,
     log: Vec<String>,
     question: Option<Question>,
@@ -85,7 +85,7 @@ impl Screen {
     /// Takes over the terminal. `stop` is set from outside to end the session.
     pub(crate) fn new(
         stop: Arc<AtomicBool>,
-        beforehand: Beforehand,
+        yes: bool,
         events: Option<Box<dyn Write>>,
     ) -> Result<Self> {
         let failed = |error: std::io::Error| {
@@ -109,7 +109,7 @@ impl Screen {
             ended,
             stop,
             events,
-            beforehand,
+            yes,
             standing: SessionState::default(),
             log: Vec::new(),
             question: None,
@@ -189,8 +189,8 @@ impl View for Screen {
     }
 
     fn ask(&mut self, question: &Question) -> Option<bool> {
-        if let Some(answer) = self.beforehand.answer(question) {
-            return Some(answer);
+        if self.yes {
+            return Some(of_yes(question));
         }
         if self.question.as_ref() != Some(question) {
             (self.question, self.answer) = (Some(question.clone()), None);

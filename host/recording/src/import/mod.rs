@@ -67,10 +67,8 @@ pub use summary::{ImportSummary, SkippedLines};
 pub use time::{Decimal, Jitter, Rounds, TimeSummary};
 
 use joined::JoinedFiles;
-use options::file_name;
+use options::source;
 
-use super::digest;
-use super::manifest::Source;
 use super::writer::Writer;
 use crate::error::Result;
 
@@ -122,10 +120,7 @@ fn import_sensors(
     }
     import.finish_summary(writer.rows(), &manifest)?;
     for file in options.files.iter().chain(&options.inputs) {
-        manifest.sources.push(Source {
-            file: file_name(file),
-            sha256: digest::sha256(file)?,
-        });
+        manifest.sources.push(source(file)?);
     }
     if let Some(inputs) = &import.inputs {
         manifest.turn_steps = inputs.turns().collect();

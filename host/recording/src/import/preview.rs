@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::binary::{refuse_binary, without_zeros};
 use super::log::is_log;
 use super::parquet_table;
+use super::text_table::without_comment_sign;
 use crate::cell;
 use crate::csv_file::BOM;
 use crate::error::{Error, Result};
@@ -69,13 +70,6 @@ pub fn preview(path: &Path, separator: Option<Separator>) -> Result<Preview> {
 }
 
 fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Preview> {
-    // Names may follow the sign of a comment.
-    let plain = |line: &[u8]| {
-        let from = line
-            .iter()
-            .position(|b| !matches!(b, b'#' | b'%' | b' ' | b'\t'));
-        line[from.unwrap_or(line.len())..].to_vec()
-    };
     let comment = |line: &[u8]| matches!(line.trim_ascii().first(), Some(b'#' | b'%'));
     let shown: Vec<&[u8]> = lines
         .iter()
@@ -103,7 +97,10 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Preview> {
     };
     let first = lines.iter().position(is_row)?;
     let width = cells(lines[first]).len();
-    let above = lines[..first].iter().rev().map(|line| cells(&plain(line)));
+    let above = lines[..first]
+        .iter()
+        .rev()
+        .map(|line| cells(without_comment_sign(line)));
     let mut headers = above.filter(|row| row.len() == width && numbers(row) == 0);
     let rows = lines[first..].iter().filter(|line| is_row(line));
     Some(Preview {

@@ -8,15 +8,14 @@ use std::path::Path;
 
 use super::faces::Face;
 use super::joined::JoinedFiles;
-use super::options::file_name;
+use super::options::{file_name, source};
 use super::sequence_position::SequencePosition;
 use super::step_inputs::StepInputs;
 use super::step_labels::StepLabels;
 use super::{ImportOptions, ImportSummary};
 use crate::columns::Columns;
-use crate::digest;
 use crate::error::{Argument, Error, Result};
-use crate::manifest::{Manifest, Reference, Source};
+use crate::manifest::{Manifest, Reference};
 use crate::writer::Writer;
 
 /// Rates of two files may differ by this share: a loop without a timer is not equally fast each time.
@@ -150,13 +149,6 @@ fn of_faces(options: &ImportOptions, gyro: bool) -> Vec<String> {
         );
     }
     warnings
-}
-
-fn source(path: &Path) -> Result<Source> {
-    Ok(Source {
-        file: file_name(path),
-        sha256: digest::sha256(path)?,
-    })
 }
 
 /// Labels of the steps: the faces, or the names of the files without their endings.

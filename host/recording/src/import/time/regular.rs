@@ -8,7 +8,7 @@
 //! have exact stamps, which must stay as they are.
 
 use super::gap::{Gap, Jitter, STALL_S, quantile};
-use super::grid::{self, Steps};
+use super::grid::{self, SAMPLED, Steps};
 use super::polled::{self, Rounds};
 
 /// An interval longer than this many periods may hide missing samples.
@@ -39,9 +39,7 @@ const WANDER: f64 = 1e-3;
 const ROUNDS: usize = 6;
 /// Rows of a segment by which the unit of the stamps is recognised.
 const SEGMENT: usize = 64;
-/// Number of values from which a quantile over a long file is computed.
-const SAMPLED: usize = 20_000;
-/// The same for a window.
+/// Number of values from which a quantile over a window is computed.
 const MOST: usize = 512;
 
 /// Regular times of the rows of a file.
