@@ -155,10 +155,8 @@ fn roles(list: &ColumnList, names: &[String]) -> Vec<&'static str> {
 /// What the page shows of a recording.
 #[derive(Serialize)]
 struct View {
-    duration_s: f64,
     /// The readings over time with the dwells, as in the report.
     trace: String,
-    dwells: usize,
     #[serde(flatten)]
     poses: poses::Poses,
 }
@@ -172,12 +170,8 @@ fn view(recording: &Path, calibration: Option<&PathBuf>) -> Result<View> {
         steps: Steps::AsRecorded,
     };
     let prepared = Prepared::read(&Recording::open(recording)?, finding, |_| {})?;
-    let blocks = &prepared.condensed.blocks;
-    let times = blocks.first().zip(blocks.last());
     Ok(View {
-        duration_s: times.map_or(0.0, |(first, last)| last.start_s - first.start_s),
         trace: mimu_cli::report::trace_figure(&prepared),
-        dwells: prepared.dwells.list.len(),
         poses: poses::of(&prepared, calibration.as_ref()),
     })
 }

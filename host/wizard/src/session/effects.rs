@@ -41,10 +41,7 @@ impl OpenSession<'_> {
                 second: Some(other.clone()),
                 ..Recordings::from(first)
             },
-            Options {
-                holdout_blocks: 0,
-                ..Options::default()
-            },
+            Options::IN_SAMPLE,
         );
         // The stored calibration is verified already. A recording that cannot be diagnosed does not invalidate it.
         let mut diagnosis = match diagnosed {

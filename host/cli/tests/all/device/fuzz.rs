@@ -18,22 +18,7 @@ use mimu_core::{PerSensor, Sensor};
 use mimu_device::{Answer, Event, Received, Receiver, contents};
 use nalgebra::{Matrix3, Vector3};
 
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.bits() % end as u64) as usize
-    }
-}
+use crate::random::Random;
 
 fn frame(message: &Message<'_>) -> Vec<u8> {
     let mut out = [0; MAX_FRAME];
