@@ -66,7 +66,7 @@ pub fn info(length: u32, hash: u64, stored: &Stored) -> StoredInfo {
 
 /// Number of refused calls, and number of times that bytes were lost before the decoder.
 #[derive(Default)]
-struct Heard {
+struct Received {
     refused: u32,
     overruns: u32,
     garbled: u32,
@@ -77,26 +77,26 @@ impl Commands<'_> {
     pub async fn serve(mut self, mut input: Input) -> ! {
         self.greet(0).await;
         let mut decoder = Decoder::new();
-        let mut heard = Heard::default();
+        let mut received = Received::default();
         let mut bytes = [0; 64];
         loop {
             let Some(count) = input.receive(&mut bytes).await else {
-                heard.overruns = heard.overruns.wrapping_add(1);
+                received.overruns = received.overruns.wrapping_add(1);
                 continue;
             };
             for byte in &bytes[..count] {
-                heard.garbled = decoder.garbled();
+                received.garbled = decoder.garbled();
                 let Some(frame) = decoder.push(*byte) else {
                     continue;
                 };
                 let reset = match frame.call() {
                     Some(call) => {
-                        self.answer(&call, &mut heard).await;
+                        self.answer(&call, &mut received).await;
                         call.request == Request::ResetCounters
                     }
                     None => {
                         let id = frame.id().unwrap_or_default();
-                        heard.refused = heard.refused.wrapping_add(1);
+                        received.refused = received.refused.wrapping_add(1);
                         self.refuse(id, Refusal::Unknown).await;
                         false
                     }
@@ -112,7 +112,7 @@ impl Commands<'_> {
         send(&mut self.replies, &Message::Refused { id, refusal }).await;
     }
 
-    async fn answer(&mut self, call: &Call<'_>, heard: &mut Heard) {
+    async fn answer(&mut self, call: &Call<'_>, received: &mut Received) {
         let id = call.id;
         let mut part = [0; CHUNK];
         let outcome = match call.request {
@@ -124,9 +124,9 @@ impl Commands<'_> {
                 let result = self_test::run(pins, &mut self.supply, self.pipeline).await;
                 Ok(Reply::SelfTest(result))
             }
-            Request::Counters => Ok(Reply::Counters(self.counters(heard))),
+            Request::Counters => Ok(Reply::Counters(self.counters(received))),
             Request::ResetCounters => {
-                self.reset_counters(heard);
+                self.reset_counters(received);
                 Ok(Reply::Done)
             }
             request => self.at_once(request),
@@ -134,7 +134,7 @@ impl Commands<'_> {
         match outcome {
             Ok(reply) => send(&mut self.replies, &Message::Reply { id, reply }).await,
             Err(refusal) => {
-                heard.refused = heard.refused.wrapping_add(1);
+                received.refused = received.refused.wrapping_add(1);
                 self.refuse(id, refusal).await;
             }
         }
@@ -283,7 +283,7 @@ impl Commands<'_> {
         send(&mut self.replies, &Message::Greeting { id, greeting }).await;
     }
 
-    fn counters(&self, heard: &Heard) -> Counters {
+    fn counters(&self, received: &Received) -> Counters {
         let of = |counter: &AtomicU32| counter.load(Ordering::Relaxed);
         let losses = self.pipeline.lock(|p| p.borrow().losses());
         Counters {
@@ -295,16 +295,16 @@ impl Commands<'_> {
             stalls: of(&self.tally.stalls),
             queue_overruns: of(&self.tally.queue_overruns),
             batches_dropped: losses.batches,
-            frames_garbled: heard.garbled,
-            receiver_overruns: heard.overruns,
-            refused: heard.refused,
+            frames_garbled: received.garbled,
+            receiver_overruns: received.overruns,
+            refused: received.refused,
             flash_corrected: of(&flash::CORRECTED),
             flash_uncorrectable: of(&flash::UNCORRECTABLE),
             longest_us: of(&self.tally.longest_us),
         }
     }
 
-    fn reset_counters(&mut self, heard: &mut Heard) {
+    fn reset_counters(&mut self, received: &mut Received) {
         for counter in [
             &self.tally.samples,
             &self.tally.late,
@@ -318,6 +318,6 @@ impl Commands<'_> {
             counter.store(0, Ordering::Relaxed);
         }
         self.pipeline.lock(|p| p.borrow_mut().reset_losses());
-        *heard = Heard::default();
+        *received = Received::default();
     }
 }

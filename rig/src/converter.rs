@@ -54,7 +54,7 @@ struct Channel {
     /// Codes per ratio of the voltage at the pin to the true reference.
     gain: f64,
     /// Reported unit per code.
-    worth: f64,
+    unit_per_code: f64,
     /// Code of the nominal reference pin, or of half the nominal supply, at the nominal reference.
     expected: f64,
 }
@@ -80,7 +80,7 @@ impl Converter {
         let channel = |analog: bool, divider: f64, known_v: f64| Channel {
             analog,
             gain: divider * codes,
-            worth: match truth.raw_unit {
+            unit_per_code: match truth.raw_unit {
                 RawUnit::V => nominal / (codes * divider),
                 RawUnit::Count => 1.0,
             },
@@ -109,7 +109,7 @@ impl Converter {
         let mut gyro = pins.gyro_v;
         if self.gyro.analog {
             for (i, v) in gyro.iter_mut().enumerate() {
-                *v = self.gyro.worth * self.code(*v * self.gyro.gain * per_volt);
+                *v = self.gyro.unit_per_code * self.code(*v * self.gyro.gain * per_volt);
                 if self.take_out_reference {
                     // A dead pin reads 0; a firmware avoids dividing by it.
                     let pin = self.code(pins.gyro_reference_v[i] * self.gyro.gain * per_volt);
@@ -121,13 +121,13 @@ impl Converter {
         }
         let mut accel = pins.accel_v;
         if self.accel.analog {
-            let mut worth = self.accel.worth;
+            let mut unit_per_code = self.accel.unit_per_code;
             if self.take_out_reference {
                 let pin = self.code(pins.supply_v * self.half_supply * per_volt);
-                worth *= self.accel.expected / pin.max(1.0);
+                unit_per_code *= self.accel.expected / pin.max(1.0);
             }
             for v in &mut accel {
-                *v = worth * self.code(*v * self.accel.gain * per_volt);
+                *v = unit_per_code * self.code(*v * self.accel.gain * per_volt);
             }
         } else {
             accel = accel.map(digital);

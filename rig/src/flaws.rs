@@ -125,15 +125,15 @@ impl FlawsTruth {
 }
 
 /// Selects at random `count` of `n` things for a flaw.
-pub(crate) fn struck(count: u32, n: usize, random: &mut Random) -> Vec<bool> {
+pub(crate) fn pick(count: u32, n: usize, random: &mut Random) -> Vec<bool> {
     let mut order: Vec<usize> = (0..n).collect();
-    let mut struck = vec![false; n];
+    let mut picked = vec![false; n];
     for k in 0..n.min(count as usize) {
         let other = k + (random.uniform() * (n - k) as f64) as usize;
         order.swap(k, other);
-        struck[order[k]] = true;
+        picked[order[k]] = true;
     }
-    struck
+    picked
 }
 
 /// A random direction, uniformly distributed.
@@ -200,13 +200,13 @@ impl Flaws {
     pub(crate) fn new(truth: &FlawsTruth, dwells: u64, period_s: f64, seed: u64) -> Self {
         let mut random = Random::new(seed, "upset turns");
         let turns = (dwells as usize).saturating_sub(1);
-        let struck = struck(truth.upset_turns, turns, &mut random);
+        let picked = pick(truth.upset_turns, turns, &mut random);
         let size = truth.upset_dps.to_radians();
         let upset = |s: bool| match s {
             true => scale(size, direction(&mut random)),
             false => [0.0; 3],
         };
-        let upset = struck.into_iter().map(upset).collect();
+        let upset = picked.into_iter().map(upset).collect();
         let mut building = Random::new(seed, "building");
         Self {
             truth: truth.clone(),
@@ -235,7 +235,7 @@ impl Flaws {
     }
 
     /// The motion as sensed: a disturbed gyro has an additional rate.
-    pub(crate) fn felt(&mut self, instant: &Instant) -> Motion {
+    pub(crate) fn sensed(&mut self, instant: &Instant) -> Motion {
         self.last_step = instant.step.or(self.last_step);
         let before = self.last_step.filter(|_| instant.step.is_none());
         let upset = before.and_then(|step| self.upset.get(step as usize));

@@ -15,7 +15,7 @@ use crate::refusal::{Refusal, within};
 use crate::rotation::{Vector, scale};
 
 use choice::{Jolt, Turn, between, chosen};
-use commanded::Told;
+use commanded::CommandState;
 
 mod choice;
 mod commanded;
@@ -207,7 +207,7 @@ pub struct Hands {
     jolt_s: f64,
     still: Option<(usize, Motion)>,
     /// State under command; `None` if there is a plan.
-    told: Option<Told>,
+    commanded: Option<CommandState>,
 }
 
 impl Hands {
@@ -258,7 +258,7 @@ impl Hands {
             sway,
             jolt_s: truth.jolt_s,
             still: None,
-            told: None,
+            commanded: None,
         }
     }
 }
@@ -277,7 +277,7 @@ impl Carrier for Hands {
             self.cursor += 1;
         }
         let turn = &self.turns[self.cursor];
-        let dwells = t_s >= turn.dwell[0] && t_s < turn.dwell[1] && self.told.is_none();
+        let dwells = t_s >= turn.dwell[0] && t_s < turn.dwell[1] && self.commanded.is_none();
         let step = dwells.then_some(self.cursor as u32);
         let turning = t_s < turn.start_s + turn.turn_s;
         let jolt = turn

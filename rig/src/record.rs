@@ -102,8 +102,8 @@ impl Run<'_> {
         self.next += 1;
         let mut instant = self.carrier.at(t_s);
         self.flaws.sway(&mut instant);
-        let felt = self.flaws.felt(&instant);
-        let pins = self.unit.step(&felt, self.plan.chamber_c(t_s));
+        let sensed = self.flaws.sensed(&instant);
+        let pins = self.unit.step(&sensed, self.plan.chamber_c(t_s));
         let mut readings = self.converter.read(&pins);
         readings.temp_c = self.flaws.thermometer(t_s, readings.temp_c);
         Row {

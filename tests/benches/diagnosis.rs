@@ -5,7 +5,7 @@
 use std::time::Instant;
 
 use mimu::diagnose::diagnose;
-use mimu::fit::{Method, Options};
+use mimu::fit::Options;
 use mimu::plan::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
@@ -55,12 +55,7 @@ fn main() {
     let blocks = &prepared.condensed.blocks;
     let minutes = blocks.last().map_or(0.0, |b| b.last_s) / 60.0;
     let read = begun.elapsed();
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    };
-    let found = diagnose(prepared.into(), options).expect("a diagnosis");
+    let found = diagnose(prepared.into(), Options::IN_SAMPLE).expect("a diagnosis");
     let diagnosed = begun.elapsed();
     let planned = next(&found);
     let all = begun.elapsed();

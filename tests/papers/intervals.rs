@@ -38,8 +38,12 @@ const NAMES: [&str; 4] = [
 /// On a table in random order, in the listed order, in the listed order with the noise of the unit at rest; and by hand.
 pub fn blocks() -> Vec<Block> {
     let hand = [by_hand(RUNS, false), by_hand(RUNS, true)].concat();
-    let [randomised, listed, known] = [Dwells::ByLot, Dwells::AsListed, Dwells::AsListedWithNoise]
-        .map(|dwells| with_a_table(RUNS, dwells));
+    let [randomised, listed, known] = [
+        Dwells::Randomised,
+        Dwells::AsListed,
+        Dwells::AsListedWithNoise,
+    ]
+    .map(|dwells| with_a_table(RUNS, dwells));
     let all = [randomised, listed, known, hand];
     let block = |(name, tallies): (_, &Vec<Tally>)| Block::table(name, &table(tallies));
     NAMES.into_iter().zip(&all).map(block).collect()

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::effects;
 use mimu::estimate::Observation;
-use mimu::fit::{Method, Options};
+use mimu::fit::Options;
 use mimu::plan::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -162,15 +162,6 @@ pub struct Case {
     pub left: Vec<String>,
 }
 
-/// Options of the diagnosis in the suites.
-pub(crate) fn options() -> Options {
-    Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    }
-}
-
 /// Rms of the difference between two recordings after an affine model, over the noise floor, for the sensor where it is larger.
 fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
     let of = |sensor: Sensor| {
@@ -275,7 +266,7 @@ pub fn case_on(plan: &str, ids: &[&str], seed: u64) -> Case {
     let noise = bench::noise_file(&file, seed, with.condensed.period_s);
     let with = with.with_noise(&noise).expect("its noise");
     let truth: Vec<String> = ids.iter().map(|id| (*id).into()).collect();
-    let found: Diagnosis = match diagnose(with.into(), options()) {
+    let found: Diagnosis = match diagnose(with.into(), Options::IN_SAMPLE) {
         Ok(found) => found,
         // If an error is so large that the readings no longer follow their inputs, the recording is refused before the diagnosis.
         Err(refusal) => {

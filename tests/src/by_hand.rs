@@ -4,7 +4,7 @@
 //! truth.
 
 use mimu::diagnose::{Diagnosis, diagnose};
-use mimu::fit::{Fit, fit};
+use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu_rig::flaws::FlawsTruth;
@@ -13,7 +13,7 @@ use mimu_rig::rig_file::{AffineFile, Parts, RigFile};
 use nalgebra::SVector;
 
 use crate::bench;
-use crate::blind::{options, reported, with_effects};
+use crate::blind::{reported, with_effects};
 
 /// Effects that a few minutes by hand can show: hands have no steady rate, and the temperature does not go up and down.
 pub const SHOWN: [&str; 10] = [
@@ -167,7 +167,7 @@ pub fn plan(seed: u64) -> String {
 /// Rms that the affine fit of `with` leaves in excess of that of `without`, over the noise, for the sensor where it is larger.
 fn strength(with: &Prepared, without: &Prepared) -> f64 {
     let chi = |prepared: &Prepared, sensor: Sensor| {
-        let fit = fit(prepared.clone(), options()).ok()?;
+        let fit = fit(prepared.clone(), Options::IN_SAMPLE).ok()?;
         let residuals = &fit.sensor(sensor)?.residuals;
         let squares = residuals
             .iter()
@@ -254,7 +254,7 @@ pub(crate) fn case_of(
         inside,
         left,
     };
-    let diagnosis: Diagnosis = match diagnose(with.into(), options()) {
+    let diagnosis: Diagnosis = match diagnose(with.into(), Options::IN_SAMPLE) {
         Ok(diagnosis) => reported(diagnosis),
         Err(refusal) => {
             return case(

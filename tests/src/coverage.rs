@@ -124,7 +124,7 @@ fn over(runs: u64, empty: &[Tally], case: impl Fn(u64, &mut [Tally]) + Sync) -> 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dwells {
     /// In a randomised order.
-    ByLot,
+    Randomised,
     /// As listed, axis by axis: neighbouring dwells share the wander of the bias and differ along one axis only.
     AsListed,
     /// As listed, fitted with the noise of the unit at rest.
@@ -158,7 +158,7 @@ pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
         }
     }
     over(runs, &empty, |seed, tallies| {
-        let plan = bench::table_plan((dwells == Dwells::ByLot).then_some(seed));
+        let plan = bench::table_plan((dwells == Dwells::Randomised).then_some(seed));
         let mut random = Random::new(seed, "unit");
         let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
         let file = bench::clean(gyro, accel);

@@ -7,7 +7,7 @@ use mimu::calibration::Calibration;
 use mimu::calibration::apply::apply;
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::effects::fitted::FittedEffect;
-use mimu::fit::fit;
+use mimu::fit::{Options, fit};
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::error::Result;
@@ -20,7 +20,7 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::bench;
-use crate::blind::{options, reported};
+use crate::blind::reported;
 use crate::by_hand::{Grade, unit};
 
 /// Creation time of every file.
@@ -385,7 +385,11 @@ fn judge(case: &mut Case) -> Result<()> {
     let sessions = 0..set.sessions as u64;
     let mut all: Vec<Prepared> = sessions.map(|k| set.recorded(k, k).prepared()).collect();
     let first = all.remove(0);
-    let without = written(&Calibration::of(&fit(first.clone(), options())?, &[], NOW)?)?;
+    let without = written(&Calibration::of(
+        &fit(first.clone(), Options::IN_SAMPLE)?,
+        &[],
+        NOW,
+    )?)?;
     let recordings = Recordings {
         first,
         more: all,
@@ -393,7 +397,7 @@ fn judge(case: &mut Case) -> Result<()> {
         given: None,
         accept: Vec::new(),
     };
-    let diagnosis = reported(diagnose(recordings, options())?);
+    let diagnosis = reported(diagnose(recordings, Options::IN_SAMPLE)?);
     case.verdict = diagnosis.verdict.name().into();
     let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
     case.found = accepted

@@ -13,19 +13,19 @@ use crate::by_hand::{Case, Grade, case_of, plan, unit};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// Linear in time, of a unit that has been on for an hour.
-    EvenDrift,
+    LinearDrift,
     /// Linear in time while the unit warms up after power-on.
-    EvenDriftFromPowerOn,
+    LinearDriftFromPowerOn,
     /// Exponential since power-on, with a time constant of an eighth to a third of the recording.
-    BentDrift,
+    ExponentialDrift,
     /// Linear in time, of the accelerometer.
-    AccelEvenDrift,
+    AccelLinearDrift,
     /// Exponential, of the accelerometer.
-    AccelBentDrift,
+    AccelExponentialDrift,
     /// Linear in the reported temperature, in a chamber that warms and cools.
-    StraightOverTemperature,
+    LinearOverTemperature,
     /// With a curvature of 1 % a kelvin.
-    BentOverTemperature,
+    CurvedOverTemperature,
     /// Linear in the temperature, plus a part that follows the temperature with a lag.
     LagBesideBias,
 }
@@ -33,26 +33,26 @@ pub enum Kind {
 impl Kind {
     /// All.
     pub const ALL: [Self; 8] = [
-        Self::EvenDrift,
-        Self::EvenDriftFromPowerOn,
-        Self::BentDrift,
-        Self::AccelEvenDrift,
-        Self::AccelBentDrift,
-        Self::StraightOverTemperature,
-        Self::BentOverTemperature,
+        Self::LinearDrift,
+        Self::LinearDriftFromPowerOn,
+        Self::ExponentialDrift,
+        Self::AccelLinearDrift,
+        Self::AccelExponentialDrift,
+        Self::LinearOverTemperature,
+        Self::CurvedOverTemperature,
         Self::LagBesideBias,
     ];
 
     /// In words.
     pub fn name(self) -> &'static str {
         match self {
-            Self::EvenDrift => "even drift",
-            Self::EvenDriftFromPowerOn => "even drift from power-on",
-            Self::BentDrift => "drift that bends",
-            Self::AccelEvenDrift => "accelerometer, even drift",
-            Self::AccelBentDrift => "accelerometer, drift that bends",
-            Self::StraightOverTemperature => "bias over temperature, straight",
-            Self::BentOverTemperature => "bias over temperature, bent",
+            Self::LinearDrift => "even drift",
+            Self::LinearDriftFromPowerOn => "even drift from power-on",
+            Self::ExponentialDrift => "drift that bends",
+            Self::AccelLinearDrift => "accelerometer, even drift",
+            Self::AccelExponentialDrift => "accelerometer, drift that bends",
+            Self::LinearOverTemperature => "bias over temperature, straight",
+            Self::CurvedOverTemperature => "bias over temperature, bent",
             Self::LagBesideBias => "lag beside a bias over temperature",
         }
     }
@@ -60,11 +60,11 @@ impl Kind {
     /// Its effects.
     pub fn effects(self) -> &'static [&'static str] {
         match self {
-            Self::EvenDrift | Self::EvenDriftFromPowerOn => &["gyro_bias_drift"],
-            Self::BentDrift => &["gyro_warm_up"],
-            Self::AccelEvenDrift => &["accel_bias_drift"],
-            Self::AccelBentDrift => &["accel_warm_up"],
-            Self::StraightOverTemperature | Self::BentOverTemperature => &["gyro_thermal_bias"],
+            Self::LinearDrift | Self::LinearDriftFromPowerOn => &["gyro_bias_drift"],
+            Self::ExponentialDrift => &["gyro_warm_up"],
+            Self::AccelLinearDrift => &["accel_bias_drift"],
+            Self::AccelExponentialDrift => &["accel_warm_up"],
+            Self::LinearOverTemperature | Self::CurvedOverTemperature => &["gyro_thermal_bias"],
             Self::LagBesideBias => &["gyro_thermal_bias", "gyro_thermal_lag"],
         }
     }
@@ -72,12 +72,12 @@ impl Kind {
     fn in_chamber(self) -> bool {
         matches!(
             self,
-            Self::StraightOverTemperature | Self::BentOverTemperature | Self::LagBesideBias
+            Self::LinearOverTemperature | Self::CurvedOverTemperature | Self::LagBesideBias
         )
     }
 
     fn is_warm(self) -> bool {
-        self.in_chamber() || matches!(self, Self::EvenDrift | Self::AccelEvenDrift)
+        self.in_chamber() || matches!(self, Self::LinearDrift | Self::AccelLinearDrift)
     }
 
     /// 3 to 5 minutes on a warm desk, or 9 minutes in which the unit warms by some 15 K and cools again.
@@ -157,16 +157,16 @@ impl Kind {
         let tau_s = session_s / 8.0 * (8.0 / 3.0f64).powf(form.uniform());
         let lag_s = 20.0 * 3f64.powf(form.uniform());
         match self {
-            Self::BentDrift | Self::AccelBentDrift => {
+            Self::ExponentialDrift | Self::AccelExponentialDrift => {
                 add("time_constant_s", toml::Value::Float(tau_s));
             }
             Self::LagBesideBias if k == 1 => {
                 add("lag_s", toml::Value::Float(lag_s));
             }
-            Self::StraightOverTemperature | Self::LagBesideBias => {
+            Self::LinearOverTemperature | Self::LagBesideBias => {
                 add("curvature_per_c", toml::Value::Float(1e-6));
             }
-            Self::BentOverTemperature => {
+            Self::CurvedOverTemperature => {
                 add("curvature_per_c", toml::Value::Float(0.01));
             }
             _ => {}

@@ -4,6 +4,7 @@
 //! beside bare polynomials. Outside the fitted temperatures the polynomials continue to bend, and the estimators' curves continue along their slope.
 
 use mimu::quantity::Sensor;
+use mimu_tests::recordings::data_set;
 use mimu_thermal::basis::Shape;
 use mimu_thermal::points::{Point, curves};
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -25,9 +26,8 @@ struct Burst {
 
 /// The bursts of the recording; `None` if the data are missing.
 fn bursts() -> Option<Vec<Burst>> {
-    let beside = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let all = std::env::var_os("MIMU_DATA").map_or(beside, Into::into);
-    let text = std::fs::read_to_string(all.join("pan_tvac_gyro/TVCtest3_7_20.csv")).ok()?;
+    let file = data_set("pan_tvac_gyro")?.join("TVCtest3_7_20.csv");
+    let text = std::fs::read_to_string(file).ok()?;
     let mut samples: Vec<Vec<(f64, Vector3<f64>)>> = Vec::new();
     let mut before = f64::NEG_INFINITY;
     for line in text.lines().skip(1) {

@@ -2,12 +2,11 @@
 // file handles the port, the prompts and the person's answers.
 
 import { unzip, zip } from "./archive.js";
+import { $, made } from "./elements.js";
 import { cut } from "./fields.js";
 import { Program, Refused } from "./program.js";
 import { NO_SERIAL, Port, now } from "./serial.js";
 import * as session from "./session.js";
-
-const $ = (id) => document.getElementById(id);
 
 /** Field that sets an argument of `mimu wizard`. */
 const FIELDS = {
@@ -38,12 +37,6 @@ let worker;
 const program = () => (worker ??= new Program(() => {}, said));
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
-
-function made(name, properties, ...children) {
-  const element = Object.assign(document.createElement(name), properties);
-  element.append(...children);
-  return element;
-}
 
 /** Bytes as the characters with these codes, so that garbled bytes stay unchanged. */
 function characters(bytes) {

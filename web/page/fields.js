@@ -1,5 +1,7 @@
 // From the form to the arguments of `mimu import`.
 
+import { $, made } from "./elements.js";
+
 const ROLES = [
   ["-", "not used"],
   ["t_s", "time"],
@@ -25,14 +27,6 @@ export const FIELD_OF = {
   "--steps": "more-fit", "--only": "more-fit", "--keep": "more-fit",
 };
 
-const field = (id) => document.getElementById(id);
-
-function made(name, properties, ...children) {
-  const element = Object.assign(document.createElement(name), properties);
-  element.append(...children);
-  return element;
-}
-
 /** Shows the columns of `looked`, the answer of `columns`, each with its guessed role. */
 export function show(looked) {
   const lists = looked.files.map((file, k) => {
@@ -54,17 +48,17 @@ export function show(looked) {
       : made("ul", { className: "column-list" }, ...columns);
     return made("fieldset", { className: "file" }, legend, content);
   });
-  field("files").replaceChildren(...lists);
+  $("files").replaceChildren(...lists);
   const { preset, files } = looked;
   const guessed = files.some((file) => file.by_readings);
-  field("taken").textContent = files.every((file) => file.log)
+  $("taken").textContent = files.every((file) => file.log)
     ? ""
     : preset
       ? `Recognised by its header: ${preset.title}.`
       : guessed
         ? "The file has no names of columns, so they were guessed from the readings. Check them."
         : "By the names in the file. Correct what is wrong.";
-  const say = (id, value) => (field(id).value = value);
+  const say = (id, value) => ($(id).value = value);
   const of = (key) => files.map((file) => file[key]).find(Boolean);
   const si = preset?.raw_unit === "SI";
   say("accel-unit", si ? "m/s²" : (of("accel_unit") ?? "count"));
@@ -76,15 +70,15 @@ export function show(looked) {
     const roles = chosen();
     const has = (start) => roles.flat().some((role) => role.startsWith(start));
     const log = files.some((file) => file.log);
-    field("accel-unit-field").hidden = log || !has("accel_");
-    field("gyro-unit-field").hidden = log || !has("gyro_");
-    field("time-unit-field").hidden = log || !has("t_s");
-    field("rate-field").hidden = log;
+    $("accel-unit-field").hidden = log || !has("accel_");
+    $("gyro-unit-field").hidden = log || !has("gyro_");
+    $("time-unit-field").hidden = log || !has("t_s");
+    $("rate-field").hidden = log;
     const timeless = !log && !has("t_s");
-    field("rate").required = timeless;
-    field("rate").placeholder = timeless ? "needed: no column is the time" : "from the time stamps";
-    field("topic-field").hidden = !log;
-    field("several-field").hidden = files.length < 2;
+    $("rate").required = timeless;
+    $("rate").placeholder = timeless ? "needed: no column is the time" : "from the time stamps";
+    $("topic-field").hidden = !log;
+    $("several-field").hidden = files.length < 2;
     if (has("ref_")) say("reference", "table");
   }
 }
@@ -100,7 +94,7 @@ export function cut(text) {
 }
 
 /** How several files belong together: joined, one pose each, or separate recordings. */
-export const several = (looked) => (looked.files.length > 1 ? field("several").value : "");
+export const several = (looked) => (looked.files.length > 1 ? $("several").value : "");
 
 /** The arguments of `mimu import` without its output, for each recording that the files of `looked` make. */
 export function imports(looked, names) {
@@ -123,19 +117,19 @@ function importArguments(looked, names, roles, device, alone = false) {
     else roles.forEach((list) => args.push("--columns", list.join(",")));
     if (preset && !as) preset.scales.forEach((scale) => args.push("--scale", scale));
     const present = ["accel", "gyro"].filter((sensor) => roles.flat().some((role) => role.startsWith(sensor)));
-    const units = present.map((sensor) => field(`${sensor}-unit`).value);
+    const units = present.map((sensor) => $(`${sensor}-unit`).value);
     const si = present.every((sensor, k) => units[k] in TO_SI[sensor]);
     if (si) {
       present.forEach((sensor, k) => TO_SI[sensor][units[k]] !== 1 && args.push("--scale", `${sensor}=${TO_SI[sensor][units[k]]}`));
       args.push("--raw-unit", "SI");
     } else args.push("--raw-unit", units.every((unit) => unit === "V") ? "V" : "count");
-    add("--time-unit", field("time-unit").value);
-    add("--rate-hz", field("rate").value.trim().replace(",", "."));
-  } else add("--topic", field("topic").value.trim());
-  add("--gravity", field("gravity").value.trim().replace(",", "."));
-  add("--latitude", field("latitude").value.trim().replace(",", "."));
-  args.push("--reference", field("reference").value);
+    add("--time-unit", $("time-unit").value);
+    add("--rate-hz", $("rate").value.trim().replace(",", "."));
+  } else add("--topic", $("topic").value.trim());
+  add("--gravity", $("gravity").value.trim().replace(",", "."));
+  add("--latitude", $("latitude").value.trim().replace(",", "."));
+  args.push("--reference", $("reference").value);
   if (several(looked)) args.push(`--${several(looked)}`);
-  if (field("broken").value) args.push(`--skip-broken=${field("broken").value}`);
-  return [...args, "--device", device, ...cut(field("more-import").value), "--replace", "--json", "import.json"];
+  if ($("broken").value) args.push(`--skip-broken=${$("broken").value}`);
+  return [...args, "--device", device, ...cut($("more-import").value), "--replace", "--json", "import.json"];
 }

@@ -1,24 +1,17 @@
 // The page: from dropped files to a calibration, one step after the other.
 
 import { loadJournal, offerBoards } from "./board.js";
+import { $, made } from "./elements.js";
 import { FORMATS } from "./exports.js";
 import { FIELD_OF, cut, imports, several, show } from "./fields.js";
 import { Cancelled, Program, Refused, load } from "./program.js";
 import { sphere } from "./sphere.js";
-
-const $ = (id) => document.getElementById(id);
 
 /**
  * The files that were dropped last and what was found in them, or a later session with a board; and the results from these and earlier ones, as
  * the text of each file.
  */
 const state = { files: [], looked: null, session: null, recordings: ["rec"], program: null, calibration: null, noise: null, from: {}, example: false };
-
-function made(name, properties, ...children) {
-  const element = Object.assign(document.createElement(name), properties);
-  element.append(...children);
-  return element;
-}
 
 /** Text in which each argument of the command links to the field that sets it. */
 function withFields(text, fields = FIELD_OF) {

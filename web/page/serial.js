@@ -32,10 +32,6 @@ export class Port {
     }
   }
 
-  get chosen() {
-    return this.port !== null;
-  }
-
   get isOpen() {
     return this.reading !== null;
   }

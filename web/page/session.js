@@ -1,22 +1,16 @@
 // The state of a session as the page shows it: what to do next, how far it is, what was received and what has happened.
 
+import { $, made } from "./elements.js";
 import { pose } from "./pose.js";
 import { now } from "./serial.js";
 import { sphere } from "./sphere.js";
 
-const $ = (id) => document.getElementById(id);
 const digits = (value) => Number(value.toPrecision(3)).toString();
 const capital = (words) => words.slice(0, 1).toUpperCase() + words.slice(1);
 const WAITING = { "warm-up": "Leave the board still.", diagnosis: "The dwells are evaluated …", store: "The dwells are evaluated …" };
 
 /** `journal` reads the journal of the session that is shown. */
 let shown = {};
-
-function made(name, properties, ...children) {
-  const element = Object.assign(document.createElement(name), properties);
-  element.append(...children);
-  return element;
-}
 
 /** Begins to show a session whose journal is read by `journal`. */
 export function begin(journal) {

@@ -43,11 +43,10 @@ const answers = {
     root.entries.set(name, new MemoryFile(new TextEncoder().encode(text)));
   },
   run({ args }) {
-    const begun = performance.now();
     try {
-      return { ...run(module, root, ["mimu", ...args]), ms: performance.now() - begun };
+      return run(module, root, ["mimu", ...args]);
     } catch (trap) {
-      return { status: 1, stdout: "", stderr: `mimu: ${broken(trap)}`, ms: performance.now() - begun };
+      return { status: 1, stdout: "", stderr: `mimu: ${broken(trap)}` };
     }
   },
   /** Begins a session with a board by the arguments of `mimu wizard`, or resumes the one in the folder. */

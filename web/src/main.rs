@@ -20,7 +20,7 @@ use mimu::calibration::Calibration;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{ColumnList, Look, Preset, Recording, look};
+use mimu_recording::{ColumnList, Preset, Preview, Recording, preview};
 use serde::Serialize;
 
 /// Rows of a file that the page shows.
@@ -88,7 +88,7 @@ struct Recognised {
 struct DroppedFile {
     file: String,
     #[serde(flatten)]
-    look: Look,
+    preview: Preview,
     #[serde(flatten)]
     guess: columns::Guess,
 }
@@ -100,25 +100,25 @@ fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
     };
     let mut files = Vec::new();
     for (k, path) in paths.iter().enumerate() {
-        let mut look = look(path, None)?;
+        let mut preview = preview(path, None)?;
         let number = |cell: &String| cell.replacen(',', ".", 1).parse().unwrap_or(f64::NAN);
-        let rows: Vec<Vec<f64>> = look
+        let rows: Vec<Vec<f64>> = preview
             .rows
             .iter()
             .map(|row| row.iter().map(number).collect())
             .collect();
-        look.rows.truncate(SHOWN);
+        preview.rows.truncate(SHOWN);
         let file = path.file_name().unwrap_or_default().to_string_lossy();
-        let mut guess = match look.log {
+        let mut guess = match preview.log {
             true => columns::Guess::default(),
-            false => columns::guess(&file, &look.names, &rows),
+            false => columns::guess(&file, &preview.names, &rows),
         };
         if let Some(list) = chosen.as_ref().and_then(|chosen| chosen.columns.get(k)) {
-            guess.roles = roles(list, &look.names);
+            guess.roles = roles(list, &preview.names);
         }
         files.push(DroppedFile {
             file: file.into_owned(),
-            look,
+            preview,
             guess,
         });
     }
@@ -155,10 +155,8 @@ fn roles(list: &ColumnList, names: &[String]) -> Vec<&'static str> {
 /// What the page shows of a recording.
 #[derive(Serialize)]
 struct View {
-    duration_s: f64,
     /// The readings over time with the dwells, as in the report.
     trace: String,
-    dwells: usize,
     #[serde(flatten)]
     poses: poses::Poses,
 }
@@ -172,12 +170,8 @@ fn view(recording: &Path, calibration: Option<&PathBuf>) -> Result<View> {
         steps: Steps::AsRecorded,
     };
     let prepared = Prepared::read(&Recording::open(recording)?, finding, |_| {})?;
-    let blocks = &prepared.condensed.blocks;
-    let times = blocks.first().zip(blocks.last());
     Ok(View {
-        duration_s: times.map_or(0.0, |(first, last)| last.start_s - first.start_s),
         trace: mimu_cli::report::trace_figure(&prepared),
-        dwells: prepared.dwells.list.len(),
         poses: poses::of(&prepared, calibration.as_ref()),
     })
 }

@@ -28,7 +28,7 @@ use std::sync::mpsc::{Sender, channel};
 
 use mimu_cli::called::{self, Refusal, Session};
 use mimu_cli::report::{wizard_lines, wizard_text};
-use mimu_wizard::event::{Event, Question, Standing, View, Wish};
+use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
 use mimu_wizard::relay::{Arrival, Stamped};
 use mimu_wizard::turn::go_on;
 use serde::Deserialize;
@@ -47,7 +47,7 @@ struct OpenSession {
 /// Input of the person that the session has not taken yet.
 #[derive(Default)]
 struct Person {
-    wishes: VecDeque<Wish>,
+    requests: VecDeque<UserRequest>,
     answer: Option<bool>,
 }
 
@@ -141,11 +141,11 @@ impl OpenSession {
                 person.answer = Some(answer);
                 return Ok(());
             }
-            Input::Wish(wish) => {
-                person.wishes.push_back(match wish {
-                    WishInput::Cancel => Wish::Cancel,
-                    WishInput::RedoLast => Wish::RedoLast,
-                    WishInput::Skip => Wish::Skip,
+            Input::Wish(request) => {
+                person.requests.push_back(match request {
+                    WishInput::Cancel => UserRequest::Cancel,
+                    WishInput::RedoLast => UserRequest::RedoLast,
+                    WishInput::Skip => UserRequest::Skip,
                 });
                 return Ok(());
             }
@@ -167,12 +167,12 @@ impl View for PageView {
         say(&json!({"event": event, "lines": wizard_lines(event)}));
     }
 
-    fn show(&mut self, standing: &Standing) {
+    fn show(&mut self, standing: &SessionState) {
         say(&json!({"standing": standing}));
     }
 
-    fn wish(&mut self) -> Option<Wish> {
-        self.person.borrow_mut().wishes.pop_front()
+    fn request(&mut self) -> Option<UserRequest> {
+        self.person.borrow_mut().requests.pop_front()
     }
 
     fn ask(&mut self, question: &Question) -> Option<bool> {

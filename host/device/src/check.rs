@@ -1,6 +1,6 @@
 //! Compares the compensated stream with this program's compensation of the raw stream, sample by sample.
 
-mod twin;
+mod host_reference;
 
 use std::time::{Duration, Instant};
 
@@ -9,18 +9,15 @@ use mimu_core::wire::Request;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::heard::{Event, Samples};
 use super::image::{Image, effects_of};
+use super::received::{Event, Samples};
 use super::session::Session;
+use host_reference::HostReference;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
-use twin::HostReference;
 
-pub use twin::rounding;
-
-/// Longest silence of a stream before the comparison fails.
-const SILENCE: Duration = Duration::from_secs(3);
+pub use host_reference::rounding;
 
 /// Largest differences found in one triad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -89,7 +86,8 @@ pub fn check(
         return Err(Error::device(session.port(), problem, remedy));
     }
     let rate_hz = session.who().sample_rate_hz;
-    let mut twin = HostReference::new(calibration, &image, rate_hz, powered_for_ms, place)?;
+    let mut host_reference =
+        HostReference::new(calibration, &image, rate_hz, powered_for_ms, place)?;
     let wanted = (duration.as_secs_f64() * f64::from(session.who().sample_rate_hz)) as u64;
     let mut found = Checked {
         samples: 0,
@@ -107,9 +105,9 @@ pub fn check(
     };
     session.begin_stream(both)?;
     let mut raw: Option<Samples> = None;
-    let mut heard = Instant::now();
+    let mut last = Instant::now();
     while found.samples < wanted {
-        match session.event()? {
+        match session.stream_event(last, "compensated stream")? {
             // The raw batch is always sent before the compensated one of the same samples.
             Some(Event::Raw(batch)) => {
                 let lost = raw.replace(batch);
@@ -118,7 +116,7 @@ pub fn check(
             Some(Event::Compensated(batch)) => {
                 let pair = raw.take().filter(|r| r.head.first == batch.head.first);
                 match pair.filter(|r| r.values.len() == batch.values.len()) {
-                    Some(raw) => twin.compare(&raw, &batch, &mut found),
+                    Some(raw) => host_reference.compare(&raw, &batch, &mut found),
                     None => found.unpaired += batch.values.len() as u64,
                 }
                 if found.unpaired > wanted.max(1000) {
@@ -126,27 +124,10 @@ pub fn check(
                     let remedy = "check the cable, and close other programs";
                     return Err(Error::device(session.port(), problem, remedy));
                 }
-                heard = Instant::now();
+                last = Instant::now();
                 progress(found.samples as f64 / wanted as f64);
             }
-            Some(Event::Started(_)) => {
-                let remedy = "run it again; `mimu device info` shows the reset cause";
-                return Err(Error::device(
-                    session.port(),
-                    "the device restarted meanwhile",
-                    remedy,
-                ));
-            }
-            Some(Event::Kalman(_)) => {}
-            None if heard.elapsed() > SILENCE => {
-                let problem = "the compensated stream does not arrive";
-                return Err(Error::device(
-                    session.port(),
-                    problem,
-                    "reset the board and run it again",
-                ));
-            }
-            None => {}
+            Some(Event::Started(_) | Event::Kalman(_)) | None => {}
         }
     }
     session.done(Request::Stop, "to stop streaming")?;

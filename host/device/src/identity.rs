@@ -41,7 +41,7 @@ pub struct Identity {
     /// Starts since the last power failure, including this one.
     pub starts: u32,
     /// The calibration in use.
-    pub stored: Option<Held>,
+    pub stored: Option<StoredCalibration>,
     /// Contents of the two slots for a calibration, in words.
     pub slots: [String; 2],
     /// Time since power-on at the start of sampling, ms; `None` if the device does not know it.
@@ -63,7 +63,7 @@ pub struct Room {
 
 /// The calibration in use, from the device's greeting.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Held {
+pub struct StoredCalibration {
     /// Identifies the calibration.
     pub hash: Hash,
     /// Length, bytes.
@@ -183,7 +183,7 @@ impl From<&Greeting<'_>> for Identity {
             raw_unit: greeting.raw_unit.into(),
             start: greeting.start.into(),
             starts: greeting.starts,
-            stored: greeting.stored.map(|held| Held {
+            stored: greeting.stored.map(|held| StoredCalibration {
                 hash: Hash(held.hash),
                 bytes: held.length,
                 nodes: held.nodes,

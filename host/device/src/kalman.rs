@@ -9,8 +9,8 @@ use mimu_core::wire::{Capabilities, KalmanState, Prior, Request};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::heard::{Answer, Event};
-use super::session::{PATIENCE, Session};
+use super::received::{Answer, Event};
+use super::session::{PATIENCE, SILENCE, Session};
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 
@@ -20,8 +20,6 @@ pub const SHORTEST: Duration = Duration::from_secs(1);
 const NOISE_SAMPLES: usize = 1000;
 /// Smallest variance of a reading, V²: rounding to 25 µV, the quantisation step of the converter's sums.
 const LEAST_VARIANCE: f64 = 25e-6 * 25e-6 / 12.0;
-/// Longest silence of the stream or the bank before the run fails.
-const SILENCE: Duration = Duration::from_secs(3);
 
 /// Inputs and settings of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +32,17 @@ pub struct KalmanPlan {
     pub each: Duration,
     /// Variances of single readings of the sensors x, y, z, V². `None`: estimated from a second of readings before the first input.
     pub noise: Option<[f32; 3]>,
+}
+
+impl KalmanPlan {
+    /// Largest magnitude of the inputs. If they are all zero it does not matter, but it has to be positive.
+    fn span(&self) -> f32 {
+        let largest = |s: f32, v: &f32| s.max(v.abs());
+        match self.inputs.as_flattened().iter().fold(0.0, largest) {
+            span if span > 0.0 => span,
+            _ => 1.0,
+        }
+    }
 }
 
 /// Estimate of one sensor: `[b, P1, P2, P3]`, V and V per rad/s or per m/s².
@@ -114,7 +123,8 @@ fn largest(distances: &[[f64; STATES]; 3]) -> f64 {
 struct Log {
     samples: BTreeMap<u32, Sample<f32>>,
     reports: Vec<KalmanState>,
-    heard: Instant,
+    /// When the last samples came.
+    last: Instant,
 }
 
 /// Runs a bank on the device. `apply` is called before each input and returns once it is applied; `progress` gets the fraction done.
@@ -136,7 +146,7 @@ pub fn kalman(
     let mut log = Log {
         samples: BTreeMap::new(),
         reports: Vec::new(),
-        heard: Instant::now(),
+        last: Instant::now(),
     };
     session.forget_events();
     let raw = Request::Stream {
@@ -148,7 +158,7 @@ pub fn kalman(
     let mut ends: Vec<u32> = Vec::new();
     for (at, input) in plan.inputs.iter().enumerate() {
         apply(input)?;
-        log.heard = Instant::now();
+        log.last = Instant::now();
         session.begin_stream(raw)?;
         // The input is set only after the first batch: the samples before it are missing here, and the bank must not use them.
         let before = log.samples.len();
@@ -162,14 +172,7 @@ pub fn kalman(
                 }
             }
             let noise = *noise.get_or_insert_with(|| variances(&log.samples, sensor));
-            let span = plan
-                .inputs
-                .as_flattened()
-                .iter()
-                .fold(0.0, |s: f32, v| s.max(v.abs()));
-            // At rest the span does not matter, but it has to be positive.
-            let span = if span > 0.0 { span } else { 1.0 };
-            let prior = Prior::Diffuse { span };
+            let prior = Prior::Diffuse { span: plan.span() };
             let start = Request::KalmanStart {
                 sensor,
                 noise,
@@ -230,31 +233,14 @@ pub fn kalman(
 
 impl Log {
     fn listen(&mut self, session: &mut Session, sensor: Sensor) -> Result<()> {
-        match session.event()? {
+        match session.stream_event(self.last, "raw stream")? {
             Some(Event::Raw(batch)) => {
                 let numbers = (0..).map(|k| batch.head.first.wrapping_add(k));
                 self.samples.extend(numbers.zip(batch.values));
-                self.heard = Instant::now();
+                self.last = Instant::now();
             }
             Some(Event::Kalman(state)) if state.sensor == sensor => self.reports.push(*state),
-            Some(Event::Started(_)) => {
-                let remedy = "run it again; `mimu device info` shows the reset cause";
-                return Err(Error::device(
-                    session.port(),
-                    "the device restarted meanwhile",
-                    remedy,
-                ));
-            }
-            Some(_) => {}
-            None if self.heard.elapsed() > SILENCE => {
-                let problem = "the raw stream does not arrive";
-                return Err(Error::device(
-                    session.port(),
-                    problem,
-                    "reset the board and run it again",
-                ));
-            }
-            None => {}
+            _ => {}
         }
         Ok(())
     }
@@ -314,13 +300,7 @@ fn replay(
     samples: &BTreeMap<u32, Sample<f32>>,
 ) -> Result<[AxisEstimate; 3]> {
     let noise = Vector3::from(noise.map(f64::from));
-    let span = plan
-        .inputs
-        .as_flattened()
-        .iter()
-        .fold(0.0, |s: f32, v| s.max(v.abs()));
-    let span = if span > 0.0 { f64::from(span) } else { 1.0 };
-    let mut bank = Bank::<f64>::diffuse(&noise, span);
+    let mut bank = Bank::<f64>::diffuse(&noise, plan.span().into());
     let mut missing = 0;
     for Applied { input, first, last } in inputs {
         let input = Vector3::from(input.map(f64::from));

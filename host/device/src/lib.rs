@@ -3,7 +3,7 @@
 //! | module            | what it is                                                               |
 //! |-------------------|--------------------------------------------------------------------------|
 //! | `port`            | the serial port, and why it cannot be opened                             |
-//! | `heard`           | decodes bytes into messages, and counts garbled ones                     |
+//! | `received`        | decodes bytes into messages, and counts garbled ones                     |
 //! | `line`, `session` | calls, each repeated until it is answered or refused                     |
 //! | `identity`        | the greeting: the device's identity, and whether it is compatible        |
 //! | `nominal`         | the sensors by their data sheets                                         |
@@ -23,7 +23,6 @@
 mod check;
 mod contents;
 mod flagged;
-mod heard;
 mod identity;
 mod image;
 mod kalman;
@@ -31,6 +30,7 @@ mod line;
 mod nominal;
 mod origin;
 mod port;
+mod received;
 pub mod record;
 mod result;
 mod self_test;
@@ -42,12 +42,12 @@ mod upload;
 pub use check::{Checked, Difference, check, rounding, ulps};
 pub use contents::{Contents, Inverse, NodeContents, calibration, contents};
 pub use flagged::Flagged;
-pub use heard::{Answer, Event, Heard, LineCount, Receiver, Samples};
-pub use identity::{Hash, Held, Identity, Room, Started, unit_name};
+pub use identity::{Hash, Identity, Room, Started, StoredCalibration, unit_name};
 pub use image::Image;
 pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
 pub use nominal::nominal;
 pub use port::{BAUD, Port, Ports, SerialPair, ports, serial_pair};
+pub use received::{Answer, Event, LineCount, Received, Receiver, Samples};
 pub use result::{Counted, DeviceResult};
 pub use self_test::{Passed, SelfTested, self_test};
 pub use session::{Session, refused};

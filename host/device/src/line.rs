@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use mimu_core::wire::{Call, MAX_FRAME, Request, encode};
 
-use super::heard::{Answer, Event, Heard, Receiver};
 use super::identity::check;
 use super::port::Port;
+use super::received::{Answer, Event, Received, Receiver};
 use mimu_recording::error::{Error, Result};
 
 /// Attempts at a call. Garbled frames are lost in both directions, and every call may be repeated.
@@ -21,7 +21,7 @@ const WAITING: usize = 6000;
 #[derive(Debug)]
 pub(super) struct Line {
     pub port: Port,
-    pub ear: Receiver,
+    pub receiver: Receiver,
     pub waiting: VecDeque<Event>,
     pub overflowed: u64,
     /// How many of the waiting events came before the last answer.
@@ -35,7 +35,7 @@ impl Line {
     pub fn new(port: Port) -> Self {
         Self {
             port,
-            ear: Receiver::default(),
+            receiver: Receiver::default(),
             waiting: VecDeque::new(),
             overflowed: 0,
             before_answer: 0,
@@ -60,14 +60,14 @@ impl Line {
                 .map_err(|e| Error::device(self.port.name(), e, "report this"))?;
             self.port.write(&frame[..length])?;
             let mut until = Instant::now() + wait;
-            let garbled = self.ear.count().garbled;
+            let garbled = self.receiver.count().garbled;
             let mut was_garbled = false;
             while Instant::now() < until {
                 if let Some(answer) = self.listen(Some(id))? {
                     return Ok(Some(answer));
                 }
                 // The garbled frame may have been the answer. The call is then repeated earlier.
-                if !was_garbled && self.ear.count().garbled > garbled {
+                if !was_garbled && self.receiver.count().garbled > garbled {
                     was_garbled = true;
                     until = until.min(Instant::now() + GARBLED);
                 }
@@ -84,16 +84,16 @@ impl Line {
         let mut stranger = None;
         let (waiting, overflowed) = (&mut self.waiting, &mut self.overflowed);
         let before_answer = &mut self.before_answer;
-        self.ear.take(&bytes[..count], |heard| match heard {
-            Heard::Event(event) if waiting.len() < WAITING => waiting.push_back(event),
-            Heard::Event(_) => *overflowed += 1,
+        self.receiver.take(&bytes[..count], |heard| match heard {
+            Received::Event(event) if waiting.len() < WAITING => waiting.push_back(event),
+            Received::Event(_) => *overflowed += 1,
             // Late answers to abandoned calls are ignored.
-            Heard::Answer(id, of) if Some(id) == wanted => {
+            Received::Answer(id, of) if Some(id) == wanted => {
                 *before_answer = waiting.len();
                 answer = Some(of);
             }
-            Heard::Answer(..) => {}
-            Heard::Stranger(_, magic, version) => stranger = Some((magic, version)),
+            Received::Answer(..) => {}
+            Received::Stranger(_, magic, version) => stranger = Some((magic, version)),
         });
         match stranger {
             Some((magic, version)) => {

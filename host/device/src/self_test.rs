@@ -9,7 +9,7 @@ use mimu::quantity::AXES;
 use mimu_core::wire::{Request, checks};
 use serde::Serialize;
 
-use super::heard::Answer;
+use super::received::Answer;
 use super::session::Session;
 use super::stream::{Moments, Stream, Streamed, stream};
 use mimu_recording::error::Result;

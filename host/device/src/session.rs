@@ -1,19 +1,21 @@
 //! A session with a device: calls, each answered or refused, and events.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use mimu_core::wire::{Refusal, Request};
 
-use super::heard::{Answer, Event, LineCount};
 use super::identity::Identity;
 use super::line::{ATTEMPTS, Line};
 use super::origin;
 use super::port::{Port, ports};
+use super::received::{Answer, Event, LineCount};
 use mimu_recording::error::{Argument, Error, Result};
 
 /// Longest wait for an answer without work. A frame takes 5 ms, and a frame of samples may be sent before it. With all attempts of a call, the wait
 /// also covers a device that is still storing what an earlier program committed.
 pub(super) const PATIENCE: Duration = Duration::from_millis(1500);
+/// Longest silence of a stream.
+pub(super) const SILENCE: Duration = Duration::from_secs(3);
 
 /// An open line to a compatible device that has sent its greeting.
 #[derive(Debug)]
@@ -72,7 +74,7 @@ impl Session {
     fn greet(port: Port) -> Result<Self> {
         let mut line = Line::new(port);
         let Some(Answer::Greeting(who)) = line.ask(Request::Hello, PATIENCE)? else {
-            return Err(no_greeting(line.port.name(), &line.ear.count()));
+            return Err(no_greeting(line.port.name(), &line.receiver.count()));
         };
         let mut session = Self { line, who: *who };
         if !session.line.waiting.is_empty() {
@@ -95,7 +97,7 @@ impl Session {
 
     /// Counts of what was received so far.
     pub fn count(&self) -> LineCount {
-        self.line.ear.count()
+        self.line.receiver.count()
     }
 
     /// Calls that had to be repeated because no answer came.
@@ -142,7 +144,7 @@ impl Session {
                 format!(
                     "the device does not answer the request {purpose}, made {ATTEMPTS} times in {:.0} s ({} frames were garbled)",
                     wait.as_secs_f64() * f64::from(ATTEMPTS),
-                    self.line.ear.count().garbled
+                    self.line.receiver.count().garbled
                 ),
                 "check the cable, reset the board and run it again",
             )),
@@ -175,6 +177,23 @@ impl Session {
             self.who = (**who).clone();
         }
         Ok(event)
+    }
+
+    /// The next event of a stream, whose last samples came at `last`; `name` is "raw stream", for example. A restart or a silence of 3 s is an error.
+    pub(super) fn stream_event(&mut self, last: Instant, name: &str) -> Result<Option<Event>> {
+        let event = self.event()?;
+        let (problem, remedy) = match &event {
+            Some(Event::Started(_)) => (
+                "the device restarted meanwhile".into(),
+                "run it again; `mimu device info` shows the reset cause",
+            ),
+            None if last.elapsed() > SILENCE => (
+                format!("the {name} does not arrive"),
+                "reset the board and run it again",
+            ),
+            _ => return Ok(event),
+        };
+        Err(Error::device(self.port(), problem, remedy))
     }
 
     /// Starts a stream, and discards events from before its confirmation. They may be batches of an earlier stream, which a gap would follow.

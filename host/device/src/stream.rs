@@ -7,12 +7,9 @@ use mimu_core::wire::{BatchHead, Request};
 use serde::Serialize;
 
 use super::flagged::Flagged;
-use super::heard::{Event, LineCount};
+use super::received::{Event, LineCount};
 use super::session::Session;
-use mimu_recording::error::{Error, Result};
-
-/// Longest silence of a stream before the command fails.
-const SILENCE: Duration = Duration::from_secs(3);
+use mimu_recording::error::Result;
 
 /// Which stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -99,7 +96,7 @@ pub fn stream(
     let wanted = duration.map(|d| (d.as_secs_f64() * rate_hz).round() as u64);
     let mut found = Streamed::new(which);
     let mut expected: Option<u32> = None;
-    let mut heard = Instant::now();
+    let mut last = Instant::now();
     let before = session.count();
     let request = Request::Stream {
         raw: which == Stream::Raw,
@@ -107,29 +104,12 @@ pub fn stream(
     };
     session.begin_stream(request)?;
     'all: while !stop() {
-        let batch = match (session.event()?, which) {
+        let batch = match (session.stream_event(last, "stream")?, which) {
             (Some(Event::Raw(batch)), Stream::Raw)
             | (Some(Event::Compensated(batch)), Stream::Compensated) => batch,
-            (Some(Event::Started(_)), _) => {
-                let remedy = "run it again; `mimu device info` shows the reset cause";
-                return Err(Error::device(
-                    session.port(),
-                    "the device restarted meanwhile",
-                    remedy,
-                ));
-            }
-            (Some(_), _) => continue,
-            (None, _) if heard.elapsed() > SILENCE => {
-                let problem = "the stream does not arrive";
-                return Err(Error::device(
-                    session.port(),
-                    problem,
-                    "reset the board and run it again",
-                ));
-            }
-            (None, _) => continue,
+            _ => continue,
         };
-        heard = Instant::now();
+        last = Instant::now();
         found.temp_c = f64::from(batch.head.temp_c);
         found.gyro_temps_c = batch.gyro_temps_c;
         for (k, sample) in (0..).zip(&batch.values) {

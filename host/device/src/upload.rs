@@ -7,10 +7,10 @@ use mimu_core::stored;
 use mimu_core::wire::{CHUNK, Refusal, Request};
 use serde::Serialize;
 
-use super::heard::Answer;
 use super::identity::Hash;
 use super::image::Image;
 use super::origin;
+use super::received::Answer;
 use super::session::{PATIENCE, Session, refused};
 use super::stream::{Stream, stream};
 use mimu::calibration::Calibration;
@@ -65,14 +65,14 @@ pub fn upload(
     let mut restarts = 0;
     if !was_there {
         while !send(session, image, other_unit, &progress)
-            .map_err(|error| told(session, image, error))?
+            .map_err(|error| with_stored_calibration(session, image, error))?
         {
             restarts += 1;
             if restarts == BEGINNINGS {
                 let problem = format!("the device restarted in each of {BEGINNINGS} uploads");
                 let remedy = "check its supply; `mimu device info` shows the reset cause";
                 let error = Error::device(session.port(), problem, remedy);
-                return Err(told(session, image, error));
+                return Err(with_stored_calibration(session, image, error));
             }
         }
     }
@@ -183,7 +183,7 @@ pub fn outside_now(session: &mut Session, calibration: &Calibration) -> Result<O
 }
 
 /// `error`, with the calibration that the device stores now.
-fn told(session: &mut Session, image: &Image, error: Error) -> Error {
+fn with_stored_calibration(session: &mut Session, image: &Image, error: Error) -> Error {
     let holds = match session.hello() {
         Ok(who) => match &who.stored {
             None => "the device stores no calibration, as before".to_string(),

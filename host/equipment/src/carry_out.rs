@@ -10,7 +10,9 @@ mod sequence;
 use std::cell::RefCell;
 
 use mimu_device::Session;
-use mimu_device::record::{Known, Procedure, RecordOptions, RecordSummary, Standing, Wish, record};
+use mimu_device::record::{
+    Known, Procedure, RecordOptions, RecordSummary, RecordingState, UserRequest, record,
+};
 use mimu_recording::error::{Error, Result};
 use serde::{Serialize, Serializer};
 
@@ -85,11 +87,11 @@ pub fn carry_out(
         cut_short: None,
         not_at_rest: Vec::new(),
     });
-    let look = |standing: &Standing| {
+    let look = |state: &RecordingState| {
         let mut run = run.borrow_mut();
-        let wish = run.look(standing, &stop);
-        show(&run.progress(standing));
-        wish
+        let request = run.look(state, &stop);
+        show(&run.progress(state));
+        request
     };
     let recorded = record(session, options, known, look, finishing);
     let mut run = run.into_inner();
@@ -133,18 +135,18 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Advances the procedure, and returns the requests to the recording.
-    fn look(&mut self, standing: &Standing, stop: &impl Fn() -> bool) -> Wish {
-        if standing.ended {
+    fn look(&mut self, state: &RecordingState, stop: &impl Fn() -> bool) -> UserRequest {
+        if state.ended {
             self.rest();
         }
         let Some(equipment) = &mut self.equipment else {
-            return Wish::default();
+            return UserRequest::default();
         };
         if let Some(error) = equipment.take_news() {
             return self.end(error, true);
         }
         if stop() {
-            let place = standing.last_s.unwrap_or_default();
+            let place = state.last_s.unwrap_or_default();
             let place = format!("at {place:.1} s");
             let problem = "it was interrupted and is incomplete";
             return self.end(
@@ -153,38 +155,38 @@ impl Run<'_> {
             );
         }
         let seen = Seen {
-            now_s: self.sequence.clock(standing),
-            line_lost: standing.waiting,
+            now_s: self.sequence.clock(state),
+            line_lost: state.waiting,
             arrived: equipment.is_done(),
             chamber_c: equipment.chamber_c(),
         };
-        let does = self.sequence.look(&seen);
-        for order in does.orders {
+        let actions = self.sequence.look(&seen);
+        for order in actions.orders {
             equipment.order(order);
         }
         let running = self.sequence.running();
         let wrong = self
             .checked
             .as_mut()
-            .and_then(|checked| checked.look(running, &self.procedure.dwells, standing));
+            .and_then(|checked| checked.look(running, &self.procedure.dwells, state));
         if let Some((dwell, error)) = wrong {
-            let mut wish = self.end(error, false);
-            (wish.marks, wish.drop) = (does.marks, Some(dwell as i32));
-            return wish;
+            let mut request = self.end(error, false);
+            (request.marks, request.drop) = (actions.marks, Some(dwell as i32));
+            return request;
         }
-        Wish {
+        UserRequest {
             end: false,
-            marks: does.marks,
+            marks: actions.marks,
             drop: None,
         }
     }
 
     /// Ends the procedure. If `spoiled`, the running dwell is discarded.
-    fn end(&mut self, error: Error, spoiled: bool) -> Wish {
+    fn end(&mut self, error: Error, spoiled: bool) -> UserRequest {
         self.cut_short = Some(error);
         self.rest();
         let running = self.sequence.running().filter(|_| spoiled);
-        Wish {
+        UserRequest {
             end: true,
             marks: 0,
             drop: running.map(|k| k as i32),
@@ -197,8 +199,8 @@ impl Run<'_> {
         }
     }
 
-    fn progress(&self, standing: &Standing) -> Progress {
+    fn progress(&self, state: &RecordingState) -> Progress {
         let chamber_c = self.equipment.as_ref().and_then(Equipment::chamber_c);
-        Progress::of(self.procedure, &self.sequence, standing, chamber_c)
+        Progress::of(self.procedure, &self.sequence, state, chamber_c)
     }
 }

@@ -15,7 +15,7 @@ use crate::step::Step;
 /// Moves the unit, switches its supply, and changes its temperature.
 pub trait Driver: Send {
     /// Why motion is blocked by the interlock; `None` if it is allowed.
-    fn held(&mut self) -> Result<Option<String>>;
+    fn interlock(&mut self) -> Result<Option<String>>;
 
     /// Begins to move to a step.
     fn go(&mut self, step: &Step) -> Result<()>;
@@ -106,7 +106,7 @@ pub struct ChamberLimits {
 pub struct Person;
 
 impl Driver for Person {
-    fn held(&mut self) -> Result<Option<String>> {
+    fn interlock(&mut self) -> Result<Option<String>> {
         Ok(None)
     }
 
@@ -135,9 +135,9 @@ impl Driver for Person {
 pub struct Together(pub Vec<Box<dyn Driver>>);
 
 impl Driver for Together {
-    fn held(&mut self) -> Result<Option<String>> {
+    fn interlock(&mut self) -> Result<Option<String>> {
         for driver in &mut self.0 {
-            if let Some(why) = driver.held()? {
+            if let Some(why) = driver.interlock()? {
                 return Ok(Some(why));
             }
         }

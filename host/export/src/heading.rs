@@ -10,12 +10,7 @@ use crate::{Export, Sources};
 /// Header of a file made from a calibration, without comment signs.
 pub fn of_calibration(calibration: &Calibration, export: &Export) -> Vec<String> {
     let date = calibration.created.as_deref().unwrap_or("an unknown date");
-    let mut lines = vec![format!(
-        "{}: {}, by mimu {}",
-        calibration.device,
-        what(export.to),
-        env!("CARGO_PKG_VERSION")
-    )];
+    let mut lines = vec![first_line(&calibration.device, export)];
     let unit = match &calibration.unit_id {
         Some(id) => format!("unit {id}, "),
         None => String::new(),
@@ -29,7 +24,7 @@ pub fn of_calibration(calibration: &Calibration, export: &Export) -> Vec<String>
             ));
         }
     }
-    lines.extend(said(export));
+    lines.extend(notes_and_remaining(export));
     lines
 }
 
@@ -40,37 +35,27 @@ pub fn of_biases(biases: &ThermalBiases, export: &Export) -> Vec<String> {
         None => String::new(),
     };
     let mut lines = vec![
-        format!(
-            "{}: {}, by mimu {}",
-            biases.device,
-            what(export.to),
-            env!("CARGO_PKG_VERSION")
-        ),
+        first_line(&biases.device, export),
         format!(
             "{unit}biases over temperature from a recording at rest, evaluated {}; readings in {}",
             biases.created, biases.recording.raw_unit
         ),
     ];
-    lines.extend(said(export));
+    lines.extend(notes_and_remaining(export));
     lines
 }
 
 /// Header of a file made from noise, without comment signs.
 pub fn of_noise(noise: &NoiseFile, export: &Export) -> Vec<String> {
     let mut lines = vec![
-        format!(
-            "{}: {}, by mimu {}",
-            noise.device,
-            what(export.to),
-            env!("CARGO_PKG_VERSION")
-        ),
+        first_line(&noise.device, export),
         format!(
             "from {:.0} s at rest, evaluated {}",
             noise.duration_s,
             noise.created.as_deref().unwrap_or("at an unknown date")
         ),
     ];
-    lines.extend(said(export));
+    lines.extend(notes_and_remaining(export));
     lines
 }
 
@@ -97,7 +82,7 @@ pub fn needs_calibrated(from: &Sources) -> Option<String> {
 }
 
 /// Lines after the first ones, for the file and the terminal.
-pub fn said(export: &Export) -> Vec<String> {
+pub fn notes_and_remaining(export: &Export) -> Vec<String> {
     let mut lines = export.formulas.clone();
     lines.extend(export.notes.iter().cloned());
     if !export.remaining.is_empty() {
@@ -114,6 +99,7 @@ pub fn comments(sign: &str, lines: &[String]) -> String {
     lines.iter().map(line).collect()
 }
 
-fn what(to: &str) -> String {
-    format!("for {to}")
+fn first_line(device: &str, export: &Export) -> String {
+    let (to, version) = (export.to, env!("CARGO_PKG_VERSION"));
+    format!("{device}: for {to}, by mimu {version}")
 }

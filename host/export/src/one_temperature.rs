@@ -35,7 +35,7 @@ pub(crate) fn offsets(
     options: &parameters::Options,
     export: &mut Export,
 ) -> Result<Vec<Offsets>> {
-    let known = options.conversions();
+    let known = options.driver.conversions();
     export.formulas.push(
         "x = (v - offset) scale on each axis, raw to SI; v is the driver's output for a raw reading; a gyro has no scale.".into(),
     );

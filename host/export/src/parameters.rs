@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use mimu::calibration::bias_cubic::KnownConversion;
 use mimu::quantity::PerSensor;
 use serde::Serialize;
 
@@ -80,11 +79,6 @@ pub struct Options {
 }
 
 impl Options {
-    /// Conversions of the drivers, as far as the user knows them.
-    pub fn conversions(&self) -> PerSensor<KnownConversion> {
-        self.driver.conversions()
-    }
-
     /// Device ids, as far as the user knows them. Autopilots store them bit by bit in signed parameters.
     pub fn ids(&self) -> PerSensor<Option<i32>> {
         PerSensor::from([self.gyro_id, self.accel_id]).map(|id| id.map(|id| id as i32))

@@ -125,7 +125,7 @@ fn each_sensor(
     of: impl Fn(Sensor, &KnownConversion) -> Result<Option<BiasCubics>>,
     none: impl Fn(Sensor) -> String,
 ) -> Result<()> {
-    let mut conversions = options.conversions();
+    let mut conversions = options.driver.conversions();
     export.notes.push(AXES_OF_THE_RECORDING.into());
     for sensor in Sensor::BOTH {
         let known = std::mem::take(&mut conversions[sensor]);

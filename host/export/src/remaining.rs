@@ -174,14 +174,12 @@ fn inputs(sensor: Sensor) -> impl Iterator<Item = Vector3<f64>> {
 fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> Remaining {
     const SOURCE: &str = "95 % interval of the calibrated output";
     let forward = Forward::of(model);
-    let (Some(covariance), Some(forward)) = (calibration.covariance(sensor), forward) else {
+    let both = calibration
+        .table(sensor)
+        .zip(calibration.covariance(sensor));
+    let (Some((table, covariance)), Some(forward)) = (both, forward) else {
         return Remaining::unknown(sensor, SOURCE, "the calibration has no intervals");
     };
-    let table = calibration.table(sensor);
-    // With few dwells, intervals are wider than 1.96 sigma. The file gives both.
-    let widened = table
-        .and_then(|t| Some(t.interval_o?[0] / t.sigma_o?[0]))
-        .filter(|k| k.is_finite());
     let half = inputs(sensor).map(|x| {
         let raw = forward.matrix * x + forward.bias;
         Vector3::from_fn(|row, _| {
@@ -192,7 +190,7 @@ fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> R
                 .flat_map(|i| (0..12).map(move |j| (i, j)))
                 .map(|(i, j)| gradient[i] * covariance[(i, j)] * gradient[j])
                 .sum();
-            widened.unwrap_or(1.96) * variance.max(0.0).sqrt()
+            table.interval_sigmas() * variance.max(0.0).sqrt()
         })
     });
     Remaining::new(sensor, SOURCE, at_input(sensor), &half.collect::<Vec<_>>())

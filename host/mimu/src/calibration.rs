@@ -182,6 +182,14 @@ pub struct TriadTable {
     pub physical: PhysicalTable,
 }
 
+impl TriadTable {
+    /// Half-width of the 95 % intervals in standard deviations: with few dwells it exceeds 1.96. The file gives both.
+    pub fn interval_sigmas(&self) -> f64 {
+        let ratio = self.interval_o.zip(self.sigma_o).map(|(i, s)| i[0] / s[0]);
+        ratio.filter(|k| k.is_finite()).unwrap_or(1.96)
+    }
+}
+
 /// Error figures of the fit.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]

@@ -78,14 +78,20 @@ impl Default for Options {
     /// Least squares of both triads, judged on four contiguous blocks.
     fn default() -> Self {
         Self {
-            method: Method::LeastSquares,
             holdout_blocks: 4,
-            only: None,
+            ..Self::IN_SAMPLE
         }
     }
 }
 
 impl Options {
+    /// As the default, but nothing is held out.
+    pub const IN_SAMPLE: Self = Self {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        only: None,
+    };
+
     fn wants(&self, sensor: Sensor) -> bool {
         self.only.is_none_or(|only| only == sensor)
     }

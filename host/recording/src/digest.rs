@@ -16,7 +16,10 @@ use crate::error::{Error, Result};
 /// The file is read twice, the second time from the page cache. If the readers passed their chunks on in file order instead, the slower side would
 /// hold up the other.
 #[cfg(not(target_family = "wasm"))]
-pub(super) fn beside<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<(T, String)> {
+pub(super) fn while_hashing<T>(
+    path: &Path,
+    work: impl FnOnce() -> Result<T>,
+) -> Result<(T, String)> {
     /// Tells the hashing thread to stop when the reading ends in an error, or panics.
     struct Stop<'a>(&'a AtomicBool, bool);
     impl Drop for Stop<'_> {
@@ -36,14 +39,19 @@ pub(super) fn beside<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result
         drop(guard);
         match digest.join() {
             Ok(hex) => Ok((done, hex?)),
-            Err(_) => Err(super::in_order::broke_down(&path.display().to_string())),
+            Err(_) => Err(super::in_order::reader_panicked(
+                &path.display().to_string(),
+            )),
         }
     })
 }
 
 /// The same without threads: one after the other.
 #[cfg(target_family = "wasm")]
-pub(super) fn beside<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<(T, String)> {
+pub(super) fn while_hashing<T>(
+    path: &Path,
+    work: impl FnOnce() -> Result<T>,
+) -> Result<(T, String)> {
     Ok((work()?, sha256(path)?))
 }
 
@@ -88,7 +96,10 @@ mod tests {
         std::fs::write(&path, "abc").unwrap();
         let known = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(sha256(&path).unwrap(), known);
-        assert_eq!(beside(&path, || Ok(7)).unwrap(), (7, known.to_owned()));
+        assert_eq!(
+            while_hashing(&path, || Ok(7)).unwrap(),
+            (7, known.to_owned())
+        );
     }
 
     #[test]
@@ -97,6 +108,9 @@ mod tests {
         let path = folder.path().join("x");
         std::fs::write(&path, vec![0; 1 << 20]).unwrap();
         let fail = || Err::<(), _>(Error::new("here", "no", "try"));
-        assert_eq!(beside(&path, fail).unwrap_err().refused().problem, "no");
+        assert_eq!(
+            while_hashing(&path, fail).unwrap_err().refused().problem,
+            "no"
+        );
     }
 }

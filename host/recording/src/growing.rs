@@ -5,7 +5,6 @@
 //! and a journal of another format would need its own program to be read.
 
 use std::fs::{self, File};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -17,6 +16,7 @@ use super::csv_writer::CsvWriter;
 use super::manifest::{MANIFEST_FILE, Manifest};
 use super::parents::{Parents, folder};
 use super::reader::Recording;
+use super::result_file::stage;
 use super::staging::{check_target, sync_directory};
 use super::writer::{SampleFormat, Writer};
 use crate::error::{Error, Result};
@@ -31,12 +31,12 @@ pub struct Growing {
     csv: Option<CsvWriter>,
     columns: Columns,
     rows: u64,
-    disk: Option<Disk>,
+    disk: Option<SyncThread>,
 }
 
 /// The thread that syncs the file to disk. A sync may take longer than the port can buffer, which is some tenths of a second.
 #[derive(Debug)]
-struct Disk {
+struct SyncThread {
     stop: Sender<()>,
     thread: JoinHandle<std::io::Result<()>>,
 }
@@ -58,7 +58,7 @@ impl Growing {
         fs::create_dir_all(directory).map_err(|error| Error::io(directory, &error))?;
         let mut csv = CsvWriter::create(&directory.join(SampleFormat::Csv.file_name()), columns)?;
         csv.flush()?;
-        let disk = Disk::new(csv.file()).map_err(|error| Error::io(directory, &error))?;
+        let disk = SyncThread::new(csv.file()).map_err(|error| Error::io(directory, &error))?;
         let growing = Self {
             directory: directory.to_owned(),
             csv: Some(csv),
@@ -66,7 +66,7 @@ impl Growing {
             rows: 0,
             disk,
         };
-        growing.state(&Manifest {
+        growing.write_manifest(&Manifest {
             unfinished: true,
             ..manifest.clone()
         })?;
@@ -78,7 +78,7 @@ impl Growing {
     pub fn resume(directory: &Path, columns: Columns, rows: u64, bytes: u64) -> Result<Self> {
         let path = directory.join(SampleFormat::Csv.file_name());
         let csv = CsvWriter::append(&path, columns, bytes)?;
-        let disk = Disk::new(csv.file()).map_err(|error| Error::io(directory, &error))?;
+        let disk = SyncThread::new(csv.file()).map_err(|error| Error::io(directory, &error))?;
         Ok(Self {
             directory: directory.to_owned(),
             csv: Some(csv),
@@ -114,7 +114,7 @@ impl Growing {
             .as_ref()
             .is_some_and(|disk| disk.thread.is_finished())
         {
-            self.settle()?;
+            self.stop_syncing()?;
         }
         if let Some(csv) = &mut self.csv {
             csv.write(batch)?;
@@ -138,7 +138,7 @@ impl Growing {
         mut complete: Option<&mut dyn FnMut(&mut Batch)>,
         progress: impl Fn(f64),
     ) -> Result<()> {
-        self.settle()?;
+        self.stop_syncing()?;
         if self.rows == 0 {
             drop(self.csv.take());
             return fs::remove_dir_all(&self.directory)
@@ -152,7 +152,7 @@ impl Growing {
             ..manifest.clone()
         };
         if format == SampleFormat::Csv && complete.is_none() {
-            return self.state(&manifest);
+            return self.write_manifest(&manifest);
         }
         let recording = Recording::open(&self.directory)?;
         let mut writer = Writer::create(&self.directory, self.columns, format, true)?;
@@ -168,31 +168,15 @@ impl Growing {
     }
 
     /// Replaces the manifest.
-    fn state(&self, manifest: &Manifest) -> Result<()> {
-        let io = |error: std::io::Error| Error::io(&self.directory, &error);
-        let text = manifest.to_toml()?;
-        let mut file = tempfile::Builder::new()
-            .prefix(".recording")
-            .tempfile_in(&self.directory)
-            .map_err(io)?;
-        file.write_all(text.as_bytes()).map_err(io)?;
-        file.as_file().sync_all().map_err(io)?;
-        // Temporary files are private, but everybody who may read the folder may read the recording.
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt as _;
-            let mode = fs::Permissions::from_mode(0o644);
-            file.as_file().set_permissions(mode).map_err(io)?;
-        }
-        file.persist(self.directory.join(MANIFEST_FILE))
-            .map_err(|error| io(error.error))?;
+    fn write_manifest(&self, manifest: &Manifest) -> Result<()> {
+        stage(&self.directory.join(MANIFEST_FILE), manifest.to_toml()?)?.publish()?;
         sync_directory(&self.directory);
         Ok(())
     }
 
     /// Ends the syncing thread and returns its result.
-    fn settle(&mut self) -> Result<()> {
-        let Some(Disk { stop, thread }) = self.disk.take() else {
+    fn stop_syncing(&mut self) -> Result<()> {
+        let Some(SyncThread { stop, thread }) = self.disk.take() else {
             return Ok(());
         };
         drop(stop);
@@ -207,7 +191,7 @@ impl Growing {
     }
 }
 
-impl Disk {
+impl SyncThread {
     /// `None` if files are in memory: there is no disk to sync.
     fn new(file: &File) -> std::io::Result<Option<Self>> {
         if cfg!(target_family = "wasm") {
@@ -230,6 +214,6 @@ impl Disk {
 impl Drop for Growing {
     fn drop(&mut self) {
         // The result no longer matters: the recording was abandoned and stays unfinished.
-        let _ = self.settle();
+        let _ = self.stop_syncing();
     }
 }

@@ -69,7 +69,7 @@ where
             outcome = match receivers[(index % workers as u64) as usize].recv() {
                 Ok(result) => take(index, result),
                 // The sender is gone before its last result: only a panic does that.
-                Err(_) => Err(broke_down(place)),
+                Err(_) => Err(reader_panicked(place)),
             };
             if outcome.is_err() {
                 break;
@@ -80,7 +80,7 @@ where
         for handle in handles {
             // Joined here, because the scope would pass on the panic of an unjoined thread.
             if handle.join().is_err() && outcome.is_ok() {
-                outcome = Err(broke_down(place));
+                outcome = Err(reader_panicked(place));
             }
         }
         outcome
@@ -106,7 +106,7 @@ where
 }
 
 /// Error after the code that reads a file has panicked.
-pub(super) fn broke_down(place: &str) -> Error {
+pub(super) fn reader_panicked(place: &str) -> Error {
     Error::new(
         place,
         "the reader failed on the contents",

@@ -55,9 +55,9 @@ pub use growing::Growing;
 pub use held::{Held, HeldReadings};
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, Decimal, Face, ImportOptions,
-    ImportSummary, Inputs, Jitter, Look, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role,
+    ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Preview, Role,
     Rounds, RowFilter, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log,
-    look,
+    preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};

@@ -17,7 +17,7 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use super::batch::Batch;
 use super::cell::{self, Refusal, shorten};
 use super::columns::{Column, Layout};
-use super::in_order::{broke_down, in_order, worker_count};
+use super::in_order::{in_order, reader_panicked, worker_count};
 use super::strict_file::StrictFile;
 use crate::error::{Error, Result};
 
@@ -64,7 +64,7 @@ impl ParquetFile {
         let metadata = catch_unwind(AssertUnwindSafe(|| {
             ParquetMetaDataReader::new().parse_and_finish(&file)
         }))
-        .map_err(|_| broke_down(&place))?
+        .map_err(|_| reader_panicked(&place))?
         .map_err(|error| damaged(&place, &error))?;
         let mut rows = 0_u64;
         for group in metadata.row_groups() {
@@ -129,17 +129,21 @@ impl ParquetFile {
             None => converted == ConvertedType::NONE,
             Some(kind) => matches!(kind, LogicalType::Integer { .. } | LogicalType::Unknown),
         };
-        let integer = matches!(
+        let unsigned = matches!(
             converted,
-            ConvertedType::INT_8
-                | ConvertedType::INT_16
-                | ConvertedType::INT_32
-                | ConvertedType::INT_64
-                | ConvertedType::UINT_8
+            ConvertedType::UINT_8
                 | ConvertedType::UINT_16
                 | ConvertedType::UINT_32
                 | ConvertedType::UINT_64
         );
+        let integer = unsigned
+            || matches!(
+                converted,
+                ConvertedType::INT_8
+                    | ConvertedType::INT_16
+                    | ConvertedType::INT_32
+                    | ConvertedType::INT_64
+            );
         let text = column.physical_type() == Physical::BYTE_ARRAY;
         let number = match column.physical_type() {
             Physical::DOUBLE | Physical::FLOAT => true,
@@ -157,13 +161,8 @@ impl ParquetFile {
                 "write it as DOUBLE, FLOAT, INT32 or INT64",
             ));
         }
-        let unsigned = matches!(
-            converted,
-            ConvertedType::UINT_8
-                | ConvertedType::UINT_16
-                | ConvertedType::UINT_32
-                | ConvertedType::UINT_64
-        ) || matches!(logical, Some(LogicalType::Integer(kind)) if !kind.is_signed);
+        let unsigned =
+            unsigned || matches!(logical, Some(LogicalType::Integer(kind)) if !kind.is_signed);
         Ok(Leaf {
             index,
             unsigned,

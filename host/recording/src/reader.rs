@@ -224,10 +224,10 @@ impl Recording {
         consume: impl FnMut(&Batch) -> Result<()>,
     ) -> Result<ReadSummary> {
         let (rows, sha256) = match &self.source {
-            Samples::Csv(file) => digest::beside(&self.samples, || {
+            Samples::Csv(file) => digest::while_hashing(&self.samples, || {
                 file.for_each_batch(chunk, progress, consume)
             }),
-            Samples::Parquet(file, layout) => digest::beside(&self.samples, || {
+            Samples::Parquet(file, layout) => digest::while_hashing(&self.samples, || {
                 file.for_each_batch(layout, slice, progress, consume)
             }),
             Samples::InMemory(samples) => {

@@ -11,7 +11,7 @@ const LARGEST: f64 = 32_767.0;
 
 /// A reading in whole counts without this fault. A low byte of 128 or more makes the reading 256 counts low. The low byte itself is right, so the
 /// correction is exact.
-pub fn undone(reading: f64) -> f64 {
+pub fn corrected(reading: f64) -> f64 {
     let mended = match reading.rem_euclid(BYTE) >= 0.5 * BYTE {
         true => reading + BYTE,
         false => reading,
@@ -61,8 +61,8 @@ mod tests {
         for right in i16::MIN..=i16::MAX {
             let [high, low] = right.to_be_bytes();
             let wide = i32::from(high as i8) * 256 + i32::from(low as i8);
-            assert_eq!(undone(f64::from(wide)), f64::from(right));
-            assert_eq!(undone(f64::from(wide as i16)), f64::from(right));
+            assert_eq!(corrected(f64::from(wide)), f64::from(right));
+            assert_eq!(corrected(f64::from(wide as i16)), f64::from(right));
         }
     }
 

@@ -34,14 +34,14 @@ pub struct DeviceBanks {
     /// Whether they used samples of a discarded dwell, and have to be restored first.
     spoiled: bool,
     /// Why they lack a dwell.
-    lack: Option<String>,
+    incomplete_because: Option<String>,
 }
 
 impl DeviceBanks {
     /// Banks that have missed dwells already.
-    pub fn lacking(why: &str) -> Self {
+    pub fn incomplete(why: &str) -> Self {
         Self {
-            lack: Some(why.into()),
+            incomplete_because: Some(why.into()),
             ..Self::default()
         }
     }
@@ -49,13 +49,13 @@ impl DeviceBanks {
     /// Begins a dwell. `noise`: variances of single readings, V²; `input`: rates, rad/s, and specific forces, m/s²; `spans`: largest magnitudes of
     /// both.
     pub fn begin(&mut self, station: &Station, noise: &[f64; 6], input: [f64; 6], spans: [f64; 2]) {
-        if self.lack.is_some() {
+        if self.incomplete_because.is_some() {
             return;
         }
         let (begin, spoiled) = (!self.runs, self.spoiled);
         let noise = noise.map(|v| v as f32);
         let input = input.map(|v| v as f32);
-        let told = station.aside(move |session| {
+        let sent = station.aside(move |session| {
             for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
                 let three = |of: &[f32; 6]| [0, 1, 2].map(|i| of[3 * k + i]);
                 if begin {
@@ -81,15 +81,15 @@ impl DeviceBanks {
         });
         // If only one filter received its input, the next dwell restores both.
         (self.runs, self.spoiled) = (true, true);
-        self.heed(told);
+        self.heed(sent);
     }
 
     /// Ends a dwell that is accepted.
     pub fn keep(&mut self, station: &Station) {
-        if self.lack.is_some() {
+        if self.incomplete_because.is_some() {
             return;
         }
-        let told = station.aside(|session| {
+        let sent = station.aside(|session| {
             for sensor in Sensor::BOTH {
                 done(
                     session,
@@ -103,40 +103,41 @@ impl DeviceBanks {
                 .into_iter()
                 .try_for_each(|sensor| done(session, Request::KalmanKeep { sensor }))
         });
-        self.spoiled = told.is_err();
-        self.heed(told);
+        self.spoiled = sent.is_err();
+        self.heed(sent);
     }
 
     /// Restores the filters after a discarded dwell.
     pub fn back(&mut self, station: &Station) {
-        if self.lack.is_some() || !self.runs {
+        if self.incomplete_because.is_some() || !self.runs {
             return;
         }
-        let told = station.aside(|session| {
+        let sent = station.aside(|session| {
             Sensor::BOTH
                 .into_iter()
                 .try_for_each(|sensor| done(session, Request::KalmanBack { sensor }))
         });
         // If the line is lost, they are restored once it is back.
-        self.spoiled = told.is_err();
+        self.spoiled = sent.is_err();
     }
 
     /// Records that an accepted dwell was discarded, or that the device has restarted.
-    pub fn lacks(&mut self, why: &str) {
+    pub fn mark_incomplete(&mut self, why: &str) {
         if self.runs {
-            self.lack.get_or_insert_with(|| why.into());
+            self.incomplete_because.get_or_insert_with(|| why.into());
         }
     }
 
-    fn heed(&mut self, told: Result<()>) {
-        if let Err(error) = told {
-            self.lack.get_or_insert_with(|| error.to_string());
+    fn heed(&mut self, sent: Result<()>) {
+        if let Err(error) = sent {
+            self.incomplete_because
+                .get_or_insert_with(|| error.to_string());
         }
     }
 
     /// Ends the filters. The error says why their estimate cannot be the calibration.
     pub fn end(&mut self, station: &Station) -> std::result::Result<ByDevice, String> {
-        if let Some(why) = &self.lack {
+        if let Some(why) = &self.incomplete_because {
             return Err(why.clone());
         }
         if !self.runs {

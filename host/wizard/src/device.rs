@@ -4,11 +4,11 @@ use std::time::{Duration, Instant};
 
 use mimu_core::wire::{Request, flags};
 use mimu_device::record::shortest;
-use mimu_device::{Event, Samples, Session, Started};
+use mimu_device::{Event, Identity, Samples, Session, Started};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
 
-use crate::source::{Chunk, Heard, Source, Unit};
+use crate::source::{Chunk, Source, SourceEvent, Unit};
 
 /// Silence after which the device is asked to greet and stream again.
 const SILENCE: Duration = Duration::from_secs(2);
@@ -55,17 +55,16 @@ impl DeviceSource {
         told.extend(who.warnings.iter().cloned());
         let unit = Unit {
             id: who.unit_id.clone(),
-            name: format!("mimu-{}", who.unit_id),
+            name: mimu_device::unit_name(&who.unit_id),
             raw_unit: RawUnit::Volt,
             rate_hz: f64::from(who.sample_rate_hz),
             nominal: Some(mimu_device::nominal()),
             told,
             is_device: true,
-            start: (who.start != Started::PowerOn).then(|| who.start.to_string()),
+            start: unless_power_on(&who.start),
         };
-        let powered_for_s = who.powered_for_ms.map(|ms| f64::from(ms) / 1000.0);
         Self {
-            powered_for_s,
+            powered_for_s: powered_for_s(who),
             session,
             unit,
             streaming: false,
@@ -76,7 +75,7 @@ impl DeviceSource {
         }
     }
 
-    fn take(&mut self, samples: &Samples) -> Result<Heard> {
+    fn take(&mut self, samples: &Samples) -> Result<SourceEvent> {
         self.heard = Instant::now();
         let number = i64::from(samples.head.first);
         // After a restart of the count the elapsed time is unknown. It is only assumed to be positive.
@@ -102,7 +101,7 @@ impl DeviceSource {
             values.push(row);
         }
         self.next = tick + values.len() as u64;
-        Ok(Heard::Samples(Chunk {
+        Ok(SourceEvent::Samples(Chunk {
             tick,
             values,
             temp_c: shortest(samples.head.temp_c),
@@ -115,12 +114,20 @@ impl DeviceSource {
     }
 }
 
+fn powered_for_s(who: &Identity) -> Option<f64> {
+    who.powered_for_ms.map(|ms| f64::from(ms) / 1000.0)
+}
+
+fn unless_power_on(start: &Started) -> Option<String> {
+    (*start != Started::PowerOn).then(|| start.to_string())
+}
+
 impl Source for DeviceSource {
     fn unit(&self) -> &Unit {
         &self.unit
     }
 
-    fn next(&mut self) -> Result<Heard> {
+    fn next(&mut self) -> Result<SourceEvent> {
         if !self.streaming {
             self.session.begin_stream(RAW)?;
             (self.streaming, self.heard) = (true, Instant::now());
@@ -129,19 +136,19 @@ impl Source for DeviceSource {
             Some(Event::Raw(samples)) => self.take(&samples),
             Some(Event::Started(who)) => {
                 self.anew = true;
-                self.powered_for_s = who.powered_for_ms.map(|ms| f64::from(ms) / 1000.0);
-                self.unit.start = (who.start != Started::PowerOn).then(|| who.start.to_string());
+                self.powered_for_s = powered_for_s(&who);
+                self.unit.start = unless_power_on(&who.start);
                 self.streaming = false;
-                Ok(Heard::Restarted(who.start.to_string()))
+                Ok(SourceEvent::Restarted(who.start.to_string()))
             }
-            Some(_) => Ok(Heard::Nothing),
+            Some(_) => Ok(SourceEvent::Nothing),
             None if self.heard.elapsed() > SILENCE => {
                 // It may have restarted, and its greeting may be lost.
                 self.session.hello()?;
                 self.streaming = false;
-                Ok(Heard::Nothing)
+                Ok(SourceEvent::Nothing)
             }
-            None => Ok(Heard::Nothing),
+            None => Ok(SourceEvent::Nothing),
         }
     }
 

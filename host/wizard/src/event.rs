@@ -78,7 +78,7 @@ pub enum Event {
         words: String,
     },
     /// A dwell was discarded.
-    Thrown {
+    Discarded {
         /// Name of the unit.
         unit: String,
         /// The reason.
@@ -152,7 +152,7 @@ impl Event {
             | Self::SelfTested { unit, .. }
             | Self::Waiting { unit, .. }
             | Self::Dwell { unit, .. }
-            | Self::Thrown { unit, .. }
+            | Self::Discarded { unit, .. }
             | Self::Progress { unit, .. }
             | Self::Interrupted { unit, .. }
             | Self::Verified { unit, .. }
@@ -221,7 +221,7 @@ impl Serialize for Phase {
 
 /// State of a unit.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct UnitStanding {
+pub struct UnitState {
     /// Name of the unit.
     pub unit: String,
     /// Motion of gyro and accelerometer, relative to the limit of rest.
@@ -256,7 +256,7 @@ pub struct UnitStanding {
 
 /// State of the session.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Standing {
+pub struct SessionState {
     /// The present phase.
     pub phase: Phase,
     /// The requested dwell.
@@ -264,18 +264,18 @@ pub struct Standing {
     /// Completed and planned dwells.
     pub dwells: [usize; 2],
     /// Discarded dwells.
-    pub thrown: usize,
+    pub discarded: usize,
     /// Time since the beginning by the units' clock, s.
     pub elapsed_s: f64,
     /// State of each unit.
-    pub units: Vec<UnitStanding>,
+    pub units: Vec<UnitState>,
     /// State of each calibration, as far as it is determined.
     pub progress: Vec<Progress>,
 }
 
 /// A request of the user since the last call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wish {
+pub enum UserRequest {
     /// End the session. Its data are kept, and it can be resumed.
     Cancel,
     /// Repeat the last dwell.
@@ -331,10 +331,10 @@ pub trait View {
     fn tell(&mut self, event: &Event);
 
     /// Shows the present state; called many times a second.
-    fn show(&mut self, standing: &Standing);
+    fn show(&mut self, state: &SessionState);
 
     /// The user's request since the last call.
-    fn wish(&mut self) -> Option<Wish>;
+    fn request(&mut self) -> Option<UserRequest>;
 
     /// Asks a question. Returns `None` until it is answered.
     fn ask(&mut self, question: &Question) -> Option<bool>;

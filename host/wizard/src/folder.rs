@@ -75,7 +75,7 @@ pub enum Entry {
         temp_c: Option<f64>,
     },
     /// A running dwell was discarded.
-    Thrown {
+    Discarded {
         /// The requested dwell.
         step: Step,
         /// The reason.
@@ -135,7 +135,8 @@ pub struct Begun {
     /// Sample rate, Hz.
     pub rate_hz: f64,
     /// Settings.
-    pub asked: SessionConfig,
+    #[serde(rename = "asked")]
+    pub config: SessionConfig,
 }
 
 /// The folder of a session.
@@ -295,9 +296,9 @@ impl Folder {
     }
 
     /// Number of dwells that were discarded while they ran.
-    pub fn thrown(&self) -> usize {
-        let thrown = |e: &&Entry| matches!(e, Entry::Thrown { .. });
-        self.entries.iter().filter(thrown).count()
+    pub fn discarded(&self) -> usize {
+        let discarded = |e: &&Entry| matches!(e, Entry::Discarded { .. });
+        self.entries.iter().filter(discarded).count()
     }
 
     /// Temperatures of the first and the last dwell, °C.
@@ -375,14 +376,14 @@ impl OpenRecording {
                 growing
             }
         };
-        let mut taking = Self {
+        let mut recording = Self {
             part,
             growing,
             manifest,
             samples,
         };
-        taking.manifest.dropped_steps = folder.dropped(part);
-        Ok(taking)
+        recording.manifest.dropped_steps = folder.dropped(part);
+        Ok(recording)
     }
 
     /// Appends rows.

@@ -189,7 +189,7 @@ pub fn first_steps(fixture: Fixture, dwell_s: f64, largest_rate_dps: f64, seed: 
 /// By hand the turns between poses calibrate the gyro: each is to be a quarter turn or more, about alternating axes.
 fn chained(ups: &[Vector3<f64>]) -> Vec<Setting> {
     let mut left = ups.to_vec();
-    let mut turned = Turned::default();
+    let mut turned = TurnInformation::default();
     let mut chain = vec![left.remove(left.iter().position(|u| u.z > 0.99).unwrap_or(0))];
     while !left.is_empty() {
         let from = chain[chain.len() - 1];
@@ -206,15 +206,15 @@ fn chained(ups: &[Vector3<f64>]) -> Vec<Setting> {
 
 /// Information from turns about a gyro.
 #[derive(Debug, Clone)]
-struct Turned(Matrix3<f64>);
+struct TurnInformation(Matrix3<f64>);
 
-impl Default for Turned {
+impl Default for TurnInformation {
     fn default() -> Self {
         Self(Matrix3::identity() * 0.1)
     }
 }
 
-impl Turned {
+impl TurnInformation {
     fn vector(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
         let axis = from.cross(to);
         match axis.norm() {
@@ -240,13 +240,22 @@ impl Turned {
 pub type Missed = [bool; 2];
 
 /// The dwell that adds the most information to `done`, for the sensors that need it.
-pub fn next_step(asked: &SessionConfig, done: &[Step], missed: Missed) -> Step {
-    let candidates = match asked.fixture {
+pub fn next_step(config: &SessionConfig, done: &[Step], missed: Missed) -> Step {
+    let candidates = match config.fixture {
         Fixture::Table => {
             let seed = done.len() as u64;
-            let mut all = first_steps(Fixture::Table, asked.dwell_s, asked.largest_rate_dps, seed);
+            let mut all = first_steps(
+                Fixture::Table,
+                config.dwell_s,
+                config.largest_rate_dps,
+                seed,
+            );
             let [faces, ..] = directions();
-            all.extend(faces.into_iter().map(|up| Step::at_rest(up, asked.dwell_s)));
+            all.extend(
+                faces
+                    .into_iter()
+                    .map(|up| Step::at_rest(up, config.dwell_s)),
+            );
             all
         }
         fixture => {
@@ -255,18 +264,18 @@ pub fn next_step(asked: &SessionConfig, done: &[Step], missed: Missed) -> Step {
                 Fixture::Cube => [faces, edges].concat(),
                 _ => [faces, edges, corners].concat(),
             };
-            let step = |up: Vector3<f64>| Step::at_rest(up, asked.dwell_s);
+            let step = |up: Vector3<f64>| Step::at_rest(up, config.dwell_s);
             ups.into_iter().map(step).collect()
         }
     };
-    let reference = asked.fixture.reference();
+    let reference = config.fixture.reference();
     let terms = Terms::default();
     let mut models = Vec::new();
     if missed[1] || missed == [false; 2] {
         models.push((true, Model::accel(reference, &terms)));
     }
     if missed[0] && reference == Reference::Table {
-        let span = Vector3::repeat(asked.largest_rate_dps.to_radians());
+        let span = Vector3::repeat(config.largest_rate_dps.to_radians());
         models.push((false, Model::gyro(&terms, span)));
     }
     let reaches = models.into_iter().map(|(of_accel, model)| {
@@ -283,7 +292,7 @@ pub fn next_step(asked: &SessionConfig, done: &[Step], missed: Missed) -> Step {
         rate: s.rate_dps.to_radians(),
     };
     let had: Vec<Setting> = done.iter().map(setting).collect();
-    let mut turned = Turned::default();
+    let mut turned = TurnInformation::default();
     for pair in had.windows(2) {
         turned.take(&pair[0].up, &pair[1].up);
     }
@@ -317,7 +326,7 @@ pub fn next_step(asked: &SessionConfig, done: &[Step], missed: Missed) -> Step {
         .iter()
         .map(|c| (gain(c), c))
         .reduce(|a, b| if b.0 > a.0 { b } else { a });
-    best.map_or(Step::at_rest(Vector3::z(), asked.dwell_s), |b| *b.1)
+    best.map_or(Step::at_rest(Vector3::z(), config.dwell_s), |b| *b.1)
 }
 
 /// Rate below which a dwell on a table is used for the accelerometer, rad/s ([`mimu::signal::dwell::Dwell::spins`]).
@@ -396,7 +405,7 @@ pub fn verification(
 mod tests {
     use super::*;
 
-    fn asked(fixture: Fixture) -> SessionConfig {
+    fn config(fixture: Fixture) -> SessionConfig {
         SessionConfig {
             text: None,
             fixture,
@@ -443,11 +452,11 @@ mod tests {
 
     #[test]
     fn an_accelerometer_that_misses_its_target_on_a_table_is_shown_at_rest() {
-        let mut asked = asked(Fixture::Table);
-        asked.largest_rate_dps = 250.0;
+        let mut config = config(Fixture::Table);
+        config.largest_rate_dps = 250.0;
         let done = first_steps(Fixture::Table, 3.0, 250.0, 1);
-        assert_eq!(next_step(&asked, &done, [false, true]).rate_dps, 0.0);
-        assert_ne!(next_step(&asked, &done, [true, false]).rate_dps, 0.0);
+        assert_eq!(next_step(&config, &done, [false, true]).rate_dps, 0.0);
+        assert_ne!(next_step(&config, &done, [true, false]).rate_dps, 0.0);
     }
 
     #[test]
@@ -455,8 +464,8 @@ mod tests {
         let mut done = first_steps(Fixture::Hands, 3.0, 0.0, 1);
         // No pose so far has had the side of -x up.
         done.retain(|s| s.up[0] > -0.3);
-        let asked = asked(Fixture::Hands);
-        let next = next_step(&asked, &done, [false, true]);
+        let config = config(Fixture::Hands);
+        let next = next_step(&config, &done, [false, true]);
         assert!(next.up[0] < -0.5, "{next:?}");
     }
 }

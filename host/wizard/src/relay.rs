@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 
 use mimu_recording::error::{Error, Result};
 
-use crate::source::Heard;
+use crate::source::SourceEvent;
 use crate::station::{Connect, Line, Station, StationEvent, other};
 use crate::text::{Text, TextBoard};
 use crate::turn::pause;
@@ -143,10 +143,10 @@ impl RelayedText {
         }
         loop {
             self.ready.push_back(match board.next(at_s)? {
-                Heard::Nothing => return Ok(()),
-                Heard::Restarted(why) => StationEvent::Restarted(why),
-                Heard::Note(words) => StationEvent::Note(words),
-                Heard::Samples(chunk) => {
+                SourceEvent::Nothing => return Ok(()),
+                SourceEvent::Restarted(why) => StationEvent::Restarted(why),
+                SourceEvent::Note(words) => StationEvent::Note(words),
+                SourceEvent::Samples(chunk) => {
                     self.next = chunk.tick + chunk.values.len() as u64;
                     StationEvent::Samples(chunk)
                 }

@@ -7,36 +7,36 @@ use mimu_recording::error::{Argument, Error, Result};
 use crate::procedure::SessionConfig;
 
 /// Settings that determined the recorded dwells. With other values these dwells would be wrong.
-fn kept(asked: &SessionConfig) -> [(Argument, &'static str, String); 7] {
+fn kept(config: &SessionConfig) -> [(Argument, &'static str, String); 7] {
     let or_none = |given: Option<String>| given.unwrap_or_else(|| "none".into());
-    let by = if asked.by_device { "device" } else { "pc" };
+    let by = if config.by_device { "device" } else { "pc" };
     [
-        (Argument::Fixture, "fixture", asked.fixture.name().into()),
+        (Argument::Fixture, "fixture", config.fixture.name().into()),
         (
             Argument::Gravity,
             "gravity",
-            format!("{} m/s²", asked.gravity_mps2),
+            format!("{} m/s²", config.gravity_mps2),
         ),
         (
             Argument::Latitude,
             "latitude",
-            or_none(asked.latitude_deg.map(|l| l.to_string())),
+            or_none(config.latitude_deg.map(|l| l.to_string())),
         ),
         (
             Argument::DwellLength,
             "length of a dwell",
-            format!("{} s", asked.dwell_s),
+            format!("{} s", config.dwell_s),
         ),
         (
             Argument::LargestRate,
             "largest rate",
-            format!("{} deg/s", asked.largest_rate_dps),
+            format!("{} deg/s", config.largest_rate_dps),
         ),
         (Argument::EstimatedBy, "estimator", by.into()),
         (
             Argument::TextColumns,
             "line of the board",
-            or_none(asked.text.clone()),
+            or_none(config.text.clone()),
         ),
     ]
 }
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
     use crate::procedure::{Fixture, Targets, first_steps};
 
-    fn asked() -> SessionConfig {
+    fn config() -> SessionConfig {
         SessionConfig {
             text: None,
             fixture: Fixture::Hands,
@@ -114,9 +114,9 @@ mod tests {
         let now = SessionConfig {
             gravity_mps2: 9.81,
             text: Some("ax,ay,az,gx,gy,gz in count".into()),
-            ..asked()
+            ..config()
         };
-        let error = resumed(&asked(), &now, place).unwrap_err();
+        let error = resumed(&config(), &now, place).unwrap_err();
         let (line, arguments) = (error.to_string(), &error.refused().arguments);
         for says in [
             "gravity was 9.71 m/s², now it is 9.81 m/s²",
@@ -129,17 +129,17 @@ mod tests {
         assert_eq!(*arguments, wanted);
         let now = SessionConfig {
             steps: first_steps(Fixture::Hands, 4.0, 100.0, 1)[1..].to_vec(),
-            ..asked()
+            ..config()
         };
-        let error = resumed(&asked(), &now, place).unwrap_err();
+        let error = resumed(&config(), &now, place).unwrap_err();
         let wanted = [Argument::Plan, Argument::Seed, Argument::Output];
         assert_eq!(error.refused().arguments, wanted);
         let now = SessionConfig {
             most_dwells: 20,
             patience_s: 7.0,
-            ..asked()
+            ..config()
         };
-        let kept = resumed(&asked(), &now, place).unwrap();
+        let kept = resumed(&config(), &now, place).unwrap();
         assert_eq!((kept.most_dwells, kept.patience_s), (20, 7.0));
     }
 }

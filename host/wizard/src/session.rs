@@ -57,7 +57,7 @@ pub struct UnitOutcome {
     /// Dwells used for the calibration.
     pub dwells: usize,
     /// Dwells that were discarded while they ran.
-    pub thrown: usize,
+    pub discarded: usize,
     /// Total time of the recordings, s.
     pub recorded_s: f64,
     /// The affine calibration judged by the verification.
@@ -78,14 +78,14 @@ pub struct UnitOutcome {
 
 /// Carries out a session. A resumed session keeps its settings ([`resumed`]). The session pauses when it has to wait ([`crate::turn`]).
 pub async fn run(
-    asked: SessionConfig,
+    config: SessionConfig,
     wanted: Vec<UnitSpec>,
     driver: Box<dyn Driver + '_>,
     view: &mut dyn View,
     page: Page<'_>,
 ) -> Result<Outcome> {
     let mut units = Vec::new();
-    let mut kept = asked;
+    let mut kept = config;
     let finished = wanted.iter().map(|w| finished(&w.folder, &kept));
     if let Some(units) = finished.collect::<Result<Option<Vec<_>>>>()? {
         return Ok(Outcome::of(units, false));
@@ -94,7 +94,7 @@ pub async fn run(
         let begun = Folder::begun(&folder)?;
         let (opened, station) = match &begun {
             Some(begun) => {
-                kept = resumed(&begun.asked, &kept, &folder)?;
+                kept = resumed(&begun.config, &kept, &folder)?;
                 let opened = Folder::open(&folder)?;
                 let next = UnitSession::first_tick(&opened, begun.rate_hz);
                 let station = connect(next, Some(begun.unit_id.clone())).await?;
@@ -108,7 +108,7 @@ pub async fn run(
                     format: "mimu-wizard-session/1".into(),
                     unit_id: station.unit.id.clone(),
                     rate_hz: station.unit.rate_hz,
-                    asked: kept.clone(),
+                    config: kept.clone(),
                 };
                 (Folder::create(&folder, &begun)?, station)
             }
@@ -154,7 +154,7 @@ fn finished(path: &Path, now: &SessionConfig) -> Result<Option<UnitOutcome>> {
     if !folder.is_done() {
         return Ok(None);
     }
-    resumed(&begun.asked, now, path)?;
+    resumed(&begun.config, now, path)?;
     let existing = |name: &str| {
         Some(folder.file(name))
             .filter(|p| p.exists())
@@ -169,7 +169,7 @@ fn finished(path: &Path, now: &SessionConfig) -> Result<Option<UnitOutcome>> {
         unit: begun.unit_id,
         folder: path.display().to_string(),
         dwells: folder.dwells(Part::Calibration).len(),
-        thrown: folder.thrown(),
+        discarded: folder.discarded(),
         verdict,
         effects: effects.unwrap_or_default(),
         stored: existing(WITH_EFFECTS).or(existing(PLAIN)),
@@ -186,7 +186,7 @@ struct OpenSession<'a> {
 }
 
 /// The affine calibration of a unit.
-struct Plain {
+struct AffineCalibration {
     calibration: Calibration,
     fitted: Fit,
     /// The verification recording.
@@ -200,7 +200,7 @@ const PLAIN: &str = "calibration.toml";
 const WITH_EFFECTS: &str = "with-effects.toml";
 
 /// Adds the misalignment on the table to the intervals: 95 % of each angle within `half_width_deg`.
-fn mounted(fitted: &mut Fit, half_width_deg: f64) {
+fn add_mounting_uncertainty(fitted: &mut Fit, half_width_deg: f64) {
     for sensor in &mut fitted.sensors {
         let triad = sensor.estimated.triad.clone();
         sensor.estimated.triad = triad.mounted(half_width_deg.to_radians() / 1.96);
@@ -220,9 +220,9 @@ mod effects;
 impl OpenSession<'_> {
     async fn carry_out(&mut self) -> Result<Ended> {
         let wizard = &mut self.wizard;
-        let words = wizard.asked.gravity_words();
+        let words = wizard.config.gravity_words();
         wizard.tell(Event::Note { words });
-        let limit = wizard.asked.warm_c_per_min;
+        let limit = wizard.config.warm_c_per_min;
         let words = match limit {
             Some(limit) => format!(
                 "until the temperature changes by less than {limit} °C/min; leave the unit at rest"
@@ -234,14 +234,14 @@ impl OpenSession<'_> {
         wizard.begin_phase(Phase::WarmUp, words);
         or_cancelled!(wizard.warm_up().await);
         or_cancelled!(wizard.look_at_devices().await);
-        let steps = wizard.asked.steps.clone();
+        let steps = wizard.config.steps.clone();
         wizard.begin_phase(
             Phase::Calibration,
             format!("{} dwells are planned", steps.len()),
         );
         or_cancelled!(wizard.dwells(Part::Calibration, &steps).await);
         self.finish()?;
-        let by_table = self.wizard.asked.fixture == Fixture::Table;
+        let by_table = self.wizard.config.fixture == Fixture::Table;
         let mut fits = Vec::new();
         for unit in &self.wizard.units {
             let first = prepared(&unit.folder.file(Part::Calibration.name()))?;
@@ -251,18 +251,18 @@ impl OpenSession<'_> {
             }
             fits.push(fitted);
         }
-        if self.wizard.asked.by_device {
+        if self.wizard.config.by_device {
             for (k, fitted) in fits.iter_mut().enumerate() {
                 self.take_from_device(k, fitted)?;
             }
         }
         if by_table {
             for fitted in &mut fits {
-                mounted(fitted, self.wizard.asked.mounting_deg);
+                add_mounting_uncertainty(fitted, self.wizard.config.mounting_deg);
             }
         }
         let wizard = &mut self.wizard;
-        let steps = wizard.asked.verification.clone();
+        let steps = wizard.config.verification.clone();
         let words = format!("{} poses that the fit has not used", steps.len());
         wizard.begin_phase(Phase::Verification, words);
         or_cancelled!(wizard.dwells(Part::Verification, &steps).await);
@@ -286,7 +286,7 @@ impl OpenSession<'_> {
                 None if judged.passed() => or_cancelled!(self.store(k, PLAIN, &calibration).await),
                 None => {}
             }
-            plain.push(Plain {
+            plain.push(AffineCalibration {
                 calibration,
                 fitted,
                 other,
@@ -370,8 +370,8 @@ impl OpenSession<'_> {
 
     fn finish(&mut self) -> Result<()> {
         for unit in &mut self.wizard.units {
-            if let Some(taking) = unit.taking.take() {
-                taking.finish(&unit.folder)?;
+            if let Some(recording) = unit.recording.take() {
+                recording.finish(&unit.folder)?;
             }
         }
         Ok(())
@@ -412,8 +412,8 @@ impl OpenSession<'_> {
             unit: unit.name(),
             folder: unit.folder.path.display().to_string(),
             dwells: unit.folder.dwells(Part::Calibration).len(),
-            thrown: unit.folder.thrown(),
-            recorded_s: unit.standing.samples as f64 / unit.station.unit.rate_hz,
+            discarded: unit.folder.discarded(),
+            recorded_s: unit.state.samples as f64 / unit.station.unit.rate_hz,
             ..outcome.clone()
         })
         .collect()

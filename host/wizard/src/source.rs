@@ -45,7 +45,7 @@ pub struct Chunk {
 
 /// An event of a source.
 #[derive(Debug)]
-pub enum Heard {
+pub enum SourceEvent {
     /// Samples.
     Samples(Chunk),
     /// The device restarted, with its reset cause.
@@ -62,7 +62,7 @@ pub trait Source: Send {
     fn unit(&self) -> &Unit;
 
     /// The next event; waits at most a few milliseconds. After an error the source is gone, and has to be opened again.
-    fn next(&mut self) -> Result<Heard>;
+    fn next(&mut self) -> Result<SourceEvent>;
 
     /// The session, if this is a mimu device. The stream restarts with the next [`Source::next`], whatever was requested.
     fn device(&mut self) -> Option<&mut Session>;

@@ -8,7 +8,7 @@ use std::time::Duration;
 use mimu_device::Session;
 use mimu_recording::error::{Argument, Error, Result};
 
-use crate::source::{Chunk, Heard, Opener, Source, Unit};
+use crate::source::{Chunk, Opener, Source, SourceEvent, Unit};
 
 /// Interval between attempts to reopen a port.
 const AGAIN: Duration = Duration::from_millis(300);
@@ -214,10 +214,10 @@ fn listen(
         }
         let news = match &mut source {
             Some(open) => match open.next() {
-                Ok(Heard::Nothing) => continue,
-                Ok(Heard::Restarted(why)) => StationEvent::Restarted(why),
-                Ok(Heard::Note(words)) => StationEvent::Note(words),
-                Ok(Heard::Samples(chunk)) => {
+                Ok(SourceEvent::Nothing) => continue,
+                Ok(SourceEvent::Restarted(why)) => StationEvent::Restarted(why),
+                Ok(SourceEvent::Note(words)) => StationEvent::Note(words),
+                Ok(SourceEvent::Samples(chunk)) => {
                     next = chunk.tick + chunk.values.len() as u64;
                     StationEvent::Samples(chunk)
                 }

@@ -9,7 +9,7 @@ use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::regular::{Regular, Timed};
-use crate::source::{Chunk, Heard, Unit};
+use crate::source::{Chunk, SourceEvent, Unit};
 use crate::text_line::{Columns, Lines, Reading};
 
 /// Longest wait for a line of numbers, s. A board that resets when its port is opened has started by then.
@@ -60,7 +60,7 @@ pub struct TextBoard {
     clocks: Vec<[f64; 2]>,
     /// Rate of the board's clock relative to the computer's, once they have been compared.
     clock_factor: Option<f64>,
-    ready: VecDeque<Heard>,
+    ready: VecDeque<SourceEvent>,
     /// Number of lines without data at which they are reported next.
     tell_at: u64,
 }
@@ -229,7 +229,7 @@ impl TextBoard {
                 }
                 self.regular.begin_anew();
                 let why = "its clock has gone back".to_string();
-                self.ready.push_back(Heard::Restarted(why));
+                self.ready.push_back(SourceEvent::Restarted(why));
             }
         }
         self.lines.refuse(self.regular.garbled() - self.garbled);
@@ -250,8 +250,8 @@ impl TextBoard {
             same && c.saturated == saturated && c.tick + c.values.len() as u64 == tick
         };
         match self.ready.back_mut() {
-            Some(Heard::Samples(chunk)) if fits(chunk) => chunk.values.push(sample.raw),
-            _ => self.ready.push_back(Heard::Samples(Chunk {
+            Some(SourceEvent::Samples(chunk)) if fits(chunk) => chunk.values.push(sample.raw),
+            _ => self.ready.push_back(SourceEvent::Samples(Chunk {
                 tick,
                 values: vec![sample.raw],
                 temp_c: sample.temp_c,
@@ -265,7 +265,7 @@ impl TextBoard {
     /// The next event at `now_s` that was not reported yet.
     ///
     /// Errors: the board is silent.
-    pub fn next(&mut self, now_s: f64) -> Result<Heard> {
+    pub fn next(&mut self, now_s: f64) -> Result<SourceEvent> {
         if now_s - self.heard_s > SILENCE_S {
             return Err(Error::device(
                 &self.port,
@@ -276,14 +276,14 @@ impl TextBoard {
         if self.lines.refused() >= self.tell_at {
             self.tell_at = TOLD_AGAIN * self.lines.refused();
             if let Some(words) = self.lines.refused_in_words() {
-                return Ok(Heard::Note(words));
+                return Ok(SourceEvent::Note(words));
             }
         }
-        Ok(self.ready().unwrap_or(Heard::Nothing))
+        Ok(self.ready().unwrap_or(SourceEvent::Nothing))
     }
 
     /// The next event that is known already.
-    pub(crate) fn ready(&mut self) -> Option<Heard> {
+    pub(crate) fn ready(&mut self) -> Option<SourceEvent> {
         self.ready.pop_front()
     }
 

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use mimu_device::Session;
 use mimu_recording::error::{Error, Result};
 
-use crate::source::{Heard, Source, Unit};
+use crate::source::{Source, SourceEvent, Unit};
 use crate::text::{NOTHING_S, Text, TextBoard};
 
 /// Longest wait of a read. All bytes of a read get the same time of arrival.
@@ -107,7 +107,7 @@ impl Source for TextSource {
         self.board.unit()
     }
 
-    fn next(&mut self) -> Result<Heard> {
+    fn next(&mut self) -> Result<SourceEvent> {
         if let Some(heard) = self.board.ready() {
             return Ok(heard);
         }
@@ -177,12 +177,12 @@ mod tests {
         let (mut samples, mut notes) = (Vec::new(), Vec::new());
         while let Ok(heard) = source.next() {
             match heard {
-                Heard::Samples(chunk) => {
+                SourceEvent::Samples(chunk) => {
                     let numbered = (chunk.tick..).zip(&chunk.values);
                     samples.extend(numbered.map(|(tick, v)| (tick, v[3] as usize)));
                 }
-                Heard::Restarted(words) | Heard::Note(words) => notes.push(words),
-                Heard::Nothing => {}
+                SourceEvent::Restarted(words) | SourceEvent::Note(words) => notes.push(words),
+                SourceEvent::Nothing => {}
             }
         }
         (samples, notes)

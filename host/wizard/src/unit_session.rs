@@ -15,14 +15,14 @@ use self::conditions::{Turns, motion_limits, rate_limit_dps};
 use self::rows::{cut, known, shorten};
 use crate::axes;
 use crate::bank::DeviceBanks;
-use crate::event::{Event, UnitStanding};
+use crate::event::{Event, UnitState};
 use crate::folder::{Entry, Folder, OpenRecording, Part, append};
 use crate::procedure::{Fixture, SessionConfig};
 use crate::refit::{Parameter, Progress, calibrate, progress};
 use crate::source::Chunk;
 use crate::station::{Station, StationEvent};
 use crate::waiting::{Interruption, Waiting};
-use crate::watch::{Seen, Watch, force, guessed};
+use crate::watch::{LastSecond, Watch, force, guessed};
 use mimu_equipment::step::Step;
 
 /// A dwell includes this much of the second in which it was detected, s: the unit was at rest then too.
@@ -63,7 +63,7 @@ impl Dwell {
 #[derive(Debug, Clone, Copy)]
 pub struct Round<'a> {
     /// Settings of the session.
-    pub asked: &'a SessionConfig,
+    pub config: &'a SessionConfig,
     /// The requested dwell.
     pub step: Option<&'a Step>,
     /// Dwells that follow.
@@ -81,11 +81,11 @@ pub struct UnitSession {
     /// Its folder.
     pub folder: Folder,
     /// The recording in progress.
-    pub taking: Option<OpenRecording>,
+    pub recording: Option<OpenRecording>,
     /// The calibration so far, with its targets.
     pub progress: Progress,
     /// State of the unit.
-    pub standing: UnitStanding,
+    pub state: UnitState,
     /// Whether it has completed the requested dwell.
     pub done: bool,
     watch: Watch,
@@ -107,7 +107,7 @@ pub struct UnitSession {
     turn_clipped: u64,
     /// Consecutive refused fits for another reason than too few dwells.
     refused: u32,
-    seen: Option<Seen>,
+    seen: Option<LastSecond>,
     part: Part,
     number: i32,
     /// The device's filters, if their estimate is to be the calibration.
@@ -116,19 +116,19 @@ pub struct UnitSession {
 
 impl UnitSession {
     /// A unit with its folder.
-    pub fn new(station: Station, folder: Folder, asked: &SessionConfig) -> Self {
+    pub fn new(station: Station, folder: Folder, config: &SessionConfig) -> Self {
         let unit = &station.unit;
         Self {
-            watch: Watch::new(unit.rate_hz, asked.fixture != Fixture::Table),
+            watch: Watch::new(unit.rate_hz, config.fixture != Fixture::Table),
             nominal: unit.nominal,
-            standing: UnitStanding {
+            state: UnitState {
                 unit: unit.name.clone(),
-                tilt_limit_deg: asked.fixture.tolerance_deg(),
-                ..UnitStanding::default()
+                tilt_limit_deg: config.fixture.tolerance_deg(),
+                ..UnitState::default()
             },
             station,
             folder,
-            taking: None,
+            recording: None,
             progress: Progress::default(),
             done: false,
             pending: Batch::default(),
@@ -149,9 +149,9 @@ impl UnitSession {
     }
 
     /// Begins or resumes a recording.
-    pub fn begin(&mut self, part: Part, asked: &SessionConfig) -> Result<()> {
+    pub fn begin(&mut self, part: Part, config: &SessionConfig) -> Result<()> {
         let unit = &self.station.unit;
-        let table = asked.fixture == Fixture::Table;
+        let table = config.fixture == Fixture::Table;
         let columns = Columns {
             step: true,
             temp_c: true,
@@ -162,11 +162,11 @@ impl UnitSession {
         let mut manifest = Manifest::new(
             unit.name.clone(),
             unit.rate_hz,
-            asked.gravity_mps2,
+            config.gravity_mps2,
             unit.raw_unit,
-            asked.fixture.reference(),
+            config.fixture.reference(),
         );
-        manifest.latitude_deg = asked.latitude_deg;
+        manifest.latitude_deg = config.latitude_deg;
         manifest.power_on_s = self.power_on_s;
         if unit.is_device {
             manifest.recorded = Some(Recorded {
@@ -177,7 +177,7 @@ impl UnitSession {
             });
         }
         self.part = part;
-        self.taking = Some(OpenRecording::begin(&self.folder, part, columns, manifest)?);
+        self.recording = Some(OpenRecording::begin(&self.folder, part, columns, manifest)?);
         // Discarded dwells keep their numbers.
         let had = self.folder.entries().iter().filter_map(|e| match e {
             Entry::Dwell {
@@ -186,11 +186,11 @@ impl UnitSession {
             _ => None,
         });
         self.number = had.max().unwrap_or(0);
-        self.banks = (asked.by_device && part == Part::Calibration).then(|| match self.number {
+        self.banks = (config.by_device && part == Part::Calibration).then(|| match self.number {
             0 => DeviceBanks::default(),
-            _ => {
-                DeviceBanks::lacking("the session was interrupted, so they lack the dwells before")
-            }
+            _ => DeviceBanks::incomplete(
+                "the session was interrupted, so they lack the dwells before",
+            ),
         });
         // Waiting events are from before this recording.
         while self.station.news()?.is_some() {}
@@ -225,20 +225,22 @@ impl UnitSession {
                     self.keep(&chunk);
                     if let Some(seen) = self.watch.take(&chunk) {
                         self.seen = Some(seen);
-                        self.stand(&seen, round.asked, round.step);
+                        self.stand(&seen, round.config, round.step);
                         if let (Some(step), false) = (round.step, self.done) {
-                            self.consider(&seen, round, step, tell)?;
+                            self.update_dwell(&seen, round, step, tell)?;
                         }
                     }
                 }
                 StationEvent::Restarted(why) => {
                     let next = self.next.unwrap_or(0) as f64 / self.station.unit.rate_hz;
-                    if let Some(taking) = &mut self.taking {
-                        taking.restarted(next, why.clone());
+                    if let Some(recording) = &mut self.recording {
+                        recording.restarted(next, why.clone());
                     }
                     self.interrupted(Interruption::Restarted(why), tell)?;
                     if let Some(banks) = &mut self.banks {
-                        banks.lacks("the device restarted, so they lack the dwells before");
+                        banks.mark_incomplete(
+                            "the device restarted, so they lack the dwells before",
+                        );
                     }
                 }
                 StationEvent::Note(words) => tell.push(Event::Note {
@@ -247,7 +249,7 @@ impl UnitSession {
                 StationEvent::Lost(why) => self.interrupted(Interruption::Lost(why), tell)?,
                 StationEvent::Other(why) => {
                     let why = Interruption::OtherUnit(why);
-                    self.standing.waiting = Some(Waiting::Interrupted(why.clone()));
+                    self.state.waiting = Some(Waiting::Interrupted(why.clone()));
                     tell.push(Event::Interrupted {
                         unit: self.name(),
                         why,
@@ -261,9 +263,9 @@ impl UnitSession {
 
     fn interrupted(&mut self, why: Interruption, tell: &mut Vec<Event>) -> Result<()> {
         let waiting = Waiting::Interrupted(why.clone());
-        self.throw(&waiting, tell)?;
+        self.discard(&waiting, tell)?;
         self.watch.interrupted();
-        self.standing.waiting = Some(waiting);
+        self.state.waiting = Some(waiting);
         self.folder.add(Entry::Interrupted {
             why: why.to_string(),
         })?;
@@ -278,20 +280,20 @@ impl UnitSession {
         let missing = chunk.tick.saturating_sub(self.next.unwrap_or(chunk.tick));
         self.next = Some(chunk.tick + chunk.values.len() as u64);
         self.power_on_s = chunk.power_on_s;
-        self.standing.lost += missing;
+        self.state.lost += missing;
         match &mut self.dwell {
             Some(dwell) => dwell.missing += missing,
             None => self.turn_missing += missing,
         }
         if chunk.saturated {
             let clipped = chunk.values.len() as u64;
-            self.standing.clipped += clipped;
+            self.state.clipped += clipped;
             self.turn_clipped += clipped;
         }
-        if let Some(taking) = &mut self.taking {
-            taking.missing(missing);
+        if let Some(recording) = &mut self.recording {
+            recording.missing(missing);
         }
-        self.standing.samples += chunk.values.len() as u64;
+        self.state.samples += chunk.values.len() as u64;
         let rate_hz = self.station.unit.rate_hz;
         let rows = &mut self.pending;
         for (tick, row) in (chunk.tick..).zip(&chunk.values) {
@@ -309,50 +311,50 @@ impl UnitSession {
         }
     }
 
-    fn stand(&mut self, seen: &Seen, asked: &SessionConfig, step: Option<&Step>) {
+    fn stand(&mut self, seen: &LastSecond, config: &SessionConfig, step: Option<&Step>) {
         let nominal = self
             .nominal
-            .unwrap_or_else(|| guessed(seen, asked.gravity_mps2));
+            .unwrap_or_else(|| guessed(seen, config.gravity_mps2));
         let up = force(seen, &nominal[1]);
-        let standing = &mut self.standing;
-        standing.motion = Some(seen.motion);
+        let state = &mut self.state;
+        state.motion = Some(seen.motion);
         let wanted_dps = step.map_or(0.0, |s| s.rate_dps);
-        standing.motion_limits = motion_limits(wanted_dps);
-        standing.rate_limit_dps = rate_limit_dps(wanted_dps);
-        standing.trend_limit_c_per_min = asked.warm_c_per_min;
-        standing.temp_c = seen.temp_c.is_finite().then_some(seen.temp_c);
-        standing.trend_c_per_min = seen.trend;
-        standing.tilt_deg = step.map(|s| up.angle(&s.up()).to_degrees());
+        state.motion_limits = motion_limits(wanted_dps);
+        state.rate_limit_dps = rate_limit_dps(wanted_dps);
+        state.trend_limit_c_per_min = config.warm_c_per_min;
+        state.temp_c = seen.temp_c.is_finite().then_some(seen.temp_c);
+        state.trend_c_per_min = seen.trend;
+        state.tilt_deg = step.map(|s| up.angle(&s.up()).to_degrees());
         let rate = self.watch.rate(seen, &nominal[0]);
         // An estimated gyro model has no scale.
         let known = self.nominal.is_some();
-        standing.rate_dps = known.then(|| rate.dot(&up.normalize()).to_degrees());
+        state.rate_dps = known.then(|| rate.dot(&up.normalize()).to_degrees());
     }
 
     /// Unit vector upwards, from the last second.
-    fn up(&self, seen: &Seen, asked: &SessionConfig) -> Vector3<f64> {
+    fn up(&self, seen: &LastSecond, config: &SessionConfig) -> Vector3<f64> {
         let nominal = self
             .nominal
-            .unwrap_or_else(|| guessed(seen, asked.gravity_mps2));
+            .unwrap_or_else(|| guessed(seen, config.gravity_mps2));
         force(seen, &nominal[1]).normalize()
     }
 
-    fn consider(
+    fn update_dwell(
         &mut self,
-        seen: &Seen,
+        seen: &LastSecond,
         round: &Round<'_>,
         step: &Step,
         tell: &mut Vec<Event>,
     ) -> Result<()> {
-        let asked = round.asked;
+        let config = round.config;
         let rate_hz = self.station.unit.rate_hz;
-        self.check_unit(seen, asked)?;
-        let up = self.up(seen, asked);
+        self.check_unit(seen, config)?;
+        let up = self.up(seen, config);
         let running = self.dwell.map(|d| d.step);
         let wanted = running.unwrap_or(*step);
         let limits = motion_limits(wanted.rate_dps);
         self.moved |= (0..2).any(|k| seen.motion[k] > limits[k]);
-        let found = match self.waits(seen, asked, &wanted, round.busy) {
+        let found = match self.waits(seen, config, &wanted, round.busy) {
             Some(why) => Err(why),
             None => self.pose(&up, round, &wanted, running.is_none()),
         };
@@ -362,22 +364,22 @@ impl UnitSession {
         });
         match (found, self.dwell) {
             (Err(why), _) => {
-                self.throw(&why, tell)?;
-                if self.standing.waiting.as_ref() != Some(&why) {
+                self.discard(&why, tell)?;
+                if self.state.waiting.as_ref() != Some(&why) {
                     // Changes of its numbers are shown in the state only.
-                    let told = self.standing.waiting.as_ref();
+                    let told = self.state.waiting.as_ref();
                     if !told.is_some_and(|told| told.is_like(&why)) {
                         tell.push(Event::Waiting {
                             unit: self.name(),
                             why: why.clone(),
                         });
                     }
-                    self.standing.waiting = Some(why);
+                    self.state.waiting = Some(why);
                 }
             }
             (Ok(step), None) => {
                 let from = seen.tick.saturating_sub((BEFORE_S * rate_hz) as u64);
-                self.begin_banks(&step, asked);
+                self.begin_banks(&step, config);
                 let had = self.pending.t_s.iter().rev();
                 let had = had
                     .take_while(|t| (**t * rate_hz).round() >= from as f64)
@@ -387,14 +389,14 @@ impl UnitSession {
                     from,
                     missing: (seen.tick - from).saturating_sub(had),
                 });
-                self.standing.waiting = None;
-                self.standing.left_s = Some(step.dwell_s);
+                self.state.waiting = None;
+                self.state.left_s = Some(step.dwell_s);
             }
             (Ok(_), Some(dwell)) => {
                 let guard = (GUARD_S * rate_hz) as u64;
                 let to = dwell.to(rate_hz);
                 let left = (to + guard).saturating_sub(seen.tick);
-                self.standing.left_s = Some(left as f64 / rate_hz);
+                self.state.left_s = Some(left as f64 / rate_hz);
                 if left == 0 {
                     self.accept(dwell, to, seen, round, tell)?;
                 }
@@ -404,21 +406,21 @@ impl UnitSession {
     }
 
     /// Sends the present input to the device's filters.
-    fn begin_banks(&mut self, step: &Step, asked: &SessionConfig) {
+    fn begin_banks(&mut self, step: &Step, config: &SessionConfig) {
         let (Some(banks), Some(noise)) = (&mut self.banks, self.watch.noise()) else {
             return;
         };
-        let mut input = known(step, asked);
+        let mut input = known(step, config);
         for rate in &mut input[..3] {
             *rate = rate.to_radians();
         }
-        let spans = [asked.largest_rate_dps.to_radians(), asked.gravity_mps2];
+        let spans = [config.largest_rate_dps.to_radians(), config.gravity_mps2];
         banks.begin(&self.station, &noise, input, spans);
     }
 
     /// Discards the running dwell.
-    fn throw(&mut self, why: &Waiting, tell: &mut Vec<Event>) -> Result<()> {
-        self.standing.left_s = None;
+    fn discard(&mut self, why: &Waiting, tell: &mut Vec<Event>) -> Result<()> {
+        self.state.left_s = None;
         let Some(dwell) = self.dwell.take() else {
             return Ok(());
         };
@@ -428,11 +430,11 @@ impl UnitSession {
         let rate_hz = self.station.unit.rate_hz;
         let lasted = self.next.unwrap_or(dwell.from).saturating_sub(dwell.from);
         if lasted as f64 > (BEFORE_S + BEGUN_S) * rate_hz {
-            self.folder.add(Entry::Thrown {
+            self.folder.add(Entry::Discarded {
                 step: dwell.step,
                 why: why.to_string(),
             })?;
-            tell.push(Event::Thrown {
+            tell.push(Event::Discarded {
                 unit: self.name(),
                 why: why.clone(),
             });
@@ -444,17 +446,17 @@ impl UnitSession {
         &mut self,
         dwell: Dwell,
         to: u64,
-        seen: &Seen,
+        seen: &LastSecond,
         round: &Round<'_>,
         tell: &mut Vec<Event>,
     ) -> Result<()> {
-        let asked = round.asked;
+        let config = round.config;
         let rate_hz = self.station.unit.rate_hz;
-        self.check_temperature(seen, asked)?;
+        self.check_temperature(seen, config)?;
         if let Some(banks) = &mut self.banks {
             banks.keep(&self.station);
         }
-        let Some(taking) = &mut self.taking else {
+        let Some(recording) = &mut self.recording else {
             return Ok(());
         };
         let mut rows = std::mem::take(&mut self.pending);
@@ -468,20 +470,20 @@ impl UnitSession {
         let begin = rows
             .t_s
             .partition_point(|t| (t * rate_hz).round() < dwell.from as f64);
-        let input = known(&dwell.step, asked);
+        let input = known(&dwell.step, config);
         for row in begin..end {
             rows.step[row] = self.number;
             for c in 0..6 {
                 rows.reference[c][row] = input[c];
             }
         }
-        if asked.fixture != Fixture::Table {
+        if config.fixture != Fixture::Table {
             rows.reference = Default::default();
         }
         let from_s = rows.t_s.get(begin).copied().unwrap_or(0.0);
-        taking.write(&rows)?;
+        recording.write(&rows)?;
         self.pending = behind;
-        let (rows, bytes) = taking.settled()?;
+        let (rows, bytes) = recording.settled()?;
         let number = self.number;
         self.folder.add(Entry::Dwell {
             part: self.part,
@@ -497,7 +499,7 @@ impl UnitSession {
             temp_c: seen.temp_c.is_finite().then_some(seen.temp_c),
         })?;
         self.number += 1;
-        (self.dwell, self.done, self.standing.left_s) = (None, true, None);
+        (self.dwell, self.done, self.state.left_s) = (None, true, None);
         tell.push(Event::Dwell {
             unit: self.name(),
             part: self.part,
@@ -507,12 +509,12 @@ impl UnitSession {
         });
         let missing = std::mem::take(&mut self.turn_missing);
         let clipped = std::mem::take(&mut self.turn_clipped);
-        if asked.fixture != Fixture::Table && number > 0 {
+        if config.fixture != Fixture::Table && number > 0 {
             self.count_turn(missing, tell)?;
             self.tell_clipped(clipped, tell);
         }
         if self.part == Part::Calibration {
-            self.refit(asked);
+            self.refit(config);
             self.check_hope()?;
             tell.push(Event::Progress {
                 unit: self.name(),
@@ -531,21 +533,24 @@ impl UnitSession {
     }
 
     /// Why the poses show that the accelerometer's axes do not match their names.
-    pub fn mirrored(&self, asked: &SessionConfig) -> Option<String> {
-        axes::mirrored(&self.folder.shown(self.part), asked.fixture.tolerance_deg())
+    pub fn mirrored(&self, config: &SessionConfig) -> Option<String> {
+        axes::mirrored(
+            &self.folder.shown(self.part),
+            config.fixture.tolerance_deg(),
+        )
     }
 
     /// A dwell was requested.
     pub fn asked_for(&mut self) {
-        (self.done, self.moved, self.standing.waiting) = (false, false, None);
+        (self.done, self.moved, self.state.waiting) = (false, false, None);
     }
 
-    fn check_temperature(&self, seen: &Seen, asked: &SessionConfig) -> Result<()> {
+    fn check_temperature(&self, seen: &LastSecond, config: &SessionConfig) -> Result<()> {
         let Some([first, _]) = self.folder.temperatures() else {
             return Ok(());
         };
         let moved = seen.temp_c - first;
-        if moved.abs() > asked.most_drift_c {
+        if moved.abs() > config.most_drift_c {
             let problem = format!(
                 "the temperature has changed from {first:.1} to {:.1} °C since the first dwell, but a calibration is valid at one temperature",
                 seen.temp_c
@@ -557,10 +562,10 @@ impl UnitSession {
     }
 
     /// Fits the recording so far. From now on up is found with its result.
-    pub fn refit(&mut self, asked: &SessionConfig) -> Option<Fit> {
-        let taking = self.taking.as_ref()?;
-        let fitted = calibrate(taking.manifest(), &taking.samples, 0);
-        self.progress = progress(&fitted, &asked.targets);
+    pub fn refit(&mut self, config: &SessionConfig) -> Option<Fit> {
+        let recording = self.recording.as_ref()?;
+        let fitted = calibrate(recording.manifest(), &recording.samples, 0);
+        self.progress = progress(&fitted, &config.targets);
         self.refused = match &fitted {
             Err(error) if !matches!(error, Error::Undetermined(_)) => self.refused + 1,
             _ => 0,
@@ -598,10 +603,10 @@ impl UnitSession {
         let part = self.part;
         self.folder.add(Entry::Redo { part, number })?;
         if let Some(banks) = &mut self.banks {
-            banks.lacks("a dwell that they had received was repeated");
+            banks.mark_incomplete("a dwell that they had received was repeated");
         }
-        if let Some(taking) = &mut self.taking {
-            taking.drop_dwell(number);
+        if let Some(recording) = &mut self.recording {
+            recording.drop_dwell(number);
         }
         Ok(Some(step))
     }

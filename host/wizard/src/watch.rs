@@ -112,7 +112,7 @@ struct Block {
 
 /// Statistics of the last second.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen {
+pub struct LastSecond {
     /// Tick after its last sample.
     pub tick: u64,
     /// Mean raw readings.
@@ -182,7 +182,7 @@ impl Watch {
     }
 
     /// Adds samples. Returns the statistics of the last second, if it is complete.
-    pub fn take(&mut self, chunk: &Chunk) -> Option<Seen> {
+    pub fn take(&mut self, chunk: &Chunk) -> Option<LastSecond> {
         let missing = chunk.tick.saturating_sub(self.next.unwrap_or(chunk.tick));
         self.next = Some(chunk.tick + chunk.values.len() as u64);
         // After a gap of more than a tenth of a second, a new second begins.
@@ -289,7 +289,7 @@ impl Watch {
         Some(tc / tt)
     }
 
-    fn see(&mut self, tick: u64, temp_c: f64) -> Seen {
+    fn see(&mut self, tick: u64, temp_c: f64) -> LastSecond {
         let mut all = Moments::default();
         let (mut saturated, mut missing) = (false, 0);
         for block in &self.window {
@@ -339,7 +339,7 @@ impl Watch {
                     > EXCHANGED.0 * size(Sensor::Gyro).max(1e4 * noise(Sensor::Gyro))
                 && changed(Sensor::Accel) < EXCHANGED.1 * noise(Sensor::Accel)
         });
-        Seen {
+        LastSecond {
             tick,
             mean: all.mean,
             motion,
@@ -353,7 +353,7 @@ impl Watch {
     }
 
     /// Rate of a second relative to rest, rad/s; `gyro` is the model raw to SI.
-    pub fn rate(&self, seen: &Seen, gyro: &Affine<f64>) -> Vector3<f64> {
+    pub fn rate(&self, seen: &LastSecond, gyro: &Affine<f64>) -> Vector3<f64> {
         let rest = self.rest.map_or([0.0; 6], |r| r.0);
         gyro.matrix * Vector3::from_fn(|c, _| seen.mean[c] - rest[c])
     }
@@ -367,13 +367,13 @@ impl Watch {
 }
 
 /// Specific force; `accel` is the model raw to SI.
-pub fn force(seen: &Seen, accel: &Affine<f64>) -> Vector3<f64> {
+pub fn force(seen: &LastSecond, accel: &Affine<f64>) -> Vector3<f64> {
     accel.apply(&Vector3::from_fn(|c, _| seen.mean[3 + c]))
 }
 
 /// Model of a board without a data sheet. At rest its accelerometer reads gravity, which gives the scale. The gyro's scale is set to 1 rad/s per raw
 /// unit, so only its directions are meaningful.
-pub fn guessed(seen: &Seen, gravity_mps2: f64) -> [Affine<f64>; 2] {
+pub fn guessed(seen: &LastSecond, gravity_mps2: f64) -> [Affine<f64>; 2] {
     let size = Vector3::from_fn(|c, _| seen.mean[3 + c]).norm();
     let plain = |factor: f64| Affine {
         matrix: Matrix3::identity() * factor,
@@ -465,7 +465,7 @@ mod tests {
     }
 
     /// A second and a half at rest of a board with less noise than its step, at `level`.
-    fn coarse(watch: &mut Watch, tick: u64, level: [f64; 6]) -> Option<Seen> {
+    fn coarse(watch: &mut Watch, tick: u64, level: [f64; 6]) -> Option<LastSecond> {
         let mut one = chunk(tick, 150, 0.0, 0.0);
         one.values.fill(level);
         watch.take(&one)

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use mimu_recording::error::{Error, Result};
 
 use crate::axes;
-use crate::event::{Event, Phase, Question, Standing, View, Wish};
+use crate::event::{Event, Phase, Question, SessionState, UserRequest, View};
 use crate::folder::{Entry, Part};
 use crate::procedure::{Fixture, SessionConfig, next_step};
 use crate::turn::pause;
@@ -34,7 +34,7 @@ pub enum Ended {
 /// A session.
 pub struct Wizard<'a> {
     /// Settings.
-    pub asked: SessionConfig,
+    pub config: SessionConfig,
     /// The units, all on one fixture.
     pub units: Vec<UnitSession>,
     /// Moves the units.
@@ -65,13 +65,13 @@ enum Stepped {
 impl<'a> Wizard<'a> {
     /// A session with these units.
     pub fn new(
-        asked: SessionConfig,
+        config: SessionConfig,
         units: Vec<UnitSession>,
         driver: Box<dyn Driver + 'a>,
         view: &'a mut dyn View,
     ) -> Self {
         Self {
-            asked,
+            config,
             units,
             driver,
             view,
@@ -98,10 +98,10 @@ impl<'a> Wizard<'a> {
     }
 
     /// Processes the events of all units once, and shows the state. Returns the user's request, if any.
-    async fn round(&mut self, step: Option<&Step>, busy: bool) -> Result<Option<Wish>> {
+    async fn round(&mut self, step: Option<&Step>, busy: bool) -> Result<Option<UserRequest>> {
         let mut tell = Vec::new();
         let round = Round {
-            asked: &self.asked,
+            config: &self.config,
             step,
             others: &self.queue,
             busy,
@@ -116,25 +116,25 @@ impl<'a> Wizard<'a> {
         }
         if self.shown.elapsed() > SHOWN {
             self.shown = Instant::now();
-            let samples = self.units.first().map_or(0, |u| u.standing.samples);
+            let samples = self.units.first().map_or(0, |u| u.state.samples);
             let zero = *self.zero_s.get_or_insert(samples);
             let rate_hz = self.units.first().map_or(1.0, |u| u.station.unit.rate_hz);
-            let standing = Standing {
+            let state = SessionState {
                 phase: self.phase,
                 step: self.current,
                 dwells: [self.units.first().map_or(0, |u| self.had(u)), self.planned],
-                thrown: self.units.iter().map(|u| u.folder.thrown()).sum(),
+                discarded: self.units.iter().map(|u| u.folder.discarded()).sum(),
                 elapsed_s: (samples - zero.min(samples)) as f64 / rate_hz,
-                units: self.units.iter().map(|u| u.standing.clone()).collect(),
+                units: self.units.iter().map(|u| u.state.clone()).collect(),
                 progress: self.units.iter().map(|u| u.progress.clone()).collect(),
             };
-            self.view.show(&standing);
+            self.view.show(&state);
         }
-        let wish = self.view.wish();
-        if !some && wish.is_none() {
+        let request = self.view.request();
+        if !some && request.is_none() {
             pause().await;
         }
-        Ok(wish)
+        Ok(request)
     }
 
     fn had(&self, unit: &UnitSession) -> usize {
@@ -148,7 +148,7 @@ impl<'a> Wizard<'a> {
         // A session that was killed may have left the table turning.
         self.driver.stop()?;
         while self.driver.busy()? {
-            if self.round(None, true).await? == Some(Wish::Cancel) {
+            if self.round(None, true).await? == Some(UserRequest::Cancel) {
                 return Ok(Ended::Cancelled);
             }
         }
@@ -156,7 +156,7 @@ impl<'a> Wizard<'a> {
             unit.was_turning();
         }
         loop {
-            if self.round(None, false).await? == Some(Wish::Cancel) {
+            if self.round(None, false).await? == Some(UserRequest::Cancel) {
                 return Ok(Ended::Cancelled);
             }
             let heard = self.units.iter().all(UnitSession::is_heard);
@@ -164,7 +164,7 @@ impl<'a> Wizard<'a> {
                 if since.elapsed() > SILENT {
                     let silent = self.units.iter().find(|u| !u.is_heard());
                     let name = silent.map_or_else(String::new, UnitSession::name);
-                    let (problem, remedy) = match silent.is_some_and(|u| u.standing.samples > 0) {
+                    let (problem, remedy) = match silent.is_some_and(|u| u.state.samples > 0) {
                         true => (
                             "it does not come to rest: no two successive seconds have the same readings",
                             "leave it at rest until the first dwell, and run it again",
@@ -175,7 +175,7 @@ impl<'a> Wizard<'a> {
                 }
                 continue;
             }
-            let Some(limit) = self.asked.warm_c_per_min else {
+            let Some(limit) = self.config.warm_c_per_min else {
                 return Ok(Ended::Done);
             };
             let warm = |u: &UnitSession| u.trend().is_some_and(|t| t.abs() <= limit);
@@ -185,7 +185,7 @@ impl<'a> Wizard<'a> {
                     Some(t) if t.abs() > limit => Some(Waiting::Warming(t, limit)),
                     Some(_) => None,
                 };
-                unit.standing.waiting = waiting;
+                unit.state.waiting = waiting;
             }
             if self.units.iter().all(warm) {
                 return Ok(Ended::Done);
@@ -197,10 +197,10 @@ impl<'a> Wizard<'a> {
     /// Records the dwells of a part: the planned ones that are missing and, for a calibration by targets, more or fewer.
     pub async fn dwells(&mut self, part: Part, steps: &[Step]) -> Result<Ended> {
         for unit in &mut self.units {
-            let asked = self.asked.clone();
-            unit.begin(part, &asked)?;
+            let config = self.config.clone();
+            unit.begin(part, &config)?;
             if part == Part::Calibration {
-                unit.refit(&asked);
+                unit.refit(&config);
             }
         }
         self.planned = steps.len();
@@ -249,7 +249,7 @@ impl<'a> Wizard<'a> {
     async fn goes_on(&mut self, part: Part, steps: &[Step], step: &Step) -> Result<Ended> {
         self.queue = self.left(part, steps);
         self.queue.sort_by_key(|s| self.later.contains(s));
-        let limit = self.asked.fixture.tolerance_deg();
+        let limit = self.config.fixture.tolerance_deg();
         let last = self.units.first().and_then(|u| u.folder.dwells(part).pop());
         let other = last.filter(|(_, had)| had.up().angle(&step.up()).to_degrees() > limit);
         let Some((_, had)) = other else {
@@ -266,7 +266,7 @@ impl<'a> Wizard<'a> {
         let mirrored = self
             .units
             .iter()
-            .find_map(|u| Some((u.name(), u.mirrored(&self.asked)?)));
+            .find_map(|u| Some((u.name(), u.mirrored(&self.config)?)));
         let Some((name, why)) = mirrored.filter(|_| !self.axes_agreed) else {
             return Ok(Ended::Done);
         };
@@ -286,7 +286,7 @@ impl<'a> Wizard<'a> {
         let had = self.units.iter().map(|u| u.folder.dwells(part));
         let had = had.min_by_key(Vec::len).unwrap_or_default();
         let mut left = steps.to_vec();
-        let limit = self.asked.fixture.tolerance_deg();
+        let limit = self.config.fixture.tolerance_deg();
         for (_, dwell) in had {
             let is = |s: &Step| {
                 s.rate_dps == dwell.rate_dps && s.up().angle(&dwell.up()).to_degrees() <= limit
@@ -300,7 +300,7 @@ impl<'a> Wizard<'a> {
 
     /// The next dwell; `None` if all are done.
     fn choose(&mut self, part: Part) -> Option<Step> {
-        let going_by_targets = part == Part::Calibration && self.asked.by_targets;
+        let going_by_targets = part == Part::Calibration && self.config.by_targets;
         if !going_by_targets {
             return (!self.queue.is_empty()).then(|| self.queue.remove(0));
         }
@@ -310,7 +310,7 @@ impl<'a> Wizard<'a> {
             .first()
             .map_or(0, |u| u.folder.dwells(part).len());
         // The rest must remain determined if a part is held out: half as many dwells again as that needs.
-        if met && done >= least(self.asked.fixture) || done >= self.asked.most_dwells {
+        if met && done >= least(self.config.fixture) || done >= self.config.most_dwells {
             return None;
         }
         if !self.queue.is_empty() {
@@ -321,7 +321,7 @@ impl<'a> Wizard<'a> {
             .iter()
             .find(|u| u.progress.missed() != [false; 2])?;
         let had: Vec<Step> = worst.folder.dwells(part).into_iter().map(|d| d.1).collect();
-        Some(next_step(&self.asked, &had, worst.progress.missed()))
+        Some(next_step(&self.config, &had, worst.progress.missed()))
     }
 
     async fn step(&mut self, step: &Step) -> Result<Stepped> {
@@ -330,12 +330,12 @@ impl<'a> Wizard<'a> {
         }
         let mut since = Instant::now();
         let mut told = false;
-        while let Some(why) = self.driver.held()? {
+        while let Some(why) = self.driver.interlock()? {
             if !told {
                 self.tell(Event::Note { words: why.clone() });
                 told = true;
             }
-            if self.round(None, false).await? == Some(Wish::Cancel) {
+            if self.round(None, false).await? == Some(UserRequest::Cancel) {
                 return Ok(Stepped::Cancelled);
             }
             if since.elapsed() > SILENT && !self.driver.is_person() {
@@ -352,15 +352,15 @@ impl<'a> Wizard<'a> {
         loop {
             let busy = self.driver.busy()?;
             match self.round(Some(step), busy).await? {
-                Some(Wish::Cancel) => return Ok(Stepped::Cancelled),
-                Some(Wish::Skip) => return Ok(Stepped::Skipped),
-                Some(Wish::RedoLast) => {
+                Some(UserRequest::Cancel) => return Ok(Stepped::Cancelled),
+                Some(UserRequest::Skip) => return Ok(Stepped::Skipped),
+                Some(UserRequest::RedoLast) => {
                     let last = self.units.iter().filter_map(UnitSession::last_number).max();
                     if let Some(step) = last.map(|n| self.redo(n)).transpose()?.flatten() {
                         return Ok(Stepped::Redo(step));
                     }
                 }
-                Some(Wish::Redo(number)) => {
+                Some(UserRequest::Redo(number)) => {
                     if let Some(step) = self.redo(number)? {
                         return Ok(Stepped::Redo(step));
                     }
@@ -370,17 +370,16 @@ impl<'a> Wizard<'a> {
             if self.units.iter().all(|u| u.done) {
                 return Ok(Stepped::Had);
             }
-            let wrong = |u: &UnitSession| {
-                u.done || matches!(u.standing.waiting, Some(Waiting::WrongPose(..)))
-            };
+            let wrong =
+                |u: &UnitSession| u.done || matches!(u.state.waiting, Some(Waiting::WrongPose(..)));
             if busy || !self.units.iter().all(wrong) {
                 stood = Instant::now();
             }
             let out_of_patience =
-                since.elapsed().as_secs_f64() > self.asked.patience_s || stood.elapsed() > WRONG;
+                since.elapsed().as_secs_f64() > self.config.patience_s || stood.elapsed() > WRONG;
             if out_of_patience && !self.driver.is_person() {
                 let why = self.units.iter().filter(|u| !u.done);
-                let why = why.filter_map(|u| u.standing.waiting.as_ref()).next();
+                let why = why.filter_map(|u| u.state.waiting.as_ref()).next();
                 let problem = format!(
                     "the conditions for {:?} are not met: {}",
                     step.words(),
@@ -421,7 +420,7 @@ impl<'a> Wizard<'a> {
             if let Some(answer) = self.view.ask(question) {
                 return Ok(Some(answer));
             }
-            if self.round(None, false).await? == Some(Wish::Cancel) {
+            if self.round(None, false).await? == Some(UserRequest::Cancel) {
                 return Ok(None);
             }
         }

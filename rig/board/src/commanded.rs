@@ -66,7 +66,7 @@ impl Commanded {
             while !ended.load(Ordering::Relaxed) {
                 served.step()?;
             }
-            Ok(served.board().standing().ns as f64 * 1e-9)
+            Ok(served.board().state().ns as f64 * 1e-9)
         });
         let connected = TcpStream::connect(address).and_then(|stream| {
             stream.set_read_timeout(Some(PATIENCE))?;

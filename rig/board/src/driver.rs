@@ -10,7 +10,7 @@ use crate::part::Machine;
 
 /// Current state of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Standing {
+pub struct BoardState {
     /// The virtual clock, ns since the board was first switched on.
     pub ns: u64,
     /// Instructions executed. Waiting for an interrupt executes none.
@@ -29,32 +29,32 @@ pub struct Arrival {
 }
 
 /// A function to run on a stopped board.
-pub(crate) type Errand = Box<dyn FnOnce(&mut Stopped<'_>) + Send>;
+pub(crate) type Task = Box<dyn FnOnce(&mut Stopped<'_>) + Send>;
 
 /// Commands to the board.
 pub(crate) enum Order {
     /// Run until this time, ns.
     To(u64),
     /// Run a function at the board's current time.
-    Do(Errand),
+    Do(Task),
 }
 
 /// The board between two instructions.
 pub(crate) struct Stopped<'a> {
     pub(crate) session: &'a mut Session<Machine>,
     pub(crate) host: &'a mut dyn Host,
-    pub(crate) driver: &'a mut Puppet,
+    pub(crate) driver: &'a mut CommandedDriver,
     pub(crate) stop: Stop,
 }
 
 /// The driver that the emulator calls: it carries out the commands.
-pub(crate) struct Puppet {
+pub(crate) struct CommandedDriver {
     pub(crate) orders: Receiver<Order>,
-    pub(crate) reports: Sender<Standing>,
+    pub(crate) reports: Sender<BoardState>,
     pub(crate) arrivals: Vec<Arrival>,
 }
 
-impl Driver<Machine> for Puppet {
+impl Driver<Machine> for CommandedDriver {
     fn on_settled(&mut self, _: &mut Session<Machine>, _: &mut dyn Host, settled: Settled) {
         if let Settled::Hit(hit) = settled {
             self.arrivals.push(Arrival {
@@ -72,7 +72,7 @@ impl Driver<Machine> for Puppet {
         host: &mut dyn Host,
     ) -> Option<VirtualNanos> {
         self.reports
-            .send(Standing {
+            .send(BoardState {
                 ns: stop.at.0,
                 instructions: stop.instruction_count,
             })
@@ -81,7 +81,7 @@ impl Driver<Machine> for Puppet {
             // An error means that the board's owner is gone.
             match self.orders.recv().ok()? {
                 Order::To(ns) => return Some(VirtualNanos(ns)),
-                Order::Do(errand) => errand(&mut Stopped {
+                Order::Do(task) => task(&mut Stopped {
                     session,
                     host,
                     driver: self,

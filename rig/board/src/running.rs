@@ -9,8 +9,8 @@ use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
-pub use crate::driver::{Arrival, Standing};
-use crate::driver::{Order, Puppet, Stopped};
+pub use crate::driver::{Arrival, BoardState};
+use crate::driver::{CommandedDriver, Order, Stopped};
 use crate::findings::{Findings, findings};
 use crate::flash::{BANK, BASE, Operation};
 use crate::front::Front;
@@ -50,10 +50,10 @@ pub struct Restart {
 #[derive(Debug)]
 pub struct Board {
     orders: Sender<Order>,
-    reports: Receiver<Standing>,
+    reports: Receiver<BoardState>,
     thread: Option<JoinHandle<Result<(), String>>>,
     line: Line,
-    standing: Standing,
+    state: BoardState,
 }
 
 impl Board {
@@ -77,14 +77,14 @@ impl Board {
         let thread = std::thread::Builder::new()
             .name("board".into())
             .spawn(move || {
-                let puppet = Puppet {
+                let driver = CommandedDriver {
                     orders: orders_in,
                     reports: reports_out,
                     arrivals: Vec::new(),
                 };
                 let session = Session::new(Box::new(machine), 0, VirtualNanos(0))
                     .map_err(|e| e.to_string())?;
-                emulator::run(session, &Start::new(&images), puppet)
+                emulator::run(session, &Start::new(&images), driver)
                     .map(drop)
                     .map_err(|e| e.to_string())
             })
@@ -94,7 +94,7 @@ impl Board {
             reports,
             thread: Some(thread),
             line,
-            standing: Standing {
+            state: BoardState {
                 ns: 0,
                 instructions: 0,
             },
@@ -105,8 +105,8 @@ impl Board {
 
     fn wait(&mut self) -> Result<(), String> {
         match self.reports.recv() {
-            Ok(standing) => {
-                self.standing = standing;
+            Ok(state) => {
+                self.state = state;
                 Ok(())
             }
             Err(_) => Err(self.ended()),
@@ -128,38 +128,38 @@ impl Board {
     /// Runs a function on the stopped board.
     pub(crate) fn with<T: Send + 'static>(
         &mut self,
-        errand: impl FnOnce(&mut Stopped<'_>) -> T + Send + 'static,
+        task: impl FnOnce(&mut Stopped<'_>) -> T + Send + 'static,
     ) -> Result<T, String> {
         let (back, answer) = channel();
-        let errand = Box::new(move |stopped: &mut Stopped<'_>| {
+        let task = Box::new(move |stopped: &mut Stopped<'_>| {
             // The receiver is missing only if the board is gone too.
-            let _ = back.send(errand(stopped));
+            let _ = back.send(task(stopped));
         });
-        let _ = self.orders.send(Order::Do(errand));
+        let _ = self.orders.send(Order::Do(task));
         answer.recv().map_err(|_| self.ended())
     }
 
     /// Its current state.
-    pub fn standing(&self) -> Standing {
-        self.standing
+    pub fn state(&self) -> BoardState {
+        self.state
     }
 
     /// Runs until a virtual time, ns. Bytes put on the line before arrive in the meantime.
     ///
     /// Errors: the emulator gave up.
-    pub fn run_to(&mut self, ns: u64) -> Result<Standing, String> {
-        if ns > self.standing.ns {
+    pub fn run_to(&mut self, ns: u64) -> Result<BoardState, String> {
+        if ns > self.state.ns {
             let _ = self.orders.send(Order::To(ns));
             self.wait()?;
         }
-        Ok(self.standing)
+        Ok(self.state)
     }
 
     /// Runs for a virtual duration, ns.
     ///
     /// Errors: as [`Board::run_to`].
-    pub fn run_for(&mut self, ns: u64) -> Result<Standing, String> {
-        self.run_to(self.standing.ns + ns)
+    pub fn run_for(&mut self, ns: u64) -> Result<BoardState, String> {
+        self.run_to(self.state.ns + ns)
     }
 
     /// Puts bytes on the serial line to the device, behind those that still wait. They arrive at the baud rate of the device's port.
@@ -284,7 +284,7 @@ impl Board {
     /// Contents of bank 2 if the supply were cut now: the present ones, except for the operation in flight.
     pub fn store_if_cut(&mut self, seed: u64) -> Result<Vec<u8>, String> {
         let mut bytes = self.store()?;
-        let at = self.standing.ns;
+        let at = self.state.ns;
         let mut random = Random::new(seed, "cut supply");
         for o in self.in_flight()?.iter().filter(|o| o.address >= STORE) {
             let first = (o.address - STORE) as usize;

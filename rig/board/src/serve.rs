@@ -13,10 +13,10 @@ use crate::interference::Interference;
 use crate::port::Port;
 use crate::running::{Board, STORE};
 
-mod orders;
+mod commands;
 
-pub use orders::COMMANDS;
-use orders::Desk;
+use commands::BenchState;
+pub use commands::COMMANDS;
 
 /// Speed of virtual time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,7 +83,7 @@ pub struct Served {
     board: Board,
     port: Port,
     control: Option<Control>,
-    desk: Desk,
+    bench: BenchState,
     interference: Interference,
     store: Option<StoreFile>,
     pace: Pace,
@@ -111,12 +111,12 @@ impl Served {
             }
             None => None,
         };
-        let first_ns = board.standing().ns;
+        let first_ns = board.state().ns;
         Ok(Self {
             board,
             port: Port::new()?,
             control: None,
-            desk: Desk::new(0),
+            bench: BenchState::new(0),
             interference: Interference::new(0),
             store,
             pace,
@@ -143,7 +143,7 @@ impl Served {
             spoken |= !quiet;
         }
         self.began = Instant::now();
-        self.first_ns = self.board.standing().ns;
+        self.first_ns = self.board.state().ns;
         Ok(())
     }
 
@@ -157,7 +157,7 @@ impl Served {
         let control = Control::bind(address)?;
         let address = control.address();
         self.control = Some(control);
-        self.desk = Desk::new(seed);
+        self.bench = BenchState::new(seed);
         self.interference = Interference::new(seed);
         Ok(address)
     }
@@ -206,7 +206,7 @@ impl Served {
             Pace::Wall => SLICE_NS,
             Pace::Fast => FAST_SLICE_NS,
         };
-        let standing = self.board.run_for(slice_ns)?;
+        let state = self.board.run_for(slice_ns)?;
         let bytes = self.board.receive();
         let mut bytes: Vec<u8> = bytes.iter().map(|&(_, byte)| byte).collect();
         if self.port.is_open() {
@@ -215,12 +215,12 @@ impl Served {
         self.waiting.extend(bytes);
         self.deliver()?;
         self.keep()?;
-        if self.desk.is_off() {
+        if self.bench.is_off() {
             // Nothing is converted, but the unit moves. Without this, all of the motion would be computed at once at the end.
             self.board.front(|front, ns| front.advance(ns))?;
         }
         if self.pace == Pace::Wall {
-            self.keep_pace(standing.ns);
+            self.keep_pace(state.ns);
         }
         Ok(())
     }
@@ -266,7 +266,7 @@ impl Served {
     /// From the terminal to the line.
     fn collect(&mut self) -> Result<(), String> {
         let mut some = [0; WAITING];
-        if self.desk.is_off() {
+        if self.bench.is_off() {
             self.traffic.unpowered += self.port.read(&mut some)? as u64;
             return Ok(());
         }

@@ -22,7 +22,8 @@ impl Terminal {
     ///
     /// Errors: the system has no terminal available.
     pub fn open() -> io::Result<Self> {
-        let side = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        // A program that a test starts must not inherit it: a port that disappears would still be open there.
+        let side = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&side)?;
         unlockpt(&side)?;
         let name = ptsname(&side, Vec::new())?;
@@ -58,6 +59,11 @@ impl Terminal {
     /// Waits until it accepts bytes again, is closed, or so many milliseconds have passed.
     pub fn wait_for_room(&self, ms: u32) {
         self.ready(PollFlags::OUT, ms);
+    }
+
+    /// Waits until bytes were written to it, it is closed, or so many milliseconds have passed.
+    pub fn wait_for_bytes(&self, ms: u32) {
+        self.ready(PollFlags::IN, ms);
     }
 
     fn ready(&self, what: PollFlags, ms: u32) -> PollFlags {

@@ -19,7 +19,7 @@ const FIDGET_DEG: [f64; 2] = [3.0, 8.0];
 
 /// State of a person under command.
 #[derive(Debug, Clone)]
-pub(super) struct Told {
+pub(super) struct CommandState {
     truth: HandsTruth,
     random: Random,
     /// Separate stream for a hand that moves in a pose, so that all else is unchanged.
@@ -54,7 +54,7 @@ impl Hands {
         let first = Turn::draw(None, plan.lead_in_s, &step, up, truth, &mut random);
         hands.turns = vec![first];
         hands.duration_s = f64::INFINITY;
-        hands.told = Some(Told {
+        hands.commanded = Some(CommandState {
             truth: truth.clone(),
             random,
             fidget: Random::new(seed, "fidget"),
@@ -76,7 +76,7 @@ impl Hands {
     }
 }
 
-impl Told {
+impl CommandState {
     /// The turn to a pose, after the end of `last`, and the motion of the hand in that pose, if any.
     fn turns(
         &mut self,
@@ -128,14 +128,14 @@ impl Turn {
 
 impl Commanded for Hands {
     fn command(&mut self, t_s: f64, command: Command) -> Result<(), String> {
-        let Some(mut told) = self.told.take() else {
+        let Some(mut commanded) = self.commanded.take() else {
             return Err("the person carries out a plan; serve a bench under command".into());
         };
         let mut done = Ok(());
         match command {
             Command::Move { up, heading } => {
                 if let Some(last) = self.drop_pending(t_s) {
-                    let (turn, fidget) = told.turns(&last, t_s, up, heading);
+                    let (turn, fidget) = commanded.turns(&last, t_s, up, heading);
                     self.turns.push(turn);
                     self.turns.extend(fidget);
                 }
@@ -143,7 +143,7 @@ impl Commanded for Hands {
             Command::Stop => {
                 // A turn that has begun is completed.
                 if let Some(last) = self.drop_pending(t_s) {
-                    told.busy_s = told.busy_s.min(last.dwell[0].max(t_s));
+                    commanded.busy_s = commanded.busy_s.min(last.dwell[0].max(t_s));
                 }
             }
             Command::Rate(_) | Command::Spin(_) | Command::Turn(_) => {
@@ -151,15 +151,17 @@ impl Commanded for Hands {
                     "by hand a person cannot turn at a constant rate; serve a bench with a table";
                 done = Err(problem.into());
             }
-            Command::Fidget(every) => (told.every, told.poses) = (every, 0),
-            Command::Hold(held) => told.truth.held = held,
+            Command::Fidget(every) => (commanded.every, commanded.poses) = (every, 0),
+            Command::Hold(held) => commanded.truth.held = held,
         }
-        self.told = Some(told);
+        self.commanded = Some(commanded);
         done
     }
 
     fn busy(&self, t_s: f64) -> bool {
-        self.told.as_ref().is_some_and(|told| t_s < told.busy_s)
+        self.commanded
+            .as_ref()
+            .is_some_and(|commanded| t_s < commanded.busy_s)
     }
 
     fn position(&self, _: f64) -> Position {

@@ -3,7 +3,7 @@
 use super::choice::Turn;
 use super::even::Even;
 use super::{Hands, Shake};
-use crate::flaws::{FlawsTruth, direction, struck};
+use crate::flaws::{FlawsTruth, direction, pick};
 use crate::random::Random;
 use crate::rotation::{Rotation, scale};
 
@@ -15,12 +15,12 @@ impl Hands {
         let mut shake = random("violent shake");
         self.shake = Shake::new(&mut shake, truth.shake_hz, truth.shake_mrad, 0.0);
         // The first pose has no turn before it.
-        let shaken = struck(truth.shake_turns, n.saturating_sub(1), &mut shake);
+        let shaken = pick(truth.shake_turns, n.saturating_sub(1), &mut shake);
         for (turn, shaken) in self.turns.iter_mut().skip(1).zip(shaken) {
             turn.shaken = shaken;
         }
         let mut even = random("turning rests");
-        let turning = struck(truth.turning_rests, n, &mut even);
+        let turning = pick(truth.turning_rests, n, &mut even);
         for i in (0..n).filter(|i| turning[*i] && truth.turning_dps > 0.0) {
             self.turns[i].even = Some(Even {
                 rate: scale(truth.turning_dps.to_radians(), direction(&mut even)),

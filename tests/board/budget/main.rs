@@ -94,7 +94,7 @@ fn figures() -> Result<BTreeMap<String, f64>, String> {
     if stream != Answer::Done {
         return Err(format!("the stream of raw readings: {stream:?}"));
     }
-    let began = device.board.standing();
+    let began = device.board.state();
     let ms = 1000;
     let ended = device.board.run_for(ms * MS)?;
     let each = (ended.instructions - began.instructions) as f64 / ms as f64;

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use mimu_board::commanded::Commanded;
 use run::Ended;
-use session::{Sitting, unit};
+use session::{WizardSession, unit};
 
 /// Errors above these mean a wrong calibration: several times the errors from dwells of one second. deg/s, mg.
 const RIGHT: [f64; 2] = [0.3, 3.0];
@@ -68,7 +68,7 @@ fn main() -> ExitCode {
     let names: Vec<String> = std::env::args().skip(1).collect();
     println!(
         "{:14} {:>6} {:>7} {:>6} {:>6} {:>6}  outcome",
-        "fault", "s", "unit s", "dwells", "thrown", "broken"
+        "fault", "s", "unit s", "dwells", "discarded", "broken"
     );
     let mut wrong = 0;
     for (name, scenario) in ALL {
@@ -109,7 +109,7 @@ fn report(name: &str, ended: &Ended) -> bool {
     let recorded = ended.recorded_s.map_or("-".into(), |s| format!("{s:.0}"));
     println!(
         "{name:14} {:6.0} {recorded:>7} {:6} {:6} {:6}  {outcome}",
-        ended.seconds, ended.dwells, ended.thrown, ended.interrupted
+        ended.seconds, ended.dwells, ended.discarded, ended.interrupted
     );
     for note in &ended.notes {
         println!("{:14} note: {note}", "");
@@ -130,10 +130,10 @@ const TABLE: [&str; 9] = [
     "--as-planned",
 ];
 
-fn on_table(seed: u64, folder: &Path) -> Result<Sitting, String> {
-    let mut sitting = Sitting::new("table", seed, folder, &TABLE)?;
-    sitting.run()?;
-    Ok(sitting)
+fn on_table(seed: u64, folder: &Path) -> Result<WizardSession, String> {
+    let mut session = WizardSession::new("table", seed, folder, &TABLE)?;
+    session.run()?;
+    Ok(session)
 }
 
 fn nothing(folder: &Path) -> Result<Ended, String> {
@@ -142,15 +142,15 @@ fn nothing(folder: &Path) -> Result<Ended, String> {
 
 fn by_device(folder: &Path) -> Result<Ended, String> {
     let arguments = [&TABLE[..], &["--by", "device"]].concat();
-    let mut sitting = Sitting::new("table", 2, folder, &arguments)?;
-    sitting.run()?;
-    sitting.end()
+    let mut session = WizardSession::new("table", 2, folder, &arguments)?;
+    session.run()?;
+    session.end()
 }
 
 fn garbled(folder: &Path) -> Result<Ended, String> {
-    let mut sitting = on_table(3, folder)?;
-    sitting.board.tell("GARBLE 1000")?;
-    sitting.end()
+    let mut session = on_table(3, folder)?;
+    session.board.tell("GARBLE 1000")?;
+    session.end()
 }
 
 /// Does something after every few dwells, several times.
@@ -160,15 +160,15 @@ fn now_and_then(
     times: usize,
     mut strike: impl FnMut(&mut Commanded) -> Result<(), String>,
 ) -> Result<Ended, String> {
-    let mut sitting = on_table(seed, folder)?;
+    let mut session = on_table(seed, folder)?;
     for k in 1..=times {
         // Later ones would also strike verification and store, which have fewer dwells.
-        if !sitting.wait_for(|s| s.told("step") >= 2 * k)? {
+        if !session.wait_for(|s| s.told("step") >= 2 * k)? {
             return Err(format!("it ended after {} of {times}", k - 1));
         }
-        strike(&mut sitting.board)?;
+        strike(&mut session.board)?;
     }
-    sitting.end()
+    session.end()
 }
 
 fn bursts(folder: &Path) -> Result<Ended, String> {
@@ -196,7 +196,7 @@ fn supply(folder: &Path) -> Result<Ended, String> {
 }
 
 fn killed(folder: &Path) -> Result<Ended, String> {
-    let mut sitting = on_table(8, folder)?;
+    let mut session = on_table(8, folder)?;
     let mut kills = 0;
     // Times independent of its work, a third of a second to three seconds after each start.
     for k in 0..4 * KILLS {
@@ -205,27 +205,27 @@ fn killed(folder: &Path) -> Result<Ended, String> {
         if kills == KILLS {
             break;
         }
-        if !sitting.kill()? {
+        if !session.kill()? {
             break;
         }
         kills += 1;
         // Once in five it gets further; otherwise no dwell would ever end.
         if kills % 5 == 0 {
-            sitting.run()?;
-            sitting.wait_for(|s| s.told("dwell") >= 1)?;
+            session.run()?;
+            session.wait_for(|s| s.told("dwell") >= 1)?;
         } else {
-            sitting.run()?;
+            session.run()?;
         }
     }
-    let mut ended = sitting.end()?;
+    let mut ended = session.end()?;
     ended.notes.push(format!("killed {kills} times"));
     Ok(ended)
 }
 
 fn other_unit(folder: &Path) -> Result<Ended, String> {
-    let mut sitting = on_table(9, folder)?;
-    sitting.wait_for(|s| s.told("dwell") >= 3)?;
-    sitting.board.tell("LINK OFF")?;
+    let mut session = on_table(9, folder)?;
+    session.wait_for(|s| s.told("dwell") >= 3)?;
+    session.board.tell("LINK OFF")?;
     let other_folder = folder.join("other");
     let image = mimu_board_tests::image();
     let mut other = Commanded::start(
@@ -240,14 +240,14 @@ fn other_unit(folder: &Path) -> Result<Ended, String> {
     let port = std::fs::read_link(other_folder.join("port")).map_err(|e| e.to_string())?;
     let link = folder.join("port");
     std::os::unix::fs::symlink(port, &link).map_err(|e| e.to_string())?;
-    let before = sitting.told("interrupted");
-    sitting.wait_for(|s| s.told("interrupted") > before)?;
+    let before = session.told("interrupted");
+    session.wait_for(|s| s.told("interrupted") > before)?;
     std::thread::sleep(Duration::from_secs(3));
-    let dwells = sitting.told("dwell");
+    let dwells = session.told("dwell");
     other.tell("LINK OFF")?;
     std::fs::remove_file(&link).map_err(|e| e.to_string())?;
-    sitting.board.tell("LINK ON")?;
-    let mut ended = sitting.end()?;
+    session.board.tell("LINK ON")?;
+    let mut ended = session.end()?;
     ended
         .notes
         .push(format!("{dwells} dwells when the right unit was back"));
@@ -255,20 +255,20 @@ fn other_unit(folder: &Path) -> Result<Ended, String> {
 }
 
 fn drift(folder: &Path) -> Result<Ended, String> {
-    let mut sitting = on_table(10, folder)?;
-    sitting.board.tell("CHAMBER 70 20")?;
-    sitting.end()
+    let mut session = on_table(10, folder)?;
+    session.board.tell("CHAMBER 70 20")?;
+    session.end()
 }
 
 fn wrong_axis(folder: &Path) -> Result<Ended, String> {
     let arguments = [&TABLE[..], &["--patience", "10"]].concat();
-    let mut sitting = Sitting::new("table", 11, folder, &arguments)?;
+    let mut session = WizardSession::new("table", 11, folder, &arguments)?;
     let path = folder.join("driver.toml");
     let driver = std::fs::read_to_string(&path).map_err(|e| e.to_string())?;
     let driver = driver.replace("{x} {y} {z}", "{y} {z} {x}");
     std::fs::write(&path, driver).map_err(|e| e.to_string())?;
-    sitting.run()?;
-    sitting.end()
+    session.run()?;
+    session.end()
 }
 
 const HANDS: [&str; 6] = [
@@ -281,16 +281,17 @@ const HANDS: [&str; 6] = [
 ];
 
 fn fidget(folder: &Path) -> Result<Ended, String> {
-    let mut sitting = Sitting::new("hands", 12, folder, &HANDS)?;
-    sitting.board.tell("FIDGET 3")?;
-    sitting.run()?;
-    sitting.end()
+    let mut session = WizardSession::new("hands", 12, folder, &HANDS)?;
+    session.board.tell("FIDGET 3")?;
+    session.run()?;
+    session.end()
 }
 
 /// A person who first takes the faces, edges and corners of a box in their own order, and only then follows the requests.
 fn any_order(folder: &Path) -> Result<Ended, String> {
-    let mut sitting = Sitting::new("hands", 13, folder, &["--fixture", "hands", "--dwell", "2"])?;
-    sitting.run()?;
+    let mut session =
+        WizardSession::new("hands", 13, folder, &["--fixture", "hands", "--dwell", "2"])?;
+    session.run()?;
     let mut poses = Vec::new();
     for x in [-1, 0, 1] {
         for y in [1, 0, -1] {
@@ -302,38 +303,38 @@ fn any_order(folder: &Path) -> Result<Ended, String> {
         }
     }
     // Turning the unit during its self-test would end the session.
-    sitting.wait_for(|s| s.told("step") > 0)?;
+    session.wait_for(|s| s.told("step") > 0)?;
     let mut next = 0;
     while next < 4 * poses.len() {
-        let had = sitting.told("dwell");
+        let had = session.told("dwell");
         let pose = match next < poses.len() {
             true => poses[(7 * next) % poses.len()].clone(),
-            false => sitting.asked_pose()?,
+            false => session.asked_pose()?,
         };
-        sitting.board.tell(&pose)?;
+        session.board.tell(&pose)?;
         next += 1;
         let asked = std::time::Instant::now();
         let patience = Duration::from_secs(12);
-        let goes_on = sitting.wait_for(|s| s.told("dwell") > had || asked.elapsed() > patience)?;
+        let goes_on = session.wait_for(|s| s.told("dwell") > had || asked.elapsed() > patience)?;
         if !goes_on {
             break;
         }
     }
-    let mut ended = sitting.end()?;
+    let mut ended = session.end()?;
     ended.notes.push(format!("{next} poses were shown"));
     Ok(ended)
 }
 
 fn hands(folder: &Path) -> Result<Ended, String> {
-    let mut sitting = Sitting::new("hands", 14, folder, &HANDS)?;
-    sitting.run()?;
-    sitting.end()
+    let mut session = WizardSession::new("hands", 14, folder, &HANDS)?;
+    session.run()?;
+    session.end()
 }
 
 /// The same person with all planned poses, even if fewer would suffice.
 fn hands_fixed(folder: &Path) -> Result<Ended, String> {
     let arguments = [&HANDS[..], &["--as-planned"]].concat();
-    let mut sitting = Sitting::new("hands", 14, folder, &arguments)?;
-    sitting.run()?;
-    sitting.end()
+    let mut session = WizardSession::new("hands", 14, folder, &arguments)?;
+    session.run()?;
+    session.end()
 }

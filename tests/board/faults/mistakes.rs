@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use mimu_rig::rig_file::RigTruth;
 
 use crate::run::Ended;
-use crate::session::{Sitting, unit};
+use crate::session::{WizardSession, unit};
 use crate::stored::half_widths;
 
 pub const BY_HAND: [&str; 4] = ["--fixture", "hands", "--dwell", "2"];
@@ -28,8 +28,8 @@ fn our_board(
         "hands" => &BY_HAND,
         _ => &crate::TABLE,
     };
-    let mut sitting = Sitting::with(fixture, &truth, seed, folder, arguments)?;
-    sitting.run()?;
+    let mut session = WizardSession::with(fixture, &truth, seed, folder, arguments)?;
+    session.run()?;
     let mut steps = 0;
     loop {
         // The command drives a table by itself.
@@ -37,15 +37,15 @@ fn our_board(
             break;
         }
         let asked = Instant::now();
-        if !sitting.wait_for(|s| s.told("step") > steps || asked.elapsed() > PUZZLED)? {
+        if !session.wait_for(|s| s.told("step") > steps || asked.elapsed() > PUZZLED)? {
             break;
         }
-        steps = sitting.told("step");
-        if let Ok(pose) = sitting.asked_pose() {
-            sitting.board.tell(&pose)?;
+        steps = session.told("step");
+        if let Ok(pose) = session.asked_pose() {
+            session.board.tell(&pose)?;
         }
     }
-    sitting.end()
+    session.end()
 }
 
 fn rewired(truth: &mut RigTruth, sensor: usize, order: [usize; 3], signs: [f64; 3]) {
@@ -77,52 +77,52 @@ pub fn table_z_inverted(folder: &Path) -> Result<Ended, String> {
 }
 
 pub fn changed_flag(folder: &Path) -> Result<Ended, String> {
-    let mut sitting = crate::on_table(24, folder)?;
-    sitting.wait_for(|s| s.told("dwell") >= 3)?;
-    sitting.kill()?;
-    sitting.gravity = "9.81".into();
-    sitting.run()?;
-    sitting.end()
+    let mut session = crate::on_table(24, folder)?;
+    session.wait_for(|s| s.told("dwell") >= 3)?;
+    session.kill()?;
+    session.gravity = "9.81".into();
+    session.run()?;
+    session.end()
 }
 
 /// `yes` is typed at the start, and again without the supply turned off; then the supply is turned off.
 pub fn early_yes(folder: &Path) -> Result<Ended, String> {
-    let mut sitting = Sitting::new("table", 25, folder, &crate::TABLE)?;
+    let mut session = WizardSession::new("table", 25, folder, &crate::TABLE)?;
     let path = folder.join("driver.toml");
     let driver = std::fs::read_to_string(&path).map_err(|e| e.to_string())?;
     let [before, after] = ["[power]", "# A chamber"].map(|at| driver.find(at).unwrap_or(0));
     let driver = [&driver[..before], &driver[after..]].concat();
     std::fs::write(&path, driver).map_err(|e| e.to_string())?;
-    sitting.yes = false;
-    sitting.run()?;
-    sitting.type_line("yes")?;
+    session.yes = false;
+    session.run()?;
+    session.type_line("yes")?;
     let mut said = Vec::new();
-    if sitting.wait_for(|s| s.told("question") > 0 || s.told("stored") > 0)? {
+    if session.wait_for(|s| s.told("question") > 0 || s.told("stored") > 0)? {
         said.push(format!(
             "stored before the question: {}",
-            sitting.told("stored")
+            session.told("stored")
         ));
         std::thread::sleep(Duration::from_secs(1));
-        sitting.type_line("yes")?;
-        sitting.wait_for(|s| s.told("question") > 1 || s.told("stored") > 0)?;
+        session.type_line("yes")?;
+        session.wait_for(|s| s.told("question") > 1 || s.told("stored") > 0)?;
         said.push(format!(
             "stored by a yes without a cycle: {}",
-            sitting.told("stored")
+            session.told("stored")
         ));
-        sitting.board.tell("POWER OFF")?;
+        session.board.tell("POWER OFF")?;
         std::thread::sleep(Duration::from_millis(300));
-        sitting.board.tell("POWER ON")?;
+        session.board.tell("POWER ON")?;
         std::thread::sleep(Duration::from_millis(500));
-        sitting.type_line("yes")?;
-        sitting.wait_for(|s| s.told("stored") > 0)?;
-        said.push(sitting.last_words("stored"));
+        session.type_line("yes")?;
+        session.wait_for(|s| s.told("stored") > 0)?;
+        said.push(session.last_words("stored"));
     }
     // The effects are declined.
-    while sitting.wait_for(|s| s.last_words("question").contains("effects"))? {
-        sitting.type_line("no")?;
+    while session.wait_for(|s| s.last_words("question").contains("effects"))? {
+        session.type_line("no")?;
         std::thread::sleep(Duration::from_millis(300));
     }
-    let mut ended = sitting.end()?;
+    let mut ended = session.end()?;
     ended.notes.extend(said);
     Ok(ended)
 }
@@ -140,14 +140,14 @@ pub fn table_250(folder: &Path) -> Result<Ended, String> {
         "--latitude",
         "30.5",
     ];
-    let mut sitting = Sitting::with("table", &truth, 26, folder, &arguments)?;
-    sitting.run()?;
+    let mut session = WizardSession::with("table", &truth, 26, folder, &arguments)?;
+    session.run()?;
     let mut first = String::new();
-    if sitting.wait_for(|s| s.told("stored") > 0)? {
-        first = sitting.first_stored()?;
+    if session.wait_for(|s| s.told("stored") > 0)? {
+        first = session.first_stored()?;
     }
-    let truth = *sitting.truth();
-    let mut ended = sitting.end()?;
+    let truth = *session.truth();
+    let mut ended = session.end()?;
     ended.notes.push(format!("first stored: {first}"));
     for name in ["calibration.toml", "with-effects.toml"] {
         let file = folder.join("session").join(name);

@@ -33,7 +33,7 @@ pub struct Ended {
     /// By the unit's clock, s, if anything was recorded.
     pub recorded_s: Option<f64>,
     pub dwells: u64,
-    pub thrown: u64,
+    pub discarded: u64,
     pub interrupted: usize,
     pub verdict: String,
     /// Largest errors of the device's present calibration, gyro (deg/s at 60 deg/s) and accelerometer (mg at 1 g), if there is one.
@@ -215,7 +215,7 @@ impl Run {
             seconds: self.began.elapsed().as_secs_f64(),
             recorded_s: found["recorded_s"].as_f64(),
             dwells: found["dwells"].as_u64().unwrap_or(0),
-            thrown: found["thrown"].as_u64().unwrap_or(0),
+            discarded: found["discarded"].as_u64().unwrap_or(0),
             interrupted: self.told("interrupted"),
             verdict: text(&found["verdict"]),
             stored,

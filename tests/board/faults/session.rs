@@ -34,12 +34,12 @@ pub fn on_real_table(seed: u64) -> Result<RigTruth, String> {
 }
 
 /// A session with a board of ours.
-pub struct Sitting {
+pub struct WizardSession {
     pub board: Commanded,
     run: Run,
 }
 
-impl Deref for Sitting {
+impl Deref for WizardSession {
     type Target = Run;
 
     fn deref(&self) -> &Run {
@@ -47,13 +47,13 @@ impl Deref for Sitting {
     }
 }
 
-impl DerefMut for Sitting {
+impl DerefMut for WizardSession {
     fn deref_mut(&mut self) -> &mut Run {
         &mut self.run
     }
 }
 
-impl Sitting {
+impl WizardSession {
     /// A board on a fixture; the command is not yet started.
     pub fn new(fixture: &str, seed: u64, folder: &Path, more: &[&str]) -> Result<Self, String> {
         Self::with(fixture, &unit(seed, fixture)?, seed, folder, more)

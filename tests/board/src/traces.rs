@@ -276,7 +276,7 @@ impl Step {
         device.upload(&calibration);
         assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
         device.board.reset_by_pin(1).unwrap();
-        let began = device.board.standing().ns;
+        let began = device.board.state().ns;
         let front = Front::bench(&plan, &truth, 7).unwrap().begun_at(began);
         device.board.set_front(front).unwrap();
         device.greeting();

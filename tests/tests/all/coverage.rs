@@ -73,7 +73,7 @@ const MANY: u64 = 400;
 
 #[test]
 fn intervals_hold_the_truth_where_the_input_is_known() {
-    with_a_table(FEW, Dwells::ByLot).iter().for_each(judge);
+    with_a_table(FEW, Dwells::Randomised).iter().for_each(judge);
 }
 
 /// Tests the parameters, and the delays against the filters of the bench.
@@ -128,7 +128,9 @@ fn intervals_of_many_hold_the_truth_where_inputs_move_within_dwells() {
 #[test]
 #[ignore = "nightly: more recordings"]
 fn intervals_of_many_hold_the_truth_where_the_input_is_known() {
-    with_a_table(MANY, Dwells::ByLot).iter().for_each(judge);
+    with_a_table(MANY, Dwells::Randomised)
+        .iter()
+        .for_each(judge);
 }
 
 /// Dwells in the listed order. Without the noise of the unit at rest the share drops to 90 %, because the intervals then lack the wander that

@@ -4,7 +4,7 @@ use mimu::diagnose::decision::Against;
 use mimu::diagnose::search::Alternative;
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
 use mimu::effects;
-use mimu::fit::{Method, Options};
+use mimu::fit::Options;
 use mimu::quantity::Sensor;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
@@ -12,14 +12,6 @@ use mimu_tests::blind::{Case, case, is_right, plan, reported, unit};
 use mimu_tests::recordings::{mikoff, xsens};
 use mimu_tests::{bench, by_hand};
 use rayon::prelude::*;
-
-fn options() -> Options {
-    Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    }
-}
 
 fn cases(ids: &[&str], seeds: u64) -> Vec<Case> {
     (0..seeds)
@@ -120,7 +112,11 @@ fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
     let expected = place.earth_rate()[2];
     let recorded = bench::recorded(&plan, &file, 3);
     let noise = bench::noise_file(&file, 3, recorded.condensed.period_s);
-    let mut found = diagnose(recorded.with_noise(&noise).unwrap().into(), options()).unwrap();
+    let mut found = diagnose(
+        recorded.with_noise(&noise).unwrap().into(),
+        Options::IN_SAMPLE,
+    )
+    .unwrap();
     // No dwell is planned that would distinguish the added alternative; text and drawings must still be made.
     for accepted in found
         .sensors
@@ -158,7 +154,11 @@ fn a_step_at_a_reading_is_left_over_against_the_reading_or_named_an_error_by_the
         parameters.insert("at".into(), at.into());
         let recorded = bench::recorded(&plan, &file, seed);
         let noise = bench::noise_file(&file, seed, recorded.condensed.period_s);
-        let found = diagnose(recorded.with_noise(&noise).unwrap().into(), options()).unwrap();
+        let found = diagnose(
+            recorded.with_noise(&noise).unwrap().into(),
+            Options::IN_SAMPLE,
+        )
+        .unwrap();
         let ids: Vec<String> = found.effects.iter().map(|e| e.candidate.id()).collect();
         let left = found.sensors.iter().flat_map(|s| &s.decision.leftover);
         let against: Vec<_> = left.map(|l| &l.against).collect();
@@ -182,7 +182,11 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
     file.effect[0].parameters = toml::from_str("mg_per_g2 = [50.0, -40.0, 30.0]").unwrap();
     let recorded = bench::recorded(&plan(seed), &file, seed);
     let noise = bench::noise_file(&file, seed, recorded.condensed.period_s);
-    let found = diagnose(recorded.with_noise(&noise).unwrap().into(), options()).unwrap();
+    let found = diagnose(
+        recorded.with_noise(&noise).unwrap().into(),
+        Options::IN_SAMPLE,
+    )
+    .unwrap();
     let ids: Vec<String> = found.effects.iter().map(|e| e.candidate.id()).collect();
     assert_eq!(ids, ["accel_scale_quadratic"]);
     let accepted = found.sensors.iter().flat_map(|s| &s.decision.accepted);

@@ -2,7 +2,7 @@
 
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::effects;
-use mimu::fit::{Method, Options};
+use mimu::fit::Options;
 use mimu::plan::next_experiment::prediction::Target;
 use mimu::plan::next_experiment::{Next, Setup, next, smallest};
 use mimu_rig::random::Random;
@@ -40,12 +40,7 @@ fn first_plan(rates_dps: &[f64]) -> String {
 }
 
 fn diagnosed(plan: &str, unit: &RigFile, seed: u64) -> Diagnosis {
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    };
-    diagnose(bench::recorded(plan, unit, seed).into(), options).unwrap()
+    diagnose(bench::recorded(plan, unit, seed).into(), Options::IN_SAMPLE).unwrap()
 }
 
 fn found(diagnosis: &Diagnosis) -> Vec<String> {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::diagnose::{Recordings, diagnose};
-use mimu::fit::{Method, Options, fit};
+use mimu::fit::{Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
@@ -12,12 +12,6 @@ use mimu::warning::Warning;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
-
-const OPTIONS: Options = Options {
-    method: Method::LeastSquares,
-    holdout_blocks: 0,
-    only: None,
-};
 
 /// Six faces at rest and rates in both directions, repeated, while the chamber goes through `chamber_c`.
 fn plan(rounds: u32, dwell_s: f64, chamber_c: &[[f64; 2]]) -> String {
@@ -57,7 +51,7 @@ fn thermal(seed: u64) -> RigFile {
 }
 
 fn floors(prepared: Prepared) -> [f64; 2] {
-    let fitted = fit(prepared, OPTIONS).expect("a fit");
+    let fitted = fit(prepared, Options::IN_SAMPLE).expect("a fit");
     Sensor::BOTH.map(|s| fitted.sensor(s).expect("recorded").noise_floor())
 }
 
@@ -97,7 +91,10 @@ fn at_a_constant_temperature_the_noise_floor_is_that_of_two_successive_means() {
 fn a_diagnosis_that_accepted_thermal_effects_does_not_say_that_the_model_has_no_temperature() {
     let ramp = plan(5, 10.0, &[[0.0, 0.0], [350.0, 35.0], [700.0, 0.0]]);
     let of = |file: &RigFile| {
-        let diagnosis = diagnose(Recordings::from(bench::recorded(&ramp, file, 4)), OPTIONS);
+        let diagnosis = diagnose(
+            Recordings::from(bench::recorded(&ramp, file, 4)),
+            Options::IN_SAMPLE,
+        );
         let diagnosis = diagnosis.expect("a diagnosis");
         let next = mimu::plan::next_experiment::next(&diagnosis);
         DiagnosisResult::of(&diagnosis, &next, None)
@@ -153,7 +150,7 @@ fn what_is_found_from_the_data_does_not_keep_out_a_lag_and_what_is_significant_i
     ]);
     let only = Options {
         only: Some(Sensor::Gyro),
-        ..OPTIONS
+        ..Options::IN_SAMPLE
     };
     let diagnosis = diagnose(Recordings::from(bench::recorded(&ramp, &file, 5)), only);
     let diagnosis = diagnosis.expect("a diagnosis");

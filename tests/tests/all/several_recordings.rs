@@ -4,7 +4,7 @@
 
 use mimu::diagnose::rejected::Reason;
 use mimu::diagnose::{Diagnosis, Recordings, Verdict, diagnose};
-use mimu::fit::{Method, Options};
+use mimu::fit::Options;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
@@ -13,12 +13,6 @@ use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
 use mimu_tests::blind::{plan, unit};
 use mimu_tests::recordings::{Foreign, data_set};
-
-const OPTIONS: Options = Options {
-    method: Method::LeastSquares,
-    holdout_blocks: 0,
-    only: None,
-};
 
 /// A session of the unit `file`: the seed determines noise and order, and the biases move by 15 mV (3 deg/s) and 20 mV (25 mg).
 fn session(file: &RigFile, seed: u64) -> Prepared {
@@ -55,7 +49,7 @@ fn together(first: Prepared, more: Vec<Prepared>) -> Diagnosis {
         given: None,
         accept: Vec::new(),
     };
-    diagnose(recordings, OPTIONS).expect("a diagnosis")
+    diagnose(recordings, Options::IN_SAMPLE).expect("a diagnosis")
 }
 
 fn judged_by(first: Prepared, second: Prepared) -> Diagnosis {
@@ -66,7 +60,7 @@ fn judged_by(first: Prepared, second: Prepared) -> Diagnosis {
         given: None,
         accept: Vec::new(),
     };
-    diagnose(recordings, OPTIONS).expect("a diagnosis")
+    diagnose(recordings, Options::IN_SAMPLE).expect("a diagnosis")
 }
 
 #[test]
@@ -79,7 +73,7 @@ fn biases_that_change_between_recordings_are_no_effect() {
 #[test]
 fn two_recordings_know_an_effect_better_than_one_by_the_root_of_two() {
     let file = unit(&["accel_scale_quadratic"], 5);
-    let alone = diagnose(session(&file, 51).into(), OPTIONS).expect("a diagnosis");
+    let alone = diagnose(session(&file, 51).into(), Options::IN_SAMPLE).expect("a diagnosis");
     let both = together(session(&file, 51), vec![session(&file, 52)]);
     assert_eq!(ids(&alone), ["accel_scale_quadratic"]);
     assert_eq!(ids(&both), ["accel_scale_quadratic"]);
@@ -129,7 +123,7 @@ fn recordings_of_two_units_are_refused() {
         more: vec![other],
         ..first.into()
     };
-    let refused = diagnose(recordings, OPTIONS).unwrap_err();
+    let refused = diagnose(recordings, Options::IN_SAMPLE).unwrap_err();
     assert!(refused.to_string().contains("unit-008"), "{refused}");
 }
 
@@ -156,7 +150,7 @@ fn cooling() -> Option<Prepared> {
 #[test]
 fn a_chamber_that_only_cools_cannot_tell_temperature_from_time() {
     let Some(prepared) = cooling() else { return };
-    let found = diagnose(prepared.into(), OPTIONS).expect("a diagnosis");
+    let found = diagnose(prepared.into(), Options::IN_SAMPLE).expect("a diagnosis");
     let gyro = &found.sensors[0].decision;
     println!(
         "rest, held out: {:.4} deg/s before, {:.4} after; floor {:.4}",
@@ -202,7 +196,7 @@ fn ten_poses_by_hand_leave_nothing_to_find_in_an_accelerometer() {
     let folder = tempfile::tempdir().expect("a folder");
     let recording = foreign.import(&folder).expect("importable");
     let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable");
-    let found = diagnose(prepared.into(), OPTIONS).expect("a diagnosis");
+    let found = diagnose(prepared.into(), Options::IN_SAMPLE).expect("a diagnosis");
     assert!(found.effects.is_empty(), "{:?}", ids(&found));
     let accel = &found.sensors[1].decision;
     // One of the ten is too short; nine poses determine nine parameters.

@@ -1,6 +1,6 @@
 //! A firmware on the bench that takes the low byte of a reading for a signed number: its readings are refused, and only those.
 
-use mimu::fit::{Method, Options, fit};
+use mimu::fit::{Options, fit};
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::error::Argument;
@@ -10,12 +10,6 @@ use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
 
 const RIG: &str = include_str!("../../../rig/rigs/sign-extension.toml");
-
-const OPTIONS: Options = Options {
-    method: Method::LeastSquares,
-    holdout_blocks: 0,
-    only: None,
-};
 
 #[test]
 fn readings_whose_low_byte_was_taken_for_a_signed_number_are_refused_by_their_channels() {
@@ -32,7 +26,7 @@ fn readings_whose_low_byte_was_taken_for_a_signed_number_are_refused_by_their_ch
         file.effect.retain(|effect| effect.id == kept);
         assert_eq!(file.effect.len(), 1);
         let recorded = bench::recorded(&bench::hand_plan(20), &file, 3);
-        let error = fit(recorded, OPTIONS).expect_err(kept);
+        let error = fit(recorded, Options::IN_SAMPLE).expect_err(kept);
         assert_eq!(error.refused().arguments, [Argument::SignedLowByte]);
         let refused = error.to_string();
         assert!(
@@ -42,7 +36,13 @@ fn readings_whose_low_byte_was_taken_for_a_signed_number_are_refused_by_their_ch
     }
     let mut sound = both;
     sound.effect.clear();
-    assert!(fit(bench::recorded(&bench::hand_plan(20), &sound, 3), OPTIONS).is_ok());
+    assert!(
+        fit(
+            bench::recorded(&bench::hand_plan(20), &sound, 3),
+            Options::IN_SAMPLE
+        )
+        .is_ok()
+    );
 }
 
 #[test]
@@ -70,8 +70,8 @@ fn an_import_that_mends_the_low_byte_gives_the_calibration_of_the_same_unit_with
             let mended = Recording::open(&out).unwrap();
             Prepared::read(&mended, STILL_FACTOR, |_| ()).expect("readable")
         };
-        let right = fit(imported(&sound, &[]), OPTIONS).expect("a fit");
-        let found = fit(imported(&faulty, &["gyro", "accel"]), OPTIONS).expect("a fit");
+        let right = fit(imported(&sound, &[]), Options::IN_SAMPLE).expect("a fit");
+        let found = fit(imported(&faulty, &["gyro", "accel"]), Options::IN_SAMPLE).expect("a fit");
         for (found, right) in found.sensors.iter().zip(&right.sensors) {
             let [a, b] = [found, right].map(|s| &s.estimated.triad);
             assert_eq!(
@@ -82,7 +82,7 @@ fn an_import_that_mends_the_low_byte_gives_the_calibration_of_the_same_unit_with
             assert_eq!(a.forward_covariance, b.forward_covariance);
         }
         // In a sensor that is not mended, the fault remains and is refused as before.
-        let refused = fit(imported(&faulty, &["gyro"]), OPTIONS)
+        let refused = fit(imported(&faulty, &["gyro"]), Options::IN_SAMPLE)
             .unwrap_err()
             .to_string();
         assert!(

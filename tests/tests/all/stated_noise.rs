@@ -1,6 +1,6 @@
 //! The noise of the unit at rest, as used by the other commands.
 
-use mimu::fit::{Method, Options, fit};
+use mimu::fit::{Options, fit};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::budget::DwellNoise;
 use mimu::prepared::Prepared;
@@ -22,12 +22,7 @@ fn recorded() -> (Prepared, NoiseFile) {
 }
 
 fn gyro_floor(prepared: Prepared) -> f64 {
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    };
-    let fitted = fit(prepared, options).unwrap();
+    let fitted = fit(prepared, Options::IN_SAMPLE).unwrap();
     fitted.sensor(Sensor::Gyro).unwrap().noise_floor()
 }
 

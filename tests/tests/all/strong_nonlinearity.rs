@@ -1,7 +1,7 @@
 //! Units by hand with nonlinearities far above data-sheet size. Only the magnitude of gravity determines them, and it is not linear in them.
 
 use mimu::diagnose::{Verdict, diagnose};
-use mimu::fit::{Method, Options};
+use mimu::fit::Options;
 use mimu::quantity::Sensor;
 use mimu_rig::random::Random;
 use mimu_tests::bench;
@@ -20,13 +20,8 @@ fn turns(seed: u64) -> f64 {
     });
     let mut file = unit(&["accel_scale_cubic"], Grade::Tactical, seed);
     file.effect[0].parameters = toml::from_str(&format!("mg_per_g3 = {mg:?}")).unwrap();
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    };
     let recorded = bench::recorded(&plan(seed), &file, seed);
-    let diagnosis = diagnose(recorded.into(), options).unwrap();
+    let diagnosis = diagnose(recorded.into(), Options::IN_SAMPLE).unwrap();
     let ids: Vec<String> = diagnosis.effects.iter().map(|e| e.candidate.id()).collect();
     let of = |sensor| diagnosis.sensors.iter().find(|s| s.sensor == sensor);
     let [gyro, accel] = Sensor::BOTH.map(|s| &of(s).unwrap().decision);

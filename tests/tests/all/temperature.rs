@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use mimu::calibration::Calibration;
 use mimu::diagnose::decision::Accepted;
 use mimu::diagnose::{Diagnosis, Recordings, diagnose};
-use mimu::fit::{Method, Options, fit};
+use mimu::fit::{Options, fit};
 use mimu::plan::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -18,12 +18,6 @@ use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
 use mimu_tests::bench;
 use rayon::prelude::*;
-
-const OPTIONS: Options = Options {
-    method: Method::LeastSquares,
-    holdout_blocks: 0,
-    only: None,
-};
 
 type Step = ([f64; 3], f64);
 
@@ -94,7 +88,7 @@ fn diagnosed(first: Prepared, given: Option<&Calibration>) -> Diagnosis {
         given,
         ..first.into()
     };
-    diagnose(recordings, OPTIONS).expect("a diagnosis")
+    diagnose(recordings, Options::IN_SAMPLE).expect("a diagnosis")
 }
 
 fn accepted(diagnosis: &Diagnosis) -> impl Iterator<Item = &Accepted> {
@@ -131,7 +125,7 @@ fn chamber(seed: u64) -> Prepared {
 #[test]
 fn a_sweep_that_moves_the_bias_by_more_than_the_rates_is_fitted_and_its_effect_is_named() {
     let prepared = chamber(1);
-    let fitted = fit(prepared.clone(), OPTIONS).expect("a fit");
+    let fitted = fit(prepared.clone(), Options::IN_SAMPLE).expect("a fit");
     let gyro = fitted.sensor(Sensor::Gyro).expect("recorded");
     // The warning shows that the residuals exceed the share of the inputs above which readings count as unrelated.
     let warned = gyro.warnings.iter().map(Warning::to_string);
@@ -174,7 +168,7 @@ fn a_sweep_whose_readings_follow_no_input_is_refused_though_they_follow_the_temp
     for recording in [shuffled, dead] {
         let only = Options {
             only: Some(Sensor::Gyro),
-            ..OPTIONS
+            ..Options::IN_SAMPLE
         };
         let refused = fit(recording, only)
             .expect_err("no calibration")
@@ -326,7 +320,7 @@ fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
 /// A calibration of `file` from a short recording at one temperature.
 fn short(file: &RigFile, seed: u64) -> Calibration {
     let plan = plan(&faces(&[-60.0, 60.0]), 1.5, &[[0.0, 25.0]]);
-    let fitted = fit(recorded(&plan, file, seed), OPTIONS).expect("a fit");
+    let fitted = fit(recorded(&plan, file, seed), Options::IN_SAMPLE).expect("a fit");
     Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z").expect("a calibration")
 }
 

@@ -28,11 +28,7 @@ fn found(seed: u64) -> Diagnosis {
         parameters: toml::Table::from_iter([("matrix_dps_per_g".to_string(), matrix)]),
     }];
     let recorded = bench::recorded(&bench::turning_plan(seed), &file, seed);
-    let options = Options {
-        holdout_blocks: 0,
-        ..Options::default()
-    };
-    diagnose(recorded.into(), options).expect("diagnosed")
+    diagnose(recorded.into(), Options::IN_SAMPLE).expect("diagnosed")
 }
 
 /// Effects that were found.

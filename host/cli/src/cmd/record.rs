@@ -11,7 +11,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use mimu::plan::Plan;
 use mimu_device::Session;
-use mimu_device::record::{Known, RecordOptions, Standing, Steps, Wish, record};
+use mimu_device::record::{Known, RecordOptions, RecordingState, Steps, UserRequest, record};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Inputs, SampleFormat};
 
@@ -190,10 +190,10 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     let stop = interruption()?;
     let marks = args.steps.then(keyboard).transpose()?;
     let spinner = ProgressBar::new_spinner();
-    let look = |standing: &Standing| {
-        spinner.set_message(told(standing, args.steps, &titles));
+    let look = |state: &RecordingState| {
+        spinner.set_message(told(state, args.steps, &titles));
         spinner.tick();
-        Wish {
+        UserRequest {
             end: stop.load(Ordering::Relaxed),
             marks: marks.as_ref().map_or(0, |m| m.swap(0, Ordering::Relaxed)),
             drop: None,
@@ -216,17 +216,17 @@ fn titles(known: &Known) -> Vec<String> {
 }
 
 /// Progress line for a terminal.
-fn told(standing: &Standing, steps: bool, titles: &[String]) -> String {
-    if standing.waiting {
+fn told(state: &RecordingState, steps: bool, titles: &[String]) -> String {
+    if state.waiting {
         return "the port has vanished: waiting for it; Ctrl-C ends the recording".into();
     }
     let title = |dwell: usize| {
         let title = titles.get(dwell).map(|title| format!(" ({title})"));
         title.unwrap_or_default()
     };
-    let next = standing.dwells as usize;
-    let length = standing.last_s.unwrap_or_default() - standing.first_s.unwrap_or_default();
-    let dwell = match (steps, standing.step) {
+    let next = state.dwells as usize;
+    let length = state.last_s.unwrap_or_default() - state.first_s.unwrap_or_default();
+    let dwell = match (steps, state.step) {
         (false, Some(step)) => format!(", dwell {step}{}", title(step as usize)),
         (false, None) if titles.is_empty() => String::new(),
         (false, None) => format!(", next is dwell {next}{}", title(next)),
@@ -235,7 +235,7 @@ fn told(standing: &Standing, steps: bool, titles: &[String]) -> String {
     };
     format!(
         "{length:.1} s, {} samples, {} lost, {:.1} °C{dwell}; Ctrl-C ends the recording",
-        standing.samples, standing.missing, standing.temp_c
+        state.samples, state.missing, state.temp_c
     )
 }
 

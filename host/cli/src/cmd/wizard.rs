@@ -216,7 +216,7 @@ impl WizardArgs {
         Ok(targets)
     }
 
-    fn asked(&self) -> Result<SessionConfig> {
+    fn config(&self) -> Result<SessionConfig> {
         let fixture = self.fixture.fixture();
         if self.by == By::Device && (fixture != Fixture::Table || self.text.text.is_some()) {
             let problem =
@@ -371,7 +371,7 @@ pub(crate) fn session(
         return Err(Error::new("wizard", problem, "give --text and one --port"));
     };
     let board = args.text.board(names, port, None)?;
-    let (asked, folder) = (args.asked()?, args.output.clone());
+    let (config, folder) = (args.config()?, args.output.clone());
     let wanted = UnitSpec {
         connect: relayed(board, begun_rate_hz(&folder), arrivals),
         folder: folder.clone(),
@@ -379,7 +379,7 @@ pub(crate) fn session(
     Ok(async move {
         let page = page(&command_line);
         let driver = Box::new(Person);
-        let outcome = carry_out(asked, vec![wanted], driver, view.as_mut(), &page).await?;
+        let outcome = carry_out(config, vec![wanted], driver, view.as_mut(), &page).await?;
         let stored = check_stored(&outcome, &folder);
         Ok((outcome, stored))
     })

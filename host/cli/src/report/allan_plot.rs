@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use maud::{Markup, html};
 
-use super::svg::{Frame, px};
+use super::svg::{Frame, decades, px};
 use mimu::quantity::{Sensor, significant};
 use mimu::readable;
 use mimu::result::allan::{AllanResult, ChannelResult, ModelResult};
@@ -109,7 +109,7 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
         key.push(("model".into(), "models".into()));
     }
     html! {
-        (frame.grid(&title, &labelled(&x), &labelled(&y), true))
+        (frame.grid(&title, &decades(&x), &decades(&y), true))
         path class="axis" d={ "M" (px(frame.across.start)) " " (px(frame.down.start)) "V" (px(frame.down.end)) "H" (px(frame.across.end)) } {}
         (frame.x_name("averaging time, s", &frame))
         (frame.y_name(&format!("{kind} deviation, {}", usual.unit)))
@@ -249,29 +249,5 @@ fn read_at(channel: &ChannelResult, model: &ModelResult, term: Term) -> Option<(
             Some((floor_s, value * FLOOR.sqrt()))
         }
         Term::Q | Term::R => None,
-    }
-}
-
-/// Round numbers in the range, with their labels, for a logarithmic axis: powers of ten, and their multiples by 2 and 5 if there are few.
-fn labelled(range: &Range<f64>) -> Vec<(f64, String)> {
-    let (low, high) = (range.start, range.end);
-    let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
-    let steps: &[u32] = if (high / low).log10() > 3.0 {
-        &[1]
-    } else {
-        &[1, 2, 5]
-    };
-    let all = decades.flat_map(|d| steps.iter().map(move |m| format!("{m}e{d}")));
-    // Parsed from text: computed powers of ten have rounding errors that a label would show.
-    let all = all.filter_map(|t| t.parse().ok());
-    all.filter(|t| (low..=high).contains(t))
-        .map(|t: f64| (t.log10(), label(t)))
-        .collect()
-}
-
-fn label(value: f64) -> String {
-    match value {
-        v if (1e-3..1e5).contains(&v) => format!("{v}"),
-        v => format!("{v:e}"),
     }
 }

@@ -2,14 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::device::printed;
+use super::device::{line, printed};
 use mimu::quantity::{AXES, significant};
 use mimu_device::{Checked, DeviceResult, KalmanRun};
-
-/// Writes a line to a string, which cannot fail.
-macro_rules! line {
-    ($out:expr, $($of:tt)*) => { let _ = writeln!($out, $($of)*); };
-}
 
 /// Result of `mimu device check`.
 pub fn check_text(result: &DeviceResult<Checked>) -> String {

@@ -14,6 +14,7 @@ use mimu_device::{
 macro_rules! line {
     ($out:expr, $($of:tt)*) => { let _ = writeln!($out, $($of)*); };
 }
+pub(super) use line;
 
 /// Result of `mimu device info`.
 pub fn info_text(result: &DeviceResult<&Identity>) -> String {
@@ -355,7 +356,7 @@ pub(super) fn printed(unit: &str) -> String {
 /// Result of `mimu record`.
 pub fn record_text(summary: &RecordSummary) -> String {
     let mut out = String::new();
-    let s = &summary.standing;
+    let s = &summary.state;
     line!(
         out,
         "{}: {} samples from {:.3} to {:.3} s, {} missing in {} gaps, {:.2} °C",

@@ -226,10 +226,10 @@ impl Panel {
         }
     }
 
-    /// The complete drawing; `label` describes it for screen readers.
-    pub fn drawing(&self, label: &str, inside: &Markup) -> Markup {
+    /// The complete drawing; `label` describes it for screen readers, `class` is in the style sheet.
+    pub fn drawing(&self, label: &str, class: Option<&str>, inside: &Markup) -> Markup {
         html! {
-            svg role="img" aria-label=(label) viewBox={ "0 0 " (px(self.size.0)) " " (px(self.size.1)) }
+            svg class=[class] role="img" aria-label=(label) viewBox={ "0 0 " (px(self.size.0)) " " (px(self.size.1)) }
                 xmlns="http://www.w3.org/2000/svg" { (inside) }
         }
     }

@@ -41,7 +41,7 @@ pub fn thermal_record_text(made: &CarriedOut) -> String {
         "procedure: {} of {} rounds, {} of {} dwells and turns",
         made.rounds_done, made.rounds_planned, made.dwells_done, made.dwells_planned
     );
-    let dropped = made.recorded.standing.dropped.len();
+    let dropped = made.recorded.state.dropped.len();
     if dropped > 0 {
         let _ = writeln!(
             out,

@@ -41,7 +41,7 @@ pub fn wizard_lines(event: &Event) -> Vec<String> {
             Part::Calibration => Vec::new(),
             _ => vec![format!("    dwell {number} done")],
         },
-        Event::Thrown { why, .. } => {
+        Event::Discarded { why, .. } => {
             vec![format!("    discarded, repeat: {}", hint::of_waiting(why))]
         }
         Event::Redo { number } => vec![format!("    dwell {number} will be repeated")],
@@ -159,7 +159,7 @@ fn unit_text(unit: &UnitOutcome, text: &mut String) {
         unit.unit,
         plural(unit.dwells as u64, "dwell"),
         minutes(unit.recorded_s),
-        unit.thrown
+        unit.discarded
     );
     let judged = unit.confirmed.as_ref().or(unit.verified.as_ref());
     for line in judged.into_iter().flat_map(judged_lines) {

@@ -7,38 +7,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use mimu_recording::error::{Error, Result};
-use mimu_wizard::event::{Question, Wish};
+use mimu_wizard::event::{Question, UserRequest};
 
-/// Answers given in advance: then the question is not asked.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Beforehand {
-    /// Whether to store effects that were found.
-    pub store_effects: Option<bool>,
-    /// Whether to store a calibration whose error is many times the noise.
-    pub store_rough: Option<bool>,
-    /// Whether to continue despite a problem such as a failed self-test.
-    pub go_on: Option<bool>,
-    /// Whether the user switches the supply off and on.
-    pub power_cycle: Option<bool>,
-}
-
-impl Beforehand {
-    /// The answer, if it was given.
-    pub(crate) fn answer(&self, question: &Question) -> Option<bool> {
-        match question {
-            Question::PowerCycled => self.power_cycle,
-            Question::StoreEffects(_) => self.store_effects,
-            Question::StoreRough(_) => self.store_rough,
-            Question::GoOn(_) => self.go_on,
-        }
-    }
+/// The answer of `--yes`: effects are stored. A large error is not stored, a problem ends the session, and nobody switches the supply.
+pub(crate) fn of_yes(question: &Question) -> bool {
+    matches!(question, Question::StoreEffects(_))
 }
 
 /// Lines from standard input, and Ctrl-C.
 pub(crate) struct Typed {
     lines: Receiver<String>,
     stop: Arc<AtomicBool>,
-    wishes: VecDeque<Wish>,
+    requests: VecDeque<UserRequest>,
     /// Whether a question is open, and its answer once it is typed.
     asked: bool,
     answer: Option<bool>,
@@ -63,7 +43,7 @@ impl Typed {
         Ok(Self {
             lines,
             stop,
-            wishes: VecDeque::new(),
+            requests: VecDeque::new(),
             asked: false,
             answer: None,
             ended: false,
@@ -71,12 +51,12 @@ impl Typed {
     }
 
     /// The user's request, if any.
-    pub(crate) fn wish(&mut self) -> Option<Wish> {
+    pub(crate) fn request(&mut self) -> Option<UserRequest> {
         if self.stop.load(Ordering::Relaxed) {
-            return Some(Wish::Cancel);
+            return Some(UserRequest::Cancel);
         }
         self.read();
-        self.wishes.pop_front()
+        self.requests.pop_front()
     }
 
     /// Begins a question: earlier input does not answer it.
@@ -101,11 +81,11 @@ impl Typed {
     fn take(&mut self, line: &str) {
         let mut words = line.split_whitespace();
         let Some(first) = words.next() else { return };
-        let wish = match (first, words.next()) {
-            ("q" | "quit" | "cancel", None) => Some(Wish::Cancel),
-            ("s" | "skip", None) => Some(Wish::Skip),
-            ("r" | "redo", None) => Some(Wish::RedoLast),
-            ("r" | "redo", Some(number)) => number.parse().ok().map(Wish::Redo),
+        let request = match (first, words.next()) {
+            ("q" | "quit" | "cancel", None) => Some(UserRequest::Cancel),
+            ("s" | "skip", None) => Some(UserRequest::Skip),
+            ("r" | "redo", None) => Some(UserRequest::RedoLast),
+            ("r" | "redo", Some(number)) => number.parse().ok().map(UserRequest::Redo),
             ("y" | "yes" | "n" | "no", None) if !self.asked => {
                 eprintln!("there is no open question: an answer counts only after its question");
                 None
@@ -123,7 +103,7 @@ impl Typed {
                 None
             }
         };
-        self.wishes.extend(wish);
+        self.requests.extend(request);
     }
 
     /// The answer to a question, once it is typed. At the end of standard input it is no.
@@ -144,7 +124,7 @@ mod tests {
         let mut typed = Typed {
             lines,
             stop: Arc::default(),
-            wishes: VecDeque::new(),
+            requests: VecDeque::new(),
             asked: false,
             answer: None,
             ended: false,
@@ -153,13 +133,16 @@ mod tests {
         say("yes");
         say("skip");
         typed.begin_question();
-        assert_eq!((typed.wish(), typed.answer()), (Some(Wish::Skip), None));
+        assert_eq!(
+            (typed.request(), typed.answer()),
+            (Some(UserRequest::Skip), None)
+        );
         say("yes");
-        assert_eq!((typed.wish(), typed.answer()), (None, Some(true)));
+        assert_eq!((typed.request(), typed.answer()), (None, Some(true)));
         // Each question begins without an answer.
         say("no");
-        assert_eq!((typed.wish(), typed.answer()), (None, None));
+        assert_eq!((typed.request(), typed.answer()), (None, None));
         typed.begin_question();
-        assert_eq!((typed.wish(), typed.answer()), (None, None));
+        assert_eq!((typed.request(), typed.answer()), (None, None));
     }
 }

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::io::Write;
 
 use mimu_equipment::step::sketch;
-use mimu_wizard::event::{Event, Question, Standing, View, Wish};
+use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
 
-use super::answers::{Beforehand, Typed};
+use super::answers::{Typed, of_yes};
 use crate::report;
 
 /// Number of final characters of a unit's name that identify it.
@@ -21,20 +21,20 @@ pub(crate) struct Lines {
     /// Whether a person turns the unit, so that each dwell gets a sketch.
     pub sketches: bool,
     pub typed: Typed,
-    pub beforehand: Beforehand,
+    pub yes: bool,
     asked: Option<Question>,
     /// Units that have sent a greeting. If there are several, lines name the unit.
     units: BTreeSet<String>,
 }
 
 impl Lines {
-    pub(crate) fn new(typed: Typed, beforehand: Beforehand) -> Self {
+    pub(crate) fn new(typed: Typed, yes: bool) -> Self {
         Self {
             text: None,
             events: None,
             sketches: false,
             typed,
-            beforehand,
+            yes,
             asked: None,
             units: BTreeSet::new(),
         }
@@ -88,15 +88,15 @@ impl View for Lines {
         }
     }
 
-    fn show(&mut self, _: &Standing) {}
+    fn show(&mut self, _: &SessionState) {}
 
-    fn wish(&mut self) -> Option<Wish> {
-        self.typed.wish()
+    fn request(&mut self) -> Option<UserRequest> {
+        self.typed.request()
     }
 
     fn ask(&mut self, question: &Question) -> Option<bool> {
-        if let Some(answer) = self.beforehand.answer(question) {
-            return Some(answer);
+        if self.yes {
+            return Some(of_yes(question));
         }
         if self.asked.as_ref() != Some(question) {
             self.asked = Some(question.clone());

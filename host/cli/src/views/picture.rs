@@ -6,7 +6,7 @@ mod unit;
 
 use mimu::quantity::minutes;
 use mimu_equipment::step::sketch;
-use mimu_wizard::event::{Phase, Standing};
+use mimu_wizard::event::{Phase, SessionState};
 use mimu_wizard::refit::Progress;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -32,7 +32,7 @@ const LOG: u16 = 8;
 /// Everything that the picture shows.
 pub(crate) struct Shown<'a> {
     /// State of the session.
-    pub standing: &'a Standing,
+    pub standing: &'a SessionState,
     /// Past events; the last entry is the latest.
     pub log: &'a [String],
     /// The present question.
@@ -133,7 +133,7 @@ fn distance(progress: &Progress) -> f64 {
     }
 }
 
-fn draw_head(frame: &mut Frame, area: Rect, standing: &Standing) {
+fn draw_head(frame: &mut Frame, area: Rect, standing: &SessionState) {
     let title = format!(" mimu wizard: {} ", standing.phase);
     let block = Block::bordered().title(title.bold());
     let inner = block.inner(area);
@@ -142,7 +142,7 @@ fn draw_head(frame: &mut Frame, area: Rect, standing: &Standing) {
     let planned = planned.max(done);
     let right = format!(
         "{} discarded   {}",
-        standing.thrown,
+        standing.discarded,
         minutes(standing.elapsed_s.round())
     );
     let left = match planned {
@@ -160,7 +160,7 @@ fn draw_head(frame: &mut Frame, area: Rect, standing: &Standing) {
     frame.render_widget(Line::from(spans), inner);
 }
 
-fn draw_step(frame: &mut Frame, area: Rect, standing: &Standing) {
+fn draw_step(frame: &mut Frame, area: Rect, standing: &SessionState) {
     let inner = framed(frame, area, "what to do", false);
     let wide = usize::from(inner.width);
     let lines = match &standing.step {

@@ -8,12 +8,12 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use mimu_recording::error::{Error, Result};
-use mimu_wizard::event::{Event, Question, Standing, View, Wish};
+use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event as keys;
 use ratatui::crossterm::event::{KeyCode, KeyEventKind, KeyModifiers};
 
-use super::answers::Beforehand;
+use super::answers::of_yes;
 use super::lines::write_event;
 use super::picture::{LEAST, Shown, draw};
 use crate::report;
@@ -67,8 +67,8 @@ pub(crate) struct Screen {
     stop: Arc<AtomicBool>,
     /// Output of the events, if any.
     events: Option<Box<dyn Write>>,
-    beforehand: Beforehand,
-    standing: Standing,
+    yes: bool,
+    standing: SessionState,
     log: Vec<String>,
     question: Option<Question>,
     answer: Option<bool>,
@@ -85,7 +85,7 @@ impl Screen {
     /// Takes over the terminal. `stop` is set from outside to end the session.
     pub(crate) fn new(
         stop: Arc<AtomicBool>,
-        beforehand: Beforehand,
+        yes: bool,
         events: Option<Box<dyn Write>>,
     ) -> Result<Self> {
         let failed = |error: std::io::Error| {
@@ -109,8 +109,8 @@ impl Screen {
             ended,
             stop,
             events,
-            beforehand,
-            standing: Standing::default(),
+            yes,
+            standing: SessionState::default(),
             log: Vec::new(),
             question: None,
             answer: None,
@@ -166,20 +166,20 @@ impl View for Screen {
         self.draw();
     }
 
-    fn show(&mut self, standing: &Standing) {
+    fn show(&mut self, standing: &SessionState) {
         self.standing = standing.clone();
         self.draw();
     }
 
-    fn wish(&mut self) -> Option<Wish> {
+    fn request(&mut self) -> Option<UserRequest> {
         if self.stop.load(Ordering::Relaxed) {
-            return Some(Wish::Cancel);
+            return Some(UserRequest::Cancel);
         }
         while let Ok(key) = self.keys.try_recv() {
             match key {
-                Key::Cancel => return Some(Wish::Cancel),
-                Key::Redo => return Some(Wish::RedoLast),
-                Key::Skip => return Some(Wish::Skip),
+                Key::Cancel => return Some(UserRequest::Cancel),
+                Key::Redo => return Some(UserRequest::RedoLast),
+                Key::Skip => return Some(UserRequest::Skip),
                 // A key pressed before the question does not answer it.
                 Key::Yes | Key::No if self.question.is_none() => {}
                 Key::Yes | Key::No => self.answer = Some(key == Key::Yes),
@@ -189,8 +189,8 @@ impl View for Screen {
     }
 
     fn ask(&mut self, question: &Question) -> Option<bool> {
-        if let Some(answer) = self.beforehand.answer(question) {
-            return Some(answer);
+        if self.yes {
+            return Some(of_yes(question));
         }
         if self.question.as_ref() != Some(question) {
             (self.question, self.answer) = (Some(question.clone()), None);

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use mimu::diagnose::diagnose;
 use mimu::diagnose::picture::Against;
-use mimu::fit::{Method, Options};
+use mimu::fit::Options;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
@@ -81,12 +81,7 @@ fn the_effect_that_is_drawn_is_the_one_that_the_unit_has() {
     record(folder.path(), "r", &cubic(), 1);
     let recording = Recording::open(&folder.path().join("r")).unwrap();
     let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).unwrap();
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    };
-    let found = diagnose(prepared.into(), options).unwrap();
+    let found = diagnose(prepared.into(), Options::IN_SAMPLE).unwrap();
     let gyro = found
         .sensors
         .iter()

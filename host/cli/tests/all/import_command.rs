@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
+use crate::random::congruential;
+
 fn mimu(folder: &Path, arguments: &str) -> (bool, String, String) {
     let out = Command::new(env!("CARGO_BIN_EXE_mimu"))
         .current_dir(folder)
@@ -178,13 +180,8 @@ fn a_table_of_means_is_fitted_and_verified_and_everything_that_needs_samples_ref
 
 /// Numbers from -0.5 to 0.5, uniformly distributed.
 fn noise() -> impl FnMut() -> f64 {
-    let mut state = 5_u64;
-    move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    }
+    let mut uniform = congruential(5);
+    move || uniform() - 0.5
 }
 
 /// A gyro that rests for 20 s before each of three turns of 360 degrees, with a different bias each time.

@@ -14,6 +14,7 @@ mod import_command;
 mod manual;
 mod over_temperature;
 mod pocket_calculator;
+mod random;
 mod readme;
 mod thermal_command;
 mod thermal_plan_command;

@@ -6,13 +6,14 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use mimu::calibration::{Calibration, DieTable, NodeTable, OverTemperature, TemperatureNode};
-use mimu::fit::{Method, Options, fit};
+use mimu::fit::{Options, fit};
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::{Batch, Recording};
 use nalgebra::{Matrix3, Vector3};
 
 use super::effects::{mimu, unit};
+use crate::random::congruential;
 
 const DWELLS: usize = 72;
 const RATE_HZ: f64 = 50.0;
@@ -63,16 +64,8 @@ fn record(folder: &Path, ramp: bool) {
         "t_s,step,temp_c,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,ref_rate_x_dps,ref_rate_y_dps,\
          ref_rate_z_dps,ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2\n",
     );
-    let mut seed = 11_u64;
-    let mut normal = move || {
-        let mut next = || {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64
-        };
-        (0..12).map(|_| next()).sum::<f64>() - 6.0
-    };
+    let mut uniform = congruential(11);
+    let mut normal = move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
     for k in 0..DWELLS * ROWS {
         let (t, step) = (k as f64 / RATE_HZ, k / ROWS);
         let s = step as f64;
@@ -128,12 +121,7 @@ fn calibrations(folder: &Path) {
     record(&folder.join("even"), false);
     let recording = Recording::open(&folder.join("even")).unwrap();
     let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).unwrap();
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    };
-    let fit = fit(prepared, options).unwrap();
+    let fit = fit(prepared, Options::IN_SAMPLE).unwrap();
     let mut calibration = Calibration::of(&fit, &[], "2026-01-01T00:00:00Z").unwrap();
     assert_eq!(calibration.recording.temp_range_c, Some([25.0, 25.0]));
     std::fs::write(folder.join("one.toml"), calibration.to_toml()).unwrap();

@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use mimu_recording::error::{Error, Result};
 
-use crate::heard::LineCount;
 use crate::port::ports;
+use crate::received::LineCount;
 use crate::session::Session;
 
 /// Interval of the search for the port.
@@ -13,14 +13,14 @@ const PAUSE: Duration = Duration::from_millis(100);
 
 /// Counts of the line since the recording began, over all sessions.
 #[derive(Debug, Default)]
-pub(super) struct Heard {
+pub(super) struct LineTotals {
     /// Counts of earlier sessions.
     earlier: LineCount,
     /// Counts of this session before the recording.
     before: LineCount,
 }
 
-impl From<LineCount> for Heard {
+impl From<LineCount> for LineTotals {
     fn from(before: LineCount) -> Self {
         Self {
             earlier: LineCount::default(),
@@ -29,7 +29,7 @@ impl From<LineCount> for Heard {
     }
 }
 
-impl Heard {
+impl LineTotals {
     /// Total counts; `count` is the present session's.
     pub fn total(&self, count: LineCount) -> LineCount {
         self.earlier.and(&count.since(&self.before))

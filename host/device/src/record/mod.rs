@@ -24,8 +24,8 @@ pub use reading::shortest;
 pub use steps::Steps;
 
 use crate::flagged::Flagged;
-use crate::heard::LineCount;
 use crate::identity::{Started, unit_name};
+use crate::received::LineCount;
 use crate::result::TOOL;
 use crate::session::Session;
 use clock::Clock;
@@ -62,7 +62,7 @@ pub struct RecordOptions {
 
 /// Requests of the person at the keyboard since the last query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Wish {
+pub struct UserRequest {
     /// End the recording.
     pub end: bool,
     /// How many times a dwell was to begin, or the running one to end.
@@ -73,7 +73,7 @@ pub struct Wish {
 
 /// State of a recording.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Standing {
+pub struct RecordingState {
     /// Samples written.
     pub samples: u64,
     /// Samples missing between them, without those of restarts.
@@ -130,7 +130,7 @@ pub struct RecordSummary {
     pub recording: String,
     /// Its final state.
     #[serde(flatten)]
-    pub standing: Standing,
+    pub state: RecordingState,
     /// Why it ended early. It is complete up to that point.
     #[serde(serialize_with = "as_words")]
     pub broken_off: Option<Error>,
@@ -148,7 +148,7 @@ pub fn record(
     session: &mut Session,
     options: &RecordOptions,
     known: Option<Known>,
-    mut look: impl FnMut(&Standing) -> Wish,
+    mut look: impl FnMut(&RecordingState) -> UserRequest,
     finishing: impl Fn(f64),
 ) -> Result<RecordSummary> {
     let who = session.who().clone();
@@ -203,32 +203,32 @@ pub fn record(
         clock: Clock::new(who.sample_rate_hz),
         steps: options.steps.clone(),
         known,
-        standing: Standing::default(),
+        state: RecordingState::default(),
         begun: None,
         heard: Instant::now(),
         unit_id: who.unit_id,
         starts: who.starts,
         one_power_on: options.one_power_on,
         // A program that was killed may have left half a frame.
-        line: line::Heard::from(session.count()),
+        line: line::LineTotals::from(session.count()),
     };
     let ended = run.receive(session, options, &mut look);
-    run.standing.ended = true;
+    run.state.ended = true;
     run.asks_to_end(&mut look);
     run.drop_open_turn();
-    let mut standing = run.standing;
-    standing.line = run.line.total(session.count());
-    standing.waiting = false;
+    let mut state = run.state;
+    state.line = run.line.total(session.count());
+    state.waiting = false;
     if let Some(recorded) = &mut manifest.recorded {
-        recorded.missing = standing.missing;
-        recorded.restarts = standing.restarts.clone();
+        recorded.missing = state.missing;
+        recorded.restarts = state.restarts.clone();
     }
     let rate_hz = manifest.sample_rate_hz;
-    manifest.dropped_steps = standing.dropped.clone();
+    manifest.dropped_steps = state.dropped.clone();
     let mut known = run.known;
     if let Some(known) = &known {
         manifest.turn_steps = known.turns();
-        standing.warnings.extend(known.unused());
+        state.warnings.extend(known.unused());
     }
     let mut complete = known
         .as_mut()
@@ -242,12 +242,12 @@ pub fn record(
     run.growing
         .finish(&manifest, options.format, complete, finishing)?;
     match ended {
-        Ok(()) if standing.samples == 0 => Err(Error::new(
+        Ok(()) if state.samples == 0 => Err(Error::new(
             session.port(),
             "no sample came, so nothing was recorded",
             "reset the board and run it again",
         )),
-        Err(error) if standing.samples == 0 => Err(error),
+        Err(error) if state.samples == 0 => Err(error),
         ended => Ok(RecordSummary {
             format: "mimu-record/1",
             tool: TOOL,
@@ -255,8 +255,8 @@ pub fn record(
             recording: options.directory.display().to_string(),
             broken_off: ended
                 .err()
-                .map(|error| kept(error, standing.samples, &options.directory)),
-            standing,
+                .map(|error| kept(error, state.samples, &options.directory)),
+            state,
         }),
     }
 }

@@ -12,9 +12,9 @@ use super::known::Known;
 use super::line;
 use super::reading::shortest;
 use super::steps::Steps;
-use super::{RecordOptions, Standing, Wish};
-use crate::heard::{Event, Samples};
+use super::{RecordOptions, RecordingState, UserRequest};
 use crate::identity::Started;
+use crate::received::{Event, Samples};
 use crate::session::Session;
 
 /// Silence after which the device is asked to greet and stream again.
@@ -26,14 +26,14 @@ pub(super) struct Run {
     pub clock: Clock,
     pub steps: Steps,
     pub known: Option<Known>,
-    pub standing: Standing,
+    pub state: RecordingState,
     /// Tick of the first sample.
     pub begun: Option<u64>,
     pub heard: Instant,
     pub unit_id: String,
     /// Starts of the device since its last power failure.
     pub starts: u32,
-    pub line: line::Heard,
+    pub line: line::LineTotals,
     pub one_power_on: bool,
 }
 
@@ -48,7 +48,7 @@ impl Run {
         &mut self,
         session: &mut Session,
         options: &RecordOptions,
-        look: &mut impl FnMut(&Standing) -> Wish,
+        look: &mut impl FnMut(&RecordingState) -> UserRequest,
     ) -> Result<()> {
         session.begin_stream(RAW)?;
         let rate_hz = f64::from(session.who().sample_rate_hz);
@@ -65,7 +65,7 @@ impl Run {
                 }
                 Err(error) => return Err(error),
             }
-            self.standing.line = self.line.total(session.count());
+            self.state.line = self.line.total(session.count());
             if self.asks_to_end(look) || self.steps.is_done() {
                 return Ok(());
             }
@@ -73,17 +73,17 @@ impl Run {
     }
 
     /// Reports the state, and applies the person's requests. Returns whether the recording is to end.
-    pub fn asks_to_end(&mut self, look: &mut impl FnMut(&Standing) -> Wish) -> bool {
-        let wish = look(&self.standing);
-        for _ in 0..wish.marks {
+    pub fn asks_to_end(&mut self, look: &mut impl FnMut(&RecordingState) -> UserRequest) -> bool {
+        let request = look(&self.state);
+        for _ in 0..request.marks {
             self.steps.mark();
         }
-        self.drop_step(wish.drop);
-        wish.end
+        self.drop_step(request.drop);
+        request.end
     }
 
     fn drop_step(&mut self, step: Option<i32>) {
-        let dropped = &mut self.standing.dropped;
+        let dropped = &mut self.state.dropped;
         dropped.extend(step.filter(|step| !dropped.contains(step)));
     }
 
@@ -121,7 +121,7 @@ impl Run {
                 // It may have restarted, and its greeting may be lost.
                 session.hello()?;
                 session.done(RAW, "to stream")?;
-                self.standing.resumed += 1;
+                self.state.resumed += 1;
                 self.heard = Instant::now();
             }
             None => {}
@@ -135,16 +135,16 @@ impl Run {
         session: &mut Session,
         patience: Duration,
         lost: &Error,
-        look: &mut impl FnMut(&Standing) -> Wish,
+        look: &mut impl FnMut(&RecordingState) -> UserRequest,
     ) -> Result<bool> {
-        self.standing.waiting = true;
+        self.state.waiting = true;
         let (port, unit_id) = (session.port().to_owned(), self.unit_id.clone());
         let go_on = || !self.asks_to_end(look);
         let Some(again) = line::wait_for(&port, &unit_id, patience, lost, go_on)? else {
             return Ok(false);
         };
-        self.standing.waiting = false;
-        self.standing.reconnected += 1;
+        self.state.waiting = false;
+        self.state.reconnected += 1;
         self.line.lost(session.count(), again.count());
         *session = again;
         let who = session.who();
@@ -171,8 +171,8 @@ impl Run {
         let first = arrival.tick;
         let begun = *self.begun.get_or_insert(first);
         if arrival.missing > 0 {
-            self.standing.missing += arrival.missing;
-            self.standing.gaps += 1;
+            self.state.missing += arrival.missing;
+            self.state.gaps += 1;
         }
         if (arrival.missing > 0 || arrival.restart.is_some())
             && let Some(step) = self.steps.at(self.clock.length(first - begun))
@@ -185,7 +185,7 @@ impl Run {
                 let at_s = self.clock.seconds(first);
                 return Err(cut_short(port, start, at_s));
             }
-            self.standing.restarts.push(Restart {
+            self.state.restarts.push(Restart {
                 t_s: self.clock.seconds(first),
                 start: start.map_or("its greeting was lost".into(), |s: Started| s.to_string()),
             });
@@ -211,8 +211,8 @@ impl Run {
                         column.extend(there.then_some(value));
                     }
                 }
-                self.standing.step = (step >= 0).then_some(step);
-                self.standing.dwells = self.standing.dwells.max((step + 1) as u32);
+                self.state.step = (step >= 0).then_some(step);
+                self.state.dwells = self.state.dwells.max((step + 1) as u32);
             }
             batch.temp_c.push(shortest(samples.head.temp_c));
             let values = sample.gyro.iter().chain(sample.accel.iter());
@@ -233,13 +233,13 @@ impl Run {
             return Ok(());
         }
         self.growing.write(&batch)?;
-        let standing = &mut self.standing;
-        standing.raw = std::array::from_fn(|i| batch.raw[i].iter().sum::<f64>() / count as f64);
-        standing.samples += count as u64;
-        standing.temp_c = shortest(samples.head.temp_c);
-        standing.flagged.count(samples.head.flags, count as u64);
-        standing.first_s.get_or_insert(self.clock.seconds(first));
-        standing.last_s = Some(self.clock.seconds(first + count as u64 - 1));
+        let state = &mut self.state;
+        state.raw = std::array::from_fn(|i| batch.raw[i].iter().sum::<f64>() / count as f64);
+        state.samples += count as u64;
+        state.temp_c = shortest(samples.head.temp_c);
+        state.flagged.count(samples.head.flags, count as u64);
+        state.first_s.get_or_insert(self.clock.seconds(first));
+        state.last_s = Some(self.clock.seconds(first + count as u64 - 1));
         Ok(())
     }
 }

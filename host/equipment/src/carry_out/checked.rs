@@ -3,7 +3,7 @@
 
 use mimu::plan::Planned;
 use mimu_device::nominal;
-use mimu_device::record::Standing;
+use mimu_device::record::RecordingState;
 use mimu_recording::error::Error;
 use nalgebra::Vector3;
 
@@ -37,16 +37,16 @@ impl Checked {
         &mut self,
         running: Option<usize>,
         dwells: &[Planned],
-        standing: &Standing,
+        state: &RecordingState,
     ) -> Option<(usize, Error)> {
-        let now_s = standing.last_s.unwrap_or_default();
-        if standing.samples != self.samples && self.dwell.is_some() {
+        let now_s = state.last_s.unwrap_or_default();
+        if state.samples != self.samples && self.dwell.is_some() {
             self.batches += 1.0;
-            for (sum, value) in self.sum.iter_mut().zip(standing.raw) {
+            for (sum, value) in self.sum.iter_mut().zip(state.raw) {
                 *sum += value;
             }
         }
-        self.samples = standing.samples;
+        self.samples = state.samples;
         let over = running != self.dwell || now_s - self.since_s >= WINDOW_S;
         if !over {
             return None;

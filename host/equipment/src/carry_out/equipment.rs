@@ -15,7 +15,7 @@ use crate::step::Step;
 /// Interval of the check whether the table still moves.
 const BUSY: Duration = Duration::from_millis(100);
 /// Interval of the interlock check: a table that the interlock stopped must not count as turning.
-const HELD: Duration = Duration::from_millis(500);
+const INTERLOCK_INTERVAL: Duration = Duration::from_millis(500);
 /// Interval of reading the chamber's temperature.
 const READ: Duration = Duration::from_secs(2);
 
@@ -60,7 +60,7 @@ impl Equipment {
             ordered: false,
             motions: 0,
             moves: false,
-            held: Instant::now(),
+            interlock_checked: Instant::now(),
             read: None,
         };
         let work = move || {
@@ -144,7 +144,7 @@ struct Hands {
     ordered: bool,
     motions: usize,
     moves: bool,
-    held: Instant,
+    interlock_checked: Instant,
     read: Option<Instant>,
 }
 
@@ -189,10 +189,10 @@ impl Hands {
             self.moves = false;
             let _ = self.tell.send(EquipmentEvent::Done(self.motions));
         }
-        if self.held.elapsed() >= HELD {
-            self.held = Instant::now();
+        if self.interlock_checked.elapsed() >= INTERLOCK_INTERVAL {
+            self.interlock_checked = Instant::now();
             for driver in &mut self.equipped.drivers {
-                if let Some(why) = driver.held()? {
+                if let Some(why) = driver.interlock()? {
                     let remedy = "close that program, and record the rest as another recording";
                     return Err(Error::device(driver.abilities().place, why, remedy));
                 }

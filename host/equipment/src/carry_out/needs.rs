@@ -60,7 +60,7 @@ impl Equipped {
             None => None,
         };
         for (driver, ability) in drivers.iter_mut().zip(&abilities) {
-            if let Some(why) = driver.held()? {
+            if let Some(why) = driver.interlock()? {
                 return Err(Error::device(&ability.place, why, "close it"));
             }
         }

@@ -1,7 +1,7 @@
 //! The progress of a procedure, for a person.
 
 use mimu::plan::Planned;
-use mimu_device::record::{Procedure, Standing};
+use mimu_device::record::{Procedure, RecordingState};
 
 use super::sequence::Sequence;
 
@@ -34,7 +34,7 @@ impl Progress {
     pub(super) fn of(
         procedure: &Procedure,
         sequence: &Sequence<'_>,
-        standing: &Standing,
+        state: &RecordingState,
         chamber_c: Option<f64>,
     ) -> Self {
         let (done, planned) = (sequence.done(), procedure.dwells.len());
@@ -47,10 +47,10 @@ impl Progress {
             left_s: left_s(procedure, done, since_s.unwrap_or_default()),
             planned_c: procedure.temp_c(since_s.unwrap_or_default()),
             chamber_c,
-            temp_c: standing.temp_c,
-            missing: standing.missing,
-            dropped: standing.dropped.len(),
-            line_lost: standing.waiting,
+            temp_c: state.temp_c,
+            missing: state.missing,
+            dropped: state.dropped.len(),
+            line_lost: state.waiting,
         }
     }
 }

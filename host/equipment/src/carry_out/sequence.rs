@@ -6,7 +6,7 @@
 use std::time::Instant;
 
 use mimu::plan::Planned;
-use mimu_device::record::{Procedure, Standing};
+use mimu_device::record::{Procedure, RecordingState};
 
 use super::equipment::Order;
 use crate::step::Step;
@@ -35,7 +35,7 @@ pub(super) struct Seen {
 
 /// Actions that follow.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Does {
+pub(super) struct Actions {
     /// Dwells that end or begin with the next sample.
     pub marks: u32,
     pub orders: Vec<Order>,
@@ -101,12 +101,12 @@ impl<'a> Sequence<'a> {
     }
 
     /// The device's time, s: that of the last sample and, if the line is lost, the time that has passed here since.
-    pub fn clock(&mut self, standing: &Standing) -> f64 {
-        let last_s = standing.last_s.unwrap_or_default();
+    pub fn clock(&mut self, state: &RecordingState) -> f64 {
+        let last_s = state.last_s.unwrap_or_default();
         if last_s != self.heard.0 {
             self.heard = (last_s, Instant::now());
         }
-        match standing.waiting {
+        match state.waiting {
             true => last_s + self.heard.1.elapsed().as_secs_f64(),
             false => last_s,
         }
@@ -135,17 +135,20 @@ impl<'a> Sequence<'a> {
         self.zero_s.map(|zero_s| self.heard.0 - zero_s)
     }
 
-    pub fn look(&mut self, seen: &Seen) -> Does {
-        let mut does = Does::default();
-        self.lead(seen, &mut does);
+    pub fn look(&mut self, seen: &Seen) -> Actions {
+        let mut actions = Actions::default();
+        self.lead(seen, &mut actions);
         // Phases that need no motion follow at once. After an order to the table, its completion is awaited.
         let moves = |order: &Order| !matches!(order, Order::Set(_));
-        while !seen.line_lost && !does.orders.iter().any(moves) && self.advance(seen, &mut does) {}
-        does
+        while !seen.line_lost
+            && !actions.orders.iter().any(moves)
+            && self.advance(seen, &mut actions)
+        {}
+        actions
     }
 
     /// Sets the chamber to its planned temperature.
-    fn lead(&mut self, seen: &Seen, does: &mut Does) {
+    fn lead(&mut self, seen: &Seen, actions: &mut Actions) {
         if !self.has_chamber || self.set.is_some_and(|s| seen.now_s < s.1 + SET_EVERY_S) {
             return;
         }
@@ -155,16 +158,16 @@ impl<'a> Sequence<'a> {
         if told.is_some_and(|told| (temp_c - told).abs() < SET_LEAST_C) {
             return;
         }
-        does.orders.push(Order::Set(temp_c));
+        actions.orders.push(Order::Set(temp_c));
         self.set = Some((temp_c, seen.now_s));
         self.set_points += 1;
     }
 
     /// Advances by one phase. Returns whether there is more to do now.
-    fn advance(&mut self, seen: &Seen, does: &mut Does) -> bool {
+    fn advance(&mut self, seen: &Seen, actions: &mut Actions) -> bool {
         let now_s = seen.now_s;
         match self.phase {
-            Phase::Approach => return self.approach(seen, does),
+            Phase::Approach => return self.approach(seen, actions),
             Phase::Due => {
                 let Some(dwell) = self.procedure.dwells.get(self.at) else {
                     self.phase = Phase::Done;
@@ -175,32 +178,32 @@ impl<'a> Sequence<'a> {
                     if let Some((up, rate)) = self.stands
                         && rate != 0.0
                     {
-                        does.orders.push(Order::Halt);
+                        actions.orders.push(Order::Halt);
                         self.stands = Some((up, 0.0));
                     }
                     return false;
                 }
                 match self.motion_to(dwell) {
                     Some(order) => {
-                        does.orders.push(order);
+                        actions.orders.push(order);
                         self.phase = Phase::Moving;
                         return false;
                     }
                     None if !seen.arrived => return false,
-                    None => self.begin(now_s, does),
+                    None => self.begin(now_s, actions),
                 }
             }
             Phase::Moving if seen.arrived => {
                 let until_s = now_s + ON_THE_WAY_S;
                 self.phase = Phase::Arrived { until_s };
             }
-            Phase::Arrived { until_s } if now_s >= until_s => self.begin(now_s, does),
+            Phase::Arrived { until_s } if now_s >= until_s => self.begin(now_s, actions),
             Phase::Turn if seen.arrived => {
                 let until_s = now_s + ON_THE_WAY_S;
                 self.phase = Phase::Turned { until_s };
             }
             Phase::Dwell { until_s } | Phase::Turned { until_s } if now_s >= until_s => {
-                does.marks += 1;
+                actions.marks += 1;
                 self.at += 1;
                 self.phase = Phase::Due;
             }
@@ -210,12 +213,12 @@ impl<'a> Sequence<'a> {
     }
 
     /// Approaches the first pose and the first temperature. The plan begins once both are reached.
-    fn approach(&mut self, seen: &Seen, does: &mut Does) -> bool {
+    fn approach(&mut self, seen: &Seen, actions: &mut Actions) -> bool {
         let first = &self.procedure.dwells[0];
         if self.has_table && self.stands.is_none() {
             let up = first.turn.map_or(first.up, |turn| Some(turn.from_up));
             let up = up.unwrap_or([0.0, 0.0, 1.0]);
-            does.orders.push(go(up, 0.0, 0.0));
+            actions.orders.push(go(up, 0.0, 0.0));
             self.stands = Some((up, 0.0));
             return false;
         }
@@ -255,12 +258,12 @@ impl<'a> Sequence<'a> {
     }
 
     /// Begins the dwell or the turn.
-    fn begin(&mut self, now_s: f64, does: &mut Does) {
+    fn begin(&mut self, now_s: f64, actions: &mut Actions) {
         let dwell = &self.procedure.dwells[self.at];
-        does.marks += 1;
+        actions.marks += 1;
         self.phase = match &dwell.turn {
             Some(turn) => {
-                does.orders.push(Order::Turn(*turn));
+                actions.orders.push(Order::Turn(*turn));
                 self.stands = Some((turn.to_up, 0.0));
                 Phase::Turn
             }

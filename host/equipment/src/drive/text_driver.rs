@@ -91,7 +91,7 @@ impl TextDriver {
     }
 
     fn not_held(&mut self) -> Result<()> {
-        match self.held()? {
+        match self.interlock()? {
             Some(why) => Err(Error::device(&self.line.name, why, "close it")),
             None => Ok(()),
         }
@@ -125,7 +125,7 @@ fn values(step: &Step) -> [(&'static str, f64); 6] {
 }
 
 impl Driver for TextDriver {
-    fn held(&mut self) -> Result<Option<String>> {
+    fn interlock(&mut self) -> Result<Option<String>> {
         let Some(question) = self.file.interlock.clone() else {
             return Ok(None);
         };

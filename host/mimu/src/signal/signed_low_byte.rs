@@ -5,7 +5,7 @@
 //! few. A calibration could not fit this as an effect. It would take the share of time that a bit is set from the noise of the dwells,
 //! which contains the jumps: the coefficient was wrong by 40 to 64 counts of 256.
 
-use mimu_recording::signed_low_byte::undone;
+use mimu_recording::signed_low_byte::corrected;
 
 /// Fewer pairs of samples between which the error came or went prove nothing.
 const FEWEST: u64 = 12;
@@ -47,11 +47,11 @@ impl Finder {
 
     /// Looks at the pair in the middle of four samples.
     fn look(&mut self, [a, b, c, d]: [f64; 4]) {
-        let is_low = |v: f64| undone(v) != v;
+        let is_low = |v: f64| corrected(v) != v;
         let slow = |v: f64, w: f64| is_low(v) == is_low(w) && (w - v).abs() < FAST;
         if is_low(b) != is_low(c) && slow(a, b) && slow(c, d) {
             self.pairs += 1;
-            self.nearer += u64::from((undone(c) - undone(b)).abs() < (c - b).abs());
+            self.nearer += u64::from((corrected(c) - corrected(b)).abs() < (c - b).abs());
         }
     }
 
@@ -98,7 +98,7 @@ mod tests {
             let signal = signal(noise);
             let read = read(&signal);
             assert!(found(&read).is_some(), "{noise}");
-            let undone: Vec<f64> = read.iter().map(|r| undone(*r)).collect();
+            let undone: Vec<f64> = read.iter().map(|r| corrected(*r)).collect();
             assert_eq!(undone, signal);
         }
     }

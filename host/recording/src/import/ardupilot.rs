@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::readings::{Choice, Readings};
-use super::rotation::{Correction, orientation};
+use super::rotation::{Correction, listed, orientation};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use records::{Record, Records};
@@ -324,10 +324,6 @@ fn corrections(parameters: &BTreeMap<String, f64>, instance: u32) -> Option<[Cor
             scale,
         },
     ])
-}
-
-fn listed(three: [f64; 3]) -> String {
-    three.map(|value| format!("{value:.6}")).join(" ")
 }
 
 #[cfg(test)]

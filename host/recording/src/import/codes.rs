@@ -7,7 +7,7 @@ use crate::cell::{Refusal, is_reading, shorten};
 use crate::columns::Column;
 use crate::error::{Error, Result};
 use crate::raw_channels::RawChannels;
-use crate::signed_low_byte::undone;
+use crate::signed_low_byte::corrected;
 
 /// Raw columns of unsigned codes in two's complement, as in `accel=12`: the upper half of the codes are negative readings.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -118,7 +118,7 @@ impl Conversion {
                     remedy: "give the log as it was recorded, without factors or means",
                 });
             }
-            code = undone(code);
+            code = corrected(code);
         }
         let value = (code - self.zero) * self.factor + self.offset;
         match is_reading(value) {

@@ -22,14 +22,14 @@ pub(super) struct Counter {
 }
 
 /// A wrapped stamp is at most this many intervals after the one before. So a second at 100 Hz may be lost at the wrap.
-const NEAR_STEPS: i64 = 100;
+const NEAR_INTERVALS: i64 = 100;
 
 /// Continues time stamps across their wraps. Those of a microcontroller wrap in 16 bits of milliseconds after 65.5 s, in 32 bits of microseconds
 /// after 71.6 min.
 #[derive(Debug, Clone, Default)]
 pub(super) struct StampCounter {
     last: Option<i64>,
-    step: i64,
+    interval: i64,
     before: i64,
     /// How often they wrapped.
     pub wraps: u64,
@@ -46,15 +46,16 @@ impl StampCounter {
         let whole = stamp.whole();
         let last = self.last.replace(whole).unwrap_or(whole);
         let step = |size: i64| whole + size - last;
-        let wrapped =
-            |size: &i64| last < *size && (1..=NEAR_STEPS * self.step).contains(&step(*size));
+        let wrapped = |size: &i64| {
+            last < *size && (1..=NEAR_INTERVALS * self.interval).contains(&step(*size))
+        };
         if whole < last
             && let Some(size) = STAMP_SIZES.into_iter().find(wrapped)
         {
             self.before += size;
             self.wraps += 1;
         } else if whole > last {
-            self.step = whole - last;
+            self.interval = whole - last;
         }
         stamp.plus(self.before)
     }

@@ -297,7 +297,7 @@ impl ForeignFile {
         }
     }
 
-    /// Place of row `number`, for messages.
+    /// Position of row `number`, for messages.
     pub fn place(&self, number: u64) -> String {
         format!("{}, row {number}", self.path.display())
     }

@@ -7,6 +7,7 @@ use super::faces::Face;
 use super::step_labels::StepLabels;
 use crate::cell::{self, shorten};
 use crate::columns::REFERENCE_COLUMNS;
+use crate::csv_file::BOM;
 use crate::error::{Error, Result};
 
 /// Angle turned during a whole step, in degrees.
@@ -83,7 +84,7 @@ impl Inputs {
             .flexible(true)
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
-            .from_reader(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+            .from_reader(bytes.strip_prefix(BOM).unwrap_or(bytes));
         let mut record = csv::ByteRecord::new();
         let mut names: Vec<String> = Vec::new();
         let mut inputs = Inputs {

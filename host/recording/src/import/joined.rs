@@ -7,9 +7,9 @@ use super::first_pass;
 use super::foreign::{ForeignFile, HowToRead};
 use super::join::{Follower, Joined, check_order};
 use super::options::{ImportOptions, file_name};
-use super::place::Place;
 use super::resample::{self, Resampler};
 use super::row::Row;
+use super::sequence_position::SequencePosition;
 use super::step_inputs::StepInputs;
 use super::summary::ImportSummary;
 use super::time::{TimeSummary, Times};
@@ -39,8 +39,8 @@ pub(super) struct JoinedFiles {
     pub first: ForeignFile,
     /// Gives the rows of the first file regular times, if a loop took them at irregular ones.
     resampler: Option<Resampler>,
-    /// Place of the first file in a sequence.
-    pub place: Option<Place>,
+    /// Position of the first file in a sequence.
+    pub place: Option<SequencePosition>,
     /// Pause that separates two steps, s.
     step_gap_s: Option<f64>,
     followers: Vec<Follower>,

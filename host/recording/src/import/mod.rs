@@ -13,14 +13,13 @@ mod inputs;
 mod join;
 mod joined;
 mod log;
-mod look;
 mod options;
 #[cfg(feature = "parquet")]
 mod parquet_table;
-mod place;
 mod plausibility;
 mod pose_means;
 mod preset;
+mod preview;
 mod px4;
 mod readings;
 mod resample;
@@ -30,6 +29,7 @@ mod rotation;
 mod row;
 mod row_filter;
 mod sequence;
+mod sequence_position;
 #[cfg(feature = "bags")]
 mod sqlite;
 mod step_inputs;
@@ -58,19 +58,17 @@ pub use codes::{TwosComplement, Zero};
 pub use faces::Face;
 pub use inputs::Inputs;
 pub use log::is_log;
-pub use look::{Look, look};
 pub use options::ImportOptions;
 pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};
+pub use preview::{Preview, preview};
 pub use row_filter::RowFilter;
 pub use summary::{ImportSummary, SkippedLines};
 pub use time::{Decimal, Jitter, Rounds, TimeSummary};
 
 use joined::JoinedFiles;
-use options::file_name;
+use options::source;
 
-use super::digest;
-use super::manifest::Source;
 use super::writer::Writer;
 use crate::error::Result;
 
@@ -122,10 +120,7 @@ fn import_sensors(
     }
     import.finish_summary(writer.rows(), &manifest)?;
     for file in options.files.iter().chain(&options.inputs) {
-        manifest.sources.push(Source {
-            file: file_name(file),
-            sha256: digest::sha256(file)?,
-        });
+        manifest.sources.push(source(file)?);
     }
     if let Some(inputs) = &import.inputs {
         manifest.turn_steps = inputs.turns().collect();

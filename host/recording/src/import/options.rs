@@ -11,8 +11,9 @@ use super::preset::{Chosen, PresetUse};
 use super::readings::Choice;
 use super::row_filter::RowFilter;
 use super::time::Decimal;
+use crate::digest;
 use crate::error::{Argument, Error, Result};
-use crate::manifest::{RawUnit, Reference, check_gravity, check_rate};
+use crate::manifest::{RawUnit, Reference, Source, check_gravity, check_rate};
 use crate::separator::Separator;
 use crate::signed_low_byte::SignedLowByte;
 use crate::turntable::Turntable;
@@ -244,10 +245,7 @@ impl ImportOptions {
         if self.sequence {
             arguments.push("--sequence".to_owned());
         }
-        let mut option = |name: &str, value: String| {
-            arguments.push(name.to_owned());
-            arguments.push(value);
-        };
+        let mut option = |name: &str, value: String| arguments.extend([name.to_owned(), value]);
         if let Some(preset) = &self.preset {
             option("--preset", preset.name.to_owned());
         }
@@ -287,10 +285,7 @@ impl ImportOptions {
         if self.skip_broken != BrokenLimit::None {
             arguments.push(format!("--skip-broken={}", self.skip_broken));
         }
-        let mut option = |name: &str, value: String| {
-            arguments.push(name.to_owned());
-            arguments.push(value);
-        };
+        let mut option = |name: &str, value: String| arguments.extend([name.to_owned(), value]);
         if let Some(gap) = self.step_gap_s {
             option("--step-gap", gap.to_string());
         }
@@ -335,6 +330,14 @@ impl ImportOptions {
             skip_broken: self.skip_broken,
         }
     }
+}
+
+/// A file that was imported, for the manifest.
+pub(super) fn source(path: &Path) -> Result<Source> {
+    Ok(Source {
+        file: file_name(path),
+        sha256: digest::sha256(path)?,
+    })
 }
 
 /// Name of a file without its folder.

@@ -14,7 +14,7 @@ use crate::cell::{is_reading, no_reading, shorten};
 use crate::columns::Column;
 use crate::csv_writer::write_number;
 use crate::error::{Argument, Error, Result};
-use crate::in_order::broke_down;
+use crate::in_order::reader_panicked;
 use crate::parquet_file::{Cursor, Leaf, ParquetFile};
 
 /// Rows that are decoded at a time.
@@ -75,7 +75,7 @@ impl Source {
             false => self.cursor.read(count, &mut self.values),
         });
         let decoded = std::panic::catch_unwind(decode)
-            .map_err(|_| broke_down(&path.display().to_string()))?;
+            .map_err(|_| reader_panicked(&path.display().to_string()))?;
         decoded.map_err(|problem| {
             let place = format!("{}, column {}", path.display(), self.name);
             Error::new(place, problem, "make the file again from its source")

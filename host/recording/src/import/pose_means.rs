@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::assignment::{ColumnList, Offset, Role, Scale};
 use super::broken::Unreadable;
 use super::log::is_log;
-use super::options::{ImportOptions, file_name};
+use super::options::{ImportOptions, file_name, source};
 use super::plausibility::no_temperature;
 use super::text_table::{Cells, TextTable};
 use super::{ImportSummary, SkippedLines};
@@ -13,7 +13,7 @@ use crate::cell::is_reading;
 use crate::columns::{Column, Columns, Layout};
 use crate::digest;
 use crate::error::{Argument, Error, Result};
-use crate::manifest::{MANIFEST_FILE, Manifest, Reference, Source};
+use crate::manifest::{MANIFEST_FILE, Manifest, Reference};
 use crate::separator::Separator;
 use crate::staging::Staging;
 
@@ -293,10 +293,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
     manifest.means = true;
     manifest.latitude_deg = options.latitude_deg;
     manifest.imported_with = options.arguments();
-    manifest.sources.push(Source {
-        file: file_name(path),
-        sha256: digest::sha256(path)?,
-    });
+    manifest.sources.push(source(path)?);
     manifest.check("import")?;
     let staging = Staging::create(out, options.replace)?;
     staging.write_file(MEANS_FILE, &to_csv(&table))?;
@@ -313,17 +310,10 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
         means: true,
         preset: options.preset.clone(),
         sample_rate_hz: manifest.sample_rate_hz,
-        time: Vec::new(),
         skipped: table.skipped,
-        dropped_outside: 0,
-        dropped_in_gaps: 0,
-        interpolated: 0,
-        not_chosen: 0,
-        padding: 0,
-        broken_rows: Vec::new(),
         empty_cells: raw.map(|c| empty(c).count() as u64).sum(),
-        notes: Vec::new(),
         warnings,
+        ..ImportSummary::default()
     })
 }
 

@@ -61,13 +61,13 @@ enum Unfit {
     /// They come from another maker, or are incomplete.
     Other(Error),
     /// They come from its maker, but do not contain readings of a sensor.
-    Useless(Error),
+    NoReadings(Error),
 }
 
 impl Unfit {
     fn into_error(self) -> Error {
         match self {
-            Unfit::Other(error) | Unfit::Useless(error) => error,
+            Unfit::Other(error) | Unfit::NoReadings(error) => error,
         }
     }
 }
@@ -117,7 +117,7 @@ impl Preset {
         for preset in Preset::all() {
             match preset.of(paths, separator, true) {
                 Ok(chosen) => fitting.push(chosen),
-                Err(Unfit::Useless(error)) => {
+                Err(Unfit::NoReadings(error)) => {
                     useless.get_or_insert(error);
                 }
                 Err(Unfit::Other(_)) => {}
@@ -153,7 +153,7 @@ impl Preset {
             }
         }
         if let (Some([problem, remedy]), [first, _, ..], false) =
-            (self.apart, &files[..], recognise)
+            (self.not_joinable, &files[..], recognise)
         {
             return Err(Error::new(first.display(), problem, remedy).into());
         }
@@ -252,9 +252,13 @@ impl Preset {
                 )),
                 _ => layout.read(path, list, separator),
             };
-            match (outcome, layout.unfit) {
+            match (outcome, layout.refusal) {
                 (Ok(_), Some([problem, remedy])) => {
-                    return Err(Unfit::Useless(Error::new(path.display(), problem, remedy)));
+                    return Err(Unfit::NoReadings(Error::new(
+                        path.display(),
+                        problem,
+                        remedy,
+                    )));
                 }
                 (Ok(list), None) => return Ok((layout, list, rate_hz.flatten())),
                 (Err(error), _) => {
@@ -308,7 +312,7 @@ impl Preset {
             let mut cells = names.iter().zip(&row);
             cells.any(|(name, cell)| name == column && cell == value)
         };
-        beside.values.iter().any(is) != beside.one_is_there
+        beside.values.iter().any(is) != beside.belongs_if_present
     }
 }
 

@@ -8,7 +8,7 @@ use super::text_table::Cells;
 use super::time::Stamp;
 use crate::columns::Column;
 use crate::error::Result;
-use crate::in_order::broke_down;
+use crate::in_order::reader_panicked;
 
 /// The chosen sensor in a log.
 #[derive(Debug, Clone, Copy, Default)]
@@ -90,5 +90,5 @@ impl Readings {
 
 /// Calls `read` on the file at `path`. The crates that read logs panic on some damaged files; this becomes an error about the file.
 pub(super) fn guarded<T>(path: &Path, read: impl FnOnce() -> Result<T> + UnwindSafe) -> Result<T> {
-    catch_unwind(read).map_err(|_| broke_down(&path.display().to_string()))?
+    catch_unwind(read).map_err(|_| reader_panicked(&path.display().to_string()))?
 }

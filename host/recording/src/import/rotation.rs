@@ -70,6 +70,11 @@ pub(super) fn product(a: &Rotation, b: &Rotation) -> Rotation {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
+/// Offsets or scale factors of the three axes, for a note.
+pub(super) fn listed(three: [f64; 3]) -> String {
+    three.map(|value| format!("{value:.6}")).join(" ")
+}
+
 /// The calibration that was applied to one sensor's readings: `rotation ((raw - offset) scale)`, with offset and scale for each axis.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Correction {

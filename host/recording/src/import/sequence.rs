@@ -8,15 +8,14 @@ use std::path::Path;
 
 use super::faces::Face;
 use super::joined::JoinedFiles;
-use super::options::file_name;
-use super::place::Place;
+use super::options::{file_name, source};
+use super::sequence_position::SequencePosition;
 use super::step_inputs::StepInputs;
 use super::step_labels::StepLabels;
 use super::{ImportOptions, ImportSummary};
 use crate::columns::Columns;
-use crate::digest;
 use crate::error::{Argument, Error, Result};
-use crate::manifest::{Manifest, Reference, Source};
+use crate::manifest::{Manifest, Reference};
 use crate::writer::Writer;
 
 /// Rates of two files may differ by this share: a loop without a timer is not equally fast each time.
@@ -56,7 +55,7 @@ pub(super) fn import_sequence(
             origin_s = begun_s;
         }
         let behind_s = (begun_s - origin_s) as f64;
-        import.place = Some(Place::new(step as i32, behind_s, after_s));
+        import.place = Some(SequencePosition::new(step as i32, behind_s, after_s));
         let (writer, manifest, summary, columns) = match &mut open {
             Some(open) => open,
             None => {
@@ -150,13 +149,6 @@ fn of_faces(options: &ImportOptions, gyro: bool) -> Vec<String> {
         );
     }
     warnings
-}
-
-fn source(path: &Path) -> Result<Source> {
-    Ok(Source {
-        file: file_name(path),
-        sha256: digest::sha256(path)?,
-    })
 }
 
 /// Labels of the steps: the faces, or the names of the files without their endings.

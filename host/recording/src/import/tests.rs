@@ -19,6 +19,21 @@ mod sequence;
 mod sources;
 mod stamps;
 
+const BOTH: &str = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
+
+/// Rows at 100 Hz; `readings` gives the six cells of each.
+fn log<T: std::fmt::Display>(rows: usize, readings: impl Fn(usize) -> [T; 6]) -> String {
+    let row = |i: usize| {
+        let cells = readings(i).map(|cell| format!("{cell:.5}")).join(" ");
+        format!("{} {cells}\n", 10 * i)
+    };
+    (0..rows).map(row).collect()
+}
+
+fn warned(summary: &ImportSummary, words: &str) -> bool {
+    summary.warnings.iter().any(|w| w.contains(words))
+}
+
 /// A folder with foreign files, and the recording made from them.
 struct Bench(tempfile::TempDir);
 

@@ -75,6 +75,13 @@ enum Kind {
     Other,
 }
 
+/// The line after blanks and signs of a comment: names may follow them.
+pub(super) fn without_comment_sign(line: &[u8]) -> &[u8] {
+    let skipped = |b: &u8| matches!(b, b'#' | b'%' | b' ' | b'\t');
+    let from = line.iter().position(|b| !skipped(b));
+    &line[from.unwrap_or(line.len())..]
+}
+
 fn kind(line: &[u8]) -> Kind {
     match line.trim_ascii().first() {
         None => Kind::Blank,
@@ -154,7 +161,7 @@ impl TextTable {
         self.bytes as f64 / self.length.max(1) as f64
     }
 
-    /// Place of a line, for messages.
+    /// Position of a line, for messages.
     pub fn place(&self, row: u64) -> String {
         format!("{}, row {row}", self.path.display())
     }
@@ -235,11 +242,8 @@ impl TextTable {
     fn position(&self, filter: &RowFilter, lines: &[&[u8]]) -> Result<usize> {
         let mut record = csv::ByteRecord::new();
         let mut named = lines.iter().filter_map(|line| {
-            let from = line
-                .iter()
-                .position(|b| !matches!(b, b'#' | b'%' | b' ' | b'\t'));
             self.separator
-                .split(&line[from.unwrap_or(line.len())..], &mut record);
+                .split(without_comment_sign(line), &mut record);
             filter.position(&texts(&record))
         });
         named.next().or(filter.number()).ok_or_else(|| {
@@ -341,11 +345,8 @@ impl TextTable {
                 }
                 Kind::Comment => {
                     // Many programs write the names of the columns after a #.
-                    let text = line
-                        .iter()
-                        .position(|b| !matches!(b, b'#' | b'%' | b' ' | b'\t'));
                     self.separator
-                        .split(&line[text.unwrap_or(line.len())..], &mut record);
+                        .split(without_comment_sign(line), &mut record);
                     let open = self.wanted.is_empty();
                     if open {
                         self.take_header(&texts(&record), list, number)?;
@@ -373,7 +374,7 @@ impl TextTable {
                     }
                     None => "it contains words".to_owned(),
                 };
-                let data = self.are_numbers(&record);
+                let data = self.mostly_numbers(record.iter());
                 if misfit.as_ref().is_none_or(|first| data && !first.data) {
                     misfit = Some(Misfit {
                         number,
@@ -491,11 +492,6 @@ impl TextTable {
             .iter()
             .filter(|(_, role)| *role != Role::Column(Column::Step));
         self.mostly_numbers(numbers.map(|(position, _)| &record[*position]))
-    }
-
-    /// Whether a line of any width contains data.
-    fn are_numbers(&self, record: &csv::ByteRecord) -> bool {
-        self.mostly_numbers(record.iter())
     }
 
     fn mostly_numbers<'a>(&self, cells: impl Iterator<Item = &'a [u8]>) -> bool {

@@ -11,7 +11,7 @@ use mimu_recording::Reference;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
-use super::{OpenSession, Plain, WITH_EFFECTS, mounted, now};
+use super::{AffineCalibration, OpenSession, WITH_EFFECTS, add_mounting_uncertainty, now};
 use crate::event::{Event, Phase, Question};
 use crate::folder::{Entry, Part};
 use crate::procedure::verification;
@@ -20,7 +20,7 @@ use crate::wizard::Ended;
 use mimu_equipment::step::Step;
 
 /// Calibration with effects from the diagnosis of a unit.
-pub(super) struct Found {
+pub(super) struct CalibrationWithEffects {
     calibration: Calibration,
     fitted: Fit,
     effects: Vec<String>,
@@ -28,7 +28,11 @@ pub(super) struct Found {
 
 impl OpenSession<'_> {
     /// Diagnoses the remaining errors. Returns the calibration with effects if it can be stored.
-    pub(super) fn diagnose(&mut self, k: usize, plain: &Plain) -> Result<Option<Found>> {
+    pub(super) fn diagnose(
+        &mut self,
+        k: usize,
+        plain: &AffineCalibration,
+    ) -> Result<Option<CalibrationWithEffects>> {
         let other = &plain.other;
         let name = self.wizard.units[k].name();
         let first = prepared(&self.file(k, Part::Calibration.name()))?;
@@ -37,10 +41,7 @@ impl OpenSession<'_> {
                 second: Some(other.clone()),
                 ..Recordings::from(first)
             },
-            Options {
-                holdout_blocks: 0,
-                ..Options::default()
-            },
+            Options::IN_SAMPLE,
         );
         // The stored calibration is verified already. A recording that cannot be diagnosed does not invalidate it.
         let mut diagnosis = match diagnosed {
@@ -58,7 +59,7 @@ impl OpenSession<'_> {
         // On a table, a sensor without effects keeps the earlier fit: only that fit includes the lever arm of a board off the table's axis.
         let mut fitted = diagnosis.after.clone();
         if other.manifest.reference == Reference::Table {
-            mounted(&mut fitted, self.wizard.asked.mounting_deg);
+            add_mounting_uncertainty(&mut fitted, self.wizard.config.mounting_deg);
             for sensor in &mut fitted.sensors {
                 let is = |e: &FittedEffect| e.sensor() == sensor.sensor;
                 if let (false, Some(plain)) =
@@ -107,7 +108,7 @@ impl OpenSession<'_> {
             effects: effects.clone(),
             page: page.display().to_string(),
         });
-        Ok((!effects.is_empty()).then_some(Found {
+        Ok((!effects.is_empty()).then_some(CalibrationWithEffects {
             calibration: made,
             fitted,
             effects,
@@ -117,8 +118,8 @@ impl OpenSession<'_> {
     /// Offers the calibrations with effects, verifies them with a third set of poses, and stores them.
     pub(super) async fn with_effects(
         &mut self,
-        plain: &[Plain],
-        found: Vec<Option<Found>>,
+        plain: &[AffineCalibration],
+        found: Vec<Option<CalibrationWithEffects>>,
     ) -> Result<Ended> {
         let names: Vec<String> = found
             .iter()
@@ -131,14 +132,19 @@ impl OpenSession<'_> {
             Some(false) => return Ok(Ended::Done),
             Some(true) => {}
         }
-        let asked = &self.wizard.asked;
-        let used: Vec<Step> = asked
+        let config = &self.wizard.config;
+        let used: Vec<Step> = config
             .steps
             .iter()
-            .chain(&asked.verification)
+            .chain(&config.verification)
             .copied()
             .collect();
-        let steps = verification(asked.fixture, &used, asked.dwell_s, asked.largest_rate_dps);
+        let steps = verification(
+            config.fixture,
+            &used,
+            config.dwell_s,
+            config.largest_rate_dps,
+        );
         let words = format!(
             "{} poses that the fit has not used, for the calibration with {}",
             steps.len(),

@@ -9,7 +9,7 @@ use super::{Round, UnitSession};
 use crate::event::Event;
 use crate::procedure::{Fixture, SAME_POSE_DEG, SessionConfig};
 use crate::waiting::Waiting;
-use crate::watch::Seen;
+use crate::watch::LastSecond;
 use mimu_equipment::step::Step;
 
 /// Largest fraction of missing samples in a second: if only means are used, and if turns are integrated too.
@@ -28,13 +28,13 @@ impl UnitSession {
     /// Why no dwell can run now, if so.
     pub(super) fn waits(
         &self,
-        seen: &Seen,
-        asked: &SessionConfig,
+        seen: &LastSecond,
+        config: &SessionConfig,
         step: &Step,
         busy: bool,
     ) -> Option<Waiting> {
         let rate_hz = self.station.unit.rate_hz;
-        let share = LOST_SHARE[usize::from(asked.fixture != Fixture::Table)];
+        let share = LOST_SHARE[usize::from(config.fixture != Fixture::Table)];
         if busy {
             return Some(Waiting::TableMoves);
         }
@@ -64,7 +64,7 @@ impl UnitSession {
     }
 
     /// Reports a rate that differs from the requested one.
-    pub(super) fn turns_otherwise(&self, seen: &Seen, step: &Step) -> Option<Waiting> {
+    pub(super) fn turns_otherwise(&self, seen: &LastSecond, step: &Step) -> Option<Waiting> {
         let nominal = self.nominal.as_ref()?;
         let rate = self.watch.rate(seen, &nominal[0]);
         let off = (rate - step.rate()).norm().to_degrees();
@@ -82,10 +82,10 @@ impl UnitSession {
         step: &Step,
         begins: bool,
     ) -> std::result::Result<Step, Waiting> {
-        let asked = round.asked;
+        let config = round.config;
         let off = |s: &Step| up.angle(&s.up()).to_degrees();
-        let limit = asked.fixture.tolerance_deg();
-        let by_hand = asked.fixture != Fixture::Table;
+        let limit = config.fixture.tolerance_deg();
+        let by_hand = config.fixture != Fixture::Table;
         // By hand the pose is recorded as it is. It only has to differ from earlier ones.
         let as_it_is = |s: &Step| match by_hand {
             true => Step::at_rest(*up, s.dwell_s),
@@ -108,7 +108,7 @@ impl UnitSession {
             if let Some(other) = nearest {
                 return Ok(as_it_is(other));
             }
-            if asked.fixture == Fixture::Hands {
+            if config.fixture == Fixture::Hands {
                 return Ok(as_it_is(step));
             }
         }
@@ -121,20 +121,20 @@ impl UnitSession {
 
 impl UnitSession {
     /// Refuses readings that are declared as SI but are not.
-    pub(super) fn check_unit(&self, seen: &Seen, asked: &SessionConfig) -> Result<()> {
+    pub(super) fn check_unit(&self, seen: &LastSecond, config: &SessionConfig) -> Result<()> {
         let size = Vector3::from_fn(|k, _| seen.mean[3 + k]).norm();
-        let share = size / asked.gravity_mps2;
+        let share = size / config.gravity_mps2;
         if self.station.unit.raw_unit != RawUnit::Si || (1.0 / NEAR..NEAR).contains(&share) {
             return Ok(());
         }
-        let cause = match share * asked.gravity_mps2 {
+        let cause = match share * config.gravity_mps2 {
             g if (1.0 / NEAR..NEAR).contains(&g) => ", as if it were in g",
             _ => "",
         };
         let problem = format!(
             "the accelerometer reads {} at rest{cause}, but gravity is {} m/s²",
             significant(size),
-            asked.gravity_mps2
+            config.gravity_mps2
         );
         let remedy = "declare the readings as counts, which may have any unit";
         Err(Error::device(self.name(), problem, remedy).about(Argument::RawUnit))
@@ -160,7 +160,7 @@ impl UnitSession {
         if in_a_row < LOST_IN_A_ROW || 2 * lost <= all {
             return Ok(());
         }
-        let share = self.standing.lost as f64 / (self.standing.lost + self.standing.samples) as f64;
+        let share = self.state.lost as f64 / (self.state.lost + self.state.samples) as f64;
         let problem = format!(
             "samples are missing in {lost} of {all} turns ({} % of all samples), and only complete turns calibrate the gyro",
             significant(100.0 * share)

@@ -7,14 +7,14 @@ use crate::procedure::SessionConfig;
 use mimu_equipment::step::Step;
 
 /// Known inputs of a dwell on a table: rates, deg/s, and specific forces, m/s².
-pub(super) fn known(step: &Step, asked: &SessionConfig) -> [f64; 6] {
+pub(super) fn known(step: &Step, config: &SessionConfig) -> [f64; 6] {
     let up = step.up();
     // The heading of the table is unknown, so only the vertical component of the Earth's rate is known.
-    let earth = asked
+    let earth = config
         .latitude_deg
-        .map(|_| Earth::at(asked.latitude_deg).rate(&up));
+        .map(|_| Earth::at(config.latitude_deg).rate(&up));
     let rate = up * step.rate_dps + earth.unwrap_or_default().map(f64::to_degrees);
-    let force = up * asked.gravity_mps2;
+    let force = up * config.gravity_mps2;
     [rate.x, rate.y, rate.z, force.x, force.y, force.z]
 }
 

@@ -29,7 +29,7 @@ pub struct Replayed {
 /// Errors: the first frame, sample or report that differs.
 pub fn replay(trace: &Trace) -> Result<Replayed, String> {
     let stored = stored::decode(&trace.calibration).map_err(|e| format!("calibration: {e:?}"))?;
-    let mut twin = HostReference {
+    let mut host_reference = HostReference {
         state: stored.compensator.state(1000.0),
         slow_at: None,
         powered_for_ms: 0,
@@ -70,7 +70,7 @@ pub fn replay(trace: &Trace) -> Result<Replayed, String> {
                 if head != same || samples.len() != device.len() {
                     return Err(format!("sample {}: the two batches differ", head.first));
                 }
-                found.compensated += twin.compare(&head, dies_c, &samples, &device)?;
+                found.compensated += host_reference.compare(&head, dies_c, &samples, &device)?;
             }
             Message::Event(Event::Kalman(state)) => {
                 // The last samples that it includes arrive with the next batch.
@@ -78,7 +78,7 @@ pub fn replay(trace: &Trace) -> Result<Replayed, String> {
             }
             Message::Greeting { greeting, .. } => {
                 let unknown = "the device does not know for how long it has had its power";
-                twin.powered_for_ms = greeting.powered_for_ms.ok_or(unknown)?;
+                host_reference.powered_for_ms = greeting.powered_for_ms.ok_or(unknown)?;
             }
             _ => {}
         }

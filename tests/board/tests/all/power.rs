@@ -66,15 +66,15 @@ struct Course {
 /// Carries out upload and commit once.
 fn course(old: &[u8], new: &[u8]) -> Course {
     let mut device = with_old(old);
-    let began = device.board.standing().ns;
+    let began = device.board.state().ns;
     device.upload(new);
-    let committed = device.board.standing().ns;
+    let committed = device.board.state().ns;
     let id = device.send(Request::UploadCommit);
     let (mut words, mut erasing) = (Vec::new(), Vec::new());
     while device.answer(id).is_none() {
         // Half the programming time of a word, so that none is missed.
         device.run_for(MS / 20);
-        let at = device.board.standing().ns;
+        let at = device.board.state().ns;
         let operations = device.board.in_flight().unwrap();
         if operations
             .iter()
@@ -90,7 +90,7 @@ fn course(old: &[u8], new: &[u8]) -> Course {
     Course {
         began,
         committed,
-        done: device.board.standing().ns,
+        done: device.board.state().ns,
         words,
         erasing,
     }
@@ -179,9 +179,9 @@ fn cut_at_instants(cuts: usize, drawn: &Path) {
 
     // The same run again. It is identical up to each cut, and the flash contents after a cut do not depend on later events.
     let mut device = with_old(&old);
-    assert_eq!(device.board.standing().ns, course.began);
+    assert_eq!(device.board.state().ns, course.began);
     device.upload(&new);
-    assert_eq!(device.board.standing().ns, course.committed);
+    assert_eq!(device.board.state().ns, course.committed);
     let mut stores = Vec::new();
     let all = instants(&course, cuts);
     // The upload itself changes nothing in flash: the contents after a cut in it equal those at its end.
@@ -363,9 +363,9 @@ fn a_calibration_of_another_unit_is_refused_and_nothing_is_erased_for_the_one_in
 
     // It is there already: an erase alone would take a second.
     device.upload(&old);
-    let began = device.board.standing().ns;
+    let began = device.board.state().ns;
     assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
-    let took = device.board.standing().ns - began;
+    let took = device.board.state().ns - began;
     assert!(took < 50 * MS, "{took} ns");
 
     let insists = Request::UploadBegin {
@@ -420,16 +420,16 @@ fn flash_that_hangs_is_reported_and_the_old_calibration_stays_in_use() {
     let mut device = with_old(&old);
     device.upload(&calibration(16, 3.6));
     device.board.stop_flash().unwrap();
-    let began = device.board.standing().ns;
+    let began = device.board.state().ns;
     let failed = Answer::Refused(Refusal::FlashFailed);
     assert_eq!(device.ask(Request::UploadCommit), failed);
     // The data sheet's maximum for a sector is 4 s (DS12110, table 140); the host waits for 15 s.
-    let took = device.board.standing().ns - began;
+    let took = device.board.state().ns - began;
     assert!((4_000 * MS..8_000 * MS).contains(&took), "{took} ns");
     // While the operation has not ended, another upload is refused at once, and nothing restarts.
-    let began = device.board.standing().ns;
+    let began = device.board.state().ns;
     assert_eq!(device.ask(Request::UploadCommit), failed);
-    assert!(device.board.standing().ns - began < 100 * MS);
+    assert!(device.board.state().ns - began < 100 * MS);
     let Answer::Greeting { hash, start } = device.ask(Request::Hello) else {
         panic!("no greeting");
     };

@@ -239,7 +239,7 @@ fn a_program_that_waits_for_the_clocks_for_ever_is_bitten_by_the_watchdog() {
     assert_eq!(bites(&mut board), 0);
     while bites(&mut board) == 0 {
         board.run_for(MS / 100).unwrap();
-        assert!(board.standing().ns < 520 * MS, "it does not restart");
+        assert!(board.state().ns < 520 * MS, "it does not restart");
     }
     board.heal(waiting).unwrap();
     assert_eq!(greeting(&mut board).told(), ("Watchdog", 2));
@@ -257,7 +257,7 @@ fn a_panic_is_told_also_if_the_log_of_it_faults() {
     let replaced = faults.map(|(at, fault)| board.inject(at, fault).unwrap());
     while board.restarts().unwrap().is_empty() {
         board.run_for(MS / 10).unwrap();
-        assert!(board.standing().ns < 1000 * MS, "it does not restart");
+        assert!(board.state().ns < 1000 * MS, "it does not restart");
     }
     for one in replaced {
         board.heal(one).unwrap();
@@ -301,7 +301,7 @@ fn time_since_power_on_goes_on_over_resets_and_is_unknown_once_its_record_is_los
     let after = second.powered_for_ms.unwrap();
     assert!((2750..3150).contains(&after), "{after}");
     board.run_for(STARTED).unwrap();
-    let before_ms = board.standing().ns / MS;
+    let before_ms = board.state().ns / MS;
     let (ms, _, third) = restarted(&mut board, task("process"), Fault::Hang);
     let truth = before_ms as u32 + ms + first;
     let after = third.powered_for_ms.unwrap();

@@ -26,7 +26,7 @@ fn a_call_through_the_terminal_is_answered_and_no_byte_is_lost() {
     for _ in 0..3 {
         served.step().unwrap();
     }
-    assert_eq!(served.board().standing().ns, 0);
+    assert_eq!(served.board().state().ns, 0);
 
     let port = File::options().read(true).write(true).open(path).unwrap();
     let done = AtomicBool::new(false);
@@ -93,7 +93,7 @@ fn at_the_pace_of_the_wall_a_second_takes_no_less_than_a_second() {
     board.run_to(STARTED).unwrap();
     let mut served = Served::new(board, Pace::Wall, None).unwrap();
     let began = Instant::now();
-    while served.board().standing().ns < STARTED + 500 * MS {
+    while served.board().state().ns < STARTED + 500 * MS {
         served.step().unwrap();
     }
     assert!(began.elapsed() >= Duration::from_millis(500));

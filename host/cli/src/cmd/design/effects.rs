@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use mimu::effects;
-use mimu::fit::{Fit, Method, Options, fit};
+use mimu::fit::{Fit, Options, fit};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::budget::DwellNoise;
 use mimu::plan::design::reach::{Fixture, RateList, Rates};
@@ -135,12 +135,7 @@ fn after(path: &Path, args: &DesignArgs) -> Result<Fit> {
         Some(NoiseArg::File(file)) => prepared.with_noise(&NoiseFile::read(file)?)?,
         _ => prepared,
     };
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    };
-    fit(prepared, options)
+    fit(prepared, Options::IN_SAMPLE)
 }
 
 /// The smallest experiment that shows the effects `ids`, and its plan as TOML.

@@ -22,7 +22,7 @@ use super::{WizardArgs, begun_rate_hz, check_stored};
 use crate::cmd::device::interruption;
 use crate::output::{check_outputs, print};
 use crate::report;
-use crate::views::answers::{Beforehand, Typed};
+use crate::views::answers::Typed;
 use crate::views::lines::Lines;
 use crate::views::screen::Screen;
 
@@ -101,7 +101,7 @@ fn end_in_time(stop: Arc<AtomicBool>, ends: Duration, on_screen: bool) -> Result
 
 pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
-    let asked = args.asked()?;
+    let config = args.config()?;
     let wanted = args.wanted()?;
     let driver: Box<dyn Driver> = match args.drivers.as_slice() {
         [] => Box::new(Person),
@@ -112,15 +112,6 @@ pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
             });
             Box::new(Together(each.collect::<Result<_>>()?))
         }
-    };
-    let beforehand = match args.yes {
-        true => Beforehand {
-            store_effects: Some(true),
-            store_rough: Some(false),
-            go_on: Some(false),
-            power_cycle: Some(false),
-        },
-        false => Beforehand::default(),
     };
     let to_output = args.events.as_deref() == Some(Path::new("-"));
     let events: Option<Box<dyn Write>> = match &args.events {
@@ -141,9 +132,9 @@ pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
     };
     end_in_time(stop.clone(), ends, on_screen)?;
     let mut view: Box<dyn View> = match on_screen {
-        true => Box::new(Screen::new(stop, beforehand, events)?),
+        true => Box::new(Screen::new(stop, args.yes, events)?),
         false => {
-            let mut lines = Lines::new(Typed::new(stop)?, beforehand);
+            let mut lines = Lines::new(Typed::new(stop)?, args.yes);
             lines.sketches = driver.is_person() && std::io::stdout().is_terminal();
             lines.events = events;
             lines.text = match (to_output, quiet) {
@@ -155,7 +146,7 @@ pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
         }
     };
     let page = super::page(command_line);
-    let outcome = complete(carry_out(asked, wanted, driver, view.as_mut(), &page));
+    let outcome = complete(carry_out(config, wanted, driver, view.as_mut(), &page));
     // The terminal is restored before anything is printed to it.
     drop(view);
     let outcome = outcome?;

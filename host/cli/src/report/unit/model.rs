@@ -22,12 +22,6 @@ pub fn section(calibration: &Calibration) -> Markup {
     }
 }
 
-/// Half-width of the 95 % intervals in standard deviations.
-fn widening(table: &TriadTable) -> f64 {
-    let ratio = |table: &TriadTable| Some(table.interval_o?[0] / table.sigma_o?[0]);
-    ratio(table).filter(|r| r.is_finite()).unwrap_or(1.96)
-}
-
 fn value(si: f64, half: Option<f64>, factor: f64) -> Markup {
     html! {
         data value=(si) {
@@ -54,7 +48,7 @@ fn physical(table: &TriadTable) -> Markup {
         _ => readable::parameter(&format!("{raw}/({})", table.unit)),
     };
     let bias = readable::parameter(&raw);
-    let k = widening(table);
+    let k = table.interval_sigmas();
     let half = |sigmas: Option<[f64; 3]>, i: usize| sigmas.map(|s| k * s[i]);
     let angles = ["yz", "zy", "zx"];
     html! {

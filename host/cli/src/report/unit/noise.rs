@@ -100,6 +100,7 @@ fn drawn(sensor: Sensor, channels: &[&NoiseChannel], noise: &NoiseFile) -> Marku
     let name = format!("Allan deviation, {}", unit.unit);
     panel.drawing(
         &format!("Allan deviation of the {sensor}"),
+        None,
         &html! {
             (frame.grid(spoken(sensor), &decades(&(from..to)), &decades(&(low..high)), true))
             (frame.y_name(&name))

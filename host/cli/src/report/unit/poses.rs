@@ -65,7 +65,7 @@ pub fn figure(prepared: &Prepared, calibration: &Calibration, accel: Option<&Pic
     };
     html! {
         figure class="whole" {
-            div class="figures" { (Panel::ONE.drawing(&format!("{} poses on the sphere of directions", poses.len()), &drawn)) }
+            div class="figures" { (Panel::ONE.drawing(&format!("{} poses on the sphere of directions", poses.len()), None, &drawn)) }
             figcaption {
                 (poses.len()) " poses: the direction that points up, in the body frame. Left: z upward, right: z downward; equal areas, "
                 "with circles at 45° and 90° from z."

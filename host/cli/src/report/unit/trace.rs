@@ -75,6 +75,7 @@ fn drawn(prepared: &Prepared, sensor: Sensor, unit: &str) -> Markup {
     let entries: Vec<(&str, &str)> = CLASSES.into_iter().zip(AXES).collect();
     panel.drawing(
         &format!("raw {sensor} over time"),
+        None,
         &html! {
             (frame.spans("block", &dwells))
             (frame.axes(spoken(sensor), true))

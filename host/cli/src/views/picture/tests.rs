@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mimu::quantity::Sensor;
 use mimu_equipment::step::Step;
-use mimu_wizard::event::UnitStanding;
+use mimu_wizard::event::UnitState;
 use mimu_wizard::refit::{Aim, Aims, Parameter};
 use mimu_wizard::waiting::{Interruption, Waiting};
 use nalgebra::Vector3;
@@ -74,8 +74,8 @@ fn progress(gyro: [f64; 3], accel: [f64; 3]) -> Progress {
     }
 }
 
-fn unit(name: &str) -> UnitStanding {
-    UnitStanding {
+fn unit(name: &str) -> UnitState {
+    UnitState {
         unit: name.into(),
         motion: Some([0.31, 0.44]),
         motion_limits: [1.0, 1.0],
@@ -94,13 +94,13 @@ fn unit(name: &str) -> UnitStanding {
     }
 }
 
-fn standing(units: Vec<UnitStanding>) -> Standing {
+fn standing(units: Vec<UnitState>) -> SessionState {
     let progress = progress([0.0312, 2410.0, 1530.0], [0.412, 806.0, 1220.0]);
-    Standing {
+    SessionState {
         phase: Phase::Calibration,
         step: Some(Step::at_rest(Vector3::new(1.0, 0.0, -1.0), 4.0)),
         dwells: [11, 12],
-        thrown: 2,
+        discarded: 2,
         elapsed_s: 412.7,
         progress: vec![progress; units.len()],
         units,
@@ -122,7 +122,7 @@ fn log() -> Vec<String> {
     .to_vec()
 }
 
-fn shown<'a>(standing: &'a Standing, log: &'a [String]) -> Shown<'a> {
+fn shown<'a>(standing: &'a SessionState, log: &'a [String]) -> Shown<'a> {
     Shown {
         standing,
         log,
@@ -169,14 +169,14 @@ fn what_keeps_a_table_from_a_dwell_is_said_in_words_and_not_by_colour_alone() {
 
 #[test]
 fn before_the_first_sample_there_is_a_screen_already() {
-    let mut one = UnitStanding {
+    let mut one = UnitState {
         unit: "mimu-1f3a5c7e".into(),
-        ..UnitStanding::default()
+        ..UnitState::default()
     };
-    let mut standing = Standing {
+    let mut standing = SessionState {
         phase: Phase::Start,
         units: vec![one.clone()],
-        ..Standing::default()
+        ..SessionState::default()
     };
     is_as_in("nothing-yet", &shown(&standing, &[]), LEAST);
 
@@ -205,7 +205,7 @@ fn a_question_lies_above_all_else_with_its_answers() {
 
 #[test]
 fn several_units_have_two_lines_each_where_there_is_no_room_and_those_that_wait_come_first() {
-    let mut units: Vec<UnitStanding> = (1..=3).map(|k| unit(&format!("mimu-000{k}"))).collect();
+    let mut units: Vec<UnitState> = (1..=3).map(|k| unit(&format!("mimu-000{k}"))).collect();
     units[2].waiting = Some(Waiting::Moves(Sensor::Accel, 1.8));
     units[2].left_s = None;
     let mut three = standing(units);
@@ -220,7 +220,7 @@ fn several_units_have_two_lines_each_where_there_is_no_room_and_those_that_wait_
 
 #[test]
 fn four_units_stand_side_by_side_on_a_large_screen() {
-    let mut units: Vec<UnitStanding> = (1..=4).map(|k| unit(&format!("mimu-000{k}"))).collect();
+    let mut units: Vec<UnitState> = (1..=4).map(|k| unit(&format!("mimu-000{k}"))).collect();
     units[2].waiting = Some(Waiting::Moves(Sensor::Accel, 1.8));
     (units[2].motion, units[2].left_s) = (Some([0.4, 1.8]), None);
     let (standing, log) = (standing(units), log());

@@ -1,6 +1,6 @@
 //! State of a unit: each figure with its limit, the reason why it waits, and the remaining time of a dwell.
 
-use mimu_wizard::event::{Phase, Standing, UnitStanding};
+use mimu_wizard::event::{Phase, SessionState, UnitState};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Stylize as _;
@@ -15,7 +15,7 @@ use super::shapes::{clipped, filled, framed, grouped, sign, wrapped};
 const BAR: usize = 15;
 
 /// One unit in full.
-pub(super) fn draw_unit(frame: &mut Frame, area: Rect, unit: &UnitStanding, standing: &Standing) {
+pub(super) fn draw_unit(frame: &mut Frame, area: Rect, unit: &UnitState, standing: &SessionState) {
     let waits = unit.waiting.is_some();
     let inner = framed(frame, area, &unit.unit, waits);
     let wide = usize::from(inner.width);
@@ -62,10 +62,10 @@ pub(super) fn draw_unit(frame: &mut Frame, area: Rect, unit: &UnitStanding, stan
 }
 
 /// Several units without space for each: two lines per unit, waiting ones first.
-pub(super) fn draw_units(frame: &mut Frame, area: Rect, units: &[UnitStanding]) {
+pub(super) fn draw_units(frame: &mut Frame, area: Rect, units: &[UnitState]) {
     let inner = framed(frame, area, &format!("{} units", units.len()), false);
     let wide = usize::from(inner.width);
-    let mut order: Vec<&UnitStanding> = units.iter().collect();
+    let mut order: Vec<&UnitState> = units.iter().collect();
     order.sort_by_key(|u| u.waiting.is_none());
     let room = usize::from(inner.height);
     let fit = match 2 * units.len() <= room {
@@ -129,7 +129,7 @@ fn capped(value: f64) -> String {
     }
 }
 
-fn tilt_line(unit: &UnitStanding) -> Line<'static> {
+fn tilt_line(unit: &UnitState) -> Line<'static> {
     match unit.tilt_deg {
         None => Line::raw("tilt   no pose requested"),
         Some(tilt) => Line::from(vec![
@@ -142,7 +142,7 @@ fn tilt_line(unit: &UnitStanding) -> Line<'static> {
     }
 }
 
-fn temperature_line(unit: &UnitStanding, judged: bool) -> Line<'static> {
+fn temperature_line(unit: &UnitState, judged: bool) -> Line<'static> {
     let Some(temp) = unit.temp_c else {
         return Line::raw("temp   not measured");
     };

@@ -6,6 +6,8 @@ use std::fs;
 use std::ops::Range;
 use std::path::Path;
 
+pub use crate::random::Random;
+
 pub type Vector = [f64; 3];
 pub type Matrix = [[f64; 3]; 3];
 
@@ -74,32 +76,6 @@ impl Attitude {
             1.0 - 2.0 * (x * x + y * y),
         ]
         .map(|up| GRAVITY * up)
-    }
-}
-
-/// SplitMix64: a dozen lines that give the same recording on every machine.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub fn uniform(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (2.0 * PI * self.uniform()).cos()
-    }
-
-    pub fn direction(&mut self) -> Vector {
-        [self.normal(), self.normal(), self.normal()]
     }
 }
 

@@ -3,14 +3,12 @@
 //! The bench defines the truth: the inputs follow from the plan, the readings from the published matrices of its rig file.
 
 use std::os::unix::process::CommandExt as _;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use mimu_board::front::Front;
-use mimu_board::image::{Image, release_image};
 use mimu_board::running::Board;
 use mimu_board::schematic::{DIVIDER_RATIO, Volts, WIRING};
 use mimu_board::serve::{Pace, Served};
@@ -21,6 +19,7 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 
+use super::super::wizard::bench::{image, in_repository};
 use super::calibration::{Forward, text_of};
 use super::recording::rows;
 use super::{Place, Ran, command, mimu, start};
@@ -38,21 +37,6 @@ pub struct Bench {
     thread: Option<JoinHandle<Served>>,
 }
 
-fn in_repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../..")
-        .join(path)
-}
-
-fn image() -> Image {
-    let path = release_image();
-    let path = match path.is_absolute() {
-        true => path,
-        false => in_repository(&path.display().to_string()),
-    };
-    Image::read(&path).unwrap_or_else(|problem| panic!("{problem}"))
-}
-
 impl Bench {
     /// Switched on; its own greeting has been received.
     fn new(front: Front) -> Self {
@@ -67,7 +51,7 @@ impl Bench {
         let thread = std::thread::spawn(move || {
             while !ended.load(Ordering::Relaxed) {
                 served.step().unwrap();
-                let ns = served.board().standing().ns;
+                let ns = served.board().state().ns;
                 clock.store(ns / 1_000_000, Ordering::Relaxed);
             }
             served

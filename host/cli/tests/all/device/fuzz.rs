@@ -15,25 +15,10 @@ use mimu_core::wire::{
 };
 use mimu_core::{PerSensor, Sensor};
 
-use mimu_device::{Answer, Event, Heard, Receiver, contents};
+use mimu_device::{Answer, Event, Received, Receiver, contents};
 use nalgebra::{Matrix3, Vector3};
 
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.bits() % end as u64) as usize
-    }
-}
+use crate::random::Random;
 
 fn frame(message: &Message<'_>) -> Vec<u8> {
     let mut out = [0; MAX_FRAME];
@@ -120,7 +105,7 @@ fn no_bytes_make_the_ear_fail_or_deaf() {
     let (mut heard, mut garbled) = (0_u64, 0_u64);
     for case in 0..cases {
         let mut random = Random(seed ^ case.wrapping_mul(0x2545_f491_4f6c_dd1d));
-        let mut ear = Receiver::default();
+        let mut receiver = Receiver::default();
         let mut bytes = Vec::new();
         for _ in 0..random.below(5) {
             let mut next = frames[random.below(frames.len())].clone();
@@ -128,10 +113,10 @@ fn no_bytes_make_the_ear_fail_or_deaf() {
             bytes.extend(next);
         }
         let mut end = None;
-        let mut take = |ear: &mut Receiver, bytes: &[u8]| {
-            ear.take(bytes, |message| {
+        let mut take = |receiver: &mut Receiver, bytes: &[u8]| {
+            receiver.take(bytes, |message| {
                 heard += 1;
-                if let Heard::Event(Event::Raw(samples)) = &message {
+                if let Received::Event(Event::Raw(samples)) = &message {
                     assert!((1..=20).contains(&samples.values.len()), "case {case}");
                 }
                 end = Some(message);
@@ -139,11 +124,15 @@ fn no_bytes_make_the_ear_fail_or_deaf() {
         };
         // In segments, as a port delivers them.
         let middle = random.below(bytes.len() + 1);
-        take(&mut ear, &bytes[..middle]);
-        take(&mut ear, &bytes[middle..]);
-        take(&mut ear, &last);
-        assert_eq!(end, Some(Heard::Answer(4711, Answer::Done)), "case {case}");
-        garbled += u64::from(ear.count().garbled);
+        take(&mut receiver, &bytes[..middle]);
+        take(&mut receiver, &bytes[middle..]);
+        take(&mut receiver, &last);
+        assert_eq!(
+            end,
+            Some(Received::Answer(4711, Answer::Done)),
+            "case {case}"
+        );
+        garbled += u64::from(receiver.count().garbled);
     }
     println!("seed {seed}: {cases} cases, {heard} messages, {garbled} garbled frames");
     assert!(

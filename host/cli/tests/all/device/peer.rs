@@ -51,7 +51,7 @@ pub enum Act {
 
 /// Behaviour at the port.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Voice {
+pub enum Behaviour {
     /// A device.
     Device,
     /// Nothing.
@@ -64,7 +64,7 @@ pub enum Voice {
 
 #[derive(Debug, Clone)]
 pub struct Script {
-    pub voice: Voice,
+    pub behaviour: Behaviour,
     pub protocol: Version,
     pub magic: [u8; 4],
     pub effects: u32,
@@ -96,7 +96,7 @@ pub struct Script {
 impl Default for Script {
     fn default() -> Self {
         Self {
-            voice: Voice::Device,
+            behaviour: Behaviour::Device,
             protocol: PROTOCOL,
             magic: MAGIC,
             effects: effects_of_this_build(),
@@ -240,8 +240,8 @@ impl Device {
                     0
                 }
             };
-            match self.script.voice {
-                Voice::Device => {
+            match self.script.behaviour {
+                Behaviour::Device => {
                     for byte in &bytes[..count] {
                         let Some(frame) = decoder.push(*byte) else {
                             continue;
@@ -257,9 +257,9 @@ impl Device {
                     }
                     self.sample();
                 }
-                Voice::Silence => {}
-                Voice::Garbage if count > 0 => self.write(b"login: \r\nPassword: \xff\x80\r\n"),
-                Voice::Stranger if count > 0 => {
+                Behaviour::Silence => {}
+                Behaviour::Garbage if count > 0 => self.write(b"login: \r\nPassword: \xff\x80\r\n"),
+                Behaviour::Stranger if count > 0 => {
                     let reply = Reply::Done;
                     self.send(&Message::Reply { id: 0, reply });
                 }

@@ -5,9 +5,9 @@ use std::os::unix::process::CommandExt as _;
 use mimu_core::wire::{
     Decoder, Greeting, MAGIC, MAX_FRAME, Message, PROTOCOL, Slot, Start, Version, encode,
 };
-use mimu_device::{Answer, Heard, Receiver, Started};
+use mimu_device::{Answer, Received, Receiver, Started};
 
-use super::peer::{Peer, Script, Voice};
+use super::peer::{Behaviour, Peer, Script};
 use super::terminal::Terminal;
 use super::{Place, command, mimu};
 
@@ -65,13 +65,13 @@ fn an_older_a_newer_and_a_foreign_device_are_told_apart() {
 
 #[test]
 fn silence_garbage_and_another_protocol_are_told_apart() {
-    let voice = |voice| Script {
-        voice,
+    let behaviour = |behaviour| Script {
+        behaviour,
         ..Script::default()
     };
-    info(voice(Voice::Silence), &[]).refused(&["nothing answers"]);
-    info(voice(Voice::Garbage), &[]).refused(&["garbage", "not a mimu device"]);
-    info(voice(Voice::Stranger), &[]).refused(&["no greeting"]);
+    info(behaviour(Behaviour::Silence), &[]).refused(&["nothing answers"]);
+    info(behaviour(Behaviour::Garbage), &[]).refused(&["garbage", "not a mimu device"]);
+    info(behaviour(Behaviour::Stranger), &[]).refused(&["no greeting"]);
 }
 
 #[test]
@@ -133,9 +133,9 @@ fn a_device_that_started_for_a_reason_of_a_later_version_is_talked_to_all_the_sa
     let shorter = &later[..later.len() - 4];
     for payload in [&later[..], shorter] {
         let mut heard = Vec::new();
-        let mut ear = Receiver::default();
-        ear.take(&framed(payload), |message| heard.push(message));
-        let [Heard::Answer(3, Answer::Greeting(who))] = &heard[..] else {
+        let mut receiver = Receiver::default();
+        receiver.take(&framed(payload), |message| heard.push(message));
+        let [Received::Answer(3, Answer::Greeting(who))] = &heard[..] else {
             panic!("{heard:?}");
         };
         assert_eq!((&who.start, who.starts), (&Started::NotKnown, 5));

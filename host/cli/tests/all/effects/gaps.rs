@@ -6,7 +6,7 @@ use mimu::calibration::Calibration;
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::effects::fitted::FittedEffect;
 use mimu::effects::removal::{remove, remove_within};
-use mimu::fit::{Method, Options};
+use mimu::fit::Options;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::blocks::Moments;
@@ -154,11 +154,6 @@ fn what_goes_by_time_is_counted_from_power_on() {
 
 #[test]
 fn a_given_calibration_has_to_fit_the_recording() {
-    let options = || Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    };
     let refusal = |first: Prepared, given: &Calibration| {
         let recordings = Recordings {
             first,
@@ -167,7 +162,9 @@ fn a_given_calibration_has_to_fit_the_recording() {
             given: Some(given),
             accept: Vec::new(),
         };
-        diagnose(recordings, options()).unwrap_err().to_string()
+        diagnose(recordings, Options::IN_SAMPLE)
+            .unwrap_err()
+            .to_string()
     };
     let (from, calibration) = unit(&[("gyro_thermal_bias", 1e-5, 6)]);
     let mut counts = from.clone();
@@ -197,12 +194,7 @@ fn a_single_dwell_beside_a_given_calibration_leaves_nothing_to_find() {
         given: Some(&calibration),
         ..Recordings::from(one)
     };
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    };
-    match diagnose(recordings, options) {
+    match diagnose(recordings, Options::IN_SAMPLE) {
         Ok(found) => assert!(found.effects.is_empty()),
         Err(refusal) => assert!(refusal.to_string().contains("dwell"), "{refusal}"),
     }

@@ -10,19 +10,13 @@ use mimu_core::compensation::Sample;
 use mimu_core::effects::{DeviceEffect, Directions, Effects, State};
 use nalgebra::{Matrix3, Vector3};
 
+use crate::random::congruential;
+
 /// Smaller effects vanish in the rounding of the readings, rad/s or m/s².
 const ROUNDING: f64 = 1e-9;
 
 /// Random inputs of each effect.
 const DRAWS: usize = 20;
-
-/// Uniform between -1 and 1.
-fn random(seed: &mut u64) -> f64 {
-    *seed = seed
-        .wrapping_mul(6_364_136_223_846_793_005)
-        .wrapping_add(1_442_695_040_888_963_407);
-    (*seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-}
 
 /// At this fraction of the data-sheet size the inputs are practically undisturbed. This is needed because the device evaluates each law after
 /// removing the error of the previous sample.
@@ -32,7 +26,8 @@ const SMALL: f64 = 1e-3;
 fn every_effect_is_evaluated_by_the_device_as_its_data_say() {
     let matrix = Matrix3::new(1.0, 0.03, -0.02, 0.01, 1.0, 0.04, -0.03, 0.02, 1.0);
     let directions = Directions::<f64>::of(&matrix).unwrap();
-    let seed = &mut 1;
+    let mut uniform = congruential(1);
+    let mut random = || 2.0 * uniform() - 1.0;
     for effect in effects::all() {
         if !matches!(effect.on_device(), OnDevice::EverySample | OnDevice::Folded) {
             continue;
@@ -42,20 +37,20 @@ fn every_effect_is_evaluated_by_the_device_as_its_data_say() {
         for _ in 0..DRAWS {
             let size =
                 |c: &effects::effect::Coefficient, r: f64| SMALL * c.typical * (1.5 + 0.5 * r);
-            let values: Vec<f64> = effect.of_unit().map(|c| size(c, random(seed))).collect();
+            let values: Vec<f64> = effect.of_unit().map(|c| size(c, random())).collect();
             let mut device = Effects::<f64, 8>::of(mimu_core::PerSensor::both(directions));
             device
                 .push(DeviceEffect::named(effect.id, &values, parameter).unwrap())
                 .unwrap();
 
             // Two samples, a second apart, at two temperatures.
-            let mut vector = |size: f64| Vector3::from_fn(|_, _| size * random(seed));
+            let mut vector = |size: f64| Vector3::from_fn(|_, _| size * random());
             let samples = [(); 2].map(|()| Sample {
                 gyro: vector(4.0),
                 accel: vector(20.0),
             });
-            let temp_c = [(); 2].map(|()| 25.0 + 20.0 * random(seed));
-            let [first_s, step_s] = [50.0, 20.0].map(|s| s * (1.5 + random(seed)));
+            let temp_c = [(); 2].map(|()| 25.0 + 20.0 * random());
+            let [first_s, step_s] = [50.0, 20.0].map(|s| s * (1.5 + random()));
             let mut state = State::new(1.0);
             device.slow(&mut state, first_s, temp_c[0]);
             device.slow(&mut state, step_s, temp_c[1]);

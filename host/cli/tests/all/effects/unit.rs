@@ -4,13 +4,15 @@ use mimu::effects;
 use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::effects::fitted::FittedEffect;
 use mimu::effects::readout::TYPICAL;
-use mimu::fit::{Fit, Method, Options, fit};
+use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::Recording;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write as _;
 use std::path::Path;
+
+use crate::random::congruential;
 
 pub const DWELLS: usize = 72;
 pub const RATE_HZ: f64 = 50.0;
@@ -93,17 +95,9 @@ pub fn write_recording(folder: &Path, flawed: bool, converted: bool, temp: bool)
     out.push_str("gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,");
     out.push_str("ref_rate_x_dps,ref_rate_y_dps,ref_rate_z_dps,");
     out.push_str("ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2\n");
-    let mut seed = 7 + u64::from(flawed);
+    let mut uniform = congruential(7 + u64::from(flawed));
     // Sum of twelve uniform numbers: approximately normal.
-    let mut normal = move || {
-        let mut next = || {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64
-        };
-        (0..12).map(|_| next()).sum::<f64>() - 6.0
-    };
+    let mut normal = move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
     let rows = (DWELL_S * RATE_HZ) as usize;
     for k in 0..DWELLS * rows {
         let (t, step) = (k as f64 / RATE_HZ, k / rows);
@@ -151,12 +145,7 @@ pub fn prepared(folder: &Path) -> Prepared {
 }
 
 pub fn fitted(folder: &Path) -> Fit {
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-    };
-    fit(prepared(folder), options).unwrap()
+    fit(prepared(folder), Options::IN_SAMPLE).unwrap()
 }
 
 /// With an uncertainty of 1 %.

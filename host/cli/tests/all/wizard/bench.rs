@@ -23,7 +23,7 @@ pub fn in_repository(path: &str) -> PathBuf {
         .join(path)
 }
 
-fn image() -> Image {
+pub fn image() -> Image {
     let path = release_image();
     let path = match path.is_absolute() {
         true => path,

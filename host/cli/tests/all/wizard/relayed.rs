@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use mimu_cli::called::{Session, wizard};
-use mimu_wizard::event::{Event, Question, Standing, View, Wish};
+use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
 use mimu_wizard::relay::{Arrival, Stamped};
 use mimu_wizard::session::Outcome;
 use mimu_wizard::turn::go_on;
@@ -15,7 +15,7 @@ use super::text::{judge, lines};
 /// Relays events, and ends the session on request.
 struct Told {
     events: Sender<String>,
-    wishes: Receiver<Wish>,
+    requests: Receiver<UserRequest>,
 }
 
 impl View for Told {
@@ -23,10 +23,10 @@ impl View for Told {
         let _ = self.events.send(serde_json::to_string(event).unwrap());
     }
 
-    fn show(&mut self, _: &Standing) {}
+    fn show(&mut self, _: &SessionState) {}
 
-    fn wish(&mut self) -> Option<Wish> {
-        self.wishes.try_recv().ok()
+    fn request(&mut self) -> Option<UserRequest> {
+        self.requests.try_recv().ok()
     }
 
     fn ask(&mut self, question: &Question) -> Option<bool> {
@@ -39,16 +39,16 @@ struct Relay {
     session: Session,
     arrivals: Sender<Stamped>,
     events: Receiver<String>,
-    wishes: Sender<Wish>,
+    requests: Sender<UserRequest>,
 }
 
 fn begin(folder: &Path) -> Relay {
     let (arrivals, heard) = channel();
     let (tell, events) = channel();
-    let (wishes, wished) = channel();
+    let (requests, wished) = channel();
     let view = Told {
         events: tell,
-        wishes: wished,
+        requests: wished,
     };
     let folder = folder.display();
     let arguments = format!(
@@ -60,7 +60,7 @@ fn begin(folder: &Path) -> Relay {
         session,
         arrivals,
         events,
-        wishes,
+        requests,
     }
 }
 
@@ -124,7 +124,7 @@ fn a_session_that_is_relayed_is_unplugged_stopped_and_gone_on_with_and_its_inter
     at += 100;
     relay.send(0.01 * at as f64, Arrival::Opened);
     assert!(relay.hear(&lines, &mut at, 3).is_none());
-    relay.wishes.send(Wish::Cancel).unwrap();
+    relay.requests.send(UserRequest::Cancel).unwrap();
     let (outcome, refused) = relay.go_on().unwrap();
     assert!(outcome.unwrap().cancelled && refused.is_none());
     drop(relay);

@@ -17,7 +17,7 @@ const ENTERED: &str = "\x1b[?1049h";
 const LEFT: &str = "\x1b[?1049l";
 
 /// The wizard on a separate terminal.
-struct Sitting {
+struct WizardSession {
     keys: File,
     other: File,
     before: Termios,
@@ -26,7 +26,7 @@ struct Sitting {
     child: Child,
 }
 
-impl Sitting {
+impl WizardSession {
     fn begin(size: [u16; 2], arguments: &[&str]) -> Self {
         let side = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
         grantpt(&side).unwrap();
@@ -99,7 +99,7 @@ impl Sitting {
     }
 }
 
-fn sitting(size: [u16; 2], more: &[&str]) -> (Sitting, Playback, tempfile::TempDir) {
+fn session(size: [u16; 2], more: &[&str]) -> (WizardSession, Playback, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let playback = Playback::begin(lines(), 4000.0);
     let out = folder.path().join("out").display().to_string();
@@ -111,14 +111,14 @@ fn sitting(size: [u16; 2], more: &[&str]) -> (Sitting, Playback, tempfile::TempD
         playback.path(),
     ]);
     arguments.extend(more);
-    let sitting = Sitting::begin(size, &arguments);
-    (sitting, playback, folder)
+    let session = WizardSession::begin(size, &arguments);
+    (session, playback, folder)
 }
 
 #[test]
 fn the_terminal_is_given_back_after_the_end_by_a_key_and_by_control_c() {
     for key in [b"q", b"\x03"] {
-        let (mut at, _playback, _folder) = sitting([100, 30], &[]);
+        let (mut at, _playback, _folder) = session([100, 30], &[]);
         at.until("accel");
         at.keys.write_all(key).unwrap();
         let (seen, same, code) = at.end();
@@ -148,7 +148,7 @@ fn the_terminal_is_given_back_before_an_error_is_told() {
         "--port",
         "/nowhere",
     ];
-    let (seen, same, code) = Sitting::begin([80, 24], &arguments).end();
+    let (seen, same, code) = WizardSession::begin([80, 24], &arguments).end();
     let left = seen.rfind(LEFT).unwrap();
     assert!(seen.contains(ENTERED) && same, "{seen:?}");
     assert!(seen[left..].contains("the port does not exist"), "{seen:?}");
@@ -158,7 +158,7 @@ fn the_terminal_is_given_back_before_an_error_is_told() {
 #[test]
 fn a_small_terminal_and_plain_get_lines_of_text() {
     for (size, more) in [([79, 24], &[][..]), ([100, 30], &["--plain"][..])] {
-        let (mut at, _playback, _folder) = sitting(size, more);
+        let (mut at, _playback, _folder) = session(size, more);
         at.until("calibration: 14 dwells are planned");
         at.keys.write_all(b"quit\n").unwrap();
         let (seen, same, code) = at.end();

@@ -52,7 +52,7 @@ impl Scripted {
 }
 
 impl Driver for Scripted {
-    fn held(&mut self) -> Result<Option<String>> {
+    fn interlock(&mut self) -> Result<Option<String>> {
         Ok((*self.open.lock().unwrap()).then(|| "the interlock is open".into()))
     }
 

@@ -24,9 +24,9 @@ fn carried_out(procedure: &Procedure, busy_s: f64) -> (Vec<(f64, Order)>, Vec<f6
             arrived: now_s >= done_s,
             chamber_c: None,
         };
-        let does = sequence.look(&seen);
-        marks.extend((0..does.marks).map(|_| now_s));
-        for order in does.orders {
+        let actions = sequence.look(&seen);
+        marks.extend((0..actions.marks).map(|_| now_s));
+        for order in actions.orders {
             if !matches!(order, Order::Set(_)) {
                 done_s = now_s + busy_s;
             }
@@ -133,17 +133,17 @@ fn the_plan_begins_when_the_chamber_is_at_its_first_temperature_and_goes_on_whil
         arrived: true,
         chamber_c: Some(5.0),
     };
-    let does = sequence.look(&seen);
-    assert_eq!(does.orders[0], Order::Set(20.0));
+    let actions = sequence.look(&seen);
+    assert_eq!(actions.orders[0], Order::Set(20.0));
     seen.now_s = 50.0;
-    assert_eq!(sequence.look(&seen), Does::default());
+    assert_eq!(sequence.look(&seen), Actions::default());
     seen.chamber_c = Some(19.5);
     sequence.look(&seen);
     seen.now_s = 60.0;
     sequence.look(&seen);
     assert_eq!(sequence.running(), Some(0));
     (seen.now_s, seen.line_lost) = (700.0, true);
-    let does = sequence.look(&seen);
-    assert_eq!((does.marks, sequence.running()), (0, Some(0)));
-    assert_eq!(does.orders, [Order::Set(120.0)]);
+    let actions = sequence.look(&seen);
+    assert_eq!((actions.marks, sequence.running()), (0, Some(0)));
+    assert_eq!(actions.orders, [Order::Set(120.0)]);
 }

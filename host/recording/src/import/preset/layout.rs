@@ -16,7 +16,7 @@ pub struct Preset {
     /// Files that a folder may contain, the best set first; the faster sensor first in each.
     pub(super) in_folder: &'static [&'static [&'static str]],
     /// Why its files cannot be joined, and the remedy, if they have no time in common.
-    pub(super) apart: Option<[&'static str; 2]>,
+    pub(super) not_joinable: Option<[&'static str; 2]>,
     /// A file beside the readings that decides between two presets with the same headers.
     pub(super) beside: Option<Beside>,
 }
@@ -34,7 +34,7 @@ pub(super) struct Layout {
     /// Words after which a line above the data has the sample rate in Hz. The line is required.
     pub rate_after: Option<&'static str>,
     /// Why such a file is refused, and the remedy.
-    pub unfit: Option<[&'static str; 2]>,
+    pub refusal: Option<[&'static str; 2]>,
 }
 
 impl Layout {
@@ -46,7 +46,7 @@ impl Layout {
             optional: "",
             scales: &[],
             rate_after: None,
-            unfit: None,
+            refusal: None,
         }
     }
 }
@@ -77,5 +77,5 @@ pub(super) struct Beside {
     /// Columns and values.
     pub values: &'static [(&'static str, &'static str)],
     /// Whether the recording belongs to this preset if one of the values occurs, or (`false`) if none does.
-    pub one_is_there: bool,
+    pub belongs_if_present: bool,
 }

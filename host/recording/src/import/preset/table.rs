@@ -18,7 +18,7 @@ const LOGGED_ACCEL: &str = "t_s=time,accel_x=x,accel_y=y,accel_z=z";
 /// A file of Sensor Logger with an acceleration that is not a reading of a sensor.
 const fn without_gravity(file: &'static str) -> Layout {
     Layout {
-        unfit: Some([
+        refusal: Some([
             "it contains the acceleration without gravity, or gravity alone: estimates of the phone, not readings of a sensor",
             "record AccelerometerUncalibrated.csv or TotalAcceleration.csv, and import that file",
         ]),
@@ -61,7 +61,7 @@ pub(super) const PRESETS: [Preset; 7] = [
             )
         }],
         in_folder: &[&["data.csv"], &["imu0/data.csv"], &["mav0/imu0/data.csv"]],
-        apart: None,
+        not_joinable: None,
         beside: None,
     },
     // github.com/tszheichoi/awesome-sensor-logger at b10f5c5: README.md (Metadata.csv), UNITS.md, COORDINATES.md, CROSSPLATFORM.md. The columns are
@@ -80,11 +80,11 @@ pub(super) const PRESETS: [Preset; 7] = [
             without_gravity("Gravity.csv"),
         ],
         in_folder: &LOGGED_FOLDER,
-        apart: None,
+        not_joinable: None,
         beside: Some(Beside {
             file: "Metadata.csv",
             values: &AS_ANDROID,
-            one_is_there: true,
+            belongs_if_present: true,
         }),
     },
     // The same sources. On iOS, uncalibrated acceleration is in g (of 9.80665 m/s²) with the opposite sign on all three axes: a phone on its back
@@ -104,11 +104,11 @@ pub(super) const PRESETS: [Preset; 7] = [
             without_gravity("Gravity.csv"),
         ],
         in_folder: &LOGGED_FOLDER,
-        apart: None,
+        not_joinable: None,
         beside: Some(Beside {
             file: "Metadata.csv",
             values: &AS_ANDROID,
-            one_is_there: false,
+            belongs_if_present: false,
         }),
     },
     // github.com/phyphox/phyphox-experiments at 972923d: <export> of accelerometer, gyroscope and linear_accelerometer; files and separators by
@@ -133,7 +133,7 @@ pub(super) const PRESETS: [Preset; 7] = [
                 "t_s=Time (s),gyro_x=Gyroscope x (rad/s),gyro_y=Gyroscope y (rad/s),gyro_z=Gyroscope z (rad/s)",
             ),
             Layout {
-                unfit: Some([
+                refusal: Some([
                     "it contains the acceleration without gravity, which is not a reading of a sensor",
                     "record the experiment \"Acceleration (with g)\"",
                 ]),
@@ -147,7 +147,7 @@ pub(super) const PRESETS: [Preset; 7] = [
             &["Raw Data.csv"],
             &["Accelerometer.csv"],
         ],
-        apart: None,
+        not_joinable: None,
         beside: None,
     },
     // Text exports of MT Manager: lines with // above the names, one of which has the rate. Units by the MTw user manual (table of exported data):
@@ -169,7 +169,7 @@ pub(super) const PRESETS: [Preset; 7] = [
             },
         ],
         in_folder: &[],
-        apart: None,
+        not_joinable: None,
         beside: None,
     },
     // github.com/Kyle-ak/imu_tk at 7780270: bin/test_data and importAsciiData in src/io_utils.cpp. Either raw counts or SI.
@@ -188,7 +188,7 @@ pub(super) const PRESETS: [Preset; 7] = [
             },
         ],
         in_folder: &[],
-        apart: None,
+        not_joinable: None,
         beside: None,
     },
     // github.com/IntelRealSense/librealsense at 0f85e5c: np.savetxt in tools/rs-imu-calibration/rs-imu-calibration.py, and frame.get_timestamp, in
@@ -211,7 +211,7 @@ pub(super) const PRESETS: [Preset; 7] = [
             },
         ],
         in_folder: &[],
-        apart: Some([
+        not_joinable: Some([
             "rs-imu-calibration.py keeps the gyro's readings of the last of the six directions only, so a joined file has only that direction",
             "import each file separately",
         ]),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::rotation::{Correction, Rotation, from_euler, orientation, product};
+use super::super::rotation::{Correction, Rotation, from_euler, listed, orientation, product};
 
 /// Number of sensors of each kind whose calibration PX4 stores.
 const MOST_SENSORS: usize = 4;
@@ -226,10 +226,6 @@ fn correction(
         },
         name,
     ))
-}
-
-fn listed(three: [f64; 3]) -> String {
-    three.map(|value| format!("{value:.6}")).join(" ")
 }
 
 /// From the axes of the board to those of the vehicle.

@@ -2,17 +2,6 @@
 
 use super::*;
 
-const BOTH: &str = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
-
-/// Rows at 100 Hz; `readings` gives the six cells of each.
-fn log(rows: usize, readings: impl Fn(usize) -> [i32; 6]) -> String {
-    let row = |i: usize| {
-        let cells = readings(i).map(|cell| cell.to_string()).join(" ");
-        format!("{} {cells}\n", 10 * i)
-    };
-    (0..rows).map(row).collect()
-}
-
 /// Readings of a sensor at rest, with noise of up to two counts.
 fn at_rest(i: usize) -> [i32; 6] {
     let noise = |k: usize| (7 * i + 13 * k * i) as i32 % 5 - 2;
@@ -24,10 +13,6 @@ fn at_rest(i: usize) -> [i32; 6] {
         noise(5),
         4096 + noise(6),
     ]
-}
-
-fn warned(summary: &ImportSummary, words: &str) -> bool {
-    summary.warnings.iter().any(|w| w.contains(words))
 }
 
 #[test]

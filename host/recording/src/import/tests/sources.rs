@@ -2,8 +2,6 @@
 
 use super::*;
 
-const BOTH: &str = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
-
 /// Uniform from -1 to 1, by row and channel.
 fn noise(i: usize, c: usize) -> f64 {
     let mut state = (i * 6 + c + 1) as u64;
@@ -13,21 +11,9 @@ fn noise(i: usize, c: usize) -> f64 {
     (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
 }
 
-fn log(rows: usize, reading: impl Fn(usize) -> [f64; 6]) -> String {
-    let row = |i: usize| {
-        let cells = reading(i).map(|cell| format!("{cell:.5}")).join(" ");
-        format!("{} {cells}\n", 10 * i)
-    };
-    (0..rows).map(row).collect()
-}
-
 fn at_rest(i: usize) -> [f64; 6] {
     let n = |c: usize| 0.02 * noise(i, c);
     [n(0), n(1), n(2), 0.3 + n(3), n(4), 9.8 + n(5)]
-}
-
-fn warned(summary: &ImportSummary, words: &str) -> bool {
-    summary.warnings.iter().any(|w| w.contains(words))
 }
 
 #[test]

@@ -104,10 +104,11 @@ impl Times {
             });
         }
         let problem = |irregular| refused(path, irregular);
-        let step = Regular::step(&stamps.since_first).ok_or_else(|| problem(Irregular::Short))?;
+        let interval =
+            Regular::interval(&stamps.since_first).ok_or_else(|| problem(Irregular::Short))?;
         let seen = Seen {
             first: stamps.first.value,
-            step,
+            interval,
             lasts: stamps.since_first.last().copied().unwrap_or_default(),
             rate_hz: known.rate_hz,
             name: known.name,
@@ -215,7 +216,7 @@ fn either(path: &Path, seen: &Seen<'_>, both: [Decimal; 2]) -> Error {
         let per_second = unit.per_second() as f64;
         format!(
             "{unit} ({} Hz for {} s)",
-            three_digits(per_second / seen.step),
+            three_digits(per_second / seen.interval),
             three_digits(seen.lasts / per_second)
         )
     };

@@ -19,7 +19,7 @@ const SINGLE: f64 = 0.2;
 /// Low quantile of the intervals, which is one period if a fifth of the intervals are that short.
 const LOW: f64 = 0.05;
 /// Number of values from which a quantile over a long file is computed.
-const SAMPLED: usize = 20_000;
+pub(super) const SAMPLED: usize = 20_000;
 
 /// Samples closer to each other than this, in s, were fetched from a buffer.
 const FETCHED_S: f64 = 1e-3;

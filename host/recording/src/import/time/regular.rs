@@ -8,7 +8,7 @@
 //! have exact stamps, which must stay as they are.
 
 use super::gap::{Gap, Jitter, STALL_S, quantile};
-use super::grid::{self, Steps};
+use super::grid::{self, SAMPLED, Steps};
 use super::polled::{self, Rounds};
 
 /// An interval longer than this many periods may hide missing samples.
@@ -38,10 +38,8 @@ const WANDER: f64 = 1e-3;
 /// Iterations of rate and gaps; each needs the other.
 const ROUNDS: usize = 6;
 /// Rows of a segment by which the unit of the stamps is recognised.
-const STRETCH: usize = 64;
-/// Number of values from which a quantile over a long file is computed.
-const SAMPLED: usize = 20_000;
-/// The same for a window.
+const SEGMENT: usize = 64;
+/// Number of values from which a quantile over a window is computed.
 const MOST: usize = 512;
 
 /// Regular times of the rows of a file.
@@ -157,12 +155,12 @@ impl Regular {
     /// Each false gap raises the rate, and so confirms itself: from a period that was 800 ppm off, bursts of 20 samples at 100 Hz converged to 5
     /// gaps. The line through all stamps, as if nothing were missing, is therefore a second start; the result with the smaller jitter is used.
     fn by_count(stamps: &[f64], period_s: f64, hidden: f64) -> Regular {
-        let found = Self::settle(stamps, period_s, hidden);
+        let found = Self::iterate_rate_and_gaps(stamps, period_s, hidden);
         if found.gaps.is_empty() {
             return found;
         }
         let (_, whole_s) = line(stamps, &numbers(stamps.len(), &[]), period_s);
-        let other = Self::settle(stamps, whole_s, hidden);
+        let other = Self::iterate_rate_and_gaps(stamps, whole_s, hidden);
         match other.jitter.rms_s < found.jitter.rms_s {
             true => other,
             false => found,
@@ -170,7 +168,7 @@ impl Regular {
     }
 
     /// Iterates rate and gaps, each from the other, starting with `period_s`.
-    fn settle(stamps: &[f64], mut period_s: f64, hidden: f64) -> Regular {
+    fn iterate_rate_and_gaps(stamps: &[f64], mut period_s: f64, hidden: f64) -> Regular {
         let mut gaps = Vec::new();
         let mut start_s = stamps[0];
         for _ in 0..ROUNDS {
@@ -239,9 +237,9 @@ impl Regular {
 
     /// The usual time from row to row, in the unit of the stamps: the median of the means over segments that contain a hand-over or two. Intervals
     /// between samples that are fetched together do not show the rate.
-    pub fn step(stamps: &[f64]) -> Option<f64> {
+    pub fn interval(stamps: &[f64]) -> Option<f64> {
         let shortest = first_period(stamps)?;
-        let rows = STRETCH.min(stamps.len() - 1);
+        let rows = SEGMENT.min(stamps.len() - 1);
         let ends = (rows..stamps.len()).step_by(rows);
         let mut means: Vec<f64> = ends
             .map(|row| (stamps[row] - stamps[row - rows]) / rows as f64)

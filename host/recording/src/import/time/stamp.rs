@@ -214,7 +214,7 @@ pub(in super::super) struct Seen<'a> {
     /// The first of them.
     pub first: f64,
     /// Usual time from row to row.
-    pub step: f64,
+    pub interval: f64,
     /// Time from the first to the last.
     pub lasts: f64,
     /// Given rate, Hz.
@@ -236,7 +236,7 @@ impl Unit {
     /// An epoch decides by its magnitude, else a known rate, else the unit that makes the rate plausible. Two units differ by a factor of 1000, so a
     /// log of 2 Hz in microseconds looks like one of 2 kHz in nanoseconds. Then the name of the column may decide.
     pub fn recognise(seen: &Seen<'_>) -> Result<Decimal, [Decimal; 2]> {
-        let rate = |unit: &Decimal| unit.per_second() as f64 / seen.step;
+        let rate = |unit: &Decimal| unit.per_second() as f64 / seen.interval;
         let epoch = |unit: &Decimal| {
             EPOCH_S.contains(&(seen.first / unit.per_second() as f64)) && rate(unit) > SLOWEST_HZ
         };
@@ -262,7 +262,7 @@ impl Unit {
                 let named = named.filter(|unit| all.contains(unit));
                 named.ok_or([fine, coarse])
             }
-            _ => Ok(match seen.step {
+            _ => Ok(match seen.interval {
                 ..1.0 => Decimal::Second,
                 1.0..200.0 => Decimal::Millisecond,
                 200.0..2e5 => Decimal::Microsecond,
@@ -304,19 +304,19 @@ mod tests {
         assert_eq!(stamp("1.5e3").since(1000), 500.0);
     }
 
-    fn seen(first: f64, step: f64) -> Seen<'static> {
+    fn seen(first: f64, interval: f64) -> Seen<'static> {
         Seen {
             first,
-            step,
-            lasts: 2000.0 * step,
+            interval,
+            lasts: 2000.0 * interval,
             ..Seen::default()
         }
     }
 
     #[test]
-    fn units_are_recognised_by_an_epoch_the_rate_or_the_step() {
+    fn units_are_recognised_by_an_epoch_the_rate_or_the_interval() {
         use Decimal::*;
-        for (first, step, rate_hz, unit) in [
+        for (first, interval, rate_hz, unit) in [
             (1.7e9, 0.005, None, Second),
             (1.7e12, 5.0, None, Millisecond),
             (1.7e12, 1.0, None, Millisecond),
@@ -338,9 +338,9 @@ mod tests {
         ] {
             let seen = Seen {
                 rate_hz,
-                ..seen(first, step)
+                ..seen(first, interval)
             };
-            assert_eq!(Unit::recognise(&seen), Ok(unit), "{first} {step}");
+            assert_eq!(Unit::recognise(&seen), Ok(unit), "{first} {interval}");
         }
         assert_eq!(Unit::of_factor(0.001), Unit::Decimal(Millisecond));
         assert_eq!(Unit::of_factor(3.05e-5), Unit::Other(3.05e-5));
@@ -349,7 +349,7 @@ mod tests {
     #[test]
     fn two_units_remain_where_both_make_a_plausible_rate_unless_the_column_or_a_week_says_which() {
         use Decimal::*;
-        for (step, both) in [
+        for (interval, both) in [
             (1.0, [Millisecond, Second]),
             (0.5, [Millisecond, Second]),
             (500.0, [Microsecond, Millisecond]),
@@ -357,22 +357,26 @@ mod tests {
             (5e5, [Nanosecond, Microsecond]),
             (1e6, [Nanosecond, Microsecond]),
         ] {
-            assert_eq!(Unit::recognise(&seen(97.0, step)), Err(both), "{step}");
+            assert_eq!(
+                Unit::recognise(&seen(97.0, interval)),
+                Err(both),
+                "{interval}"
+            );
             for (name, unit) in [("timestamp_us", Microsecond), ("Time [ms]", Millisecond)] {
                 let named = Seen {
                     name: Some(name),
-                    ..seen(97.0, step)
+                    ..seen(97.0, interval)
                 };
                 let known = both.contains(&unit);
                 let expected = if known { Ok(unit) } else { Err(both) };
-                assert_eq!(Unit::recognise(&named), expected, "{step} {name}");
+                assert_eq!(Unit::recognise(&named), expected, "{interval} {name}");
             }
             let long = Seen {
-                lasts: 1e6 * step,
-                ..seen(97.0, step)
+                lasts: 1e6 * interval,
+                ..seen(97.0, interval)
             };
-            let weeks = 1e6 * step / both[1].per_second() as f64 > LONGEST_S;
-            assert_eq!(Unit::recognise(&long).is_ok(), weeks, "{step}");
+            let weeks = 1e6 * interval / both[1].per_second() as f64 > LONGEST_S;
+            assert_eq!(Unit::recognise(&long).is_ok(), weeks, "{interval}");
         }
     }
 }

@@ -4,19 +4,16 @@ use std::ops::Range;
 
 use maud::{Markup, html};
 
-use crate::report::svg::{Frame, power_of_ten, px, range, times_ten};
+use crate::report::svg::{self, Frame, power_of_ten, range, times_ten};
 use mimu::diagnose::picture::{Against, Panel, Picture, Quantile, ResidualKind, Track};
 use mimu::observable::Observable;
 use mimu::quantity::Figure;
 use mimu::quantity::Sensor;
 
-/// Width and height of a figure, pixels.
-const SIZE: (f64, f64) = (560.0, 232.0);
-/// Space for the numbers and the name of the ordinate.
-const LEFT: f64 = 62.0;
-const RIGHT: f64 = 8.0;
-const TOP: f64 = 26.0;
-const BOTTOM: f64 = 40.0;
+const FIGURE: svg::Panel = svg::Panel {
+    room: [62.0, 8.0, 26.0, 40.0],
+    ..svg::Panel::ONE
+};
 /// Space between two drawings with a common ordinate.
 const GAP: f64 = 18.0;
 const MINUTE_S: f64 = 60.0;
@@ -30,14 +27,13 @@ pub fn unit(kind: ResidualKind, sensor: Sensor) -> (f64, &'static str) {
 }
 
 fn frames<const N: usize>(x: &Range<f64>, y: &Range<f64>) -> [Frame; N] {
-    let width = (SIZE.0 - LEFT - RIGHT - GAP * (N - 1) as f64) / N as f64;
+    let all = FIGURE.frame(x.clone(), y.clone());
+    let width = (all.across.end - all.across.start - GAP * (N - 1) as f64) / N as f64;
     std::array::from_fn(|i| {
-        let left = LEFT + i as f64 * (width + GAP);
+        let left = all.across.start + i as f64 * (width + GAP);
         Frame {
             across: left..left + width,
-            down: TOP..SIZE.1 - BOTTOM,
-            x: x.clone(),
-            y: y.clone(),
+            ..all.clone()
         }
     })
 }
@@ -47,10 +43,7 @@ const MANY: usize = 60;
 
 /// `rows` is the number of marks.
 fn drawing(label: &str, rows: usize, inside: &Markup) -> Markup {
-    html! {
-        svg class=[(rows > MANY).then_some("many")] role="img" aria-label=(label) viewBox={ "0 0 " (px(SIZE.0)) " " (px(SIZE.1)) }
-            xmlns="http://www.w3.org/2000/svg" { (inside) }
-    }
+    FIGURE.drawing(label, (rows > MANY).then_some("many"), inside)
 }
 
 /// Ordinate of a drawing in the shown unit, with a power of ten.

@@ -9,8 +9,8 @@ use mimu_core::wire::BatchHead;
 use nalgebra::{RealField, Vector3};
 
 use super::Checked;
-use crate::heard::Samples;
 use crate::image::Image;
+use crate::received::Samples;
 use mimu::calibration::{Calibration, compensator};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};

@@ -41,7 +41,7 @@ pub const COMMANDS: [(&str, &str); 25] = [
 
 /// State of the bench beside the board and its port.
 #[derive(Debug)]
-pub(super) struct Desk {
+pub(super) struct BenchState {
     seed: u64,
     /// The interlock is closed: motions are allowed.
     interlock: bool,
@@ -51,7 +51,7 @@ pub(super) struct Desk {
     torn: u64,
 }
 
-impl Desk {
+impl BenchState {
     pub(super) fn new(seed: u64) -> Self {
         Self {
             seed,
@@ -184,13 +184,13 @@ impl Served {
         match line.name.as_str() {
             "*IDN?" => return self.identity(),
             "TIME?" => {
-                let ns = self.board.standing().ns;
+                let ns = self.board.state().ns;
                 return Ok(format!("{}.{:09}", ns / 1_000_000_000, ns % 1_000_000_000));
             }
             "PORT?" => return Ok(self.path().display().to_string()),
             "TRAFFIC?" => return Ok(self.traffic.to_string()),
-            "INTERLOCK?" => return bit(self.desk.interlock),
-            "POWER?" => return bit(!self.desk.is_off()),
+            "INTERLOCK?" => return bit(self.bench.interlock),
+            "POWER?" => return bit(!self.bench.is_off()),
             "LINK?" => return bit(self.port.is_plugged()),
             "BUSY?" => return bit(self.at_front(|front, ns| front.busy(ns))?),
             "CHAMBER?" => {
@@ -208,8 +208,8 @@ impl Served {
                 return Ok(written(&motion));
             }
             "INTERLOCK" => {
-                self.desk.interlock = line.switch()?;
-                if !self.desk.interlock {
+                self.bench.interlock = line.switch()?;
+                if !self.bench.interlock {
                     // Like an opened door, this stops a table; a plan continues.
                     let stop = |front: &mut Front, ns| front.command(ns, Command::Stop);
                     let _ = self.board.front(stop)?;
@@ -240,7 +240,7 @@ impl Served {
                 false => self.switch_off()?,
             },
             "RESET" => {
-                if self.desk.is_off() {
+                if self.bench.is_off() {
                     return refused("`RESET`: the supply is off; send `POWER ON`");
                 }
                 self.tearing(|board, seed| board.reset_by_pin(seed))?;
@@ -248,7 +248,7 @@ impl Served {
             "GARBLE" => {
                 let per_million = line.count(MILLION)?;
                 self.board.garble(per_million)?;
-                self.board.seed_line(self.desk.seed)?;
+                self.board.seed_line(self.bench.seed)?;
                 self.interference.garble(per_million);
             }
             "BURST" => self.interference.burst(u64::from(line.count(u32::MAX)?)),
@@ -272,7 +272,7 @@ impl Served {
             Some(CarriedBy::Hands) => "hands",
             None => "none",
         };
-        Ok(format!("mimu-bench,{carrier},{},1", self.desk.seed))
+        Ok(format!("mimu-bench,{carrier},{},1", self.bench.seed))
     }
 
     /// Calls a function of the front end that may refuse.
@@ -284,7 +284,7 @@ impl Served {
     }
 
     fn moved(&mut self, command: Command) -> Result<String, Problem> {
-        if !self.desk.interlock {
+        if !self.bench.interlock {
             return refused("the interlock is open; close it with `INTERLOCK 1`");
         }
         self.at_front(move |front, ns| front.command(ns, command))?;
@@ -319,8 +319,8 @@ impl Served {
         &mut self,
         tear: impl FnOnce(&mut Board, u64) -> Result<(), String>,
     ) -> Result<(), String> {
-        self.desk.torn += 1;
-        let seed = self.desk.seed.wrapping_mul(1000) + self.desk.torn;
+        self.bench.torn += 1;
+        let seed = self.bench.seed.wrapping_mul(1000) + self.bench.torn;
         self.keep()?;
         let spans: Vec<(u64, u64)> = self
             .board
@@ -333,15 +333,15 @@ impl Served {
     }
 
     fn switch_off(&mut self) -> Result<(), String> {
-        if !self.desk.is_off() {
+        if !self.bench.is_off() {
             self.tearing(Board::cut_supply)?;
-            self.desk.off_ns = Some(self.board.standing().ns);
+            self.bench.off_ns = Some(self.board.state().ns);
         }
         Ok(())
     }
 
     fn switch_on(&mut self) -> Result<(), String> {
-        if let Some(off_ns) = self.desk.off_ns.take() {
+        if let Some(off_ns) = self.bench.off_ns.take() {
             // The part must notice that it was off.
             self.board.run_to(off_ns + SLICE_NS)?;
             self.board.restore_supply()?;

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::binary::{refuse_binary, without_zeros};
 use super::log::is_log;
 use super::parquet_table;
+use super::text_table::without_comment_sign;
 use crate::cell;
 use crate::csv_file::BOM;
 use crate::error::{Error, Result};
@@ -20,7 +21,7 @@ const ROWS: usize = 200;
 
 /// The beginning of a foreign file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Look {
+pub struct Preview {
     /// Whether it is a log, whose columns are fixed; the other fields are then empty.
     pub log: bool,
     /// Names of the columns; empty if no line has them.
@@ -33,17 +34,17 @@ pub struct Look {
 ///
 /// # Errors
 /// The file cannot be read, is of another kind, or none of its lines contains numbers.
-pub fn look(path: &Path, separator: Option<Separator>) -> Result<Look> {
+pub fn preview(path: &Path, separator: Option<Separator>) -> Result<Preview> {
     let ending = path.extension().unwrap_or_default();
     if is_log(path) {
-        return Ok(Look {
+        return Ok(Preview {
             log: true,
-            ..Look::default()
+            ..Preview::default()
         });
     }
     if ending.eq_ignore_ascii_case("parquet") {
         let (names, rows) = parquet_table::first_rows(path, ROWS)?;
-        return Ok(Look {
+        return Ok(Preview {
             log: false,
             names,
             rows,
@@ -68,14 +69,7 @@ pub fn look(path: &Path, separator: Option<Separator>) -> Result<Look> {
     })
 }
 
-fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Look> {
-    // Names may follow the sign of a comment.
-    let plain = |line: &[u8]| {
-        let from = line
-            .iter()
-            .position(|b| !matches!(b, b'#' | b'%' | b' ' | b'\t'));
-        line[from.unwrap_or(line.len())..].to_vec()
-    };
+fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Preview> {
     let comment = |line: &[u8]| matches!(line.trim_ascii().first(), Some(b'#' | b'%'));
     let shown: Vec<&[u8]> = lines
         .iter()
@@ -103,10 +97,13 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Look> {
     };
     let first = lines.iter().position(is_row)?;
     let width = cells(lines[first]).len();
-    let above = lines[..first].iter().rev().map(|line| cells(&plain(line)));
+    let above = lines[..first]
+        .iter()
+        .rev()
+        .map(|line| cells(without_comment_sign(line)));
     let mut headers = above.filter(|row| row.len() == width && numbers(row) == 0);
     let rows = lines[first..].iter().filter(|line| is_row(line));
-    Some(Look {
+    Some(Preview {
         log: false,
         names: headers.next().unwrap_or_default(),
         rows: rows.take(ROWS).map(|line| cells(line)).collect(),
@@ -117,16 +114,16 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Look> {
 mod tests {
     use super::*;
 
-    fn of(text: &str) -> Look {
+    fn of(text: &str) -> Preview {
         let lines: Vec<&[u8]> = text.lines().map(str::as_bytes).collect();
         of_lines(&lines, None).unwrap()
     }
 
     #[test]
     fn names_stand_in_the_last_line_of_words_above_the_first_row() {
-        let look = of("log of today\nt;wx;ax\n0,01;2;3\n0,02;4;5\n");
-        assert_eq!(look.names, ["t", "wx", "ax"]);
-        assert_eq!(look.rows, [["0,01", "2", "3"], ["0,02", "4", "5"]]);
+        let preview = of("log of today\nt;wx;ax\n0,01;2;3\n0,02;4;5\n");
+        assert_eq!(preview.names, ["t", "wx", "ax"]);
+        assert_eq!(preview.rows, [["0,01", "2", "3"], ["0,02", "4", "5"]]);
         assert_eq!(of("# t wx ax\n0 1 2\n1 1 2\n").names, ["t", "wx", "ax"]);
         assert!(of("1\t2\n3\t4\n").names.is_empty());
     }
@@ -136,7 +133,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("letter.txt");
         std::fs::write(&path, "Dear Sir,\nyours, faithfully\n").unwrap();
-        let line = look(&path, None).unwrap_err().to_string();
+        let line = preview(&path, None).unwrap_err().to_string();
         assert!(
             line.contains("letter.txt: none of its lines is a row of numbers"),
             "{line}"

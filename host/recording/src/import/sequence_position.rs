@@ -1,13 +1,13 @@
-//! Place of a file in a sequence: the step of its rows, and their times among those of the other files.
+//! Position of a file in a sequence: the step of its rows, and their times among those of the other files.
 
 use super::row::Row;
 
 /// Time in s from one file to the next if it is unknown. No turn is integrated across such a gap.
 pub(super) const PAUSE_S: f64 = 10.0;
 
-/// Place of a file in a sequence.
+/// Position of a file in a sequence.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct SequencePosition {
     step: i32,
     /// Delay of its times relative to those of the first file, s.
     behind_s: f64,
@@ -18,7 +18,7 @@ pub(super) struct Place {
     last_s: f64,
 }
 
-impl Place {
+impl SequencePosition {
     /// For the file of `step`, which by its stamps began `behind_s` after the first; the last row before it is at `after_s`.
     pub fn new(step: i32, behind_s: f64, after_s: f64) -> Self {
         Self {

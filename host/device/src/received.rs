@@ -63,7 +63,7 @@ pub enum Event {
 
 /// A message.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Heard {
+pub enum Received {
     /// Answer to the call with this number.
     Answer(u16, Answer),
     /// Message without a call.
@@ -116,7 +116,7 @@ pub struct Receiver {
 
 impl Receiver {
     /// Decodes bytes and calls `hear` for each message that they complete.
-    pub fn take(&mut self, bytes: &[u8], mut hear: impl FnMut(Heard)) {
+    pub fn take(&mut self, bytes: &[u8], mut hear: impl FnMut(Received)) {
         for byte in bytes {
             self.count.bytes += 1;
             let Some(frame) = self.decoder.push(*byte) else {
@@ -137,26 +137,26 @@ impl Receiver {
     }
 }
 
-fn understood(frame: &Frame<'_>) -> Option<Heard> {
+fn understood(frame: &Frame<'_>) -> Option<Received> {
     let message = frame.message();
     if let Some((id, magic, version)) = beginning(frame.0)
         && !matches!(&message, Some(Message::Greeting { greeting, .. })
             if super::identity::check("", greeting.magic, greeting.protocol).is_ok())
     {
-        return Some(Heard::Stranger(id, magic, version));
+        return Some(Received::Stranger(id, magic, version));
     }
     Some(match message? {
         // Calls are numbered from 1. Number 0 means that the device has just started.
         Message::Greeting { id: 0, greeting } => {
-            Heard::Event(Event::Started(Box::new(Identity::from(&greeting))))
+            Received::Event(Event::Started(Box::new(Identity::from(&greeting))))
         }
         Message::Greeting { id, greeting } => {
-            Heard::Answer(id, Answer::Greeting(Box::new(Identity::from(&greeting))))
+            Received::Answer(id, Answer::Greeting(Box::new(Identity::from(&greeting))))
         }
-        Message::Refused { id, refusal } => Heard::Answer(id, Answer::Refused(refusal)),
-        Message::Reply { id, reply } => Heard::Answer(id, answer(reply)),
+        Message::Refused { id, refusal } => Received::Answer(id, Answer::Refused(refusal)),
+        Message::Reply { id, reply } => Received::Answer(id, answer(reply)),
         Message::Event(WireEvent::Raw(batch)) if batch.is_whole() => {
-            Heard::Event(Event::Raw(Samples {
+            Received::Event(Event::Raw(Samples {
                 head: batch.head,
                 gyro_temps_c: Some(batch.gyro_temps_c),
                 dies_c: None,
@@ -164,14 +164,14 @@ fn understood(frame: &Frame<'_>) -> Option<Heard> {
             }))
         }
         Message::Event(WireEvent::Compensated(batch)) if batch.is_whole() => {
-            Heard::Event(Event::Compensated(Samples {
+            Received::Event(Event::Compensated(Samples {
                 head: batch.head,
                 gyro_temps_c: None,
                 dies_c: Some(batch.dies_c()),
                 values: batch.values().map(|(_, sample)| sample).collect(),
             }))
         }
-        Message::Event(WireEvent::Kalman(state)) => Heard::Event(Event::Kalman(Box::new(state))),
+        Message::Event(WireEvent::Kalman(state)) => Received::Event(Event::Kalman(Box::new(state))),
         Message::Event(_) => return None,
     })
 }
