@@ -35,7 +35,7 @@ impl Prepared {
             blocks,
             increments: Vec::new(),
             rows: means.poses.len() as u64,
-            reading_step: [None; 6],
+            quantisation_step: [None; 6],
             signed_low_byte: [None; 6],
             no_temperatures: Default::default(),
             has_raw,

@@ -128,7 +128,8 @@ impl Prepared {
             return Err(Error::new(&self.place, problem, "leave it out"));
         }
         let Dwells { list, warnings, .. } = &mut self.dwells;
-        self.noise.state(file, &self.manifest, list, warnings)?;
+        self.noise
+            .use_noise_at_rest(file, &self.manifest, list, warnings)?;
         Ok(self)
     }
 
@@ -290,7 +291,7 @@ impl Prepared {
     }
 
     /// Noise variances of the magnitude of specific force in each of `poses`, (m/s²)².
-    pub fn size_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
+    pub fn magnitude_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
         if self.noise.is_by_channel(Sensor::Accel) {
             let size = |o: &Observation| {
                 let by = accel.matrix.tr_mul(&accel.apply(&o.raw).normalize());
@@ -306,14 +307,14 @@ impl Prepared {
     }
 
     /// Standard deviations of the same, for people; not a number if the noise is unknown.
-    pub fn size_floors(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
+    pub fn magnitude_floors(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
         let by_channel = self.noise.is_by_channel(Sensor::Accel);
         let known = match by_channel {
             true => self.noise.is_known(Sensor::Accel),
             false => Noise::of_size(&self.dwells.list, &self.condensed, accel).known,
         };
         let floor = |v: &f64| if known { v.sqrt() } else { f64::NAN };
-        self.size_variances(accel, poses)
+        self.magnitude_variances(accel, poses)
             .iter()
             .map(floor)
             .collect()

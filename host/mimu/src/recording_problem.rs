@@ -148,7 +148,7 @@ impl RecordingProblem {
             all.push(Self::SlowForTurns(rate_hz));
         }
         let missing = accel
-            .filter(|a| a.figure == Figure::GravitySize)
+            .filter(|a| a.figure == Figure::GravityMagnitude)
             .and_then(|accel| {
                 let poses = prepared.observations(Sensor::Accel);
                 let raw: Vec<_> = poses.iter().map(|o| o.raw).collect();

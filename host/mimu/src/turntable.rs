@@ -129,7 +129,7 @@ impl RatedDwells {
 
     /// Excludes the turning dwells for the accelerometer, which senses an unknown centripetal force off the axis, and those at another rate
     /// for both sensors. Returns the warning about the latter.
-    pub fn set_aside(&self, prepared: &mut Prepared) -> Option<Warning> {
+    pub fn exclude_dwells(&self, prepared: &mut Prepared) -> Option<Warning> {
         let turning = self.turning.iter().map(|o| o.dwell);
         for dwell in turning.chain(self.others.iter().copied()) {
             let dwell = &mut prepared.dwells.list[dwell];

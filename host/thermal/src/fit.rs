@@ -136,7 +136,7 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
     };
     warnings.extend(joint.warnings.iter().cloned());
     let estimated = !matches!(options.estimator, Estimator::Classic(_));
-    if estimated && sessions.iter().all(|s| s.stated == [None; 6]) {
+    if estimated && sessions.iter().all(|s| s.noise_at_rest == [None; 6]) {
         warnings.push(Warning::WithoutNoise);
     }
     check_range(&joint, options.range_c)?;

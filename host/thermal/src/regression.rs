@@ -264,7 +264,7 @@ impl AxisNoise {
     }
 
     /// The bias wander that a record at rest gives, raw, divided by the `gain` of the axis, raw per SI.
-    pub fn stated_wander(model: &AllanModel, gain: f64) -> Self {
+    pub fn wander_at_rest(model: &AllanModel, gain: f64) -> Self {
         let (b, k) = ((model.flicker / FLOOR).sqrt(), (3.0 * model.walk).sqrt());
         Self::of_densities([0.0, b / gain, k / gain], 1.0)
     }

@@ -61,7 +61,7 @@ pub struct Session {
     /// Samples of the recording.
     pub samples: f64,
     /// Noise of the six channels at rest, raw, if a noise file gives it.
-    pub stated: [Option<AllanModel>; 6],
+    pub noise_at_rest: [Option<AllanModel>; 6],
     /// Where the input is not known: times, s, at which the unit was put into another pose, as it matters to gyro and accelerometer.
     pub moved_s: [Vec<f64>; 2],
     /// Where the input is not known: jumps of the gyro's bias.
@@ -127,7 +127,7 @@ impl Session {
             thermometer,
             rows,
             samples: condensed.rows as f64,
-            stated: std::array::from_fn(|c| prepared.noise.largest_stated(c)),
+            noise_at_rest: std::array::from_fn(|c| prepared.noise.largest_at_rest(c)),
             moved_s,
             bias_jumps,
             unused: unused(prepared),

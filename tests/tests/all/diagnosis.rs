@@ -1,6 +1,6 @@
 //! Diagnosis of units whose truth is known, and of recordings by other people. `make blind` runs the complete study of the former.
 
-use mimu::diagnose::decision::Against;
+use mimu::diagnose::decision::CorrelatesWith;
 use mimu::diagnose::search::Alternative;
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
 use mimu::effects;
@@ -163,7 +163,7 @@ fn a_step_at_a_reading_is_left_over_against_the_reading_or_named_an_error_by_the
         let left = found.sensors.iter().flat_map(|s| &s.decision.leftover);
         let against: Vec<_> = left.map(|l| &l.against).collect();
         println!("seed {seed}: {ids:?}, left {against:?}");
-        by_reading += u32::from(against.contains(&&Against::Reading));
+        by_reading += u32::from(against.contains(&&CorrelatesWith::Reading));
         let named = ids.iter().all(|id| is_right(id, "gyro_missing_codes"));
         assert!(
             named || found.verdict == Verdict::Unexplained,

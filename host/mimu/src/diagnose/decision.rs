@@ -39,7 +39,7 @@ use undecided::undecided;
 
 use hold_out::rms_at_rest;
 pub(super) use hold_out::{held_out, part, rms};
-pub use leftover::{Against, FALSE_LEFTOVER, Leftover};
+pub use leftover::{CorrelatesWith, FALSE_LEFTOVER, Leftover};
 pub use model::Model;
 pub use nonlinear::Nonlinear;
 pub use second::Second;
@@ -139,7 +139,7 @@ impl Decision {
     /// Marks effects that depend on the time since power-on as specific to the recording, because its device had started by `start` instead
     /// of a power-on.
     pub(super) fn without_power_on(&mut self, start: &str) {
-        let by_time = |a: &&mut Accepted| a.chosen.candidate.goes_by_time();
+        let by_time = |a: &&mut Accepted| a.chosen.candidate.depends_on_time();
         let mut ids = Vec::new();
         for accepted in self.accepted.iter_mut().filter(by_time) {
             accepted.of_unit = false;
@@ -263,8 +263,8 @@ pub fn decide(
     let nonlinear = Nonlinear::of(&search, &kept, &after);
     let (model, last) = (&after.columns, &after.fitted);
     let mut accepted = Vec::new();
-    let values = shares(&search, &kept, last);
-    let seconds = judge.elsewhere(&kept, &values);
+    let values = coefficients_of(&search, &kept, last);
+    let seconds = judge.on_second_recording(&kept, &values);
     let (first, mut from) = (search.basis.ncols(), 0);
     for (i, one) in kept.iter().enumerate() {
         let count = one.columns.ncols();
@@ -430,7 +430,7 @@ fn known_in(rows: &Rows) -> [f64; 2] {
 }
 
 /// Coefficients of each of the chosen.
-fn shares(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>> {
+fn coefficients_of(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>> {
     let mut from = search.basis.ncols();
     let mut all = Vec::new();
     for one in chosen {

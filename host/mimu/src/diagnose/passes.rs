@@ -24,7 +24,7 @@ use mimu_recording::error::{Error, Result};
 /// Most times that the rows of a sensor are made.
 const PASSES: usize = 3;
 /// Error of the effects by the affine model, over the noise, above which the rows are made again.
-const BENT: f64 = 0.1;
+const DISTORTED: f64 = 0.1;
 /// An effect with more coefficients than this is complex: a simpler one may have distorted the affine model. The simplest effects have one
 /// coefficient for each axis.
 const SIMPLE: usize = 3;
@@ -74,7 +74,7 @@ fn removed_of(decision: &Decision) -> Vec<FittedEffect> {
 }
 
 /// Relative difference of two affine models in scale and direction.
-fn bent(was: &Affine<f64>, is: &Affine<f64>) -> f64 {
+fn relative_change(was: &Affine<f64>, is: &Affine<f64>) -> f64 {
     let inverse = was.matrix.try_inverse().unwrap_or_else(Matrix3::zeros);
     (is.matrix * inverse - Matrix3::identity()).amax()
 }
@@ -97,7 +97,7 @@ pub(super) struct Pass {
 
 impl Pass {
     /// Whether `other` is no better: by the held-out error, or because its readings without the effects cannot be calibrated.
-    fn stands_before(&self, other: &Self) -> bool {
+    fn is_no_worse_than(&self, other: &Self) -> bool {
         let held_out = |pass: &Self| pass.decision.held_out_rms[1];
         !matches!(other.after, Some(Ok(_))) || !(held_out(other) <= held_out(self))
     }
@@ -107,7 +107,7 @@ impl Pass {
     fn about(&self) -> Vec<FittedEffect> {
         match self.rows.figure {
             RowFigure::Input | RowFigure::Rest => Vec::new(),
-            RowFigure::Size | RowFigure::Direction => {
+            RowFigure::Magnitude | RowFigure::Direction => {
                 let found = self.found.iter().filter(|e| e.is_of_own_input());
                 found.cloned().collect()
             }
@@ -191,16 +191,16 @@ impl Passes<'_> {
     /// The same with some effects not tried, each with the reason. If the accepted effects distorted the affine model, or cannot be removed,
     /// each complex one is left out in turn, and the pass that predicts best is taken.
     fn best_without(&self, without: &[Rejected]) -> Result<Pass> {
-        let (mut best, strong) = self.settled(without)?;
+        let (mut best, strong) = self.converged(without)?;
         let complex = best.decision.accepted.iter();
         let complex = complex.filter(|a| strong && a.effect.values.len() > SIMPLE);
         let ids: Vec<String> = complex.map(|a| a.chosen.candidate.id()).collect();
         for id in ids {
             let mut without = without.to_vec();
             without.push(self.rejected(id, Reason::OtherPredictsBetter));
-            let (other, _) = self.settled(&without)?;
+            let (other, _) = self.converged(&without)?;
             let refused = matches!(best.after, Some(Err(_)));
-            if matches!(other.after, Some(Ok(_))) && (refused || !best.stands_before(&other)) {
+            if matches!(other.after, Some(Ok(_))) && (refused || !best.is_no_worse_than(&other)) {
                 best = other;
             }
         }
@@ -209,7 +209,7 @@ impl Passes<'_> {
 
     /// Repeats passes until the affine model stays. The flag says whether the first pass distorted it, or led to readings that cannot be
     /// calibrated.
-    fn settled(&self, without: &[Rejected]) -> Result<(Pass, bool)> {
+    fn converged(&self, without: &[Rejected]) -> Result<(Pass, bool)> {
         let sensor = self.sensor;
         let fits = Sensor::BOTH.map(|s| self.now.sensor(s));
         let mut models = fits.map(|f| Some(f?.estimated.triad.inverse));
@@ -218,7 +218,8 @@ impl Passes<'_> {
             let (Some(was), Some(is)) = (models[sensor as usize], pass.affine(sensor)) else {
                 return false;
             };
-            bent(&was, &is) * explained_rms(&pass.decision) > BENT * pass.decision.noise_floor
+            relative_change(&was, &is) * explained_rms(&pass.decision)
+                > DISTORTED * pass.decision.noise_floor
         };
         let strong = moves(&models, &pass) || matches!(pass.after, Some(Err(_)));
         for _ in 1..PASSES {
@@ -229,7 +230,7 @@ impl Passes<'_> {
             let about = pass.about();
             let next = self.pass(models, &about, without)?;
             let closer = !about.is_empty() && pass.has_effects_of(&next);
-            if !closer && pass.stands_before(&next) {
+            if !closer && pass.is_no_worse_than(&next) {
                 break;
             }
             pass = next;

@@ -115,7 +115,7 @@ pub fn least_squares(
         let errors = errors(observations, axis, wander);
         let (solution, scatter) = solve_with_excess(&design, &raw, &errors)
             .ok_or_else(|| Failure::NoSolution("the design is singular".into()))?;
-        axes.push(OfAxis {
+        axes.push(AxisEstimate {
             parameters: solution.parameters,
             covariance: solution.covariance,
             scatter: vec![(Observable::Axis(axis), scatter)],
@@ -218,7 +218,7 @@ pub fn kalman(
             round += 1;
             if settled || round == 30 {
                 let covariance = DMatrix::from_column_slice(4, 4, filter.covariance().as_slice());
-                return Ok(OfAxis {
+                return Ok(AxisEstimate {
                     parameters: mean,
                     covariance,
                     scatter: vec![(Observable::Axis(axis), scatter)],
@@ -231,7 +231,7 @@ pub fn kalman(
 }
 
 /// The estimate of one sensor.
-pub(super) struct OfAxis {
+pub(super) struct AxisEstimate {
     /// `[b, P1, P2, P3]`, inputs in units of the span.
     pub parameters: DVector<f64>,
     /// Their covariance.
@@ -241,7 +241,11 @@ pub(super) struct OfAxis {
 }
 
 /// Combines `[b, P1, P2, P3]` of the three sensors (inputs in units of `span`).
-pub(super) fn forward(axes: &[OfAxis], span: f64, condition: f64) -> Result<Estimated, Failure> {
+pub(super) fn forward(
+    axes: &[AxisEstimate],
+    span: f64,
+    condition: f64,
+) -> Result<Estimated, Failure> {
     let mut model = Forward {
         matrix: Matrix3::zeros(),
         bias: Vector3::zeros(),

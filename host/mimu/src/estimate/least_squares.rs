@@ -147,7 +147,7 @@ pub fn solve(
     errors: &Errors,
     excess: f64,
 ) -> Option<Solution> {
-    let found = by_qr(&errors.whitened(excess, &beside(design, observations))?)?;
+    let found = by_qr(&errors.whitened(excess, &with_observations(design, observations))?)?;
     let residuals = observations - design * &found.parameters;
     Some(Solution {
         parameters: found.parameters,
@@ -157,7 +157,7 @@ pub fn solve(
 }
 
 /// `design` with the observations as its last column.
-fn beside(design: &DMatrix<f64>, observations: &DVector<f64>) -> DMatrix<f64> {
+fn with_observations(design: &DMatrix<f64>, observations: &DVector<f64>) -> DMatrix<f64> {
     let columns = design.ncols();
     let mut both = design.clone().insert_column(columns, 0.0);
     both.set_column(columns, observations);
@@ -165,14 +165,14 @@ fn beside(design: &DMatrix<f64>, observations: &DVector<f64>) -> DMatrix<f64> {
 }
 
 /// The solution of decorrelated rows with the observations in the last column.
-struct ByRows {
+struct QrSolution {
     parameters: DVector<f64>,
     covariance: DMatrix<f64>,
     /// For each row, the share of its own noise in its prediction.
     leverage: DVector<f64>,
 }
 
-fn by_qr(white: &DMatrix<f64>) -> Option<ByRows> {
+fn by_qr(white: &DMatrix<f64>) -> Option<QrSolution> {
     let columns = white.ncols() - 1;
     let (mut a, y) = (
         white.columns(0, columns).into_owned(),
@@ -197,7 +197,7 @@ fn by_qr(white: &DMatrix<f64>) -> Option<ByRows> {
         }
     }
     let rows = q.row_iter().map(|r| r.norm_squared());
-    Some(ByRows {
+    Some(QrSolution {
         leverage: DVector::from_iterator(q.nrows(), rows),
         parameters,
         covariance,
@@ -223,7 +223,7 @@ pub fn solve_groups(groups: &[Group]) -> Option<(Solution, Vec<Scatter>)> {
     for _ in 0..30 {
         let excess = |g: usize| last.as_ref().map_or(0.0, |l| l.1[g].excess);
         let white = groups.iter().enumerate().map(|(g, group)| {
-            let both = beside(&group.design, &group.observations);
+            let both = with_observations(&group.design, &group.observations);
             group.errors.whitened(excess(g), &both)
         });
         let white = white.collect::<Option<Vec<DMatrix<f64>>>>()?;

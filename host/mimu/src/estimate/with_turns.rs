@@ -27,7 +27,7 @@ const ALL: usize = ACCEL + 12;
 const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// The data of the joint fit.
-pub struct Together<'a> {
+pub struct JointFit<'a> {
     /// Poses.
     pub poses: &'a [Observation],
     /// Variances of their magnitudes by noise, (m/s²)².
@@ -51,7 +51,7 @@ struct Models {
     gyro: Affine<f64>,
 }
 
-impl Together<'_> {
+impl JointFit<'_> {
     /// Fits both and returns the accelerometer.
     pub fn estimate(&self) -> Result<Estimated, Failure> {
         let g = self.gravity;

@@ -122,13 +122,13 @@ const ACCEL_PARAMETERS: [&str; 9] = [
 fn fit_poses(prepared: &Prepared, poses: &[Observation]) -> Option<Estimated> {
     let g = prepared.manifest.gravity_mps2;
     let first = magnitude::first_guess(poses, g)?;
-    let variances = prepared.size_variances(&first, poses);
+    let variances = prepared.magnitude_variances(&first, poses);
     magnitude::by_gravity(poses, &variances, g).ok()
 }
 
 fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {
     let g = prepared.manifest.gravity_mps2;
-    let variances = prepared.size_variances(accel, poses);
+    let variances = prepared.magnitude_variances(accel, poses);
     let up: Vec<Vector3<f64>> = poses.iter().map(|o| accel.apply(&o.raw)).collect();
     let rows = poses.iter().enumerate().map(|(k, o)| {
         let direction = up[k].normalize();

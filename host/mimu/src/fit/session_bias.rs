@@ -52,7 +52,7 @@ pub fn estimate(
                 .filter(|k| svd.singular_values[*k] > 0.05 * svd.singular_values.max())
                 .collect();
             kept = shown.select_rows(&strong).transpose();
-            let variances = prepared.size_variances(&model, &observations);
+            let variances = prepared.magnitude_variances(&model, &observations);
             let errors = Errors::Independent(DVector::from_vec(variances));
             let found = solve_with_excess(&(&design * &kept), &y, &errors).ok_or_else(none)?;
             let step = &kept * &found.0.parameters;

@@ -138,7 +138,7 @@ pub struct SensorFitResult {
     pub noise_floor: f64,
     /// Error of the readings before calibration, in [`Self::unit`]; absent if they are not in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub as_they_came_rms: Option<f64>,
+    pub uncalibrated_rms: Option<f64>,
     /// SI unit of the figures.
     pub unit: &'static str,
     /// Quantity of the figures.
@@ -353,7 +353,7 @@ impl SensorFitResult {
             rms: found.rms(),
             held_out_rms: found.held_out_rms(),
             noise_floor: found.noise_floor(),
-            as_they_came_rms: found.as_came,
+            uncalibrated_rms: found.uncalibrated_rms,
             unit: found.figure.unit(found.sensor),
             figure: found.figure,
             dwells: found.dwells,
@@ -406,7 +406,7 @@ fn excess_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
     let si = found.sensor.unit();
     match found.figure {
         Figure::Direction if group == Observable::Rest => si.into(),
-        Figure::Direction | Figure::GravitySize | Figure::RateSize => {
+        Figure::Direction | Figure::GravityMagnitude | Figure::RateMagnitude => {
             found.figure.unit(found.sensor).into()
         }
         // Axes of the forward form are in raw units, of the inverse form in SI.

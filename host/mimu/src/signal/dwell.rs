@@ -9,7 +9,7 @@ use std::ops::Range;
 pub use crate::fault::Fault;
 use crate::fault::SHORTEST_S;
 use crate::quantity::Sensor;
-use crate::signal::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
+use crate::signal::blocks::{Condensed, Level, Rails, StepBlocks, pool, quantile};
 use crate::signal::course::{Course, Motion, motion};
 use crate::signal::rails::{self, longest_run_by_chance};
 use crate::signal::ramp::ramps;
@@ -258,7 +258,7 @@ impl Dwells {
             });
         }
         for (c, longest) in longest_run.iter_mut().enumerate() {
-            if is_coarse(&list, condensed.reading_step[c], c) {
+            if is_coarse(&list, condensed.quantisation_step[c], c) {
                 *longest = f64::INFINITY;
             }
         }
@@ -337,8 +337,8 @@ fn is_coarse(list: &[Dwell], step: Option<f64>, c: usize) -> bool {
     quantile(&mut changing, 0.5).is_none_or(|v| v < TWO_CODES * step * step)
 }
 
-fn by_step(condensed: &Condensed) -> Vec<Stretch> {
-    let mut ranges: Vec<Stretch> = Vec::new();
+fn by_step(condensed: &Condensed) -> Vec<StepBlocks> {
+    let mut ranges: Vec<StepBlocks> = Vec::new();
     for (i, block) in condensed.blocks.iter().enumerate() {
         match ranges.last_mut() {
             Some((step, range)) if *step == Some(block.step) && range.end == i => range.end = i + 1,

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::fault::SHORTEST_S;
 use crate::quantity::Sensor;
-use crate::signal::blocks::{Block, Condensed, Level, Stretch, pool, quantile};
+use crate::signal::blocks::{Block, Condensed, Level, StepBlocks, pool, quantile};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, Reference};
 
@@ -84,7 +84,7 @@ pub(crate) fn find(
     condensed: &Condensed,
     manifest: &Manifest,
     factor: f64,
-) -> Result<(Vec<Stretch>, Detection)> {
+) -> Result<(Vec<StepBlocks>, Detection)> {
     let blocks = &condensed.blocks;
     let block_s = blocks.iter().map(|b| b.rows).max().unwrap_or(1) as f64 * condensed.period_s;
     let width = ((WINDOW_S / block_s).round() as usize).max(2);

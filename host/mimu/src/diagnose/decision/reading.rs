@@ -9,7 +9,7 @@
 use nalgebra::DMatrix;
 
 use super::hold_out::{held_out, rms};
-use super::leftover::{Against, FALSE_LEFTOVER, Leftover};
+use super::leftover::{CorrelatesWith, FALSE_LEFTOVER, Leftover};
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{COEFFICIENT, Chosen, Search, beside, independent_of, unit_columns};
 use crate::diagnose::variance::{Fitted, LikelihoodKind};
@@ -168,7 +168,7 @@ fn of_axis(
             sensor: rows.sensor,
             stratum: of_axis.map_or(StratumName(Observable::Axis(axis), None), |s| s.name),
             axis: Some(axis),
-            against: Against::Reading,
+            against: CorrelatesWith::Reading,
             strength: (explained.max(0.0) / stratum.rows.len() as f64).sqrt(),
             usual: false,
         },

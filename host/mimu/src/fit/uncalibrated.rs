@@ -1,4 +1,4 @@
-//! The readings as they came, judged like a calibration.
+//! Readings in SI without a calibration, judged like one.
 //!
 //! A unit with readings in SI is calibrated already, and a new calibration has to improve its readings. Ten poses by hand once gave a calibration
 //! whose direction of gravity was 1.65 degrees off in sample, while that of the readings themselves was 0.44 degrees off.
@@ -23,7 +23,7 @@ pub(super) fn inputs<'a>(
     in_si(prepared).then(|| rms(Figure::Input, observations.map(|o| o.raw - o.input)))
 }
 
-/// Error of the magnitudes of observations as they came; `known` has each with its known magnitude.
+/// Error of the magnitudes of readings in SI; `known` has each with its known magnitude.
 pub(super) fn magnitudes(
     prepared: &Prepared,
     figure: Figure,
@@ -35,7 +35,7 @@ pub(super) fn magnitudes(
     in_si(prepared).then(|| rms(figure, errors))
 }
 
-/// Error of the directions after turns, gyro and accelerometer both as they came.
+/// Error of the directions after turns, both sensors uncalibrated.
 pub(super) fn directions(prepared: &Prepared, turns: &[Turn]) -> Option<f64> {
     let gyro = Affine {
         matrix: Matrix3::identity(),
@@ -57,18 +57,20 @@ fn in_si(prepared: &Prepared) -> bool {
     prepared.manifest.raw_unit == RawUnit::Si
 }
 
-/// Warns of a calibration that does no better than the readings as they came.
+/// Warns of a calibration that does no better than the uncalibrated readings.
 pub(super) fn compare(fit: &mut SensorFit) {
-    let Some(came) = fit.as_came else { return };
+    let Some(uncalibrated) = fit.uncalibrated_rms else {
+        return;
+    };
     let held_out = fit.held_out_rms();
     let calibrated = held_out.unwrap_or_else(|| fit.rms());
-    if calibrated < came {
+    if calibrated < uncalibrated {
         return;
     }
     let (factor, unit) = fit.figure.readable(fit.sensor);
     let count = fit.residuals.len();
-    let worse = exceeds(calibrated, came, errors(fit.figure, count));
-    let errors = [came, calibrated].map(|error| error * factor);
+    let worse = exceeds(calibrated, uncalibrated, errors(fit.figure, count));
+    let errors = [uncalibrated, calibrated].map(|error| error * factor);
     let undecided = (!worse).then_some(count);
     let warning = Warning::NoBetter(errors, unit, held_out.is_some(), undecided);
     fit.warnings.push(warning.of(fit.sensor));
@@ -83,7 +85,7 @@ pub(crate) fn errors(figure: Figure, count: usize) -> usize {
         * match figure {
             Figure::Input => 3,
             Figure::Direction => 2,
-            Figure::GravitySize | Figure::RateSize => 1,
+            Figure::GravityMagnitude | Figure::RateMagnitude => 1,
         }
 }
 

@@ -36,7 +36,7 @@ const RATE_OFF: [f64; 2] = [0.02, 1e-3];
 
 /// Rows without a gap.
 #[derive(Debug, Clone)]
-pub(super) struct Stretch {
+pub(super) struct Segment {
     /// Rows from 0.
     pub rows: Range<usize>,
     /// Times of the first and last, s.
@@ -45,7 +45,7 @@ pub(super) struct Stretch {
     pub period_s: f64,
 }
 
-impl Stretch {
+impl Segment {
     pub fn find(
         columns: &mut Columns,
         recording: &Recording,
