@@ -55,7 +55,7 @@ impl Experiment<'_> {
         errors: &[Errors; 2],
         delay: f64,
         forward: Option<RowVector3<f64>>,
-    ) -> Option<(Solution, Vec<Scatter>)> {
+    ) -> Option<(Solution, [Scatter; 2])> {
         let groups = [0, 1].map(|part| {
             let all = self.parts[part];
             Group {

@@ -332,8 +332,8 @@ impl SensorFitResult {
             let result = ScatterResult {
                 chi2: s.chi2,
                 dof: s.dof,
-                excess_sigma: s.excess.sqrt(),
-                unit: excess_unit(fit, found, *group),
+                excess_sigma: s.extra_variance.sqrt(),
+                unit: extra_sigma_unit(fit, found, *group),
                 // An unknown noise neither explains an error nor leaves one unexplained.
                 significant: s.is_significant() && fit.prepared.noise.is_known(found.sensor),
             };
@@ -401,8 +401,8 @@ impl Parameter {
     }
 }
 
-/// Unit of the excess of a group of observations.
-fn excess_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
+/// Unit of the extra sigma of a group of observations.
+fn extra_sigma_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
     let si = found.sensor.unit();
     match found.figure {
         Figure::Direction if group == Observable::Rest => si.into(),
