@@ -26,4 +26,5 @@ mod white;
 
 pub use self::line::Line;
 pub use self::remove_lines::{WithoutLines, remove_lines, remove_lines_after};
+pub(crate) use self::welch::sum_over;
 pub use self::white::{White, white_band};

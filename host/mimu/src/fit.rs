@@ -20,6 +20,7 @@ use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::estimate::{Estimated, Observation};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
+use crate::signal::blocks::extent;
 use crate::triad::Triad;
 use crate::turntable::RatedDwells;
 use crate::warning::Warning;
@@ -219,8 +220,7 @@ fn without_temperature(prepared: &Prepared) -> Option<Warning> {
             .map(|d| d.temp_c)
             .filter(|t| t.is_finite())
     };
-    let high = temperatures().fold(f64::NEG_INFINITY, f64::max);
-    let low = temperatures().fold(f64::INFINITY, f64::min);
+    let [low, high] = extent(temperatures());
     (high - low > ISOTHERMAL_C).then_some(Warning::WithoutTemperature(low, high, None))
 }
 

@@ -143,7 +143,7 @@ impl Noise {
         for sensor in Sensor::BOTH {
             for c in sensor.channels() {
                 if condensed.has_raw[c] {
-                    let of_sensor = dwells.iter().filter(|d| d.fault(sensor).is_none());
+                    let of_sensor = dwells.iter().filter(|d| d.faults[sensor].is_none());
                     let used: Vec<&Dwell> = of_sensor.filter(|d| !d.turn).collect();
                     let used = still(&used, sensor);
                     let usable = || used.iter().copied();
@@ -221,7 +221,7 @@ impl Noise {
     }
 
     /// Whether the variances of the means are known for each channel. If not, a fit to gravity uses the noise of the magnitude
-    /// ([`Noise::of_size`]).
+    /// ([`Noise::of_magnitude`]).
     pub fn is_by_channel(&self, sensor: Sensor) -> bool {
         self.of_table.is_some() || self.has_noise_at_rest(sensor)
     }
@@ -299,7 +299,11 @@ impl Noise {
 
     /// Noise of the magnitude of specific force after the calibration `accel`, m/s²: the noise in a fit to the magnitude of gravity. A unit
     /// that creeps on its support tilts, which changes the channels but not the magnitude.
-    pub fn of_size(dwells: &[Dwell], condensed: &Condensed, accel: &Affine<f64>) -> ChannelNoise {
+    pub fn of_magnitude(
+        dwells: &[Dwell],
+        condensed: &Condensed,
+        accel: &Affine<f64>,
+    ) -> ChannelNoise {
         let from = Sensor::Accel.channels().start;
         let force = |b: &Block| {
             let raw = Vector3::from_fn(|i, _| b.raw[from + i].mean);
@@ -313,7 +317,9 @@ impl Noise {
             let mut across = blocks.map(|f| f.normalize().cross(&up).norm());
             across.any(|sin| sin > SWINGS_BY)
         };
-        let usable = dwells.iter().filter(|d| d.accel_fault.is_none() && !d.turn);
+        let usable = dwells
+            .iter()
+            .filter(|d| d.faults.accel.is_none() && !d.turn);
         let still = usable.filter(|d| !turns(d));
         within(still, condensed, |b| force(b).map(|f| f.norm()))
     }

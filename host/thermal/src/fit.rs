@@ -2,6 +2,7 @@
 
 use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node};
 use mimu::quantity::{PerSensor, Sensor};
+use mimu::signal::blocks::extent;
 use mimu_recording::Reference;
 use mimu_recording::error::{Argument, Error, Result};
 use serde::Serialize;
@@ -241,10 +242,7 @@ fn check_range(joint: &Joint, wanted: Option<[f64; 2]>) -> Result<()> {
 
 /// Temperatures of the dies, °C.
 pub fn range(joint: &Joint) -> [f64; 2] {
-    let all = joint.recorded().map(|c| c.range_c);
-    all.fold([f64::INFINITY, f64::NEG_INFINITY], |r, c| {
-        [r[0].min(c[0]), r[1].max(c[1])]
-    })
+    extent(joint.recorded().flat_map(|c| c.range_c))
 }
 
 fn judge(

@@ -186,7 +186,7 @@ impl Problem {
                 Some(_) => CurveKind::Cross,
             };
             let part = Part { input, kind, from };
-            from += self.basis(kind).len();
+            from += self.basis(kind).functions();
             part
         });
         curves.collect()
@@ -197,7 +197,7 @@ impl Problem {
         let curves: usize = self
             .parts(axis)
             .iter()
-            .map(|p| self.basis(p.kind).len())
+            .map(|p| self.basis(p.kind).functions())
             .sum();
         curves + self.offsets - 1
     }

@@ -200,7 +200,7 @@ fn rows(prepared: &Prepared, sensor: Sensor) -> Vec<Row> {
         return Vec::new();
     }
     let usable = prepared.dwells.list.iter();
-    let usable: Vec<&Dwell> = usable.filter(|d| d.fault(sensor).is_none()).collect();
+    let usable: Vec<&Dwell> = usable.filter(|d| d.faults[sensor].is_none()).collect();
     // Readings of an input that moves within a dwell are late or early by some milliseconds. Over a whole turn that cancels for the gyro,
     // but not for a rotating force.
     let stands = usable.iter().any(|d| !d.moves(sensor) && !d.turn);

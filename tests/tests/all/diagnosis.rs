@@ -4,6 +4,7 @@ use mimu::diagnose::decision::CorrelatesWith;
 use mimu::diagnose::search::Alternative;
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
 use mimu::effects;
+use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::fit::{Method, Options};
 use mimu::quantity::Sensor;
 use mimu_rig::located::Source;
@@ -128,7 +129,8 @@ fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
         .flat_map(|s| &mut s.decision.accepted)
     {
         let other = effects::by_id("gyro_g_sensitivity").unwrap();
-        let other = Alternative::from((other, -1.0));
+        let other = Candidate::new(other.sensor, CandidateKind::Effect(other));
+        let other = Alternative::of(&other, -1.0);
         accepted.chosen.alternatives.push(other);
     }
     let found = reported(found);

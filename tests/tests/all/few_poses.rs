@@ -283,7 +283,7 @@ fn a_channel_whose_step_is_coarser_than_its_noise_is_not_stuck() {
         .dwells
         .list
         .iter()
-        .filter_map(|d| d.gyro_fault)
+        .filter_map(|d| d.faults.gyro)
         .map(|f| f.to_string())
         .collect();
     assert!(!faults.iter().any(|f| f.contains("stuck")), "{faults:?}");

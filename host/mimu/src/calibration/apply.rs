@@ -7,7 +7,7 @@ use std::path::Path;
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::compensator::{Compensator, State};
 use mimu_core::stored::NODES;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::calibration::die_temperature::outside;
@@ -281,11 +281,8 @@ impl Batches {
         }
         let curves = curves.filter(|_| first_temp_c.is_some());
         let first_s = blocks.first().map_or(0.0, |block| block.start_s);
-        let none = Affine {
-            matrix: Matrix3::identity(),
-            offset: Vector3::zeros(),
-        };
-        let models = Compensation::from_fn(|s| calibration.inverse(s).unwrap_or(none));
+        let models =
+            Compensation::from_fn(|s| calibration.inverse(s).unwrap_or_else(Affine::identity));
         let effects = calibration.effects_of_models(&models)?;
         let compensator = compensator(calibration, models, curves, effects);
         let first = |channel: usize| {

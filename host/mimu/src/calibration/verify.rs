@@ -20,7 +20,7 @@ use crate::triad::Forward;
 use crate::turntable::RatedDwells;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, RawUnit, Reference};
+use mimu_recording::{Manifest, Reference};
 
 /// Errors of one triad of a recording with and without a calibration. Figures as in [`Figure`].
 #[derive(Debug, Clone, Serialize)]
@@ -259,16 +259,6 @@ pub fn nominal(calibrated: &Affine<f64>) -> Option<Affine<f64>> {
     })
 }
 
-/// Readings as they are.
-const ONE: Affine<f64> = Affine {
-    matrix: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
-    offset: Vector3::new(0.0, 0.0, 0.0),
-};
-
-fn in_si(prepared: &Prepared) -> bool {
-    prepared.manifest.raw_unit == RawUnit::Si
-}
-
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
@@ -326,7 +316,9 @@ fn known(
         &floor,
     )?;
     Some(SensorVerification {
-        rms_uncalibrated: in_si(prepared).then(|| rms(&errors(&ONE))),
+        rms_uncalibrated: prepared
+            .is_in_si()
+            .then(|| rms(&errors(&Affine::identity()))),
         ..judged
     })
 }
@@ -389,7 +381,9 @@ fn magnitudes(
         floor,
     )?;
     Some(SensorVerification {
-        rms_uncalibrated: in_si(prepared).then(|| rms(&errors(&ONE))),
+        rms_uncalibrated: prepared
+            .is_in_si()
+            .then(|| rms(&errors(&Affine::identity()))),
         ..judged
     })
 }
@@ -424,7 +418,10 @@ fn turns(
     let judged = judged(Sensor::Gyro, Figure::Direction, &before, &after, &floor)?;
     Some(SensorVerification {
         static_rms: Some(rms(&rest)),
-        rms_uncalibrated: in_si(prepared).then(|| rms(&errors(&prepared.turns(&ONE).0, &ONE))),
+        rms_uncalibrated: prepared.is_in_si().then(|| {
+            let one = Affine::identity();
+            rms(&errors(&prepared.turns(&one).0, &one))
+        }),
         ..judged
     })
 }

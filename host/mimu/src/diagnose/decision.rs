@@ -266,19 +266,16 @@ pub fn decide(
     let values = coefficients_of(&search, &kept, last);
     let seconds = judge.on_second_recording(&kept, &values);
     let (first, mut from) = (search.basis.ncols(), 0);
+    let held_with_all = judge.held(&kept, &with, split);
     for (i, one) in kept.iter().enumerate() {
         let count = one.columns.ncols();
         let mut rest = kept.clone();
         rest.remove(i);
         let without = search.fit(&rest)?;
-        let both = [
-            judge.held(&rest, &without, split),
-            judge.held(&kept, &with, split),
-        ];
-        let held = both.each_ref().map(|h| h.as_ref().map(|h| rms(rows, h)));
-        let at_rest = both
-            .each_ref()
-            .map(|h| h.as_ref().and_then(|h| rms_at_rest(rows, h)));
+        let held_without = judge.held(&rest, &without, split);
+        let both = [held_without.as_ref(), held_with_all.as_ref()];
+        let held = both.map(|h| h.map(|h| rms(rows, h)));
+        let at_rest = both.map(|h| h.and_then(|h| rms_at_rest(rows, h)));
         let covariance = nonlinear.covariance.view((from, from), (count, count));
         let [before, after] = held.map(|h| h.unwrap_or(f64::NAN));
         let (at_rest_before, at_rest_after) = match at_rest {
@@ -324,6 +321,10 @@ pub fn decide(
             .iter()
             .map(|one| rejection(&one.candidate, Reason::Suggestion(one.p))),
     );
+    let now = (
+        rms(rows, &(&rows.y - search.model(&kept) * &with.coefficients)),
+        judge.held_rms(&kept, &with, usual),
+    );
     for one in search.others(&with_jumps, &all) {
         let id = one.candidate.id();
         if rejected.iter().any(|r| r.id == id) || not_excited.iter().any(|n| n.id == id) {
@@ -340,10 +341,6 @@ pub fn decide(
                     held,
                 )
             });
-        let now = (
-            rms(rows, &(&rows.y - search.model(&kept) * &with.coefficients)),
-            judge.held_rms(&kept, &with, usual),
-        );
         let errors = match (held, now) {
             (Some((sample, held)), (before, Some(out))) => {
                 Some([[before, sample], [out, held]].map(|of| of.map(|v| ErrorRms::of(rows, v))))

@@ -14,12 +14,13 @@ use super::decision::{Decision, decide, noisier};
 use super::rejected::{Reason, Rejected};
 use super::rows::{ForceErrors, FreeParameters, RowFigure, Rows, Session};
 use super::search::Chosen;
+use super::singular;
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
 use crate::fit::{Fit, session_bias};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::Result;
 
 /// Most times that the rows of a sensor are made.
 const PASSES: usize = 3;
@@ -150,14 +151,6 @@ pub(super) struct Passes<'a> {
 }
 
 impl Passes<'_> {
-    fn singular(&self) -> Error {
-        Error::new(
-            self.place,
-            "the calibration is singular",
-            "check the columns of the recording",
-        )
-    }
-
     /// The best pass without effects that make the calibration file err more on another recording.
     pub fn best(&self) -> Result<Pass> {
         let judge = AsWritten {
@@ -281,13 +274,13 @@ impl Passes<'_> {
         let sessions: Vec<Session> = std::iter::once(head).chain(others).collect();
         let (ours, unseen) = sessions.split_at(self.found_in);
         let rows = self.rows(ours, &models, about);
-        let rows = rows.ok_or_else(|| self.singular())?;
+        let rows = rows.ok_or_else(|| singular(self.place))?;
         let unseen = self.rows(unseen, &models, about);
         let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
         let ends = dwell_ends(&all);
         let decide = |without: &[Rejected]| {
             decide(&rows, &ends, unseen.as_ref(), without, self.accept)
-                .ok_or_else(|| self.singular())
+                .ok_or_else(|| singular(self.place))
         };
         let clean = |found: &[FittedEffect]| -> Result<(Fit, Vec<Prepared>)> {
             let lasting: Vec<FittedEffect> = found.iter().map(FittedEffect::lasting).collect();
@@ -300,7 +293,7 @@ impl Passes<'_> {
                     _ => &of_unit,
                 };
                 remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects)
-                    .ok_or_else(|| self.singular())
+                    .ok_or_else(|| singular(self.place))
             };
             let cleaned = sessions.iter().enumerate().map(clean);
             let mut cleaned: Vec<Prepared> = cleaned.collect::<Result<_>>()?;

@@ -29,6 +29,7 @@ use crate::effects::fitted::FittedEffect;
 use crate::effects::quantity::Conditions;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
 use crate::estimate::earth::poses;
+use crate::signal::blocks::extent;
 pub use forces::ForceErrors;
 use terms::Quantities;
 
@@ -354,11 +355,9 @@ impl Rows {
     }
 
     /// Lowest and highest reading of any axis, raw, each a mean under one set of conditions.
-    pub fn reading_range(&self) -> (f64, f64) {
+    pub fn reading_range(&self) -> [f64; 2] {
         let all = self.conditions.iter().flat_map(|m| m.reading.mean.iter());
-        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-            (a.min(*v), b.max(*v))
-        })
+        extent(all.copied())
     }
 
     /// The conditions, with the temperature that an effect follows.

@@ -12,7 +12,7 @@ use crate::quantity::AXES;
 use crate::quantity::Sensor;
 
 /// Kind of a candidate.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum CandidateKind {
     /// A named effect.
     Effect(&'static Effect),

@@ -300,10 +300,7 @@ fn leave_out_unknown(sensor: Sensor, effects: &[&FittedEffect], out: &mut Prepar
         let Some(fault) = other.channels().find(empty).map(Fault::Missing) else {
             continue;
         };
-        let slot = match sensor {
-            Sensor::Gyro => &mut dwell.gyro_fault,
-            Sensor::Accel => &mut dwell.accel_fault,
-        };
+        let slot = &mut dwell.faults[sensor];
         if slot.is_none() {
             *slot = Some(fault);
             let id = effect.candidate.id();

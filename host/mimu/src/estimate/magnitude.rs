@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::least_squares::{Linearized, Observability, Reweighted, minimize};
 use super::turn::Rest;
-use super::{Estimated, Failure, Observation};
+use super::{Estimated, Failure, LOWER, Observation};
 use crate::observable::Observable;
 use crate::quantity::{AXES, Sensor, plural};
 use crate::triad::{Part, Triad};
@@ -19,9 +19,6 @@ use crate::warning::Warning;
 
 /// Number of parameters: six of C, three of o.
 pub const PARAMETERS: usize = 9;
-
-/// Row and column of the six elements of C.
-const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// What is known of the input of a triad.
 #[derive(Debug, Clone, Copy)]

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use super::least_squares::{Linearized, Reweighted};
 use super::turn::{Rest, Rotations, Turn, across, between, by_forces};
-use super::{Estimated, Failure, Observation};
+use super::{Estimated, Failure, LOWER, Observation};
 use crate::observable::Observable;
 use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
@@ -22,9 +22,6 @@ use crate::warning::Warning;
 /// Parameters: six of C and three of o of the accelerometer, then nine of C and three of o of the gyro.
 const ACCEL: usize = 9;
 const ALL: usize = ACCEL + 12;
-
-/// Row and column of the six elements of the accelerometer's C.
-const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// The data of the joint fit.
 pub struct JointFit<'a> {

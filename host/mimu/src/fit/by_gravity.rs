@@ -98,7 +98,9 @@ pub(super) fn fit_gravity(
         };
         let turns = fit_turns(prepared, &accel, &parts, warnings);
         // If only the turns determined the accelerometer, and they do not determine the gyro, the poses are wrong.
-        if let (Err(_), Some(_), Err(failure)) = (&turns, &with_turns, by_poses.alone()) {
+        if let (Err(_), Some(_), Err(failure)) =
+            (&turns, &with_turns, by_poses.without(&|_| true, None))
+        {
             return Err(prepared.refused(by_poses.with_faces(failure), Sensor::Accel));
         }
         sensors.extend(turns?);
@@ -147,7 +149,7 @@ impl ByPoses<'_> {
     }
 
     fn estimate(&self) -> Outcome<(Estimated, Option<Guesses>)> {
-        let alone = magnitude::by_gravity(self.poses, self.variances, self.gravity());
+        let alone = self.without(&|_| true, None);
         let poor = !alone.as_ref().is_ok_and(|a| a.condition <= POOR_POSES);
         let enough = self.poses.len() >= magnitude::PARAMETERS;
         if poor
@@ -163,10 +165,7 @@ impl ByPoses<'_> {
     /// First guess: the readings as they came if they are in SI, otherwise by the sphere through them.
     fn first_accel(&self) -> Option<Affine<f64>> {
         match self.prepared.manifest.raw_unit {
-            RawUnit::Si => Some(Affine {
-                matrix: nalgebra::Matrix3::identity(),
-                offset: Vector3::zeros(),
-            }),
+            RawUnit::Si => Some(Affine::identity()),
             _ => magnitude::first_guess(self.poses, self.gravity()),
         }
     }
@@ -230,11 +229,6 @@ impl ByPoses<'_> {
             gravity: self.gravity(),
         }
         .estimate()
-    }
-
-    /// The accelerometer by the magnitude of gravity in its poses.
-    fn alone(&self) -> Outcome<Estimated> {
-        magnitude::by_gravity(self.poses, self.variances, self.gravity())
     }
 
     /// `failure`, naming the faces that no pose had up.

@@ -205,10 +205,7 @@ mod tests {
                 covariance[(row, column)] = nine[(i, j)];
             }
         }
-        let one = Affine {
-            matrix: nalgebra::Matrix3::identity(),
-            offset: Vector3::zeros(),
-        };
+        let one = Affine::identity();
         let part = crate::triad::Part {
             covariance,
             dof: 9.0,
@@ -236,10 +233,7 @@ mod tests {
 
     #[test]
     fn the_face_that_was_never_up_is_named() {
-        let one = Affine {
-            matrix: nalgebra::Matrix3::identity(),
-            offset: Vector3::zeros(),
-        };
+        let one = Affine::identity();
         let raw: Vec<Vector3<f64>> = directions()
             .into_iter()
             .filter(|(name, _)| !name.contains("-x"))

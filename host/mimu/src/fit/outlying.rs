@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use super::by_gravity::POOR_POSES;
 use crate::estimate::turn::{Turn, sensitivity};
-use crate::estimate::{Estimated, Observation, magnitude, rotation};
+use crate::estimate::{Estimated, LOWER, Observation, magnitude, rotation};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{AXES, Sensor};
 use crate::signal::blocks::quantile;
@@ -133,8 +133,7 @@ fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64
     let rows = poses.iter().enumerate().map(|(k, o)| {
         let direction = up[k].normalize();
         // Derivatives by the lower triangle of C, which magnitudes determine, and by o.
-        let by = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-        let slope = |j: usize| match by.get(j) {
+        let slope = |j: usize| match LOWER.get(j) {
             Some((row, column)) => direction[*row] * o.raw[*column],
             None => direction[j - 6],
         };

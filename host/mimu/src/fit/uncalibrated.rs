@@ -4,7 +4,7 @@
 //! whose direction of gravity was 1.65 degrees off in sample, while that of the readings themselves was 0.44 degrees off.
 
 use mimu_core::compensation::Affine;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::sensor::{SensorFit, rms};
 use crate::estimate::Observation;
@@ -12,7 +12,6 @@ use crate::estimate::turn::{Turn, direction_error};
 use crate::prepared::Prepared;
 use crate::quantity::Figure;
 use crate::warning::Warning;
-use mimu_recording::RawUnit;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Error of readings in SI whose inputs are known.
@@ -20,7 +19,9 @@ pub(super) fn inputs<'a>(
     prepared: &Prepared,
     observations: impl Iterator<Item = &'a Observation>,
 ) -> Option<f64> {
-    in_si(prepared).then(|| rms(Figure::Input, observations.map(|o| o.raw - o.input)))
+    prepared
+        .is_in_si()
+        .then(|| rms(Figure::Input, observations.map(|o| o.raw - o.input)))
 }
 
 /// Error of the magnitudes of readings in SI; `known` has each with its known magnitude.
@@ -32,15 +33,11 @@ pub(super) fn magnitudes(
     let errors = known
         .iter()
         .map(|(o, magnitude)| Vector3::new(o.raw.norm() - magnitude, 0.0, 0.0));
-    in_si(prepared).then(|| rms(figure, errors))
+    prepared.is_in_si().then(|| rms(figure, errors))
 }
 
 /// Error of the directions after turns, both sensors uncalibrated.
 pub(super) fn directions(prepared: &Prepared, turns: &[Turn]) -> Option<f64> {
-    let gyro = Affine {
-        matrix: Matrix3::identity(),
-        offset: Vector3::zeros(),
-    };
     let errors = turns.iter().map(|turn| {
         let [before, after] = turn.raw;
         let turn = Turn {
@@ -48,13 +45,9 @@ pub(super) fn directions(prepared: &Prepared, turns: &[Turn]) -> Option<f64> {
             after,
             ..*turn
         };
-        direction_error(&turn, &gyro)
+        direction_error(&turn, &Affine::identity())
     });
-    in_si(prepared).then(|| rms(Figure::Direction, errors))
-}
-
-fn in_si(prepared: &Prepared) -> bool {
-    prepared.manifest.raw_unit == RawUnit::Si
+    prepared.is_in_si().then(|| rms(Figure::Direction, errors))
 }
 
 /// Warns of a calibration that does no better than the uncalibrated readings.

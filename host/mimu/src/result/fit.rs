@@ -307,7 +307,7 @@ impl DwellResult {
     }
 
     fn of(dwell: &Dwell, labels: &[String]) -> Self {
-        let fault = |sensor| dwell.fault(sensor).map(|f| f.to_string());
+        let fault = |sensor| dwell.faults[sensor].map(|f| f.to_string());
         let label = usize::try_from(dwell.step).ok().and_then(|s| labels.get(s));
         Self {
             step: dwell.step,

@@ -640,6 +640,16 @@ impl Condenser {
     }
 }
 
+/// Standard deviation of normal deviations over the median of their magnitudes.
+pub(crate) const OF_MEDIAN: f64 = 1.4826;
+
+/// The lowest and the highest of `values`; the infinities, the higher one first, without any.
+pub fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+        [low.min(v), high.max(v)]
+    })
+}
+
 /// A range of blocks, with its step if that is given.
 pub(crate) type StepBlocks = (Option<i32>, std::ops::Range<usize>);
 

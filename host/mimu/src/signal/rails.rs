@@ -1,7 +1,7 @@
 //! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
 
 use crate::quantity::{significant, unsigned_zero};
-use crate::signal::blocks::{Condensed, Moments, Rails, quantile};
+use crate::signal::blocks::{Condensed, Moments, Rails, extent, quantile};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS};
@@ -160,8 +160,7 @@ pub(crate) fn find(
         }
         let moments = || condensed.blocks.iter().map(|b| &b.raw[c]);
         let known = || moments().filter(|m| m.n > 0);
-        let high = known().map(|m| m.max).fold(f64::NEG_INFINITY, f64::max);
-        let low = known().map(|m| m.min).fold(f64::INFINITY, f64::min);
+        let [low, high] = extent(known().flat_map(|m| [m.min, m.max]));
         if low == high {
             continue;
         }
@@ -197,8 +196,7 @@ fn coarse_step_at_rest(condensed: &Condensed, c: usize) -> Option<f64> {
                 .map(|b| &b.raw[o])
                 .filter(|m| m.n > 0)
         };
-        let high = known().map(|m| m.max).fold(f64::NEG_INFINITY, f64::max);
-        let low = known().map(|m| m.min).fold(f64::INFINITY, f64::min);
+        let [low, high] = extent(known().flat_map(|m| [m.min, m.max]));
         let step = condensed.quantisation_step[o]?;
         if high - low > AT_REST_STEPS * step {
             return None;

@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use crate::quantity::Sensor;
-use crate::signal::blocks::{Condensed, StepBlocks, pool, quantile};
+use crate::signal::blocks::{Condensed, OF_MEDIAN, StepBlocks, pool, quantile};
 
 /// Number of blocks whose mean is compared with that of the middle: the noise of a single block would hide a slow turn.
 const GROUP: usize = 3;
@@ -19,8 +19,6 @@ const AMONG_DWELLS: f64 = 8.0;
 const BEYOND: f64 = 2.0;
 /// Fewer dwells do not show what is usual.
 const FEWEST: usize = 7;
-/// From a median absolute deviation to a standard deviation.
-const OF_MEDIAN: f64 = 1.4826;
 
 fn mean(condensed: &Condensed, blocks: Range<usize>, c: usize) -> f64 {
     pool(condensed.blocks[blocks].iter().map(|b| b.raw[c])).mean

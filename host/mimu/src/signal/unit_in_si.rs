@@ -70,7 +70,7 @@ pub(crate) fn at_rest(list: &[Dwell], manifest: &Manifest) -> Vec<Warning> {
         return Vec::new();
     }
     let usual = |sensor: Sensor| {
-        let usable = list.iter().filter(|d| d.fault(sensor).is_none());
+        let usable = list.iter().filter(|d| d.faults[sensor].is_none());
         let sizes = usable.map(|d| d.raw_mean(sensor).norm());
         let mut sizes: Vec<f64> = sizes.filter(|size| *size > 0.0).collect();
         quantile(&mut sizes, 0.5)

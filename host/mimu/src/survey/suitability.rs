@@ -2,7 +2,7 @@
 
 use super::segment::{FEWEST, Part, Segment, longest, segments};
 use crate::quantity::{duration, unsigned_zero};
-use crate::signal::blocks::quantile;
+use crate::signal::blocks::{OF_MEDIAN, quantile};
 use crate::signal::stillness::{STILL_FACTOR, WINDOW_S};
 use crate::warning::Warning;
 use mimu_recording::RAW_COLUMNS;
@@ -120,7 +120,7 @@ pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Sui
         .max(least);
     // A slow turn does not show in the variance, but the mean jumps where it begins and ends; a drift does not jump.
     let mut steps: Vec<f64> = means.windows(2).map(|m| (m[1] - m[0]).abs()).collect();
-    let sigma = 1.4826 * quantile(&mut steps.clone(), 0.5).unwrap_or(0.0);
+    let sigma = OF_MEDIAN * quantile(&mut steps.clone(), 0.5).unwrap_or(0.0);
     let reach = STEP_SIGMAS * sigma.max((floor / window as f64).sqrt());
     steps.insert(0, 0.0);
     let moving = variances

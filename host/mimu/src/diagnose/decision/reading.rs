@@ -16,6 +16,7 @@ use crate::diagnose::variance::{Fitted, LikelihoodKind};
 use crate::effects::quantity::Conditions;
 use crate::fit::Split;
 use crate::observable::{Observable, StratumName};
+use crate::signal::blocks::extent;
 
 /// Numbers of segments that the range of the readings is divided into.
 const PIECES: [usize; 3] = [4, 16, 64];
@@ -44,11 +45,7 @@ impl<'a> Readings<'a> {
     fn new(rows: &'a Rows, conditions: Vec<Conditions>) -> Self {
         let range = |axis: usize| {
             let all = conditions.iter().map(|m| m.reading.mean[axis]);
-            let (low, high) = all
-                .filter(|u| u.is_finite())
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), u| {
-                    (a.min(u), b.max(u))
-                });
+            let [low, high] = extent(all.filter(|u| u.is_finite()));
             (low, high - low)
         };
         Self {

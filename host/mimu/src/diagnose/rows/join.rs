@@ -4,20 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::build::{Part, common_step};
 use super::{Row, Rows};
+use crate::diagnose::search::unit_columns;
 use crate::effects::temperature::without_self_heating;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
-
-/// Columns scaled to length 1; zero columns stay zero.
-fn scaled(mut nuisance: DMatrix<f64>) -> DMatrix<f64> {
-    for mut column in nuisance.column_iter_mut() {
-        let norm = column.norm();
-        if norm > 0.0 {
-            column /= norm;
-        }
-    }
-    nuisance
-}
 
 /// For each part the places of its nuisance columns among those of all, and how many there are. Recordings with the same
 /// reference share the columns of the matrix; each has separate columns for its biases.
@@ -143,7 +133,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         y,
         parameters,
         by_matrix,
-        nuisance: scaled(nuisance),
+        nuisance: unit_columns(&nuisance),
         strata,
         figure,
         judged: (judged, together),
