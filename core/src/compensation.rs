@@ -83,6 +83,14 @@ impl core::fmt::Display for Implausible {
 impl core::error::Error for Implausible {}
 
 impl<T: RealField + Copy> Affine<T> {
+    /// The model of readings that are in SI already.
+    pub fn identity() -> Self {
+        Self {
+            matrix: Matrix3::identity(),
+            offset: Vector3::zeros(),
+        }
+    }
+
     /// Refuses a model that no sensor can have. `slope`: derivative of the model by the temperature, per kelvin.
     pub fn check(&self, slope: Option<&Self>) -> Result<(), Implausible> {
         let finite = |of: &Self| of.matrix.iter().chain(&of.offset).all(T::is_finite);

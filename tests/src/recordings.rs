@@ -254,7 +254,7 @@ pub fn dwell_rows(fit: &Fit) -> Vec<std::ops::Range<usize>> {
     let usable = fit.prepared.dwells.list.iter().filter(|d| {
         mimu::quantity::Sensor::BOTH
             .iter()
-            .all(|s| d.fault(*s).is_none())
+            .all(|s| d.faults[*s].is_none())
     });
     usable
         .map(|d| d.first_row as usize..(d.first_row + d.rows) as usize)

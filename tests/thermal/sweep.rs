@@ -112,7 +112,7 @@ fn once(plan: &str, rig: &str, stated: bool, seed: u64) -> Outcome {
     let file = unit(rig, seed);
     let mut recorded = session(plan, &file, seed);
     if stated {
-        recorded.stated = at_rest(&file, seed);
+        recorded.noise_at_rest = at_rest(&file, seed);
     }
     let options = Options {
         estimator: Estimator::Joint,

@@ -42,7 +42,7 @@ pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
         .dwells
         .list
         .iter()
-        .filter(|d| d.accel_fault.is_none());
+        .filter(|d| d.faults.accel.is_none());
     let ups: Vec<Vector3<f64>> = used
         .map(|dwell| model.apply(&dwell.raw_mean(Sensor::Accel)))
         .filter(|force| force.norm().is_finite() && force.norm() > 0.0)

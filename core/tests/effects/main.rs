@@ -61,10 +61,7 @@ impl Mounted {
 }
 
 fn si() -> Affine<f64> {
-    Affine {
-        matrix: Matrix3::identity(),
-        offset: Vector3::zeros(),
-    }
+    Affine::identity()
 }
 
 fn with(effects: &[DeviceEffect<f64>], inverse: &Affine<f64>) -> Eight {

@@ -3,27 +3,28 @@
 //! An Allan variance is the spectrum through a filter an octave wide: a building that sways at 0.56 Hz bends it over a decade of averaging
 //! times, without showing the cause. In the spectrum the sway is a few frequencies of ten thousand.
 //!
-//! | module       | what                                                              |
-//! |--------------|-------------------------------------------------------------------|
-//! | `welch`      | averaged periodograms, two-sided densities                        |
-//! | `floor`      | local floor of one, from the medians beside each frequency        |
-//! | `search`     | which frequencies stand above it, by more than chance             |
-//! | `transform`  | the whole series by frequency                                     |
-//! | `sinusoid`   | amplitude, phase and frequency of a steady line                   |
-//! | `flatten`    | bands brought down to the floor                                   |
-//! | `set_aside`  | all of these: a series without its lines, and the lines           |
-//! | `white`      | N from the band in which the spectrum is flat                     |
+//! | module         | what                                                       |
+//! |----------------|------------------------------------------------------------|
+//! | `welch`        | averaged periodograms, two-sided densities                 |
+//! | `floor`        | local floor of one, from the medians beside each frequency |
+//! | `search`       | which frequencies stand above it, by more than chance      |
+//! | `transform`    | the whole series by frequency                              |
+//! | `sinusoid`     | amplitude, phase and frequency of a steady line            |
+//! | `flatten`      | bands brought down to the floor                            |
+//! | `remove_lines` | all of these: a series without its lines, and the lines    |
+//! | `white`        | N from the band in which the spectrum is flat              |
 
 mod flatten;
 mod floor;
 mod line;
+mod remove_lines;
 mod search;
-mod set_aside;
 mod sinusoid;
 mod transform;
 mod welch;
 mod white;
 
 pub use self::line::Line;
-pub use self::set_aside::{SetAside, set_aside, set_aside_after};
+pub use self::remove_lines::{WithoutLines, remove_lines, remove_lines_after};
+pub(crate) use self::welch::sum_over;
 pub use self::white::{White, white_band};

@@ -90,7 +90,7 @@ pub(crate) struct NoiseArgs {
 
 impl NoiseArgs {
     /// `prepared`, with the noise of the file if one is given.
-    pub(crate) fn state(&self, prepared: Prepared) -> Result<Prepared> {
+    pub(crate) fn apply(&self, prepared: Prepared) -> Result<Prepared> {
         match &self.file {
             Some(path) => prepared.with_noise(&NoiseFile::read(path)?),
             None => Ok(prepared),

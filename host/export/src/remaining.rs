@@ -278,11 +278,7 @@ fn effects(calibration: &Calibration) -> Result<Vec<Remaining>> {
     if calibration.effects().is_empty() {
         return Ok(Vec::new());
     }
-    let none = Affine {
-        matrix: Matrix3::identity(),
-        offset: Vector3::zeros(),
-    };
-    let models = Compensation::from_fn(|s| calibration.inverse(s).unwrap_or(none));
+    let models = Compensation::from_fn(|s| calibration.inverse(s).unwrap_or_else(Affine::identity));
     let limits = calibration.limits();
     let mut all = Vec::new();
     for effect in calibration.effects() {

@@ -23,9 +23,7 @@ pub use over_temperature::{
 
 use std::path::Path;
 
-use mimu_core::RealField;
-use mimu_core::compensation::{Affine, Compensation};
-use mimu_core::effects::Effects;
+use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -296,20 +294,6 @@ impl Calibration {
     /// The errors that the affine models lack.
     pub fn effects(&self) -> &[FittedEffect] {
         &self.effects
-    }
-
-    /// The effects as the device removes them: for each triad, up to N that run with every sample and N that do not. One that this build of `core`
-    /// cannot remove is refused by its id.
-    pub fn core_effects<T: RealField + Copy, const N: usize>(&self) -> Result<Effects<T, N>> {
-        on_device::core_effects(self)
-    }
-
-    /// The same, with a substitute among `models` for a sensor that is not calibrated.
-    pub(crate) fn effects_of_models<T: RealField + Copy, const N: usize>(
-        &self,
-        models: &Compensation<f64>,
-    ) -> Result<Effects<T, N>> {
-        on_device::effects_of_models(self, models)
     }
 
     /// The table of `sensor`.

@@ -1,6 +1,5 @@
 //! From a recording to a calibration of both triads, judged on held-out data.
 
-pub(crate) mod as_came;
 mod biases;
 mod by_gravity;
 pub(crate) mod by_rate;
@@ -15,11 +14,13 @@ mod outlying;
 pub mod plausible;
 mod sensor;
 pub mod session_bias;
+pub(crate) mod uncalibrated;
 
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::estimate::{Estimated, Observation};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
+use crate::signal::blocks::extent;
 use crate::triad::Triad;
 use crate::turntable::RatedDwells;
 use crate::warning::Warning;
@@ -165,7 +166,7 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         Reference::TurntableRate => Some(RatedDwells::of(&prepared)?),
         Reference::Table | Reference::Gravity => None,
     };
-    let at_none = rated.as_ref().and_then(|r| r.set_aside(&mut prepared));
+    let at_none = rated.as_ref().and_then(|r| r.exclude_dwells(&mut prepared));
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warnings.extend(without_temperature(&prepared));
@@ -179,15 +180,15 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     for sensor in &mut sensors {
         plausible::check(&prepared, sensor)?;
     }
-    let by_size = |s: &&SensorFit| s.figure == Figure::GravitySize;
-    let accel = sensors.iter().find(by_size);
+    let by_magnitude = |s: &&SensorFit| s.figure == Figure::GravityMagnitude;
+    let accel = sensors.iter().find(by_magnitude);
     let accel = accel.map(|s| s.estimated.triad.clone());
     // The gyro is listed first. If gravity is the only reference, it depends on the accelerometer, so this is checked before it.
     for sensor in sensors.iter().rev() {
         determined::check(&prepared, sensor, accel.as_ref())?;
     }
     for sensor in &mut sensors {
-        as_came::compare(sensor);
+        uncalibrated::compare(sensor);
         if let Some(before) = &with_all[sensor.sensor] {
             let raw = prepared.manifest.raw_unit;
             let of_sensor = change::changes(sensor.sensor, raw, before, &sensor.estimated.triad);
@@ -225,8 +226,7 @@ fn without_temperature(prepared: &Prepared) -> Option<Warning> {
             .map(|d| d.temp_c)
             .filter(|t| t.is_finite())
     };
-    let high = temperatures().fold(f64::NEG_INFINITY, f64::max);
-    let low = temperatures().fold(f64::INFINITY, f64::min);
+    let [low, high] = extent(temperatures());
     (high - low > ISOTHERMAL_C).then_some(Warning::WithoutTemperature(low, high, None))
 }
 
@@ -277,7 +277,7 @@ fn finish(
         dwells,
         static_rms,
         held_out,
-        as_came: None,
+        uncalibrated_rms: None,
         warnings,
     }
 }

@@ -37,7 +37,7 @@
 //! let manifest = Manifest::new("my unit", 100.0, g, RawUnit::Volt, Reference::Gravity);
 //! let options = Options::default();
 //!
-//! let prepared = Prepared::of(manifest, &samples, options.still_factor)?; // its dwells are found
+//! let prepared = Prepared::of(manifest, &samples, mimu::signal::stillness::STILL_FACTOR)?; // its dwells are found
 //! assert_eq!(prepared.dwells.list.len(), 12);
 //! let fitted = fit(prepared, options)?;
 //! let accel = fitted.sensor(Sensor::Accel).unwrap();

@@ -27,12 +27,12 @@ use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 
 /// Noise of one raw channel from a record at rest, at one temperature or several (fang, Table 5).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stated {
+pub struct NoiseAtRest {
     /// Temperature, °C, ascending, and the model there; a single model applies at all temperatures.
     nodes: Vec<(f64, AllanModel)>,
 }
 
-impl Stated {
+impl NoiseAtRest {
     /// The model at `temp_c`: interpolated linearly in the variances between the temperatures of the records, beyond them that of the
     /// nearest. If `temp_c` is unknown, that of the lowest.
     fn at(&self, temp_c: f64) -> AllanModel {
@@ -87,7 +87,7 @@ pub struct Noise {
     /// Gyro x, y, z, accelerometer x, y, z: within the dwells.
     pub channels: [ChannelNoise; 6],
     /// Their noise from a record at rest, if it is used.
-    stated: [Option<Stated>; 6],
+    at_rest: [Option<NoiseAtRest>; 6],
     /// Variances of a mean over a second, raw units squared, within the dwells and from a record at rest, if the two contradict each other.
     other: [Option<[f64; 2]>; 6],
     /// From the first dwell to the end of the last, s.
@@ -143,7 +143,7 @@ impl Noise {
         for sensor in Sensor::BOTH {
             for c in sensor.channels() {
                 if condensed.has_raw[c] {
-                    let of_sensor = dwells.iter().filter(|d| d.fault(sensor).is_none());
+                    let of_sensor = dwells.iter().filter(|d| d.faults[sensor].is_none());
                     let used: Vec<&Dwell> = of_sensor.filter(|d| !d.turn).collect();
                     let used = still(&used, sensor);
                     let usable = || used.iter().copied();
@@ -180,7 +180,7 @@ impl Noise {
         let end = |d: &Dwell| d.start_s + d.duration_s;
         Self {
             channels,
-            stated: Default::default(),
+            at_rest: Default::default(),
             other: Default::default(),
             session: [
                 dwells.first().map_or(0.0, |d| d.start_s),
@@ -205,13 +205,13 @@ impl Noise {
             Some(known) => known[sensor as usize],
             None => sensor
                 .channels()
-                .all(|c| self.stated[c].is_some() || self.channels[c].known),
+                .all(|c| self.at_rest[c].is_some() || self.channels[c].known),
         }
     }
 
     /// The noise of a channel from a record at rest, if it is used: the largest of each term over the temperatures.
-    pub fn largest_stated(&self, channel: usize) -> Option<AllanModel> {
-        let nodes = self.stated[channel].as_ref()?.nodes.iter();
+    pub fn largest_at_rest(&self, channel: usize) -> Option<AllanModel> {
+        let nodes = self.at_rest[channel].as_ref()?.nodes.iter();
         let largest = nodes.fold(AllanModel::default(), |all, (_, node)| AllanModel {
             white: all.white.max(node.white),
             flicker: all.flicker.max(node.flicker),
@@ -221,16 +221,16 @@ impl Noise {
     }
 
     /// Whether the variances of the means are known for each channel. If not, a fit to gravity uses the noise of the magnitude
-    /// ([`Noise::of_size`]).
+    /// ([`Noise::of_magnitude`]).
     pub fn is_by_channel(&self, sensor: Sensor) -> bool {
-        self.of_table.is_some() || self.is_stated(sensor)
+        self.of_table.is_some() || self.has_noise_at_rest(sensor)
     }
 
     /// Uses the noise of `file` instead of that within the dwells. A channel whose dwells contradict the file keeps its own noise, with a
     /// warning.
     ///
     /// Errors: the file has no scale factor to the unit of the readings, or lacks a channel.
-    pub fn state(
+    pub fn use_noise_at_rest(
         &mut self,
         file: &NoiseFile,
         manifest: &Manifest,
@@ -279,15 +279,15 @@ impl Noise {
                 ));
             }
             nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let stated = Stated { nodes };
+            let at_rest = NoiseAtRest { nodes };
             let mean_c = dwells.iter().map(|d| d.temp_c).sum::<f64>() / dwells.len() as f64;
             let second = [
                 self.channels[c].variance(1.0),
-                stated.at(mean_c).variance(1.0),
+                at_rest.at(mean_c).variance(1.0),
             ];
             let ratio = second[0] / second[1];
             if (1.0 / ANOTHER_NOISE..=ANOTHER_NOISE).contains(&ratio) {
-                self.stated[c] = Some(stated);
+                self.at_rest[c] = Some(at_rest);
             } else {
                 self.other[c] = Some(second);
                 let warning = Warning::NoisierThanFile(ratio.sqrt(), file.place.clone());
@@ -299,7 +299,11 @@ impl Noise {
 
     /// Noise of the magnitude of specific force after the calibration `accel`, m/s²: the noise in a fit to the magnitude of gravity. A unit
     /// that creeps on its support tilts, which changes the channels but not the magnitude.
-    pub fn of_size(dwells: &[Dwell], condensed: &Condensed, accel: &Affine<f64>) -> ChannelNoise {
+    pub fn of_magnitude(
+        dwells: &[Dwell],
+        condensed: &Condensed,
+        accel: &Affine<f64>,
+    ) -> ChannelNoise {
         let from = Sensor::Accel.channels().start;
         let force = |b: &Block| {
             let raw = Vector3::from_fn(|i, _| b.raw[from + i].mean);
@@ -313,28 +317,30 @@ impl Noise {
             let mut across = blocks.map(|f| f.normalize().cross(&up).norm());
             across.any(|sin| sin > SWINGS_BY)
         };
-        let usable = dwells.iter().filter(|d| d.accel_fault.is_none() && !d.turn);
+        let usable = dwells
+            .iter()
+            .filter(|d| d.faults.accel.is_none() && !d.turn);
         let still = usable.filter(|d| !turns(d));
         within(still, condensed, |b| force(b).map(|f| f.norm()))
     }
 
     /// Whether a record at rest gives the noise of all channels of `sensor`.
-    pub fn is_stated(&self, sensor: Sensor) -> bool {
-        self.stated[sensor.channels()].iter().all(Option::is_some)
+    pub fn has_noise_at_rest(&self, sensor: Sensor) -> bool {
+        self.at_rest[sensor.channels()].iter().all(Option::is_some)
     }
 
     /// If the dwells of channel `c` are noisier than its record at rest: the excess, as the standard deviation of a mean over a second,
     /// raw, and the ratio of the two standard deviations.
-    pub fn beyond_stated(&self, c: usize) -> Option<(f64, f64)> {
-        let [within, stated] = self.other[c]?;
-        let more = within > stated;
-        more.then(|| ((within - stated).sqrt(), (within / stated).sqrt()))
+    pub fn beyond_noise_at_rest(&self, c: usize) -> Option<(f64, f64)> {
+        let [within, at_rest] = self.other[c]?;
+        let more = within > at_rest;
+        more.then(|| ((within - at_rest).sqrt(), (within / at_rest).sqrt()))
     }
 
     /// Variance of the difference of two successive means over `tau_s` of channel `c`, halved, raw units squared.
     pub fn variance(&self, c: usize, tau_s: f64, temp_c: f64) -> f64 {
-        match &self.stated[c] {
-            Some(stated) => stated.at(temp_c).variance(tau_s),
+        match &self.at_rest[c] {
+            Some(at_rest) => at_rest.at(temp_c).variance(tau_s),
             None => self.channels[c].variance(tau_s),
         }
     }
@@ -350,10 +356,10 @@ impl Noise {
             });
         }
         let averaged_s = dwell.averaged_s(sensor);
-        Vector3::from_fn(|i, _| match &self.stated[from + i] {
+        Vector3::from_fn(|i, _| match &self.at_rest[from + i] {
             None => self.channels[from + i].variance(averaged_s),
-            Some(stated) => {
-                let model = stated.at(dwell.temp_c);
+            Some(at_rest) => {
+                let model = at_rest.at(dwell.temp_c);
                 let wander = Slow::from(model).covariance(&[span(dwell)], self.session);
                 model.white / averaged_s + wander[(0, 0)]
             }
@@ -364,20 +370,20 @@ impl Noise {
     /// variances of [`Noise::of_mean`]. `None` if no record at rest gives the wander.
     pub fn wander(&self, sensor: Sensor, dwells: &[Dwell]) -> Option<[DMatrix<f64>; 3]> {
         let from = sensor.channels().start;
-        let stated = || self.stated[from..from + 3].iter().flatten();
-        let wanders = |s: &Stated| s.nodes.iter().any(|n| n.1.flicker + n.1.walk > 0.0);
-        if !stated().any(wanders) {
+        let at_rest = || self.at_rest[from..from + 3].iter().flatten();
+        let wanders = |s: &NoiseAtRest| s.nodes.iter().any(|n| n.1.flicker + n.1.walk > 0.0);
+        if !at_rest().any(wanders) {
             return None;
         }
         let spans: Vec<Span> = dwells.iter().map(span).collect();
-        Some(std::array::from_fn(|i| match &self.stated[from + i] {
+        Some(std::array::from_fn(|i| match &self.at_rest[from + i] {
             None => DMatrix::zeros(dwells.len(), dwells.len()),
-            Some(stated) => {
+            Some(at_rest) => {
                 // The noise depends on temperature, so each mean has a separate amplitude.
                 let of = |part: fn(&mut AllanModel) -> &mut f64| {
                     let amplitude: Vec<f64> = dwells
                         .iter()
-                        .map(|d| part(&mut stated.at(d.temp_c)).sqrt())
+                        .map(|d| part(&mut at_rest.at(d.temp_c)).sqrt())
                         .collect();
                     let mut one = AllanModel::default();
                     *part(&mut one) = 1.0;

@@ -5,7 +5,7 @@
 
 use crate::noise::Noise;
 use crate::prepared::Prepared;
-use crate::quantity::Sensor;
+use crate::quantity::{PerSensor, Sensor};
 use crate::signal::blocks::{Block, Condensed, Level, Moments};
 use crate::signal::dwell::{Dwell, Dwells, Fault, Keep, Mean};
 use crate::warning::Warning;
@@ -35,7 +35,7 @@ impl Prepared {
             blocks,
             increments: Vec::new(),
             rows: means.poses.len() as u64,
-            reading_step: [None; 6],
+            quantisation_step: [None; 6],
             signed_low_byte: [None; 6],
             no_temperatures: Default::default(),
             has_raw,
@@ -104,8 +104,7 @@ fn dwell(i: usize, pose: &PoseMean, period_s: f64, has_raw: &[bool; 6]) -> Dwell
             false => f64::NAN,
         },
         blocks: i..i + 1,
-        gyro_fault: fault(Sensor::Gyro),
-        accel_fault: fault(Sensor::Accel),
+        faults: PerSensor::from_fn(fault),
         raw,
         reference,
         temp_c: pose.temp_c,
@@ -160,7 +159,7 @@ fn warnings(list: &[Dwell], means: &PoseMeans, has_raw: &[bool; 6]) -> Vec<Warni
             true => Warning::WhiteMeans,
         };
         warnings.push(noise.of(sensor));
-        let without = list.iter().filter(|d| d.fault(sensor).is_some()).count();
+        let without = list.iter().filter(|d| d.faults[sensor].is_some()).count();
         if without > 0 {
             warnings.push(Warning::MeansMissing(without, list.len()).of(sensor));
         }

@@ -128,14 +128,15 @@ impl Prepared {
             return Err(Error::new(&self.place, problem, "leave it out"));
         }
         let Dwells { list, warnings, .. } = &mut self.dwells;
-        self.noise.state(file, &self.manifest, list, warnings)?;
+        self.noise
+            .use_noise_at_rest(file, &self.manifest, list, warnings)?;
         Ok(self)
     }
 
     /// Excludes dwells and turns from the fit. They stay in the list of dwells, but observations and turns lack them.
     pub fn leave_out(&mut self, these: &[LeftOut]) {
         for dwell in these.iter().filter(|l| l.sensor == Sensor::Accel) {
-            self.dwells.list[dwell.from].accel_fault = Some(Fault::Outlying);
+            self.dwells.list[dwell.from].faults.accel = Some(Fault::Outlying);
         }
         self.dwells.left_out.extend_from_slice(these);
     }
@@ -155,10 +156,10 @@ impl Prepared {
     /// Excludes the dwells in which a table turns the accelerometer, if there are others: off the axis they contain a centripetal force
     /// that no reference gives.
     pub fn accel_at_rest(mut self) -> Self {
-        let usable = |d: &Dwell| d.accel_fault.is_none() && d.input(Sensor::Accel).is_some();
+        let usable = |d: &Dwell| d.faults.accel.is_none() && d.input(Sensor::Accel).is_some();
         if self.dwells.list.iter().any(|d| usable(d) && !d.spins()) {
             for dwell in self.dwells.list.iter_mut().filter(|d| d.spins()) {
-                dwell.accel_fault.get_or_insert(Fault::Spinning);
+                dwell.faults.accel.get_or_insert(Fault::Spinning);
             }
         }
         self
@@ -173,7 +174,7 @@ impl Prepared {
             .iter()
             .enumerate()
             // A turn of known angle is not a pose.
-            .filter(|(_, d)| d.fault(sensor).is_none() && (table || !d.turn));
+            .filter(|(_, d)| d.faults[sensor].is_none() && (table || !d.turn));
         usable
             .filter_map(|(i, d)| {
                 let input = d.input(sensor);
@@ -215,7 +216,7 @@ impl Prepared {
     pub(crate) fn observation(&self, sensor: Sensor, contrast: &Contrast) -> Option<Observation> {
         let dwell = &self.dwells.list[contrast.dwell];
         let [input, change] = contrast.known[sensor as usize]?;
-        if dwell.fault(sensor).is_some() || !self.has(sensor) {
+        if dwell.faults[sensor].is_some() || !self.has(sensor) {
             return None;
         }
         let from = sensor.channels().start;
@@ -289,34 +290,37 @@ impl Prepared {
         sum / self.dwells.list.len().max(1) as f64
     }
 
-    /// Noise variances of the magnitude of specific force in each of `poses`, (m/s²)².
-    pub fn size_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
+    /// Whether the readings are in SI.
+    pub(crate) fn is_in_si(&self) -> bool {
+        self.manifest.raw_unit == mimu_recording::RawUnit::Si
+    }
+
+    /// Noise variances of the magnitude of specific force in each of `poses`, (m/s²)², and whether the noise is known.
+    fn magnitude_noise(&self, accel: &Affine<f64>, poses: &[Observation]) -> (Vec<f64>, bool) {
         if self.noise.is_by_channel(Sensor::Accel) {
-            let size = |o: &Observation| {
+            let magnitude = |o: &Observation| {
                 let by = accel.matrix.tr_mul(&accel.apply(&o.raw).normalize());
                 by.component_mul(&by).dot(&o.variance)
             };
-            return poses.iter().map(size).collect();
+            let known = self.noise.is_known(Sensor::Accel);
+            return (poses.iter().map(magnitude).collect(), known);
         }
-        let noise = Noise::of_size(&self.dwells.list, &self.condensed, accel);
-        poses
-            .iter()
-            .map(|o| noise.variance(self.dwells.list[o.dwell].averaged_s(Sensor::Accel)))
-            .collect()
+        let noise = Noise::of_magnitude(&self.dwells.list, &self.condensed, accel);
+        let averaged_s = |o: &Observation| self.dwells.list[o.dwell].averaged_s(Sensor::Accel);
+        let each = poses.iter().map(|o| noise.variance(averaged_s(o)));
+        (each.collect(), noise.known)
+    }
+
+    /// Noise variances of the magnitude of specific force in each of `poses`, (m/s²)².
+    pub fn magnitude_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
+        self.magnitude_noise(accel, poses).0
     }
 
     /// Standard deviations of the same, for people; not a number if the noise is unknown.
-    pub fn size_floors(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
-        let by_channel = self.noise.is_by_channel(Sensor::Accel);
-        let known = match by_channel {
-            true => self.noise.is_known(Sensor::Accel),
-            false => Noise::of_size(&self.dwells.list, &self.condensed, accel).known,
-        };
+    pub fn magnitude_floors(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
+        let (variances, known) = self.magnitude_noise(accel, poses);
         let floor = |v: &f64| if known { v.sqrt() } else { f64::NAN };
-        self.size_variances(accel, poses)
-            .iter()
-            .map(floor)
-            .collect()
+        variances.iter().map(floor).collect()
     }
 
     /// `floor`, a figure from the noise of `sensors`; not a number if that is unknown.
@@ -333,7 +337,7 @@ impl Prepared {
         let usable: Vec<usize> = (0..self.dwells.list.len())
             .filter(|&i| {
                 let dwell = &self.dwells.list[i];
-                !dwell.turn && Sensor::BOTH.iter().all(|s| dwell.fault(*s).is_none())
+                !dwell.turn && Sensor::BOTH.iter().all(|s| dwell.faults[*s].is_none())
             })
             .collect();
         let earth = self.earth();

@@ -22,9 +22,9 @@ pub enum Figure {
     /// Compensated dwell mean minus known input, over dwells and axes: SI of the sensor.
     Input,
     /// Magnitude of the compensated dwell mean minus gravity, m/s².
-    GravitySize,
+    GravityMagnitude,
     /// Magnitude of the compensated dwell mean minus the rate of the turntable, rad/s.
-    RateSize,
+    RateMagnitude,
     /// Angle between the predicted and the measured direction of gravity after each turn, rad.
     Direction,
 }
@@ -46,15 +46,15 @@ impl Figure {
 
     /// Whether only the magnitude of the input is known, so that the triad's own axes are its frame.
     pub fn is_magnitude(self) -> bool {
-        matches!(self, Self::GravitySize | Self::RateSize)
+        matches!(self, Self::GravityMagnitude | Self::RateMagnitude)
     }
 
     /// The quantity, as a sentence fragment.
     pub fn description(self) -> &'static str {
         match self {
             Self::Input => "compensated dwell mean minus known input, over dwells and axes",
-            Self::GravitySize => "magnitude of the compensated dwell mean minus gravity",
-            Self::RateSize => {
+            Self::GravityMagnitude => "magnitude of the compensated dwell mean minus gravity",
+            Self::RateMagnitude => {
                 "magnitude of the compensated dwell mean minus the rate of the turntable"
             }
             Self::Direction => "angle between predicted and measured gravity after each turn",

@@ -12,6 +12,7 @@ use crate::fault::Fault;
 use crate::fit::{Fit, SensorFit, faces_not_up};
 use crate::prepared::Prepared;
 use crate::quantity::{AXES, Figure, Sensor, significant};
+use crate::signal::blocks::extent;
 use crate::warning::Warning;
 use mimu_recording::RawUnit;
 
@@ -148,7 +149,7 @@ impl RecordingProblem {
             all.push(Self::SlowForTurns(rate_hz));
         }
         let missing = accel
-            .filter(|a| a.figure == Figure::GravitySize)
+            .filter(|a| a.figure == Figure::GravityMagnitude)
             .and_then(|accel| {
                 let poses = prepared.observations(Sensor::Accel);
                 let raw: Vec<_> = poses.iter().map(|o| o.raw).collect();
@@ -190,9 +191,7 @@ impl RecordingProblem {
         let mut all = Vec::new();
         let blocks = prepared.condensed.blocks.iter().map(|b| b.temp_c.mean);
         let known = blocks.filter(|t| t.is_finite());
-        let [low, high] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| {
-            [low.min(t), high.max(t)]
-        });
+        let [low, high] = extent(known);
         if low <= high && !(USUAL_C.contains(&low) && USUAL_C.contains(&high)) {
             all.push(Self::Temperatures(low, high));
         }

@@ -6,8 +6,8 @@
 mod ahead;
 mod columns;
 mod masking;
+mod segment;
 mod several;
-mod stretch;
 mod suitability;
 pub mod unit;
 mod values;
@@ -15,9 +15,9 @@ mod values;
 use self::ahead::ahead;
 use self::columns::Columns;
 pub use self::masking::Masked;
+pub use self::segment::Part;
+use self::segment::{Segment, temperature};
 pub use self::several::survey_all;
-pub use self::stretch::Part;
-use self::stretch::{Stretch, temperature};
 use self::unit::Unit;
 use self::values::{Read, Values};
 use crate::calibration::Calibration;
@@ -29,7 +29,7 @@ use mimu_allan::deviation::Integrated;
 use mimu_allan::model::{
     Coefficient, Estimator, NoiseModel, Term, allan_factors, hadamard_factors,
 };
-use mimu_allan::spectrum::{SetAside, set_aside_after};
+use mimu_allan::spectrum::{WithoutLines, remove_lines_after};
 use mimu_allan::{Deviation, NotFinite, Point, Spacing};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, NoTemperatures, RAW_COLUMNS, RawUnit, Recording};
@@ -67,7 +67,7 @@ pub struct Channel {
     /// Hadamard deviation, if the curve shows a drift.
     pub hadamard: Option<Vec<Point>>,
     /// Lines of its spectrum, which the model excludes.
-    pub spectrum: SetAside,
+    pub spectrum: WithoutLines,
     /// [`Channel::curve`] without the lines, if there are any.
     pub without_lines: Option<Vec<Point>>,
     /// The noise model; `None` where the record has too few octaves for one.
@@ -121,15 +121,15 @@ pub fn survey(
     let mut columns = Columns::open(recording, &indices, &progress)?;
     let read = recording.warnings.iter().cloned();
     let mut warnings: Vec<Warning> = read.map(Warning::Reading).collect();
-    let stretch = Stretch::find(&mut columns, recording, options.part, &place, &mut warnings)?;
+    let segment = Segment::find(&mut columns, recording, options.part, &place, &mut warnings)?;
     let temp_c = match recording.columns.temp_c {
         true => {
             let mut temp_c = columns.take(Column::Temperature)?;
             let mut none = NoTemperatures::default();
-            let times = (0..).map(|k| stretch.span_s[0] + f64::from(k) * stretch.period_s);
-            no_temperature::leave_empty(&mut temp_c[stretch.rows.clone()], times, &mut none);
+            let times = (0..).map(|k| segment.span_s[0] + f64::from(k) * segment.period_s);
+            no_temperature::leave_empty(&mut temp_c[segment.rows.clone()], times, &mut none);
             warnings.extend(no_temperature::warning(&none));
-            temperature(&temp_c, &stretch.rows)
+            temperature(&temp_c, &segment.rows)
         }
         false => None,
     };
@@ -139,7 +139,7 @@ pub fn survey(
     let read = |done: usize| {
         let (i, unit) = (indices[done], units[done]);
         let values = columns.take(Column::Raw(i))?;
-        Values::of(values, &stretch, options.part, i, unit, &place)
+        Values::of(values, &segment, options.part, i, unit, &place)
     };
     ahead(&place, indices.len(), read, |done, read, next| {
         let i = indices[done];
@@ -155,7 +155,7 @@ pub fn survey(
         warnings.extend(values.warnings);
         let samples = values.rates.len();
         if !estimators.iter().any(|(n, _)| *n == samples) {
-            let new = Estimator::new(samples, stretch.period_s, options.confidence);
+            let new = Estimator::new(samples, segment.period_s, options.confidence);
             estimators.push((samples, new));
         }
         let estimator = estimators.iter().find(|(n, _)| *n == samples);
@@ -164,10 +164,10 @@ pub fn survey(
             .and_then(|t| t.against(&values.suitability.levels));
         judged.push((i, values.suitability));
         let mut rates = values.rates;
-        let dt_s = stretch.period_s;
+        let dt_s = segment.period_s;
         // Only its curves are kept: the integral is as long as the series.
         let mut as_it_is = None;
-        let spectrum = set_aside_after(&mut rates, dt_s, options.confidence, |rates| {
+        let spectrum = remove_lines_after(&mut rates, dt_s, options.confidence, |rates| {
             as_it_is = Some(AsItIs::of(rates, dt_s, &options));
         });
         let without_lines = Integrated::new(rates, dt_s).map_err(not_finite)?;
@@ -215,13 +215,13 @@ pub fn survey(
         (levels.len() == 3).then(|| square.sqrt())
     });
     warnings.extend(of_sizes(sizes, &recording.manifest));
-    suitability::refuse_motion(&judged, &stretch, options.part, &place, &mut warnings)?;
+    suitability::refuse_motion(&judged, &segment, options.part, &place, &mut warnings)?;
     Ok(Survey {
         recording: recording.directory.display().to_string(),
         device: recording.manifest.device.clone(),
         temp_c: temp_c.map(|t| t.mean_c),
-        sample_rate_hz: 1.0 / stretch.period_s,
-        span_s: stretch.span_s,
+        sample_rate_hz: 1.0 / segment.period_s,
+        span_s: segment.span_s,
         options,
         channels,
         warnings,
@@ -322,7 +322,7 @@ impl Channel {
             masked: None,
             curve: Vec::new(),
             hadamard: None,
-            spectrum: SetAside::default(),
+            spectrum: WithoutLines::default(),
             without_lines: None,
             model: None,
             n_band_hz: None,

@@ -141,7 +141,7 @@ fn students_factor(dof: f64) -> f64 {
 }
 
 /// Half of a 95 % interval of a normal variable, in sigmas.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
+pub(crate) const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// Calibration of one triad.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,12 +11,11 @@ use crate::estimate::{Observation, magnitude};
 use crate::prepared::Prepared;
 use crate::quantity::{Sensor, significant};
 use crate::signal::dwell::Fault;
+use crate::triad::NORMAL_95;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Turntable};
 
-/// Half of a 95 % interval of a normal variable, in sigmas.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 /// Expected standard deviations of the readings. At rest, relative to the largest rate: the bias wanders. At a rate, relative to it: scale
 /// factors differ from axis to axis.
 const REST_SIGMA: f64 = 0.02;
@@ -129,14 +128,14 @@ impl RatedDwells {
 
     /// Excludes the turning dwells for the accelerometer, which senses an unknown centripetal force off the axis, and those at another rate
     /// for both sensors. Returns the warning about the latter.
-    pub fn set_aside(&self, prepared: &mut Prepared) -> Option<Warning> {
+    pub fn exclude_dwells(&self, prepared: &mut Prepared) -> Option<Warning> {
         let turning = self.turning.iter().map(|o| o.dwell);
         for dwell in turning.chain(self.others.iter().copied()) {
             let dwell = &mut prepared.dwells.list[dwell];
-            dwell.accel_fault.get_or_insert(Fault::Spinning);
+            dwell.faults.accel.get_or_insert(Fault::Spinning);
         }
         for dwell in &self.others {
-            prepared.dwells.list[*dwell].gyro_fault = Some(Fault::OtherRate);
+            prepared.dwells.list[*dwell].faults.gyro = Some(Fault::OtherRate);
         }
         let step = |dwell: &usize| prepared.dwells.list[*dwell].step;
         let steps = self.others.iter().map(step);

@@ -64,7 +64,7 @@ impl Basis {
     }
 
     /// Number of functions.
-    pub fn len(&self) -> usize {
+    pub fn functions(&self) -> usize {
         match self.shape {
             Shape::Constant => 1,
             Shape::Line => 2,
@@ -73,16 +73,11 @@ impl Basis {
         }
     }
 
-    /// Never: a constant is a function.
-    pub fn is_empty(&self) -> bool {
-        false
-    }
-
     /// How many combinations of them the penalty leaves free.
     pub fn free(&self) -> usize {
         match self.shape {
             Shape::Spline => 2,
-            _ => self.len(),
+            _ => self.functions(),
         }
     }
 
@@ -162,7 +157,7 @@ impl Basis {
     /// The penalties: integrals over the range of products of second derivatives, 1/K³, and of fourth derivatives, 1/K⁷, the latter by
     /// differences of the coefficients. The first leaves a line free, the second a cubic. Zero for other shapes than splines.
     pub fn penalties(&self) -> [DMatrix<f64>; 2] {
-        let n = self.len();
+        let n = self.functions();
         let mut second = DMatrix::zeros(n, n);
         let mut fourth = DMatrix::zeros(n, n);
         if self.shape != Shape::Spline {
@@ -189,9 +184,13 @@ impl Basis {
             Shape::Spline => {
                 let h = 2.0 / self.intervals as f64;
                 let line = |i: usize| -1.0 + (i as f64 - 1.0) * h;
-                DMatrix::from_fn(self.len(), 2, |i, j| if j == 0 { 1.0 } else { line(i) })
+                DMatrix::from_fn(
+                    self.functions(),
+                    2,
+                    |i, j| if j == 0 { 1.0 } else { line(i) },
+                )
             }
-            _ => DMatrix::identity(self.len(), self.len()),
+            _ => DMatrix::identity(self.functions(), self.functions()),
         }
     }
 }
@@ -230,7 +229,7 @@ mod tests {
     #[test]
     fn the_penalty_of_a_line_is_nothing_and_that_of_a_parabola_its_curvature() {
         let basis = Basis::new(Shape::Spline, [0.0, 80.0]);
-        let n = basis.len();
+        let n = basis.functions();
         // Coefficients of a function that is quadratic are its values at the centres, up to a constant.
         let centre = |i: usize| (i as f64 - 1.0) * 80.0 / (n - 3) as f64;
         let line = nalgebra::DVector::from_fn(n, |i, _| 3.0 - 0.2 * centre(i));

@@ -184,7 +184,7 @@ impl TriadCurves {
         let mut terms = Vec::new();
         for (temp_c, sign) in temps.into_iter().zip([-1.0, 1.0]) {
             let (from, values) = basis.values(temp_c);
-            let used = values.iter().take(basis.len() - from).enumerate();
+            let used = values.iter().take(basis.functions() - from).enumerate();
             terms.extend(used.map(|(k, v)| (first + from + k, sign * v)));
         }
         let change: f64 = terms.iter().map(|(k, v)| v * fitted.coefficients[*k]).sum();
@@ -219,7 +219,7 @@ impl TriadCurves {
                     false => basis.values(temp_c),
                 };
                 let coefficients = &fit.axes[axis].coefficients;
-                let used = values.iter().take(basis.len() - from).enumerate();
+                let used = values.iter().take(basis.functions() - from).enumerate();
                 let value: f64 = used
                     .map(|(k, v)| v * coefficients[part.from + from + k])
                     .sum();
@@ -250,7 +250,7 @@ impl TriadCurves {
                 .map(|p| {
                     let basis = problem.basis(p.kind);
                     let (from, v) = basis.values(temp_c);
-                    (p.from + from, (basis.len() - from).min(4), v)
+                    (p.from + from, (basis.functions() - from).min(4), v)
                 })
                 .collect();
             let known = &fit.axes[axis].covariance;

@@ -140,7 +140,7 @@ impl<'a> Evaluator<'a> {
                     &self.smoothness,
                     &self.noise[axis],
                 );
-                self.noise[axis] = self.with_stated(axis);
+                self.noise[axis] = self.with_noise_at_rest(axis);
             }
             if self.noise.iter().all(|n| n.wander == 0.0) || self.evaluate(lag_s, starts).is_none()
             {
@@ -151,16 +151,19 @@ impl<'a> Evaluator<'a> {
 
     /// The noise of `axis`. If a record at rest gives more bias wander than the recording shows, that wander is used: a recording hardly
     /// shows wander slower than itself.
-    fn with_stated(&self, axis: usize) -> AxisNoise {
+    fn with_noise_at_rest(&self, axis: usize) -> AxisNoise {
         let found = self.noise[axis];
         let channel = self.problem.sensor.channels().start + axis;
-        let all = self.sessions.iter().filter_map(|s| s.stated[channel]);
-        let wander = all.map(|model| AxisNoise::stated_wander(&model, self.problem.gain[axis]));
-        let more = wander.filter(|stated| stated.wander > found.wander);
+        let all = self
+            .sessions
+            .iter()
+            .filter_map(|s| s.noise_at_rest[channel]);
+        let wander = all.map(|model| AxisNoise::wander_at_rest(&model, self.problem.gain[axis]));
+        let more = wander.filter(|at_rest| at_rest.wander > found.wander);
         more.max_by(|a, b| a.wander.total_cmp(&b.wander))
-            .map_or(found, |stated| AxisNoise {
+            .map_or(found, |at_rest| AxisNoise {
                 white: found.white,
-                ..stated
+                ..at_rest
             })
     }
 

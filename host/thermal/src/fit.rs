@@ -2,6 +2,7 @@
 
 use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node};
 use mimu::quantity::{PerSensor, Sensor};
+use mimu::signal::blocks::extent;
 use mimu_recording::Reference;
 use mimu_recording::error::{Argument, Error, Result};
 use serde::Serialize;
@@ -136,7 +137,7 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
     };
     warnings.extend(joint.warnings.iter().cloned());
     let estimated = !matches!(options.estimator, Estimator::Classic(_));
-    if estimated && sessions.iter().all(|s| s.stated == [None; 6]) {
+    if estimated && sessions.iter().all(|s| s.noise_at_rest == [None; 6]) {
         warnings.push(Warning::WithoutNoise);
     }
     check_range(&joint, options.range_c)?;
@@ -241,10 +242,7 @@ fn check_range(joint: &Joint, wanted: Option<[f64; 2]>) -> Result<()> {
 
 /// Temperatures of the dies, °C.
 pub fn range(joint: &Joint) -> [f64; 2] {
-    let all = joint.recorded().map(|c| c.range_c);
-    all.fold([f64::INFINITY, f64::NEG_INFINITY], |r, c| {
-        [r[0].min(c[0]), r[1].max(c[1])]
-    })
+    extent(joint.recorded().flat_map(|c| c.range_c))
 }
 
 fn judge(

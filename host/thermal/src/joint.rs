@@ -1,6 +1,7 @@
 //! The joint estimate of all curves and of the lag.
 
 use mimu::quantity::{PerSensor, Sensor};
+use mimu::signal::blocks::extent;
 use mimu_recording::error::{Error, Result};
 
 use crate::basis::Shape;
@@ -167,9 +168,7 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
         let dies = joint.dies(sessions, sensor);
         let rows = triad.problem.rows.iter();
         let temps = rows.map(|r| dies[r.session].at(r.middle_s));
-        let range_c = temps.fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {
-            [r[0].min(t), r[1].max(t)]
-        });
+        let range_c = extent(temps);
         joint.noise[sensor] = Some(triad.noise);
         let (profile, lag) = (&joint.profiles[sensor], joint.lag(sensor));
         joint.curves[sensor] = Some(triad.curves(profile, lag, &joint.starts, range_c));

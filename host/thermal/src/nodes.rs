@@ -3,6 +3,7 @@
 
 use mimu::calibration::{DieTable, NodeTable, OverTemperature, TemperatureNode};
 use mimu::quantity::{PerSensor, Sensor};
+use mimu::signal::blocks::extent;
 use mimu::triad::{Angles, Forward, Triad};
 use mimu_core::compensation::Affine;
 use mimu_core::die::LEAST_LAG_S;
@@ -46,10 +47,7 @@ pub fn physical(triad: &Triad) -> [[f64; 3]; 2] {
 pub fn over_temperature(joint: &Joint) -> Result<OverTemperature> {
     let curves = joint.curves.as_ref();
     let curves = curves.map(|c| c.as_ref().filter(|c| !c.biases_only()));
-    let ranges = curves.present().map(|(_, c)| c.range_c);
-    let range_c = ranges.fold([f64::INFINITY, f64::NEG_INFINITY], |r, c| {
-        [r[0].min(c[0]), r[1].max(c[1])]
-    });
+    let range_c = extent(curves.present().flat_map(|(_, c)| c.range_c));
     if !(range_c[0] <= range_c[1]) {
         return Err(Error::undetermined(
             "calibration",

@@ -71,31 +71,30 @@ pub fn estimate(
         return *before;
     };
     let mut best = (without - DEVIANCE, 0.0, 1.0, 1, white);
-    let mut attempt = |ratio: f64, correlation_s: f64, parts: usize| {
+    let better = |best: &mut (f64, f64, f64, usize, f64), ratio, correlation_s, parts| {
         let against = if parts == 1 { SINGLE } else { 0.0 };
         if let Some((d, white)) = deviance(ratio, correlation_s, parts)
             && d + against < best.0
         {
-            best = (d + against, ratio, correlation_s, parts, white);
+            *best = (d + against, ratio, correlation_s, parts, white);
         }
-        best
     };
     let single = CORRELATION_S.map(|correlation_s| (1, correlation_s));
     for (parts, correlation_s) in single.into_iter().chain([FLICKER]) {
         for ratio in RATIOS {
-            attempt(ratio, correlation_s, parts);
+            better(&mut best, ratio, correlation_s, parts);
         }
     }
     // A bias that jumps needs larger ratios.
     let mut largest = RATIOS[RATIOS.len() - 1];
-    while attempt(0.0, 1.0, 1).1 >= largest && largest < LARGEST_RATIO {
-        let (_, ratio, correlation_s, parts, _) = attempt(0.0, 1.0, 1);
-        attempt(10.0 * ratio, correlation_s, parts);
+    while best.1 >= largest && largest < LARGEST_RATIO {
+        let (_, ratio, correlation_s, parts, _) = best;
+        better(&mut best, 10.0 * ratio, correlation_s, parts);
         largest *= 10.0;
     }
-    if attempt(0.0, 1.0, 1).1 > 0.0 {
+    if best.1 > 0.0 {
         for factor in [2.5, 1.6, 1.25] {
-            let (_, ratio, correlation_s, parts, _) = attempt(0.0, 1.0, 1);
+            let (_, ratio, correlation_s, parts, _) = best;
             for [a, b] in [
                 [factor, 1.0],
                 [1.0 / factor, 1.0],
@@ -104,7 +103,7 @@ pub fn estimate(
             ] {
                 // Flicker noise has no single correlation time.
                 let b = if parts == 1 { b } else { 1.0 };
-                attempt(ratio * a, correlation_s * b, parts);
+                better(&mut best, ratio * a, correlation_s * b, parts);
             }
         }
     }

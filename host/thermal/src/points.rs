@@ -1,6 +1,7 @@
 //! Curves through estimates at single temperatures: the second stage of every estimator but the joint one.
 
 use mimu::quantity::Sensor;
+use mimu::signal::blocks::extent;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::basis::{Basis, Shape};
@@ -22,10 +23,7 @@ pub struct Point {
 /// Curves of `shape` through `points`, each number by itself by weighted least squares. `None` with fewer points than a curve has
 /// numbers.
 pub fn curves(sensor: Sensor, points: &[Point], shape: Shape) -> Option<TriadCurves> {
-    let temps = points.iter().map(|p| p.temp_c);
-    let range_c = temps.fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {
-        [r[0].min(t), r[1].max(t)]
-    });
+    let range_c = extent(points.iter().map(|p| p.temp_c));
     let basis = Basis::new(shape, range_c);
     if points.len() < basis.free() + 1 || !(range_c[0] < range_c[1]) {
         return None;
@@ -66,7 +64,7 @@ fn normal(problem: &Problem, axis: usize, points: &[Point]) -> Normal {
             let value = (p.numbers[number] - null) / problem.gain[axis];
             let weight = problem.gain[axis].powi(2) / p.variances[number];
             let (from, v) = basis.values(p.temp_c);
-            let used = 4.min(basis.len() - from);
+            let used = 4.min(basis.functions() - from);
             for i in 0..used {
                 let a = part.from + from + i;
                 with[a] += weight * v[i] * value;

@@ -186,7 +186,7 @@ impl Problem {
                 Some(_) => CurveKind::Cross,
             };
             let part = Part { input, kind, from };
-            from += self.basis(kind).len();
+            from += self.basis(kind).functions();
             part
         });
         curves.collect()
@@ -197,7 +197,7 @@ impl Problem {
         let curves: usize = self
             .parts(axis)
             .iter()
-            .map(|p| self.basis(p.kind).len())
+            .map(|p| self.basis(p.kind).functions())
             .sum();
         curves + self.offsets - 1
     }
@@ -264,7 +264,7 @@ impl AxisNoise {
     }
 
     /// The bias wander that a record at rest gives, raw, divided by the `gain` of the axis, raw per SI.
-    pub fn stated_wander(model: &AllanModel, gain: f64) -> Self {
+    pub fn wander_at_rest(model: &AllanModel, gain: f64) -> Self {
         let (b, k) = ((model.flicker / FLOOR).sqrt(), (3.0 * model.walk).sqrt());
         Self::of_densities([0.0, b / gain, k / gain], 1.0)
     }

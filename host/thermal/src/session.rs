@@ -61,7 +61,7 @@ pub struct Session {
     /// Samples of the recording.
     pub samples: f64,
     /// Noise of the six channels at rest, raw, if a noise file gives it.
-    pub stated: [Option<AllanModel>; 6],
+    pub noise_at_rest: [Option<AllanModel>; 6],
     /// Where the input is not known: times, s, at which the unit was put into another pose, as it matters to gyro and accelerometer.
     pub moved_s: [Vec<f64>; 2],
     /// Where the input is not known: jumps of the gyro's bias.
@@ -127,7 +127,7 @@ impl Session {
             thermometer,
             rows,
             samples: condensed.rows as f64,
-            stated: std::array::from_fn(|c| prepared.noise.largest_stated(c)),
+            noise_at_rest: std::array::from_fn(|c| prepared.noise.largest_at_rest(c)),
             moved_s,
             bias_jumps,
             unused: unused(prepared),
@@ -200,7 +200,7 @@ fn rows(prepared: &Prepared, sensor: Sensor) -> Vec<Row> {
         return Vec::new();
     }
     let usable = prepared.dwells.list.iter();
-    let usable: Vec<&Dwell> = usable.filter(|d| d.fault(sensor).is_none()).collect();
+    let usable: Vec<&Dwell> = usable.filter(|d| d.faults[sensor].is_none()).collect();
     // Readings of an input that moves within a dwell are late or early by some milliseconds. Over a whole turn that cancels for the gyro,
     // but not for a rotating force.
     let stands = usable.iter().any(|d| !d.moves(sensor) && !d.turn);

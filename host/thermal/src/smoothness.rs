@@ -7,6 +7,7 @@
 //! Schall in the form of Wood and Fasiolo (2017), within the limits of data sheets.
 
 use mimu::quantity::Sensor;
+use mimu::signal::blocks::extent;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::basis::Shape;
@@ -46,10 +47,7 @@ pub fn largest(problem: &Problem) -> Smoothness {
 
 fn range(problem: &Problem) -> f64 {
     let spans = (0..3).map(|k| {
-        let readings = problem.rows.iter().map(|r| r.reading[k]);
-        let (low, high) = readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(v), h.max(v))
-        });
+        let [low, high] = extent(problem.rows.iter().map(|r| r.reading[k]));
         high - low
     });
     spans.fold(f64::MIN_POSITIVE, f64::max)
@@ -94,9 +92,9 @@ impl Penalties {
                 return [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)];
             }
             let eigen = pair[0].clone().symmetric_eigen();
-            let mut order: Vec<usize> = (0..basis.len()).collect();
+            let mut order: Vec<usize> = (0..basis.functions()).collect();
             order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-            let bent = &order[..basis.len() - basis.free()];
+            let bent = &order[..basis.functions() - basis.free()];
             let across = eigen.eigenvectors.select_columns(bent);
             [0, 1].map(|k| across.tr_mul(&(&pair[k] * &across)))
         });
@@ -155,7 +153,7 @@ pub fn solve(
         if basis.shape() != Shape::Spline {
             continue;
         }
-        let (n, k) = (basis.len(), part.kind as usize);
+        let (n, k) = (basis.functions(), part.kind as usize);
         let mut block = matrix.view_mut((part.from, part.from), (n, n));
         block += penalties.precision(k, &smoothness[k]);
         determinants -= penalties.determinant(k, &smoothness[k])?.0;
@@ -273,7 +271,7 @@ fn step(
             if basis.shape() != Shape::Spline {
                 continue;
             }
-            let (k, n) = (part.kind as usize, basis.len());
+            let (k, n) = (part.kind as usize, basis.functions());
             let own = solved.coefficients.rows(part.from, n);
             let known = covariance.view((part.from, part.from), (n, n));
             let (_, prior) = penalties.determinant(k, &smoothness[k])?;

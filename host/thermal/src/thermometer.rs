@@ -1,6 +1,7 @@
 //! The thermometer over a whole recording: refused where it sticks, jumps or is missing, evenly spaced and smoothed.
 
 use mimu::quantity::{duration, significant};
+use mimu::signal::blocks::extent;
 use mimu::signal::blocks::{Block, Condensed};
 use mimu_recording::NoTemperatures;
 use mimu_recording::error::{Argument, Error, Result};
@@ -151,7 +152,7 @@ impl Thermometer {
 
     /// Lowest and highest temperature, °C.
     pub fn range(&self) -> [f64; 2] {
-        extremes(&self.temp_c)
+        extent(self.temp_c.iter().copied())
     }
 
     /// Beginning of the record, s.
@@ -226,7 +227,7 @@ impl Die {
 
     /// Lowest and highest temperature, °C.
     pub fn range(&self) -> [f64; 2] {
-        extremes(&self.temp_c)
+        extent(self.temp_c.iter().copied())
     }
 }
 
@@ -241,14 +242,6 @@ fn between(values: &[f64], k: usize, share: f64) -> f64 {
         Some(next) => values[k] + share * (next - values[k]),
         None => values[k],
     }
-}
-
-fn extremes(values: &[f64]) -> [f64; 2] {
-    values
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-            [low.min(*v), high.max(*v)]
-        })
 }
 
 fn missing(place: &str, problem: &str) -> Error {

@@ -6,7 +6,6 @@ use std::collections::VecDeque;
 use mimu_core::compensation::Affine;
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
-use nalgebra::{Matrix3, Vector3};
 
 use crate::regular::{Regular, Timed};
 use crate::source::{Chunk, SourceEvent, Unit};
@@ -75,7 +74,8 @@ impl TextBoard {
             name,
             raw_unit: text.raw_unit,
             rate_hz: rate_hz.unwrap_or(f64::NAN),
-            nominal: (text.raw_unit == RawUnit::Si).then(|| [identity(), identity()]),
+            nominal: (text.raw_unit == RawUnit::Si)
+                .then(|| [Affine::identity(), Affine::identity()]),
             told: Vec::new(),
             is_device: false,
             start: None,
@@ -291,12 +291,5 @@ impl TextBoard {
     #[cfg(test)]
     pub(crate) fn refused(&self) -> u64 {
         self.lines.refused()
-    }
-}
-
-fn identity() -> Affine<f64> {
-    Affine {
-        matrix: Matrix3::identity(),
-        offset: Vector3::zeros(),
     }
 }

@@ -266,7 +266,7 @@ fn a_saturated_dwell_is_found_and_left_out() {
         .dwells
         .list
         .iter()
-        .filter(|d| d.accel_fault.is_some());
+        .filter(|d| d.faults.accel.is_some());
     let saturated = faults.count();
     assert!((1..8).contains(&saturated), "{saturated}");
     let fitted = fit(prepared, options(0)).unwrap();

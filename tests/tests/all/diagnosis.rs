@@ -1,9 +1,10 @@
 //! Diagnosis of units whose truth is known, and of recordings by other people. `make blind` runs the complete study of the former.
 
-use mimu::diagnose::decision::Against;
+use mimu::diagnose::decision::CorrelatesWith;
 use mimu::diagnose::search::Alternative;
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
 use mimu::effects;
+use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::fit::Options;
 use mimu::quantity::Sensor;
 use mimu_rig::located::Source;
@@ -124,7 +125,8 @@ fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
         .flat_map(|s| &mut s.decision.accepted)
     {
         let other = effects::by_id("gyro_g_sensitivity").unwrap();
-        let other = Alternative::from((other, -1.0));
+        let other = Candidate::new(other.sensor, CandidateKind::Effect(other));
+        let other = Alternative::of(&other, -1.0);
         accepted.chosen.alternatives.push(other);
     }
     let found = reported(found);
@@ -163,7 +165,7 @@ fn a_step_at_a_reading_is_left_over_against_the_reading_or_named_an_error_by_the
         let left = found.sensors.iter().flat_map(|s| &s.decision.leftover);
         let against: Vec<_> = left.map(|l| &l.against).collect();
         println!("seed {seed}: {ids:?}, left {against:?}");
-        by_reading += u32::from(against.contains(&&Against::Reading));
+        by_reading += u32::from(against.contains(&&CorrelatesWith::Reading));
         let named = ids.iter().all(|id| is_right(id, "gyro_missing_codes"));
         assert!(
             named || found.verdict == Verdict::Unexplained,

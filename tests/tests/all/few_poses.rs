@@ -230,11 +230,11 @@ fn a_scale_factor_that_the_poses_leave_open_is_refused_with_the_pose_that_is_mis
 }
 
 #[test]
-fn readings_in_si_are_judged_as_they_came_beside_every_fit() {
+fn readings_in_si_are_judged_uncalibrated_beside_every_fit() {
     let session = Session::of(FIXTURE, QUIET, 1).in_si();
     let found = session.fit().expect("ten poses");
     for sensor in &found.sensors {
-        let came = sensor.as_came.expect("in SI");
+        let came = sensor.uncalibrated_rms.expect("in SI");
         let better = sensor.held_out_rms().unwrap_or(sensor.rms()) < came;
         let warned = sensor
             .warnings
@@ -250,7 +250,7 @@ fn readings_in_si_are_judged_as_they_came_beside_every_fit() {
         (size - session.manifest.gravity_mps2).powi(2)
     });
     let rms = (squares.sum::<f64>() / accel.residuals.len() as f64).sqrt();
-    assert!((accel.as_came.expect("in SI") / rms - 1.0).abs() < 1e-12);
+    assert!((accel.uncalibrated_rms.expect("in SI") / rms - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -283,7 +283,7 @@ fn a_channel_whose_step_is_coarser_than_its_noise_is_not_stuck() {
         .dwells
         .list
         .iter()
-        .filter_map(|d| d.gyro_fault)
+        .filter_map(|d| d.faults.gyro)
         .map(|f| f.to_string())
         .collect();
     assert!(!faults.iter().any(|f| f.contains("stuck")), "{faults:?}");

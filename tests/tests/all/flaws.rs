@@ -52,7 +52,7 @@ fn a_recording_without_a_flaw_loses_no_dwell_and_no_turn() {
             .dwells
             .list
             .iter()
-            .all(|d| d.gyro_fault != Some(Fault::Turning))
+            .all(|d| d.faults.gyro != Some(Fault::Turning))
     );
     assert!(
         !fit.warnings.iter().any(|w| w.to_string().contains("rail")),
@@ -81,7 +81,7 @@ fn a_rest_that_turns_evenly_is_no_dwell() {
     let mut file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
     let turning = |file: &RigFile| {
         let prepared = bench::recorded(&bench::hand_plan(38), file, 7);
-        let is = |d: &&Dwell| d.gyro_fault == Some(Fault::Turning);
+        let is = |d: &&Dwell| d.faults.gyro == Some(Fault::Turning);
         prepared.dwells.list.iter().filter(is).count()
     };
     assert_eq!(turning(&file), 0);
@@ -119,7 +119,7 @@ fn a_real_effect_is_no_outlier() {
             "{effect}{:?}",
             fit.prepared.dwells.left_out
         );
-        let turning = |d: &Dwell| d.gyro_fault == Some(Fault::Turning);
+        let turning = |d: &Dwell| d.faults.gyro == Some(Fault::Turning);
         assert!(!fit.prepared.dwells.list.iter().any(turning), "{effect}");
     }
 }

@@ -61,7 +61,10 @@ fn a_channel_whose_dwells_are_not_as_noisy_as_the_file_says_keeps_its_own_noise_
         .filter(|w| w.starts_with("gyro_x"))
         .collect();
     assert!(told.len() == 1 && told[0].contains("as noisy"), "{told:?}");
-    assert!(!stated.noise.is_stated(Sensor::Gyro) && stated.noise.is_stated(Sensor::Accel));
+    assert!(
+        !stated.noise.has_noise_at_rest(Sensor::Gyro)
+            && stated.noise.has_noise_at_rest(Sensor::Accel)
+    );
 }
 
 #[test]

@@ -290,7 +290,9 @@ fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
         .effects
         .iter()
         .find(|e| e.effect.id() == "gyro_thermal_lag");
-    let form = lag.and_then(|l| l.effect.form()).expect("a lag");
+    let form = lag
+        .and_then(|l| l.effect.nonlinear_parameter())
+        .expect("a lag");
     let json = serde_json::to_value(&form).expect("JSON");
     let [lower, upper] = ["lower", "upper"].map(|k| json[k].as_f64().expect("an end"));
     assert!(lower < form.value && form.value < upper, "{json}");

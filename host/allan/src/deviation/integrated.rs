@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::NotFinite;
 use crate::bounds::Sampling;
+use crate::spectrum::sum_over;
 
 /// Number of samples that are summed separately before they are added to the integral.
 const CHUNK: usize = 4096;
@@ -174,17 +175,8 @@ fn mean(rates: &[f64]) -> f64 {
 
 /// Sums of chunks of the rates minus a reference.
 fn chunk_sums(rates: &[f64], reference: f64) -> Vec<f64> {
-    let sum = |chunk: &[f64]| -> f64 {
-        let mut lanes = [0.0; 8];
-        let (rows, rest) = chunk.as_chunks::<8>();
-        for row in rows {
-            for (lane, rate) in lanes.iter_mut().zip(row) {
-                *lane += rate - reference;
-            }
-        }
-        lanes.iter().sum::<f64>() + rest.iter().map(|rate| rate - reference).sum::<f64>()
-    };
-    rates.chunks(CHUNK).map(sum).collect()
+    let chunks = rates.chunks(CHUNK);
+    chunks.map(|chunk| sum_over(chunk, reference)).collect()
 }
 
 /// A sum with compensation of rounding errors (Neumaier 1974): 1e8 samples are 24 000 chunks, and an error at a border would be a step in

@@ -45,10 +45,10 @@ impl Fitted {
 }
 
 /// Expected values and covariance of the points for given amplitudes.
-struct Spread {
+struct Expectation {
     mu: Vec<f64>,
     /// Cholesky factor of the relative covariance.
-    root: Cholesky<f64, Dyn>,
+    factor: Cholesky<f64, Dyn>,
     /// Relative variances of the points.
     relative: Vec<f64>,
 }
@@ -82,7 +82,7 @@ impl Curve<'_> {
         self.range.end -= 1;
     }
 
-    fn spread(&self, a: &[f64; TERMS]) -> Option<Spread> {
+    fn expectation(&self, a: &[f64; TERMS]) -> Option<Expectation> {
         let points = self.points();
         let n = points.len();
         let size = |d: &Differences| d.basis().iter().zip(a).map(|(b, a)| b * a).sum();
@@ -101,9 +101,9 @@ impl Curve<'_> {
             }
             relative[(i, i)] = relative[(i, i)] * (1.0 + 1e-9) + NUMERICS * NUMERICS;
         }
-        Some(Spread {
+        Some(Expectation {
             relative: relative.diagonal().iter().copied().collect(),
-            root: Cholesky::new(relative)?,
+            factor: Cholesky::new(relative)?,
             mu,
         })
     }
@@ -111,14 +111,14 @@ impl Curve<'_> {
     /// Regressors of `terms` over the sizes of the points, decorrelated; and the covariance of the amplitudes.
     fn information(
         &self,
-        spread: &Spread,
+        expectation: &Expectation,
         terms: &[usize],
     ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let points = self.points();
         let a = DMatrix::from_fn(points.len(), terms.len(), |i, k| {
-            points[i].basis()[terms[k]] / spread.mu[i]
+            points[i].basis()[terms[k]] / expectation.mu[i]
         });
-        let mut white = spread.root.l_dirty().solve_lower_triangular(&a)?;
+        let mut white = expectation.factor.l_dirty().solve_lower_triangular(&a)?;
         // Columns differ by the square of the longest time.
         let scale: Vec<f64> = white.column_iter().map(|c| c.norm()).collect();
         for (mut column, s) in white.column_iter_mut().zip(&scale) {
@@ -138,10 +138,10 @@ impl Curve<'_> {
 
     /// Generalized least squares with the covariance of the points for the amplitudes `at`.
     fn solve(&self, at: &[f64; TERMS], terms: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let spread = self.spread(at)?;
-        let (white, covariance) = self.information(&spread, terms)?;
-        let y = DVector::from_fn(self.y.len(), |i, _| self.y[i] / spread.mu[i]);
-        let y = spread.root.l_dirty().solve_lower_triangular(&y)?;
+        let expectation = self.expectation(at)?;
+        let (white, covariance) = self.information(&expectation, terms)?;
+        let y = DVector::from_fn(self.y.len(), |i, _| self.y[i] / expectation.mu[i]);
+        let y = expectation.factor.l_dirty().solve_lower_triangular(&y)?;
         Some((&covariance * white.tr_mul(&y), covariance))
     }
 
@@ -182,9 +182,9 @@ impl Curve<'_> {
                 break;
             }
         }
-        let spread = self.spread(&a)?;
-        let (_, covariance) = self.information(&spread, terms)?;
-        let (chi2, deviance) = self.deviance(&spread)?;
+        let expectation = self.expectation(&a)?;
+        let (_, covariance) = self.information(&expectation, terms)?;
+        let (chi2, deviance) = self.deviance(&expectation)?;
         Some(Fitted {
             terms: terms.to_vec(),
             a,
@@ -199,21 +199,21 @@ impl Curve<'_> {
     /// The cube root of a mean square is nearly normal down to two degrees of freedom (Wilson and Hilferty 1931). The roots are assumed to
     /// be jointly normal with the correlations of the points. The points themselves are not normal: with three degrees of freedom one value
     /// in fifty is 2.8 sigmas high, and would require a random walk.
-    fn deviance(&self, spread: &Spread) -> Option<(f64, f64)> {
+    fn deviance(&self, expectation: &Expectation) -> Option<(f64, f64)> {
         let n = self.y.len();
         let mut logs = 0.0;
         let z = DVector::from_fn(n, |i, _| {
-            let variance = spread.relative[i] / 9.0;
-            logs += (2.0 / 3.0) * spread.mu[i].ln() + variance.ln();
-            ((self.y[i] / spread.mu[i]).cbrt() - (1.0 - variance)) / variance.sqrt()
+            let variance = expectation.relative[i] / 9.0;
+            logs += (2.0 / 3.0) * expectation.mu[i].ln() + variance.ln();
+            ((self.y[i] / expectation.mu[i]).cbrt() - (1.0 - variance)) / variance.sqrt()
         });
         // Decorrelated by the factor of the correlations.
-        let sigma = DVector::from_fn(n, |i, _| spread.relative[i].sqrt());
-        let white = spread
-            .root
+        let sigma = DVector::from_fn(n, |i, _| expectation.relative[i].sqrt());
+        let white = expectation
+            .factor
             .l_dirty()
             .solve_lower_triangular(&z.component_mul(&sigma))?;
-        let l = spread.root.l_dirty();
+        let l = expectation.factor.l_dirty();
         let correlation: f64 = (0..n).map(|i| 2.0 * (l[(i, i)] / sigma[i]).ln()).sum();
         let chi2 = white.norm_squared();
         Some((chi2, chi2 + correlation + logs))
@@ -221,15 +221,15 @@ impl Curve<'_> {
 
     /// Standard deviation and skewness of the estimate of `term` among `terms` if the true amplitudes are `a`.
     fn error_at(&self, a: &[f64; TERMS], terms: &[usize], term: usize) -> Option<(f64, f64)> {
-        let spread = self.spread(a)?;
-        let (white, covariance) = self.information(&spread, terms)?;
+        let expectation = self.expectation(a)?;
+        let (white, covariance) = self.information(&expectation, terms)?;
         let row = terms.iter().position(|k| *k == term)?;
         // The estimate is a weighted sum of decorrelated points. The first of them is the longest, a chi-square of few degrees of freedom.
         // Each other one is the part that the next point adds, with the skewness of that point.
         let weights = white * covariance.column(row);
         let sigma = weights.norm();
         let third: f64 = (0..weights.len())
-            .map(|i| weights[i].powi(3) * 2.0 * spread.relative[i].sqrt())
+            .map(|i| weights[i].powi(3) * 2.0 * expectation.relative[i].sqrt())
             .sum();
         Some((sigma, third / sigma.powi(3)))
     }

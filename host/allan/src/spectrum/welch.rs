@@ -112,7 +112,7 @@ impl Hann {
 }
 
 /// Sum of `values`, each minus `reference`.
-fn sum_over(values: &[f64], reference: f64) -> f64 {
+pub(crate) fn sum_over(values: &[f64], reference: f64) -> f64 {
     let mut lanes = [0.0; LANES];
     let (rows, rest) = values.as_chunks::<LANES>();
     for row in rows {

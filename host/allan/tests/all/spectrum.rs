@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use mimu_allan::deviation::Integrated;
 use mimu_allan::model::{Estimator, Term, allan_factors, hadamard_factors};
-use mimu_allan::spectrum::{Line, set_aside, white_band};
+use mimu_allan::spectrum::{Line, remove_lines, white_band};
 use mimu_allan::{Deviation, Spacing};
 use mimu_rig::noise::{Coefficients, Noise};
 use mimu_rig::random::Random;
@@ -67,7 +67,7 @@ fn with_lines(of: [f64; 3], samples: usize, runs: u64) -> usize {
     let has_lines = |seed: &u64| {
         let before = noise(of, samples, *seed);
         let mut after = before.clone();
-        let found = set_aside(&mut after, DT_S, 0.95);
+        let found = remove_lines(&mut after, DT_S, 0.95);
         assert!(!found.lines.is_empty() || before == after);
         !found.lines.is_empty()
     };
@@ -83,7 +83,7 @@ fn steady_line(rms: f64, runs: u64) -> usize {
         for (i, rate) in rates.iter_mut().enumerate() {
             *rate += 1e3 + 1e-4 * i as f64;
         }
-        let found = set_aside(&mut rates, DT_S, 0.95);
+        let found = remove_lines(&mut rates, DT_S, 0.95);
         // One run in two hundred also has a false line.
         assert!(!found.lines.is_empty() && !found.remains, "{found:?}");
         let line = &found.lines[0];
@@ -105,7 +105,7 @@ fn beside_bump(width_hz: f64, rms: f64, runs: u64) -> usize {
     let held = |seed: &u64| {
         let mut rates = noise([1.0, 0.3, 0.05], SAMPLES, *seed);
         add_bump(&mut rates, LINE_HZ, width_hz, rms, *seed);
-        let found = set_aside(&mut rates, DT_S, 0.95);
+        let found = remove_lines(&mut rates, DT_S, 0.95);
         let highest = |a: &&Line, b: &&Line| a.rms.total_cmp(&b.rms);
         let line = found.lines.iter().max_by(highest).unwrap();
         let off = (line.frequency_hz - LINE_HZ).abs();
@@ -132,7 +132,11 @@ fn behind_filter(corner_hz: f64, runs: u64) -> usize {
             }
         }
         // The edge of the filter's band is not a bump.
-        assert!(set_aside(&mut rates.clone(), DT_S, 0.95).lines.is_empty());
+        assert!(
+            remove_lines(&mut rates.clone(), DT_S, 0.95)
+                .lines
+                .is_empty()
+        );
         let white = white_band(&rates, DT_S, &[], 0.95).unwrap();
         // It may end early, if a misfit by chance leaves its end out: N is then less certain, and the interval includes that.
         let inside = |[_, to]: [f64; 2]| to < corner_hz;
@@ -217,7 +221,7 @@ fn a_line_that_is_set_aside_leaves_the_coefficients_of_the_noise_beneath() {
             let mut rates = plain.clone();
             add_line(&mut rates, LINE_HZ, 3.0, seed);
             let bent = fit(&rates);
-            set_aside(&mut rates, DT_S, 0.95);
+            remove_lines(&mut rates, DT_S, 0.95);
             [bent, fit(&rates), fit(&plain)]
         })
         .collect();
@@ -258,7 +262,7 @@ fn harmonics_of_the_mains_are_lines_each() {
     for (hz, rms) in [(8.3, 2.0), (16.6, 1.0), (24.9, 0.5)] {
         add_line(&mut rates, hz, rms, 1);
     }
-    let found = set_aside(&mut rates, DT_S, 0.95);
+    let found = remove_lines(&mut rates, DT_S, 0.95);
     let frequencies: Vec<f64> = found.lines.iter().map(|l| l.frequency_hz).collect();
     assert!(frequencies.len() == 3 && !found.remains, "{found:?}");
     for (found, known) in frequencies.iter().zip([8.3, 16.6, 24.9]) {
@@ -277,7 +281,7 @@ fn wide_bumps_cost_a_few_times_what_noise_alone_does() {
         let each = (0..3).map(|_| {
             let mut rates = rates.to_vec();
             let start = std::time::Instant::now();
-            let found = set_aside(&mut rates, DT_S, 0.95);
+            let found = remove_lines(&mut rates, DT_S, 0.95);
             (start.elapsed().as_secs_f64(), found.lines.len())
         });
         each.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap()
@@ -293,7 +297,7 @@ fn wide_bumps_cost_a_few_times_what_noise_alone_does() {
 fn a_record_too_short_for_a_spectrum_is_left_alone_and_says_so() {
     let mut rates = noise([1.0, 0.0, 0.0], 500, 1);
     let before = rates.clone();
-    let found = set_aside(&mut rates, DT_S, 0.95);
+    let found = remove_lines(&mut rates, DT_S, 0.95);
     assert!(found.searched_hz.is_none() && found.lines.is_empty() && rates == before);
     assert!(white_band(&rates[..200], DT_S, &[], 0.95).is_none());
 }

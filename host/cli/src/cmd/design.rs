@@ -212,9 +212,9 @@ impl DesignArgs {
 
     /// Noise of the sensor. Values given as options override the file.
     fn noise(&self) -> Result<DwellNoise> {
-        let stated = match &self.noise {
+        let at_rest = match &self.noise {
             Some(NoiseArg::File(path)) => {
-                DwellNoise::stated(&NoiseFile::read(path)?, self.sensor())?
+                DwellNoise::from_file(&NoiseFile::read(path)?, self.sensor())?
             }
             other => {
                 let fang = DwellNoise::fang(self.sensor());
@@ -227,9 +227,9 @@ impl DesignArgs {
             }
         };
         Ok(DwellNoise {
-            n: stated.n,
-            b: self.instability.unwrap_or(stated.b),
-            k: self.walk.unwrap_or(stated.k),
+            n: at_rest.n,
+            b: self.instability.unwrap_or(at_rest.b),
+            k: self.walk.unwrap_or(at_rest.k),
         })
     }
 

@@ -69,7 +69,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<()> {
     let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
     let open = |path: &PathBuf| {
         let prepared = read(path, args.still.finding(), &outputs, &inputs)?;
-        Ok(args.keep.apply(args.noise.state(prepared)?))
+        Ok(args.keep.apply(args.noise.apply(prepared)?))
     };
     let given = args.calibration.as_deref().map(Calibration::read);
     let given = given.transpose()?;

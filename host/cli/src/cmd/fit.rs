@@ -86,7 +86,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref()];
     let prepared = read_samples_or_means(&args.recording, args.still.finding(), &outputs, &inputs)?;
-    let prepared = args.keep.apply(args.noise.state(prepared)?);
+    let prepared = args.keep.apply(args.noise.apply(prepared)?);
     if args.method.is_some() && prepared.manifest.reference != Reference::Table {
         return Err(Error::new(
             args.recording.display(),

@@ -86,7 +86,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let others = [args.noise.file.as_deref(), inputs.calibration.as_deref()];
     let open = |path: &PathBuf| -> Result<(String, Prepared)> {
         let prepared = read(path, args.still.finding(), &outputs, &others)?;
-        let prepared = args.keep.apply(args.noise.state(prepared)?);
+        let prepared = args.keep.apply(args.noise.apply(prepared)?);
         Ok((path.display().to_string(), prepared))
     };
     let recordings: Vec<_> = inputs.recordings.iter().map(open).collect::<Result<_>>()?;

@@ -167,7 +167,7 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<()> {
     let base = args.base.as_deref().map(Calibration::read).transpose()?;
     let session = |directory: &PathBuf, finding: Finding| {
         let prepared = read(directory, finding, &outputs, &beside)?;
-        Session::of(&args.noise.state(prepared)?)
+        Session::of(&args.noise.apply(prepared)?)
     };
     let all = |list: &[PathBuf]| -> Result<Vec<Session>> {
         let each = list.iter();

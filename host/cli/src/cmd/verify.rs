@@ -38,7 +38,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
         &outputs,
         &[Some(&args.calibration), args.noise.file.as_deref()],
     )?;
-    let prepared = args.noise.state(prepared)?;
+    let prepared = args.noise.apply(prepared)?;
     let result = verify(&prepared, &calibration)?;
     print(
         &args.json,

@@ -117,7 +117,7 @@ fn errors_text(out: &mut String, fit: &FitResult) {
     let came = fit
         .sensors
         .present()
-        .any(|(_, s)| s.as_they_came_rms.is_some());
+        .any(|(_, s)| s.uncalibrated_rms.is_some());
     let last = if came { "  uncalibrated" } else { "" };
     let _ = writeln!(
         out,
@@ -130,7 +130,7 @@ fn errors_text(out: &mut String, fit: &FitResult) {
             Some(value) => significant(value * unit.factor),
             None => "-".into(),
         };
-        let last = match (came, s.as_they_came_rms) {
+        let last = match (came, s.uncalibrated_rms) {
             (true, came) => shown(came),
             (false, _) => String::new(),
         };
@@ -257,7 +257,7 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorF
         true => line("noise floor", Some(sensor.noise_floor), "noise-only rms"),
         false => line("noise floor", None, "unknown: no dwell shows the noise"),
     }
-    if let Some(came) = sensor.as_they_came_rms {
+    if let Some(came) = sensor.uncalibrated_rms {
         line(
             "uncalibrated",
             Some(came),

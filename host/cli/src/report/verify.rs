@@ -30,7 +30,7 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
             });
         let noun = match s.figure {
             Figure::Direction => "turns",
-            Figure::Input | Figure::GravitySize | Figure::RateSize => "dwells",
+            Figure::Input | Figure::GravityMagnitude | Figure::RateMagnitude => "dwells",
         };
         let over = format!("{} {noun}", s.count);
         let _ = writeln!(
@@ -38,7 +38,7 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
             "{name:<7}{raw:>14}{rms:>14}{max:>14}{floor:>14}{over:>12}"
         );
         let below = [
-            ("uncalibrated", s.rms_as_they_came.map(|v| figure.write(v))),
+            ("uncalibrated", s.rms_uncalibrated.map(|v| figure.write(v))),
             ("effects left in", s.rms_affine.map(|v| figure.write(v))),
             (
                 "at rest",
@@ -76,7 +76,7 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
 /// Effect of the calibration on a sensor's error.
 fn verdict(s: &SensorVerification) -> String {
     let figure = readable::error(s.unit);
-    let (other, what) = match s.rms_as_they_came {
+    let (other, what) = match s.rms_uncalibrated {
         Some(came) => (came, "uncalibrated"),
         None => (s.rms_raw, "with one scale"),
     };

@@ -47,7 +47,7 @@ impl Dwells {
     pub fn scenes(&self, prepared: &Prepared) -> (Vec<(f64, Value)>, Option<String>) {
         let gravity = prepared.manifest.gravity_mps2;
         let dwells = prepared.dwells.list.iter().zip(&self.sums);
-        let used = dwells.filter(|(d, s)| d.fault(Sensor::Accel).is_none() && s.3 > 0);
+        let used = dwells.filter(|(d, s)| d.faults[Sensor::Accel].is_none() && s.3 > 0);
         let all: Vec<_> = used
             .map(|(dwell, (_, _, sum, n))| {
                 let force = sum / f64::from(*n);

@@ -7,7 +7,7 @@ use std::path::Path;
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::compensator::{Compensator, State};
 use mimu_core::stored::NODES;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::calibration::die_temperature::outside;
@@ -210,7 +210,7 @@ fn compensated_manifest(recording: &Recording, sha256: &str) -> Manifest {
 }
 
 /// A segment of samples in which the calibration treats temperature and time as constant.
-struct Slow {
+struct SlowSegment {
     first_row: u64,
     middle_s: f64,
     temp_c: Option<f64>,
@@ -225,10 +225,10 @@ struct Batches {
     rails: [Rails; 6],
     period_s: f64,
     /// In order of time; the first `reached` have been applied.
-    slow: Vec<Slow>,
+    slow: Vec<SlowSegment>,
     reached: usize,
     /// Time to which the compensator has followed, s; at first that of power-on.
-    told_s: f64,
+    followed_to_s: f64,
     last_s: f64,
     /// Last whole reading of each triad. The other triad's effects depend on it while this triad has none.
     held: Sample<f64>,
@@ -268,7 +268,7 @@ impl Batches {
             if block.temp_c.mean.is_finite() {
                 temp_c = block.temp_c.mean;
             }
-            Slow {
+            SlowSegment {
                 first_row: block.first_row,
                 middle_s: 0.5 * (block.start_s + block.last_s),
                 temp_c: Some(temp_c).filter(|c| c.is_finite()),
@@ -281,11 +281,8 @@ impl Batches {
         }
         let curves = curves.filter(|_| first_temp_c.is_some());
         let first_s = blocks.first().map_or(0.0, |block| block.start_s);
-        let none = Affine {
-            matrix: Matrix3::identity(),
-            offset: Vector3::zeros(),
-        };
-        let models = Compensation::from_fn(|s| calibration.inverse(s).unwrap_or(none));
+        let models =
+            Compensation::from_fn(|s| calibration.inverse(s).unwrap_or_else(Affine::identity));
         let effects = calibration.effects_of_models(&models)?;
         let compensator = compensator(calibration, models, curves, effects);
         let first = |channel: usize| {
@@ -310,7 +307,7 @@ impl Batches {
             period_s: condensed.period_s,
             slow,
             reached: 0,
-            told_s: manifest.power_on_s.unwrap_or(first_s),
+            followed_to_s: manifest.power_on_s.unwrap_or(first_s),
             last_s: first_s,
             held: Sample::from_fn(|s| Vector3::from_fn(|i, _| first(s.channels().start + i))),
             counts: Default::default(),
@@ -352,9 +349,9 @@ impl Batches {
     /// Follows time and temperature to the block that `row` is in.
     fn follow(&mut self, row: u64) {
         while let Some(slow) = self.slow.get(self.reached).filter(|s| s.first_row <= row) {
-            let dt_s = slow.middle_s - self.told_s;
+            let dt_s = slow.middle_s - self.followed_to_s;
             self.compensator.follow(&mut self.state, dt_s, slow.temp_c);
-            self.told_s = slow.middle_s;
+            self.followed_to_s = slow.middle_s;
             self.reached += 1;
         }
     }

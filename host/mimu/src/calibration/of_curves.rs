@@ -1,14 +1,12 @@
 //! The calibration that results from curves over temperature.
 
+use super::of_fit::FIGURE_DIGITS;
 use super::of_fit::triad_table;
 use super::{Calibration, Judged, Origin, OverTemperature};
 use crate::quantity::{Figure, PerSensor, Sensor, rounded};
 use crate::triad::Triad;
 use mimu_recording::error::Result;
 use mimu_recording::{RawUnit, Reference};
-
-/// Digits of the error figures.
-const FIGURE_DIGITS: usize = 7;
 
 /// A triad at the temperature of one node, with the error figures of its curves.
 #[derive(Debug, Clone)]

@@ -36,46 +36,48 @@ pub fn compensator<const N: usize>(
     }
 }
 
-/// The effects of a calibration as the device removes them; one that `core` lacks is refused by its id.
-pub(super) fn core_effects<T: RealField + Copy, const N: usize>(
-    calibration: &Calibration,
-) -> Result<Effects<T, N>> {
-    let place = format!("calibration of {:?}", calibration.device);
-    let model = |sensor| {
-        calibration.inverse(sensor).ok_or_else(|| {
-            let problem = format!("the file has no [{sensor}], and the device needs both sensors");
-            Error::new(&place, problem, "calibrate both sensors")
-        })
-    };
-    let (gyro, accel) = (model(Sensor::Gyro)?, model(Sensor::Accel)?);
-    effects_of_models(calibration, &Compensation { gyro, accel })
-}
-
-/// The same for a unit with these inverse models.
-pub(super) fn effects_of_models<T: RealField + Copy, const N: usize>(
-    calibration: &Calibration,
-    models: &Compensation<f64>,
-) -> Result<Effects<T, N>> {
-    let place = format!("calibration of {:?}", calibration.device);
-    let singular = || Error::new(&place, "C is singular", "fit the recording again");
-    let limits = calibration.limits().map(|limits| limits.map(convert));
-    let mut all = Effects::new(models).ok_or_else(singular)?.within(limits);
-    for effect in calibration.effects() {
-        let refuse = |problem: String, remedy: &str| {
-            let id = effect.id();
-            Error::new(format!("{place}, [[effect]] {id}"), problem, remedy)
+impl Calibration {
+    /// The effects as the device removes them: for each triad, up to N that run with every sample and N that do not. One that this build of `core`
+    /// cannot remove is refused by its id.
+    pub fn core_effects<T: RealField + Copy, const N: usize>(&self) -> Result<Effects<T, N>> {
+        let place = format!("calibration of {:?}", self.device);
+        let model = |sensor| {
+            self.inverse(sensor).ok_or_else(|| {
+                let problem =
+                    format!("the file has no [{sensor}], and the device needs both sensors");
+                Error::new(&place, problem, "calibrate both sensors")
+            })
         };
-        const WITHOUT: &str = "update the device, or use the calibration without effects";
-        let parts = effect.on_device().map_err(|why| match why {
-            NotOnDevice::Numbers => refuse(why.to_string(), "diagnose the recording again"),
-            _ => refuse(why.to_string(), WITHOUT),
-        })?;
-        for part in parts {
-            all.push(part).map_err(|_| {
-                let problem = format!("the device has no room for it: at most {N} of a kind");
-                refuse(problem, WITHOUT)
-            })?;
-        }
+        let (gyro, accel) = (model(Sensor::Gyro)?, model(Sensor::Accel)?);
+        self.effects_of_models(&Compensation { gyro, accel })
     }
-    Ok(all)
+
+    /// The same, with a substitute among `models` for a sensor that is not calibrated.
+    pub(crate) fn effects_of_models<T: RealField + Copy, const N: usize>(
+        &self,
+        models: &Compensation<f64>,
+    ) -> Result<Effects<T, N>> {
+        let place = format!("calibration of {:?}", self.device);
+        let singular = || Error::new(&place, "C is singular", "fit the recording again");
+        let limits = self.limits().map(|limits| limits.map(convert));
+        let mut all = Effects::new(models).ok_or_else(singular)?.within(limits);
+        for effect in self.effects() {
+            let refuse = |problem: String, remedy: &str| {
+                let id = effect.id();
+                Error::new(format!("{place}, [[effect]] {id}"), problem, remedy)
+            };
+            const WITHOUT: &str = "update the device, or use the calibration without effects";
+            let parts = effect.on_device().map_err(|why| match why {
+                NotOnDevice::Numbers => refuse(why.to_string(), "diagnose the recording again"),
+                _ => refuse(why.to_string(), WITHOUT),
+            })?;
+            for part in parts {
+                all.push(part).map_err(|_| {
+                    let problem = format!("the device has no room for it: at most {N} of a kind");
+                    refuse(problem, WITHOUT)
+                })?;
+            }
+        }
+        Ok(all)
+    }
 }

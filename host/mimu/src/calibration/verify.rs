@@ -9,9 +9,9 @@ use crate::calibration::die_temperature::{at_one_temperature, outside};
 use crate::effects::removal::{removable, remove_within};
 use crate::estimate::Observation;
 use crate::estimate::turn::{Turn, direction_error};
-use crate::fit::as_came::{errors, exceeds};
 use crate::fit::by_rate::variances;
 use crate::fit::refuse_wrong_gravity;
+use crate::fit::uncalibrated::{errors, exceeds};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::{PerSensor, Sensor, present};
@@ -20,7 +20,7 @@ use crate::triad::Forward;
 use crate::turntable::RatedDwells;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, RawUnit, Reference};
+use mimu_recording::{Manifest, Reference};
 
 /// Errors of one triad of a recording with and without a calibration. Figures as in [`Figure`].
 #[derive(Debug, Clone, Serialize)]
@@ -28,9 +28,9 @@ pub struct SensorVerification {
     /// With the mean of the calibration's scale factors and of its biases on all three axes and no misalignment, in [`Self::unit`]: fitted means
     /// replace those of a data sheet.
     pub rms_raw: f64,
-    /// The readings as they came, in [`Self::unit`]; absent if they are not in SI.
+    /// The readings without a calibration, in [`Self::unit`]; absent if they are not in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_as_they_came: Option<f64>,
+    pub rms_uncalibrated: Option<f64>,
     /// With the calibration, in [`Self::unit`].
     pub rms: f64,
     /// With the calibration except its effects, in [`Self::unit`]; absent if it has none.
@@ -96,7 +96,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let at_rest = match manifest.reference {
         Reference::TurntableRate => {
             let mut at_rest = prepared.clone();
-            warnings.extend(RatedDwells::of(prepared)?.set_aside(&mut at_rest));
+            warnings.extend(RatedDwells::of(prepared)?.exclude_dwells(&mut at_rest));
             Some(at_rest)
         }
         Reference::Table | Reference::Gravity => None,
@@ -118,7 +118,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             (Some((affine, _)), Some((clean, refused))) => {
                 let judged = SensorVerification {
                     rms_raw: affine.rms_raw,
-                    rms_as_they_came: affine.rms_as_they_came,
+                    rms_uncalibrated: affine.rms_uncalibrated,
                     rms_affine: Some(affine.rms),
                     ..clean
                 };
@@ -154,14 +154,18 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let at_rest = sensors.present().filter_map(|(_, s)| s.static_rms);
     warnings.extend(at_rest.filter_map(restless));
     for (sensor, s) in sensors.present() {
-        let other = s.rms_as_they_came.unwrap_or(s.rms_raw);
+        let other = s.rms_uncalibrated.unwrap_or(s.rms_raw);
         if !(s.rms > other) {
             continue;
         }
-        let as_came = s.rms_as_they_came.is_some();
+        let readings_in_si = s.rms_uncalibrated.is_some();
         let warning = match exceeds(s.rms, other, errors(s.figure, s.count)) {
-            true => Warning::Worse(as_came),
-            false => Warning::Undecided(s.count as u64, s.figure == Figure::Direction, as_came),
+            true => Warning::Worse(readings_in_si),
+            false => Warning::Undecided(
+                s.count as u64,
+                s.figure == Figure::Direction,
+                readings_in_si,
+            ),
         };
         warnings.push(warning.of(sensor));
     }
@@ -255,16 +259,6 @@ pub fn nominal(calibrated: &Affine<f64>) -> Option<Affine<f64>> {
     })
 }
 
-/// Readings as they are.
-const ONE: Affine<f64> = Affine {
-    matrix: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
-    offset: Vector3::new(0.0, 0.0, 0.0),
-};
-
-fn in_si(prepared: &Prepared) -> bool {
-    prepared.manifest.raw_unit == RawUnit::Si
-}
-
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
@@ -286,7 +280,7 @@ fn judged(
         unit: figure.unit(sensor),
         figure,
         rms_raw: rms(raw),
-        rms_as_they_came: None,
+        rms_uncalibrated: None,
         rms_affine: None,
         rms: rms(after),
         max: largest(after),
@@ -322,7 +316,9 @@ fn known(
         &floor,
     )?;
     Some(SensorVerification {
-        rms_as_they_came: in_si(prepared).then(|| rms(&errors(&ONE))),
+        rms_uncalibrated: prepared
+            .is_in_si()
+            .then(|| rms(&errors(&Affine::identity()))),
         ..judged
     })
 }
@@ -330,9 +326,15 @@ fn known(
 fn size(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerification> {
     let g = prepared.manifest.gravity_mps2;
     let observations = prepared.observations(Sensor::Accel);
-    let floor = prepared.size_floors(calibrated, &observations);
+    let floor = prepared.magnitude_floors(calibrated, &observations);
     let known: Vec<(&Observation, f64)> = observations.iter().map(|o| (o, g)).collect();
-    magnitudes(prepared, Figure::GravitySize, calibrated, &known, &floor)
+    magnitudes(
+        prepared,
+        Figure::GravityMagnitude,
+        calibrated,
+        &known,
+        &floor,
+    )
 }
 
 fn rate(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerification> {
@@ -342,7 +344,7 @@ fn rate(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerificat
         .map(|v| prepared.if_noise_known(&[Sensor::Gyro], v.sqrt()))
         .collect();
     let known: Vec<(&Observation, f64)> = dwells.turning.iter().zip(dwells.magnitudes()).collect();
-    let judged = magnitudes(prepared, Figure::RateSize, calibrated, &known, &floor)?;
+    let judged = magnitudes(prepared, Figure::RateMagnitude, calibrated, &known, &floor)?;
     let rests = dwells.rests.iter();
     let rest: Vec<f64> = rests
         .flat_map(|r| <[f64; 3]>::from(calibrated.apply(&r.raw)))
@@ -362,7 +364,7 @@ fn magnitudes(
     floor: &[f64],
 ) -> Option<SensorVerification> {
     let sensor = match figure {
-        Figure::RateSize => Sensor::Gyro,
+        Figure::RateMagnitude => Sensor::Gyro,
         _ => Sensor::Accel,
     };
     let errors = |model: &Affine<f64>| -> Vec<f64> {
@@ -379,7 +381,9 @@ fn magnitudes(
         floor,
     )?;
     Some(SensorVerification {
-        rms_as_they_came: in_si(prepared).then(|| rms(&errors(&ONE))),
+        rms_uncalibrated: prepared
+            .is_in_si()
+            .then(|| rms(&errors(&Affine::identity()))),
         ..judged
     })
 }
@@ -414,7 +418,10 @@ fn turns(
     let judged = judged(Sensor::Gyro, Figure::Direction, &before, &after, &floor)?;
     Some(SensorVerification {
         static_rms: Some(rms(&rest)),
-        rms_as_they_came: in_si(prepared).then(|| rms(&errors(&prepared.turns(&ONE).0, &ONE))),
+        rms_uncalibrated: prepared.is_in_si().then(|| {
+            let one = Affine::identity();
+            rms(&errors(&prepared.turns(&one).0, &one))
+        }),
         ..judged
     })
 }

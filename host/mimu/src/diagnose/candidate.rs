@@ -21,7 +21,7 @@ impl Candidate {
         if !candidate.reads_code() {
             return Some(candidate);
         }
-        let (lowest, highest) = rows.reading_range();
+        let [lowest, highest] = rows.reading_range();
         let weight = converter::first_weight(rows.step?, lowest, highest);
         Some(candidate.behind_one(Converter::of(weight, 0.0)))
     }

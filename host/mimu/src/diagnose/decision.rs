@@ -39,7 +39,7 @@ use undecided::undecided;
 
 use hold_out::rms_at_rest;
 pub(super) use hold_out::{held_out, part, rms};
-pub use leftover::{Against, FALSE_LEFTOVER, Leftover};
+pub use leftover::{CorrelatesWith, FALSE_LEFTOVER, Leftover};
 pub use model::Model;
 pub use nonlinear::Nonlinear;
 pub use second::Second;
@@ -139,7 +139,7 @@ impl Decision {
     /// Marks effects that depend on the time since power-on as specific to the recording, because its device had started by `start` instead
     /// of a power-on.
     pub(super) fn without_power_on(&mut self, start: &str) {
-        let by_time = |a: &&mut Accepted| a.chosen.candidate.goes_by_time();
+        let by_time = |a: &&mut Accepted| a.chosen.candidate.depends_on_time();
         let mut ids = Vec::new();
         for accepted in self.accepted.iter_mut().filter(by_time) {
             accepted.of_unit = false;
@@ -263,22 +263,19 @@ pub fn decide(
     let nonlinear = Nonlinear::of(&search, &kept, &after);
     let (model, last) = (&after.columns, &after.fitted);
     let mut accepted = Vec::new();
-    let values = shares(&search, &kept, last);
-    let seconds = judge.elsewhere(&kept, &values);
+    let values = coefficients_of(&search, &kept, last);
+    let seconds = judge.on_second_recording(&kept, &values);
     let (first, mut from) = (search.basis.ncols(), 0);
+    let held_with_all = judge.held(&kept, &with, split);
     for (i, one) in kept.iter().enumerate() {
         let count = one.columns.ncols();
         let mut rest = kept.clone();
         rest.remove(i);
         let without = search.fit(&rest)?;
-        let both = [
-            judge.held(&rest, &without, split),
-            judge.held(&kept, &with, split),
-        ];
-        let held = both.each_ref().map(|h| h.as_ref().map(|h| rms(rows, h)));
-        let at_rest = both
-            .each_ref()
-            .map(|h| h.as_ref().and_then(|h| rms_at_rest(rows, h)));
+        let held_without = judge.held(&rest, &without, split);
+        let both = [held_without.as_ref(), held_with_all.as_ref()];
+        let held = both.map(|h| h.map(|h| rms(rows, h)));
+        let at_rest = both.map(|h| h.and_then(|h| rms_at_rest(rows, h)));
         let covariance = nonlinear.covariance.view((from, from), (count, count));
         let [before, after] = held.map(|h| h.unwrap_or(f64::NAN));
         let (at_rest_before, at_rest_after) = match at_rest {
@@ -324,6 +321,10 @@ pub fn decide(
             .iter()
             .map(|one| rejection(&one.candidate, Reason::Suggestion(one.p))),
     );
+    let now = (
+        rms(rows, &(&rows.y - search.model(&kept) * &with.coefficients)),
+        judge.held_rms(&kept, &with, usual),
+    );
     for one in search.others(&with_jumps, &all) {
         let id = one.candidate.id();
         if rejected.iter().any(|r| r.id == id) || not_excited.iter().any(|n| n.id == id) {
@@ -340,10 +341,6 @@ pub fn decide(
                     held,
                 )
             });
-        let now = (
-            rms(rows, &(&rows.y - search.model(&kept) * &with.coefficients)),
-            judge.held_rms(&kept, &with, usual),
-        );
         let errors = match (held, now) {
             (Some((sample, held)), (before, Some(out))) => {
                 Some([[before, sample], [out, held]].map(|of| of.map(|v| ErrorRms::of(rows, v))))
@@ -430,7 +427,7 @@ fn known_in(rows: &Rows) -> [f64; 2] {
 }
 
 /// Coefficients of each of the chosen.
-fn shares(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>> {
+fn coefficients_of(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>> {
     let mut from = search.basis.ncols();
     let mut all = Vec::new();
     for one in chosen {

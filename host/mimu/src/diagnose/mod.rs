@@ -28,7 +28,6 @@ pub mod variance;
 
 use decision::Decision;
 use mimu_core::compensation::Affine;
-use nalgebra::{Matrix3, Vector3};
 use passes::{Pass, Passes, session};
 use picture::Picture;
 use rows::{ForceErrors, FreeParameters, Rows};
@@ -306,10 +305,7 @@ fn matrices(recordings: &Recordings) -> Option<[Option<Affine<f64>>; 2]> {
         return Some(Sensor::BOTH.map(|s| given.inverse(s)));
     }
     let first = &recordings.first;
-    let unit = Affine {
-        matrix: Matrix3::identity(),
-        offset: Vector3::zeros(),
-    };
+    let unit = Affine::identity();
     let never_turned = match first.manifest.reference {
         Reference::Gravity | Reference::TurntableRate => !first.has(Sensor::Accel),
         Reference::Table => Sensor::BOTH.iter().all(|s| {
@@ -339,19 +335,18 @@ fn with_temperature(now: &mut Fit, sensors: &[SensorDiagnosis]) {
     });
 }
 
+fn singular(place: &str) -> Error {
+    let remedy = "check the columns of the recording";
+    Error::new(place, "the calibration is singular", remedy)
+}
+
 /// Diagnoses a unit.
 ///
 /// The accelerometer comes first: without a table, its directions of gravity judge the gyro.
 pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
     recordings.check()?;
     let place = recordings.first.place.clone();
-    let singular = || {
-        Error::new(
-            &place,
-            "the calibration is singular",
-            "check the columns of the recording",
-        )
-    };
+    let singular = || singular(&place);
     let held = matrices(&recordings);
     // For readings in SI of a unit that is never turned, the uncertainty of the matrix is unknown.
     let covariances = Sensor::BOTH.map(|s| recordings.given.and_then(|c| c.covariance(s)));

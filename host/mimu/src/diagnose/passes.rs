@@ -14,17 +14,18 @@ use super::decision::{Decision, decide, noisier};
 use super::rejected::{Reason, Rejected};
 use super::rows::{ForceErrors, FreeParameters, RowFigure, Rows, Session};
 use super::search::Chosen;
+use super::singular;
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
 use crate::fit::{Fit, session_bias};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::Result;
 
 /// Most times that the rows of a sensor are made.
 const PASSES: usize = 3;
 /// Error of the effects by the affine model, over the noise, above which the rows are made again.
-const BENT: f64 = 0.1;
+const DISTORTED: f64 = 0.1;
 /// An effect with more coefficients than this is complex: a simpler one may have distorted the affine model. The simplest effects have one
 /// coefficient for each axis.
 const SIMPLE: usize = 3;
@@ -74,7 +75,7 @@ fn removed_of(decision: &Decision) -> Vec<FittedEffect> {
 }
 
 /// Relative difference of two affine models in scale and direction.
-fn bent(was: &Affine<f64>, is: &Affine<f64>) -> f64 {
+fn relative_change(was: &Affine<f64>, is: &Affine<f64>) -> f64 {
     let inverse = was.matrix.try_inverse().unwrap_or_else(Matrix3::zeros);
     (is.matrix * inverse - Matrix3::identity()).amax()
 }
@@ -97,7 +98,7 @@ pub(super) struct Pass {
 
 impl Pass {
     /// Whether `other` is no better: by the held-out error, or because its readings without the effects cannot be calibrated.
-    fn stands_before(&self, other: &Self) -> bool {
+    fn is_no_worse_than(&self, other: &Self) -> bool {
         let held_out = |pass: &Self| pass.decision.held_out_rms[1];
         !matches!(other.after, Some(Ok(_))) || !(held_out(other) <= held_out(self))
     }
@@ -107,7 +108,7 @@ impl Pass {
     fn about(&self) -> Vec<FittedEffect> {
         match self.rows.figure {
             RowFigure::Input | RowFigure::Rest => Vec::new(),
-            RowFigure::Size | RowFigure::Direction => {
+            RowFigure::Magnitude | RowFigure::Direction => {
                 let found = self.found.iter().filter(|e| e.is_of_own_input());
                 found.cloned().collect()
             }
@@ -150,14 +151,6 @@ pub(super) struct Passes<'a> {
 }
 
 impl Passes<'_> {
-    fn singular(&self) -> Error {
-        Error::new(
-            self.place,
-            "the calibration is singular",
-            "check the columns of the recording",
-        )
-    }
-
     /// The best pass without effects that make the calibration file err more on another recording.
     pub fn best(&self) -> Result<Pass> {
         let judge = AsWritten {
@@ -191,16 +184,16 @@ impl Passes<'_> {
     /// The same with some effects not tried, each with the reason. If the accepted effects distorted the affine model, or cannot be removed,
     /// each complex one is left out in turn, and the pass that predicts best is taken.
     fn best_without(&self, without: &[Rejected]) -> Result<Pass> {
-        let (mut best, strong) = self.settled(without)?;
+        let (mut best, strong) = self.converged(without)?;
         let complex = best.decision.accepted.iter();
         let complex = complex.filter(|a| strong && a.effect.values.len() > SIMPLE);
         let ids: Vec<String> = complex.map(|a| a.chosen.candidate.id()).collect();
         for id in ids {
             let mut without = without.to_vec();
             without.push(self.rejected(id, Reason::OtherPredictsBetter));
-            let (other, _) = self.settled(&without)?;
+            let (other, _) = self.converged(&without)?;
             let refused = matches!(best.after, Some(Err(_)));
-            if matches!(other.after, Some(Ok(_))) && (refused || !best.stands_before(&other)) {
+            if matches!(other.after, Some(Ok(_))) && (refused || !best.is_no_worse_than(&other)) {
                 best = other;
             }
         }
@@ -209,7 +202,7 @@ impl Passes<'_> {
 
     /// Repeats passes until the affine model stays. The flag says whether the first pass distorted it, or led to readings that cannot be
     /// calibrated.
-    fn settled(&self, without: &[Rejected]) -> Result<(Pass, bool)> {
+    fn converged(&self, without: &[Rejected]) -> Result<(Pass, bool)> {
         let sensor = self.sensor;
         let fits = Sensor::BOTH.map(|s| self.now.sensor(s));
         let mut models = fits.map(|f| Some(f?.estimated.triad.inverse));
@@ -218,7 +211,8 @@ impl Passes<'_> {
             let (Some(was), Some(is)) = (models[sensor as usize], pass.affine(sensor)) else {
                 return false;
             };
-            bent(&was, &is) * explained_rms(&pass.decision) > BENT * pass.decision.noise_floor
+            relative_change(&was, &is) * explained_rms(&pass.decision)
+                > DISTORTED * pass.decision.noise_floor
         };
         let strong = moves(&models, &pass) || matches!(pass.after, Some(Err(_)));
         for _ in 1..PASSES {
@@ -229,7 +223,7 @@ impl Passes<'_> {
             let about = pass.about();
             let next = self.pass(models, &about, without)?;
             let closer = !about.is_empty() && pass.has_effects_of(&next);
-            if !closer && pass.stands_before(&next) {
+            if !closer && pass.is_no_worse_than(&next) {
                 break;
             }
             pass = next;
@@ -280,13 +274,13 @@ impl Passes<'_> {
         let sessions: Vec<Session> = std::iter::once(head).chain(others).collect();
         let (ours, unseen) = sessions.split_at(self.found_in);
         let rows = self.rows(ours, &models, about);
-        let rows = rows.ok_or_else(|| self.singular())?;
+        let rows = rows.ok_or_else(|| singular(self.place))?;
         let unseen = self.rows(unseen, &models, about);
         let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
         let ends = dwell_ends(&all);
         let decide = |without: &[Rejected]| {
             decide(&rows, &ends, unseen.as_ref(), without, self.accept)
-                .ok_or_else(|| self.singular())
+                .ok_or_else(|| singular(self.place))
         };
         let clean = |found: &[FittedEffect]| -> Result<(Fit, Vec<Prepared>)> {
             let lasting: Vec<FittedEffect> = found.iter().map(FittedEffect::lasting).collect();
@@ -299,7 +293,7 @@ impl Passes<'_> {
                     _ => &of_unit,
                 };
                 remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects)
-                    .ok_or_else(|| self.singular())
+                    .ok_or_else(|| singular(self.place))
             };
             let cleaned = sessions.iter().enumerate().map(clean);
             let mut cleaned: Vec<Prepared> = cleaned.collect::<Result<_>>()?;

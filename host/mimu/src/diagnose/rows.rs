@@ -29,6 +29,7 @@ use crate::effects::fitted::FittedEffect;
 use crate::effects::quantity::Conditions;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
 use crate::estimate::earth::poses;
+use crate::signal::blocks::extent;
 pub use forces::ForceErrors;
 use terms::Quantities;
 
@@ -70,7 +71,7 @@ pub enum RowFigure {
     /// Error of a known input, SI.
     Input,
     /// Magnitude of the specific force minus gravity, m/s².
-    Size,
+    Magnitude,
     /// Direction of gravity predicted by a turn, rad.
     Direction,
     /// Rate at rest, rad/s.
@@ -81,7 +82,7 @@ impl From<RowFigure> for quantity::Figure {
     fn from(figure: RowFigure) -> Self {
         match figure {
             RowFigure::Input | RowFigure::Rest => Self::Input,
-            RowFigure::Size => Self::GravitySize,
+            RowFigure::Magnitude => Self::GravityMagnitude,
             RowFigure::Direction => Self::Direction,
         }
     }
@@ -354,11 +355,9 @@ impl Rows {
     }
 
     /// Lowest and highest reading of any axis, raw, each a mean under one set of conditions.
-    pub fn reading_range(&self) -> (f64, f64) {
+    pub fn reading_range(&self) -> [f64; 2] {
         let all = self.conditions.iter().flat_map(|m| m.reading.mean.iter());
-        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-            (a.min(*v), b.max(*v))
-        })
+        extent(all.copied())
     }
 
     /// The conditions, with the temperature that an effect follows.
@@ -367,13 +366,13 @@ impl Rows {
             return Cow::Borrowed(&self.conditions);
         };
         let each = self.temperature.iter().zip(&self.without_self_heating);
-        let warm: Vec<&[(f64, f64)]> = each
+        let temperature_offset: Vec<&[(f64, f64)]> = each
             .map(|(recorded, other)| {
                 let other = other.as_deref().filter(|_| followed.without_self_heating);
                 other.unwrap_or(recorded)
             })
             .collect();
-        let late: Vec<Vec<f64>> = warm
+        let lagged_temperature: Vec<Vec<f64>> = temperature_offset
             .iter()
             .map(|w| match followed.lag_s {
                 Some(lag_s) => lagged(w, lag_s),
@@ -382,8 +381,8 @@ impl Rows {
             .collect();
         let mut conditions = self.conditions.clone();
         for (at_one, (session, at)) in conditions.iter_mut().zip(&self.block) {
-            at_one.temperature_offset = warm[*session][*at].1;
-            at_one.lagged_temperature = late[*session][*at];
+            at_one.temperature_offset = temperature_offset[*session][*at].1;
+            at_one.lagged_temperature = lagged_temperature[*session][*at];
         }
         Cow::Owned(conditions)
     }

@@ -309,7 +309,7 @@ impl<'a> Search<'a> {
                 let (candidate, with) = beside_these.coefficients(candidate, parameter, with)?;
                 let (parameter, with) = match candidate.active.len() == before {
                     true => (parameter, with),
-                    false => beside_these.parameter_from(&candidate, (parameter, with))?,
+                    false => beside_these.climb(&candidate, (parameter, with), |c| c)?,
                 };
                 (candidate, parameter, with, whole)
             }
@@ -397,39 +397,21 @@ pub(super) const CONFUSED: f64 = 12.0;
 impl Candidate {
     /// Whether both are the same but for the choice of coefficients.
     fn is_variant_of(&self, other: &Self) -> bool {
-        match (&self.kind, &other.kind) {
-            (CandidateKind::Effect(a), CandidateKind::Effect(b)) => a.id == b.id,
-            (CandidateKind::Term(i, a), CandidateKind::Term(j, b)) => i == j && a == b,
-            (
-                CandidateKind::Jump {
-                    axis: i,
-                    session: r,
-                    t_s: a,
-                },
-                CandidateKind::Jump {
-                    axis: j,
-                    session: s,
-                    t_s: b,
-                },
-            ) => i == j && r == s && a == b,
-            _ => false,
-        }
+        self.kind == other.kind
     }
 
     /// Whether both are a term or a jump, and the same but for the axis.
     fn is_same_of_another_axis(&self, other: &Self) -> bool {
-        match (&self.kind, &other.kind) {
-            (CandidateKind::Term(_, a), CandidateKind::Term(_, b)) => a == b,
-            (
-                CandidateKind::Jump {
-                    session: r, t_s: a, ..
-                },
-                CandidateKind::Jump {
-                    session: s, t_s: b, ..
-                },
-            ) => r == s && a == b,
-            _ => false,
-        }
+        let on_x = |kind: &CandidateKind| match *kind {
+            CandidateKind::Effect(_) => None,
+            CandidateKind::Term(_, product) => Some(CandidateKind::Term(0, product)),
+            CandidateKind::Jump { session, t_s, .. } => Some(CandidateKind::Jump {
+                axis: 0,
+                session,
+                t_s,
+            }),
+        };
+        on_x(&self.kind).is_some_and(|kind| on_x(&other.kind) == Some(kind))
     }
 
     /// Number of independent tests that it counts as, apart from the choice among its variants.

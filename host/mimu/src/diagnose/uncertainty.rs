@@ -54,16 +54,16 @@ pub fn of_affine(rows: &Rows, decision: &Decision) -> Option<Part> {
 /// `f_z f_x` by y and `f_x f_y` by z it shows the sum. The rest is taken to have data-sheet size. So a gyro is not reported to have an
 /// effect that the rest could cause.
 ///
-/// `session` is the first recording, `sizes` are the rows of its accelerometer (and of later ones), and `decision` is the one on these.
-pub fn of_forces(session: &Session, sizes: &Rows, decision: &Decision) -> Option<ForceErrors> {
+/// `session` is the first recording, `magnitudes` are the rows of its accelerometer (and of later ones), and `decision` is the one on these.
+pub fn of_forces(session: &Session, magnitudes: &Rows, decision: &Decision) -> Option<ForceErrors> {
     let rows = Rows::forces(session)?;
     let n = rows.y.len() / 3;
-    let stratum = sizes.strata.iter().find(|s| s.session == 0)?;
+    let stratum = magnitudes.strata.iter().find(|s| s.session == 0)?;
     if stratum.rows.len() != n {
         return None;
     }
     let model = decision.models.last()?;
-    let variances = VarianceModel::new(sizes, false).variances(&model.fitted.components);
+    let variances = VarianceModel::new(magnitudes, false).variances(&model.fitted.components);
     // A prior of 1/sigma² for each column; 0 for those that the magnitudes determine.
     let mut columns = rows.nuisance.clone();
     let mut precision = vec![0.0; columns.ncols()];

@@ -48,7 +48,7 @@ pub enum LikelihoodKind {
 }
 
 /// What a stratum adds to the normal equations.
-struct Share {
+struct NormalEquations {
     /// Normal matrix of columns and residual.
     normal: DMatrix<f64>,
     log_determinant: f64,
@@ -234,30 +234,30 @@ impl<'a> VarianceModel<'a> {
         Some(DecorrelatedChoice { parts })
     }
 
-    fn share(
+    fn stratum(
         &self,
         s: usize,
         extra_white: f64,
         random_walk: f64,
         both: &DMatrix<f64>,
-    ) -> Option<Share> {
+    ) -> Option<NormalEquations> {
         let range = &self.rows.strata[s].rows;
         let mut part = both.rows(range.start, range.len()).into_owned();
         let factor = self.factor(s, extra_white, random_walk)?;
         factor.whiten(&mut part);
-        Some(Share {
+        Some(NormalEquations {
             normal: part.tr_mul(&part),
             log_determinant: factor.log_determinant(),
         })
     }
 
-    fn solve(&self, shares: &[Share], at: &Components) -> Option<Fitted> {
-        let p = shares.first()?.normal.ncols() - 1;
+    fn solve(&self, strata: &[NormalEquations], at: &Components) -> Option<Fitted> {
+        let p = strata.first()?.normal.ncols() - 1;
         let mut normal = DMatrix::zeros(p + 1, p + 1);
         let mut logs = 0.0;
-        for share in shares {
-            normal += &share.normal;
-            logs += share.log_determinant;
+        for stratum in strata {
+            normal += &stratum.normal;
+            logs += stratum.log_determinant;
         }
         let y2 = normal[(p, p)];
         if p == 0 {
@@ -306,10 +306,10 @@ impl<'a> VarianceModel<'a> {
     /// The model with `columns` at given components.
     pub fn fit_at(&self, columns: &DMatrix<f64>, at: &Components) -> Option<Fitted> {
         let both = self.both(columns);
-        let shares: Option<Vec<Share>> = (0..self.rows.strata.len())
-            .map(|s| self.share(s, at.extra_white[s], at.random_walk[s], &both))
+        let strata: Option<Vec<NormalEquations>> = (0..self.rows.strata.len())
+            .map(|s| self.stratum(s, at.extra_white[s], at.random_walk[s], &both))
             .collect();
-        self.solve(&shares?, at)
+        self.solve(&strata?, at)
     }
 
     /// The model with `columns` at the components that maximise the likelihood `by`, searched from `start` on.
@@ -325,13 +325,13 @@ impl<'a> VarianceModel<'a> {
         };
         let both = self.both(columns);
         let mut at = start.clone();
-        let mut shares: Vec<Share> = (0..self.rows.strata.len())
-            .map(|s| self.share(s, at.extra_white[s], at.random_walk[s], &both))
+        let mut strata: Vec<NormalEquations> = (0..self.rows.strata.len())
+            .map(|s| self.stratum(s, at.extra_white[s], at.random_walk[s], &both))
             .collect::<Option<_>>()?;
-        let mut best = self.solve(&shares, &at)?;
+        let mut best = self.solve(&strata, &at)?;
         for _ in 0..SWEEPS {
             let before = cost(&best);
-            for s in 0..shares.len() {
+            for s in 0..strata.len() {
                 let (row, unit_random_walk) = self.typical[s];
                 for part in 0..if self.seeks_random_walk(s) { 2 } else { 1 } {
                     let (now, unit) = match part {
@@ -350,29 +350,29 @@ impl<'a> VarianceModel<'a> {
                         _ => (at.extra_white[s], value),
                     };
                     // In parallel: decorrelating a stratum takes nearly all of the time, and the values do not depend on each other.
-                    let tried: Vec<((f64, f64), Option<Share>)> = steps
+                    let tried: Vec<((f64, f64), Option<NormalEquations>)> = steps
                         .into_par_iter()
                         .map(|value| {
                             let (extra_white, random_walk) = with(value);
                             (
                                 (extra_white, random_walk),
-                                self.share(s, extra_white, random_walk, &both),
+                                self.stratum(s, extra_white, random_walk, &both),
                             )
                         })
                         .collect();
-                    for ((extra_white, random_walk), share) in tried {
-                        let Some(new) = share else {
+                    for ((extra_white, random_walk), stratum) in tried {
+                        let Some(new) = stratum else {
                             continue;
                         };
-                        let old = std::mem::replace(&mut shares[s], new);
+                        let old = std::mem::replace(&mut strata[s], new);
                         let mut there = at.clone();
                         (there.extra_white[s], there.random_walk[s]) = (extra_white, random_walk);
-                        match self.solve(&shares, &there) {
+                        match self.solve(&strata, &there) {
                             Some(found) if cost(&found) < cost(&best) - 1e-9 => {
                                 best = found;
                                 at = there;
                             }
-                            _ => shares[s] = old,
+                            _ => strata[s] = old,
                         }
                     }
                 }

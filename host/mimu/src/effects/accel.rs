@@ -1,12 +1,9 @@
 //! Accelerometer errors that depend on the motion.
 
-use super::effect::{Coefficient, Effect, each, times};
+use super::effect::{Coefficient, Effect, G, MG, each, times};
 use super::quantity::Quantity::{AngularAcceleration, Input, InputAlong, Rate};
 use super::regressor::{Product, Regressor};
 use crate::quantity::Sensor;
-
-const G: f64 = 9.80665;
-const MG: f64 = 1e-3 * G;
 
 const PRODUCT: [Coefficient; 9] = {
     let [xy, yz, zx] = [

@@ -15,7 +15,7 @@ pub struct Alternative {
     /// Ids of the effects whose residuals it may explain.
     pub of: &'static [&'static str],
     /// The experiment that would distinguish them.
-    pub settled_by: &'static str,
+    pub discriminating_experiment: &'static str,
 }
 
 /// Mouldings and glue relax from seconds after power-on to minutes.
@@ -98,22 +98,22 @@ static ALTERNATIVES: [Alternative; 5] = [
             "gyro_scale_asymmetry",
             "gyro_scale_quadratic",
         ],
-        settled_by: BY_HAND,
+        discriminating_experiment: BY_HAND,
     },
     Alternative {
         law: by_turning(Sensor::Accel),
         of: &["accel_readout_code", "accel_size_effect"],
-        settled_by: BY_HAND,
+        discriminating_experiment: BY_HAND,
     },
     Alternative {
         law: creep(Sensor::Gyro),
         of: &["gyro_warm_up", "gyro_thermal_lag"],
-        settled_by: LONGER,
+        discriminating_experiment: LONGER,
     },
     Alternative {
         law: creep(Sensor::Accel),
         of: &["accel_warm_up", "accel_thermal_lag"],
-        settled_by: LONGER,
+        discriminating_experiment: LONGER,
     },
     // A field along the vertical, above all the Earth's magnetic field, acts on each axis only by its component along it. A proof mass that sags also
     // responds to some force across its axis.
@@ -126,7 +126,7 @@ static ALTERNATIVES: [Alternative; 5] = [
             None,
         ),
         of: &["gyro_g_sensitivity"],
-        settled_by: "the same poses far from iron, or with a magnet near",
+        discriminating_experiment: "the same poses far from iron, or with a magnet near",
     },
 ];
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::converter::{BITS, Codes, Converter};
+use super::converter::{BITS, Converter, Converters};
 use super::effect::{Coefficient, Effect, NonlinearParameter, Role, Scope};
 use super::quantity::{Conditions, Need, Quantity, RATE_LAG_S};
 use super::readout;
@@ -12,7 +12,7 @@ use crate::quantity::AXES;
 use crate::quantity::Sensor;
 
 /// Kind of a candidate.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum CandidateKind {
     /// A named effect.
     Effect(&'static Effect),
@@ -39,7 +39,7 @@ pub struct Candidate {
     /// Coefficients that the experiment determines.
     pub active: Vec<usize>,
     /// For errors that depend on the code: the converter of each axis that has one. Axes may share one.
-    pub codes: Codes,
+    pub codes: Converters,
     /// As in [`Followed`].
     pub without_self_heating: bool,
     /// Coefficients that the experiment would show at data-sheet size.
@@ -54,7 +54,7 @@ pub struct Candidate {
 
 /// Errors of a converter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OfConverter {
+pub struct ConverterErrors {
     /// Axis that it reads; `None` for all axes.
     pub axis: Option<usize>,
     /// Relation between its codes and readings.
@@ -307,8 +307,8 @@ impl Candidate {
 
     /// For errors that depend on the code: the errors of each converter, from the values of the active coefficients. If all three are equal, one
     /// entry for all axes.
-    pub fn by_converter(&self, values: &[f64]) -> Vec<OfConverter> {
-        let all: Vec<OfConverter> = (0..3)
+    pub fn by_converter(&self, values: &[f64]) -> Vec<ConverterErrors> {
+        let all: Vec<ConverterErrors> = (0..3)
             .filter_map(|axis| {
                 let mut errors = [0.0; BITS];
                 for (k, value) in self.active.iter().zip(values) {
@@ -318,7 +318,7 @@ impl Candidate {
                         *error += value;
                     }
                 }
-                Some(OfConverter {
+                Some(ConverterErrors {
                     axis: Some(axis),
                     converter: self.codes[axis]?,
                     errors,
@@ -326,12 +326,12 @@ impl Candidate {
             })
             .collect();
         let first = all.first().copied();
-        let alike = |one: &OfConverter| {
+        let alike = |one: &ConverterErrors| {
             first.is_some_and(|f| (f.converter, f.errors) == (one.converter, one.errors))
         };
         match first {
             Some(one) if all.len() == 3 && all.iter().all(alike) => {
-                vec![OfConverter { axis: None, ..one }]
+                vec![ConverterErrors { axis: None, ..one }]
             }
             _ => all,
         }
@@ -413,7 +413,7 @@ impl Candidate {
     }
 
     /// Whether it depends on the time since power-on.
-    pub fn goes_by_time(&self) -> bool {
+    pub fn depends_on_time(&self) -> bool {
         let mut all = self.active_regressors().into_iter();
         all.any(|r| r.quantities().contains(&Quantity::Time))
     }

@@ -8,7 +8,7 @@ use super::quantity::{Conditions, Reading};
 pub const BITS: usize = 9;
 
 /// Converters of the axes.
-pub type Codes = [Option<Converter>; 3];
+pub type Converters = [Option<Converter>; 3];
 
 /// Relation between a converter's codes and readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +28,7 @@ impl Converter {
 
 impl Conditions {
     /// The conditions with each axis's reading in units of its converter's first bit, counted from code 0; not a number for an axis without one.
-    pub(crate) fn in_bits(&self, codes: &Codes) -> Self {
+    pub(crate) fn in_bits(&self, codes: &Converters) -> Self {
         let mut out = *self;
         let Reading { mean, sd, scale } = &mut out.reading;
         for (i, converter) in codes.iter().enumerate() {

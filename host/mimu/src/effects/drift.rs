@@ -1,12 +1,10 @@
 //! Biases that move with time.
 
-use super::effect::{Effect, NonlinearParameter, Role, each};
+use super::effect::{DPS, Effect, MG, NonlinearParameter, Role, each};
 use super::quantity::Quantity::{SessionTime, Time};
 use super::regressor::Regressor;
 use crate::quantity::Sensor;
 
-const DPS: f64 = std::f64::consts::PI / 180.0;
-const MG: f64 = 9.80665e-3;
 const HOUR_S: f64 = 3600.0;
 
 /// A die of some tens of milliwatts and its package settle within minutes.

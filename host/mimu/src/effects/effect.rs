@@ -4,6 +4,13 @@ use super::quantity::Quantity;
 use super::regressor::{Product, Regressor};
 use crate::quantity::Sensor;
 
+/// 1 deg/s, rad/s.
+pub(super) const DPS: f64 = std::f64::consts::PI / 180.0;
+/// 1 g, m/s².
+pub(super) const G: f64 = crate::readable::STANDARD_GRAVITY;
+/// 1 milli-g, m/s².
+pub(super) const MG: f64 = 1e-3 * G;
+
 /// Role of the nonlinear parameter of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
@@ -155,6 +162,12 @@ pub enum OnDevice {
     EverySample,
     /// Folded into a bias and a matrix, when temperature or time changes.
     Folded,
+}
+
+impl PartialEq for Effect {
+    fn eq(&self, other: &Self) -> bool {
+        self.id == other.id
+    }
 }
 
 impl Effect {

@@ -126,7 +126,7 @@ impl FittedEffect {
     }
 
     /// Its nonlinear parameter by name.
-    pub fn form(&self) -> Option<WrittenParameter> {
+    pub fn nonlinear_parameter(&self) -> Option<WrittenParameter> {
         let NonlinearParameter { name, from, to, .. } = self.candidate.parameter()?;
         Some(WrittenParameter {
             name: name.into(),

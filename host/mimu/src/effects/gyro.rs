@@ -1,13 +1,10 @@
 //! Gyro errors that depend on the motion.
 
-use super::effect::{Coefficient, Effect, Scope, each, force, matrix};
+use super::effect::{Coefficient, DPS, Effect, G, Scope, each, force, matrix};
 use super::quantity::Quantity::{Input, Up};
 use super::regressor::Regressor;
 use crate::quantity::Sensor;
 
-/// 1 deg/s, rad/s.
-const DPS: f64 = std::f64::consts::PI / 180.0;
-const G: f64 = 9.80665;
 /// Full scale of an ADXRS300, rad/s, at which its nonlinearity is specified.
 const FULL: f64 = 300.0 * DPS;
 

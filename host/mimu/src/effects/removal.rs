@@ -115,17 +115,17 @@ pub fn remove_within(
 }
 
 /// The effects of a sensor, and what evaluating them needs.
-struct Stretches<'a> {
+struct SensorEffects<'a> {
     sensor: Sensor,
     /// Sensitive directions by rows; `to_body`, their inverse, transforms errors along them to the body frame.
     direction: Matrix3<f64>,
     to_body: Matrix3<f64>,
     effects: &'a [&'a FittedEffect],
     /// For each effect that does not follow the recorded temperature: its temperature and the lagged one, by block.
-    late: Vec<Option<Vec<(f64, f64)>>>,
+    followed_temperatures: Vec<Option<Vec<(f64, f64)>>>,
 }
 
-impl Stretches<'_> {
+impl SensorEffects<'_> {
     /// The conditions without `error` of the sensor.
     fn without(&self, at: &Conditions, error: &Vector3<f64>) -> Conditions {
         let mut clean = at.read_without(error);
@@ -142,12 +142,13 @@ impl Stretches<'_> {
     fn error(&self, conditions: &Conditions, at: usize) -> Vector3<f64> {
         let sum = |conditions: &Conditions, codes: bool| {
             let mut error = Vector3::zeros();
-            for (effect, late) in self.effects.iter().zip(&self.late) {
+            for (effect, followed) in self.effects.iter().zip(&self.followed_temperatures) {
                 if effect.candidate.reads_code() != codes {
                     continue;
                 }
                 let now = (conditions.temperature_offset, conditions.temperature_offset);
-                let (temperature_offset, lagged_temperature) = late.as_ref().map_or(now, |l| l[at]);
+                let (temperature_offset, lagged_temperature) =
+                    followed.as_ref().map_or(now, |l| l[at]);
                 let conditions = Conditions {
                     temperature_offset,
                     lagged_temperature,
@@ -190,27 +191,27 @@ fn of_sensor(
     let t0_s = blocks.first()?.start_s;
     let middle_s = prepared.middle_s();
     // As on the device: before the first temperature that one is used, and without any the reference.
-    let warm = offsets(blocks);
-    let first = warm.iter().map(|w| w.1).find(|w| w.is_finite());
+    let recorded = offsets(blocks);
+    let first = recorded.iter().map(|w| w.1).find(|w| w.is_finite());
     let known = |w: f64| if w.is_nan() { first.unwrap_or(0.0) } else { w };
-    let warm: Vec<(f64, f64)> = warm.into_iter().map(|(t, w)| (t, known(w))).collect();
-    let all = Stretches {
+    let recorded: Vec<(f64, f64)> = recorded.into_iter().map(|(t, w)| (t, known(w))).collect();
+    let all = SensorEffects {
         sensor,
         direction,
         to_body: direction.try_inverse()?,
         effects,
-        late: effects
+        followed_temperatures: effects
             .iter()
             .map(|e| {
                 let followed: Followed = e.candidate.followed(e.parameter)?;
                 let other = match followed.without_self_heating {
-                    true => without_self_heating(&warm),
+                    true => without_self_heating(&recorded),
                     false => None,
                 };
-                let warm = other.as_ref().unwrap_or(&warm);
-                let now = warm.iter().map(|w| w.1);
+                let recorded = other.as_ref().unwrap_or(&recorded);
+                let now = recorded.iter().map(|w| w.1);
                 Some(match followed.lag_s {
-                    Some(lag_s) => now.zip(lagged(warm, lag_s)).collect(),
+                    Some(lag_s) => now.zip(lagged(recorded, lag_s)).collect(),
                     None => now.map(|w| (w, w)).collect(),
                 })
             })
@@ -236,12 +237,12 @@ fn of_sensor(
         force,
         angular_acceleration: Vector3::zeros(),
         sensed: direction * if sensor == Sensor::Gyro { rate } else { force },
-        temperature_offset: warm[at].1,
-        lagged_temperature: warm[at].1,
+        temperature_offset: recorded[at].1,
+        lagged_temperature: recorded[at].1,
         reading: reading(at),
     };
     let mut of_block = Vec::with_capacity(blocks.len());
-    for (at, (t_s, _)) in warm.iter().enumerate() {
+    for (at, (t_s, _)) in recorded.iter().enumerate() {
         let [rate, force] = [0, 1].map(|s| apply(models[s], raw(at, 3 * s)));
         of_block.push(all.error(&conditions(at, *t_s, rate, force), at));
     }
@@ -299,10 +300,7 @@ fn leave_out_unknown(sensor: Sensor, effects: &[&FittedEffect], out: &mut Prepar
         let Some(fault) = other.channels().find(empty).map(Fault::Missing) else {
             continue;
         };
-        let slot = match sensor {
-            Sensor::Gyro => &mut dwell.gyro_fault,
-            Sensor::Accel => &mut dwell.accel_fault,
-        };
+        let slot = &mut dwell.faults[sensor];
         if slot.is_none() {
             *slot = Some(fault);
             let id = effect.candidate.id();

@@ -53,11 +53,11 @@ pub fn lagged(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
 /// Time after the start in which a thermometer heats itself, s. The dies of such parts need 3 to 10 s.
 const START_S: f64 = 60.0;
 /// Time constants of the self-heating that are tried first: the smallest, s, the ratio of each to the one before, and their number.
-const OWN_S: (f64, f64, i32) = (2.0, 1.33, 9);
+const SELF_HEATING_S: (f64, f64, i32) = (2.0, 1.33, 9);
 /// Smallest self-heating that counts, K.
-const OWN_C: f64 = 0.2;
+const SELF_HEATING_C: f64 = 0.2;
 /// Smallest F statistic: the thermometer alone has to show self-heating beyond doubt.
-const OWN_F: f64 = 50.0;
+const SELF_HEATING_F: f64 = 50.0;
 
 /// A temperature without the self-heating of its thermometer after power-on, which a sensor on another die does not share. Over the first minute an
 /// exponential is fitted beside a parabola, the slower course of the board. `None` if no self-heating shows.
@@ -84,7 +84,7 @@ pub fn without_self_heating(signal: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
         Some(((&y - design * &x).norm_squared(), x))
     };
     let (without, _) = fit(None)?;
-    let (least, mut ratio, count) = OWN_S;
+    let (least, mut ratio, count) = SELF_HEATING_S;
     let at = |own_s: f64| Some((own_s, fit(Some(own_s))?));
     let tried = (0..count).filter_map(|k| at(least * ratio.powi(k)));
     let mut best = tried.min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
@@ -100,7 +100,7 @@ pub fn without_self_heating(signal: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
     }
     let (own_s, (with, x)) = best;
     let f = (without - with) / 2.0 / (with / (n as f64 - 5.0)).max(f64::MIN_POSITIVE);
-    if f < OWN_F || x[3] > -OWN_C {
+    if f < SELF_HEATING_F || x[3] > -SELF_HEATING_C {
         return None;
     }
     let without = signal

@@ -1,14 +1,11 @@
 //! Errors that depend on the temperature.
 
-use super::effect::{Coefficient, Effect, NonlinearParameter, Role, Scope, each, times};
+use super::effect::{Coefficient, DPS, Effect, MG, NonlinearParameter, Role, Scope, each, times};
 use super::quantity::Quantity::{
     self, Force, Input, Rate, RecordingTime, Temperature, TemperatureLag,
 };
 use super::regressor::Regressor;
 use crate::quantity::Sensor;
-
-const DPS: f64 = std::f64::consts::PI / 180.0;
-const MG: f64 = 9.80665e-3;
 
 /// Slope and curvature of the bias.
 const fn bias(slope: f64, curvature: f64) -> [Coefficient; 6] {

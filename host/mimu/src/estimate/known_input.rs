@@ -5,7 +5,7 @@ use mimu_core::kalman::Filter;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use super::least_squares::{
-    Errors, Observability, Scatter, excess_of, excess_variance, solve_with_excess,
+    Errors, Group, Observability, Scatter, extra_variance, extra_variance_of, solve_groups,
 };
 use super::{Addition, Estimated, Failure, Observation};
 use crate::observable::Observable;
@@ -113,9 +113,14 @@ pub fn least_squares(
     for axis in 0..3 {
         let raw = DVector::from_fn(observations.len(), |i, _| observations[i].raw[axis]);
         let errors = errors(observations, axis, wander);
-        let (solution, scatter) = solve_with_excess(&design, &raw, &errors)
+        let group = Group {
+            design: design.clone(),
+            observations: raw,
+            errors,
+        };
+        let (solution, [scatter]) = solve_groups(&[group])
             .ok_or_else(|| Failure::NoSolution("the design is singular".into()))?;
-        axes.push(OfAxis {
+        axes.push(AxisEstimate {
             parameters: solution.parameters,
             covariance: solution.covariance,
             scatter: vec![(Observable::Axis(axis), scatter)],
@@ -138,7 +143,7 @@ fn innovations(
     span: f64,
     axis: usize,
     errors: &Errors,
-    excess: f64,
+    extra: f64,
 ) -> Option<Vec<Measurement>> {
     let covariance = match errors {
         Errors::Independent(variances) => {
@@ -147,7 +152,7 @@ fn innovations(
                 own.map(|(o, v)| Measurement {
                     input: o.input / span,
                     raw: o.raw[axis],
-                    variance: v + excess,
+                    variance: v + extra,
                 })
                 .collect(),
             );
@@ -155,7 +160,7 @@ fn innovations(
         Errors::Correlated(covariance) => covariance,
     };
     let n = observations.len();
-    let root = (covariance + DMatrix::identity(n, n) * excess).cholesky()?;
+    let root = (covariance + DMatrix::identity(n, n) * extra).cholesky()?;
     let rows = DMatrix::from_fn(n, 5, |i, j| match j {
         0 => 1.0,
         4 => observations[i].raw[axis],
@@ -175,7 +180,7 @@ fn innovations(
 
 /// The Kalman bank of fang (23)-(28), fed the dwell means one scalar at a time with a diffuse prior.
 ///
-/// Its noise is that of the dwell means. If the residuals show more, the bank runs again with the excess added, as in [`least_squares`], with which
+/// Its noise is that of the dwell means. If the residuals show more, the bank runs again with the extra variance added, as in [`least_squares`], with which
 /// it agrees to rounding. With a `wander`, the errors of the means are correlated: from each measurement the error that those before predict is
 /// subtracted.
 pub fn kalman(
@@ -190,15 +195,16 @@ pub fn kalman(
         let known = DVector::from_fn(observations.len(), |i, _| observations[i].variance[axis]);
         let floor = positive(known).max();
         let mut scatter = Scatter {
-            excess: 0.0,
+            extra_variance: 0.0,
             chi2: 0.0,
             dof,
         };
         let mut round = 0;
         loop {
-            let mut filter = Filter::<f64>::diffuse(floor + scatter.excess, 1.0);
-            let measurements = innovations(observations, span, axis, &errors, scatter.excess)
-                .ok_or_else(|| Failure::NoSolution("the noise of the dwells is zero".into()))?;
+            let mut filter = Filter::<f64>::diffuse(floor + scatter.extra_variance, 1.0);
+            let measurements =
+                innovations(observations, span, axis, &errors, scatter.extra_variance)
+                    .ok_or_else(|| Failure::NoSolution("the noise of the dwells is zero".into()))?;
             for (m, o) in measurements.iter().zip(observations) {
                 filter
                     .update(&m.input, m.raw, m.variance)
@@ -209,8 +215,9 @@ pub fn kalman(
                 let o = &observations[i];
                 o.raw[axis] - mean[0] - mean.fixed_rows::<3>(1).dot(&(o.input / span))
             });
-            let found = excess_of(&residuals, &errors, dof);
-            let settled = (found.excess - scatter.excess).abs() <= 1e-6 * scatter.excess;
+            let found = extra_variance_of(&residuals, &errors, dof);
+            let settled = (found.extra_variance - scatter.extra_variance).abs()
+                <= 1e-6 * scatter.extra_variance;
             scatter = Scatter {
                 chi2: if round == 0 { found.chi2 } else { scatter.chi2 },
                 ..found
@@ -218,7 +225,7 @@ pub fn kalman(
             round += 1;
             if settled || round == 30 {
                 let covariance = DMatrix::from_column_slice(4, 4, filter.covariance().as_slice());
-                return Ok(OfAxis {
+                return Ok(AxisEstimate {
                     parameters: mean,
                     covariance,
                     scatter: vec![(Observable::Axis(axis), scatter)],
@@ -231,7 +238,7 @@ pub fn kalman(
 }
 
 /// The estimate of one sensor.
-pub(super) struct OfAxis {
+pub(super) struct AxisEstimate {
     /// `[b, P1, P2, P3]`, inputs in units of the span.
     pub parameters: DVector<f64>,
     /// Their covariance.
@@ -241,7 +248,11 @@ pub(super) struct OfAxis {
 }
 
 /// Combines `[b, P1, P2, P3]` of the three sensors (inputs in units of `span`).
-pub(super) fn forward(axes: &[OfAxis], span: f64, condition: f64) -> Result<Estimated, Failure> {
+pub(super) fn forward(
+    axes: &[AxisEstimate],
+    span: f64,
+    condition: f64,
+) -> Result<Estimated, Failure> {
     let mut model = Forward {
         matrix: Matrix3::zeros(),
         bias: Vector3::zeros(),
@@ -382,7 +393,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
             .iter()
             .map(|v| v[(axis, axis)].max(f64::MIN_POSITIVE))
             .collect();
-        excess_variance(&values, &variances, dof)
+        extra_variance(&values, &variances, dof)
     };
     let mut scatter: Vec<_> = (0..3)
         .map(|axis| {
@@ -399,20 +410,25 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         let values = offsets.iter().map(|o| o[axis] - offset[axis]).collect();
         let of_rest = scatter_of(values, &rest_variance, axis, count - 1.0);
         let of_pairs = scatter[axis].1;
-        // If rest shows no excess, there may be too few rests: then that of the pairs counts.
-        let (excess, dof) = if of_rest.excess > 0.0 {
-            (of_rest.excess, of_rest.variance_dof())
+        // If rest shows no extra variance, there may be too few rests: then that of the pairs counts.
+        let (extra, dof) = if of_rest.extra_variance > 0.0 {
+            (of_rest.extra_variance, of_rest.variance_dof())
         } else {
-            (0.5 * of_pairs.excess, of_pairs.variance_dof())
+            (0.5 * of_pairs.extra_variance, of_pairs.variance_dof())
         };
         rest_dof[axis] = dof;
-        rest_noise[(axis, axis)] += excess / count;
-        if of_rest.excess > 0.0 {
+        rest_noise[(axis, axis)] += extra / count;
+        if of_rest.extra_variance > 0.0 {
             scatter.push((Observable::AtRest(axis), of_rest));
         }
     }
     let covariance = rows_covariance(&pseudo, |p, r, s| {
-        noise[p][(r, s)] + if r == s { scatter[r].1.excess } else { 0.0 }
+        noise[p][(r, s)]
+            + if r == s {
+                scatter[r].1.extra_variance
+            } else {
+                0.0
+            }
     });
     // o_r = -c_r . G0: its errors come from c_r and from the readings at rest.
     let mut by_c = SMatrix::<f64, 12, 9>::zeros();
@@ -539,7 +555,7 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
                 .collect();
             (
                 Observable::Axis(axis),
-                excess_variance(&r, &v, n as f64 - 4.0),
+                extra_variance(&r, &v, n as f64 - 4.0),
             )
         })
         .collect();
@@ -552,7 +568,11 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
                 for j in 0..4 {
                     full[(place(r, i), place(s, j))] = (0..n)
                         .map(|p| {
-                            let extra = if r == s { scatter[r].1.excess } else { 0.0 };
+                            let extra = if r == s {
+                                scatter[r].1.extra_variance
+                            } else {
+                                0.0
+                            };
                             left[(i, p)] * (noise[p][(r, s)] + extra) * left[(j, p)]
                         })
                         .sum();
@@ -639,9 +659,9 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
             .iter()
             .map(|o| o.variance[axis].max(f64::MIN_POSITIVE))
             .collect();
-        let of_axis = excess_variance(&residuals, &variances, used.len() as f64 - 2.0);
-        down.2 += of_axis.excess / ends[0].3;
-        up.2 += of_axis.excess / ends[1].3;
+        let of_axis = extra_variance(&residuals, &variances, used.len() as f64 - 2.0);
+        down.2 += of_axis.extra_variance / ends[0].3;
+        up.2 += of_axis.extra_variance / ends[1].3;
         scatter.push((Observable::Axis(axis), of_axis));
         // Bias at the middle of the two inputs, which is zero to the table's repeatability.
         covariance[(4 * axis, 4 * axis)] = (up.2 + down.2) / (width * width);

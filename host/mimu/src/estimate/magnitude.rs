@@ -9,9 +9,9 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
-use super::least_squares::{Linearized, Observability, Scatter, excess_variance, minimize};
+use super::least_squares::{Linearized, Observability, Reweighted, minimize};
 use super::turn::Rest;
-use super::{Estimated, Failure, Observation};
+use super::{Estimated, Failure, LOWER, Observation};
 use crate::observable::Observable;
 use crate::quantity::{AXES, Sensor, plural};
 use crate::triad::{Part, Triad};
@@ -19,9 +19,6 @@ use crate::warning::Warning;
 
 /// Number of parameters: six of C, three of o.
 pub const PARAMETERS: usize = 9;
-
-/// Row and column of the six elements of C.
-const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
 /// What is known of the input of a triad.
 #[derive(Debug, Clone, Copy)]
@@ -235,15 +232,11 @@ pub fn estimate(
         (c, Vector3::new(p[6], p[7], p[8]))
     };
     // All in units of the largest magnitude, so that parameters and columns are of order one.
-    let evaluate = |p: &DVector<f64>, variances: &[f64]| {
+    let linearize = |p: &DVector<f64>| {
         let (c, o) = unpack(p);
-        let mut out = Linearized {
-            residuals: DVector::zeros(rows),
-            jacobian: DMatrix::zeros(rows, parameters),
-        };
+        let mut out = Linearized::zeros(rows, parameters);
         for i in 0..n {
             let f = c * v[i] + o;
-            let weight = variances[i].sqrt().recip();
             let up = f / f.norm();
             let level = known.level_of[i];
             let off = if levels > 0 {
@@ -251,36 +244,34 @@ pub fn estimate(
             } else {
                 0.0
             };
-            out.residuals[i] = weight * (f.norm() - shares[i] * (1.0 + off));
+            out.residuals[i] = f.norm() - shares[i] * (1.0 + off);
             for (k, (row, column)) in LOWER.iter().enumerate() {
-                out.jacobian[(i, k)] = weight * up[*row] * v[i][*column];
+                out.jacobian[(i, k)] = up[*row] * v[i][*column];
             }
             for k in 0..3 {
-                out.jacobian[(i, 6 + k)] = weight * up[k];
+                out.jacobian[(i, 6 + k)] = up[k];
             }
             if levels > 0 {
-                out.jacobian[(i, PARAMETERS + level)] = -weight * shares[i];
+                out.jacobian[(i, PARAMETERS + level)] = -shares[i];
             }
         }
         for (r, u) in resting.iter().enumerate() {
             let f = c * u + o - rests[r].rate / unit;
             for axis in 0..3 {
                 let i = ends[0] + 3 * r + axis;
-                let weight = variances[i].sqrt().recip();
-                out.residuals[i] = weight * f[axis];
+                out.residuals[i] = f[axis];
                 for (k, (row, column)) in LOWER.iter().enumerate() {
                     if *row == axis {
-                        out.jacobian[(i, k)] = weight * u[*column];
+                        out.jacobian[(i, k)] = u[*column];
                     }
                 }
-                out.jacobian[(i, 6 + axis)] = weight;
+                out.jacobian[(i, 6 + axis)] = 1.0;
             }
         }
         for l in 0..levels {
             let i = ends[1] + l;
-            let weight = known.level_sigma.recip();
-            out.residuals[i] = weight * p[PARAMETERS + l];
-            out.jacobian[(i, PARAMETERS + l)] = weight;
+            out.residuals[i] = p[PARAMETERS + l];
+            out.jacobian[(i, PARAMETERS + l)] = 1.0;
         }
         out
     };
@@ -292,10 +283,9 @@ pub fn estimate(
     });
     let variances: Vec<f64> = variances.iter().copied().chain(at_rest).collect();
     let floor = (1e-12 * variances.iter().copied().fold(0.0, f64::max)).max(1e-24);
-    let variances: Vec<f64> = variances
-        .iter()
-        .map(|v| (v / (unit * unit)).max(floor))
-        .collect();
+    let noise = variances.iter().map(|v| (v / (unit * unit)).max(floor));
+    let by_level = std::iter::repeat_n(known.level_sigma.powi(2), levels);
+    let variances: Vec<f64> = noise.chain(by_level).collect();
     let lost = || {
         let magnitude = match known.sensor {
             Sensor::Accel => "magnitude of gravity",
@@ -307,65 +297,42 @@ pub fn estimate(
     for k in [0, 2, 5] {
         start[k] = 1.0;
     }
-    let alike = vec![1.0; ends[1]];
+    let mut alike = vec![1.0; ends[1]];
+    alike.resize(rows, known.level_sigma.recip());
+    let alike = |p: &DVector<f64>| linearize(p).weighted(&alike);
     // Observability of the nine at known levels: the levels can worsen it only by their error.
     let shape_of = |p: &DVector<f64>| {
-        let all = evaluate(p, &alike).jacobian;
+        let all = linearize(p).jacobian;
         Observability::of(&all.view((0, 0), (ends[1], PARAMETERS)).into_owned())
     };
     let shape = shape_of(&start);
     if !shape.is_complete() {
         return Err(undetermined(&shape, known.sensor));
     }
-    let first = minimize(start.clone(), |p| evaluate(p, &alike));
+    let first = minimize(start.clone(), alike);
     // If the poses do not determine the angles between the sensors, the fit diverges towards C = 0 and |o| = g, which fits every pose.
     let Some((mut p, _)) = first.filter(|(p, _)| is_triad(&unpack(p).0)) else {
-        let weak = weak_beside_scatter(&start, |p| evaluate(p, &alike));
+        let weak = weak_beside_scatter(&start, alike);
         return Err(weak.map_or_else(lost, |shape| undetermined(&shape, known.sensor)));
     };
-    let groups = [0..ends[0], ends[0]..ends[1]];
-    let mut scatter: [Scatter; 2] = groups
-        .each_ref()
-        .map(|g| excess_variance(&[], &[], g.len() as f64));
+    let mut groups = Reweighted::new([0..ends[0], ends[0]..ends[1]], [0.0; 2]);
     let mut chi2: Option<[f64; 2]> = None;
-    let weights_of = |scatter: &[Scatter; 2]| -> Vec<f64> {
-        let each = variances.iter().enumerate();
-        each.map(|(i, v)| v + scatter[usize::from(i >= ends[0])].excess)
-            .collect()
-    };
     for _ in 0..30 {
-        let weights = weights_of(&scatter);
-        let here;
-        (p, here) = minimize(p, |p| evaluate(p, &weights)).ok_or_else(lost)?;
-        let covariance = normal_inverse(&here.jacobian)?;
-        let before = scatter;
-        for (g, own) in groups.iter().enumerate() {
-            let j = here.jacobian.rows(own.start, own.len());
-            let taken = (j * &covariance).component_mul(&j).sum();
-            let residuals: Vec<f64> = own
-                .clone()
-                .map(|i| here.residuals[i] * weights[i].sqrt())
-                .collect();
-            // Without rests and levels this is the number of poses minus nine, to within rounding of the trace. Ten poses once gave 1e-12 less than
-            // one degree of freedom, and intervals a sixth of the right ones.
-            let left = own.len() as f64 - taken;
-            let whole = (left - left.round()).abs() < 1e-6;
-            let dof = if whole { left.round() } else { left };
-            scatter[g] = excess_variance(&residuals, &variances[own.clone()], dof);
-        }
-        chi2.get_or_insert(scatter.map(|s| s.chi2));
-        let settled =
-            |g: usize| (scatter[g].excess - before[g].excess).abs() <= 1e-6 * before[g].excess;
-        if settled(0) && settled(1) {
+        let found = groups.minimize(p, &variances, linearize).ok_or_else(lost)?;
+        let covariance = found.at.covariance()?;
+        let converged = groups.update(&found, &covariance, &variances, 1e-6);
+        p = found.parameters;
+        chi2.get_or_insert(groups.scatter.map(|s| s.chi2));
+        if converged {
             break;
         }
     }
-    let last = evaluate(&p, &weights_of(&scatter));
+    let last = linearize(&p).weighted(&groups.weights(&variances));
     let shape = shape_of(&p);
     if !shape.is_complete() {
         return Err(undetermined(&shape, known.sensor));
     }
-    let covariance = normal_inverse(&last.jacobian)?;
+    let covariance = last.covariance()?;
     // Back: x = m (C' (u - centre)/radius + o').
     let (mut c, mut o) = unpack(&p);
     let scale = unit / sphere.radius;
@@ -397,23 +364,23 @@ pub fn estimate(
         offset: o * unit - matrix * sphere.centre,
     };
     // From units of the largest magnitude to SI.
+    let mut scatter = groups.scatter;
     for (g, scatter) in scatter.iter_mut().enumerate() {
-        scatter.excess *= unit * unit;
+        scatter.extra_variance *= unit * unit;
         scatter.chi2 = chi2.map_or(scatter.chi2, |first| first[g]);
     }
     let part = |rows: std::ops::Range<usize>, dof: f64| {
-        let j = last.jacobian.rows(rows.start, rows.len());
-        let own = &covariance * (j.transpose() * j) * &covariance;
+        let own = last.part(&covariance, &rows);
         let nine = SMatrix::<f64, 9, 9>::from_fn(|i, j| own[(i, j)]);
         Part {
             covariance: change * nine * change.transpose(),
             dof,
         }
     };
-    let mut parts = vec![part(groups[0].clone(), scatter[0].variance_dof())];
+    let mut parts = vec![part(0..ends[0], scatter[0].variance_dof())];
     let mut found = vec![(Observable::Magnitude, scatter[0])];
     if !rests.is_empty() {
-        parts.push(part(groups[1].clone(), scatter[1].variance_dof()));
+        parts.push(part(ends[0]..ends[1], scatter[1].variance_dof()));
         found.push((Observable::Rest, scatter[1]));
     }
     let mut notes = Vec::new();
@@ -441,12 +408,6 @@ pub fn estimate(
 
 /// A level that moves by more sigmas than this contradicts the given one. With two levels each moves by half of their contradiction.
 const CONTRADICTED: f64 = 2.5;
-
-fn normal_inverse(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, Failure> {
-    (jacobian.transpose() * jacobian)
-        .try_inverse()
-        .ok_or_else(|| Failure::NoSolution("the normal matrix is singular".into()))
-}
 
 /// An off-diagonal element of C over the diagonal one from which on this is not a triad: 30 degrees from a right angle.
 const SKEWED: f64 = 0.5;

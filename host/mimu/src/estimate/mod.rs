@@ -30,6 +30,9 @@ use crate::triad::Triad;
 use crate::warning::Warning;
 use least_squares::Scatter;
 
+/// Row and column of the six elements of a lower triangular C, which magnitudes determine.
+pub const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
 /// The mean of a dwell. If the input moves within the dwell, also another weighted sum over it, with weights that add to zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {

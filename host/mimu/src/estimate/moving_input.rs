@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector, RowVector3, Vector3};
 
-use super::known_input::{OfAxis, complete, errors, forward, positive, span};
+use super::known_input::{AxisEstimate, complete, errors, forward, positive, span};
 use super::least_squares::{
     Errors, Group, Observability, POORLY_DETERMINED, Scatter, Solution, solve_groups,
 };
@@ -55,7 +55,7 @@ impl Experiment<'_> {
         errors: &[Errors; 2],
         delay: f64,
         forward: Option<RowVector3<f64>>,
-    ) -> Option<(Solution, Vec<Scatter>)> {
+    ) -> Option<(Solution, [Scatter; 2])> {
         let groups = [0, 1].map(|part| {
             let all = self.parts[part];
             Group {
@@ -122,7 +122,7 @@ pub fn least_squares(
             delays[1][axis] = solution.covariance[(4, 4)].sqrt();
         }
         let names = [Observable::Axis(axis), Observable::Within(axis)];
-        axes.push(OfAxis {
+        axes.push(AxisEstimate {
             parameters: solution.parameters.rows(0, 4).into_owned(),
             covariance: solution.covariance.view((0, 0), (4, 4)).into_owned(),
             scatter: names.into_iter().zip(scatter).collect(),

@@ -9,7 +9,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::chains::Chains;
-use super::least_squares::{Linearized, Observability, Scatter, excess_variance, minimize};
+use super::least_squares::{Linearized, Observability, Reweighted};
 use super::turn::{Motion, Rest, Rotations, Turn, across, between, by_forces};
 use super::{Estimated, Failure};
 use crate::observable::Observable;
@@ -104,8 +104,8 @@ pub fn estimate(
     // Unweighted residuals and derivatives: rad, then rad/s.
     let linearize = |p: &DVector<f64>| {
         let (c, o) = unpack(p);
-        let mut r = DVector::zeros(n_turns + n_rest);
-        let mut j = DMatrix::zeros(n_turns + n_rest, all);
+        let mut out = Linearized::zeros(n_turns + n_rest, all);
+        let (r, j) = (&mut out.residuals, &mut out.jacobian);
         let turned = rotations.at(&c, &o);
         let level = chains.level(turns, turned.iter().map(|t| t.0));
         for (t, (after, by)) in turned.iter().enumerate() {
@@ -154,7 +154,7 @@ pub fn estimate(
                 j[(row, 9 + i)] = 1.0;
             }
         }
-        (r, j)
+        out
     };
     let known = |p: &DVector<f64>| -> Vec<f64> {
         let (c, _) = unpack(p);
@@ -202,43 +202,21 @@ pub fn estimate(
             0.0
         }
     });
-    let mut groups = [Scatter {
-        excess: 0.0,
-        chi2: 0.0,
-        dof: 1.0,
-    }; 2];
     // The first weights: half a degree, and the scatter of the dwells.
-    let (r, _) = linearize(&p);
-    groups[0].excess = 0.5f64.to_radians().powi(2);
-    groups[1].excess = r.rows(n_turns, n_rest).norm_squared() / n_rest as f64;
+    let r = linearize(&p).residuals;
+    let of_rest = r.rows(n_turns, n_rest).norm_squared() / n_rest as f64;
+    let mut groups = Reweighted::new(
+        [0..n_turns, n_turns..n_turns + n_rest],
+        [0.5f64.to_radians().powi(2), of_rest],
+    );
     let lost = || Failure::NoSolution("the fit of the gyro to the turns does not converge".into());
     let mut gain = DMatrix::zeros(all, 12);
     let mut of_groups = [(); 2].map(|()| DMatrix::zeros(all, all));
     let mut condition = f64::INFINITY;
     for round in 0..30 {
         let variances = known(&p);
-        let weights: Vec<f64> = variances
-            .iter()
-            .enumerate()
-            .map(|(k, v)| {
-                (v + groups[usize::from(k >= n_turns)].excess)
-                    .sqrt()
-                    .recip()
-            })
-            .collect();
-        let weigh = |(mut r, mut j): (DVector<f64>, DMatrix<f64>)| {
-            for (k, weight) in weights.iter().enumerate() {
-                r[k] *= weight;
-                let mut row = j.row_mut(k);
-                row *= *weight;
-            }
-            Linearized {
-                residuals: r,
-                jacobian: j,
-            }
-        };
-        let last;
-        (p, last) = minimize(p, |p| weigh(linearize(p))).ok_or_else(lost)?;
+        let found = groups.minimize(p, &variances, linearize).ok_or_else(lost)?;
+        let last = &found.at;
         let turns_only = last.jacobian.rows(0, n_turns).columns(0, 9).into_owned();
         let shape = Observability::of(&turns_only);
         if !shape.is_complete() {
@@ -253,44 +231,28 @@ pub fn estimate(
             });
         }
         condition = shape.condition;
-        let covariance = (last.jacobian.transpose() * &last.jacobian)
-            .try_inverse()
-            .ok_or_else(|| Failure::NoSolution("the normal matrix is singular".into()))?;
+        let covariance = last.covariance()?;
         // Errors of the accelerometer's calibration are common to all turns. They go into the parameters in full, and into the size that residuals
         // may have, but not into the weights.
-        let by = by_accelerometer(&p);
+        let by = by_accelerometer(&found.parameters);
         let mut weighted = by.clone();
-        for (mut row, weight) in weighted.row_iter_mut().zip(&weights) {
+        for (mut row, weight) in weighted.row_iter_mut().zip(&found.weights) {
             row *= *weight;
         }
         gain = &covariance * last.jacobian.rows(0, n_turns).transpose() * weighted;
-        of_groups = [(0, n_turns), (n_turns, n_rest)].map(|(from, rows)| {
-            let j = last.jacobian.rows(from, rows);
-            &covariance * (j.transpose() * j) * &covariance
-        });
+        of_groups = groups
+            .rows
+            .each_ref()
+            .map(|rows| last.part(&covariance, rows));
         let common = (&by * &accel_covariance).component_mul(&by).column_sum();
         let allowed: Vec<f64> = variances
             .iter()
             .enumerate()
             .map(|(k, v)| v + common.get(k).copied().unwrap_or(0.0))
             .collect();
-        // Leverage: the degrees of freedom that the parameters take from the rows of a group.
-        let leverage = |from: usize, rows: usize| {
-            let j = last.jacobian.rows(from, rows);
-            // The trace of J C J' without that matrix, which would fill the memory for thousands of dwells.
-            (j * &covariance).component_mul(&j).sum()
-        };
-        let before = groups;
-        for (g, (from, rows)) in [(0, n_turns), (n_turns, n_rest)].into_iter().enumerate() {
-            let residuals: Vec<f64> = (from..from + rows)
-                .map(|k| last.residuals[k] / weights[k])
-                .collect();
-            let dof = rows as f64 - leverage(from, rows);
-            groups[g] = excess_variance(&residuals, &allowed[from..from + rows], dof);
-        }
-        let settled =
-            (0..2).all(|g| (groups[g].excess - before[g].excess).abs() <= 1e-3 * before[g].excess);
-        if settled && round > 0 {
+        let converged = groups.update(&found, &covariance, &allowed, 1e-3);
+        p = found.parameters;
+        if converged && round > 0 {
             break;
         }
     }
@@ -307,17 +269,20 @@ pub fn estimate(
         }
     }
     let in_unit = |m: &DMatrix<f64>| Covariance::from_fn(|i, j| m[(i, j)]);
-    let own = of_groups.iter().zip(&groups).map(|(c, group)| Part {
-        covariance: in_unit(c),
-        dof: group.variance_dof(),
-    });
+    let own = of_groups
+        .iter()
+        .zip(&groups.scatter)
+        .map(|(c, group)| Part {
+            covariance: in_unit(c),
+            dof: group.variance_dof(),
+        });
     let gain = Covariance::from_fn(|i, j| gain[(i, j)]);
     let of_accelerometer = accel.inverse_parts();
     let shared = of_accelerometer.iter().map(|part| part.seen_by(&gain));
     let parts = own.chain(shared).map(|part| part.seen_by(&change));
     let scatter = [Observable::Turns, Observable::Rest]
         .into_iter()
-        .zip(groups)
+        .zip(groups.scatter)
         .collect();
     let triad = Triad::from_inverse(inverse, parts.collect()).ok_or_else(|| {
         Failure::NoSolution(

@@ -12,9 +12,9 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
-use super::least_squares::{Linearized, excess_variance, minimize};
+use super::least_squares::{Linearized, Reweighted};
 use super::turn::{Rest, Rotations, Turn, across, between, by_forces};
-use super::{Estimated, Failure, Observation};
+use super::{Estimated, Failure, LOWER, Observation};
 use crate::observable::Observable;
 use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
@@ -23,11 +23,8 @@ use crate::warning::Warning;
 const ACCEL: usize = 9;
 const ALL: usize = ACCEL + 12;
 
-/// Row and column of the six elements of the accelerometer's C.
-const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-
 /// The data of the joint fit.
-pub struct Together<'a> {
+pub struct JointFit<'a> {
     /// Poses.
     pub poses: &'a [Observation],
     /// Variances of their magnitudes by noise, (m/s²)².
@@ -51,7 +48,7 @@ struct Models {
     gyro: Affine<f64>,
 }
 
-impl Together<'_> {
+impl JointFit<'_> {
     /// Fits both and returns the accelerometer.
     pub fn estimate(&self) -> Result<Estimated, Failure> {
         let g = self.gravity;
@@ -81,14 +78,14 @@ impl Together<'_> {
         // Residuals without weights: share of gravity, rad, rad/s.
         let linearize = |p: &DVector<f64>| {
             let Models { accel, gyro } = unpack(p);
-            let mut r = DVector::zeros(rows.iter().sum());
-            let mut j = DMatrix::zeros(r.len(), ALL);
+            let mut out = Linearized::zeros(rows.iter().sum(), ALL);
+            let (r, j) = (&mut out.residuals, &mut out.jacobian);
             for (row, o) in self.poses.iter().enumerate() {
                 let v = order_one(&o.raw);
                 let f = accel.apply(&v);
                 let up = f.normalize();
                 r[row] = f.norm() - 1.0;
-                by_accel(&mut j, row, &up, &v);
+                by_accel(j, row, &up, &v);
             }
             let turned = rotations.at(&gyro.matrix, &gyro.offset);
             for (t, (turn, (after, by))) in self.turns.iter().zip(turned).enumerate() {
@@ -104,7 +101,7 @@ impl Together<'_> {
                     let row = from[1] + 2 * t + k;
                     r[row] = e.dot(&error);
                     for (side, v) in by_forces(&turn, &after, e).iter().zip(&v) {
-                        by_accel(&mut j, row, side, v);
+                        by_accel(j, row, side, v);
                     }
                     for (column, by) in by.iter().enumerate() {
                         let slope = by.transpose() * e;
@@ -129,7 +126,7 @@ impl Together<'_> {
                     j[(row, 18 + i)] = 1.0;
                 }
             }
-            (r, j)
+            out
         };
         let known = |p: &DVector<f64>| -> Vec<f64> {
             let c = unpack(p).gyro.matrix;
@@ -167,58 +164,26 @@ impl Together<'_> {
             Failure::NoSolution("the fit to the magnitudes and the turns does not converge".into())
         };
         // The first weights: 5 milli-g, half a degree, and the scatter of the dwells.
-        let (r, _) = linearize(&p);
-        let at_rest_variance = r.rows(from[2], rows[2]).norm_squared() / rows[2].max(1) as f64;
-        let mut groups = [0, 1, 2].map(|_| excess_variance(&[], &[], 0.0));
-        for (group, first) in groups.iter_mut().zip([2.5e-5, 7.6e-5, at_rest_variance]) {
-            group.excess = first;
-        }
+        let r = linearize(&p).residuals;
+        let of_rest = r.rows(from[2], rows[2]).norm_squared() / rows[2].max(1) as f64;
+        let groups = [0, 1, 2].map(|g| from[g]..from[g] + rows[g]);
+        let mut groups = Reweighted::new(groups, [2.5e-5, 7.6e-5, of_rest]);
         let mut first_chi2 = None;
-        let mut last = None;
-        for _ in 0..30 {
+        let mut round = 0;
+        let (found, covariance) = loop {
             let variances = known(&p);
-            let group = |k: usize| usize::from(k >= from[1]) + usize::from(k >= from[2]);
-            let weights: Vec<f64> = variances
-                .iter()
-                .enumerate()
-                .map(|(k, v)| (v + groups[group(k)].excess).sqrt().recip())
-                .collect();
-            let weigh = |(mut r, mut j): (DVector<f64>, DMatrix<f64>)| {
-                for (k, weight) in weights.iter().enumerate() {
-                    r[k] *= weight;
-                    let mut row = j.row_mut(k);
-                    row *= *weight;
-                }
-                Linearized {
-                    residuals: r,
-                    jacobian: j,
-                }
-            };
-            let here;
-            (p, here) = minimize(p, |p| weigh(linearize(p))).ok_or_else(lost)?;
-            let covariance = (here.jacobian.transpose() * &here.jacobian)
-                .try_inverse()
-                .ok_or_else(|| Failure::NoSolution("the normal matrix is singular".into()))?;
-            let before = groups.map(|s| s.excess);
-            for (g, scatter) in groups.iter_mut().enumerate() {
-                let j = here.jacobian.rows(from[g], rows[g]);
-                let taken = (j * &covariance).component_mul(&j).sum();
-                let own = from[g]..from[g] + rows[g];
-                let residuals: Vec<f64> = own
-                    .clone()
-                    .map(|k| here.residuals[k] / weights[k])
-                    .collect();
-                *scatter = excess_variance(&residuals, &variances[own], rows[g] as f64 - taken);
+            let found = groups.minimize(p, &variances, linearize).ok_or_else(lost)?;
+            let covariance = found.at.covariance()?;
+            let converged = groups.update(&found, &covariance, &variances, 1e-3);
+            first_chi2.get_or_insert(groups.scatter[0].chi2);
+            round += 1;
+            if converged || round == 30 {
+                break (found, covariance);
             }
-            first_chi2.get_or_insert(groups[0].chi2);
-            let settled = (0..3).all(|g| (groups[g].excess - before[g]).abs() <= 1e-3 * before[g]);
-            last = Some((here, covariance));
-            if settled {
-                break;
-            }
-        }
-        let (here, covariance) = last.ok_or_else(lost)?;
-        let c = unpack(&p).accel.matrix;
+            p = found.parameters;
+        };
+        let p = &found.parameters;
+        let c = unpack(p).accel.matrix;
         if (0..3).any(|k| !(c[(k, k)] > 0.0)) {
             return Err(lost());
         }
@@ -238,24 +203,23 @@ impl Together<'_> {
             change[(9 + k, 6 + k)] = g;
         }
         let parts = (0..3).map(|g| {
-            let j = here.jacobian.rows(from[g], rows[g]);
-            let own = &covariance * (j.transpose() * j) * &covariance;
+            let own = found.at.part(&covariance, &groups.rows[g]);
             let nine = SMatrix::<f64, 9, 9>::from_fn(|i, j| own[(i, j)]);
             let covariance: Covariance = change * nine * change.transpose();
             Part {
                 covariance,
-                dof: groups[g].variance_dof(),
+                dof: groups.scatter[g].variance_dof(),
             }
         });
-        let found = unpack(&p).accel;
+        let change = unpack(p).accel;
         let inverse = Affine {
-            matrix: found.matrix * matrix,
-            offset: found.matrix * offset + found.offset * g,
+            matrix: change.matrix * matrix,
+            offset: change.matrix * offset + change.offset * g,
         };
         let triad = Triad::from_inverse(inverse, parts.collect())
             .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
-        let mut magnitude = groups[0];
-        magnitude.excess *= g * g;
+        let mut magnitude = groups.scatter[0];
+        magnitude.extra_variance *= g * g;
         magnitude.chi2 = first_chi2.unwrap_or(magnitude.chi2);
         Ok(Estimated {
             triad,

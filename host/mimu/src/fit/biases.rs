@@ -66,7 +66,7 @@ pub fn fit_biases(
         let reference = prepared.manifest.reference;
         let by_size = reference == Reference::Gravity && sensor == Sensor::Accel;
         let floors: Vec<f64> = match by_size {
-            true => prepared.size_variances(&inverse, &observations),
+            true => prepared.magnitude_variances(&inverse, &observations),
             false => observations
                 .iter()
                 .map(|o| si_covariance(&inverse.matrix, &o.variance).trace() / 3.0)
@@ -90,7 +90,7 @@ pub fn fit_biases(
             }
         });
         let figure = match by_size {
-            true => Figure::GravitySize,
+            true => Figure::GravityMagnitude,
             false => Figure::Input,
         };
         let residuals = residuals.collect();

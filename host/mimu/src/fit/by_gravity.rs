@@ -4,11 +4,11 @@ use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 
 use super::determined::{faces_not_up, unseen_poses};
-use super::hold_out::{HeldOut, Split, determined};
+use super::hold_out::{Refits, Split, determined};
 use super::sensor::{Residual, SensorFit, rms, typical};
-use super::{Options, as_came, finish, refuse_wrong_gravity};
+use super::{Options, finish, refuse_wrong_gravity, uncalibrated};
 use crate::estimate::turn::{Rest, Turn, direction_error, sensitivity};
-use crate::estimate::with_turns::Together;
+use crate::estimate::with_turns::JointFit;
 use crate::estimate::{Estimated, Failure, Observation, magnitude, rotation};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
@@ -43,7 +43,7 @@ pub(super) fn fit_gravity(
         return Err(prepared.with_steps_as_given(error, Sensor::Accel));
     }
     refuse_wrong_gravity(prepared, Sensor::Accel, &poses)?;
-    let variances = |accel: &Affine<f64>| prepared.size_variances(accel, &poses);
+    let variances = |accel: &Affine<f64>| prepared.magnitude_variances(accel, &poses);
     let by_sphere =
         magnitude::first_guess(&poses, g).map_or_else(|| vec![0.0; poses.len()], |a| variances(&a));
     let by_poses = ByPoses {
@@ -54,7 +54,7 @@ pub(super) fn fit_gravity(
     let (accel, with_turns) = by_poses
         .estimate()
         .map_err(|f| prepared.refused(by_poses.with_faces(f), Sensor::Accel))?;
-    let floors = prepared.size_floors(&accel.triad.inverse, &poses);
+    let floors = prepared.magnitude_floors(&accel.triad.inverse, &poses);
     let parts = options.holdout_blocks.min(poses.len());
     let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
     let size_error = |triad: &Triad, o: &Observation| {
@@ -71,7 +71,7 @@ pub(super) fn fit_gravity(
             floor: *floor,
         })
         .collect();
-    let typical = typical(Figure::GravitySize, &residuals);
+    let typical = typical(Figure::GravityMagnitude, &residuals);
     let without = |split: Split, part: usize| {
         let of_part = |o: &Observation| part_of(split, o.dwell) == part;
         let kept = |dwell: usize| part_of(split, dwell) != part;
@@ -80,10 +80,10 @@ pub(super) fn fit_gravity(
             let up = accel.triad.inverse.apply(&o.raw).normalize();
             refit.triad.variance(&slope(&up, &o.raw))
         });
-        determined(open, typical, (Figure::GravitySize, Sensor::Accel))?;
+        determined(open, typical, (Figure::GravityMagnitude, Sensor::Accel))?;
         Ok(refit)
     };
-    let held_out = HeldOut::of(parts, without);
+    let held_out = Refits::of(parts, without);
     for (residual, o) in residuals.iter_mut().zip(&poses) {
         let refit = held_out.without(part_of(held_out.split, o.dwell));
         residual.held_out = refit.map(|refit| size_error(&refit.triad, o));
@@ -98,7 +98,9 @@ pub(super) fn fit_gravity(
         };
         let turns = fit_turns(prepared, &accel, &parts, warnings);
         // If only the turns determined the accelerometer, and they do not determine the gyro, the poses are wrong.
-        if let (Err(_), Some(_), Err(failure)) = (&turns, &with_turns, by_poses.alone()) {
+        if let (Err(_), Some(_), Err(failure)) =
+            (&turns, &with_turns, by_poses.without(&|_| true, None))
+        {
             return Err(prepared.refused(by_poses.with_faces(failure), Sensor::Accel));
         }
         sensors.extend(turns?);
@@ -107,14 +109,14 @@ pub(super) fn fit_gravity(
     let mut fit = finish(
         Sensor::Accel,
         accel,
-        Figure::GravitySize,
+        Figure::GravityMagnitude,
         residuals,
         poses.len(),
         None,
         held_out.into(),
     );
     let known: Vec<(&Observation, f64)> = poses.iter().map(|o| (o, g)).collect();
-    fit.as_came = as_came::magnitudes(prepared, Figure::GravitySize, &known);
+    fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::GravityMagnitude, &known);
     fit.warnings.extend(unseen);
     sensors.push(fit);
     Ok(sensors)
@@ -147,7 +149,7 @@ impl ByPoses<'_> {
     }
 
     fn estimate(&self) -> Outcome<(Estimated, Option<Guesses>)> {
-        let alone = magnitude::by_gravity(self.poses, self.variances, self.gravity());
+        let alone = self.without(&|_| true, None);
         let poor = !alone.as_ref().is_ok_and(|a| a.condition <= POOR_POSES);
         let enough = self.poses.len() >= magnitude::PARAMETERS;
         if poor
@@ -163,10 +165,7 @@ impl ByPoses<'_> {
     /// First guess: the readings as they came if they are in SI, otherwise by the sphere through them.
     fn first_accel(&self) -> Option<Affine<f64>> {
         match self.prepared.manifest.raw_unit {
-            RawUnit::Si => Some(Affine {
-                matrix: nalgebra::Matrix3::identity(),
-                offset: Vector3::zeros(),
-            }),
+            RawUnit::Si => Some(Affine::identity()),
             _ => magnitude::first_guess(self.poses, self.gravity()),
         }
     }
@@ -220,7 +219,7 @@ impl ByPoses<'_> {
                 add: "add poses, and turns between them".into(),
             });
         }
-        Together {
+        JointFit {
             poses: &poses,
             variances: &variances,
             turns: &turns,
@@ -230,11 +229,6 @@ impl ByPoses<'_> {
             gravity: self.gravity(),
         }
         .estimate()
-    }
-
-    /// The accelerometer by the magnitude of gravity in its poses.
-    fn alone(&self) -> Outcome<Estimated> {
-        magnitude::by_gravity(self.poses, self.variances, self.gravity())
     }
 
     /// `failure`, naming the faces that no pose had up.
@@ -301,7 +295,7 @@ fn fit_turns(
         })
         .collect();
     let typical = typical(Figure::Direction, &residuals);
-    let held = HeldOut::of(parts.count, |split, part| {
+    let held = Refits::of(parts.count, |split, part| {
         let accel = (parts.accel_without)(split, part).map_err(|failure| {
             let problem = failure.problem();
             Failure::NoSolution(format!("the accelerometer is not determined: {problem}"))
@@ -359,7 +353,7 @@ fn fit_turns(
         in_sample.map(|r| (r, at_rest)),
         held.into(),
     );
-    fit.as_came = as_came::directions(prepared, &turns);
+    fit.uncalibrated_rms = uncalibrated::directions(prepared, &turns);
     if wide > 20f64.to_radians() {
         fit.warnings.push(Warning::WideTurn(wide).of(Sensor::Gyro));
     }

@@ -6,9 +6,9 @@ use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 
 use super::by_gravity::fit_gravity;
-use super::hold_out::{HeldOut, Split, determined};
+use super::hold_out::{Refits, Split, determined};
 use super::sensor::{Residual, SensorFit, rms, typical};
-use super::{Options, as_came, finish};
+use super::{Options, finish, uncalibrated};
 use crate::estimate::magnitude::{self, KnownMagnitudes};
 use crate::estimate::turn::Rest;
 use crate::estimate::{Estimated, Failure, Observation};
@@ -104,11 +104,11 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
             floor: prepared.if_noise_known(&[Sensor::Gyro], variance.sqrt()),
         })
         .collect();
-    let typical = typical(Figure::RateSize, &residuals);
+    let typical = typical(Figure::RateMagnitude, &residuals);
     let parts = options.holdout_blocks.min(rated.len());
     let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
     // The error of the rates is common to kept and held-out dwells, so no refit is judged by it.
-    let held_out = HeldOut::of(parts, |split, part| {
+    let held_out = Refits::of(parts, |split, part| {
         let refit = estimate(&|dwell| part_of(split, dwell) != part)?;
         let open = rated
             .iter()
@@ -118,7 +118,7 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
             let up = inverse.apply(&o.raw).normalize();
             (refit.triad.variance(&slope(&up, &o.raw)) - (scale * rate).powi(2)).max(0.0)
         });
-        determined(open, typical, (Figure::RateSize, Sensor::Gyro))?;
+        determined(open, typical, (Figure::RateMagnitude, Sensor::Gyro))?;
         Ok(refit)
     });
     let without = |dwell: usize| held_out.without(part_of(held_out.split, dwell));
@@ -134,13 +134,13 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
     let mut fit = finish(
         Sensor::Gyro,
         gyro,
-        Figure::RateSize,
+        Figure::RateMagnitude,
         residuals,
         dwells.turning.len() + dwells.rests.len(),
         static_rms.map(|r| (r, static_held_out)),
         held_out.into(),
     );
-    fit.as_came = as_came::magnitudes(prepared, Figure::RateSize, &rated);
+    fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::RateMagnitude, &rated);
     let rates_dps = dwells.rates.iter().map(|r| r.to_degrees()).collect();
     let error = prepared
         .manifest

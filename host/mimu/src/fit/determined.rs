@@ -71,11 +71,11 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
     }
     let poses = accel.and_then(|accel| missing_poses(prepared, accel));
     let add = match (fit.figure, poses) {
-        (Figure::GravitySize, Some(poses)) => poses.into(),
-        (Figure::GravitySize, None) => {
+        (Figure::GravityMagnitude, Some(poses)) => poses.into(),
+        (Figure::GravityMagnitude, None) => {
             "add poses: each axis up, down and in between; hold each still".into()
         }
-        (Figure::RateSize, _) => "lay the unit on the turntable with each axis up, down and slanted, and record rests too".into(),
+        (Figure::RateMagnitude, _) => "lay the unit on the turntable with each axis up, down and slanted, and record rests too".into(),
         // The turns are judged by the accelerometer's directions, so its errors are in the intervals of the gyro.
         (Figure::Direction, Some(poses)) => {
             format!("{poses}: the accelerometer gives the direction of gravity after each turn").into()
@@ -96,7 +96,7 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
 fn by_temperature(prepared: &Prepared, fit: &SensorFit) -> bool {
     let with = match fit.figure {
         Figure::Input => with_temperature(prepared, fit.sensor, &fit.residuals),
-        Figure::GravitySize | Figure::RateSize | Figure::Direction => None,
+        Figure::GravityMagnitude | Figure::RateMagnitude | Figure::Direction => None,
     };
     with.is_some_and(|with| with.rms < 0.5 * fit.rms())
 }
@@ -205,10 +205,7 @@ mod tests {
                 covariance[(row, column)] = nine[(i, j)];
             }
         }
-        let one = Affine {
-            matrix: nalgebra::Matrix3::identity(),
-            offset: Vector3::zeros(),
-        };
+        let one = Affine::identity();
         let part = crate::triad::Part {
             covariance,
             dof: 9.0,
@@ -236,10 +233,7 @@ mod tests {
 
     #[test]
     fn the_face_that_was_never_up_is_named() {
-        let one = Affine {
-            matrix: nalgebra::Matrix3::identity(),
-            offset: Vector3::zeros(),
-        };
+        let one = Affine::identity();
         let raw: Vec<Vector3<f64>> = directions()
             .into_iter()
             .filter(|(name, _)| !name.contains("-x"))

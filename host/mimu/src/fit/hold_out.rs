@@ -63,7 +63,7 @@ impl HoldOut {
 }
 
 /// Fits without each part.
-pub(super) struct HeldOut<T> {
+pub(super) struct Refits<T> {
     /// How the recording is split.
     pub split: Split,
     /// One for each part.
@@ -73,7 +73,7 @@ pub(super) struct HeldOut<T> {
 }
 
 /// The parts that cannot be held out, and why the first of them cannot.
-fn cannot<T>(blocks: bool, refits: &[Result<T, Failure>]) -> Option<Warning> {
+fn not_held_out<T>(blocks: bool, refits: &[Result<T, Failure>]) -> Option<Warning> {
     let failed = refits.iter().enumerate();
     let failed = failed.filter_map(|(part, refit)| Some((part + 1, refit.as_ref().err()?)));
     let (parts, failures): (Vec<usize>, Vec<&Failure>) = failed.unzip();
@@ -81,7 +81,7 @@ fn cannot<T>(blocks: bool, refits: &[Result<T, Failure>]) -> Option<Warning> {
     Some(Warning::NotHeldOut(blocks, parts, problem))
 }
 
-impl<T: Send> HeldOut<T> {
+impl<T: Send> Refits<T> {
     /// Fits without each of `parts` blocks, in parallel. If some blocks cannot be held out, it tries every n-th dwell instead, and keeps this if
     /// fewer parts fail.
     pub fn of(
@@ -93,7 +93,7 @@ impl<T: Send> HeldOut<T> {
             refits.collect()
         };
         let blocks = cut(Split::Blocks);
-        let Some(why) = cannot(true, &blocks) else {
+        let Some(why) = not_held_out(true, &blocks) else {
             return Self {
                 split: Split::Blocks,
                 refits: blocks,
@@ -104,7 +104,7 @@ impl<T: Send> HeldOut<T> {
         let interleaved = cut(Split::Interleaved);
         if failed(&interleaved) < failed(&blocks) {
             let mut reasons = vec![Warning::Interleaved(parts, Box::new(why))];
-            reasons.extend(cannot(false, &interleaved));
+            reasons.extend(not_held_out(false, &interleaved));
             return Self {
                 split: Split::Interleaved,
                 refits: interleaved,
@@ -124,8 +124,8 @@ impl<T: Send> HeldOut<T> {
     }
 }
 
-impl<T> From<HeldOut<T>> for HoldOut {
-    fn from(held: HeldOut<T>) -> Self {
+impl<T> From<Refits<T>> for HoldOut {
+    fn from(held: Refits<T>) -> Self {
         Self {
             split: held.split,
             parts: held.refits.len(),

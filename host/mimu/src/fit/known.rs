@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::hold_out::{HeldOut, Split, determined};
+use super::hold_out::{Refits, Split, determined};
 use super::sensor::{Residual, SensorFit, typical};
-use super::{Method, Options, as_came, finish, lever_arm, refuse_wrong_gravity};
+use super::{Method, Options, finish, lever_arm, refuse_wrong_gravity, uncalibrated};
 use crate::estimate::{Observation, known_input, moving_input};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
@@ -133,7 +133,7 @@ pub(super) fn fit_known(
             split.part(at.min(n - 1), n, parts)
         };
         let typical = typical(Figure::Input, &residuals);
-        let held_out = HeldOut::of(parts, |split, part| {
+        let held_out = Refits::of(parts, |split, part| {
             let of_part = |o: &Observation| part_of(split, o.dwell) == part;
             let kept = |all: &[Observation]| -> Vec<Observation> {
                 all.iter().filter(|o| !of_part(o)).copied().collect()
@@ -168,7 +168,7 @@ pub(super) fn fit_known(
             None,
             held_out.into(),
         );
-        fit.as_came = as_came::inputs(prepared, all.iter().map(|(o, _)| *o));
+        fit.uncalibrated_rms = uncalibrated::inputs(prepared, all.iter().map(|(o, _)| *o));
         sensors.push(fit);
     }
     if sensors.is_empty() {

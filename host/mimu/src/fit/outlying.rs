@@ -10,8 +10,8 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, Vector3};
 
 use super::by_gravity::POOR_POSES;
-use crate::estimate::turn::{Turn, direction_error};
-use crate::estimate::{Estimated, Observation, magnitude, rotation};
+use crate::estimate::turn::{Turn, sensitivity};
+use crate::estimate::{Estimated, LOWER, Observation, magnitude, rotation};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{AXES, Sensor};
 use crate::signal::blocks::quantile;
@@ -122,19 +122,18 @@ const ACCEL_PARAMETERS: [&str; 9] = [
 fn fit_poses(prepared: &Prepared, poses: &[Observation]) -> Option<Estimated> {
     let g = prepared.manifest.gravity_mps2;
     let first = magnitude::first_guess(poses, g)?;
-    let variances = prepared.size_variances(&first, poses);
+    let variances = prepared.magnitude_variances(&first, poses);
     magnitude::by_gravity(poses, &variances, g).ok()
 }
 
 fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {
     let g = prepared.manifest.gravity_mps2;
-    let variances = prepared.size_variances(accel, poses);
+    let variances = prepared.magnitude_variances(accel, poses);
     let up: Vec<Vector3<f64>> = poses.iter().map(|o| accel.apply(&o.raw)).collect();
     let rows = poses.iter().enumerate().map(|(k, o)| {
         let direction = up[k].normalize();
         // Derivatives by the lower triangle of C, which magnitudes determine, and by o.
-        let by = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-        let slope = |j: usize| match by.get(j) {
+        let slope = |j: usize| match LOWER.get(j) {
             Some((row, column)) => direction[*row] * o.raw[*column],
             None => direction[j - 6],
         };
@@ -185,10 +184,14 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
     };
     let Affine { matrix, offset } = gyro.triad.inverse;
     let mean_square = matrix.norm_squared() / 3.0;
-    let turned = |turn: &Turn| Row {
-        error: direction_error(turn, &gyro.triad.inverse),
-        by: slopes(turn, &gyro.triad.inverse),
-        variance: (turn.variance(mean_square) + turn.earth_variance).max(1e-18),
+    let turned = |turn: &Turn| {
+        let found = sensitivity(turn, &gyro.triad.inverse);
+        let ([a, b], [by_a, by_b]) = (found.sides, found.by_parameters(turn));
+        Row {
+            error: a * found.error[0] + b * found.error[1],
+            by: DMatrix::from_fn(3, 12, |i, j| a[i] * by_a[j] + b[i] * by_b[j]),
+            variance: (turn.variance(mean_square) + turn.earth_variance).max(1e-18),
+        }
     };
     let mut rows: Vec<Row> = turns.iter().map(turned).collect();
     rows.extend(
@@ -241,26 +244,4 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
     }
     out.with_all = Some(gyro.triad);
     out
-}
-
-/// Derivatives of the direction error of a turn by C (rows first) and o, by finite differences.
-fn slopes(turn: &Turn, gyro: &Affine<f64>) -> DMatrix<f64> {
-    // In turns of some radians a thousandth of C moves the direction by milliradians: far above rounding, and still linear.
-    let size = gyro.matrix.norm() / 3f64.sqrt();
-    let steps = [1e-3 * size, 1e-3 / turn.duration_s.max(1e-3)];
-    let mut by = DMatrix::zeros(3, 12);
-    for j in 0..12 {
-        let step = steps[j / 9];
-        let moved = |sign: f64| {
-            let mut model = *gyro;
-            match j {
-                0..9 => model.matrix[(j / 3, j % 3)] += sign * step,
-                _ => model.offset[j - 9] += sign * step,
-            }
-            direction_error(turn, &model)
-        };
-        let slope = (moved(1.0) - moved(-1.0)) / (2.0 * step);
-        by.set_column(j, &slope);
-    }
-    by
 }

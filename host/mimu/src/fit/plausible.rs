@@ -90,8 +90,8 @@ pub fn check_numbers(fit: &SensorFit) -> Result<()> {
 fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
     match fit.figure {
         Figure::Direction => 1.0,
-        Figure::GravitySize => prepared.manifest.gravity_mps2,
-        Figure::RateSize => {
+        Figure::GravityMagnitude => prepared.manifest.gravity_mps2,
+        Figure::RateMagnitude => {
             let rates = prepared
                 .manifest
                 .turntable
@@ -123,7 +123,7 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warni
     let percent = |share: f64| format!("{} %", significant(100.0 * share));
     let with = match fit.figure {
         Figure::Input => with_temperature(prepared, fit.sensor, &fit.residuals),
-        Figure::GravitySize | Figure::RateSize | Figure::Direction => None,
+        Figure::GravityMagnitude | Figure::RateMagnitude | Figure::Direction => None,
     };
     if let Some(with) = with.filter(|w| w.rms / spread <= FOLLOWS_NOTHING) {
         let warning = Warning::FollowsTemperature(share, with.rms / spread, with.mean_c);
@@ -131,8 +131,8 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warni
     }
     let against = match fit.figure {
         Figure::Input => "the known inputs",
-        Figure::GravitySize => "the magnitude of gravity",
-        Figure::RateSize => "the magnitude of the rate",
+        Figure::GravityMagnitude => "the magnitude of gravity",
+        Figure::RateMagnitude => "the magnitude of the rate",
         Figure::Direction => "the turns of gravity",
     };
     let how = match share < 1.0 {

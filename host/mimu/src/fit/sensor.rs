@@ -39,8 +39,8 @@ pub struct SensorFit {
     pub static_rms: Option<(f64, Option<f64>)>,
     /// How its residuals were held out.
     pub held_out: HoldOut,
-    /// Error of the readings as they came, if they are in SI: [`Self::rms`] without a calibration.
-    pub as_came: Option<f64>,
+    /// [`Self::rms`] without a calibration, if the readings are in SI.
+    pub uncalibrated_rms: Option<f64>,
     /// What a person should know.
     pub warnings: Vec<Warning>,
 }
@@ -64,7 +64,7 @@ impl SensorFit {
             return f64::NAN;
         }
         rms(
-            Figure::GravitySize,
+            Figure::GravityMagnitude,
             self.residuals
                 .iter()
                 .map(|r| Vector3::new(r.floor, 0.0, 0.0)),
@@ -76,7 +76,7 @@ impl SensorFit {
 pub(super) fn typical(figure: Figure, residuals: &[Residual]) -> f64 {
     let floor = |r: &Residual| Vector3::new(r.floor, 0.0, 0.0);
     let in_sample = rms(figure, residuals.iter().map(|r| r.value));
-    in_sample.max(rms(Figure::GravitySize, residuals.iter().map(floor)))
+    in_sample.max(rms(Figure::GravityMagnitude, residuals.iter().map(floor)))
 }
 
 /// Root mean square: over axes if the input is known, otherwise of the angle or magnitude.
@@ -86,7 +86,7 @@ pub(super) fn rms(figure: Figure, values: impl Iterator<Item = Vector3<f64>>) ->
         sum += v.norm_squared();
         n += match figure {
             Figure::Input => 3.0,
-            Figure::GravitySize | Figure::RateSize | Figure::Direction => 1.0,
+            Figure::GravityMagnitude | Figure::RateMagnitude | Figure::Direction => 1.0,
         };
     }
     (sum / n).sqrt()

@@ -4,7 +4,7 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use crate::estimate::least_squares::{Errors, Scatter, Solution, solve_with_excess};
+use crate::estimate::least_squares::{Errors, Group, Scatter, Solution, solve_groups};
 use crate::estimate::{Estimated, Failure};
 use crate::observable::Observable;
 use crate::prepared::{Prepared, si_covariance};
@@ -52,12 +52,16 @@ pub fn estimate(
                 .filter(|k| svd.singular_values[*k] > 0.05 * svd.singular_values.max())
                 .collect();
             kept = shown.select_rows(&strong).transpose();
-            let variances = prepared.size_variances(&model, &observations);
-            let errors = Errors::Independent(DVector::from_vec(variances));
-            let found = solve_with_excess(&(&design * &kept), &y, &errors).ok_or_else(none)?;
-            let step = &kept * &found.0.parameters;
+            let variances = prepared.magnitude_variances(&model, &observations);
+            let (solution, [found]) = solve_groups(&[Group {
+                design: &design * &kept,
+                observations: y,
+                errors: Errors::Independent(DVector::from_vec(variances)),
+            }])
+            .ok_or_else(none)?;
+            let step = &kept * &solution.parameters;
             offset += Vector3::new(step[0], step[1], step[2]);
-            last = Some(found);
+            last = Some((solution, found));
         }
         let (solution, found) = last.ok_or_else(none)?;
         let full = &kept * solution.covariance * kept.transpose();
@@ -78,9 +82,12 @@ pub fn estimate(
             let variances = DVector::from_fn(n, |i, _| {
                 si_covariance(&matrix, &observations[i].variance)[(axis, axis)]
             });
-            let design = DMatrix::from_element(n, 1, 1.0);
-            let (solution, found) =
-                solve_with_excess(&design, &y, &Errors::Independent(variances)).ok_or_else(none)?;
+            let (solution, [found]) = solve_groups(&[Group {
+                design: DMatrix::from_element(n, 1, 1.0),
+                observations: y,
+                errors: Errors::Independent(variances),
+            }])
+            .ok_or_else(none)?;
             offset[axis] = solution.parameters[0];
             covariance[(9 + axis, 9 + axis)] = solution.covariance[(0, 0)];
             scatter.push((Observable::Axis(axis), found));

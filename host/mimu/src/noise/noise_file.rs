@@ -122,9 +122,7 @@ impl NoiseChannel {
             walk: squared(Term::K) / 3.0,
         }
     }
-}
 
-impl NoiseChannel {
     /// [`Self::model`] in `unit` squared, which is the unit of the readings or of the calibrated readings.
     ///
     /// Errors: `unit` is another one.

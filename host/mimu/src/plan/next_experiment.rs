@@ -272,7 +272,7 @@ fn noise(fit: &Fit, sensor: Sensor) -> DwellNoise {
         .dwells
         .list
         .iter()
-        .filter(|d| d.fault(sensor).is_none());
+        .filter(|d| d.faults[sensor].is_none());
     let each = usable.map(|d| {
         let variance = si_covariance(matrix, &prepared.noise.of_mean(sensor, d));
         variance.trace() / 3.0 * d.averaged_s(sensor)

@@ -122,8 +122,8 @@ fn the_noise_of_a_mean_is_that_of_the_table_and_without_one_it_is_unknown_and_th
         let means = table(24, Reference::Table, 2.0, known, 1);
         let fitted = fit(Prepared::of_means(&means).unwrap(), options()).unwrap();
         let sensor = fitted.sensor(Sensor::Accel).unwrap();
-        let excess = sensor.estimated.scatter[0].1.excess;
-        (sensor.noise_floor(), excess, fitted.warnings)
+        let extra = sensor.estimated.scatter[0].1.extra_variance;
+        (sensor.noise_floor(), extra, fitted.warnings)
     };
     let (floor, _, warnings) = noise_floor(true);
     // 20 counts over the root of 100, in m/s² of about 829 counts.
@@ -133,10 +133,10 @@ fn the_noise_of_a_mean_is_that_of_the_table_and_without_one_it_is_unknown_and_th
             .iter()
             .any(|w| w.to_string().contains("assumed to be white"))
     );
-    let (floor, excess, warnings) = noise_floor(false);
+    let (floor, extra, warnings) = noise_floor(false);
     // Unknown, not zero.
     assert!(floor.is_nan(), "{floor}");
-    assert!((0.5..2.0).contains(&(excess.sqrt() / 2.0)), "{excess}");
+    assert!((0.5..2.0).contains(&(extra.sqrt() / 2.0)), "{extra}");
     assert!(
         warnings
             .iter()

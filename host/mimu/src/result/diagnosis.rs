@@ -248,7 +248,7 @@ fn figures(d: &Diagnosis, found: &SensorDiagnosis) -> SensorDiagnosisResult {
     let figure = fit.map_or(Figure::Input, |f| f.figure);
     let (count, together) = found.rows.judged;
     let of_one = match found.rows.figure {
-        RowFigure::Direction | RowFigure::Size => together,
+        RowFigure::Direction | RowFigure::Magnitude => together,
         RowFigure::Input | RowFigure::Rest => 3 * together,
     };
     let dwells = &d.before.prepared.dwells;

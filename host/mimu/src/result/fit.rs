@@ -138,7 +138,7 @@ pub struct SensorFitResult {
     pub noise_floor: f64,
     /// Error of the readings before calibration, in [`Self::unit`]; absent if they are not in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub as_they_came_rms: Option<f64>,
+    pub uncalibrated_rms: Option<f64>,
     /// SI unit of the figures.
     pub unit: &'static str,
     /// Quantity of the figures.
@@ -307,7 +307,7 @@ impl DwellResult {
     }
 
     fn of(dwell: &Dwell, labels: &[String]) -> Self {
-        let fault = |sensor| dwell.fault(sensor).map(|f| f.to_string());
+        let fault = |sensor| dwell.faults[sensor].map(|f| f.to_string());
         let label = usize::try_from(dwell.step).ok().and_then(|s| labels.get(s));
         Self {
             step: dwell.step,
@@ -332,8 +332,8 @@ impl SensorFitResult {
             let result = ScatterResult {
                 chi2: s.chi2,
                 dof: s.dof,
-                excess_sigma: s.excess.sqrt(),
-                unit: excess_unit(fit, found, *group),
+                excess_sigma: s.extra_variance.sqrt(),
+                unit: extra_sigma_unit(fit, found, *group),
                 // An unknown noise neither explains an error nor leaves one unexplained.
                 significant: s.is_significant() && fit.prepared.noise.is_known(found.sensor),
             };
@@ -353,7 +353,7 @@ impl SensorFitResult {
             rms: found.rms(),
             held_out_rms: found.held_out_rms(),
             noise_floor: found.noise_floor(),
-            as_they_came_rms: found.as_came,
+            uncalibrated_rms: found.uncalibrated_rms,
             unit: found.figure.unit(found.sensor),
             figure: found.figure,
             dwells: found.dwells,
@@ -401,12 +401,12 @@ impl Parameter {
     }
 }
 
-/// Unit of the excess of a group of observations.
-fn excess_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
+/// Unit of the extra sigma of a group of observations.
+fn extra_sigma_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
     let si = found.sensor.unit();
     match found.figure {
         Figure::Direction if group == Observable::Rest => si.into(),
-        Figure::Direction | Figure::GravitySize | Figure::RateSize => {
+        Figure::Direction | Figure::GravityMagnitude | Figure::RateMagnitude => {
             found.figure.unit(found.sensor).into()
         }
         // Axes of the forward form are in raw units, of the inverse form in SI.

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::TOOL;
+use crate::plan::design::tour::Order;
 use crate::plan::next_experiment::recipe::Course;
 use crate::plan::next_experiment::{Answer, Setup};
 use crate::plan::round;
@@ -34,7 +35,7 @@ pub struct NextExperiment {
     /// When each dwell begins, s.
     pub begin_s: Vec<f64>,
     /// Chamber, s and °C; empty where it does not matter.
-    pub chamber_c: Vec<(f64, f64)>,
+    pub chamber_c: Vec<[f64; 2]>,
     /// Whether the unit is switched on as the recording begins.
     pub cold_start: bool,
     /// Always null in JSON: every result of `mimu-design/1` has this key.
@@ -45,7 +46,7 @@ pub struct NextExperiment {
     pub dwell_s: f64,
     /// Sigma of a dwell mean of each sensor.
     pub dwell_sigma: Vec<DwellSigma>,
-    /// `lot`: randomised.
+    /// `randomised`.
     pub order: &'static str,
     /// Time of the whole, s.
     pub time_s: f64,
@@ -130,7 +131,7 @@ impl NextExperiment {
             sigma_per_parameter: sigmas.collect(),
             dwell_s: experiment.dwell_s,
             dwell_sigma: dwell_sigma.collect(),
-            order: "lot",
+            order: Order::Randomised.name(),
             time_s: experiment.time_s,
         }
     }

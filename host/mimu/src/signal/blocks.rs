@@ -7,7 +7,7 @@
 use crate::quantity::Sensor;
 use crate::signal::increment::{Increment, Integrator};
 use crate::signal::no_temperature;
-use crate::signal::reading_step::StepFinder;
+use crate::signal::quantisation_step::QuantisationFinder;
 use crate::signal::signed_low_byte;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
@@ -233,7 +233,7 @@ pub struct Condensed {
     /// Number of rows.
     pub rows: u64,
     /// Quantisation step of each raw channel, raw; `None` if none was found.
-    pub reading_step: [Option<f64>; 6],
+    pub quantisation_step: [Option<f64>; 6],
     /// For each raw channel: the number of sample pairs that show a [low byte read as a signed number](crate::signal::signed_low_byte).
     pub signed_low_byte: [Option<u64>; 6],
     /// Which of the six raw channels the recording has.
@@ -307,8 +307,8 @@ struct Condenser {
     open_after_gap: bool,
     last: Option<(f64, i32)>,
     integrator: Option<Integrator>,
-    steps: Steps,
-    reading_steps: [StepFinder; 6],
+    intervals: Intervals,
+    quantisation_steps: [QuantisationFinder; 6],
     signed_low_bytes: [signed_low_byte::Finder; 6],
     held: [HeldReadings; 2],
     out: Condensed,
@@ -316,7 +316,7 @@ struct Condenser {
 
 /// Statistics of the intervals between time stamps.
 #[derive(Default)]
-struct Steps {
+struct Intervals {
     regular: u64,
     regular_s: f64,
     longer: u64,
@@ -339,15 +339,15 @@ impl Condenser {
             open_after_gap: false,
             last: None,
             integrator: integrate.then(|| Integrator::new(period_s)),
-            steps: Steps::default(),
-            reading_steps: Default::default(),
+            intervals: Intervals::default(),
+            quantisation_steps: Default::default(),
             signed_low_bytes: Default::default(),
             held: Default::default(),
             out: Condensed {
                 blocks: Vec::new(),
                 increments: Vec::new(),
                 rows: 0,
-                reading_step: [None; 6],
+                quantisation_step: [None; 6],
                 signed_low_byte: [None; 6],
                 has_raw: [false; 6],
                 has_reference: [false; 6],
@@ -459,22 +459,22 @@ impl Condenser {
 
     /// Counts an interval between time stamps; returns whether it is a gap.
     fn count(&mut self, dt: f64, row: u64) -> bool {
-        let steps = &mut self.steps;
+        let intervals = &mut self.intervals;
         if dt > GAP_PERIODS * self.period_s {
-            steps.longer += 1;
+            intervals.longer += 1;
             let periods = dt / self.period_s;
             let whole = (periods - periods.round()).abs() < WHOLE;
-            steps.whole += u64::from(whole || periods > PAUSE);
-            steps.missing_s += dt - self.period_s;
-            steps.first_odd.get_or_insert((row, dt));
+            intervals.whole += u64::from(whole || periods > PAUSE);
+            intervals.missing_s += dt - self.period_s;
+            intervals.first_odd.get_or_insert((row, dt));
             return true;
         }
         if dt < 0.5 * self.period_s {
-            steps.shorter += 1;
-            steps.first_odd.get_or_insert((row, dt));
+            intervals.shorter += 1;
+            intervals.first_odd.get_or_insert((row, dt));
         }
-        steps.regular += 1;
-        steps.regular_s += dt;
+        intervals.regular += 1;
+        intervals.regular_s += dt;
         false
     }
 
@@ -515,7 +515,7 @@ impl Condenser {
         for (c, column) in open.raw.iter().enumerate() {
             if !column.is_empty() {
                 raw[c] = Moments::of(column);
-                self.reading_steps[c].push(column);
+                self.quantisation_steps[c].push(column);
                 self.signed_low_bytes[c].push(column);
                 self.out.missing[c] += column.len() as u64 - u64::from(raw[c].n);
             }
@@ -542,14 +542,14 @@ impl Condenser {
 
     /// Refuses a recording whose intervals between time stamps often do not fit the rate.
     fn check_rate(&self) -> Result<()> {
-        let steps = &self.steps;
-        let all = (steps.regular + steps.longer) as f64;
-        let share = (steps.longer + steps.shorter) as f64 / all;
-        let odd = (steps.longer - steps.whole + steps.shorter) as f64 / all;
+        let intervals = &self.intervals;
+        let all = (intervals.regular + intervals.longer) as f64;
+        let share = (intervals.longer + intervals.shorter) as f64 / all;
+        let odd = (intervals.longer - intervals.whole + intervals.shorter) as f64 / all;
         if odd <= GAP_SHARE && share <= LOSS_SHARE {
             return Ok(());
         }
-        let (row, dt) = steps.first_odd.unwrap_or((0, f64::NAN));
+        let (row, dt) = intervals.first_odd.unwrap_or((0, f64::NAN));
         let rate = self.rate_hz;
         let (problem, remedy) = if share > 0.9 {
             (
@@ -581,9 +581,9 @@ impl Condenser {
 
     fn finish(mut self) -> Result<Condensed> {
         self.flush();
-        let steps = &self.steps;
+        let intervals = &self.intervals;
         let rate = self.rate_hz;
-        if steps.regular + steps.longer == 0 {
+        if intervals.regular + intervals.longer == 0 {
             return Err(Error::new(
                 &self.place,
                 "it has only one row",
@@ -591,7 +591,7 @@ impl Condenser {
             ));
         }
         self.check_rate()?;
-        let period = steps.regular_s / steps.regular.max(1) as f64;
+        let period = intervals.regular_s / intervals.regular.max(1) as f64;
         let off = period / self.period_s - 1.0;
         if off.abs() > 0.02 {
             let problem = format!(
@@ -610,10 +610,10 @@ impl Condenser {
                 .push(Warning::RateOff(1.0 / period, -100.0 * off, rate));
         }
         out.period_s = period;
-        out.gaps = (steps.longer, steps.missing_s);
-        if steps.longer > 0 {
-            let (row, _) = steps.first_odd.unwrap_or((0, 0.0));
-            let gaps = Warning::Gaps(steps.longer, steps.missing_s, row + 1);
+        out.gaps = (intervals.longer, intervals.missing_s);
+        if intervals.longer > 0 {
+            let (row, _) = intervals.first_odd.unwrap_or((0, 0.0));
+            let gaps = Warning::Gaps(intervals.longer, intervals.missing_s, row + 1);
             out.warnings.push(gaps);
         }
         if out.duplicates > 0 {
@@ -634,14 +634,24 @@ impl Condenser {
         if let Some(integrator) = &mut self.integrator {
             out.increments.extend(integrator.take());
         }
-        out.reading_step = self.reading_steps.map(StepFinder::find);
+        out.quantisation_step = self.quantisation_steps.map(QuantisationFinder::find);
         out.signed_low_byte = self.signed_low_bytes.map(|finder| finder.find());
         Ok(self.out)
     }
 }
 
+/// Standard deviation of normal deviations over the median of their magnitudes.
+pub(crate) const OF_MEDIAN: f64 = 1.4826;
+
+/// The lowest and the highest of `values`; the infinities, the higher one first, without any.
+pub fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+        [low.min(v), high.max(v)]
+    })
+}
+
 /// A range of blocks, with its step if that is given.
-pub(crate) type Stretch = (Option<i32>, std::ops::Range<usize>);
+pub(crate) type StepBlocks = (Option<i32>, std::ops::Range<usize>);
 
 /// Pooled moments of several blocks; extremes are not kept.
 pub(crate) fn pool(parts: impl Iterator<Item = Moments>) -> Moments {

@@ -8,7 +8,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::quantity::Sensor;
-use crate::signal::blocks::{Block, Condensed, Rails};
+use crate::signal::blocks::{Block, Condensed, Rails, extent};
 use crate::signal::stillness::tolerance;
 
 /// Fewer blocks leave too few residuals after a regression on an input and its rate of change.
@@ -41,8 +41,7 @@ pub(crate) fn motion(blocks: &[Block], sensor: Sensor, spans: &[f64; 6]) -> Moti
         if !levels().all(|l| l.mean.is_finite()) {
             return Motion::Stands;
         }
-        let high = levels().map(|l| l.mean).fold(f64::NEG_INFINITY, f64::max);
-        let low = levels().map(|l| l.mean).fold(f64::INFINITY, f64::min);
+        let [low, high] = extent(levels().map(|l| l.mean));
         if high - low <= tolerance(c, spans) {
             // A whole turn in every block: the means are equal although the samples move.
             let within = levels().map(|l| l.max - l.min).fold(0.0, f64::max);

@@ -8,8 +8,8 @@ use std::ops::Range;
 
 pub use crate::fault::Fault;
 use crate::fault::SHORTEST_S;
-use crate::quantity::Sensor;
-use crate::signal::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
+use crate::quantity::{PerSensor, Sensor};
+use crate::signal::blocks::{Condensed, Level, Rails, StepBlocks, pool, quantile};
 use crate::signal::course::{Course, Motion, motion};
 use crate::signal::rails::{self, longest_run_by_chance};
 use crate::signal::ramp::ramps;
@@ -73,21 +73,11 @@ pub struct Dwell {
     pub moves: [bool; 2],
     /// Whether no bias explains the gyro's reading, as in a slow turn about the vertical: then the dwell is a pose, but not a rest.
     pub turns_slowly: bool,
-    /// Why it is not used for the gyro, if so.
-    pub gyro_fault: Option<Fault>,
-    /// Why it is not used for the accelerometer, if so.
-    pub accel_fault: Option<Fault>,
+    /// Why it is not used for a sensor, if so.
+    pub faults: PerSensor<Option<Fault>>,
 }
 
 impl Dwell {
-    /// Why it is not used for `sensor`, if so.
-    pub fn fault(&self, sensor: Sensor) -> Option<Fault> {
-        match sensor {
-            Sensor::Gyro => self.gyro_fault,
-            Sensor::Accel => self.accel_fault,
-        }
-    }
-
     /// Whether a table turns the unit so fast that an accelerometer off the axis would show it.
     pub fn spins(&self) -> bool {
         self.input(Sensor::Gyro)
@@ -258,7 +248,7 @@ impl Dwells {
             });
         }
         for (c, longest) in longest_run.iter_mut().enumerate() {
-            if is_coarse(&list, condensed.reading_step[c], c) {
+            if is_coarse(&list, condensed.quantisation_step[c], c) {
                 *longest = f64::INFINITY;
             }
         }
@@ -269,10 +259,9 @@ impl Dwells {
         };
         judge(&mut list, condensed, (&longest_run, &rails), judged);
         for (dwell, too_fast) in list.iter_mut().zip(too_fast) {
-            let faults = [&mut dwell.gyro_fault, &mut dwell.accel_fault];
-            for (fault, too_fast) in faults.into_iter().zip(too_fast) {
-                if too_fast && *fault == Some(Fault::NotStill) {
-                    *fault = Some(Fault::TooFast);
+            for (sensor, too_fast) in PerSensor::from(too_fast) {
+                if too_fast && dwell.faults[sensor] == Some(Fault::NotStill) {
+                    dwell.faults[sensor] = Some(Fault::TooFast);
                 }
             }
         }
@@ -291,18 +280,15 @@ impl Dwells {
             warnings,
         })
     }
-}
 
-impl Dwells {
     /// The dwells that are not used for `sensor`, as a remark: ` (not used: 3 too short, 1 accel_z saturated)`; empty
     /// if all are used.
     pub fn unused(&self, sensor: Sensor) -> String {
-        let mut counts: Vec<(String, usize)> = Vec::new();
-        for fault in self.list.iter().filter_map(|d| d.fault(sensor)) {
-            let name = fault.to_string();
-            match counts.iter_mut().find(|(known, _)| *known == name) {
+        let mut counts: Vec<(Fault, usize)> = Vec::new();
+        for fault in self.list.iter().filter_map(|d| d.faults[sensor]) {
+            match counts.iter_mut().find(|(known, _)| *known == fault) {
                 Some((_, count)) => *count += 1,
-                None => counts.push((name, 1)),
+                None => counts.push((fault, 1)),
             }
         }
         let all: Vec<String> = counts.iter().map(|(f, n)| format!("{n} {f}")).collect();
@@ -311,12 +297,10 @@ impl Dwells {
             false => format!(" (not used: {})", all.join(", ")),
         }
     }
-}
 
-impl Dwells {
     /// Whether dwells of the `step` column are not used for `sensor` because they are not still; [`Steps::Given`] would use them.
     pub fn are_judged_not_still(&self, sensor: Sensor) -> bool {
-        let not_still = |d: &Dwell| d.fault(sensor) == Some(Fault::NotStill);
+        let not_still = |d: &Dwell| d.faults[sensor] == Some(Fault::NotStill);
         self.detection.is_none() && self.list.iter().any(not_still)
     }
 }
@@ -337,8 +321,8 @@ fn is_coarse(list: &[Dwell], step: Option<f64>, c: usize) -> bool {
     quantile(&mut changing, 0.5).is_none_or(|v| v < TWO_CODES * step * step)
 }
 
-fn by_step(condensed: &Condensed) -> Vec<Stretch> {
-    let mut ranges: Vec<Stretch> = Vec::new();
+fn by_step(condensed: &Condensed) -> Vec<StepBlocks> {
+    let mut ranges: Vec<StepBlocks> = Vec::new();
     for (i, block) in condensed.blocks.iter().enumerate() {
         match ranges.last_mut() {
             Some((step, range)) if *step == Some(block.step) && range.end == i => range.end = i + 1,
@@ -397,14 +381,13 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
         turn: false,
         moves: [false; 2],
         turns_slowly: false,
-        gyro_fault: None,
-        accel_fault: None,
+        faults: PerSensor::default(),
     }
 }
 
 /// Excludes dwells that turn evenly, for both sensors.
 fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
-    let usable = |d: &&Dwell| Sensor::BOTH.iter().all(|s| d.fault(*s).is_none());
+    let usable = |d: &&Dwell| Sensor::BOTH.iter().all(|s| d.faults[*s].is_none());
     let judged: Vec<&Dwell> = list.iter().filter(usable).collect();
     let rests = judged.iter().map(|d| Rest {
         blocks: d.blocks.clone(),
@@ -416,14 +399,13 @@ fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
     let starts = judged.iter().zip(turning).filter(|(_, turning)| *turning);
     let starts: Vec<u64> = starts.map(|(d, _)| d.first_row).collect();
     for dwell in list.iter_mut().filter(|d| starts.contains(&d.first_row)) {
-        dwell.gyro_fault = Some(Fault::Turning);
-        dwell.accel_fault = Some(Fault::Turning);
+        dwell.faults = PerSensor::both(Some(Fault::Turning));
     }
 }
 
 /// Marks the dwells that are poses of the accelerometer but not rests of the gyro; returns the warning about them.
 fn mark_slow_turns(list: &mut [Dwell]) -> Option<Warning> {
-    let usable = |d: &&mut Dwell| Sensor::BOTH.iter().all(|s| d.fault(*s).is_none());
+    let usable = |d: &&mut Dwell| Sensor::BOTH.iter().all(|s| d.faults[*s].is_none());
     let mut usable: Vec<&mut Dwell> = list.iter_mut().filter(usable).collect();
     let complete = usable.iter().all(|d| d.raw.iter().all(|m| m.n > 0));
     if !complete {
@@ -543,10 +525,7 @@ fn judge(
             if dwell.duration_s < SHORTEST_S - 0.5 * condensed.period_s && !turn {
                 fault = fault.or(Some(Fault::TooShort));
             }
-            match sensor {
-                Sensor::Gyro => dwell.gyro_fault = fault,
-                Sensor::Accel => dwell.accel_fault = fault,
-            }
+            dwell.faults[sensor] = fault;
         }
     }
 }
@@ -555,7 +534,7 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<Warning>) {
     let mut by_fault: Vec<(Fault, Option<Sensor>, Vec<String>)> = Vec::new();
     for dwell in list {
         for sensor in Sensor::BOTH {
-            let Some(fault) = dwell.fault(sensor) else {
+            let Some(fault) = dwell.faults[sensor] else {
                 continue;
             };
             if matches!(fault, Fault::TooShort | Fault::Turning) && sensor == Sensor::Accel {

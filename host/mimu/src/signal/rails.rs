@@ -1,7 +1,7 @@
 //! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
 
 use crate::quantity::{significant, unsigned_zero};
-use crate::signal::blocks::{Condensed, Moments, Rails, quantile};
+use crate::signal::blocks::{Condensed, Moments, Rails, extent, quantile};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS};
@@ -62,13 +62,13 @@ fn calm_end(condensed: &Condensed, c: usize, sign: f64, range: [f64; 2]) -> Opti
     }
     let calm = |m: &Moments| deviation(m) < CALM * quiet && (m.mean - end).abs() < near;
     // The outermost calm segment: a pose near the end may be calm at another value than the rail.
-    let stretches = blocks.chunk_by(|a, b| calm(a) && calm(b));
-    let calm_stretches = stretches.filter(|s| s.len() >= CALM_BLOCKS && calm(&s[0]));
+    let segments = blocks.chunk_by(|a, b| calm(a) && calm(b));
+    let calm_segments = segments.filter(|s| s.len() >= CALM_BLOCKS && calm(&s[0]));
     let inner = |s: &[Moments]| {
         let values = s.iter().map(|m| if sign > 0.0 { m.min } else { m.max });
         values.fold(end, |a, b| if sign > 0.0 { a.min(b) } else { a.max(b) })
     };
-    let widest = calm_stretches
+    let widest = calm_segments
         .map(inner)
         .max_by(|a, b| (sign * a).total_cmp(&(sign * b)))?;
     let spread = (end - widest).abs();
@@ -126,7 +126,7 @@ fn count(moments: impl Iterator<Item = Moments>, value: f64) -> (u64, f64) {
 fn converter_rail(condensed: &Condensed, c: usize, value: f64, high: bool) -> Option<Warning> {
     let moments = condensed.blocks.iter().map(|b| b.raw[c]);
     let (all, longest) = count(moments.filter(|m| m.n > 0), value);
-    let full_scale = full_scale_log_odds(value, condensed.reading_step[c]);
+    let full_scale = full_scale_log_odds(value, condensed.quantisation_step[c]);
     if full_scale > RUN_LOG_ODDS {
         return Some(Warning::EndOfConverter(all, value).of_channel(c));
     }
@@ -160,8 +160,7 @@ pub(crate) fn find(
         }
         let moments = || condensed.blocks.iter().map(|b| &b.raw[c]);
         let known = || moments().filter(|m| m.n > 0);
-        let high = known().map(|m| m.max).fold(f64::NEG_INFINITY, f64::max);
-        let low = known().map(|m| m.min).fold(f64::INFINITY, f64::min);
+        let [low, high] = extent(known().flat_map(|m| [m.min, m.max]));
         if low == high {
             continue;
         }
@@ -197,9 +196,8 @@ fn coarse_step_at_rest(condensed: &Condensed, c: usize) -> Option<f64> {
                 .map(|b| &b.raw[o])
                 .filter(|m| m.n > 0)
         };
-        let high = known().map(|m| m.max).fold(f64::NEG_INFINITY, f64::max);
-        let low = known().map(|m| m.min).fold(f64::INFINITY, f64::min);
-        let step = condensed.reading_step[o]?;
+        let [low, high] = extent(known().flat_map(|m| [m.min, m.max]));
+        let step = condensed.quantisation_step[o]?;
         if high - low > AT_REST_STEPS * step {
             return None;
         }

@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use crate::quantity::Sensor;
-use crate::signal::blocks::{Condensed, Stretch, pool, quantile};
+use crate::signal::blocks::{Condensed, OF_MEDIAN, StepBlocks, pool, quantile};
 
 /// Number of blocks whose mean is compared with that of the middle: the noise of a single block would hide a slow turn.
 const GROUP: usize = 3;
@@ -19,8 +19,6 @@ const AMONG_DWELLS: f64 = 8.0;
 const BEYOND: f64 = 2.0;
 /// Fewer dwells do not show what is usual.
 const FEWEST: usize = 7;
-/// From a median absolute deviation to a standard deviation.
-const OF_MEDIAN: f64 = 1.4826;
 
 fn mean(condensed: &Condensed, blocks: Range<usize>, c: usize) -> f64 {
     pool(condensed.blocks[blocks].iter().map(|b| b.raw[c])).mean
@@ -34,7 +32,7 @@ fn usual(deviations: &[f64], condensed: &Condensed, c: usize) -> f64 {
     let largest = blocks.map(|m| m.max.abs().max(m.min.abs()));
     let rounding = 1e-9 * largest.fold(0.0, f64::max);
     scale
-        .max(0.3 * condensed.reading_step[c].unwrap_or(0.0))
+        .max(0.3 * condensed.quantisation_step[c].unwrap_or(0.0))
         .max(rounding)
 }
 
@@ -66,11 +64,11 @@ fn in_middle(condensed: &Condensed, middle: &Range<usize>, c: usize) -> Vec<f64>
 
 /// Trims the segments at both ends until gyro and accelerometer read what they read in the middle. Returns the number of segments that were
 /// cut, and of blocks removed.
-pub(crate) fn walk_in(stretches: &mut [Stretch], condensed: &Condensed) -> (u64, u64) {
-    let (mut cut, mut blocks) = (vec![0_usize; stretches.len()], 0);
-    let mut ends: Vec<[usize; 2]> = vec![[0; 2]; stretches.len()];
+pub(crate) fn walk_in(segments: &mut [StepBlocks], condensed: &Condensed) -> (u64, u64) {
+    let (mut cut, mut blocks) = (vec![0_usize; segments.len()], 0);
+    let mut ends: Vec<[usize; 2]> = vec![[0; 2]; segments.len()];
     for c in (0..6).filter(|&c| condensed.has_raw[c]) {
-        let middles: Vec<_> = stretches.iter().map(|(_, r)| middles(r)).collect();
+        let middles: Vec<_> = segments.iter().map(|(_, r)| middles(r)).collect();
         let own: Vec<[Vec<f64>; 2]> = middles
             .iter()
             .flatten()
@@ -79,7 +77,7 @@ pub(crate) fn walk_in(stretches: &mut [Stretch], condensed: &Condensed) -> (u64,
         let all: Vec<f64> = own.iter().flatten().flatten().copied().collect();
         let pooled = usual(&all, condensed, c);
         let mut own = own.iter();
-        for (k, (_, range)) in stretches.iter().enumerate() {
+        for (k, (_, range)) in segments.iter().enumerate() {
             let Some((middles, own)) = middles[k].as_ref().and_then(|m| Some((m, own.next()?)))
             else {
                 continue;
@@ -105,7 +103,7 @@ pub(crate) fn walk_in(stretches: &mut [Stretch], condensed: &Condensed) -> (u64,
             ends[k] = [ends[k][0].max(begins), ends[k][1].max(stops)];
         }
     }
-    for (((_, range), [begins, stops]), cut) in stretches.iter_mut().zip(ends).zip(&mut cut) {
+    for (((_, range), [begins, stops]), cut) in segments.iter_mut().zip(ends).zip(&mut cut) {
         *range = range.start + begins..range.end - stops;
         *cut = begins + stops;
         blocks += (begins + stops) as u64;

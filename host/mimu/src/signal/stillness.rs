@@ -4,7 +4,9 @@ use serde::Serialize;
 
 use crate::fault::SHORTEST_S;
 use crate::quantity::Sensor;
-use crate::signal::blocks::{Block, Condensed, Level, Stretch, pool, quantile};
+use crate::signal::blocks::{
+    Block, Condensed, Level, OF_MEDIAN, StepBlocks, extent, pool, quantile,
+};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, Reference};
 
@@ -84,7 +86,7 @@ pub(crate) fn find(
     condensed: &Condensed,
     manifest: &Manifest,
     factor: f64,
-) -> Result<(Vec<Stretch>, Detection)> {
+) -> Result<(Vec<StepBlocks>, Detection)> {
     let blocks = &condensed.blocks;
     let block_s = blocks.iter().map(|b| b.rows).max().unwrap_or(1) as f64 * condensed.period_s;
     let width = ((WINDOW_S / block_s).round() as usize).max(2);
@@ -300,7 +302,7 @@ impl RateAtRest {
             .iter()
             .map(|w| (w.mean[c] - rate.level(w.temp_c)).abs())
             .collect();
-        let sigma = 1.4826 * quantile(&mut deviations, 0.5).unwrap_or(0.0);
+        let sigma = OF_MEDIAN * quantile(&mut deviations, 0.5).unwrap_or(0.0);
         rate.reach = margin + REACH_SIGMAS * sigma;
         rate
     }
@@ -338,8 +340,7 @@ pub(crate) fn reference_spans(condensed: &Condensed) -> [f64; 6] {
                     .map(move |b| &b.reference[c])
                     .filter(|l| l.mean.is_finite())
             };
-            let high = levels().map(|l| l.max).fold(f64::NEG_INFINITY, f64::max);
-            let low = levels().map(|l| l.min).fold(f64::INFINITY, f64::min);
+            let [low, high] = extent(levels().flat_map(|l| [l.min, l.max]));
             span = span.max(high - low);
         }
         spans[sensor.channels()].fill(span);
@@ -364,11 +365,7 @@ fn constant_input<'a>(
 ) -> bool {
     (0..6).all(|c| {
         let known = levels.clone().map(|l| l[c]).filter(|l| l.mean.is_finite());
-        let high = known
-            .clone()
-            .map(|l| l.max)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let low = known.map(|l| l.min).fold(f64::INFINITY, f64::min);
+        let [low, high] = extent(known.flat_map(|l| [l.min, l.max]));
         high - low <= tolerance(c, spans)
     })
 }

@@ -45,10 +45,10 @@ fn said_of(
         Sensor::Gyro if near(degrees.recip()) => {
             "the ref_ columns are not in deg/s, or the readings were converted to rad/s twice"
         }
-        Sensor::Gyro if figure == Figure::RateSize && rpm(200.0 / 270.0) => {
+        Sensor::Gyro if figure == Figure::RateMagnitude && rpm(200.0 / 270.0) => {
             "was the turntable at 33 1/3 rpm while the rate of 45 rpm is given?"
         }
-        Sensor::Gyro if figure == Figure::RateSize && rpm(270.0 / 200.0) => {
+        Sensor::Gyro if figure == Figure::RateMagnitude && rpm(270.0 / 200.0) => {
             "was the turntable at 45 rpm while the rate of 33 1/3 rpm is given?"
         }
         // The gyro is integrated over the turns: time stamps that run twice as fast halve the scale factor.
@@ -70,7 +70,7 @@ pub(crate) fn at_rest(list: &[Dwell], manifest: &Manifest) -> Vec<Warning> {
         return Vec::new();
     }
     let usual = |sensor: Sensor| {
-        let usable = list.iter().filter(|d| d.fault(sensor).is_none());
+        let usable = list.iter().filter(|d| d.faults[sensor].is_none());
         let sizes = usable.map(|d| d.raw_mean(sensor).norm());
         let mut sizes: Vec<f64> = sizes.filter(|size| *size > 0.0).collect();
         quantile(&mut sizes, 0.5)
@@ -90,7 +90,7 @@ pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> 
             true,
             size / gravity,
             gravity,
-            Figure::GravitySize,
+            Figure::GravityMagnitude,
         )
     });
     let rate = rate.filter(|rate| *rate > LARGEST_BIAS);

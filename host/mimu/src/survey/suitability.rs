@@ -1,8 +1,8 @@
 //! Whether a channel is at rest and alive: only then does its Allan curve show its noise.
 
-use super::stretch::{FEWEST, Part, Stretch, longest, segments};
+use super::segment::{FEWEST, Part, Segment, longest, segments};
 use crate::quantity::{duration, unsigned_zero};
-use crate::signal::blocks::quantile;
+use crate::signal::blocks::{OF_MEDIAN, quantile};
 use crate::signal::stillness::{STILL_FACTOR, WINDOW_S};
 use crate::warning::Warning;
 use mimu_recording::RAW_COLUMNS;
@@ -120,7 +120,7 @@ pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Sui
         .max(least);
     // A slow turn does not show in the variance, but the mean jumps where it begins and ends; a drift does not jump.
     let mut steps: Vec<f64> = means.windows(2).map(|m| (m[1] - m[0]).abs()).collect();
-    let sigma = 1.4826 * quantile(&mut steps.clone(), 0.5).unwrap_or(0.0);
+    let sigma = OF_MEDIAN * quantile(&mut steps.clone(), 0.5).unwrap_or(0.0);
     let reach = STEP_SIGMAS * sigma.max((floor / window as f64).sqrt());
     steps.insert(0, 0.0);
     let moving = variances
@@ -145,7 +145,7 @@ fn seconds_in(s: f64) -> String {
 /// they may know better what a disturbance is.
 pub(super) fn refuse_motion(
     channels: &[(usize, Suitability)],
-    stretch: &Stretch,
+    segment: &Segment,
     part: Part,
     place: &str,
     warnings: &mut Vec<Warning>,
@@ -161,8 +161,8 @@ pub(super) fn refuse_motion(
     };
     let who = channels.iter().find(|(_, s)| s.moving[first]);
     let name = who.map_or("a channel", |(i, _)| RAW_COLUMNS[*i]);
-    let window_s = channels[0].1.window as f64 * stretch.period_s;
-    let time = |k: usize| stretch.span_s[0] + k as f64 * window_s;
+    let window_s = channels[0].1.window as f64 * segment.period_s;
+    let time = |k: usize| segment.span_s[0] + k as f64 * window_s;
     let count = (0..windows).filter(|k| moves(*k)).count();
     let problem = Warning::Moves([count, windows], window_s, time(first), name);
     if part != Part::Whole {

@@ -1,7 +1,7 @@
 //! The samples of a channel for the computation: a segment without a gap, checked, with short disturbances masked.
 
 use super::masking::{Masked, mask};
-use super::stretch::{FEWEST, Part, Stretch, longest};
+use super::segment::{FEWEST, Part, Segment, longest};
 use super::suitability::{Suitability, dead, suitability};
 use crate::survey::unit::Unit;
 use crate::warning::Warning;
@@ -26,17 +26,17 @@ pub(super) struct Values {
 }
 
 impl Values {
-    /// The samples of `stretch` in `unit`, checked; if the channel has empty cells, its longest segment without any. A `part` that a person
+    /// The samples of `segment` in `unit`, checked; if the channel has empty cells, its longest segment without any. A `part` that a person
     /// chose is used as it is; otherwise short disturbances are masked.
     pub fn of(
         mut values: Vec<f64>,
-        stretch: &Stretch,
+        segment: &Segment,
         part: Part,
         i: usize,
         unit: Unit,
         place: &str,
     ) -> Result<Read> {
-        let (rows, period_s) = (&stretch.rows, stretch.period_s);
+        let (rows, period_s) = (&segment.rows, segment.period_s);
         let place = format!("{place}, column {}", RAW_COLUMNS[i]);
         values.truncate(rows.end);
         values.drain(..rows.start);
@@ -70,7 +70,7 @@ impl Values {
             _ => None,
         };
         warnings.extend(masked.map(|masked| {
-            let first_s = stretch.span_s[0] + from as f64 * period_s + masked.first_s;
+            let first_s = segment.span_s[0] + from as f64 * period_s + masked.first_s;
             let samples = masked.samples as u64;
             Warning::Disturbed(samples, masked.share, first_s).of_channel(i)
         }));

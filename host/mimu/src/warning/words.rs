@@ -33,8 +33,8 @@ fn few(names: &[String]) -> String {
 }
 
 /// What a calibration that does no better was compared with.
-fn without(as_came: bool) -> &'static str {
-    match as_came {
+fn without(readings_in_si: bool) -> &'static str {
+    match readings_in_si {
         true => "the uncalibrated readings",
         false => "its own mean scale factor and mean bias on all three axes, without misalignment",
     }
@@ -200,13 +200,13 @@ impl fmt::Display for Warning {
             }
             Self::NoTemperature => f.write_str("the recording has no temp_c: the calibration's model at one temperature is used instead of its curves"),
             Self::NothingToJudge => f.write_str("the recording has no data to judge it"),
-            Self::Worse(as_came) => {
-                let question = if *as_came { "this unit" } else { "this unit, in this state" };
-                write!(f, "worse than with {}: is it the calibration of {question}?", without(*as_came))
+            Self::Worse(readings_in_si) => {
+                let question = if *readings_in_si { "this unit" } else { "this unit, in this state" };
+                write!(f, "worse than with {}: is it the calibration of {question}?", without(*readings_in_si))
             }
-            Self::Undecided(count, turns, as_came) => {
+            Self::Undecided(count, turns, readings_in_si) => {
                 let noun = if *turns { "turn" } else { "dwell" };
-                write!(f, "{} do not show whether it is better than {}: record more", plural(*count, noun), without(*as_came))
+                write!(f, "{} do not show whether it is better than {}: record more", plural(*count, noun), without(*readings_in_si))
             }
             Self::NotCalibrated(sensor) => write!(f, "the calibration is not for the {sensor}: its columns are left out"),
             Self::Uncertain => f.write_str("the calibration has no uncertainty, like one that was read from a device. Its matrix is taken as exact: an error of it may be found as an effect, and the intervals of a new calibration do not include it"),

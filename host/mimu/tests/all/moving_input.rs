@@ -158,7 +158,7 @@ fn a_unit_that_swings_about_level_axes_is_calibrated_by_the_reference_of_every_i
     for seed in 1..9 {
         let fit = fitted(recorded(swing, none, 1.0, seed));
         for dwell in &fit.prepared.dwells.list {
-            assert_eq!((dwell.gyro_fault, dwell.accel_fault), (None, None));
+            assert_eq!((dwell.faults.gyro, dwell.faults.accel), (None, None));
         }
         for error in errors(&fit) {
             assert!(error.abs() < 4.5, "seed {seed}: {error} sigma");
@@ -195,7 +195,7 @@ fn a_dwell_whose_reading_does_not_follow_its_reference_is_not_still() {
     let prepared = recorded(swing, none, 0.7, 1);
     let swings = &prepared.dwells.list[6..];
     for dwell in swings {
-        assert_eq!(dwell.gyro_fault, Some(Fault::NotStill));
+        assert_eq!(dwell.faults.gyro, Some(Fault::NotStill));
     }
 }
 
@@ -204,8 +204,8 @@ fn an_input_that_turns_by_a_right_angle_in_a_block_is_too_fast_for_the_one_senso
  {
     let prepared = recorded(whirl, none, 1.0, 1);
     for dwell in &prepared.dwells.list[6..] {
-        assert_eq!(dwell.accel_fault, Some(Fault::TooFast));
-        assert_eq!(dwell.gyro_fault, None);
+        assert_eq!(dwell.faults.accel, Some(Fault::TooFast));
+        assert_eq!(dwell.faults.gyro, None);
     }
     let warned = prepared.dwells.warnings.iter().any(|w| {
         w.to_string().starts_with(

@@ -151,10 +151,10 @@ fn biases_that_wander_widen_the_intervals_of_the_biases() {
 #[test]
 fn the_noise_at_rest_widens_the_intervals_of_the_biases_by_what_it_says_and_nothing_else() {
     let recorded = session(Experiment::ramp(60.0, true).record(9)).unwrap();
-    let mut stated = recorded.clone();
+    let mut noise_at_rest = recorded.clone();
     // Bias instabilities B, SI: 60 deg/h, and 200 µg.
     let instability = [60.0 / 3600.0_f64.to_degrees(), 2e-4 * 9.80665];
-    stated.stated = std::array::from_fn(|channel| {
+    noise_at_rest.noise_at_rest = std::array::from_fn(|channel| {
         let b = instability[channel / 3] * GAIN[channel / 3];
         Some(AllanModel {
             white: 0.0,
@@ -162,7 +162,7 @@ fn the_noise_at_rest_widens_the_intervals_of_the_biases_by_what_it_says_and_noth
             walk: 0.0,
         })
     });
-    let [without, with] = [recorded, stated].map(|s| estimate(&[s], Choice::JOINT).unwrap());
+    let [without, with] = [recorded, noise_at_rest].map(|s| estimate(&[s], Choice::JOINT).unwrap());
     for sensor in 0..2 {
         let [narrow, wide] = [&without, &with].map(|j| errors(j, sensor, 31.0));
         for axis in 9..12 {

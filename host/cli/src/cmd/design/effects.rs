@@ -101,7 +101,7 @@ impl DesignArgs {
                 let file = NoiseFile::read(path)?;
                 let [gyro, accel] = Sensor::BOTH.map(|s| match file.of(s).is_empty() {
                     true => Ok(DwellNoise::fang(s)),
-                    false => DwellNoise::stated(&file, s),
+                    false => DwellNoise::from_file(&file, s),
                 });
                 Ok(Some([gyro?, accel?]))
             }

@@ -96,7 +96,7 @@ impl PlanArgs {
             None => Sensor::BOTH.map(DwellNoise::fang),
             Some(path) => {
                 let file = NoiseFile::read(path)?;
-                let of = |sensor| DwellNoise::stated(&file, sensor);
+                let of = |sensor| DwellNoise::from_file(&file, sensor);
                 [of(Sensor::Gyro)?, of(Sensor::Accel)?]
             }
         };

@@ -329,7 +329,7 @@ fn effect(d: &DiagnosisResult, s: &Shown, one: &Accepted, panels: &[Panel]) -> M
                 "Left: residuals plus the named part of the effect (its other parts and the other effects removed), against the "
                 "variable that it depends on, minus the part that the affine calibration absorbs (the mean, and the best straight line if the model is "
                 "linear in the variable). " (key("fit", "M0 6H24")) "fitted effect with its 95 % band"
-                @if let Some(form) = one.effect.form() { " (for the " code { (form.name) } " found)" }
+                @if let Some(form) = one.effect.nonlinear_parameter() { " (for the " code { (form.name) } " found)" }
                 ". Right: the residuals, on the same scale. " (keys()) "."
                 @if whole {
                     " If a residual is that of a whole turn or of the magnitude of gravity, the abscissa is the change that the fitted effect "

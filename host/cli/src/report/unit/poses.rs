@@ -23,7 +23,7 @@ pub fn figure(prepared: &Prepared, calibration: &Calibration, accel: Option<&Pic
     };
     let from = Sensor::Accel.channels().start;
     let at_rest = prepared.dwells.list.iter();
-    let at_rest = at_rest.filter(|d| d.accel_fault.is_none() && d.raw[from].mean.is_finite());
+    let at_rest = at_rest.filter(|d| d.faults.accel.is_none() && d.raw[from].mean.is_finite());
     let poses: Vec<(Vector3<f64>, f64)> = at_rest
         .map(|dwell| {
             let raw = Vector3::from_fn(|i, _| dwell.raw[from + i].mean);

@@ -17,7 +17,7 @@ pub fn figure(prepared: &Prepared) -> Markup {
     let unit = prepared.manifest.raw_unit;
     let used = |sensor| {
         let all = prepared.dwells.list.iter();
-        all.filter(|d| d.fault(sensor).is_none()).count()
+        all.filter(|d| d.faults[sensor].is_none()).count()
     };
     html! {
         figure {
@@ -68,7 +68,7 @@ fn drawn(prepared: &Prepared, sensor: Sensor, unit: &str) -> Markup {
         .dwells
         .list
         .iter()
-        .filter(|d| d.fault(sensor).is_none())
+        .filter(|d| d.faults[sensor].is_none())
         .map(|d| (d.start_s / MINUTE_S, (d.start_s + d.duration_s) / MINUTE_S))
         .collect();
     let unit = if unit == "SI" { sensor.unit() } else { unit };

@@ -75,7 +75,7 @@ fn samples_that_are_missing_from_the_other_triad_do_not_make_an_error() {
         mean.n = 0;
     }
     let after = fitted_effect(&hole, &calibration);
-    assert_eq!(after.dwells.list[5].gyro_fault, Some(Fault::Missing(3)));
+    assert_eq!(after.dwells.list[5].faults.gyro, Some(Fault::Missing(3)));
     let said = after.dwells.warnings[0].to_string();
     assert!(
         said.contains("accel_x missing") && said.contains("gyro_g_sensitivity"),

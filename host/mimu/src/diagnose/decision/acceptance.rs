@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::hold_out::{chance_without_a_dwell, held_out_by_part, leverage, parts_helped};
 use super::second::second;
-use super::{LEVERAGE, SURVIVES, Second, held_out, rms, shares};
+use super::{LEVERAGE, SURVIVES, Second, coefficients_of, held_out, rms};
 use crate::diagnose::rejected::{ErrorRms, Reason};
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Chosen, Search};
@@ -94,7 +94,11 @@ impl<'a> Acceptance<'a> {
     }
 
     /// Test of each of the `kept`, with these coefficients, on the second recording; `None` if it is specific to a session.
-    pub fn elsewhere(&self, kept: &[Chosen], values: &[DVector<f64>]) -> Vec<Option<Second>> {
+    pub fn on_second_recording(
+        &self,
+        kept: &[Chosen],
+        values: &[DVector<f64>],
+    ) -> Vec<Option<Second>> {
         let each = kept.iter().zip(values);
         let given: Vec<FittedEffect> = each
             .filter(|(c, _)| !c.candidate.is_of_session())
@@ -122,7 +126,7 @@ impl<'a> Acceptance<'a> {
         with: &Fitted,
         passed: &[String],
     ) -> Option<Option<Failed>> {
-        let seconds = self.elsewhere(kept, &shares(self.search, kept, with));
+        let seconds = self.on_second_recording(kept, &coefficients_of(self.search, kept, with));
         let (weights, split) = self.common(kept, with);
         let with_all = self.held(kept, with, split);
         let open = |at: &usize| !passed.contains(&kept[*at].candidate.id());
@@ -220,7 +224,7 @@ impl<'a> Acceptance<'a> {
         with: &Fitted,
         accept: &[String],
     ) -> Vec<Chosen> {
-        let seconds = self.elsewhere(kept, &shares(self.search, kept, with));
+        let seconds = self.on_second_recording(kept, &coefficients_of(self.search, kept, with));
         let confirmed = seconds.iter().map(|s| s.is_some_and(|s| s.shows));
         let (taken, suggested): (Vec<_>, Vec<_>) =
             kept.drain(..).zip(confirmed).partition(|(one, confirmed)| {

@@ -27,10 +27,9 @@ pub(super) fn others_in_time(search: &Search, kept: &mut [Chosen], with: &Fitted
         let rivals = effects::all().filter(|e| e.sensor == search.rows.sensor && !listed(e));
         let found: Vec<Alternative> = rivals
             .filter_map(|rival| {
-                Some(Alternative::from((
-                    rival,
-                    worse_with(search, kept, i, rival, with)?,
-                )))
+                let worse = worse_with(search, kept, i, rival, with)?;
+                let rival = Candidate::new(rival.sensor, CandidateKind::Effect(rival));
+                Some(Alternative::of(&rival, worse))
             })
             .filter(|other| other.score_worse_by < CONFUSED)
             .collect();

@@ -31,7 +31,7 @@ pub struct Leftover {
     /// Axis, if it belongs to one.
     pub axis: Option<usize>,
     /// What it correlates with.
-    pub against: Against,
+    pub against: CorrelatesWith,
     /// Root mean square beyond the noise, in [`Self::unit`].
     pub strength: f64,
     /// Whether the biases of usual sensors wander as much, and the wander of this unit at rest was not recorded. It is then reported, not
@@ -41,7 +41,7 @@ pub struct Leftover {
 
 /// What residuals correlate with.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Against {
+pub enum CorrelatesWith {
     /// A product or a jump that is reported and not removed, by its id.
     Effect(String),
     /// The reading.
@@ -54,7 +54,7 @@ pub enum Against {
     Noisier(f64),
 }
 
-impl fmt::Display for Against {
+impl fmt::Display for CorrelatesWith {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Effect(id) => f.write_str(id),
@@ -108,7 +108,7 @@ impl Leftover {
             sensor: rows.sensor,
             stratum: StratumName(Observable::Axis(axis.unwrap_or_default()), None),
             axis,
-            against: Against::Effect(term.id()),
+            against: CorrelatesWith::Effect(term.id()),
             strength: mean_square.sqrt(),
             usual: false,
         }
@@ -160,9 +160,9 @@ pub(super) fn leftover(
             continue;
         }
         let against = match jump {
-            Some(jump) => Against::Effect(jump.candidate.id()),
-            None if random_walk * unit > extra_white => Against::Time,
-            None => Against::Nothing,
+            Some(jump) => CorrelatesWith::Effect(jump.candidate.id()),
+            None if random_walk * unit > extra_white => CorrelatesWith::Time,
+            None => CorrelatesWith::Nothing,
         };
         left.push(Leftover {
             sensor: rows.sensor,
@@ -184,12 +184,12 @@ pub(in crate::diagnose) fn noisier(session: &Session, sensor: Sensor) -> Vec<Lef
     };
     let of = |axis: usize| {
         let channel = sensor.channels().start + axis;
-        let (beyond, times) = session.prepared.noise.beyond_stated(channel)?;
+        let (beyond, times) = session.prepared.noise.beyond_noise_at_rest(channel)?;
         Some(Leftover {
             sensor,
             stratum: StratumName(Observable::Second(axis), None),
             axis: Some(axis),
-            against: Against::Noisier(times),
+            against: CorrelatesWith::Noisier(times),
             strength: beyond / scale[axis],
             usual: false,
         })

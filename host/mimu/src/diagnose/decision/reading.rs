@@ -9,13 +9,14 @@
 use nalgebra::DMatrix;
 
 use super::hold_out::{held_out, rms};
-use super::leftover::{Against, FALSE_LEFTOVER, Leftover};
+use super::leftover::{CorrelatesWith, FALSE_LEFTOVER, Leftover};
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{COEFFICIENT, Chosen, Search, beside, independent_of, unit_columns};
 use crate::diagnose::variance::{Fitted, LikelihoodKind};
 use crate::effects::quantity::Conditions;
 use crate::fit::Split;
 use crate::observable::{Observable, StratumName};
+use crate::signal::blocks::extent;
 
 /// Numbers of segments that the range of the readings is divided into.
 const PIECES: [usize; 3] = [4, 16, 64];
@@ -44,11 +45,7 @@ impl<'a> Readings<'a> {
     fn new(rows: &'a Rows, conditions: Vec<Conditions>) -> Self {
         let range = |axis: usize| {
             let all = conditions.iter().map(|m| m.reading.mean[axis]);
-            let (low, high) = all
-                .filter(|u| u.is_finite())
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), u| {
-                    (a.min(u), b.max(u))
-                });
+            let [low, high] = extent(all.filter(|u| u.is_finite()));
             (low, high - low)
         };
         Self {
@@ -168,7 +165,7 @@ fn of_axis(
             sensor: rows.sensor,
             stratum: of_axis.map_or(StratumName(Observable::Axis(axis), None), |s| s.name),
             axis: Some(axis),
-            against: Against::Reading,
+            against: CorrelatesWith::Reading,
             strength: (explained.max(0.0) / stratum.rows.len() as f64).sqrt(),
             usual: false,
         },

@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 
 use crate::diagnose::note::Note;
-use crate::diagnose::search::{COEFFICIENT, CONFUSED, Chosen, Search, beside};
+use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search, beside};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
 use crate::effects::alternatives::one_at_a_constant_input;
@@ -53,7 +53,8 @@ pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> V
         notes.push(Note::new(found, advice));
         let others = &mut kept[i].alternatives;
         others.retain(|o| o.id != rival.id);
-        others.insert(0, (rival, worse).into());
+        let rival = Candidate::new(rival.sensor, CandidateKind::Effect(rival));
+        others.insert(0, Alternative::of(&rival, worse));
     }
     notes
 }

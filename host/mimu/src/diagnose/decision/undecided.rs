@@ -41,7 +41,7 @@ pub(super) fn undecided(search: &Search, kept: &[Chosen]) -> Vec<Undecided> {
                     sensor,
                     law: rival.law.about,
                     difference,
-                    experiment: rival.settled_by,
+                    experiment: rival.discriminating_experiment,
                 });
             }
         }

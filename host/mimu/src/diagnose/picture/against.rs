@@ -16,6 +16,7 @@ use crate::diagnose::search::Search;
 use crate::diagnose::variance::Fitted;
 use crate::effects::quantity::Conditions;
 use crate::quantity::AXES;
+use crate::signal::blocks::extent;
 
 /// Points of a curve.
 const POINTS: usize = 81;
@@ -226,7 +227,7 @@ fn variable(
             _ => column(group.members[0], *r),
         })
         .collect();
-    let (low, high) = ends(&x);
+    let [low, high] = extent(x.iter().copied());
     if !(high - low > 1e-9 * high.abs().max(low.abs())) {
         return None;
     }
@@ -334,7 +335,7 @@ impl Drawn<'_> {
         let covariance = DMatrix::from_fn(count, count, |i, j| {
             self.one.conditional[(self.members[i], self.members[j])]
         });
-        let (low, high) = ends(&self.x);
+        let [low, high] = extent(self.x.iter().copied());
         let curve = (0..self.points).map(|i| {
             let x = low + (high - low) * i as f64 / (self.points - 1) as f64;
             let values = values(x);
@@ -364,13 +365,6 @@ impl Drawn<'_> {
             points: points(self.track, |i| (self.x[i], effect(i))),
         }
     }
-}
-
-fn ends(x: &[f64]) -> (f64, f64) {
-    x.iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(*v), h.max(*v))
-        })
 }
 
 /// Whether the affine calibration can absorb a straight line in `x`, the values of the rows of `track`.

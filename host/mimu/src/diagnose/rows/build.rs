@@ -39,7 +39,7 @@ pub(super) struct Part {
     pub rows: Vec<Row>,
     pub conditions: Vec<Conditions>,
     pub block: Vec<usize>,
-    pub warm: Vec<(f64, f64)>,
+    pub temperature_offset: Vec<(f64, f64)>,
 }
 
 pub(super) struct Builder<'a> {
@@ -50,7 +50,7 @@ pub(super) struct Builder<'a> {
     pub other_measured: bool,
     pub t0_s: f64,
     pub middle_s: f64,
-    pub warm: Vec<(f64, f64)>,
+    pub temperature_offset: Vec<(f64, f64)>,
     pub rows: Vec<Row>,
     pub conditions: Vec<Conditions>,
     pub block: Vec<usize>,
@@ -66,7 +66,9 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: FreeParameters) -> O
     let reference = session.prepared.manifest.reference;
     let mut part = match (reference, sensor) {
         (Reference::Table, _) => builder.known(&inverse, accel),
-        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => builder.sizes(&inverse),
+        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
+            builder.magnitudes(&inverse)
+        }
         // A diagnosis of a recording from a turntable is refused before.
         (Reference::TurntableRate, Sensor::Gyro) => return None,
         (Reference::Gravity, Sensor::Gyro) => builder.turns(&inverse, accel, session.forces),
@@ -111,7 +113,7 @@ impl<'a> Builder<'a> {
             },
             t0_s: blocks.first()?.start_s,
             middle_s: prepared.middle_s(),
-            warm: offsets(blocks),
+            temperature_offset: offsets(blocks),
             rows: Vec::new(),
             conditions: Vec::new(),
             block: Vec::new(),
@@ -144,8 +146,8 @@ impl Builder<'_> {
             force,
             angular_acceleration: Vector3::zeros(),
             sensed: self.direction * input,
-            temperature_offset: self.warm[at].1,
-            lagged_temperature: self.warm[at].1,
+            temperature_offset: self.temperature_offset[at].1,
+            lagged_temperature: self.temperature_offset[at].1,
             reading: Reading::of(
                 &self.prepared.condensed.blocks[at].raw[self.sensor.channels()],
                 &self.scale,
@@ -222,11 +224,11 @@ impl Builder<'_> {
             strata,
             figure: figure.0,
             judged: (figure.1, figure.2),
-            step: common_step(&self.prepared.condensed.reading_step[self.sensor.channels()]),
+            step: common_step(&self.prepared.condensed.quantisation_step[self.sensor.channels()]),
             rows: self.rows,
             conditions: self.conditions,
             block: self.block,
-            warm: self.warm,
+            temperature_offset: self.temperature_offset,
         })
     }
 

@@ -66,7 +66,7 @@ impl Builder<'_> {
     }
 
     /// A row for each pose.
-    pub(super) fn sizes(mut self, inverse: &Affine<f64>) -> Option<Part> {
+    pub(super) fn magnitudes(mut self, inverse: &Affine<f64>) -> Option<Part> {
         let prepared = self.prepared;
         let g = prepared.manifest.gravity_mps2;
         let observations = prepared.observations(Sensor::Accel);
@@ -95,7 +95,7 @@ impl Builder<'_> {
                 .row_mut(i)
                 .copy_from(&by_force.tr_mul(&up).transpose());
         }
-        let variances = prepared.size_variances(inverse, &observations);
+        let variances = prepared.magnitude_variances(inverse, &observations);
         let strata = vec![Stratum {
             name: StratumName(Observable::Magnitude, None),
             axis: None,
@@ -105,14 +105,20 @@ impl Builder<'_> {
             by_reference: None,
             open: None,
             random_walk: Some(self.random_walk(&dwells)),
-            wander_known: prepared.noise.is_stated(Sensor::Accel),
+            wander_known: prepared.noise.has_noise_at_rest(Sensor::Accel),
             within: false,
         }];
         let nuisance = (nuisance, shapes.parameters, by_matrix);
-        self.finish(y, nuisance, vec![6, 7, 8], strata, (RowFigure::Size, n, 1))
+        self.finish(
+            y,
+            nuisance,
+            vec![6, 7, 8],
+            strata,
+            (RowFigure::Magnitude, n, 1),
+        )
     }
 
-    /// Three rows for each pose: the error of the force as a vector. [`Self::sizes`] contain only its part along the force. The rest
+    /// Three rows for each pose: the error of the force as a vector. [`Self::magnitudes`] contain only its part along the force. The rest
     /// enters the directions that judge a gyro.
     pub(super) fn forces(mut self, inverse: &Affine<f64>) -> Option<Part> {
         let observations = self.prepared.observations(Sensor::Accel);
@@ -143,7 +149,7 @@ impl Builder<'_> {
             nuisance,
             vec![6, 7, 8],
             strata,
-            (RowFigure::Size, n, 3),
+            (RowFigure::Magnitude, n, 3),
         )
     }
 

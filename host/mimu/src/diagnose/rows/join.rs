@@ -4,20 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::build::{Part, common_step};
 use super::{Row, Rows};
+use crate::diagnose::search::unit_columns;
 use crate::effects::temperature::without_self_heating;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
-
-/// Columns scaled to length 1; zero columns stay zero.
-fn scaled(mut nuisance: DMatrix<f64>) -> DMatrix<f64> {
-    for mut column in nuisance.column_iter_mut() {
-        let norm = column.norm();
-        if norm > 0.0 {
-            column /= norm;
-        }
-    }
-    nuisance
-}
 
 /// For each part the places of its nuisance columns among those of all, and how many there are. Recordings with the same
 /// reference share the columns of the matrix; each has separate columns for its biases.
@@ -79,19 +69,19 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
     let mut first = vec![0];
     let mut conditions = Vec::new();
     let mut block = Vec::new();
-    let mut warm = vec![Vec::new(); sessions];
-    let mut from_moment = Vec::new();
+    let mut temperature = vec![Vec::new(); sessions];
+    let mut first_condition = Vec::new();
     for session in 0..sessions {
         let dwells = match parts.iter().find(|p| p.0 == session) {
             Some((_, part)) => {
-                from_moment.push(conditions.len());
+                first_condition.push(conditions.len());
                 conditions.extend(part.conditions.iter().map(|m| {
                     let mut conditions = *m;
                     conditions.session = session;
                     conditions
                 }));
                 block.extend(part.block.iter().map(|b| (session, *b)));
-                warm[session].clone_from(&part.warm);
+                temperature[session].clone_from(&part.temperature_offset);
                 let last = part.rows.iter().flat_map(|r| r.dwells).max();
                 1 + last.unwrap_or(0)
             }
@@ -116,7 +106,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
             }
             by_matrix.set_row(rows.len(), &part.by_matrix.row(r));
             let row = &part.rows[r];
-            let offset = from_moment[p];
+            let offset = first_condition[p];
             rows.push(Row {
                 conditions: row.conditions.start + offset..row.conditions.end + offset,
                 weights: row.weights.clone(),
@@ -143,7 +133,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         y,
         parameters,
         by_matrix,
-        nuisance: scaled(nuisance),
+        nuisance: unit_columns(&nuisance),
         strata,
         figure,
         judged: (judged, together),
@@ -151,8 +141,11 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         rows,
         conditions,
         block,
-        without_self_heating: warm.iter().map(|w| without_self_heating(w)).collect(),
-        temperature: warm,
+        without_self_heating: temperature
+            .iter()
+            .map(|w| without_self_heating(w))
+            .collect(),
+        temperature,
         first,
         quantities: std::sync::OnceLock::new(),
     })

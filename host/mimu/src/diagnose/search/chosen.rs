@@ -67,16 +67,6 @@ impl Alternative {
     }
 }
 
-impl From<(&'static Effect, f64)> for Alternative {
-    fn from((effect, score_worse_by): (&'static Effect, f64)) -> Self {
-        Self {
-            id: effect.id.into(),
-            kind: CandidateKind::Effect(effect),
-            score_worse_by,
-        }
-    }
-}
-
 /// Score of a candidate: the drop in deviance, minus a cost for each coefficient (Akaike's two, doubled, because each is one of several
 /// candidates), minus the penalty for implausible sizes. Products also cost their order: of those that are equal in this recording, the
 /// shortest wins.

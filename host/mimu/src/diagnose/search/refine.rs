@@ -57,11 +57,6 @@ impl Beside<'_> {
         self.climb(candidate, (first.parameter, at_first), |columns| columns)
     }
 
-    /// The same, from the result for a candidate with other coefficients.
-    pub fn parameter_from(&self, candidate: &Candidate, start: (f64, With)) -> Option<(f64, With)> {
-        self.climb(candidate, start, |columns| columns)
-    }
-
     /// The same for an unlisted alternative model. Only its part that the model does not contain yet is fitted, and has a cost.
     pub fn law(&self, law: &Candidate, first: f64) -> Option<(f64, With)> {
         let part = |columns: DMatrix<f64>| independent_of(&columns, &self.model);
@@ -70,7 +65,8 @@ impl Beside<'_> {
         self.climb(law, (first, at_first), part)
     }
 
-    fn climb(
+    /// The best value of the nonlinear parameter from the `best` so far on. `part` of the columns is fitted.
+    pub fn climb(
         &self,
         candidate: &Candidate,
         mut best: (f64, With),

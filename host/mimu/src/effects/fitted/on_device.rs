@@ -8,7 +8,7 @@ use mimu_core::wire::EFFECTS;
 use nalgebra::convert;
 
 use super::{FittedEffect, candidate};
-use crate::effects::candidate::{CandidateKind, OfConverter};
+use crate::effects::candidate::{CandidateKind, ConverterErrors};
 use crate::effects::converter::Converter;
 use crate::effects::quantity::Quantity;
 use crate::effects::readout;
@@ -53,7 +53,7 @@ impl FittedEffect {
                 Err(NotOnDevice::NoLaw)
             }
             CandidateKind::Effect(_) if candidate.reads_code() => {
-                let of = |c: OfConverter| {
+                let of = |c: ConverterErrors| {
                     let (weight, zero) = (convert(c.converter.weight), convert(c.converter.zero));
                     let errors = c.errors.map(convert);
                     numbers(DeviceEffect::code(sensor, c.axis, &errors, weight, zero))

@@ -160,7 +160,7 @@ fn an_interval_that_reaches_the_end_of_what_was_searched_is_open_there() {
             interval: Some(Interval { lower, upper }),
             ..FittedEffect::new(candidate("gyro_thermal_lag").unwrap(), 60.0, vec![0.0; 3])
         };
-        lag.form().unwrap().interval()
+        lag.nonlinear_parameter().unwrap().interval()
     };
     assert_eq!(interval(Some(55.0), Some(66.0)), "55.0 to 66.0");
     assert_eq!(interval(None, Some(66.0)), "at most 66.0");

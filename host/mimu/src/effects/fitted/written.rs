@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{FittedEffect, Interval};
 use crate::effects::candidate::{Candidate, CandidateKind};
-use crate::effects::converter::{Codes, Converter};
+use crate::effects::converter::{Converter, Converters};
 use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
 use crate::quantity::{AXES, Sensor, significant};
@@ -105,7 +105,7 @@ impl From<FittedEffect> for WrittenEffect {
             about: effect.candidate.about().into(),
             formula: FORMULA.into(),
             direction: DIRECTION.into(),
-            form: effect.form(),
+            form: effect.nonlinear_parameter(),
             converters: effect.converters(),
             coefficients: effect.coefficients(),
         }
@@ -136,7 +136,7 @@ impl WrittenParameter {
 
 impl WrittenConverter {
     /// Converters of the axes: one for each, or one if all are the same.
-    pub(super) fn of(codes: &Codes) -> Vec<Self> {
+    pub(super) fn of(codes: &Converters) -> Vec<Self> {
         let one = |axes: &str, converter: &Converter| Self {
             axes: axes.into(),
             weight_of_bit_0_raw: converter.weight,
@@ -154,8 +154,8 @@ impl WrittenConverter {
     }
 
     /// The converters of the axes, or what is wrong.
-    fn codes(all: &[Self]) -> Result<Codes, String> {
-        let mut codes: Codes = [None; 3];
+    fn codes(all: &[Self]) -> Result<Converters, String> {
+        let mut codes: Converters = [None; 3];
         for one in all {
             let ours: Vec<usize> = match one.axes.as_str() {
                 "xyz" => (0..3).collect(),

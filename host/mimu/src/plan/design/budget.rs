@@ -49,7 +49,7 @@ impl DwellNoise {
     /// The largest of each coefficient over all axes of `sensor` in a noise file, and over all temperatures.
     ///
     /// Errors: the file lacks the sensor, or is of raw readings without a scale factor.
-    pub fn stated(file: &NoiseFile, sensor: Sensor) -> Result<Self> {
+    pub fn from_file(file: &NoiseFile, sensor: Sensor) -> Result<Self> {
         let mut worst = Self {
             n: 0.0,
             b: 0.0,

@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use nalgebra::Vector3;
 
+use crate::estimate::LOWER;
 use crate::quantity::{AXES, Sensor};
 use crate::readable;
 use mimu_recording::Reference;
@@ -317,9 +318,6 @@ impl fmt::Display for Model {
             .try_for_each(|t| write!(f, ",{}", t.name()))
     }
 }
-
-/// Row and column of the six elements of C, as in [`crate::estimate::magnitude`].
-const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 /// Pairs of axes of the cross terms.
 const PRODUCTS: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 

@@ -8,6 +8,7 @@ use crate::effects;
 use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::{Effect, NonlinearParameter};
 use crate::effects::quantity::{Conditions, Reading};
+use crate::estimate::LOWER;
 use crate::plan::design::information::{Inverse, Rows};
 use crate::plan::design::lack_of_fit::{ALIASED, extend, outside};
 use crate::quantity::Sensor;
@@ -177,10 +178,7 @@ fn apart_from_bias(mut candidate: Candidate) -> Candidate {
     let mut spanned: [Vec<DVector<f64>>; 3] = std::array::from_fn(|_| vec![bias.clone()]);
     let mut kept: Vec<bool> = vec![false; candidate.active.len()];
     for ((coefficient, axis), column) in slots.into_iter().zip(columns) {
-        let left = spanned[axis].iter().fold(column.clone(), |left, unit| {
-            let share = unit.dot(&left);
-            left - unit * share
-        });
+        let left = outside(&spanned[axis], column.clone());
         // Less is rounding. A column of zeros needs other conditions than these, and is not judged here.
         if left.norm() > 1e-9 * column.norm() || column.norm() == 0.0 {
             kept[coefficient] = true;
@@ -238,8 +236,8 @@ fn problems(setup: &Setup, sensor: Sensor, states: &[Conditions]) -> Vec<Problem
     };
     let matrix = sensor == Sensor::Accel || setup.turns();
     if setup.reference == Reference::Gravity && sensor == Sensor::Accel {
-        let lower = (0..3).flat_map(|i| (0..=i).map(move |j| (i, Some(j))));
-        let all: Vec<_> = lower.chain((0..3).map(|i| (i, None))).collect();
+        let matrix = LOWER.iter().map(|(i, j)| (*i, Some(*j)));
+        let all: Vec<_> = matrix.chain((0..3).map(|i| (i, None))).collect();
         let up = states.iter().map(|at| at.force.normalize()).collect();
         return vec![problem(up, &all)];
     }

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::Setup;
 use crate::effects::quantity::{Conditions, REFERENCE_C, Reading};
 use crate::effects::temperature::lagged;
+use crate::plan::chamber::temp_c;
 use crate::plan::design::model::{GRAVITY, Setting};
 use crate::plan::design::reach::{Fixture, Rates};
 use crate::plan::design::tour::randomised;
@@ -161,9 +162,9 @@ pub struct Experiment {
     /// Dwells in a row in each state before the next one.
     pub hold: usize,
     /// Temperature of the chamber, s and °C; empty where it does not matter.
-    pub chamber_c: Vec<(f64, f64)>,
+    pub chamber_c: Vec<[f64; 2]>,
     /// Temperature of the board, s and °C above [`REFERENCE_C`].
-    board: Vec<(f64, f64)>,
+    board: Vec<[f64; 2]>,
     /// All of it, moves included, s.
     pub time_s: f64,
 }
@@ -179,7 +180,7 @@ impl Experiment {
         let length_s = match recipe.course {
             Course::Dwells => f64::INFINITY,
             Course::ColdStart => 60.0 * size,
-            Course::Chamber => chamber_c.last().map_or(0.0, |p| p.0),
+            Course::Chamber => chamber_c.last().map_or(0.0, |p| p[0]),
         };
         let passes = match recipe.course {
             Course::Dwells => size as u64,
@@ -220,9 +221,9 @@ impl Experiment {
             }
         }
         let steps = (out.time_s / STEP_S).ceil() as usize;
-        let air: Vec<(f64, f64)> = (0..=steps)
+        let air: Vec<[f64; 2]> = (0..=steps)
             .map(|k| k as f64 * STEP_S)
-            .map(|t| (t, at(&out.chamber_c, t) - REFERENCE_C))
+            .map(|t| [t, temp_c(&out.chamber_c, t) - REFERENCE_C])
             .collect();
         if !out.chamber_c.is_empty() {
             out.board = behind(&air, BOARD_LAG_S);
@@ -241,11 +242,11 @@ impl Experiment {
         each.map(|(setting, begin_s)| {
             let t_s = begin_s + 0.5 * self.dwell_s;
             let (rate, force) = (setting.up * setting.rate, setting.up * GRAVITY);
-            let of = |track: &[(f64, f64)]| {
+            let of = |track: &[[f64; 2]]| {
                 if track.is_empty() {
                     0.0
                 } else {
-                    at(track, t_s)
+                    temp_c(track, t_s)
                 }
             };
             Conditions {
@@ -281,32 +282,23 @@ impl Setup {
 
 /// From the first temperature to the two others and back, over a share of their distance: up and down, and the first again at
 /// the end, so that a lag shows between the ways up and down and a drift between beginning and end.
-fn profile([first, second, third]: [f64; 3], share: f64) -> Vec<(f64, f64)> {
+fn profile([first, second, third]: [f64; 3], share: f64) -> Vec<[f64; 2]> {
     let ends = [second, third].map(|c| first + share * (c - first));
-    let mut profile = vec![(0.0, first), (SOAK_S, first)];
+    let mut profile = vec![[0.0, first], [SOAK_S, first]];
     let (mut t_s, mut now) = (SOAK_S, first);
     for next in [ends[0], ends[1], first] {
         t_s += (next - now).abs() / RAMP;
-        profile.push((t_s, next));
+        profile.push([t_s, next]);
         t_s += SOAK_S;
-        profile.push((t_s, next));
+        profile.push([t_s, next]);
         now = next;
     }
     profile
 }
 
 /// A track after a first-order lag.
-fn behind(track: &[(f64, f64)], lag_s: f64) -> Vec<(f64, f64)> {
-    let times = track.iter().map(|p| p.0);
-    times.zip(lagged(track, lag_s)).collect()
-}
-
-/// Value of a piecewise linear track at a time.
-fn at(track: &[(f64, f64)], t_s: f64) -> f64 {
-    let after = track.partition_point(|p| p.0 <= t_s);
-    match (after.checked_sub(1).map(|i| track[i]), track.get(after)) {
-        (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (t_s - a.0) / (b.0 - a.0),
-        (Some(a), None) => a.1,
-        (None, first) => first.map_or(f64::NAN, |f| f.1),
-    }
+fn behind(track: &[[f64; 2]], lag_s: f64) -> Vec<[f64; 2]> {
+    let pairs: Vec<(f64, f64)> = track.iter().map(|p| (*p).into()).collect();
+    let lagged = lagged(&pairs, lag_s).into_iter();
+    pairs.iter().zip(lagged).map(|(p, c)| [p.0, c]).collect()
 }

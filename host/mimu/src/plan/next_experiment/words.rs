@@ -63,8 +63,8 @@ impl Answer {
         let steps = same.map(|s| Step::of(&s[0], done.dwell_s).repeated(s.len() as u32));
         let mut plan = Plan::new(setup.fixture, sample_rate_hz, steps.collect());
         plan.device = device.map(str::to_owned);
-        let chamber_c = done.chamber_c.iter().map(|(t, c)| [*t, *c]);
-        plan.in_chamber(chamber_c).to_toml(&about)
+        plan.in_chamber(done.chamber_c.iter().copied())
+            .to_toml(&about)
     }
 }
 
@@ -101,7 +101,7 @@ fn inputs(setup: &Setup, inputs: Inputs) -> String {
 
 /// Temperatures in turn: `25 to 45 to 5 to 25`.
 fn course_of(experiment: &Experiment) -> String {
-    let mut all: Vec<String> = experiment.chamber_c.iter().map(|c| shown(c.1)).collect();
+    let mut all: Vec<String> = experiment.chamber_c.iter().map(|c| shown(c[1])).collect();
     all.dedup();
     all.join(" to ")
 }

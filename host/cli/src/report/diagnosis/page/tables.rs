@@ -80,7 +80,7 @@ pub fn coefficients(one: &Accepted) -> Markup {
                         td class="dim" { (c.unit.replace("^2", "²")) }
                     }
                 }
-                @if let Some(form) = one.effect.form() {
+                @if let Some(form) = one.effect.nonlinear_parameter() {
                     tr {
                         td { (form.name) }
                         td class="n" { (number(form.value, 1.0, "")) }

@@ -39,7 +39,7 @@ pub(super) fn effect(
         }
         false => compact(out, &coefficients),
     }
-    if let Some(form) = a.effect.form() {
+    if let Some(form) = a.effect.nonlinear_parameter() {
         let (value, interval) = (significant(form.value), form.interval());
         let _ = writeln!(out, "    {} {value} (95 %: {interval})", form.name);
     }

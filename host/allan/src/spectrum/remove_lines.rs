@@ -23,7 +23,7 @@ const CERTAIN: f64 = 4.0;
 
 /// A series without its lines.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct SetAside {
+pub struct WithoutLines {
     /// Lines and bumps by frequency.
     pub lines: Vec<Line>,
     /// Lowest and highest frequency that was searched, Hz; `None` for a series too short for a spectrum.
@@ -34,7 +34,7 @@ pub struct SetAside {
     finest: Option<Welch>,
 }
 
-impl SetAside {
+impl WithoutLines {
     /// [`super::white_band`] of the residual series (samples `dt_s` apart), from its stored spectrum; `None` also if it was too short for a
     /// search.
     pub fn white_band(&self, dt_s: f64, confidence: f64) -> Option<White> {
@@ -50,17 +50,17 @@ impl SetAside {
 
 /// Finds the lines and bumps of `rates` (any unit, `dt_s` apart) and removes them: a steady line as a sinusoid, anything else by reducing
 /// its band to the floor. Without any, no bit of the series changes. Intervals have the probability `confidence`.
-pub fn set_aside(rates: &mut [f64], dt_s: f64, confidence: f64) -> SetAside {
-    set_aside_after(rates, dt_s, confidence, |_| {})
+pub fn remove_lines(rates: &mut [f64], dt_s: f64, confidence: f64) -> WithoutLines {
+    remove_lines_after(rates, dt_s, confidence, |_| {})
 }
 
-/// [`set_aside`] that calls `before` once with the series, if it is going to be changed.
-pub fn set_aside_after(
+/// [`remove_lines`] that calls `before` once with the series, if it is going to be changed.
+pub fn remove_lines_after(
     rates: &mut [f64],
     dt_s: f64,
     confidence: f64,
     before: impl FnOnce(&[f64]),
-) -> SetAside {
+) -> WithoutLines {
     let mut lines: Vec<Line> = Vec::new();
     let mut searched_hz = None;
     let mut remains = false;
@@ -82,7 +82,7 @@ pub fn set_aside_after(
         remove(rates, dt_s, &search, confidence, &mut lines);
     }
     lines.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-    SetAside {
+    WithoutLines {
         lines,
         searched_hz,
         remains,

@@ -1,10 +1,10 @@
-//! The readings as they came, judged like a calibration.
+//! Readings in SI without a calibration, judged like one.
 //!
 //! A unit with readings in SI is calibrated already, and a new calibration has to improve its readings. Ten poses by hand once gave a calibration
 //! whose direction of gravity was 1.65 degrees off in sample, while that of the readings themselves was 0.44 degrees off.
 
 use mimu_core::compensation::Affine;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::sensor::{SensorFit, rms};
 use crate::estimate::Observation;
@@ -12,7 +12,6 @@ use crate::estimate::turn::{Turn, direction_error};
 use crate::prepared::Prepared;
 use crate::quantity::Figure;
 use crate::warning::Warning;
-use mimu_recording::RawUnit;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Error of readings in SI whose inputs are known.
@@ -20,10 +19,12 @@ pub(super) fn inputs<'a>(
     prepared: &Prepared,
     observations: impl Iterator<Item = &'a Observation>,
 ) -> Option<f64> {
-    in_si(prepared).then(|| rms(Figure::Input, observations.map(|o| o.raw - o.input)))
+    prepared
+        .is_in_si()
+        .then(|| rms(Figure::Input, observations.map(|o| o.raw - o.input)))
 }
 
-/// Error of the magnitudes of observations as they came; `known` has each with its known magnitude.
+/// Error of the magnitudes of readings in SI; `known` has each with its known magnitude.
 pub(super) fn magnitudes(
     prepared: &Prepared,
     figure: Figure,
@@ -32,15 +33,11 @@ pub(super) fn magnitudes(
     let errors = known
         .iter()
         .map(|(o, magnitude)| Vector3::new(o.raw.norm() - magnitude, 0.0, 0.0));
-    in_si(prepared).then(|| rms(figure, errors))
+    prepared.is_in_si().then(|| rms(figure, errors))
 }
 
-/// Error of the directions after turns, gyro and accelerometer both as they came.
+/// Error of the directions after turns, both sensors uncalibrated.
 pub(super) fn directions(prepared: &Prepared, turns: &[Turn]) -> Option<f64> {
-    let gyro = Affine {
-        matrix: Matrix3::identity(),
-        offset: Vector3::zeros(),
-    };
     let errors = turns.iter().map(|turn| {
         let [before, after] = turn.raw;
         let turn = Turn {
@@ -48,27 +45,25 @@ pub(super) fn directions(prepared: &Prepared, turns: &[Turn]) -> Option<f64> {
             after,
             ..*turn
         };
-        direction_error(&turn, &gyro)
+        direction_error(&turn, &Affine::identity())
     });
-    in_si(prepared).then(|| rms(Figure::Direction, errors))
+    prepared.is_in_si().then(|| rms(Figure::Direction, errors))
 }
 
-fn in_si(prepared: &Prepared) -> bool {
-    prepared.manifest.raw_unit == RawUnit::Si
-}
-
-/// Warns of a calibration that does no better than the readings as they came.
+/// Warns of a calibration that does no better than the uncalibrated readings.
 pub(super) fn compare(fit: &mut SensorFit) {
-    let Some(came) = fit.as_came else { return };
+    let Some(uncalibrated) = fit.uncalibrated_rms else {
+        return;
+    };
     let held_out = fit.held_out_rms();
     let calibrated = held_out.unwrap_or_else(|| fit.rms());
-    if calibrated < came {
+    if calibrated < uncalibrated {
         return;
     }
     let (factor, unit) = fit.figure.readable(fit.sensor);
     let count = fit.residuals.len();
-    let worse = exceeds(calibrated, came, errors(fit.figure, count));
-    let errors = [came, calibrated].map(|error| error * factor);
+    let worse = exceeds(calibrated, uncalibrated, errors(fit.figure, count));
+    let errors = [uncalibrated, calibrated].map(|error| error * factor);
     let undecided = (!worse).then_some(count);
     let warning = Warning::NoBetter(errors, unit, held_out.is_some(), undecided);
     fit.warnings.push(warning.of(fit.sensor));
@@ -83,7 +78,7 @@ pub(crate) fn errors(figure: Figure, count: usize) -> usize {
         * match figure {
             Figure::Input => 3,
             Figure::Direction => 2,
-            Figure::GravitySize | Figure::RateSize => 1,
+            Figure::GravityMagnitude | Figure::RateMagnitude => 1,
         }
 }
 

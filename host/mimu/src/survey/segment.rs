@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::columns::Columns;
 use crate::quantity::plural;
+use crate::signal::blocks::extent;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, Recording};
@@ -36,7 +37,7 @@ const RATE_OFF: [f64; 2] = [0.02, 1e-3];
 
 /// Rows without a gap.
 #[derive(Debug, Clone)]
-pub(super) struct Stretch {
+pub(super) struct Segment {
     /// Rows from 0.
     pub rows: Range<usize>,
     /// Times of the first and last, s.
@@ -45,7 +46,7 @@ pub(super) struct Stretch {
     pub period_s: f64,
 }
 
-impl Stretch {
+impl Segment {
     pub fn find(
         columns: &mut Columns,
         recording: &Recording,
@@ -264,8 +265,7 @@ pub(super) fn segments(values: &[f64]) -> Vec<f64> {
 impl Temperature {
     /// Correlation with a channel's means, and the change of temperature, °C, where the channel follows it.
     pub fn against(&self, levels: &[f64]) -> Option<(f64, f64)> {
-        let high = self.means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let low = self.means.iter().copied().fold(f64::INFINITY, f64::min);
+        let [low, high] = extent(self.means.iter().copied());
         let known = self.means.iter().all(|t| t.is_finite());
         if !known || levels.len() != self.means.len() || high - low < CHANGE_C {
             return None;

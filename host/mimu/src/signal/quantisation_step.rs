@@ -22,14 +22,14 @@ const TRIED: usize = 12;
 
 /// Takes the samples of a channel in a stream.
 #[derive(Debug, Clone)]
-pub struct StepFinder {
+pub struct QuantisationFinder {
     differences: Vec<f64>,
     /// One in this many blocks is used.
     every: u64,
     blocks: u64,
 }
 
-impl Default for StepFinder {
+impl Default for QuantisationFinder {
     fn default() -> Self {
         Self {
             differences: Vec::new(),
@@ -39,7 +39,7 @@ impl Default for StepFinder {
     }
 }
 
-impl StepFinder {
+impl QuantisationFinder {
     /// Looks at the samples of a block.
     pub fn push(&mut self, samples: &[f64]) {
         self.blocks += 1;
@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     fn step(reading: impl Fn(f64) -> f64) -> Option<f64> {
-        let mut finder = StepFinder::default();
+        let mut finder = QuantisationFinder::default();
         let mut seed = 1u64;
         let mut uniform = || {
             seed = seed
