@@ -141,7 +141,7 @@ fn what_depends_on_time_begins_cold_and_what_depends_on_temperature_goes_up_and_
     );
     for id in ["gyro_thermal_bias", "gyro_thermal_lag"] {
         let chamber = answer(&setup, id).unwrap().experiment.chamber_c;
-        let temperatures: Vec<f64> = chamber.iter().map(|c| c.1).collect();
+        let temperatures: Vec<f64> = chamber.iter().map(|c| c[1]).collect();
         let (first, last) = (temperatures[0], temperatures[temperatures.len() - 1]);
         assert!(first == 25.0 && last == 25.0);
         assert!(temperatures.iter().any(|t| *t > 25.0) && temperatures.iter().any(|t| *t < 25.0));
