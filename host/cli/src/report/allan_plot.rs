@@ -29,7 +29,7 @@ pub fn svg(result: &AllanResult) -> String {
     let drawn = |c: &&ChannelResult| !c.tau_s.is_empty();
     let of = |sensor: Sensor| {
         let ours = result.channels.iter().filter(drawn);
-        ours.filter(move |c| c.sensor() == sensor)
+        ours.filter(move |c| c.sensor == sensor)
     };
     let panels: Vec<(Sensor, Vec<&ChannelResult>)> = Sensor::BOTH
         .into_iter()

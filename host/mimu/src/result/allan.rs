@@ -63,6 +63,9 @@ pub struct RecordingResult {
 pub struct ChannelResult {
     /// Column: `gyro_x` to `accel_z`.
     pub name: &'static str,
+    /// Its sensor.
+    #[serde(skip)]
+    pub sensor: Sensor,
     /// Directory of its recording.
     pub recording: String,
     /// Mean temperature, °C; null where it was not recorded.
@@ -214,7 +217,7 @@ impl AllanResult {
 
     /// The channels of `sensor` in `recording`, in the order of its axes.
     pub fn channels(&self, recording: &str, sensor: Sensor) -> Vec<&ChannelResult> {
-        let ours = |c: &&ChannelResult| c.recording == recording && c.sensor() == sensor;
+        let ours = |c: &&ChannelResult| c.recording == recording && c.sensor == sensor;
         self.channels.iter().filter(ours).collect()
     }
 
@@ -263,6 +266,7 @@ impl ChannelResult {
         });
         Self {
             name: channel.name,
+            sensor: channel.sensor,
             recording: survey.recording.clone(),
             temp_c: survey.temp_c,
             unit: channel.unit.name,
@@ -291,14 +295,6 @@ impl ChannelResult {
             adev_without_lines: without_lines.map(|curve| self::column(curve, |p| p.deviation)),
             n_band_hz: channel.n_band_hz,
             hadamard: channel.hadamard.as_deref().map(HadamardResult::of),
-        }
-    }
-
-    /// Sensor of the channel.
-    pub fn sensor(&self) -> Sensor {
-        match self.name.starts_with(Sensor::Gyro.name()) {
-            true => Sensor::Gyro,
-            false => Sensor::Accel,
         }
     }
 
