@@ -144,12 +144,12 @@ def test_a_file_can_be_dropped_anywhere_on_the_page(page):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("letter.csv", b"Dear Sir,\nyours faithfully\n", "none of its lines is a row of numbers"),
+        ("letter.csv", b"Dear Sir,\nyours faithfully\n", "no line is a row of numbers"),
         ("log.csv.gz", b"\x1f\x8b" + bytes(100), "compressed with gzip; unpack it with gunzip"),
         ("log.parquet", b"PAR1" + bytes(200) + b"PAR1", "not a readable Parquet file"),
         ("log.ulg", b"ULog" + bytes(300), "log.ulg"),
         ("log.bag", b"#ROSBAG V2.0\n", "a browser cannot read bags of ROS 1"),
-        ("empty.csv", b"", "none of its lines is a row of numbers"),
+        ("empty.csv", b"", "no line is a row of numbers"),
     ],
     ids=lambda value: value if isinstance(value, str) and "." in value and " " not in value else "",
 )

@@ -121,7 +121,7 @@ impl Prepared {
         })
     }
 
-    /// Uses the noise of a record at rest instead of that within the dwells. Errors: see [`Noise::state`].
+    /// Uses the noise of a record at rest instead of that within the dwells. Errors: see [`Noise::use_noise_at_rest`].
     pub fn with_noise(mut self, file: &NoiseFile) -> Result<Self> {
         if self.manifest.means {
             let problem = "a noise file gives the error of a mean over some seconds, and these means have no durations";

@@ -137,7 +137,7 @@ impl Wizard<'_> {
             };
             self.wait_for(k, hash).await?;
             if !cycled {
-                break "not tried with the supply off".to_string();
+                break "not tested with a power cycle".to_string();
             }
             let now_s = self.units[k].station.with(powered)?;
             match (now_s, driven) {
@@ -147,15 +147,15 @@ impl Wizard<'_> {
                         || now_s < since.elapsed().as_secs_f64() =>
                 {
                     break format!(
-                        "kept over a loss of the supply (power-on, {now_s:.1} s before)"
+                        "survived a power cycle (switched on {now_s:.1} s before)"
                     );
                 }
                 (_, true) => {
-                    break "not proven to be kept over a loss of the supply: the driver turned the supply off and on, but the device has not started by power-on since".into();
+                    break "not proven to survive a power cycle: the driver switched the supply off and on, but the device reports no power-on since".into();
                 }
                 (_, false) => {
                     let words = format!(
-                        "{name}: it has not lost its supply since the question; perhaps another supply keeps it on"
+                        "{name}: it has not been without power since the question; perhaps a second supply keeps it on"
                     );
                     self.tell(Event::Note { words });
                 }

@@ -128,7 +128,7 @@ impl Calibration {
         }
         if let Some(temp_c) = self.recording.temp_c.filter(|t| !is_temperature(*t)) {
             return refuse(format!(
-                "temp_c is {temp_c}, and has to be from {least} to {most} °C"
+                "temp_c is {temp_c}; it has to be from {least} to {most} °C"
             ));
         }
         match &self.temperature {

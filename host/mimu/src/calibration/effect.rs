@@ -21,7 +21,7 @@ pub(super) fn check(calibration: &Calibration, place: &str) -> Result<()> {
         let same = |e: &FittedEffect| e.id() == id && e.parameter == effect.parameter;
         if all[..at].iter().any(same) {
             let remedy = "diagnose the recording again";
-            return refuse("it is there twice".into(), remedy);
+            return refuse("it occurs twice".into(), remedy);
         }
         for (sensor, need) in [(Sensor::Gyro, Need::Rate), (Sensor::Accel, Need::Force)] {
             let needed = effect.sensor() == sensor || effect.candidate.needs(need);

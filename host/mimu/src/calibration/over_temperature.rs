@@ -235,7 +235,7 @@ impl OverTemperature {
         self.dies.into_iter().find_map(|(sensor, dies)| {
             let problem = match (dies.lag_s, dies.interval_lag_s) {
                 (Some(lag_s), _) if DieLag::new(lag_s).is_none() => format!(
-                    "lag_s is {lag_s}, and has to be from {least} to {most}, and 0 or at least {LEAST_LAG_S}"
+                    "lag_s is {lag_s}; it has to be from {least} to {most}, and 0 or at least {LEAST_LAG_S}"
                 ),
                 (None, Some(_)) => "it has interval_lag_s but not lag_s".into(),
                 (_, Some([lower, upper])) if !(lower <= upper) => {
@@ -258,7 +258,7 @@ impl OverTemperature {
         if !is_temperature(temp_c) {
             let [least, most] = TEMPERATURE_RANGE_C;
             return Some(format!(
-                "temp_c is {temp_c}, and has to be from {least} to {most} °C"
+                "temp_c is {temp_c}; it has to be from {least} to {most} °C"
             ));
         }
         if let Some(before) = before.filter(|before| temp_c <= *before) {

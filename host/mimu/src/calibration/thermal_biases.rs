@@ -221,7 +221,7 @@ impl ThermalBiases {
         let [from, to] = self.range_c;
         if !(is_temperature(from) && is_temperature(to) && from <= to) {
             return refuse(format!(
-                "range_c is [{from}, {to}], and has to rise, within {least} and {most} °C"
+                "range_c is [{from}, {to}]; it has to increase within {least} to {most} °C"
             ));
         }
         if !(self.has(Sensor::Gyro) || self.has(Sensor::Accel)) {
@@ -232,7 +232,7 @@ impl ThermalBiases {
             if !is_temperature(node.temp_c) {
                 let temp_c = node.temp_c;
                 return refuse(format!(
-                    "temp_c of node {number} is {temp_c}, and has to be from {least} to {most} °C"
+                    "temp_c of node {number} is {temp_c}; it has to be from {least} to {most} °C"
                 ));
             }
             for sensor in Sensor::BOTH {
@@ -245,7 +245,7 @@ impl ThermalBiases {
                 let mut sigmas = reading.iter().flat_map(|r| r.sigma_u);
                 if !sigmas.all(|s| s.is_finite() && s >= 0.0) {
                     return refuse(format!(
-                        "sigma_u of {sensor} in node {number} has an entry that is no standard deviation"
+                        "sigma_u of {sensor} in node {number} has an entry that cannot be a standard deviation"
                     ));
                 }
             }

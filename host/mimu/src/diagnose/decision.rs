@@ -458,13 +458,13 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
         );
         Some(Note::new(
             found,
-            format!("at 1 g it is no larger than {}; a force of several g tells them apart", input.size),
+            format!("at 1 g it is no larger than {}; a force of several g distinguishes them", input.size),
         ))
     }));
     let sessions = chosen.iter().filter(|c| c.candidate.is_of_session());
     notes.extend(sessions.map(|c| {
         let found = format!(
-            "{}: specific to this session, because nobody knows how long it goes on: it is not stored in a calibration, and the biases are those of the middle of the session",
+            "{}: specific to this session, because it is unknown how long it lasts; it is not stored in a calibration, and the biases are those of the middle of the session",
             c.candidate.id()
         );
         Note::new(found, "")

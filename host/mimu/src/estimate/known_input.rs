@@ -353,7 +353,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
             .map(|(k, _)| AXES[*k])
             .collect();
         return Err(Failure::Undetermined {
-            parameters: format!("C, for want of opposite rates about {}", axes.join(", ")),
+            parameters: format!("C (there are no opposite rates about {})", axes.join(", ")),
             add: "add the opposite of each rate, or use least squares".into(),
         });
     }

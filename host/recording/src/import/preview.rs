@@ -62,7 +62,7 @@ pub fn preview(path: &Path, separator: Option<Separator>) -> Result<Preview> {
         lines.pop();
     }
     of_lines(&lines, separator).ok_or_else(|| {
-        let problem = "none of its lines is a row of numbers";
+        let problem = "no line is a row of numbers";
         let remedy =
             "give a text file with one sample a line, Parquet, or a log with its usual ending";
         Error::new(path.display(), problem, remedy)
@@ -135,7 +135,7 @@ mod tests {
         std::fs::write(&path, "Dear Sir,\nyours, faithfully\n").unwrap();
         let line = preview(&path, None).unwrap_err().to_string();
         assert!(
-            line.contains("letter.txt: none of its lines is a row of numbers"),
+            line.contains("letter.txt: no line is a row of numbers"),
             "{line}"
         );
     }

@@ -173,7 +173,7 @@ impl UnitSession {
     pub(super) fn tell_clipped(&self, clipped: u64, tell: &mut Vec<Event>) {
         if clipped > 0 {
             let words = format!(
-                "{}: in the turn to it {} at the end of a range: turn it more slowly, or it is of no use for the gyro",
+                "{}: in the turn to it {} at the end of a range: turn it more slowly, or the gyro cannot use this turn",
                 self.name(),
                 match clipped {
                     1 => "1 sample is".into(),

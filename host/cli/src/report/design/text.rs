@@ -302,7 +302,7 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
     for p in weak.filter(|p| p.inflation >= WEAK && p.value.is_finite()) {
         let _ = writeln!(
             out,
-            "warning: {} is all but unobservable: sigma {} times that with the others known",
+            "warning: {} is hardly observable: sigma {} times that with the others known",
             p.name,
             significant(p.inflation)
         );

@@ -149,7 +149,7 @@ fn converters_that_make_no_sense_are_refused() {
         (
             "formula = \"x = C (u - S e)",
             "form = { name = \"time_constant_s\", value = 3.0 }\nformula = \"x = C (u - S e)",
-            "has none now",
+            "has no nonlinear parameter",
         ),
     ] {
         assert!(text.contains(from), "{from} is not in {text}");

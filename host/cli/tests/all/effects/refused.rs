@@ -47,7 +47,7 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
             "{ name = \"y\", value",
             "{ name = \"w\", value",
             "gyro_warm_up",
-            "those it has: x, y, z",
+            "its coefficients are x, y, z",
         ),
         (
             "{ name = \"y\", value",
@@ -106,7 +106,7 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
     let refusal = Calibration::parse(&twice, "cal.toml")
         .unwrap_err()
         .to_string();
-    assert!(refusal.contains("there twice"), "{refusal}");
+    assert!(refusal.contains("occurs twice"), "{refusal}");
     // The sag depends on the force.
     let from = text.find("\n[accel]").unwrap();
     let gyro_only = format!("{}\n[[effect]]{rest}", &text[..from]);

@@ -165,7 +165,7 @@ fn an_interval_that_reaches_the_end_of_what_was_searched_is_open_there() {
     assert_eq!(interval(Some(55.0), Some(66.0)), "55.0 to 66.0");
     assert_eq!(interval(None, Some(66.0)), "at most 66.0");
     assert_eq!(interval(Some(55.0), None), "at least 55.0");
-    assert_eq!(interval(None, None), "any that was tried");
+    assert_eq!(interval(None, None), "the whole searched range");
 }
 
 #[test]

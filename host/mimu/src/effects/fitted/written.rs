@@ -129,7 +129,7 @@ impl WrittenParameter {
             [Some(lower), Some(upper)] => format!("{lower} to {upper}"),
             [None, Some(upper)] => format!("at most {upper}"),
             [Some(lower), None] => format!("at least {lower}"),
-            [None, None] => "any that was tried".into(),
+            [None, None] => "the whole searched range".into(),
         }
     }
 }
@@ -233,7 +233,7 @@ impl WrittenEffect {
             (Some(name), _) => return Err(format!("form has to be {name}, a positive number")),
             (None, Some(f)) => {
                 return Err(format!(
-                    "form is {:?}, and an effect of this id has none now",
+                    "form is {:?}, but this effect has no nonlinear parameter",
                     f.name
                 ));
             }
@@ -244,7 +244,7 @@ impl WrittenEffect {
             let Some(at) = known.iter().position(|(name, _)| *name == c.name) else {
                 let names: Vec<&str> = known.iter().map(|(name, _)| name.as_str()).collect();
                 return Err(format!(
-                    "it has no coefficient {:?}; those it has: {}",
+                    "unknown coefficient {:?}; its coefficients are {}",
                     c.name,
                     names.join(", ")
                 ));

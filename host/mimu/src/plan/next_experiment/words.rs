@@ -38,7 +38,7 @@ impl Answer {
         let mut words = format!("{how}: {}.", inputs(setup, done.recipe.inputs));
         for p in self.predictions.iter().filter(|p| !p.done()) {
             words += &format!(
-                " Even then the sigma of {} is {:.0} % of its typical size, and {:.0} % are wanted: make the dwells longer, or make several such recordings.",
+                " Even then the sigma of {} is {:.0} % of its typical size; {:.0} % is wanted: make the dwells longer, or make several such recordings.",
                 p.id,
                 100.0 * p.share,
                 100.0 * p.wanted
