@@ -146,9 +146,7 @@ impl Wizard<'_> {
                     if on_s.is_none_or(|on_s| now_s < on_s)
                         || now_s < since.elapsed().as_secs_f64() =>
                 {
-                    break format!(
-                        "survived a power cycle (switched on {now_s:.1} s before)"
-                    );
+                    break format!("survived a power cycle (switched on {now_s:.1} s before)");
                 }
                 (_, true) => {
                     break "not proven to survive a power cycle: the driver switched the supply off and on, but the device reports no power-on since".into();
