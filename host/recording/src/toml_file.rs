@@ -27,11 +27,12 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &str, again: Option<&s
         let span = error.span().unwrap_or(0..text.len());
         let before = text.get(..span.start).unwrap_or_default();
         let line = before.rsplit('\n').next().unwrap_or_default();
-        let after = text.get(span.end..).unwrap_or_default();
-        let whole_file = span.start == 0 && after.trim().is_empty();
-        // Only what a table lacks is an error of the whole table: its heading, or the whole file.
-        let missing =
-            whole_file || (line.trim().is_empty() && text[before.len()..].starts_with('['));
+        let spanned = text.get(span).unwrap_or_default();
+        // Only a missing key is an error of a table: of one with a heading, or of the keys before the first heading.
+        let heading = spanned.starts_with('[');
+        let missing = line.trim().is_empty()
+            && (heading || spanned.contains(['=', '\n']) || text.trim().is_empty());
+        let whole_file = missing && !heading;
         let remedy = match (again, missing) {
             (Some(again), true) => {
                 format!("the file is cut or was edited: copy it again, or {again}")
@@ -90,6 +91,11 @@ mod tests {
             ("rate_hz = 1\n\n[part]\n", "a.toml, line 3: ", "`axis`"),
             ("rate_hz = 1\nx", "a.toml, line 2: ", "no value"),
             ("", "a.toml: ", "`rate_hz`"),
+            (
+                "# Note.\n[part]\naxis = [1.0, 2.0, 3.0]\n",
+                "a.toml",
+                "`rate_hz`",
+            ),
         ] {
             let line = refused(text);
             assert!(

@@ -216,7 +216,7 @@ fn what_describes_a_weak_drift_by_hand_is_named_with_the_drift() {
         ("accel_bias_drift", by_hand::Grade::Analog),
         ("gyro_bias_drift", by_hand::Grade::Consumer),
     ] {
-        let cases = (8..14).map(|seed| by_hand::case(&[id], grade, seed, false));
+        let cases = (8..20).map(|seed| by_hand::case(&[id], grade, seed, false));
         let found: Vec<by_hand::Case> = cases.filter(|c| !c.found.is_empty()).collect();
         assert!(!found.is_empty(), "{id}: found in none");
         for case in found {

@@ -261,7 +261,7 @@ fn a_file_that_was_edited_or_is_not_enough_is_refused() {
         ),
         (
             good.replace("[-20.0, 60.0]", "[60.0, -20.0]"),
-            &["range_c", "rise"],
+            &["range_c", "increase"],
         ),
         (
             good.replacen("sigma_u = [1e-5", "sigma_u = [-1.0", 1),

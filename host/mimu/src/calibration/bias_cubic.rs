@@ -148,11 +148,7 @@ impl BiasCubics {
     fn misses(&self, biases: &[Vector3<f64>]) -> Remainder {
         let misses = temperatures(self.range_c).zip(biases);
         let misses: Vec<_> = misses.map(|(t, b)| b - self.at(t)).collect();
-        Remainder::of(
-            "deviation of the bias from the cubic",
-            "without input",
-            &misses,
-        )
+        Remainder::of("bias minus the cubic", "without input", &misses)
     }
 
     /// The change of the biases if the dies follow the thermometer by `lag_s`; `bias` gives the bias at a temperature of the dies.

@@ -16,6 +16,7 @@
 
 mod as_written;
 mod candidate;
+pub mod columns;
 pub mod decision;
 pub mod note;
 mod passes;

@@ -5,7 +5,6 @@
 //! that lacks an effect is too large, so a test with that noise would miss the effect.
 
 mod chosen;
-mod columns;
 mod forward;
 mod refine;
 mod screen;
@@ -14,6 +13,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::columns::{basis, beside};
 use super::rows::Rows;
 use super::variance::{Fitted, LikelihoodKind, VarianceModel};
 use crate::effects::candidate::{Candidate, CandidateKind};
@@ -21,7 +21,6 @@ use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
 pub use chosen::{Alternative, COEFFICIENT, Chosen};
 use chosen::{price, score};
-pub use columns::{basis, beside, independent_of, unit_columns};
 use refine::{Beside, With};
 use screen::Screened;
 

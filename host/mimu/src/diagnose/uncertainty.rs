@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::decision::Decision;
 use super::rows::{ForceErrors, Rows, Session};
-use super::search::beside;
 use super::variance::VarianceModel;
+use crate::diagnose::columns::beside;
 use crate::effects;
 use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;

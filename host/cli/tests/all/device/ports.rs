@@ -88,8 +88,13 @@ fn a_port_that_cannot_be_opened_is_named_with_the_reason() {
         .unwrap();
     mimu(&place, &["device", "info", "--port", &peer.path]).refused(&["busy"]);
     drop(held);
-    let free = mimu(&place, &["device", "info", "--port", &peer.path]);
-    assert_eq!(free.status, Some(0), "{}", free.stderr);
+    // A program that another test has started meanwhile inherits the open port until it ends.
+    let free = || mimu(&place, &["device", "info", "--port", &peer.path]);
+    let is_free = (0..300).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        free().status == Some(0)
+    });
+    assert!(is_free, "{}", free().stderr);
 }
 
 #[test]

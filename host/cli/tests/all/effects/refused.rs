@@ -41,7 +41,7 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
             "id = \"gyro_warm_up\"",
             "id = \"gyro_g_sensitivity\"",
             "gyro_g_sensitivity",
-            "has none",
+            "no nonlinear parameter",
         ),
         (
             "{ name = \"y\", value",

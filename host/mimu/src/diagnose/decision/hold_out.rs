@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::diagnose::columns::unit_columns;
 use crate::diagnose::rows::{RowFigure, Rows};
-use crate::diagnose::search::{Chosen, Search, unit_columns};
+use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::Fitted;
 use crate::fit::Split;
 

@@ -6,7 +6,8 @@
 use nalgebra::DMatrix;
 
 use super::together::PLAUSIBLE;
-use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search, beside};
+use crate::diagnose::columns::beside;
+use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
 use crate::effects::candidate::{Candidate, CandidateKind};

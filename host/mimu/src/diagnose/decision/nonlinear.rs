@@ -7,7 +7,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::model::Model;
-use crate::diagnose::search::{Chosen, Search, beside};
+use crate::diagnose::columns::beside;
+use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::{Components, Fitted};
 use crate::effects::fitted::Interval;
 use crate::triad::half_width_95;

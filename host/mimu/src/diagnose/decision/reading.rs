@@ -10,8 +10,9 @@ use nalgebra::DMatrix;
 
 use super::hold_out::{held_out, rms};
 use super::leftover::{CorrelatesWith, FALSE_LEFTOVER, Leftover};
+use crate::diagnose::columns::{beside, independent_of, unit_columns};
 use crate::diagnose::rows::Rows;
-use crate::diagnose::search::{COEFFICIENT, Chosen, Search, beside, independent_of, unit_columns};
+use crate::diagnose::search::{COEFFICIENT, Chosen, Search};
 use crate::diagnose::variance::{Fitted, LikelihoodKind};
 use crate::effects::quantity::Conditions;
 use crate::fit::Split;

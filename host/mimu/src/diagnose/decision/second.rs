@@ -4,8 +4,9 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::hold_out::rms;
+use crate::diagnose::columns::{basis, beside};
 use crate::diagnose::rows::Rows;
-use crate::diagnose::search::{Search, basis, beside};
+use crate::diagnose::search::Search;
 use crate::diagnose::variance::LikelihoodKind;
 use crate::effects::fitted::FittedEffect;
 

@@ -5,8 +5,9 @@
 
 use nalgebra::DMatrix;
 
+use crate::diagnose::columns::beside;
 use crate::diagnose::note::Note;
-use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search, beside};
+use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
 use crate::effects::alternatives::one_at_a_constant_input;

@@ -9,7 +9,6 @@ use crate::effects;
 use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::regressor::{Product, Regressor};
-use crate::plan::design::lack_of_fit::outside;
 
 /// Share of its upper bound below which a product is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -114,7 +113,10 @@ fn separate(candidate: &mut Candidate, columns: &DMatrix<f64>) {
     let mut spanned: Vec<DVector<f64>> = Vec::new();
     let mut kept = Vec::new();
     for (k, column) in candidate.active.iter().zip(columns.column_iter()) {
-        let left = outside(&spanned, column.into_owned());
+        let left = spanned.iter().fold(column.into_owned(), |left, unit| {
+            let share = unit.dot(&left);
+            left - unit * share
+        });
         if left.norm() > SEPARATE * column.norm() {
             spanned.push(left.normalize());
             kept.push(*k);

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::build::{Part, common_step};
 use super::{Row, Rows};
-use crate::diagnose::search::unit_columns;
+use crate::diagnose::columns::unit_columns;
 use crate::effects::temperature::without_self_heating;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;

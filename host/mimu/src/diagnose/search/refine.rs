@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::{Columns, Search, beside, independent_of, price, unit_columns};
+use super::{Columns, Search, price};
+use crate::diagnose::columns::{beside, independent_of, unit_columns};
 use crate::diagnose::variance::{Components, Fitted, LikelihoodKind};
 use crate::effects::candidate::Candidate;
 use crate::effects::effect::NonlinearParameter;
