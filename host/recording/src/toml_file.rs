@@ -27,12 +27,10 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &str, again: Option<&s
         let span = error.span().unwrap_or(0..text.len());
         let before = text.get(..span.start).unwrap_or_default();
         let line = before.rsplit('\n').next().unwrap_or_default();
-        let spanned = text.get(span).unwrap_or_default();
-        // Only a missing key is an error of a table: of one with a heading, or of the keys before the first heading.
-        let heading = spanned.starts_with('[');
-        let missing = line.trim().is_empty()
-            && (heading || spanned.contains(['=', '\n']) || text.trim().is_empty());
-        let whole_file = missing && !heading;
+        // Only a missing key is an error of a whole table: the span is its heading, or empty for the keys before the first heading.
+        let whole_file = span == (0..0);
+        let heading = text.get(span).is_some_and(|s| s.starts_with('['));
+        let missing = whole_file || heading && line.trim().is_empty();
         let remedy = match (again, missing) {
             (Some(again), true) => {
                 format!("the file is cut or was edited: copy it again, or {again}")
