@@ -18,7 +18,7 @@ use serde::Serialize;
 
 /// Number of temperatures at which curves are compared with one model.
 const TEMPERATURES: usize = 101;
-/// Number of inputs along an axis at which effects are evaluated. It is prime, so that the spacing is no multiple of a converter's quantisation step.
+/// Number of inputs along an axis at which effects are evaluated.
 const INPUTS: usize = 97;
 /// Times since power-on at which effects are evaluated, s.
 const AFTER_S: [f64; 2] = [0.0, 3600.0];
