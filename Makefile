@@ -44,7 +44,7 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests but the
 test $(STAGES) demo faults nightly: export CARGO_INCREMENTAL = 0
 # Tests of devices and of the wizard wait for answers more than they compute: four of them at a time leave two cores no pause.
 test run-tests: export RUST_TEST_THREADS = 4
-# Tests of Python use the extension module that `build-tests` has compiled; `make python` by itself builds and tests the wheel.
+# Tests of Python use the extension module that `build-tests` has compiled; `make python` alone builds and tests the wheel.
 test: export MIMU_LIBRARY = $(abspath $(or $(CARGO_TARGET_DIR),target))/debug/lib_mimu.so
 
 fmt:

@@ -214,7 +214,7 @@ fn clean(plan: &str, file: &RigFile, seed: u64) -> Arc<Prepared> {
     known().entry(key).or_insert(recorded).clone()
 }
 
-/// A diagnosis whose text and drawings were all made: none of them may fail, whatever was found.
+/// A diagnosis whose text and drawings were all made: each must succeed, whatever was found.
 pub fn reported(diagnosis: Diagnosis) -> Diagnosis {
     let report = DiagnosisResult::of(&diagnosis, &next(&diagnosis), None);
     let made = Made {

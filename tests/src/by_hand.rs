@@ -74,7 +74,7 @@ impl Case {
         self.truth.iter().any(|t| found.iter().any(|f| f == t))
     }
 
-    /// Whether all effects of the unit are named, and no others.
+    /// Whether exactly the effects of the unit are named.
     pub fn is_named_alone(&self) -> bool {
         self.found.len() == self.truth.len() && self.found.iter().all(|f| self.is_right(f))
     }

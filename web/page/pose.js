@@ -18,7 +18,7 @@ const axis = (k, sign = 1) => [0, 1, 2].map((i) => (i === k ? sign : 0));
 /** Up, front and right in the body frame: the given direction is up, and the face that leans most to the front is in front. */
 function frame(up) {
   const order = [0, 1, 2].sort((a, b) => Math.abs(up[b]) - Math.abs(up[a]));
-  // If a face points straight up, no other leans to the front: then the next axis is in front, as in the sketch of the command.
+  // If a face points straight up, the others do not lean to the front: then the next axis is in front, as in the sketch of the command.
   const second = Math.abs(up[order[1]]) > 0.3 ? order[1] : (order[0] + 1) % 3;
   const towards = axis(second, up[second] < -0.3 ? -1 : 1);
   const front = unit(sum(towards, scaled(up, -dot(towards, up))));

@@ -170,7 +170,7 @@ impl Sources<'_> {
     /// The noise of the unit.
     ///
     /// # Errors
-    /// There is no noise.
+    /// The noise is missing.
     pub fn noise(&self) -> Result<&NoiseFile> {
         self.noise.ok_or_else(|| {
             Error::new(

@@ -90,7 +90,7 @@ impl Codes {
         self.constant == Some(true) || self.step.zip(self.quietest).is_some_and(hides)
     }
 
-    /// Whether a second with a single value is a fault and not a coarse step. `moved`: the unit was turned since the beginning.
+    /// Whether a second with a single value is a fault; a coarse quantisation step also gives one. `moved`: the unit was turned since the beginning.
     fn is_stuck(&self, moved: bool) -> bool {
         !self.is_coarse() || moved && self.step.is_none()
     }

@@ -19,7 +19,7 @@ const SHOWN: Duration = Duration::from_millis(100);
 /// Longest wait for a unit to send anything, or for a table's interlock.
 const SILENT: Duration = Duration::from_secs(30);
 
-/// Longest time in a wrong pose if no person turns the unit: the pose will not change by itself.
+/// Longest time in a wrong pose if no person turns the unit: nobody corrects the pose.
 const WRONG: Duration = Duration::from_secs(10);
 
 /// How a phase ended.

@@ -1,4 +1,4 @@
-//! Flaws of recordings: each has the effect of its key, and no other.
+//! Flaws of recordings: each has only the effect of its key.
 
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;

@@ -1,4 +1,4 @@
-//! `docs/bench.md` against the code: every key and no other, and the defaults.
+//! `docs/bench.md` against the code: exactly its keys, and the defaults.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -32,7 +32,7 @@ fn our_board(
     session.run()?;
     let mut steps = 0;
     loop {
-        // The command drives a table by itself.
+        // The command drives a table without a person.
         if fixture != "hands" {
             break;
         }

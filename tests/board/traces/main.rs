@@ -5,7 +5,7 @@
 //! cargo run -p mimu-board-tests --bin traces [NAME...]
 //! ```
 //!
-//! Names select steps. This is a program and not a test, because nightly tests must not change their references.
+//! Names select steps. This is a program, because nightly tests must not change their references.
 
 use mimu_board_tests::traces::STEPS;
 

@@ -112,7 +112,7 @@ fn edges(files: &[(Module, String)]) -> Edges {
     let mut edges = Edges::new();
     for (from, code) in files {
         for mut to in mentioned(from, code) {
-            // The last part may be an item and not a module.
+            // The last part may be an item instead of a module.
             while !to.is_empty() && !known.contains(&to) {
                 to.pop();
             }

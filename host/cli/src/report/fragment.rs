@@ -64,7 +64,7 @@ pub fn of_allan(result: &AllanResult) -> String {
     fragment(&html! {
         h1 { "Noise of " (result.device.as_deref().unwrap_or("a unit")) }
         @if let Some(noise) = result.noise_file(&now()) { (unit::noise::section(&noise)) }
-        // As an image: the drawing has a style of its own, which would otherwise apply to the whole page.
+        // As an image: otherwise the drawing's style would apply to the whole page.
         @if result.recordings.len() == 1 {
             img alt="Allan deviation with its fitted model" style="max-width:100%" src=(data_url(&allan_plot::svg(result))) {}
         }

@@ -227,7 +227,7 @@ fn bins_text(out: &mut String, sensor: &SensorResult) {
     }
 }
 
-/// Whether a curve is a physical parameter of `sensor`, and not an element of C or o.
+/// Whether a curve is a physical parameter of `sensor`; elements of C and o are not.
 pub(super) fn physical(curve: &CurveResult, sensor: Sensor) -> bool {
     curve.sensor == sensor && curve.of.0 != ParameterKind::Inverse
 }

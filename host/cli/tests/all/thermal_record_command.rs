@@ -93,7 +93,7 @@ fn recorded(path: &Path) -> Inputs {
     all
 }
 
-/// The inputs that the bench writes when it carries out the same plan by itself.
+/// The inputs that the bench writes when it carries out the same plan without mimu.
 fn by_the_bench(plan: &str, truth: &RigTruth) -> Inputs {
     let plan = Plan::parse(Source::new("plan", plan)).unwrap();
     let mut all = Inputs::new();

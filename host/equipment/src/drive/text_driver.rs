@@ -110,7 +110,7 @@ fn angles(up: &Vector3<f64>) -> (f64, f64) {
     (across.atan2(up.z).to_degrees(), inner.to_degrees())
 }
 
-/// Values for the placeholders of a command.
+/// Values that replace `{name}` in a command.
 fn values(step: &Step) -> [(&'static str, f64); 6] {
     let (middle, inner) = angles(&step.up());
     let [x, y, z] = step.up;

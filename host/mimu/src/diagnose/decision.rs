@@ -94,7 +94,7 @@ pub struct Accepted {
 pub struct Decision {
     /// Accepted effects.
     pub accepted: Vec<Accepted>,
-    /// Effects that were found and not accepted, and named effects that were not chosen; each with the reason.
+    /// Effects that were found but rejected, and named effects that were not chosen; each with the reason.
     pub rejected: Vec<Rejected>,
     /// Effects that the experiment could not show.
     pub not_excited: Vec<&'static Effect>,

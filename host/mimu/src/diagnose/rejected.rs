@@ -1,4 +1,4 @@
-//! Effects that were tried and not accepted. The reason is a type; only its display is a sentence.
+//! Rejected effects. The reason is a type; only its display is a sentence.
 
 use std::fmt;
 

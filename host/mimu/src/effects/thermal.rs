@@ -35,7 +35,7 @@ const fn tilt(x: Quantity, y: Quantity, z: Quantity) -> [Coefficient; 6] {
 }
 
 /// Lag of each axis, and how far it still was behind when the recording began. The die is elsewhere than the thermometer, and after power-on each
-/// warms up by itself. Their difference at the start decays with the lag.
+/// heats itself. Their difference at the start decays with the lag.
 const fn behind(slope: f64, at_start: f64) -> [Coefficient; 6] {
     let [x, y, z] = each(Regressor::linear(TemperatureLag), slope);
     let left = Regressor::Decay(RecordingTime);

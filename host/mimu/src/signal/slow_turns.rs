@@ -162,7 +162,7 @@ impl Fit {
     /// Deletion residual of a dwell that was fitted, in standard deviations of the others.
     fn deleted(&self, reading: &Reading, c: usize) -> f64 {
         let (off, leverage) = self.residual(reading, c);
-        // If no other dwell predicts it, it cannot be judged.
+        // It can be judged only if another dwell predicts it.
         if leverage > 0.99 {
             return 0.0;
         }

@@ -27,7 +27,7 @@ pub(super) struct Values {
 
 impl Values {
     /// The samples of `segment` in `unit`, checked; if the channel has empty cells, its longest segment without any. A `part` that a person
-    /// chose is used as it is; otherwise short disturbances are masked.
+    /// chose is used unchanged; otherwise short disturbances are masked.
     pub fn of(
         mut values: Vec<f64>,
         segment: &Segment,

@@ -1,4 +1,4 @@
-//! Parts of a recording that no other dwell determines are held out differently, or named; their errors are not averaged in.
+//! Parts of a recording that the other dwells do not determine are held out differently, or named; their errors are not averaged in.
 
 use mimu::fit::Split;
 use mimu::quantity::Sensor;

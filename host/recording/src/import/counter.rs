@@ -9,7 +9,7 @@ const SIZES: [f64; 2] = [65_536.0, 4_294_967_296.0];
 const STAMP_SIZES: [i64; 3] = [1 << 16, 1 << 24, 1 << 32];
 
 /// A counter has wrapped if it goes back from within this distance of its end to within this distance of 0. So ten seconds at 100 Hz may be lost at
-/// the wrap. Any other step back is another recording or a mistake, and is kept as it is.
+/// the wrap. Any other step back is another recording or a mistake, and is kept unchanged.
 const NEAR: f64 = 1000.0;
 
 /// Continues a sample counter across its wraps.

@@ -33,7 +33,7 @@ pub struct Preview {
 /// Looks at the beginning of a file; `separator` as in an import.
 ///
 /// # Errors
-/// The file cannot be read, is of another kind, or none of its lines contains numbers.
+/// The file cannot be read, is of another kind, or has no line of numbers.
 pub fn preview(path: &Path, separator: Option<Separator>) -> Result<Preview> {
     let ending = path.extension().unwrap_or_default();
     if is_log(path) {

@@ -86,7 +86,7 @@ impl UnitSession {
         let off = |s: &Step| up.angle(&s.up()).to_degrees();
         let limit = config.fixture.tolerance_deg();
         let by_hand = config.fixture != Fixture::Table;
-        // By hand the pose is recorded as it is. It only has to differ from earlier ones.
+        // By hand any pose is recorded that differs from the earlier ones.
         let as_it_is = |s: &Step| match by_hand {
             true => Step::at_rest(*up, s.dwell_s),
             false => *s,

@@ -249,7 +249,7 @@ impl Host {
         self.port.write_all(&frame[..length]).unwrap();
     }
 
-    /// Id of the call that the next greeting answers; 0 means the device sent it by itself.
+    /// Id of the call that the next greeting answers; 0 means the device sent it without a call.
     fn greeting(&mut self) -> u16 {
         loop {
             let mut byte = [0];

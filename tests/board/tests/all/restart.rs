@@ -1,4 +1,4 @@
-//! The release image when its program fails: it restarts by itself, samples, and reports the reason.
+//! The release image when its program fails: it restarts, samples, and reports the reason.
 //!
 //! The faults replace an instruction while the program runs, and are removed as soon as it has restarted.
 
@@ -24,7 +24,7 @@ impl Greeted {
     }
 }
 
-/// Calls `look` with the greeting that the device sends by itself after a start.
+/// Calls `look` with the greeting that the device sends after a start.
 fn greeted<T>(board: &mut Board, look: impl Fn(&Greeting<'_>) -> T) -> T {
     let mut decoder = Decoder::new();
     for _ in 0..1000 {

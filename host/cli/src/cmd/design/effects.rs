@@ -66,7 +66,7 @@ fn targets(ids: &[String]) -> Result<Vec<Target>> {
 }
 
 impl DesignArgs {
-    /// The unit and its fixture from the options, if there is no recording.
+    /// The unit and its fixture from the options, if no recording is given.
     fn setup(&self) -> Setup {
         let fixture = self.fixture();
         let motion = self.motion();

@@ -38,7 +38,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// A layout with names in the header and no other property.
+    /// A layout of which only the names in the header are known.
     pub const fn of(columns: &'static str) -> Layout {
         Layout {
             file: FileName::Any,

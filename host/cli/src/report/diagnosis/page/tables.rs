@@ -189,7 +189,7 @@ pub fn second(both: &SecondResult) -> Markup {
     }
 }
 
-/// Effects that were tried and not accepted.
+/// Rejected effects.
 pub fn rejected(d: &DiagnosisResult) -> Markup {
     html! {
         @if d.rejected.is_empty() {
