@@ -3,12 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use mimu::judgement::{Judgement, JudgementKind};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::Keep;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
-use mimu_recording::error::Result;
+use mimu_recording::error::{Argument, Error, Result};
+
+use crate::status::Status;
 
 #[derive(Args)]
 pub(crate) struct StillArgs {
@@ -103,6 +106,46 @@ pub(crate) struct VerboseArgs {
     /// Print everything instead of a summary
     #[arg(long)]
     pub(crate) verbose: bool,
+}
+
+#[derive(Args)]
+pub(crate) struct StrictArgs {
+    /// Exit with status 3 unless the judgement is `good`
+    #[arg(long)]
+    strict: bool,
+}
+
+impl StrictArgs {
+    /// The status of a command whose result is judged so.
+    pub(crate) fn status(&self, judgement: &Judgement) -> Status {
+        match self.strict && !judgement.is_good() {
+            true => Status::NotGood,
+            false => Status::Done,
+        }
+    }
+}
+
+#[derive(Args)]
+pub(crate) struct ForceArgs {
+    /// Write the calibration although it is judged a misfit; the file contains the judgement
+    #[arg(long)]
+    force: bool,
+}
+
+impl ForceArgs {
+    /// The error about a result of `place` that is judged a misfit and would therefore not be written; `remedy` says what to do.
+    pub(crate) fn refusal(
+        &self,
+        judgement: &Judgement,
+        place: &str,
+        remedy: &str,
+    ) -> Option<Error> {
+        if self.force || judgement.kind != JudgementKind::Misfit {
+            return None;
+        }
+        let problem = format!("no calibration is written, because it is a {judgement}");
+        Some(Error::new(place, problem, remedy).about(Argument::Force))
+    }
 }
 
 #[derive(Args)]

@@ -125,6 +125,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::SkipBroken => "--skip-broken",
         Argument::SignedLowByte => "--signed-low-byte",
         Argument::Accept => "--accept",
+        Argument::Force => "--force",
         Argument::Base => "--base",
         Argument::Estimator => "--estimator",
         Argument::Range => "--range",

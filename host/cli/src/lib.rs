@@ -5,6 +5,7 @@
 //! | `cmd` | the subcommands: arguments and execution |
 //! | [`called`] | subcommands that other programs can call |
 //! | `arguments` | arguments that several subcommands share |
+//! | `status` | how a subcommand ended |
 //! | `reading`, `output` | reads recordings; writes text, JSON and files |
 //! | [`report`] | results as JSON, text and page |
 //! | `views` | shows a session of the wizard while it runs |
@@ -19,6 +20,7 @@ mod hint;
 mod output;
 mod reading;
 pub mod report;
+mod status;
 #[cfg(not(target_family = "wasm"))]
 mod views;
 
@@ -27,13 +29,16 @@ use std::ffi::OsString;
 pub use output::now;
 
 use clap::{FromArgMatches, Parser, Subcommand};
+use status::Status;
+
 use cmd::{allan, apply, design, diagnose, fit, import, thermal, verify};
 #[cfg(not(target_family = "wasm"))]
 use cmd::{device, record, wizard};
 
 /// Calibration of inertial units made of analog MEMS sensors.
 ///
-/// Exit status 0: done; 1: the data were refused, and one line gives the fault, its place and the remedy; 2: wrong usage.
+/// Exit status 0: done; 1: the data were refused, and one line gives the fault, its place and the remedy; 2: wrong usage; 3: done, but --strict was
+/// given and the result is not judged good.
 #[derive(Parser)]
 #[command(name = "mimu", version, max_term_width = 100)]
 struct Cli {
@@ -95,29 +100,30 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     let typed = command_line(&arguments);
-    let done = match cli.command {
+    let done = |()| Status::Done;
+    let ended = match cli.command {
         #[cfg(not(target_family = "wasm"))]
-        Command::Wizard(args) => wizard::run(&args, &typed),
-        Command::Import(args) => import::run(*args),
+        Command::Wizard(args) => wizard::run(&args, &typed).map(done),
+        Command::Import(args) => import::run(*args).map(done),
         Command::Fit(args) => fit::run(&args),
         Command::Verify(args) => verify::run(&args),
-        Command::Apply(args) => apply::run(&args),
-        Command::Compare(args) => cmd::compare::run(&args),
+        Command::Apply(args) => apply::run(&args).map(done),
+        Command::Compare(args) => cmd::compare::run(&args).map(done),
         Command::Diagnose(args) => diagnose::run(&args, &typed),
-        Command::Design(args) => design::run(&args),
+        Command::Design(args) => design::run(&args).map(done),
         Command::Thermal(args) => thermal::run(&args, &typed),
-        Command::Allan(args) => allan::run(&args),
-        Command::Export(args) => cmd::export::run(&args),
-        Command::Report(args) => cmd::report::run(&args, &typed),
+        Command::Allan(args) => allan::run(&args).map(done),
+        Command::Export(args) => cmd::export::run(&args).map(done),
+        Command::Report(args) => cmd::report::run(&args, &typed).map(done),
         #[cfg(not(target_family = "wasm"))]
-        Command::Record(args) => record::run(&args),
+        Command::Record(args) => record::run(&args).map(done),
         #[cfg(not(target_family = "wasm"))]
-        Command::Device(args) => device::run(&args),
-        Command::Completions(args) => cmd::completions::run(&args),
-        Command::Man(args) => cmd::man::run(&args),
+        Command::Device(args) => device::run(&args).map(done),
+        Command::Completions(args) => cmd::completions::run(&args).map(done),
+        Command::Man(args) => cmd::man::run(&args).map(done),
     };
-    match done {
-        Ok(()) => 0,
+    match ended {
+        Ok(status) => status.code(),
         Err(error) => {
             eprintln!("mimu: {}", hint::line(&error, &innermost(&matches)));
             1

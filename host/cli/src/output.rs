@@ -77,11 +77,12 @@ pub(crate) fn print(
 }
 
 /// Beginnings of lines that are coloured on a terminal.
-const HEADS: [(&str, AnsiColor); 5] = [
+const HEADS: [(&str, AnsiColor); 6] = [
     ("problems of this recording:", AnsiColor::Red),
     ("problems of these recordings:", AnsiColor::Red),
     ("warning:", AnsiColor::Yellow),
     ("verdict:", AnsiColor::Green),
+    ("judgement:", AnsiColor::Green),
     ("next:", AnsiColor::Cyan),
 ];
 

@@ -39,11 +39,11 @@ pub type Options = parameters::Options;
 /// The calibration is missing, an offset or a scale factor exceeds ArduPilot's range, or an error of [`BiasCubics::of`], [`BiasCubics::of_rest`] or
 /// `Conversion::of`.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
+    let mut export = Export::new("ardupilot", from);
     if let Some(biases) = from.biases {
-        return at_rest(biases, options);
+        return at_rest(biases, options, export);
     }
     let (calibration, _) = from.calibration()?;
-    let mut export = Export::new("ardupilot");
     export.notes.push("ArduPilot measures gyro offsets again at every start (INS_GYR_CAL), at the temperature of that start.".into());
     export.notes.push("It accepts an accelerometer as calibrated only if INS_ACC_ID is its device id: give --accel-id, or calibrate there once and then load this file.".into());
     for (sensor, id) in options.ids() {
@@ -77,9 +77,8 @@ fn cut([from_c, to_c]: [f64; 2], export: &mut Export) -> [f64; 2] {
 
 /// Writes the coefficients alone. ArduPilot's own calibration over temperature is made at rest too, and does the same: it leaves the offsets to the
 /// calibrations at one temperature, with their CALTEMP. Source: libraries/AP_InertialSensor/AP_InertialSensor_tempcal.cpp, `save_calibration`.
-fn at_rest(biases: &ThermalBiases, options: &Options) -> Result<Export> {
+fn at_rest(biases: &ThermalBiases, options: &Options, mut export: Export) -> Result<Export> {
     let (imu, n) = (options.imu, number(options.imu));
-    let mut export = Export::new("ardupilot");
     let range_c = cut(biases.range_c, &mut export);
     px4::cubics_at_rest(biases, options, range_c, REFERENCE_C, &mut export)?;
     export.notes.push(format!("Scale factors and offsets stay the flight controller's own (INS_ACC{n}SCAL, INS_ACC{n}OFFS): a recording at rest does not show them."));

@@ -58,7 +58,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         calibration,
         effects: &effects,
     };
-    let mut export = Export::new("c");
+    let mut export = Export::new("c", from);
     export.formulas = header.formulas();
     let places = Places {
         cross_terms: true,

@@ -12,7 +12,7 @@ use crate::{Export, Sources};
 pub fn export(from: &Sources) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let image = Image::new(calibration, place)?;
-    let mut export = Export::new("core");
+    let mut export = Export::new("core", from);
     export.notes.push(format!("hash {}", image.hash));
     if !image.effects.is_empty() {
         let effects = format!("effects: {}", image.effects.join(", "));

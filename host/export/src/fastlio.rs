@@ -30,7 +30,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.noise.walks.calibrated(noise)?;
     let rate = options.noise.rate_hz(noise);
-    let mut export = Export::new("fastlio");
+    let mut export = Export::new("fastlio", from);
     export.formulas.push(format!(
         "Variances of one sample at {rate:.3} Hz: acc_cov = N^2 rate, b_acc_cov = K^2 rate, and so for the gyro; the worst axis, {} % interval of N and K behind each.",
         100.0 * noise.confidence

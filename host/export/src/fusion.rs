@@ -22,7 +22,7 @@ use crate::{Export, Sources, heading};
 /// The calibration is missing, or an error of [`Misalignment::of`].
 pub fn export(from: &Sources) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
-    let mut export = Export::new("fusion");
+    let mut export = Export::new("fusion", from);
     let raw_unit = calibration.recording.raw_unit;
     let mut body = String::new();
     for sensor in [Sensor::Gyro, Sensor::Accel] {

@@ -5,6 +5,7 @@ use mimu::calibration::thermal_biases::ThermalBiases;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::quantity::Sensor;
 
+use crate::judged::JudgedSource;
 use crate::{Export, Sources};
 
 /// Header of a file made from a calibration, without comment signs.
@@ -83,12 +84,23 @@ pub fn needs_calibrated(from: &Sources) -> Option<String> {
 
 /// Lines after the first ones, for the file and the terminal.
 pub fn notes_and_remaining(export: &Export) -> Vec<String> {
-    let mut lines = export.formulas.clone();
+    let mut lines: Vec<String> = export.judgements.iter().map(JudgedSource::line).collect();
+    lines.extend(export.formulas.iter().cloned());
     lines.extend(export.notes.iter().cloned());
-    if !export.remaining.is_empty() {
-        lines.push("Errors that remain when a program uses this file:".into());
-        let each = export.remaining.iter();
-        lines.extend(each.map(|r| format!("  {}", r.line())));
+    for (head, errors) in [
+        (
+            "Errors of the calibration itself, which remain in every program:",
+            &export.calibration_errors,
+        ),
+        (
+            "Errors that remain when a program uses this file, beside those:",
+            &export.remaining,
+        ),
+    ] {
+        if !errors.is_empty() {
+            lines.push(head.into());
+            lines.extend(errors.iter().map(|r| format!("  {}", r.line())));
+        }
     }
     lines
 }

@@ -20,7 +20,7 @@ pub type Options = driver::Options;
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let readings = options.readings(calibration, place, Sensor::Accel)?;
-    let mut export = Export::new("imu-calib");
+    let mut export = Export::new("imu-calib", from);
     export.formulas.push(
         "accel: output = SM reading - bias, m/s^2 to m/s^2; SM by rows, output in the frame of the calibration"
             .into(),

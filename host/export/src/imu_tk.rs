@@ -56,7 +56,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         )
     })?;
     let factors = Misalignment::of(&model.matrix, sensor)?;
-    let mut export = Export::new("imu-tk");
+    let mut export = Export::new("imu-tk", from);
     export.formulas.push(format!(
         "{sensor}: output = T K (raw - B), {} to {}; above T and K by rows, then B",
         calibration.recording.raw_unit,

@@ -19,7 +19,9 @@ struct CalibrationJson<'a> {
     about: Vec<String>,
     #[serde(flatten)]
     calibration: &'a Calibration,
-    /// Errors that remain, as far as they are known.
+    /// Errors of the calibration itself.
+    calibration_errors: Vec<Remaining>,
+    /// Errors that remain beside those, as far as they are known.
     remaining: Vec<Remaining>,
 }
 
@@ -29,7 +31,7 @@ struct CalibrationJson<'a> {
 /// The calibration is missing, or this build cannot evaluate an effect.
 pub fn export(from: &Sources) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
-    let mut export = Export::new("json");
+    let mut export = Export::new("json", from);
     export
         .formulas
         .push("x = C u + o, raw to SI, and u = P x + b, SI to raw; C and P by rows.".into());
@@ -45,6 +47,7 @@ pub fn export(from: &Sources) -> Result<Export> {
     let file = CalibrationJson {
         about: heading::of_calibration(calibration, &export),
         calibration,
+        calibration_errors: export.calibration_errors.clone(),
         remaining: export.remaining.clone(),
     };
     let text = serde_json::to_string_pretty(&file).map_err(|e| {

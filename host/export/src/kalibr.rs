@@ -52,7 +52,7 @@ pub struct Options {
 /// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`] or [`Intrinsics::of`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
-    let mut export = Export::new("kalibr");
+    let mut export = Export::new("kalibr", from);
     export.formulas.push(format!(
         "Continuous-time densities of the worst axis; {} % interval behind each.",
         100.0 * noise.confidence

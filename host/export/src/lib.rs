@@ -10,6 +10,7 @@
 //! | [`misalignment`] | misalignment times sensitivity, for IMU-TK and Fusion |
 //! | [`intrinsics`] | triangular matrices and rotations, for Kalibr and OpenVINS |
 //! | [`remaining`] | errors that remain because a format cannot store a part of the calibration |
+//! | [`judged`] | judgements of the sources, and errors that every program inherits |
 //! | [`heading`] | the comments at the head of every file |
 //! | [`parameters`] | parameters of autopilots, and their file layouts |
 
@@ -24,6 +25,7 @@ pub mod imu_calib;
 pub mod imu_tk;
 pub mod intrinsics;
 pub mod json;
+pub mod judged;
 pub mod kalibr;
 pub mod liosam;
 pub mod mcap;
@@ -51,6 +53,7 @@ use mimu::noise::noise_file::NoiseFile;
 use mimu_recording::error::{Argument, Error, Result};
 use serde::Serialize;
 
+use crate::judged::JudgedSource;
 use crate::parameters::Parameter;
 use crate::remaining::Remaining;
 
@@ -122,7 +125,11 @@ pub struct Export {
     pub formulas: Vec<String>,
     /// Notes for the user.
     pub notes: Vec<String>,
-    /// Parts of the calibration that the file cannot store, and the errors that remain.
+    /// Judgements of its sources.
+    pub judgements: Vec<JudgedSource>,
+    /// Errors of the calibration itself, which every program inherits.
+    pub calibration_errors: Vec<Remaining>,
+    /// Parts of the calibration that the file cannot store, and the errors that this adds.
     pub remaining: Vec<Remaining>,
     /// Parameters in the order of the file, if it consists of parameters.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -136,13 +143,16 @@ pub struct Export {
 }
 
 impl Export {
-    /// An export without content.
-    pub fn new(to: &'static str) -> Self {
+    /// An export of these sources, without content.
+    pub fn new(to: &'static str, from: &Sources) -> Self {
+        let calibration = from.calibration.map(|(calibration, _)| calibration);
         Self {
             format: "mimu-export/1",
             to,
             formulas: Vec::new(),
             notes: Vec::new(),
+            judgements: JudgedSource::all(from),
+            calibration_errors: calibration.map(judged::errors_of).unwrap_or_default(),
             remaining: Vec::new(),
             parameters: Vec::new(),
             cubics: Vec::new(),

@@ -33,7 +33,7 @@ pub struct Options {
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.walks.calibrated(noise)?;
-    let mut export = Export::new("liosam");
+    let mut export = Export::new("liosam", from);
     export.formulas.push(format!(
         "Continuous-time densities of the worst axis; {} % interval behind each.",
         100.0 * noise.confidence

@@ -55,7 +55,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let recording = Recording::open(&options.recording)?;
     let place = recording.samples.display().to_string();
     let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ())?;
-    let mut export = Export::new("mcap");
+    let mut export = Export::new("mcap", from);
     export.formulas.push(
         "x = C u + o, raw to SI, and the other parts of the calibration, as `mimu apply` computes it."
             .into(),

@@ -62,7 +62,7 @@ pub struct Options {
 /// The noise is missing, or an error of [`crate::worst_axis::WalkOptions::densities`] or [`Intrinsics::of`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
-    let mut export = Export::new("openvins");
+    let mut export = Export::new("openvins", from);
     let (half, model) = match options.model {
         Model::Kalibr => (Triangle::Lower, "kalibr"),
         Model::Rpng => (Triangle::Upper, "rpng"),

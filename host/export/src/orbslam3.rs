@@ -21,7 +21,7 @@ pub type Options = NoiseOptions;
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.walks.calibrated(noise)?;
-    let mut export = Export::new("orbslam3");
+    let mut export = Export::new("orbslam3", from);
     export.formulas.push(format!(
         "Continuous-time densities of the worst axis; {} % interval behind each.",
         100.0 * noise.confidence

@@ -33,7 +33,7 @@ const SCALES: [f64; 2] = [0.1, 3.0];
 /// # Errors
 /// The calibration is missing, a scale factor exceeds PX4's range, or an error of [`BiasCubics::of`], [`BiasCubics::of_rest`] or `Conversion::of`.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let mut export = Export::new("px4");
+    let mut export = Export::new("px4", from);
     let head = if let Some(biases) = from.biases {
         needs_ids(options, ["TC_G", "TC_A"], &mut export);
         at_rest(biases, options, &mut export)?;

@@ -56,7 +56,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let of = |sensor| options.driver.readings(calibration, place, sensor);
     let [accel, gyro] = [of(Sensor::Accel)?, of(Sensor::Gyro)?];
-    let mut export = Export::new("realsense");
+    let mut export = Export::new("realsense", from);
     let (matrices, gyro_unit) = match options.layout {
         Layout::Eeprom => ("sensitivity by columns", "deg/s"),
         Layout::Json => ("scale_and_alignment by columns", "rad/s"),

@@ -16,6 +16,8 @@ use mimu_recording::error::Result;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
+use crate::judged::held_out;
+
 /// Number of temperatures at which curves are compared with one model.
 const TEMPERATURES: usize = 101;
 /// Number of inputs along an axis at which effects are evaluated.
@@ -37,7 +39,7 @@ pub struct Remaining {
     pub unit: &'static str,
     /// Root of the mean square; `None` where it is not known.
     pub rms: Option<f64>,
-    /// Largest size; `None` where it is not known.
+    /// Largest size; `None` where it is not known, as for an rms of unseen data.
     pub max: Option<f64>,
 }
 
@@ -76,6 +78,14 @@ impl Remaining {
         }
     }
 
+    /// This error, or `rms` if that is larger.
+    fn at_least(mut self, rms: Option<f64>) -> Self {
+        for figure in [&mut self.rms, &mut self.max] {
+            *figure = figure.map(|own| own.max(rms.unwrap_or(0.0)));
+        }
+        self
+    }
+
     /// Scale factors and cross terms of readings that a program uses uncorrected; `matrix` maps the input to them, SI to SI.
     pub fn of_readings(sensor: Sensor, matrix: &Matrix3<f64>) -> Self {
         let errors: Vec<_> = inputs(sensor).map(|x| matrix * x - x).collect();
@@ -111,7 +121,13 @@ impl Remaining {
                 readable.write(rms),
                 readable.write(max)
             ),
-            _ => format!("{sensor}: {source}: unknown, {condition}"),
+            (Some(rms), None) => {
+                format!(
+                    "{sensor}: {source}, {condition}: rms {}",
+                    readable.write(rms)
+                )
+            }
+            (None, _) => format!("{sensor}: {source}: unknown, {condition}"),
         }
     }
 }
@@ -170,7 +186,8 @@ fn inputs(sensor: Sensor) -> impl Iterator<Item = Vector3<f64>> {
     (0..6).map(move |k| Vector3::ith(k / 2, if k % 2 == 0 { size } else { -size }))
 }
 
-/// Half of the 95 % interval of the calibrated output, from the covariance of C and o.
+/// Half of the 95 % interval of the calibrated output, from the covariance of C and o. If unseen data erred by more, that error: intervals include
+/// what the fit knew, and a misfit of another recording is none of that.
 fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> Remaining {
     const SOURCE: &str = "95 % interval of the calibrated output";
     let forward = Forward::of(model);
@@ -193,7 +210,8 @@ fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> R
             table.interval_sigmas() * variance.max(0.0).sqrt()
         })
     });
-    Remaining::new(sensor, SOURCE, at_input(sensor), &half.collect::<Vec<_>>())
+    let interval = Remaining::new(sensor, SOURCE, at_input(sensor), &half.collect::<Vec<_>>());
+    interval.at_least(held_out(calibration, sensor))
 }
 
 /// Error of a format without scale factors: a reading changes by `gain` with the input of its axis instead of by 1.

@@ -33,7 +33,7 @@ pub fn export(from: &Sources) -> Result<Export> {
         let problem = format!("the device could not use it: {refused}");
         Error::new(place, problem, "fit the recording again")
     })?;
-    let mut export = Export::new("rust");
+    let mut export = Export::new("rust", from);
     export.formulas = vec![
         "x = C u + o, raw to SI. compensator() makes it; state(), follow() and apply() of mimu_core::compensator::Compensator run it.".into(),
         format!("It computes the same as the device with the calibration of hash {}, to the last bit.", image.hash),

@@ -36,7 +36,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.noise.walks.calibrated(noise)?;
     let rate = options.noise.rate_hz(noise);
-    let mut export = Export::new("vins");
+    let mut export = Export::new("vins", from);
     export.formulas.push(format!(
         "Of one sample at {rate:.3} Hz: acc_n = N sqrt(rate), acc_w = K sqrt(rate), and so for the gyro; the worst axis, {} % interval of N and K behind each.",
         100.0 * noise.confidence

@@ -28,6 +28,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::effects::fitted::FittedEffect;
+use crate::judgement::Judgement;
 use crate::quantity::Sensor;
 use crate::triad::Covariance;
 use crate::warning::Warning;
@@ -89,6 +90,9 @@ pub struct Calibration {
     pub trimmed: Option<String>,
     /// Program and version that made it.
     pub tool: String,
+    /// The judgement of the result that it comes from; a device does not store it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub judgement: Option<Judgement>,
     /// The recording that it was made from.
     pub recording: Origin,
     /// Gyro triad.

@@ -93,6 +93,7 @@ impl Diagnosed {
     /// Those of [`Calibration::of`].
     pub fn calibration(&self, created: &str) -> Result<Calibration> {
         let mut made = Calibration::of(&self.diagnosis.after, &self.effects, created)?;
+        made.judgement = Some(self.result.judgement.clone());
         // An imported recording lacks the unit's number, but it was checked to be of the same unit.
         made.unit_id = made.unit_id.or(self.unit_id.clone());
         Ok(made)

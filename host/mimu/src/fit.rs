@@ -126,6 +126,12 @@ impl Fit {
         }
     }
 
+    /// All warnings: about the recording, then about each triad.
+    pub fn all_warnings(&self) -> impl Iterator<Item = &Warning> {
+        let of_sensors = self.sensors.iter().flat_map(|s| &s.warnings);
+        self.warnings.iter().chain(of_sensors)
+    }
+
     /// Fit of `sensor`.
     pub fn sensor(&self, sensor: Sensor) -> Option<&SensorFit> {
         self.sensors.iter().find(|s| s.sensor == sensor)

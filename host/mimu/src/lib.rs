@@ -7,6 +7,7 @@
 //! | [`noise`] | how well a dwell mean is known; [`survey`] finds it from a recording at rest, by the Allan deviation of [`mimu_allan`] |
 //! | [`estimate`], [`triad`] | the estimators, and what they estimate: both directions, covariances, physical quantities |
 //! | [`mod@fit`] | both triads, judged on held-out data; impossible results are refused |
+//! | [`judgement`], [`judge`] | the one judgement of every result, with its reason; the rules |
 //! | [`calibration`] | the file; [`calibration::verify`] judges it by another recording, [`calibration::apply`] compensates one |
 //! | [`effects`], [`diagnose`], [`mod@diagnosed`] | the effect behind a residual: found, added, proved on other data |
 //! | [`plan`] | experiments: [`plan::design`] chooses attitudes, rates and times, [`plan::next_experiment`] what to record next |
@@ -60,6 +61,8 @@ pub mod effects;
 pub mod estimate;
 mod fault;
 pub mod fit;
+pub mod judge;
+pub mod judgement;
 pub mod noise;
 pub mod observable;
 pub mod parameter;
@@ -79,6 +82,7 @@ pub mod warning;
 
 pub use calibration::Calibration;
 pub use fit::{Fit, Options, fit};
+pub use judgement::{Judgement, JudgementKind};
 pub use mimu_recording::error::Error;
 pub use mimu_recording::{Batch as Samples, Manifest, RawUnit, Recording, Reference};
 pub use nalgebra;

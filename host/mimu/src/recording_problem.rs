@@ -137,8 +137,7 @@ impl RecordingProblem {
     /// All problems of a recording that was fitted; those that may spoil all of it come first.
     pub fn of(fit: &Fit) -> Vec<Self> {
         let prepared = &fit.prepared;
-        let of_sensors = fit.sensors.iter().flat_map(|s| &s.warnings);
-        let mut all = Self::seen(fit.warnings.iter().chain(of_sensors));
+        let mut all = Self::seen(fit.all_warnings());
         let accel = fit.sensor(Sensor::Accel);
         all.extend(accel.into_iter().flat_map(|accel| offsets(fit, accel)));
         let rate_hz = prepared.condensed.period_s.recip();

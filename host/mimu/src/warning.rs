@@ -58,6 +58,9 @@ pub enum Warning {
     CalmEnd(bool, f64),
     /// Gravity that no height explains, m/s², and the latitude, degrees.
     Gravity(f64, f64),
+    /// Gravity of the calibration and of the recording, m/s²; the mean magnitude of the calibrated force at rest, and whether it agrees with the
+    /// former.
+    OtherGravity([f64; 2], f64, bool),
     /// Readings in SI: whether they are at rest (and include biases), how many times their input they are, and the likely cause.
     NotSi(bool, f64, &'static str),
     /// Reading of a gyro at rest, rad/s, that is larger than any bias.

@@ -94,6 +94,8 @@ pub enum Argument {
     SignedLowByte,
     /// Products that are accepted on the evidence of one recording.
     Accept,
+    /// Writing a calibration that is judged a misfit.
+    Force,
     /// The calibration at one temperature that curves are added to.
     Base,
     /// The estimator of curves over temperature.

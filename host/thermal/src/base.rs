@@ -106,7 +106,7 @@ pub fn calibration(fit: &ThermalFit, base: &Calibration, created: &str) -> Resul
     let temps: Vec<f64> = temperature.nodes.iter().map(|n| n.temp_c).collect();
     let temp_c = reference_node(&temps).map_or(at_c, |k| temps[k]);
     let triads = based.as_ref().map(|b| b.as_ref()?.triad(temp_c));
-    base.with_curves(temperature, temp_c, triads, created)
+    base.with_curves(temperature, temp_c, triads, fit.judgement(), created)
 }
 
 /// Refuses a base that the curves cannot be added to; returns its temperature, °C.

@@ -79,6 +79,7 @@ impl ThermalFit {
                 temp_range_c: Some(range_c),
             },
             range_c,
+            judgement: self.judgement(),
             nodes: readings.collect(),
             dies: over.dies,
         };

@@ -356,6 +356,7 @@ impl ThermalFit {
             temp_c,
             triads,
             temperature,
+            judgement: self.judgement(),
         };
         Calibration::of_curves(unit, created)
     }

@@ -18,6 +18,7 @@
 //! | [`judge`] | errors of dwells, by temperature, separately for heating and cooling |
 //! | [`classic`], [`points`] | estimators of the literature, for comparison |
 //! | [`mod@fit`], [`extrapolation`] | curves by one of the estimators, judged; whether there is curvature at all |
+//! | [`judgement`] | the judgement of such a fit |
 //! | [`mod@compare`] | two calibrations, curve by curve |
 //! | [`plan`] | procedures in chamber and table, and how well the curves are known afterwards |
 //! | [`result`] | the result, as written to JSON |
@@ -37,6 +38,7 @@ pub mod extrapolation;
 pub mod fit;
 pub mod joint;
 pub mod judge;
+pub mod judgement;
 pub mod nodes;
 pub mod noise;
 pub mod path;

@@ -1,5 +1,6 @@
 //! `mimu-thermal/1`: what a fit over temperature found. SI and raw units throughout; what is not a number is null.
 
+use mimu::judgement::Judgement;
 use mimu::parameter::{ParameterKind, TriadParameter, parameters};
 use mimu::quantity::{PerSensor, Sensor, present, raw_unit};
 use mimu::triad::Estimate;
@@ -32,6 +33,8 @@ pub struct ThermalResult {
     pub estimator: &'static str,
     /// Whether it distinguishes lag and slope, and describes the readings.
     pub verdict: FitVerdict,
+    /// The judgement.
+    pub judgement: Judgement,
     /// Lowest and highest temperature of the dies, °C.
     pub range_c: [f64; 2],
     /// Figures of the triads.
@@ -123,6 +126,7 @@ impl ThermalResult {
             recordings: recordings(fit),
             estimator: fit.options.estimator.name(),
             verdict: fit.verdict,
+            judgement: fit.judgement(),
             range_c: range(&fit.joint),
             sensors: PerSensor::from_fn(of),
             curves: curves.collect(),

@@ -13,10 +13,13 @@ use mimu::recording_problem::OfRecording;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
-use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, StillArgs, VerboseArgs};
+use crate::arguments::{
+    ForceArgs, JsonArgs, KeepArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs,
+};
 use crate::output::{now, print};
 use crate::reading::read;
 use crate::report::refused;
+use crate::status::Status;
 
 #[derive(Args)]
 pub struct DiagnoseArgs {
@@ -54,12 +57,20 @@ pub struct DiagnoseArgs {
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
+    force: ForceArgs,
+    #[command(flatten)]
+    strict: StrictArgs,
+    #[command(flatten)]
     verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
 
-pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<()> {
+/// What to do about readings that no calibration describes.
+const MISFIT: &str =
+    "check range, columns and unit of the readings and record again, or write it all the same";
+
+pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let outputs = [
         args.output.as_deref(),
         args.page.as_deref(),
@@ -99,7 +110,10 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<()> {
         ..
     } = &done;
     let mut files = Vec::new();
-    if let Some(path) = &args.output {
+    let place = diagnosis.before.prepared.place.clone();
+    let refusal = args.force.refusal(&found.judgement, &place, MISFIT);
+    let output = args.output.as_ref().filter(|_| refusal.is_none());
+    if let Some(path) = output {
         files.push(stage(path, done.calibration(&now)?.to_toml())?);
     }
     let mut said = String::new();
@@ -132,7 +146,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<()> {
         };
         files.push(stage(path, report::diagnosis_page(found, &made)?)?);
     }
-    for (what, path) in [("calibration", &args.output), ("page", &args.page)] {
+    for (what, path) in [("calibration", output), ("page", args.page.as_ref())] {
         if let Some(path) = path {
             said += &format!("\n{what}: {}\n", path.display());
         }
@@ -146,5 +160,9 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<()> {
         &(report::diagnosis_text(found, detail) + &said),
         found,
         files,
-    )
+    )?;
+    match refusal {
+        Some(error) => Err(error),
+        None => Ok(args.strict.status(&found.judgement)),
+    }
 }

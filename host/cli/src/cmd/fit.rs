@@ -11,11 +11,14 @@ use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
-use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, VerboseArgs};
+use crate::arguments::{
+    ForceArgs, JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs,
+};
 use crate::output::{now, print};
 use crate::reading::read_samples_or_means;
 use crate::report;
 use crate::report::refused;
+use crate::status::Status;
 
 #[derive(Args)]
 pub(crate) struct FitArgs {
@@ -42,6 +45,10 @@ pub(crate) struct FitArgs {
     /// Calibration file to write
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    force: ForceArgs,
+    #[command(flatten)]
+    strict: StrictArgs,
     #[command(flatten)]
     verbose: VerboseArgs,
     #[command(flatten)]
@@ -72,7 +79,11 @@ fn holdout(text: &str) -> std::result::Result<usize, String> {
     }
 }
 
-pub(crate) fn run(args: &FitArgs) -> Result<()> {
+/// What to do about readings that no calibration describes.
+const CHECK: &str =
+    "check range, columns and unit of the readings and record again, or write it all the same";
+
+pub(crate) fn run(args: &FitArgs) -> Result<Status> {
     let options = Options {
         method: match args.method {
             None | Some(MethodArg::LeastSquares) => Method::LeastSquares,
@@ -97,7 +108,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
             "leave --method out, or give the dwells their inputs (reference = \"table\")",
         ));
     }
-    let found = DwellResult::list(&prepared);
+    let (found, place) = (DwellResult::list(&prepared), prepared.place.clone());
     // After a refusal the user first needs the list of dwells. The error line comes last.
     let problems = OfRecording::prepared(&prepared);
     let fitted = fit(prepared, options).inspect_err(|error| {
@@ -110,11 +121,16 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
         text.push('\n');
         text.push_str(&report::dwell_table(&result.dwells));
     }
+    let refusal = args.force.refusal(&result.judgement, &place, CHECK);
     let mut calibration = None;
-    if let Some(path) = &args.output {
+    if let Some(path) = args.output.as_ref().filter(|_| refusal.is_none()) {
         let made = Calibration::of(&fitted, &[], &now())?;
         calibration = Some(stage(path, made.to_toml())?);
         text.push_str(&format!("\ncalibration: {}\n", path.display()));
     }
-    print(&args.json, &text, &result, calibration)
+    print(&args.json, &text, &result, calibration)?;
+    match refusal {
+        Some(error) => Err(error),
+        None => Ok(args.strict.status(&result.judgement)),
+    }
 }

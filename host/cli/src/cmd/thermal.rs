@@ -18,10 +18,11 @@ use mimu_thermal::fit::{Estimator, Options, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 
-use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, VerboseArgs};
+use crate::arguments::{ForceArgs, JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs};
 use crate::output::{check_outputs, now, print};
 use crate::reading::read;
 use crate::report::{self, Made, thermal_plot};
+use crate::status::Status;
 
 #[derive(Args)]
 pub(crate) struct ThermalArgs {
@@ -80,6 +81,10 @@ struct FitArgs {
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
     #[command(flatten)]
+    force: ForceArgs,
+    #[command(flatten)]
+    strict: StrictArgs,
+    #[command(flatten)]
     verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
@@ -130,6 +135,10 @@ impl EstimatorArg {
 const BIASES: &str =
     "biases over temperature, no calibration (for mimu export px4 and ardupilot; --base makes one)";
 
+/// What to do about readings that curves over temperature do not describe.
+const MISFIT: &str =
+    "look for jumps and moves in the plot and leave those parts out, or write it all the same";
+
 fn lag(text: &str) -> std::result::Result<f64, String> {
     match text.parse() {
         Ok(s) if (-120.0..=600.0).contains(&s) => Ok(s),
@@ -146,17 +155,18 @@ fn range(text: &str) -> std::result::Result<[f64; 2], String> {
     }
 }
 
-pub(crate) fn run(args: &ThermalArgs, command_line: &str) -> Result<()> {
+pub(crate) fn run(args: &ThermalArgs, command_line: &str) -> Result<Status> {
+    let done = |()| Status::Done;
     match &args.command {
         ThermalCommand::Fit(args) => run_fit(args, command_line),
-        ThermalCommand::Compare(args) => run_compare(args),
-        ThermalCommand::Plan(args) => plan::run(args),
+        ThermalCommand::Compare(args) => run_compare(args).map(done),
+        ThermalCommand::Plan(args) => plan::run(args).map(done),
         #[cfg(not(target_family = "wasm"))]
-        ThermalCommand::Record(args) => record::run(args),
+        ThermalCommand::Record(args) => record::run(args).map(done),
     }
 }
 
-fn run_fit(args: &FitArgs, command_line: &str) -> Result<()> {
+fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {
     let outputs = [
         args.output.as_deref(),
         args.plot.as_deref(),
@@ -188,7 +198,9 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<()> {
     let mut text = report::thermal_text(&result, args.verbose.verbose);
     let mut staged = Vec::new();
     let now = now();
-    if let Some(path) = &args.output {
+    let place = fitted.sessions[0].place.clone();
+    let refusal = args.force.refusal(&result.judgement, &place, MISFIT);
+    if let Some(path) = args.output.as_ref().filter(|_| refusal.is_none()) {
         let (what, made) = match &base {
             None if fitted.is_biases_only() => (BIASES, fitted.biases(&now)?.to_toml()),
             None => ("calibration", fitted.calibration(&now)?.to_toml()),
@@ -214,7 +226,11 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<()> {
         staged.push(stage(path, report::thermal_page(&result, &made))?);
         text.push_str(&format!("\npage: {}\n", path.display()));
     }
-    print(&args.json, &text, &result, staged)
+    print(&args.json, &text, &result, staged)?;
+    match refusal {
+        Some(error) => Err(error),
+        None => Ok(args.strict.status(&result.judgement)),
+    }
 }
 
 fn run_compare(args: &CompareArgs) -> Result<()> {

@@ -7,10 +7,11 @@ use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
 use mimu_recording::error::Result;
 
-use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, VerboseArgs};
+use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs};
 use crate::output::print;
 use crate::reading::read_samples_or_means;
 use crate::report;
+use crate::status::Status;
 
 #[derive(Args)]
 pub(crate) struct VerifyArgs {
@@ -24,12 +25,14 @@ pub(crate) struct VerifyArgs {
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
+    strict: StrictArgs,
+    #[command(flatten)]
     verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
 
-pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
+pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
     let calibration = Calibration::read(&args.calibration)?;
     let outputs = [args.json.file()];
     let prepared = read_samples_or_means(
@@ -45,5 +48,6 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
         &report::verify_text(&result, args.verbose.verbose),
         &result,
         None,
-    )
+    )?;
+    Ok(args.strict.status(&result.judgement))
 }

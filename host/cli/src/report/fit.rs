@@ -1,8 +1,11 @@
 //! A fit as text: fixed-width tables with units and intervals.
 
+use std::cmp::Reverse;
 use std::fmt::Write as _;
 
 use mimu::fit::Split;
+use mimu::judge::input;
+use mimu::judgement::JudgementKind;
 use mimu::parameter::ParameterKind;
 use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable;
@@ -29,12 +32,13 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
     }
     problems(&mut out, &fit.recording_problems, false, verbose);
     if verbose {
+        let _ = writeln!(out, "judgement: {}", fit.judgement);
         for (name, sensor) in fit.sensors.present() {
             let _ = writeln!(out);
             sensor_text(&mut out, fit, name, sensor);
         }
     } else {
-        let _ = writeln!(out, "verdict: {}\n", verdict(fit));
+        let _ = writeln!(out, "judgement: {}\n", fit.judgement);
         errors_text(&mut out, fit);
         for (name, sensor) in fit.sensors.present() {
             let _ = writeln!(out);
@@ -42,7 +46,9 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
             parameters_text(&mut out, fit, name, sensor, &head);
         }
     }
-    let others = fit.warnings.iter().filter(|w| !w.is_of_recording());
+    let decisive = |w: &Warning| w.to_string() == fit.judgement.reason;
+    let others = fit.warnings.iter();
+    let others = others.filter(|w| !w.is_of_recording() && !decisive(w));
     match verbose {
         true => {
             let all: Vec<String> = others.map(hint::of_warning).collect();
@@ -52,7 +58,10 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
             }
         }
         false => {
-            let kinds = kinds(others, Warning::is_like);
+            // Those that matter most come first, because the summary may lack room for the others.
+            let mut others: Vec<&Warning> = others.collect();
+            others.sort_by_key(|w| Reverse(input::of_warning(w)));
+            let kinds = kinds(others.into_iter(), Warning::is_like);
             let shown = kinds.map(|(warning, more)| counted(hint::of_warning(warning), more));
             warn_within(&mut out, shown, 1);
             let _ = writeln!(out, "next: {}", next(fit));
@@ -61,44 +70,9 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
     out
 }
 
-/// If the error exceeds this many noise floors, it contains more than noise.
-const BEYOND_NOISE: f64 = 2.0;
-
-/// Sensors whose error exceeds the noise, with the ratio.
-fn beyond(fit: &FitResult) -> Vec<(Sensor, f64)> {
-    let share = |s: &SensorFitResult| s.held_out_rms.unwrap_or(s.rms) / s.noise_floor;
-    let all = fit.sensors.present().map(|(name, s)| (name, share(s)));
-    all.filter(|(_, share)| *share > BEYOND_NOISE).collect()
-}
-
-/// Summary of the fit's quality.
-fn verdict(fit: &FitResult) -> String {
-    let names: Vec<&str> = fit.sensors.present().map(|(name, _)| name.name()).collect();
-    let calibrated = format!("{} calibrated", names.join(" and "));
-    let beyond: Vec<String> = beyond(fit)
-        .iter()
-        .map(|(name, share)| format!("{} times the noise ({name})", significant(*share)))
-        .collect();
-    let known = fit
-        .sensors
-        .present()
-        .all(|(_, s)| s.noise_floor.is_finite());
-    let errors = match (beyond.is_empty(), known) {
-        (false, _) => format!("the error is {}", beyond.join(" and ")),
-        (true, true) => "the errors are those of noise".into(),
-        (true, false) => {
-            "no dwell shows the noise, so the errors cannot be compared with it".into()
-        }
-    };
-    format!("{calibrated}; {errors}")
-}
-
 /// Next step after the fit.
 fn next(fit: &FitResult) -> String {
     let judge = "judge it on another recording (mimu verify OTHER --calibration FILE)";
-    if !fit.recording_problems.is_empty() {
-        return format!("correct the problems of the recording, and record again; or {judge}");
-    }
     let contradict = |w: &Warning| match w {
         Warning::Of(_, w) => matches!(**w, Warning::RatesContradict(..)),
         _ => false,
@@ -106,9 +80,19 @@ fn next(fit: &FitResult) -> String {
     if fit.warnings.iter().any(contradict) {
         return "correct the rates or their error (mimu import --rate-dps, --rate-error), and fit again; --verbose prints more".into();
     }
-    match beyond(fit).is_empty() || fit.reference == Reference::TurntableRate {
-        true => format!("{judge}; --verbose prints how it was found"),
-        false => format!("find what the model lacks (mimu diagnose), then {judge}"),
+    match fit.judgement.kind {
+        JudgementKind::Misfit => "correct range, columns or unit of the readings (mimu import), or record again; --verbose prints the dwells".into(),
+        JudgementKind::Suspect => format!("correct what the judgement names (mimu import), and fit again; or {judge}"),
+        _ if !fit.recording_problems.is_empty() => {
+            format!("correct the problems of the recording, and record again; or {judge}")
+        }
+        JudgementKind::Unexplained if fit.reference != Reference::TurntableRate => {
+            format!("find what the model lacks (mimu diagnose), then {judge}")
+        }
+        JudgementKind::Untested => format!("record more poses, each of them twice, and fit again; or {judge}"),
+        JudgementKind::Good | JudgementKind::Unexplained => {
+            format!("{judge}; --verbose prints how it was found")
+        }
     }
 }
 

@@ -49,7 +49,8 @@ fn summary(result: &ThermalResult) -> String {
         FitVerdict::OneWay => VERDICT_ONE_WAY.into(),
         FitVerdict::Misfit => VERDICT_MISFIT.into(),
     };
-    let _ = writeln!(out, "verdict: {}: {meaning}\n", result.verdict.name());
+    let _ = writeln!(out, "verdict: {}: {meaning}", result.verdict.name());
+    let _ = writeln!(out, "judgement: {}\n", result.judgement);
     errors_text(&mut out, result);
     for (name, sensor) in result.sensors.present() {
         if let Some(what) = sensor.inseparable {
@@ -137,6 +138,7 @@ fn everything(result: &ThermalResult) -> String {
         FitVerdict::OneWay => wrap(&mut out, "", VERDICT_ONE_WAY),
         FitVerdict::Misfit => wrap(&mut out, "", VERDICT_MISFIT),
     }
+    let _ = writeln!(out, "judgement: {}", result.judgement);
     for (name, sensor) in result.sensors.present() {
         let _ = writeln!(out);
         sensor_text(&mut out, name, sensor);

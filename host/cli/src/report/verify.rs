@@ -2,8 +2,10 @@
 
 use std::fmt::Write as _;
 
-use mimu::calibration::verify::{SensorVerification, Verification};
-use mimu::quantity::{Figure, significant};
+use mimu::calibration::verify::{Causes, SensorVerification, Verification};
+use mimu::judge::errors::BEYOND_NOISE;
+use mimu::judgement::JudgementKind;
+use mimu::quantity::{AXES, Figure, Sensor, plus_minus, significant};
 use mimu::readable;
 use mimu::warning::Warning;
 
@@ -11,7 +13,7 @@ use crate::report::text::{counted, kinds, warn, warn_within, wrap};
 
 /// Result of `mimu verify`: a summary, or with `verbose` all warnings.
 pub fn verify_text(verification: &Verification, verbose: bool) -> String {
-    let mut out = String::new();
+    let mut out = format!("judgement: {}\n", verification.judgement);
     for (name, s) in verification.sensors.present() {
         wrap(&mut out, &format!("{name}: "), &verdict(s));
     }
@@ -59,18 +61,74 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
         "one scale: ",
         "on all three axes the mean of the calibration's scale factors and that of its biases, without misalignment",
     );
+    for (name, s) in verification.sensors.present() {
+        if let Some(causes) = s.causes.as_ref().filter(|_| verbose || beyond_noise(s)) {
+            causes_text(&mut out, name, causes);
+        }
+    }
+    let all = verification.warnings.iter();
     match verbose {
-        true => warn(&mut out, verification.warnings.iter()),
+        true => warn(&mut out, all),
         false => {
-            let kinds = kinds(verification.warnings.iter(), Warning::is_like);
+            let decisive = |w: &&Warning| w.to_string() == verification.judgement.reason;
+            let kinds = kinds(all.filter(|w| !decisive(w)), Warning::is_like);
             warn_within(
                 &mut out,
                 kinds.map(|(w, more)| counted(w.to_string(), more)),
-                0,
+                1,
             );
         }
     }
+    let _ = writeln!(out, "next: {}", next(verification));
     out
+}
+
+fn beyond_noise(s: &SensorVerification) -> bool {
+    s.rms > BEYOND_NOISE * s.noise_floor
+}
+
+/// How much the bias has changed, and how much of the error that explains.
+fn causes_text(out: &mut String, name: Sensor, causes: &Causes) {
+    let unit = readable::parameter(name.unit());
+    let changes = AXES.iter().enumerate().map(|(k, axis)| {
+        let [change, half] =
+            [causes.bias_change[k], causes.bias_change_interval[k]].map(|v| v * unit.factor);
+        format!("{axis} {}", plus_minus(change, half))
+    });
+    let changes: Vec<String> = changes.collect();
+    let text = format!(
+        "the bias has changed by {} {}; of the mean square error {}",
+        changes.join(", "),
+        unit.unit,
+        causes.words()
+    );
+    wrap(out, &format!("{name}: "), &text);
+}
+
+/// Next step after the verification.
+fn next(verification: &Verification) -> String {
+    let again = "fit this recording (mimu fit), and compare both calibrations (mimu compare)";
+    match verification.judgement.kind {
+        JudgementKind::Good => return "use the calibration".into(),
+        JudgementKind::Untested => {
+            return "record more dwells or turns on another day, and verify with that recording"
+                .into();
+        }
+        JudgementKind::Suspect => {
+            return "correct what the judgement names (mimu import), and verify again".into();
+        }
+        JudgementKind::Unexplained | JudgementKind::Misfit => {}
+    }
+    let worst = verification.worst().and_then(|(_, s)| s.causes.as_ref());
+    match worst {
+        Some(c) if c.bias.value >= c.matrix.value.max(c.rest.value) => {
+            "estimate the biases again and keep the matrices (mimu diagnose REC --calibration FILE -o NEW)".into()
+        }
+        Some(c) if c.rest.value >= c.matrix.value => {
+            "find what the model lacks (mimu diagnose REC)".into()
+        }
+        _ => again.into(),
+    }
 }
 
 /// Effect of the calibration on a sensor's error.

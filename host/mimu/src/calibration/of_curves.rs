@@ -3,6 +3,7 @@
 use super::of_fit::FIGURE_DIGITS;
 use super::of_fit::triad_table;
 use super::{Calibration, Judged, Origin, OverTemperature};
+use crate::judgement::Judgement;
 use crate::quantity::{Figure, PerSensor, Sensor, rounded};
 use crate::triad::Triad;
 use mimu_recording::error::Result;
@@ -48,6 +49,8 @@ pub struct CurvesOfUnit {
     pub triads: PerSensor<Option<TriadOfCurves>>,
     /// The models at all temperatures.
     pub temperature: OverTemperature,
+    /// The judgement of the curves.
+    pub judgement: Judgement,
 }
 
 impl Calibration {
@@ -85,6 +88,7 @@ impl Calibration {
             created: Some(created.into()),
             trimmed: None,
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            judgement: Some(unit.judgement),
             recording: Origin {
                 sha256: Some(unit.sha256.clone()).filter(|s| !s.is_empty()),
                 reference: Some(unit.reference),
@@ -102,7 +106,7 @@ impl Calibration {
     }
 
     /// This calibration at one temperature with `temperature` added, made at `created` (RFC 3339). `triads` are the models of its sensors at `temp_c`
-    /// of the dies. Error figures stay the same.
+    /// of the dies, and `judgement` is that of the curves: the file has the worse of both. Error figures stay the same.
     ///
     /// # Errors
     /// Curves that cannot be applied.
@@ -111,9 +115,11 @@ impl Calibration {
         temperature: OverTemperature,
         temp_c: f64,
         triads: PerSensor<Option<Triad>>,
+        judgement: Judgement,
         created: &str,
     ) -> Result<Self> {
         let mut all = self.clone();
+        all.judgement = Judgement::worst(all.judgement.into_iter().chain([judgement]));
         let tables = PerSensor {
             gyro: &mut all.gyro,
             accel: &mut all.accel,

@@ -66,6 +66,7 @@ impl Calibration {
             created: stored.created.clone(),
             trimmed: stored.trimmed.clone(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            judgement: None,
             recording: Origin {
                 sha256: stored.sha256.clone(),
                 reference: None,

@@ -9,6 +9,7 @@ use super::{
 };
 use crate::effects::fitted::FittedEffect;
 use crate::fit::{Fit, SensorFit};
+use crate::judgement::Judgement;
 use crate::quantity::{Sensor, inverse_names, rounded};
 use crate::triad::{Angles, Estimate, Forward, Physical, Triad};
 use mimu_recording::error::Result;
@@ -41,6 +42,7 @@ impl Calibration {
             created: Some(created.into()),
             trimmed: None,
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            judgement: Some(Judgement::of_fit(fit)),
             recording: Origin {
                 sha256: Some(fit.prepared.condensed.sha256.clone()),
                 reference: Some(manifest.reference),

@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{DieTable, Origin};
+use crate::judgement::Judgement;
 use crate::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::parse_toml;
@@ -42,6 +43,8 @@ pub struct ThermalBiases {
     pub created: String,
     /// Program and version that made it.
     pub tool: String,
+    /// The judgement of the curves.
+    pub judgement: Judgement,
     /// Dies' temperatures in the recordings that it was fitted to, °C.
     pub range_c: [f64; 2],
     /// The recording that it was made from.
@@ -138,6 +141,8 @@ pub struct RestOfUnit {
     pub range_c: [f64; 2],
     /// What is known of the dies; hysteresis raw.
     pub dies: PerSensor<DieTable>,
+    /// The judgement of the curves.
+    pub judgement: Judgement,
     /// Readings, the coldest first.
     pub nodes: Vec<BiasNode>,
 }
@@ -155,6 +160,7 @@ impl ThermalBiases {
             unit_id: unit.unit_id,
             created: created.into(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            judgement: unit.judgement,
             range_c: unit.range_c,
             recording: unit.recording,
             dies: unit.dies,

@@ -1,5 +1,10 @@
 //! Judging a calibration by another recording.
 
+mod causes;
+mod judged;
+
+pub use causes::{Causes, Share};
+
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
@@ -12,6 +17,7 @@ use crate::estimate::turn::{Turn, direction_error};
 use crate::fit::by_rate::variances;
 use crate::fit::refuse_wrong_gravity;
 use crate::fit::uncalibrated::{errors, exceeds};
+use crate::judgement::Judgement;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::{PerSensor, Sensor, present};
@@ -49,6 +55,9 @@ pub struct SensorVerification {
     /// Compensated gyro at rest without a table, rad/s; absent with one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_rms: Option<f64>,
+    /// What explains the mean square of the errors; absent if the recording does not distinguish the causes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub causes: Option<Causes>,
 }
 
 /// Result of verifying a calibration by a recording: `mimu-verify/1`.
@@ -56,6 +65,8 @@ pub struct SensorVerification {
 pub struct Verification {
     /// `mimu-verify/1`.
     pub format: &'static str,
+    /// The judgement.
+    pub judgement: Judgement,
     /// Whether it is the recording that the calibration was made from.
     #[serde(skip)]
     pub same_recording: bool,
@@ -77,6 +88,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         warnings.push(Warning::SameRecording);
     }
     warnings.extend(outside(calibration, &prepared.condensed.blocks));
+    warnings.extend(judged::other_gravity(calibration, prepared));
     if manifest.means && !calibration.effects().is_empty() {
         return Err(Error::new(
             &prepared.place,
@@ -169,8 +181,10 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         };
         warnings.push(warning.of(sensor));
     }
+    let all: Vec<(Sensor, &SensorVerification)> = sensors.present().collect();
     Ok(Verification {
         format: "mimu-verify/1",
+        judgement: judged::judgement(prepared, &all, &warnings),
         same_recording,
         sensors,
         warnings,
@@ -233,7 +247,10 @@ fn judge(
             turns(prepared, &inverse, &accel, &mut warnings)
         }
     };
-    judged.map(|j| (j, warnings))
+    let judged = judged?;
+    let accel = calibration.inverse(Sensor::Accel);
+    let causes = causes::of(prepared, sensor, &inverse, accel.as_ref());
+    Some((SensorVerification { causes, ..judged }, warnings))
 }
 
 /// The calibration of a unit whose sensors are all alike and perfectly mounted: every sensor with the mean scale factor
@@ -286,6 +303,7 @@ fn judged(
         max: largest(after),
         noise_floor: rms(floor),
         static_rms: None,
+        causes: None,
         count: floor.len(),
     })
 }

@@ -40,7 +40,7 @@ use undecided::undecided;
 
 use hold_out::rms_at_rest;
 pub(super) use hold_out::{held_out, part, rms};
-pub use leftover::{CorrelatesWith, FALSE_LEFTOVER, Leftover};
+pub use leftover::{CorrelatesWith, FALSE_LEFTOVER, Leftover, WANDERS};
 pub use model::Model;
 pub use nonlinear::Nonlinear;
 pub use second::Second;

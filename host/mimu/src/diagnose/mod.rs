@@ -8,6 +8,7 @@
 //! | [`rows`]        | residuals of dwells and turns after the affine model, as one linear problem      |
 //! | [`variance`]    | variance of the residuals: known noise, extra white variance, rate random walk   |
 //! | [`search`]      | search for the effects that explain the residuals                                |
+//! | `judged`        | the judgement                                                                    |
 //! | [`note`]        | notes on accepted effects for the user                                           |
 //! | [`decision`]    | accepted effects, and residual errors                                            |
 //! | `passes`        | repeats the search with the affine model fitted beside strong effects            |
@@ -18,6 +19,7 @@ mod as_written;
 mod candidate;
 pub mod columns;
 pub mod decision;
+mod judged;
 pub mod note;
 mod passes;
 pub mod picture;

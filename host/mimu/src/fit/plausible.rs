@@ -86,8 +86,9 @@ pub fn check_numbers(fit: &SensorFit) -> Result<()> {
     Err(Failure::NoSolution(seen).into_error(fit.sensor))
 }
 
-/// Root mean square of the inputs about their mean; if these are unknown, the size of the quantity that the figure describes.
-fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
+/// Size of the input, in the unit of the figure: root mean square of the known inputs about their mean; if these are unknown, the size of the
+/// quantity that the figure describes.
+pub fn input_size(prepared: &Prepared, fit: &SensorFit) -> f64 {
     match fit.figure {
         Figure::Direction => 1.0,
         Figure::GravityMagnitude => prepared.manifest.gravity_mps2,
@@ -115,7 +116,7 @@ fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
 
 /// Refuses readings that do not follow their inputs. If they do with temperature in the model, they are fitted, with a warning.
 fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warning>> {
-    let spread = spread(prepared, fit);
+    let spread = input_size(prepared, fit);
     let share = fit.rms() / spread;
     if share <= FOLLOWS_NOTHING {
         return Ok(None);

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::judgement::Judgement;
 use crate::quantity::Sensor;
 use crate::toml_layout::to_toml;
 use mimu_allan::model::{FLOOR, Term};
@@ -26,6 +27,9 @@ pub struct NoiseFile {
     /// When it was made, RFC 3339.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub created: Option<String>,
+    /// The judgement of the record, if it was made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub judgement: Option<Judgement>,
     /// Samples a second.
     pub sample_rate_hz: f64,
     /// Length of the record, s; of several records, that of the shortest.

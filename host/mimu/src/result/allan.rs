@@ -229,6 +229,7 @@ impl AllanResult {
         Some(NoiseFile {
             format: NOISE_FORMAT.into(),
             created: Some(created.to_owned()),
+            judgement: None,
             device: self.device.clone()?,
             sample_rate_hz: self.recordings.first()?.sample_rate_hz,
             duration_s: lengths.fold(f64::INFINITY, f64::min),

@@ -12,6 +12,7 @@ use crate::diagnose::rejected::Rejected;
 use crate::diagnose::rows::RowFigure;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::fit::Split;
+use crate::judgement::Judgement;
 use crate::plan::next_experiment::{Confused, Next, NotExcited, NotInPlan};
 use crate::quantity::{Figure, PerSensor, Sensor, present};
 use crate::recording_problem::OfRecording;
@@ -34,6 +35,8 @@ pub struct DiagnosisResult {
     pub recordings: Vec<Source>,
     /// Verdict.
     pub verdict: Verdict,
+    /// The judgement.
+    pub judgement: Judgement,
     /// Sensors that the recordings cannot judge.
     pub untestable: Vec<UntestableResult>,
     /// Accepted effects.
@@ -189,6 +192,7 @@ impl DiagnosisResult {
             gravity_mps2: prepared.manifest.gravity_mps2,
             recordings: d.sources.clone(),
             verdict: d.verdict,
+            judgement: d.judgement(),
             untestable: d.untestable.iter().map(UntestableResult::from).collect(),
             effects: Vec::new(),
             rejected: Vec::new(),

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::TOOL;
 use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
+use crate::judgement::Judgement;
 use crate::observable::Observable;
 use crate::parameter::{ParameterKind, TriadParameter, parameters};
 use crate::prepared::Prepared;
@@ -27,6 +28,8 @@ pub struct FitResult {
     pub tool: &'static str,
     /// Unit under test.
     pub device: String,
+    /// The judgement.
+    pub judgement: Judgement,
     /// SHA-256 of the samples file.
     pub sha256: String,
     /// What is known of the input.
@@ -249,11 +252,11 @@ impl FitResult {
     pub fn of(fit: &Fit) -> Self {
         let (condensed, manifest) = (&fit.prepared.condensed, &fit.prepared.manifest);
         let of = |sensor: Sensor| Some(SensorFitResult::of(fit, fit.sensor(sensor)?));
-        let of_sensors = fit.sensors.iter().flat_map(|s| &s.warnings);
         Self {
             format: "mimu-fit/1",
             tool: TOOL,
             device: manifest.device.clone(),
+            judgement: Judgement::of_fit(fit),
             sha256: condensed.sha256.clone(),
             reference: manifest.reference,
             raw_unit: manifest.raw_unit,
@@ -274,7 +277,7 @@ impl FitResult {
             left_out: LeftOutResult::list(&fit.prepared),
             left_out_changes: fit.changes.clone(),
             recording_problems: OfRecording::fitted(fit),
-            warnings: fit.warnings.iter().chain(of_sensors).cloned().collect(),
+            warnings: fit.all_warnings().cloned().collect(),
         }
     }
 }

@@ -92,6 +92,14 @@ impl fmt::Display for Warning {
             }
             Self::Turning(rate) => write!(f, "at rest it reads {} deg/s, more than any bias: the unit turns evenly, or the readings are in deg/s", degrees(*rate)),
             Self::Restless(rms) => write!(f, "from dwell to dwell the calibrated rate at rest differs by {} deg/s rms, more than any bias: in some dwells the unit turned evenly, about the vertical if the accelerometer shows nothing; leave these dwells out", degrees(*rms)),
+            Self::OtherGravity([ours, theirs], mean, contradicted) => {
+                let ppm = 1e6 * (theirs / ours - 1.0).abs();
+                write!(f, "gravity is {ours} m/s² in the calibration and {theirs} m/s² in the recording, a difference of {ppm:.0} ppm, and the calibrated force at rest has a magnitude of {mean:.5} m/s²: ")?;
+                f.write_str(match contradicted {
+                    true => "the readings contradict the gravity of the recording; give both the gravity of their place",
+                    false => "if both were recorded at one place, one of the two is wrong",
+                })
+            }
             Self::NoiseOfAnother(file, recording) => write!(f, "the noise file belongs to {file:?}, the recording to {recording:?}"),
             Self::NoisierThanFile(times, file) => write!(f, "within the dwells the mean over a second is {} times as noisy as in {file}, so the noise within the dwells is used", significant(*times)),
             Self::MeansWithoutNoise => f.write_str("the table has no standard deviations: the scatter about the fit is taken as the noise, and the noise floor is unknown"),

@@ -41,6 +41,7 @@ pub fn diagnosis_text(d: &DiagnosisResult, detail: Detail) -> String {
     let mut out = String::new();
     problems(&mut out, &d.recording_problems, d.has_several(), all);
     let _ = writeln!(out, "{}: {}: {}", d.device, d.verdict.name(), meaning(d));
+    wrap(&mut out, "judgement: ", &d.judgement.to_string());
     for u in &d.untestable {
         wrap(&mut out, &format!("  {}: ", u.sensor), &u.reason);
     }

@@ -17,7 +17,7 @@ use crate::triad::directions;
 /// A bias that wanders by more than this many times the noise of a dwell mean is unusual, and the verdict reports it even if the wander of
 /// this unit was not recorded. Usual sensors wander by up to three times the noise in half an hour, not only by a random walk but also by
 /// flicker, so that dwells of clean units scatter more than their samples.
-const WANDERS: f64 = 4.0;
+pub const WANDERS: f64 = 4.0;
 /// Probability that structure is reported for a clean sensor.
 pub const FALSE_LEFTOVER: f64 = 1e-3;
 

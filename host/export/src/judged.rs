@@ -1,0 +1,80 @@
+//! What is known of the quality of an export's sources: their judgements, and the errors of the calibration that every program inherits.
+
+use mimu::calibration::{Calibration, TriadTable};
+use mimu::judgement::Judgement;
+use mimu::quantity::Sensor;
+use serde::Serialize;
+
+use crate::Sources;
+use crate::remaining::Remaining;
+
+/// The judgement of a source.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JudgedSource {
+    /// The source: `calibration`, `biases` or `noise`.
+    pub source: &'static str,
+    /// Its judgement; null if its file contains none, like a calibration that was read from a device.
+    pub judgement: Option<Judgement>,
+}
+
+impl JudgedSource {
+    /// Those of all sources.
+    pub fn all(from: &Sources) -> Vec<Self> {
+        let calibration = from.calibration.map(|(c, _)| ("calibration", &c.judgement));
+        let noise = from.noise.map(|n| ("noise", &n.judgement));
+        let mut all: Vec<Self> = [calibration, noise]
+            .into_iter()
+            .flatten()
+            .map(|(source, judgement)| Self {
+                source,
+                judgement: judgement.clone(),
+            })
+            .collect();
+        all.extend(from.biases.map(|b| Self {
+            source: "biases",
+            judgement: Some(b.judgement.clone()),
+        }));
+        all
+    }
+
+    /// One line for comments and the terminal.
+    pub fn line(&self) -> String {
+        match &self.judgement {
+            Some(judgement) => format!("judgement of the {}: {judgement}", self.source),
+            None => format!("judgement of the {}: its file contains none", self.source),
+        }
+    }
+}
+
+/// The error of the fit that `table` comes from, of unseen data if any were held out.
+fn error(sensor: Sensor, table: &TriadTable) -> Option<Remaining> {
+    let judged = table.judged.as_ref()?;
+    let (source, rms) = match judged.held_out_rms {
+        Some(rms) => ("error of unseen data", rms),
+        None => ("error in sample, as nothing was held out", judged.rms),
+    };
+    Some(Remaining {
+        sensor,
+        source: source.into(),
+        condition: judged.figure.clone(),
+        unit: if judged.unit == "rad" {
+            "rad"
+        } else {
+            sensor.unit()
+        },
+        rms: Some(rms),
+        max: None,
+    })
+}
+
+/// The errors of `calibration` itself.
+pub fn errors_of(calibration: &Calibration) -> Vec<Remaining> {
+    let of = |sensor| error(sensor, calibration.table(sensor)?);
+    Sensor::BOTH.into_iter().filter_map(of).collect()
+}
+
+/// The error of the output of `sensor` that was measured on unseen data, SI; `None` if none was, or of another quantity.
+pub fn held_out(calibration: &Calibration, sensor: Sensor) -> Option<f64> {
+    let judged = calibration.table(sensor)?.judged.as_ref()?;
+    judged.held_out_rms.filter(|_| judged.unit == sensor.unit())
+}

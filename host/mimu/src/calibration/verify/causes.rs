@@ -1,0 +1,333 @@
+//! Why a calibration errs on another recording: a bias that has changed since, a matrix that is wrong, or neither.
+//!
+//! With a unit of `u = P x + b`, a calibration of C and o gives `C u + o`. Its error is `A x + d`, with the matrix error `A = C P - 1` and the
+//! bias error `d = C b + o`, both SI. It is linear in A and d, so both are found by least squares from the errors that the recording shows:
+//!
+//! - at known inputs, the error itself;
+//! - where only the magnitude of x is known, its part along x: `n·(A x + d)`. It shows the symmetric part of A only;
+//! - for a gyro judged by gravity, the direction errors of the turns and the rates at rest. The directions come from the accelerometer,
+//!   so A and d of that are estimated too, from its magnitudes and from the turns.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, DVector, Vector3};
+use serde::Serialize;
+
+use crate::estimate::Observation;
+use crate::estimate::least_squares::{Errors, Group, Observability, Solution, solve_groups};
+use crate::estimate::turn::{Turn, sensitivity};
+use crate::fit::by_rate::variances;
+use crate::prepared::{Prepared, si_covariance};
+use crate::quantity::Sensor;
+use crate::turntable::RatedDwells;
+use mimu_recording::Reference;
+
+/// Half-width of a 95 % interval in standard deviations.
+const INTERVAL: f64 = 1.96;
+/// Condition of the design above which bias and matrix look alike.
+const ALIKE: f64 = 300.0;
+
+/// Part of a mean square error that a cause explains, with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Share {
+    /// Estimate, from 0 to 1.
+    pub value: f64,
+    /// Lower end.
+    pub lower: f64,
+    /// Upper end.
+    pub upper: f64,
+}
+
+/// Causes of the error of a sensor. The values of all shares add up to 1; `rest` is what neither explains, noise included.
+#[derive(Debug, Clone, Serialize)]
+pub struct Causes {
+    /// A bias that has changed since the calibration.
+    pub bias: Share,
+    /// A wrong matrix: scale factors, misalignment, non-orthogonality.
+    pub matrix: Share,
+    /// For a gyro judged by gravity: errors of the accelerometer's directions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accel: Option<Share>,
+    /// Neither.
+    pub rest: Share,
+    /// Output without input, x, y, z, SI: the bias has changed by this since the calibration.
+    pub bias_change: [f64; 3],
+    /// Half of the 95 % interval of each.
+    pub bias_change_interval: [f64; 3],
+}
+
+/// Rows of one group of errors: a column for each of d, then for each entry of A.
+struct Rows {
+    design: DMatrix<f64>,
+    errors: DVector<f64>,
+    variances: DVector<f64>,
+}
+
+impl Rows {
+    fn of(rows: Vec<(Vec<f64>, f64, f64)>, columns: usize) -> Self {
+        let n = rows.len();
+        Self {
+            design: DMatrix::from_fn(n, columns, |i, j| rows[i].0[j]),
+            errors: DVector::from_fn(n, |i, _| rows[i].1),
+            variances: DVector::from_fn(n, |i, _| rows[i].2),
+        }
+    }
+
+    fn group(&self, kept: &[usize]) -> Group {
+        Group {
+            design: self.design.select_columns(kept),
+            observations: self.errors.clone(),
+            errors: Errors::Independent(self.variances.clone()),
+        }
+    }
+}
+
+/// Symmetric entries of A: xx, yy, zz, xy, xz, yz.
+const SYMMETRIC: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+/// Columns of d and of the symmetric part of A.
+const OF_MAGNITUDE: usize = 9;
+/// Columns of d and of A.
+const OF_TRIAD: usize = 12;
+
+/// Derivatives of a component along `by` of `A x + d`, by d and the symmetric part of A.
+fn along(by: &Vector3<f64>, x: &Vector3<f64>) -> [f64; OF_MAGNITUDE] {
+    let mut row = [0.0; OF_MAGNITUDE];
+    row[..3].copy_from_slice(by.as_slice());
+    for (to, (i, j)) in row[3..].iter_mut().zip(SYMMETRIC) {
+        *to = by[i] * x[j];
+        if i != j {
+            *to += by[j] * x[i];
+        }
+    }
+    row
+}
+
+/// Row of the magnitude error of one observation.
+fn of_magnitude(model: &Affine<f64>, raw: &Vector3<f64>, size: f64) -> (Vec<f64>, f64) {
+    let found = model.apply(raw);
+    let n = found.normalize();
+    (along(&n, &(n * size)).to_vec(), found.norm() - size)
+}
+
+/// The causes of the errors of `sensor`; `None` if the recording does not distinguish them.
+pub(super) fn of(
+    prepared: &Prepared,
+    sensor: Sensor,
+    model: &Affine<f64>,
+    accel: Option<&Affine<f64>>,
+) -> Option<Causes> {
+    match (prepared.manifest.reference, sensor) {
+        (Reference::Table, _) => known(prepared, sensor, model),
+        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
+            let poses = prepared.observations(Sensor::Accel);
+            separate(&[gravity_rows(prepared, model, &poses)], &[0..3, 3..9])
+        }
+        (Reference::TurntableRate, Sensor::Gyro) => by_rate(prepared, model),
+        (Reference::Gravity, Sensor::Gyro) => by_turns(prepared, model, accel?),
+    }
+}
+
+fn known(prepared: &Prepared, sensor: Sensor, model: &Affine<f64>) -> Option<Causes> {
+    let mut rows = Vec::new();
+    for o in prepared.observations(sensor) {
+        let error = model.apply(&o.raw) - o.input;
+        let covariance = si_covariance(&model.matrix, &o.variance);
+        for k in 0..3 {
+            let mut row = vec![0.0; OF_TRIAD];
+            row[k] = 1.0;
+            (0..3).for_each(|j| row[3 + 3 * k + j] = o.input[j]);
+            rows.push((row, error[k], covariance[(k, k)]));
+        }
+    }
+    separate(&[Rows::of(rows, OF_TRIAD)], &[0..3, 3..12])
+}
+
+fn gravity_rows(prepared: &Prepared, model: &Affine<f64>, poses: &[Observation]) -> Rows {
+    let g = prepared.manifest.gravity_mps2;
+    let noise = prepared.magnitude_variances(model, poses);
+    let rows = poses.iter().zip(noise).map(|(o, variance)| {
+        let (row, error) = of_magnitude(model, &o.raw, g);
+        (row, error, variance)
+    });
+    Rows::of(rows.collect(), OF_MAGNITUDE)
+}
+
+fn by_rate(prepared: &Prepared, model: &Affine<f64>) -> Option<Causes> {
+    let dwells = RatedDwells::of(prepared).ok()?;
+    let noise = variances(model, &dwells.turning);
+    let turning = dwells.turning.iter().zip(dwells.magnitudes()).zip(noise);
+    let turning = turning.map(|((o, size), variance)| {
+        let (row, error) = of_magnitude(model, &o.raw, size);
+        (row, error, variance)
+    });
+    let turning = Rows::of(turning.collect(), OF_MAGNITUDE);
+    let rests = dwells.rests.iter().flat_map(|o| {
+        let covariance = si_covariance(&model.matrix, &o.variance);
+        let rate = model.apply(&o.raw);
+        [0, 1, 2].map(|k| {
+            let mut row = vec![0.0; OF_MAGNITUDE];
+            row[k] = 1.0;
+            (row, rate[k], covariance[(k, k)])
+        })
+    });
+    let rests = Rows::of(rests.collect(), OF_MAGNITUDE);
+    separate(&[turning, rests], &[0..3, 3..9])
+}
+
+fn by_turns(prepared: &Prepared, gyro: &Affine<f64>, accel: &Affine<f64>) -> Option<Causes> {
+    const ALL: usize = OF_TRIAD + OF_MAGNITUDE;
+    let (turns, _) = prepared.turns(accel);
+    let c2 = gyro.matrix.norm_squared() / 3.0;
+    let mut rows = Vec::new();
+    for turn in &turns {
+        rows.extend(turn_rows(turn, gyro, turn.variance(c2)));
+    }
+    let of_turns = Rows::of(rows, ALL);
+    let rests = prepared.rest(accel).into_iter().flat_map(|o| {
+        let covariance = si_covariance(&gyro.matrix, &o.variance);
+        let error = gyro.apply(&o.raw) - o.rate;
+        [0, 1, 2].map(|k| {
+            let mut row = vec![0.0; ALL];
+            row[k] = 1.0;
+            (row, error[k], covariance[(k, k)] + o.rate_variance[k])
+        })
+    });
+    let rests = Rows::of(rests.collect(), ALL);
+    let poses = prepared.observations(Sensor::Accel);
+    let mut of_poses = gravity_rows(prepared, accel, &poses);
+    of_poses.design = of_poses.design.insert_columns(0, OF_TRIAD, 0.0);
+    separate(&[of_turns, rests, of_poses], &[0..3, 3..12, 12..21])
+}
+
+/// Rows of the two components of a turn's direction error: gyro, then accelerometer.
+fn turn_rows(turn: &Turn, gyro: &Affine<f64>, variance: f64) -> [(Vec<f64>, f64, f64); 2] {
+    let at = sensitivity(turn, gyro);
+    let by_model = at.by_parameters(turn);
+    [0, 1].map(|s| {
+        let by = &by_model[s];
+        // The calibration is (1 + A) C and (1 + A) o + d of the true one.
+        let d = (0..3).map(|i| by[9 + i]);
+        let a = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));
+        let a = a.map(|(i, j)| {
+            let of_c: f64 = (0..3).map(|k| by[3 * i + k] * gyro.matrix[(j, k)]).sum();
+            of_c + by[9 + i] * gyro.offset[j]
+        });
+        let [before, after] = &at.by_force[s];
+        let of_accel = along(before, &turn.before)
+            .into_iter()
+            .zip(along(after, &turn.after))
+            .map(|(x, y)| x + y);
+        (d.chain(a).chain(of_accel).collect(), at.error[s], variance)
+    })
+}
+
+/// Separates the mean square of the first group into what each range of columns explains: bias, matrix and, if there is a third, the accelerometer.
+/// Columns of inputs that the recording lacks are dropped.
+fn separate<const N: usize>(
+    groups: &[Rows; N],
+    causes: &[std::ops::Range<usize>],
+) -> Option<Causes> {
+    let columns = groups[0].design.ncols();
+    let size = |j: usize| {
+        groups
+            .iter()
+            .map(|g| g.design.column(j).norm())
+            .sum::<f64>()
+    };
+    let kept: Vec<usize> = (0..columns).filter(|j| size(*j) > 0.0).collect();
+    let count: usize = groups.iter().map(|g| g.errors.len()).sum();
+    if count <= kept.len() || groups[0].errors.is_empty() || !determined(groups, &kept) {
+        return None;
+    }
+    let by_group: [Group; N] = std::array::from_fn(|g| groups[g].group(&kept));
+    let (solution, _) = solve_groups(&by_group)?;
+    let judged = &by_group[0];
+    let of = |range: &std::ops::Range<usize>| {
+        let ours = (0..kept.len()).filter(|k| range.contains(&kept[*k]));
+        Part::of(judged, &solution, &ours.collect::<Vec<_>>())
+    };
+    let mut parts: Vec<Part> = causes.iter().map(of).collect();
+    let rest = &judged.observations - &judged.design * &solution.parameters;
+    let dof = (count - kept.len()) as f64;
+    parts.push(Part {
+        square: rest.norm_squared(),
+        sigma: rest.norm_squared() * (2.0 / dof).sqrt(),
+    });
+    let total: f64 = parts.iter().map(|p| p.square).sum();
+    let shares: Vec<Share> = parts.iter().map(|p| p.share(total)).collect();
+    let change = |k: usize| kept.iter().position(|column| *column == k);
+    let at = |k: usize| change(k).map_or(0.0, |p| solution.parameters[p]);
+    let half =
+        |k: usize| change(k).map_or(f64::NAN, |p| INTERVAL * solution.covariance[(p, p)].sqrt());
+    Some(Causes {
+        bias: shares[0],
+        matrix: shares[1],
+        accel: shares.get(2).copied().filter(|_| causes.len() > 2),
+        rest: shares[causes.len()],
+        bias_change: [0, 1, 2].map(at),
+        bias_change_interval: [0, 1, 2].map(half),
+    })
+}
+
+/// Whether the errors distinguish all columns.
+fn determined(groups: &[Rows], kept: &[usize]) -> bool {
+    let rows: usize = groups.iter().map(|g| g.errors.len()).sum();
+    let mut white = DMatrix::zeros(rows, kept.len());
+    let mut from = 0;
+    for group in groups {
+        for (i, row) in group.design.row_iter().enumerate() {
+            let sigma = group.variances[i].max(f64::MIN_POSITIVE).sqrt();
+            for (k, column) in kept.iter().enumerate() {
+                white[(from + i, k)] = row[*column] / sigma;
+            }
+        }
+        from += group.errors.len();
+    }
+    for mut column in white.column_iter_mut() {
+        let norm = column.norm();
+        column /= norm;
+    }
+    Observability::of(&white).condition < ALIKE
+}
+
+/// Sum of squares that a cause explains, and its standard deviation.
+struct Part {
+    square: f64,
+    sigma: f64,
+}
+
+impl Part {
+    /// With estimates β of covariance V and `G = Xᵀ X`, `βᵀ G β` exceeds the true sum of squares by the trace of `G V` on average, and has the
+    /// variance `4 βᵀ G V G β + 2 tr (G V)²`.
+    fn of(judged: &Group, solution: &Solution, ours: &[usize]) -> Self {
+        let x = judged.design.select_columns(ours);
+        let beta = DVector::from_iterator(ours.len(), ours.iter().map(|k| solution.parameters[*k]));
+        let v = DMatrix::from_fn(ours.len(), ours.len(), |i, j| {
+            solution.covariance[(ours[i], ours[j])]
+        });
+        let g = x.tr_mul(&x);
+        let gv = &g * &v;
+        let with_g = &g * &beta;
+        let variance = 4.0 * with_g.dot(&(&v * &with_g)) + 2.0 * (&gv * &gv).trace();
+        Self {
+            square: (beta.dot(&with_g) - gv.trace()).max(0.0),
+            sigma: variance.max(0.0).sqrt(),
+        }
+    }
+
+    fn share(&self, total: f64) -> Share {
+        let others = total - self.square;
+        let of = |square: f64| {
+            let square = square.max(0.0);
+            if square + others > 0.0 {
+                square / (square + others)
+            } else {
+                0.0
+            }
+        };
+        Share {
+            value: of(self.square),
+            lower: of(self.square - INTERVAL * self.sigma),
+            upper: of(self.square + INTERVAL * self.sigma),
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Whether the input is what it is declared to be.
+
+use crate::judgement::{Judgement, JudgementKind};
+use crate::recording_problem::{RecordingProblem, Seen};
+use crate::warning::Warning;
+
+/// The kind of judgement that `warning` alone leads to; `None` if a good result may have it.
+///
+/// `Suspect`: the readings contradict their unit, rate, sign, range or columns. All data agree with such an input, so no residual shows it.
+/// `Untested`: the data cannot contradict the result.
+pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
+    match warning {
+        Warning::Of(_, warning) | Warning::Channel(_, warning) => of_warning(warning),
+        Warning::NotSi(..)
+        | Warning::Turning(_)
+        | Warning::Restless(_)
+        | Warning::RateOff(..)
+        | Warning::Gravity(..)
+        | Warning::OtherGravity(.., true)
+        | Warning::NoiseOfAnother(..)
+        | Warning::LeftHanded
+        | Warning::Turned(..)
+        | Warning::WideTurn(_)
+        | Warning::RatesContradict(..)
+        | Warning::OtherUnit(..)
+        | Warning::OtherDevice(..)
+        | Warning::Dead(_)
+        | Warning::EndOfConverter(..)
+        | Warning::RunAtEnd(..)
+        | Warning::CalmEnd(..)
+        | Warning::MeansOfTurns => Some(JudgementKind::Suspect),
+        Warning::NoResiduals
+        | Warning::FewResiduals
+        | Warning::PoorlyDetermined(_)
+        | Warning::UnseenPoses(..)
+        | Warning::SameRecording
+        | Warning::NothingToJudge
+        | Warning::Undecided(..) => Some(JudgementKind::Untested),
+        Warning::NoBetter(.., None) | Warning::Worse(_) | Warning::Outliers(..) => {
+            Some(JudgementKind::Unexplained)
+        }
+        _ => None,
+    }
+}
+
+/// The kind of judgement that a problem of a recording alone leads to; `None` if a good result may have it.
+pub fn of_problem(problem: &RecordingProblem) -> Option<JudgementKind> {
+    match problem {
+        RecordingProblem::Offset(..) => Some(JudgementKind::Suspect),
+        RecordingProblem::MissingPoses(_) => Some(JudgementKind::Untested),
+        RecordingProblem::Seen(Seen::Unit | Seen::Clock | Seen::Rails | Seen::DeadChannel, _) => {
+            Some(JudgementKind::Suspect)
+        }
+        RecordingProblem::SlowForTurns(_)
+        | RecordingProblem::Temperatures(..)
+        | RecordingProblem::LostSamples(_)
+        | RecordingProblem::Seen(..) => None,
+    }
+}
+
+/// The judgements that `warnings` and `problems` lead to, in their order. A warning that is also a problem is judged once.
+pub fn judgements<'a>(
+    problems: impl IntoIterator<Item = &'a RecordingProblem>,
+    warnings: impl IntoIterator<Item = &'a Warning>,
+) -> Vec<Judgement> {
+    let of_problems = problems
+        .into_iter()
+        .filter_map(|p| Some(Judgement::new(of_problem(p)?, p)));
+    let others = warnings.into_iter().filter(|w| !w.is_of_recording());
+    let of_warnings = others.filter_map(|w| Some(Judgement::new(of_warning(w)?, w)));
+    of_problems.chain(of_warnings).collect()
+}

@@ -1,0 +1,87 @@
+//! The judgement of curves over temperature.
+
+use mimu::judge::errors::{self, ErrorFigures};
+use mimu::judge::input;
+use mimu::judgement::{Judgement, JudgementKind};
+use mimu::quantity::{Figure, Sensor, significant};
+use mimu::readable;
+
+use crate::fit::{FitVerdict, Judged, ThermalFit};
+use crate::judge::rms;
+use crate::warning::Warning;
+
+/// Errors of curves that usual biases leave, in noise floors: their wander reaches 3 to 4 in the means of half a minute.
+const USUAL: f64 = 4.0;
+
+impl ThermalFit {
+    /// The judgement: the worst that the verdict, the errors, the recordings and the warnings lead to.
+    pub fn judgement(&self) -> Judgement {
+        let by_input = self.warnings.iter().filter_map(|warning| {
+            let kind = match warning {
+                Warning::Recording(warning) => input::of_warning(warning)?,
+                Warning::NotCrossed(_) | Warning::CurvatureRefused(_) => JudgementKind::Untested,
+                _ => return None,
+            };
+            Some(Judgement::new(kind, warning))
+        });
+        let figures: Vec<ErrorFigures> = self
+            .judged
+            .present()
+            .map(|(sensor, judged)| self.figures(sensor, judged))
+            .collect();
+        let by_errors = errors::judge(&figures);
+        let all = by_input
+            .chain(self.by_verdict(&figures))
+            .chain([by_errors.clone()]);
+        Judgement::worst(all).unwrap_or(by_errors)
+    }
+
+    fn by_verdict(&self, figures: &[ErrorFigures]) -> Option<Judgement> {
+        match self.verdict {
+            FitVerdict::Fitted => None,
+            FitVerdict::OneWay => Some(Judgement::new(
+                JudgementKind::Untested,
+                "the temperature goes one way only, so the lag of the dies and the slopes of the curves look alike",
+            )),
+            FitVerdict::Misfit => {
+                let in_sample = |f: &&ErrorFigures| f.rms / f.noise_floor;
+                let worst = figures
+                    .iter()
+                    .max_by(|a, b| in_sample(a).total_cmp(&in_sample(b)))?;
+                let reason = format!(
+                    "{}: the curves err by {} times the noise in the recordings that they were fitted to",
+                    worst.sensor,
+                    significant(in_sample(&worst))
+                );
+                Some(Judgement::new(JudgementKind::Misfit, reason))
+            }
+        }
+    }
+
+    fn figures(&self, sensor: Sensor, judged: &Judged) -> ErrorFigures {
+        let [own, noise_floor] = rms(&judged.errors);
+        let held_out = judged.held_out.as_ref().map(|h| rms(h)[0]);
+        let biases_only = self.joint.curves[sensor]
+            .as_ref()
+            .is_some_and(|c| c.biases_only());
+        ErrorFigures {
+            sensor,
+            figure: Figure::Input,
+            rms: own,
+            // Biases change between power-ons; no curve over temperature predicts that.
+            held_out_rms: judged.without_session_bias.or(held_out),
+            noise_floor,
+            // Where only biases are estimated, the input is constant.
+            input: match (biases_only, sensor) {
+                (true, _) => f64::INFINITY,
+                (false, Sensor::Gyro) => LARGE_RATE,
+                (false, Sensor::Accel) => readable::STANDARD_GRAVITY,
+            },
+            usual: USUAL,
+            cause: None,
+        }
+    }
+}
+
+/// Rate that errors of a gyro are compared with, rad/s: 100 deg/s, as in the errors that an export leaves.
+const LARGE_RATE: f64 = 100.0 * std::f64::consts::PI / 180.0;
