@@ -157,6 +157,7 @@ impl fmt::Display for Warning {
                 }
             }
             Self::Interleaved(parts, why) => write!(f, "one dwell in {parts} is held out instead of blocks: {why}"),
+            Self::LeftOutChanges(0, _, largest) => write!(f, "leaving out dwells or turns changes no parameter by more than its interval; the largest change: {}", largest.join("; ")),
             Self::LeftOutChanges(moved, of, largest) => write!(f, "leaving out dwells or turns changes {moved} of {of} parameters by more than their intervals, most of all: {}", largest.join("; ")),
             Self::NoBetter([came, calibrated], unit, held_out, undecided) => {
                 let how = if *held_out { "on held-out data" } else { "in sample" };
