@@ -16,6 +16,7 @@ pub mod verify;
 
 pub use of_curves::{CurvesOfUnit, TriadOfCurves};
 pub use of_device::DeviceCalibration;
+pub(crate) use of_fit::FIGURE_DIGITS;
 pub use on_device::compensator;
 pub use over_temperature::{
     Curves, DieTable, NodeTable, OverTemperature, TemperatureNode, reference_node,

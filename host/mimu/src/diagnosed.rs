@@ -2,12 +2,13 @@
 
 use mimu_recording::error::{Error, Result};
 
-use crate::calibration::Calibration;
 use crate::calibration::verify::verify;
+use crate::calibration::{Calibration, FIGURE_DIGITS};
 use crate::diagnose::{Diagnosis, Recordings, diagnose};
 use crate::effects::fitted::FittedEffect;
 use crate::fit::{Method, Options};
 use crate::plan::next_experiment::{self, Next};
+use crate::quantity::{PerSensor, rounded};
 use crate::result::diagnosis::DiagnosisResult;
 use crate::warning::Warning;
 
@@ -94,6 +95,17 @@ impl Diagnosed {
     pub fn calibration(&self, created: &str) -> Result<Calibration> {
         let mut made = Calibration::of(&self.diagnosis.after, &self.effects, created)?;
         made.judgement = Some(self.result.judgement.clone());
+        let tables = PerSensor {
+            gyro: &mut made.gyro,
+            accel: &mut made.accel,
+        };
+        for (_, (table, figures)) in tables.zip(self.result.sensors.as_ref()) {
+            let held_out = figures.as_ref().map(|f| f.held_out_rms_after);
+            let held_out = held_out.filter(|rms| rms.is_finite());
+            if let Some(judged) = table.as_mut().and_then(|t| t.judged.as_mut()) {
+                judged.held_out_rms = held_out.map(|rms| rounded(rms, FIGURE_DIGITS));
+            }
+        }
         // An imported recording lacks the unit's number, but it was checked to be of the same unit.
         made.unit_id = made.unit_id.or(self.unit_id.clone());
         Ok(made)

@@ -1,8 +1,7 @@
 //! The calibration that results from curves over temperature.
 
-use super::of_fit::FIGURE_DIGITS;
 use super::of_fit::triad_table;
-use super::{Calibration, Judged, Origin, OverTemperature};
+use super::{Calibration, FIGURE_DIGITS, Judged, Origin, OverTemperature};
 use crate::judgement::Judgement;
 use crate::quantity::{Figure, PerSensor, Sensor, rounded};
 use crate::triad::Triad;

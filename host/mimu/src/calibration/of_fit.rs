@@ -17,7 +17,8 @@ use mimu_recording::{RawUnit, Reference};
 
 /// Digits of standard deviations and intervals.
 const SIGMA_DIGITS: usize = 4;
-pub(super) const FIGURE_DIGITS: usize = 7;
+/// Digits of error figures.
+pub(crate) const FIGURE_DIGITS: usize = 7;
 
 impl Calibration {
     /// The calibration of `fit`, made at `created` (RFC 3339). The fit is of readings without `effects`; the calibration stores their lasting part.

@@ -28,7 +28,7 @@ use crate::effects::fitted::FittedEffect;
 use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
 
-use crate::fit::Split;
+use crate::fit::{SensorFit, Split};
 use acceptance::Acceptance;
 use in_time::others_in_time;
 use leftover::leftover;
@@ -135,6 +135,34 @@ impl Decision {
         let [before, after] = self.held_out_rms.map(|rms| rms * rms - known);
         (!self.accepted.is_empty() && before > 0.0 && after.is_finite())
             .then(|| 1.0 - after.max(0.0) / before)
+    }
+
+    /// Takes the figures of the model without effects from its `fit`, which a calibration without effects would be made of, and those in sample
+    /// with effects from the fit `with_effects`: the same model has the same figures in every result.
+    ///
+    /// The rows are weighted by variance components, and a fit by its extra variances. For the published Xsens session the same affine model
+    /// thus had 0.441 deg in sample and 0.531 held out in one result, 0.428 and 0.549 in the other.
+    pub(super) fn take_figures(&mut self, fit: &SensorFit, with_effects: Option<&SensorFit>) {
+        self.rms[0] = fit.rms();
+        self.rms[1] = with_effects.unwrap_or(fit).rms();
+        if fit.noise_floor().is_finite() {
+            self.noise_floor = fit.noise_floor();
+        }
+        let complete = fit.held_out.count == fit.held_out.parts;
+        // Another split answers another question: whether blocks or scattered dwells are predicted.
+        let alike = self.accepted.is_empty() || fit.held_out.split == self.split;
+        let held_out = fit.held_out_rms().filter(|_| complete && alike);
+        if let Some(held_out) = held_out.filter(|_| self.held_out_rms[0].is_finite()) {
+            self.held_out_rms[0] = held_out;
+            match &mut self.accepted[..] {
+                [] => {
+                    self.held_out_rms[1] = held_out;
+                    self.split = fit.held_out.split;
+                }
+                [only] => only.held_out_rms_before = held_out,
+                _ => {}
+            }
+        }
     }
 
     /// Marks effects that depend on the time since power-on as specific to the recording, because its device had started by `start` instead

@@ -86,6 +86,8 @@ pub enum Untestable {
     Condition(f64),
     /// The directions of gravity that judge the turns are too uncertain: their error over the noise of the turns.
     Reference(f64),
+    /// The turns determine the accelerometer too, so its directions agree with them.
+    WithTurns,
 }
 
 impl std::fmt::Display for Untestable {
@@ -102,6 +104,9 @@ impl std::fmt::Display for Untestable {
                 f,
                 "the poses hardly determine some parameters (condition {condition:.0}); record poses that differ more"
             ),
+            Self::WithTurns => f.write_str(
+                "the poses alone hardly determine the accelerometer, so the turns determine it too, and nothing else judges them; record more poses",
+            ),
             Self::Reference(times) => write!(
                 f,
                 "its turns are judged by the accelerometer's directions of gravity, whose uncertainty is {} times the noise of the turns; record more poses",
@@ -110,6 +115,18 @@ impl std::fmt::Display for Untestable {
         }
     }
 }
+
+/// Whether the turns helped to determine the accelerometer of `fit`.
+fn by_turns(fit: &Fit) -> bool {
+    let accel = fit.sensor(Sensor::Accel);
+    accel.is_some_and(|a| a.estimated.notes.contains(&Warning::WithTurns))
+}
+
+/// How the model without effects is judged, as by a fit.
+const HELD_OUT: Options = Options {
+    holdout_blocks: 4,
+    ..Options::IN_SAMPLE
+};
 
 /// A judgement needs at least this many residuals more than affine parameters.
 const FEWEST: usize = 3;
@@ -132,6 +149,7 @@ impl SensorDiagnosis {
                 Some(Untestable::Condition(condition))
             }
             () if reference > HIDDEN => Some(Untestable::Reference(reference)),
+            () if by_turns(fit) && !matrix_given => Some(Untestable::WithTurns),
             () => None,
         }
     }
@@ -371,7 +389,12 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         }
         _ => Some(prepared.clone()),
     };
-    let before = calibrate(without(&recordings.first).ok_or_else(singular)?)?;
+    let judged = |prepared: Prepared| match held {
+        // A given matrix is judged by the rows alone: its biases are all that a part could be held out of.
+        Some(_) => calibrate(prepared),
+        None => fit(prepared, HELD_OUT),
+    };
+    let before = judged(without(&recordings.first).ok_or_else(singular)?)?;
     let of_later = recordings.later().flat_map(OfRecording::prepared);
     let problems = OfRecording::fitted(&before).into_iter().chain(of_later);
     let problems = problems.collect();
@@ -406,21 +429,34 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         };
         let Pass {
             rows,
-            decision,
+            mut decision,
             found,
             after,
         } = passes.best()?;
+        let affine = match effects.is_empty() {
+            true => before.clone(),
+            false => judged(now.prepared.clone())?,
+        };
+        let with_effects = after.is_some();
         if let Some(after) = after {
             effects.extend(found);
             (now, later) = after?;
+        }
+        if held.is_none()
+            && found_in == 1
+            && let Some(affine) = affine.sensor(sensor)
+        {
+            let with_effects = now.sensor(sensor).filter(|_| with_effects);
+            decision.take_figures(affine, with_effects);
         }
         open.extend(uncertainty::of_affine(&rows, &decision).map(|part| (sensor, part)));
         if sensor == Sensor::Accel && by_gravity {
             let models = Sensor::BOTH.map(|s| now.sensor(s).map(|f| f.estimated.triad.inverse));
             let head = session(&now.prepared, models);
             forces = match held {
-                None => uncertainty::of_forces(&head, &rows, &decision),
-                Some(_) => now.sensor(sensor).map(|f| {
+                None if !by_turns(&now) => uncertainty::of_forces(&head, &rows, &decision),
+                // With the turns the fit knows the directions better than the poses alone do.
+                _ => now.sensor(sensor).map(|f| {
                     let covariance = &f.estimated.triad.inverse_covariance;
                     uncertainty::of_given_forces(&now.prepared, covariance)
                 }),

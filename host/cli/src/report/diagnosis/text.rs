@@ -19,8 +19,8 @@ use mimu::readable;
 use mimu::result::diagnosis::{DiagnosisResult, SecondResult, SensorDiagnosisResult};
 use mimu::warning::Warning;
 
-/// Why the figures differ from those of `mimu fit`.
-const FIGURES: &str = "The figures before differ slightly from those of `mimu fit`, because residuals are weighted by the variance components of this diagnosis.";
+/// Where the figures come from.
+const FIGURES: &str = "The figures before are those of `mimu fit` for the same recording. Held out, the figures after are those of effects and calibration found without the part that is judged.";
 /// Remark on residuals that can come from the biases of usual sensors.
 pub(super) const USUAL: &str = "usual biases wander by up to four times the noise of a dwell; --noise (from `mimu allan` of the unit at rest) shows whether this one does";
 /// Largest number of residuals of a sensor in the summary.
