@@ -82,10 +82,24 @@ pub fn needs_calibrated(from: &Sources) -> Option<String> {
     })
 }
 
-/// Lines after the first ones, for the file and the terminal.
-pub fn notes_and_remaining(export: &Export) -> Vec<String> {
-    let mut lines: Vec<String> = export.judgements.iter().map(JudgedSource::line).collect();
-    lines.extend(export.formulas.iter().cloned());
+/// Lines after the first ones, for the file.
+fn notes_and_remaining(export: &Export) -> Vec<String> {
+    let judgements = export.judgements.iter().map(JudgedSource::line);
+    judgements.chain(after_judgements(export)).collect()
+}
+
+/// The same for the terminal, where a judgement that is not good is a warning.
+pub fn for_terminal(export: &Export) -> Vec<String> {
+    let line = |source: &JudgedSource| match source.is_good() {
+        true => source.line(),
+        false => format!("warning: {}", source.line()),
+    };
+    let judgements = export.judgements.iter().map(line);
+    judgements.chain(after_judgements(export)).collect()
+}
+
+fn after_judgements(export: &Export) -> Vec<String> {
+    let mut lines = export.formulas.clone();
     lines.extend(export.notes.iter().cloned());
     for (head, errors) in [
         (

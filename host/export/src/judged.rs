@@ -1,5 +1,6 @@
 //! What is known of the quality of an export's sources: their judgements, and the errors of the calibration that every program inherits.
 
+use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::calibration::{Calibration, TriadTable};
 use mimu::judgement::Judgement;
 use mimu::quantity::Sensor;
@@ -37,11 +38,19 @@ impl JudgedSource {
         all
     }
 
+    /// Whether it is judged good.
+    pub fn is_good(&self) -> bool {
+        self.judgement.as_ref().is_some_and(Judgement::is_good)
+    }
+
     /// One line for comments and the terminal.
     pub fn line(&self) -> String {
         match &self.judgement {
             Some(judgement) => format!("judgement of the {}: {judgement}", self.source),
-            None => format!("judgement of the {}: its file contains none", self.source),
+            None => format!(
+                "judgement of the {}: none, its file does not contain one",
+                self.source
+            ),
         }
     }
 }
@@ -77,4 +86,17 @@ pub fn errors_of(calibration: &Calibration) -> Vec<Remaining> {
 pub fn held_out(calibration: &Calibration, sensor: Sensor) -> Option<f64> {
     let judged = calibration.table(sensor)?.judged.as_ref()?;
     judged.held_out_rms.filter(|_| judged.unit == sensor.unit())
+}
+
+/// The error of curves at rest: `rms` raw, in the unit of `cubics`.
+pub fn error_of_curves(cubics: &BiasCubics, rms: f64) -> Remaining {
+    let factors = cubics.conversion.si_per_raw.map(f64::abs);
+    Remaining {
+        sensor: cubics.sensor,
+        source: "error of unseen data".into(),
+        condition: "readings at rest minus the curves".into(),
+        unit: cubics.unit,
+        rms: Some(rms * factors.iter().sum::<f64>() / 3.0),
+        max: None,
+    }
 }

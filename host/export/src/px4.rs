@@ -17,7 +17,7 @@ use mimu_recording::error::{Argument, Result};
 use crate::one_temperature::{self, LETTERS, Offsets, within};
 use crate::parameters::Parameter;
 use crate::remaining::Remaining;
-use crate::{Export, Sources, heading, parameters, remaining};
+use crate::{Export, Sources, heading, judged, parameters, remaining};
 
 /// Options of PX4's parameters.
 pub type Options = parameters::Options;
@@ -115,7 +115,13 @@ pub(crate) fn cubics_at_rest(
         export,
         |sensor, known| BiasCubics::of_rest(biases, sensor, known, range_c, reference_c),
         |sensor| format!("The recording has no readings of the {sensor}: none are written."),
-    )
+    )?;
+    for cubics in &export.cubics {
+        let rms = biases.rms[cubics.sensor];
+        let error = rms.map(|rms| judged::error_of_curves(cubics, rms));
+        export.calibration_errors.extend(error);
+    }
+    Ok(())
 }
 
 /// Adds the cubics that `of` finds for a sensor, or the note `none` where it finds none.

@@ -68,7 +68,7 @@ impl Seen {
     fn of(warning: &Warning) -> Option<Self> {
         Some(match warning {
             Warning::Of(_, warning) | Warning::Channel(_, warning) => return Self::of(warning),
-            Warning::NotSi(..) | Warning::Turning(_) => Self::Unit,
+            Warning::NotSi(..) | Warning::NotCounts(..) | Warning::Turning(_) => Self::Unit,
             Warning::Dead(_) => Self::DeadChannel,
             Warning::EndOfConverter(..) | Warning::RunAtEnd(..) | Warning::CalmEnd(..) => {
                 Self::Rails

@@ -63,6 +63,9 @@ pub enum Warning {
     OtherGravity([f64; 2], f64, bool),
     /// Readings in SI: whether they are at rest (and include biases), how many times their input they are, and the likely cause.
     NotSi(bool, f64, &'static str),
+    /// Readings that are declared as counts, but are fractions and have the scale factor of a unit: their number per SI unit, the unit that they
+    /// are in, and how to import them.
+    NotCounts(f64, &'static str, &'static str),
     /// Reading of a gyro at rest, rad/s, that is larger than any bias.
     Turning(f64),
     /// Calibrated rate at rest, rad/s rms, by which dwells differ.

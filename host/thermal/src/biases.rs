@@ -2,13 +2,14 @@
 
 use mimu::calibration::Origin;
 use mimu::calibration::thermal_biases::{BiasNode, RestOfUnit, RestReading, ThermalBiases};
-use mimu::quantity::Sensor;
+use mimu::quantity::{PerSensor, Sensor};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Matrix3;
 
 use crate::curves::TriadCurves;
 use crate::fit::{ThermalFit, range};
+use crate::judge::rms;
 use crate::nodes::{Inverse, fewest, with_lags};
 
 impl ThermalFit {
@@ -80,6 +81,10 @@ impl ThermalFit {
             },
             range_c,
             judgement: self.judgement(),
+            rms: PerSensor::from_fn(|sensor| {
+                let judged = self.judged[sensor].as_ref()?;
+                Some(rms(judged.shown())[0])
+            }),
             nodes: readings.collect(),
             dies: over.dies,
         };

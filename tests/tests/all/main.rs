@@ -6,6 +6,7 @@ mod diagnosis;
 mod few_poses;
 mod flaws;
 mod joint;
+mod judgement;
 mod module_circles;
 mod next_experiment;
 mod noise_of_the_bench;

@@ -81,7 +81,7 @@ fn the_list_is_first_and_a_summary_has_at_most_25_lines_of_100_columns() {
         println!("{summary}");
         assert!(summary.lines().count() <= 25, "{summary}");
         // A sentence is one line; tables keep to the columns.
-        let sentences = ["  - ", "warning:", "next:", "verdict:"];
+        let sentences = ["  - ", "warning:", "next:", "judgement:"];
         for line in summary
             .lines()
             .filter(|l| !sentences.iter().any(|s| l.starts_with(s)))
@@ -94,8 +94,8 @@ fn the_list_is_first_and_a_summary_has_at_most_25_lines_of_100_columns() {
             .lines()
             .position(|l| l == "problems of this recording:");
         assert_eq!(headed.is_some(), !problems.is_empty());
-        let verdict = summary.lines().position(|l| l.starts_with("verdict:"));
-        assert!(headed < verdict, "{summary}");
+        let judgement = summary.lines().position(|l| l.starts_with("judgement:"));
+        assert!(headed < judgement, "{summary}");
         let json = serde_json::to_value(&result).expect("JSON");
         let listed = json["recording_problems"].as_array().expect("a list");
         assert_eq!(listed.len(), problems.len());

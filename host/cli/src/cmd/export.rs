@@ -79,7 +79,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         bytes: content.len(),
         export,
     };
-    let mut lines = heading::notes_and_remaining(&result.export);
+    let mut lines = heading::for_terminal(&result.export);
     lines.push(format!("{}: {}", result.export.to, result.file));
     let text = lines.join("\n") + "\n";
     print(&args.json, &text, &result, Some(stage(path, content)?))

@@ -146,9 +146,17 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         Some(d) => {
             let mut out = String::new();
             problems(&mut out, &d.recording_problems, d.has_several(), false);
-            out + &format!("{}: {}\n", d.device, d.verdict.name())
+            out + &format!(
+                "{}: {}\njudgement: {}\n",
+                d.device,
+                d.verdict.name(),
+                d.judgement
+            )
         }
-        None => format!("{}\n", calibration.device),
+        None => match &calibration.judgement {
+            Some(judgement) => format!("{}\njudgement: {judgement}\n", calibration.device),
+            None => format!("{}\n", calibration.device),
+        },
     };
     show(&format!("{verdict}page: {}\n", args.out.display()))
 }

@@ -16,6 +16,9 @@ pub fn apply_text(applied: &Applied) -> String {
         applied.recording,
         plural(applied.rows, "row")
     );
+    if let Some(judgement) = &applied.judgement {
+        let _ = writeln!(out, "  calibration: {judgement}");
+    }
     match applied.effects.as_slice() {
         [] => {}
         effects => {

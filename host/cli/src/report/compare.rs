@@ -48,6 +48,11 @@ pub fn compare_text(result: &Comparison, all: bool) -> String {
             out += "\nrepeatability: the spread beyond the uncertainty of the fits, 1 σ\n";
         }
     }
+    for (file, judgement) in result.files.iter().zip(&result.judgements) {
+        if let Some(judgement) = judgement.as_ref().filter(|j| !j.is_good()) {
+            let _ = writeln!(out, "{file}: {judgement}");
+        }
+    }
     for note in &result.notes {
         let _ = writeln!(out, "note: {note}");
     }

@@ -68,6 +68,7 @@ fn head(result: &ThermalResult, made: &Made) -> Markup {
                 dt { "Recording" } dd { code { (recording.samples) } ", SHA-256 " code { (recording.sha256) } }
             }
             dt { "Estimator" } dd { (result.estimator) }
+            dt { "Judgement" } dd { (result.judgement) }
             dt { "Fitted" } dd { (made.created) }
         }
     }

@@ -97,7 +97,7 @@ fn causes_text(out: &mut String, name: Sensor, causes: &Causes) {
     });
     let changes: Vec<String> = changes.collect();
     let text = format!(
-        "the bias has changed by {} {}; of the mean square error {}",
+        "the bias has changed by {} {}; of the error {}",
         changes.join(", "),
         unit.unit,
         causes.words()
@@ -108,6 +108,10 @@ fn causes_text(out: &mut String, name: Sensor, causes: &Causes) {
 /// Next step after the verification.
 fn next(verification: &Verification) -> String {
     let again = "fit this recording (mimu fit), and compare both calibrations (mimu compare)";
+    let contradicted = |w: &Warning| matches!(w, Warning::OtherGravity(_, _, true));
+    if verification.warnings.iter().any(contradicted) {
+        return "give the recording the gravity of its place (mimu import --gravity), and verify again".into();
+    }
     match verification.judgement.kind {
         JudgementKind::Good => return "use the calibration".into(),
         JudgementKind::Untested => {

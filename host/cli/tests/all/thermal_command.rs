@@ -149,7 +149,7 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
         println!("{short}");
         assert!(short.lines().count() <= 25, "{short}");
         assert!(all.lines().count() > short.lines().count(), "{all}");
-        let sentences = ["verdict:", "warning:", "next:"];
+        let sentences = ["verdict:", "judgement:", "warning:", "next:"];
         for line in short
             .lines()
             .filter(|l| !sentences.iter().any(|s| l.starts_with(s)))

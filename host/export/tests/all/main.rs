@@ -1,5 +1,6 @@
 //! Exports whose truth is the compiler, the device, or a published file.
 
+mod judged;
 mod rust_source;
 mod schema;
 mod stream;

@@ -14,6 +14,7 @@ use crate::calibration::die_temperature::outside;
 use crate::calibration::verify::check_unit;
 use crate::calibration::{Calibration, compensator};
 use crate::effects::quantity::Need;
+use crate::judgement::Judgement;
 use crate::quantity::{PerSensor, Sensor, present};
 use crate::signal::blocks::{Condensed, Rails};
 use crate::signal::rails::find;
@@ -33,6 +34,8 @@ pub struct Applied {
     pub format: &'static str,
     /// Directory of the compensated recording.
     pub recording: String,
+    /// The judgement of the calibration; null if its file contains none.
+    pub judgement: Option<Judgement>,
     /// Rows written: as many as the recording has.
     pub rows: u64,
     /// Sensors that were compensated.
@@ -93,6 +96,7 @@ pub fn apply(
     Ok(Applied {
         format: "mimu-apply/1",
         recording: written.display().to_string(),
+        judgement: calibration.judgement.clone(),
         rows,
         sensors: PerSensor::from_fn(|sensor| has[sensor].then_some(counts[sensor])),
         gaps: condensed.gaps.0,

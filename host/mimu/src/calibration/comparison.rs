@@ -8,6 +8,7 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::Calibration;
+use crate::judgement::Judgement;
 use crate::quantity::{AXES, Sensor};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
@@ -23,6 +24,8 @@ pub struct Comparison {
     pub format: &'static str,
     /// Files, in the order of the values.
     pub files: Vec<String>,
+    /// The judgement of each file; null if it contains none.
+    pub judgements: Vec<Option<Judgement>>,
     /// Parameters that all of them have.
     pub parameters: Vec<ComparedParameter>,
     /// What a person should know.
@@ -129,6 +132,7 @@ pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
     Ok(Comparison {
         format: "mimu-compare/1",
         files: all.iter().map(|(file, _)| file.clone()).collect(),
+        judgements: all.iter().map(|(_, c)| c.judgement.clone()).collect(),
         parameters,
         notes,
     })

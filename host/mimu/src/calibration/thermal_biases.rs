@@ -45,6 +45,9 @@ pub struct ThermalBiases {
     pub tool: String,
     /// The judgement of the curves.
     pub judgement: Judgement,
+    /// Rms error of the curves, raw: of unseen data, or of the fitted ones where nothing was held out.
+    #[serde(default)]
+    pub rms: PerSensor<Option<f64>>,
     /// Dies' temperatures in the recordings that it was fitted to, °C.
     pub range_c: [f64; 2],
     /// The recording that it was made from.
@@ -143,6 +146,8 @@ pub struct RestOfUnit {
     pub dies: PerSensor<DieTable>,
     /// The judgement of the curves.
     pub judgement: Judgement,
+    /// As in [`ThermalBiases::rms`].
+    pub rms: PerSensor<Option<f64>>,
     /// Readings, the coldest first.
     pub nodes: Vec<BiasNode>,
 }
@@ -161,6 +166,7 @@ impl ThermalBiases {
             created: created.into(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             judgement: unit.judgement,
+            rms: unit.rms,
             range_c: unit.range_c,
             recording: unit.recording,
             dies: unit.dies,

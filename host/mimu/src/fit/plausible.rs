@@ -10,7 +10,7 @@ use crate::estimate::Failure;
 use crate::prepared::Prepared;
 use crate::quantity::Figure;
 use crate::quantity::significant;
-use crate::signal::unit_in_si::{restless, wrong_gain};
+use crate::signal::unit_in_si::{not_counts, restless, wrong_gain};
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RAW_COLUMNS, RawUnit, Reference};
@@ -191,19 +191,29 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     Some(warning.of(fit.sensor))
 }
 
-/// Warns about readings in SI whose scale factor is wrong.
+/// Whether the readings of a sensor are fractions. The quantisation step shows it: a file with decimals has a step of less than 1, or none.
+fn has_fractions(prepared: &Prepared, fit: &SensorFit) -> bool {
+    let steps = &prepared.condensed.quantisation_step[fit.sensor.channels()];
+    // A table of means has fractions of counts.
+    let whole = |step: &Option<f64>| step.is_some_and(|s| s > 0.99);
+    !prepared.manifest.means && !steps.iter().any(whole)
+}
+
+/// Warns about readings in SI whose scale factor is wrong, and about counts that are in SI.
 fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let matrix = &fit.estimated.triad.forward.matrix;
     let scale = matrix.row_iter().map(|r| r.norm()).sum::<f64>() / 3.0;
-    if prepared.manifest.raw_unit != RawUnit::Si {
-        return None;
+    match prepared.manifest.raw_unit {
+        RawUnit::Volt => None,
+        RawUnit::Count if !has_fractions(prepared, fit) => None,
+        RawUnit::Count => not_counts(fit.sensor, scale),
+        RawUnit::Si => wrong_gain(
+            fit.sensor,
+            scale,
+            prepared.manifest.gravity_mps2,
+            fit.figure,
+        ),
     }
-    wrong_gain(
-        fit.sensor,
-        scale,
-        prepared.manifest.gravity_mps2,
-        fit.figure,
-    )
 }
 
 /// Warns about rests in which the gyro turns.

@@ -110,7 +110,7 @@ pub fn judge(all: &[ErrorFigures]) -> Judgement {
             .map(|f| format!("{} ({})", significant(f.over_noise()), f.sensor));
         let each: Vec<String> = each.collect();
         let reason = format!(
-            "the error of unseen data is {} times the noise",
+            "the error of unseen data is {} times what noise explains",
             each.join(" and ")
         );
         Judgement::new(JudgementKind::Good, reason)

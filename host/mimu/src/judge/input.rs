@@ -1,17 +1,19 @@
 //! Whether the input is what it is declared to be.
 
 use crate::judgement::{Judgement, JudgementKind};
-use crate::recording_problem::{RecordingProblem, Seen};
+use crate::recording_problem::RecordingProblem;
 use crate::warning::Warning;
 
 /// The kind of judgement that `warning` alone leads to; `None` if a good result may have it.
 ///
 /// `Suspect`: the readings contradict their unit, rate, sign, range or columns. All data agree with such an input, so no residual shows it.
+/// The ends of a 16-bit converter are none of these: samples there are known to be clipped and are left out.
 /// `Untested`: the data cannot contradict the result.
 pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
     match warning {
         Warning::Of(_, warning) | Warning::Channel(_, warning) => of_warning(warning),
         Warning::NotSi(..)
+        | Warning::NotCounts(..)
         | Warning::Turning(_)
         | Warning::Restless(_)
         | Warning::RateOff(..)
@@ -25,17 +27,14 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
         | Warning::OtherUnit(..)
         | Warning::OtherDevice(..)
         | Warning::Dead(_)
-        | Warning::EndOfConverter(..)
         | Warning::RunAtEnd(..)
-        | Warning::CalmEnd(..)
-        | Warning::MeansOfTurns => Some(JudgementKind::Suspect),
+        | Warning::CalmEnd(..) => Some(JudgementKind::Suspect),
         Warning::NoResiduals
         | Warning::FewResiduals
         | Warning::PoorlyDetermined(_)
         | Warning::UnseenPoses(..)
         | Warning::SameRecording
-        | Warning::NothingToJudge
-        | Warning::Undecided(..) => Some(JudgementKind::Untested),
+        | Warning::NothingToJudge => Some(JudgementKind::Untested),
         Warning::NoBetter(.., None) | Warning::Worse(_) | Warning::Outliers(..) => {
             Some(JudgementKind::Unexplained)
         }
@@ -48,13 +47,10 @@ pub fn of_problem(problem: &RecordingProblem) -> Option<JudgementKind> {
     match problem {
         RecordingProblem::Offset(..) => Some(JudgementKind::Suspect),
         RecordingProblem::MissingPoses(_) => Some(JudgementKind::Untested),
-        RecordingProblem::Seen(Seen::Unit | Seen::Clock | Seen::Rails | Seen::DeadChannel, _) => {
-            Some(JudgementKind::Suspect)
-        }
+        RecordingProblem::Seen(_, warnings) => warnings.iter().filter_map(of_warning).max(),
         RecordingProblem::SlowForTurns(_)
         | RecordingProblem::Temperatures(..)
-        | RecordingProblem::LostSamples(_)
-        | RecordingProblem::Seen(..) => None,
+        | RecordingProblem::LostSamples(_) => None,
     }
 }
 

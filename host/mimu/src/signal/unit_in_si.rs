@@ -3,6 +3,7 @@
 use mimu_recording::{Manifest, RawUnit, Reference};
 
 use crate::quantity::{Figure, Sensor};
+use crate::readable::STANDARD_GRAVITY;
 use crate::signal::blocks::quantile;
 use crate::signal::dwell::Dwell;
 use crate::warning::Warning;
@@ -61,6 +62,40 @@ fn said_of(
         _ => "check the unit, and the range that the part was set to",
     };
     Some(Warning::NotSi(at_rest, scale, cause).of(sensor))
+}
+
+/// Sensors have the scale factor of their unit to within this share.
+const OF_UNIT: f64 = 0.1;
+
+/// The warning about fractions that are declared as counts, if `scale`, their number per SI unit, is that of a unit. Whole numbers are counts
+/// whatever their scale: many drivers give mg or mdps.
+pub(crate) fn not_counts(sensor: Sensor, scale: f64) -> Option<Warning> {
+    let g = STANDARD_GRAVITY;
+    let degrees = 1f64.to_degrees();
+    let units: &[(f64, &'static str, &'static str)] = match sensor {
+        Sensor::Gyro => &[
+            (1.0, "rad/s", "raw unit SI"),
+            (
+                degrees,
+                "deg/s",
+                "raw unit SI and the factor gyro=0.0174533",
+            ),
+            (
+                1e3 * degrees,
+                "mdps",
+                "raw unit SI and the factor gyro=1.74533e-5",
+            ),
+        ],
+        Sensor::Accel => &[
+            (1.0, "m/s²", "raw unit SI"),
+            (1.0 / g, "g", "raw unit SI and the factor accel=9.80665"),
+            (1e3 / g, "mg", "raw unit SI and the factor accel=0.00980665"),
+        ],
+    };
+    let found = units
+        .iter()
+        .find(|(of, ..)| (scale / of - 1.0).abs() < OF_UNIT);
+    found.map(|(_, unit, remedy)| Warning::NotCounts(scale, unit, remedy).of(sensor))
 }
 
 /// Warnings about readings at rest that should be in SI. With known inputs the fit warns instead.

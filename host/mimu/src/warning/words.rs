@@ -90,6 +90,7 @@ impl fmt::Display for Warning {
                 };
                 write!(f, "raw_unit = \"SI\", but {what} {} times the input: {cause}", significant(*times))
             }
+            Self::NotCounts(scale, unit, remedy) => write!(f, "raw_unit = \"count\", but the readings are fractions, and the fit gives {} of them per SI unit: they are in {unit}; import them with {remedy}", significant(*scale)),
             Self::Turning(rate) => write!(f, "at rest it reads {} deg/s, more than any bias: the unit turns evenly, or the readings are in deg/s", degrees(*rate)),
             Self::Restless(rms) => write!(f, "from dwell to dwell the calibrated rate at rest differs by {} deg/s rms, more than any bias: in some dwells the unit turned evenly, about the vertical if the accelerometer shows nothing; leave these dwells out", degrees(*rms)),
             Self::OtherGravity([ours, theirs], mean, contradicted) => {

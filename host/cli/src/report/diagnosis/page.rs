@@ -199,6 +199,7 @@ fn head(d: &DiagnosisResult, made: &Made) -> Markup {
             }
             dt { "Input" } dd { (known) "; gravity " data value=(d.gravity_mps2) { (format!("{:.5}", d.gravity_mps2)) " m/s²" } }
             dt { "Judged by" } dd { (counts.join(", ")) }
+            dt { "Judgement" } dd { (d.judgement) }
             dt { "Diagnosed" } dd { (made.created) }
         }
     }

@@ -26,7 +26,7 @@ impl Causes {
             None => String::new(),
         };
         format!(
-            "of its square a changed bias explains {}, the matrix {}{accel}",
+            "a changed bias explains {} of its square, the matrix {}{accel}",
             share(&self.bias),
             share(&self.matrix)
         )
@@ -52,12 +52,17 @@ fn input_size(prepared: &Prepared, sensor: Sensor, figure: Figure) -> f64 {
     if size > 0.0 { size } else { f64::INFINITY }
 }
 
-fn figures(prepared: &Prepared, sensor: Sensor, s: &SensorVerification) -> ErrorFigures {
+fn figures(
+    prepared: &Prepared,
+    sensor: Sensor,
+    s: &SensorVerification,
+    unseen: bool,
+) -> ErrorFigures {
     ErrorFigures {
         sensor,
         figure: s.figure,
         rms: s.rms,
-        held_out_rms: Some(s.rms),
+        held_out_rms: unseen.then_some(s.rms),
         noise_floor: s.noise_floor,
         input: input_size(prepared, sensor, s.figure),
         usual: BEYOND_NOISE,
@@ -72,9 +77,23 @@ pub(super) fn judgement(
     warnings: &[Warning],
 ) -> Judgement {
     let problems = RecordingProblem::without_fit(prepared);
+    let gravity = warnings.iter().find_map(|w| match w {
+        Warning::OtherGravity([ours, theirs], _, true) => Some(format!(
+            "gravity is {ours} m/s² in the calibration and {theirs} in the recording, which the readings contradict"
+        )),
+        _ => None,
+    });
+    let unseen = !warnings.contains(&Warning::SameRecording);
     let figures: Vec<ErrorFigures> = sensors
         .iter()
-        .map(|(sensor, s)| figures(prepared, *sensor, s))
+        .map(|(sensor, s)| figures(prepared, *sensor, s, unseen))
+        .map(|f| match (f.sensor, &gravity) {
+            (Sensor::Accel, Some(gravity)) => ErrorFigures {
+                cause: Some(gravity.clone()),
+                ..f
+            },
+            _ => f,
+        })
         .collect();
     let by_errors = errors::judge(&figures);
     let all = input::judgements(&problems, warnings);
