@@ -125,7 +125,7 @@ function importArguments(looked, names, roles, device, alone = false) {
     } else args.push("--raw-unit", units.every((unit) => unit === "V") ? "V" : "count");
     add("--time-unit", $("time-unit").value);
     add("--rate-hz", $("rate").value.trim().replace(",", "."));
-  } else add("--topic", $("topic").value.trim());
+  } else $("topic").value.split(/[\s,]+/).forEach((topic) => add("--topic", topic));
   add("--gravity", $("gravity").value.trim().replace(",", "."));
   add("--latitude", $("latitude").value.trim().replace(",", "."));
   args.push("--reference", $("reference").value);

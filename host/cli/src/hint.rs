@@ -7,7 +7,7 @@ use mimu_thermal::warning::Warning as OverTemperature;
 use mimu_wizard::waiting::Waiting;
 
 /// Flags of the import. They are a remedy after any command that reads a recording; other flags only after the command that refused.
-const OF_THE_IMPORT: [&str; 15] = [
+const OF_THE_IMPORT: [&str; 18] = [
     "--columns",
     "--rate-hz",
     "--time-unit",
@@ -17,6 +17,9 @@ const OF_THE_IMPORT: [&str; 15] = [
     "--rate-dps",
     "--rate-error",
     "--where",
+    "--comment",
+    "--separator",
+    "--twos-complement",
     "--topic",
     "--instance",
     "--preset",
@@ -119,6 +122,9 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::OtherUnit => "--other-unit",
         Argument::Topic => "--topic",
         Argument::Where => "--where",
+        Argument::Comment => "--comment",
+        Argument::Separator => "--separator",
+        Argument::TwosComplement => "--twos-complement",
         Argument::Instance => "--instance",
         Argument::Preset => "--preset",
         Argument::Means => "--means",

@@ -84,6 +84,12 @@ pub enum Argument {
     Instance,
     /// Which rows of a foreign file are read.
     Where,
+    /// Characters that begin a comment.
+    Comment,
+    /// What separates the cells of a text file.
+    Separator,
+    /// Columns of unsigned codes in two's complement.
+    TwosComplement,
     /// Software or device whose files are read.
     Preset,
     /// Whether rows are means instead of samples.

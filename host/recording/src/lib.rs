@@ -39,6 +39,7 @@ mod staging;
 mod strict_file;
 mod toml_file;
 mod turntable;
+mod unit_name;
 mod warning;
 #[cfg(not(feature = "parquet"))]
 mod without_parquet;
@@ -54,10 +55,10 @@ pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
 pub use held::{Held, HeldReadings};
 pub use import::{
-    BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, Decimal, Face, ImportOptions,
-    ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Preview, Role,
-    Rounds, RowFilter, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log,
-    preview,
+    BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, Decimal, Face,
+    ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse,
+    Preview, Role, Rounds, RowFilter, Scale, SkippedLines, TimeSummary, TwosComplement, Zero,
+    import, is_log, preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
@@ -68,5 +69,6 @@ pub use recorded::{Recorded, Restart};
 pub use separator::Separator;
 pub use toml_file::{parse_toml, read_text};
 pub use turntable::{Turntable, TurntableRate, rate_error};
+pub use unit_name::{UNNAMED, are_two_units, two_units};
 pub use warning::Warning;
 pub use writer::{SampleFormat, Writer};

@@ -137,7 +137,7 @@ pub struct Source {
 pub struct Manifest {
     /// Version of the layout.
     pub format: Format,
-    /// Unit that was recorded.
+    /// Unit that was recorded; [`UNNAMED`](crate::UNNAMED) if nobody has named it.
     pub device: String,
     /// Nominal sample rate in Hz. Only means may lack it; it is NaN then.
     #[serde(default = "unknown", skip_serializing_if = "is_unknown")]
@@ -207,6 +207,12 @@ impl Manifest {
     pub fn unit_id(&self) -> Option<&str> {
         let recorded = self.recorded.as_ref()?;
         Some(recorded.unit_id.as_str()).filter(|id| id.bytes().any(|digit| digit != b'0'))
+    }
+
+    /// Whether an import computed the sample rate from the time stamps, and nobody gave it.
+    pub fn has_rate_of_stamps(&self) -> bool {
+        let given = self.imported_with.iter().any(|a| a == "--rate-hz");
+        !self.imported_with.is_empty() && !given
     }
 
     /// Whether it was joined from files that follow one another, one step each.

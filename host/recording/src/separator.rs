@@ -17,6 +17,26 @@ pub enum Separator {
     Tab,
     /// Any number of blanks and tabs.
     Whitespace,
+    /// Each of several characters, as in messages of receivers: `$A,1;2*5f` has four cells.
+    AnyOf(Characters),
+}
+
+/// Some characters of ASCII.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Characters(u128);
+
+impl Characters {
+    /// Those of `text`; `None` if one is not a printable sign of ASCII, is a letter, a digit or part of a number, or if there is none.
+    fn of(text: &str) -> Option<Self> {
+        let fits = |b: &u8| (b.is_ascii_punctuation() && !b"+-.\"".contains(b)) || *b == b' ';
+        let bits = text.bytes().map(|b| fits(&b).then(|| 1_u128 << b));
+        let all = bits.reduce(|a, b| Some(a? | b?))??;
+        Some(Self(all))
+    }
+
+    fn contains(self, byte: u8) -> bool {
+        byte.is_ascii() && self.0 >> byte & 1 == 1
+    }
 }
 
 impl Separator {
@@ -58,6 +78,17 @@ impl Separator {
         best.1
     }
 
+    /// Whether `byte` separates cells.
+    pub(crate) fn separates(self, byte: u8) -> bool {
+        match self {
+            Separator::Comma => byte == b',',
+            Separator::Semicolon => byte == b';',
+            Separator::Tab => byte == b'\t',
+            Separator::Whitespace => byte.is_ascii_whitespace(),
+            Separator::AnyOf(characters) => characters.contains(byte),
+        }
+    }
+
     /// Splits `line` into `cells`; quotes keep a separator inside a cell.
     pub(crate) fn split(self, line: &[u8], cells: &mut csv::ByteRecord) {
         cells.clear();
@@ -65,6 +96,12 @@ impl Separator {
             Separator::Comma => b',',
             Separator::Semicolon => b';',
             Separator::Tab => b'\t',
+            Separator::AnyOf(characters) => {
+                for cell in line.split(|&byte| characters.contains(byte)) {
+                    cells.push_field(cell.trim_ascii());
+                }
+                return;
+            }
             Separator::Whitespace => {
                 let words = line.split(u8::is_ascii_whitespace);
                 for word in words.filter(|word| !word.is_empty()) {
@@ -116,11 +153,13 @@ impl FromStr for Separator {
             ";" | "semicolon" => Ok(Separator::Semicolon),
             "\t" | "tab" => Ok(Separator::Tab),
             " " | "whitespace" => Ok(Separator::Whitespace),
-            _ => Err(Error::new(
-                "separator",
-                format!("{} is unknown", shorten(text.as_bytes())),
-                "write comma, semicolon, tab or whitespace",
-            )),
+            _ => Characters::of(text).map(Separator::AnyOf).ok_or_else(|| {
+                Error::new(
+                    "separator",
+                    format!("{} is unknown", shorten(text.as_bytes())),
+                    "write comma, semicolon, tab, whitespace, or all characters that separate cells: ',;*'",
+                )
+            }),
         }
     }
 }
@@ -128,6 +167,10 @@ impl FromStr for Separator {
 impl fmt::Display for Separator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Separator::AnyOf(characters) => {
+                let all = (0..128_u8).filter(|byte| characters.contains(*byte));
+                return f.write_str(&all.map(char::from).collect::<String>());
+            }
             Separator::Comma => "comma",
             Separator::Semicolon => "semicolon",
             Separator::Tab => "tab",
@@ -158,6 +201,21 @@ mod tests {
             assert_eq!(Separator::detect(&lines), expected);
         }
         Separator::detect(&[]);
+    }
+
+    #[test]
+    fn each_of_several_characters_separates_cells() {
+        let separator: Separator = ",;*".parse().unwrap();
+        let mut cells = csv::ByteRecord::new();
+        separator.split(b"%RAW,7;8,-643*0000abcd", &mut cells);
+        assert_eq!(cells, vec!["%RAW", "7", "8", "-643", "0000abcd"]);
+        assert_eq!(
+            separator.to_string().parse::<Separator>().unwrap(),
+            separator
+        );
+        for text in ["", "ab", ",.", "\u{b5},"] {
+            assert!(text.parse::<Separator>().is_err(), "{text}");
+        }
     }
 
     #[test]

@@ -9,9 +9,9 @@ use mimu::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
-    BrokenLimit, ColumnList, Decimal, Face, ImportOptions, ImportSummary, Offset, Preset, RawUnit,
-    Reference, RowFilter, SampleFormat, Scale, Separator, Turntable, TurntableRate, TwosComplement,
-    Zero, import, is_log, rate_error,
+    BrokenLimit, ColumnList, CommentSigns, Decimal, Face, ImportOptions, ImportSummary, Offset,
+    Preset, RawUnit, Reference, RowFilter, SampleFormat, Scale, Separator, Turntable,
+    TurntableRate, TwosComplement, Zero, import, is_log, rate_error,
 };
 
 use crate::arguments::JsonArgs;
@@ -25,7 +25,7 @@ pub(crate) struct ImportArgs {
     #[arg(required_unless_present = "faces")]
     files: Vec<PathBuf>,
     /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header (`gyro_x=wx,t_s=time`); one list for
-    /// each file
+    /// each file, or several for a file with a sensor in other columns or rows (--where)
     ///
     /// Names of columns: t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., ref_rate_x_dps.., ref_force_x_mps2.., and sample, an
     /// index that gives the time with --rate-hz.
@@ -58,7 +58,7 @@ pub(crate) struct ImportArgs {
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["means", "sequence", "faces"])]
     step_gap: Option<f64>,
     /// Import only the rows in which a column has this value, for one of several sensors in a file: `channel=3`; if repeated, a row must
-    /// satisfy all
+    /// satisfy all, unless they are values of one column: then each belongs to a list of --columns
     #[arg(long = "where", value_name = "COLUMN=VALUE", conflicts_with = "means")]
     filters: Vec<RowFilter>,
     /// Sample rate, Hz. Files without a time column need it; in others it checks the rate of the stamps, and decides if stamps in bursts
@@ -74,10 +74,10 @@ pub(crate) struct ImportArgs {
     /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²) [default of bags, logs and most presets: SI]
     #[arg(long, value_name = "UNIT")]
     raw_unit: Option<RawUnit>,
-    /// Topic of a bag (sensor_msgs/Imu) or of a PX4 log (sensor_gyro, sensor_combined), or message of an ArduPilot log (IMU, GYR, IMT)
-    /// [default: the only or the best one]
+    /// Topic of a bag (sensor_msgs/Imu; give two if gyro and accelerometer have one each) or of a PX4 log (sensor_gyro, sensor_combined,
+    /// vehicle_imu), or message of an ArduPilot log (IMU, GYR, IMT) [default: the only or the best one]
     #[arg(long)]
-    topic: Option<String>,
+    topic: Vec<String>,
     /// Sensor of a PX4 or ArduPilot log, counted from 0 [default: the only one]
     #[arg(long, value_name = "N")]
     instance: Option<u32>,
@@ -115,7 +115,7 @@ pub(crate) struct ImportArgs {
     /// Code of raw columns at zero input, subtracted before --scale: `gyro=2048`
     #[arg(long, value_name = "COLUMN=CODE", conflicts_with = "means")]
     zero: Vec<Zero>,
-    /// Name of the unit [default: the name of the recording]
+    /// Name of the unit; recordings and calibrations of units with different names are not used together [default: unnamed]
     #[arg(long)]
     device: Option<String>,
     /// Latitude, degrees
@@ -127,9 +127,12 @@ pub(crate) struct ImportArgs {
     /// `face_up,,9.81` and `about_x,360,`.
     #[arg(long, value_name = "FILE")]
     inputs: Option<PathBuf>,
-    /// Separator of text files: comma, semicolon, tab or space [default: recognised]
+    /// Separator of text files: comma, semicolon, tab, whitespace, or all characters that separate cells: `,;*` [default: recognised]
     #[arg(long)]
     separator: Option<Separator>,
+    /// Characters that begin a comment line in text files, or none
+    #[arg(long, value_name = "SIGNS", default_value_t)]
+    comment: CommentSigns,
     /// Leave out rows that cannot be read: at most this number (`=20`), or this share of each file (`=2%`) [without a value: 1%]
     #[arg(long, value_name = "LIMIT", num_args = 0..=1, require_equals = true, default_missing_value = "1%", conflicts_with = "means")]
     skip_broken: Option<BrokenLimit>,
@@ -231,7 +234,7 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
             Error::new("import", "the unit of the readings is unknown", remedy)
         })?;
     let options = ImportOptions {
-        topic: args.topic,
+        topics: args.topic,
         instance: args.instance,
         twos_complements: args.twos_complement,
         zeros: args.zero,
@@ -241,6 +244,7 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
             .map(|error| Turntable::new(&args.rate_dps, error)),
         columns: args.columns,
         separator: args.separator,
+        comments: args.comment,
         rate_hz: args.rate_hz,
         scales: args.scale,
         offsets: args.offset,

@@ -84,6 +84,10 @@ pub fn import_text(summary: &ImportSummary) -> String {
 /// Findings about the time stamps of a file.
 fn time_text(time: &TimeSummary) -> String {
     let mut out = match (time.unit, time.recognised) {
+        (None, recognised) if time.counter => {
+            let taken = if recognised { "taken as" } else { "from" };
+            format!("times {taken} a counter of samples")
+        }
         (Some(unit), true) => format!("time stamps assumed to be in {unit}"),
         (Some(unit), false) => format!("time stamps in {unit}"),
         (None, _) => "times scaled".into(),
@@ -99,6 +103,7 @@ fn time_text(time: &TimeSummary) -> String {
             out,
             "the stamps are kept: a polling loop reads once a round"
         ),
+        (true, false) if time.counter => write!(out, "its numbers are kept"),
         (true, false) => write!(out, "the stamps are kept"),
         (true, true) => write!(
             out,

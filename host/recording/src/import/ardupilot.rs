@@ -151,7 +151,8 @@ impl Log {
         };
         let there = of_instance(instance);
         let both_fast = there.contains(&"GYR") && there.contains(&"ACC");
-        let kinds: &[&str] = match choice.topic {
+        let topic = choice.topic_of(path, &[&["GYR", "ACC"]])?;
+        let kinds: &[&str] = match topic {
             None if both_fast => &["GYR", "ACC"],
             Some("GYR" | "ACC") => &["GYR", "ACC"],
             None if there.contains(&"IMU") => &["IMU"],
@@ -164,7 +165,7 @@ impl Log {
             .filter_map(|kind| Some((*kind, self.samples.get(&(*kind, instance))?)))
             .collect();
         if found.is_empty() {
-            let what = choice.topic.unwrap_or("IMU");
+            let what = topic.unwrap_or("IMU");
             let problem = format!(
                 "the log has no {what} of instance {instance}; it has: {}",
                 self.listed()

@@ -77,17 +77,6 @@ pub enum ColumnList {
 }
 
 impl ColumnList {
-    /// Name in the header of the column with the time stamps.
-    pub(super) fn name_of_time(&self) -> Option<&str> {
-        let ColumnList::ByName(items) = self else {
-            return None;
-        };
-        let time = items
-            .iter()
-            .find(|(role, _)| *role == Role::Column(Column::Time));
-        time.map(|(_, name)| name.as_str())
-    }
-
     /// Roles of the listed columns.
     pub fn roles(&self) -> Vec<Role> {
         match self {

@@ -56,6 +56,11 @@ pub(super) fn refuse_binary(path: &Path, head: &[u8]) -> Result<()> {
             ));
         }
     }
+    if !head.contains(&b'\n') && head.iter().filter(|byte| **byte == b'\r').count() > 1 {
+        let problem = "its lines end with a carriage return alone";
+        let remedy = "convert them: tr '\\r' '\\n'";
+        return Err(Error::new(path.display(), problem, remedy));
+    }
     let mut lines = head.split(|byte| *byte == b'\n');
     if lines.any(|line| without_zeros(line).contains(&0)) {
         let problem = "this is a binary file of an unknown kind";

@@ -2,20 +2,26 @@
 
 use super::time::Stamp;
 
-/// Number of values of 16-bit and 32-bit counters.
-const SIZES: [f64; 2] = [65_536.0, 4_294_967_296.0];
+/// Number of values of counters of 8, 16 and 32 bits, and how close to its end and its beginning a counter has to be before and after a wrap. So ten
+/// seconds at 100 Hz may be lost at the wrap of the longer ones. Any other step back is another recording or a mistake, and is kept unchanged.
+const SIZES: [(f64, f64); 3] = [(256.0, 64.0), (65_536.0, 1000.0), (4_294_967_296.0, 1000.0)];
 
-/// Number of values of the time stamps of microcontrollers.
-const STAMP_SIZES: [i64; 3] = [1 << 16, 1 << 24, 1 << 32];
-
-/// A counter has wrapped if it goes back from within this distance of its end to within this distance of 0. So ten seconds at 100 Hz may be lost at
-/// the wrap. Any other step back is another recording or a mistake, and is kept unchanged.
-const NEAR: f64 = 1000.0;
+/// Number of values of the time stamps of microcontrollers, and of those that count a day or the week of satellite navigation in s or ms.
+const STAMP_SIZES: [i64; 7] = [
+    1 << 16,
+    1 << 24,
+    1 << 32,
+    86_400,
+    604_800,
+    86_400_000,
+    604_800_000,
+];
 
 /// Continues a sample counter across its wraps.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Counter {
     last: Option<f64>,
+    highest: f64,
     before: f64,
     /// How often it wrapped.
     pub wraps: u64,
@@ -65,11 +71,15 @@ impl Counter {
     /// The number of the next row, without wraps.
     pub fn next(&mut self, number: f64) -> f64 {
         let last = self.last.replace(number).unwrap_or(number);
-        let wrapped = |size: &f64| (*size - NEAR..*size).contains(&last) && number < NEAR;
-        if let Some(size) = SIZES.into_iter().find(wrapped) {
+        let wrapped = |(size, near): &(f64, f64)| {
+            let ends = self.highest < *size && *size - near <= last;
+            ends && number < last && number < *near
+        };
+        if let Some((size, _)) = SIZES.into_iter().find(wrapped) {
             self.before += size;
             self.wraps += 1;
         }
+        self.highest = self.highest.max(number);
         self.before + number
     }
 }
@@ -77,6 +87,18 @@ impl Counter {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_counter_of_8_bits_goes_on_across_its_end_while_it_has_no_higher_numbers() {
+        let mut counter = Counter::default();
+        let all = [254.0, 255.0, 1.0, 2.0].map(|n| counter.next(n));
+        assert_eq!(all, [254.0, 255.0, 257.0, 258.0]);
+        let mut counter = Counter::default();
+        let all = [254.0, 255.0, 256.0, 257.0].map(|n| counter.next(n));
+        assert_eq!((all, counter.wraps), ([254.0, 255.0, 256.0, 257.0], 0));
+        let all = [300.0, 230.0, 5.0].map(|n| counter.next(n));
+        assert_eq!((all, counter.wraps), ([300.0, 230.0, 5.0], 0));
+    }
 
     #[test]
     fn a_counter_of_16_bits_goes_on_across_its_end_and_one_that_goes_back_elsewhere_does_not() {
@@ -91,7 +113,13 @@ mod tests {
 
     #[test]
     fn stamps_of_16_24_and_32_bits_go_on_across_their_end_and_a_clock_that_is_set_back_does_not() {
-        for (size, step) in [(1_i64 << 16, 10), (1 << 24, 10_000), (1 << 32, 5_000_000)] {
+        for (size, step) in [
+            (1_i64 << 16, 10),
+            (1 << 24, 10_000),
+            (1 << 32, 5_000_000),
+            (86_400, 1),
+            (604_800_000, 10),
+        ] {
             let mut counter = StampCounter::default();
             let first = size - 25 * step;
             for i in 0..60 {

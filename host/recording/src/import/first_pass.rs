@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::assignment::{ColumnList, Scale};
+use super::assignment::Scale;
 use super::foreign::{ForeignFile, HowToRead};
-use super::log::is_log;
+use super::log::{self, is_log};
 use super::row::Row;
 use super::time::{Known, Stamps, Times};
 use crate::columns::Column;
@@ -20,18 +20,22 @@ pub(super) fn times(
     rate_hz: Option<f64>,
     joined_to: Option<&Times>,
 ) -> Result<Times> {
-    let stamps = read(path, how)?;
+    let mut file = ForeignFile::open(path, how)?;
+    let stamps = read(path, &mut file)?;
+    let (name, counter) = (file.time_name(), file.counts_samples());
     let known = Known {
         factor: how.time_factor(path),
-        rate_hz,
-        name: how.list.and_then(ColumnList::name_of_time),
+        counter,
+        native: log::unit(path),
+        // A counter without a given rate has that of the file to which it is joined.
+        rate_hz: if counter { how.rate_hz } else { rate_hz },
+        name: name.as_deref(),
         joined_to,
     };
     Times::of(path, stamps, &known)
 }
 
-fn read(path: &Path, how: &HowToRead<'_>) -> Result<Stamps> {
-    let mut file = ForeignFile::open(path, how)?;
+fn read(path: &Path, file: &mut ForeignFile) -> Result<Stamps> {
     let (mut row, mut before) = (Row::default(), Row::default());
     let mut stamps = Stamps::default();
     while file.next(&mut row)? {

@@ -6,6 +6,7 @@ use super::SkippedLines;
 use super::assignment::{ColumnList, Offset, Role, Scale};
 use super::broken::{BrokenLimit, BrokenTally, Fault, Unreadable};
 use super::codes::{Conversion, TwosComplement, Zero};
+use super::comment_signs::TextFormat;
 use super::counter::{Counter, StampCounter};
 use super::log::{self, is_log};
 use super::parquet_table::ParquetTable;
@@ -15,25 +16,24 @@ use super::row::Row;
 use super::row_filter::RowFilter;
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
-use super::time::{Clock, Decimal, Times};
+use super::time::{Clock, Decimal, Stamp, Times};
 use crate::cell::{is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
-use crate::separator::Separator;
 use crate::signed_low_byte::SignedLowByte;
 
 /// How to read a foreign file.
 #[derive(Debug, Clone)]
 pub(super) struct HowToRead<'a> {
     pub list: Option<&'a ColumnList>,
-    pub separator: Option<Separator>,
+    pub format: TextFormat,
     pub scales: &'a [Scale],
     pub offsets: &'a [Offset],
     pub signed_low_bytes: &'a [SignedLowByte],
     pub twos_complements: &'a [TwosComplement],
     pub zeros: &'a [Zero],
     /// Which rows are wanted.
-    pub filters: &'a [RowFilter],
+    pub filters: Vec<RowFilter>,
     /// Which sensor of a log is wanted.
     pub choice: Choice<'a>,
     /// Which of the readings of a log, counted from 0.
@@ -44,6 +44,10 @@ pub(super) struct HowToRead<'a> {
     pub time_unit: Option<Decimal>,
     /// How many broken rows may be left out.
     pub skip_broken: BrokenLimit,
+    /// Whether a thermometer's cell with a zero is empty.
+    pub empty_zero_temperatures: bool,
+    /// Whether rows without a reading belong to another source of the same file.
+    pub skip_empty: bool,
 }
 
 impl HowToRead<'_> {
@@ -74,6 +78,8 @@ pub(super) struct ForeignFile {
     clock: Option<Clock>,
     before: Row,
     values: Vec<Cell>,
+    empty_zero_temperatures: bool,
+    skip_empty: bool,
     /// Counts and checks of the readings.
     pub seen: Plausibility,
     has_step: bool,
@@ -103,8 +109,8 @@ struct Cell {
 enum TimeSource {
     /// A cell with a time stamp.
     Stamp,
-    /// A cell with a sample counter, and the sample rate.
-    Sample(usize, f64),
+    /// A cell with a sample counter.
+    Sample(usize),
     /// The number of rows before, and the sample rate.
     Rows(f64),
 }
@@ -134,8 +140,8 @@ impl ForeignFile {
                 parts = all.len();
                 Table::Log(all.swap_remove(how.part))
             }
-            true => Table::Parquet(ParquetTable::open(path, how.list, how.filters)?),
-            false => Table::Text(TextTable::open(path, how.list, how.separator, how.filters)?),
+            true => Table::Parquet(ParquetTable::open(path, how.list, &how.filters)?),
+            false => Table::Text(TextTable::open(path, how.list, how.format, &how.filters)?),
         };
         let roles = match &table {
             Table::Text(table) => table.roles(),
@@ -167,7 +173,7 @@ impl ForeignFile {
         };
         let source = match (at(Role::Column(Column::Time)), at(Role::Sample)) {
             (Some(_), _) => TimeSource::Stamp,
-            (None, Some(cell)) => TimeSource::Sample(cell, needs_rate()?),
+            (None, Some(cell)) => needs_rate().map(|_| TimeSource::Sample(cell))?,
             (None, None) => TimeSource::Rows(needs_rate()?),
         };
         let numbers = roles
@@ -187,6 +193,8 @@ impl ForeignFile {
             path: path.to_owned(),
             seen: Plausibility::new(values.iter().map(|cell| cell.column)),
             values,
+            empty_zero_temperatures: how.empty_zero_temperatures,
+            skip_empty: how.skip_empty,
             has_step: at(Role::Column(Column::Step)).is_some(),
             table,
             parts,
@@ -215,8 +223,8 @@ impl ForeignFile {
     pub fn rate_hz(&self) -> f64 {
         match (&self.clock, self.source) {
             (Some(clock), _) => clock.times().summary.rate_hz,
-            (None, TimeSource::Sample(_, rate) | TimeSource::Rows(rate)) => rate,
-            (None, TimeSource::Stamp) => f64::NAN,
+            (None, TimeSource::Rows(rate)) => rate,
+            (None, TimeSource::Stamp | TimeSource::Sample(_)) => f64::NAN,
         }
     }
 
@@ -225,9 +233,23 @@ impl ForeignFile {
         self.has_step
     }
 
-    /// Whether the file has time stamps.
+    /// Whether the file has time stamps or a sample counter.
     pub fn has_time(&self) -> bool {
-        matches!(self.source, TimeSource::Stamp)
+        matches!(self.source, TimeSource::Stamp | TimeSource::Sample(_))
+    }
+
+    /// Whether its stamps are those of a sample counter, as given.
+    pub fn counts_samples(&self) -> bool {
+        matches!(self.source, TimeSource::Sample(_))
+    }
+
+    /// Name of the column with the time stamps in the file, if it has names.
+    pub fn time_name(&self) -> Option<String> {
+        match &self.table {
+            Table::Text(table) => table.time_name(),
+            Table::Parquet(table) => table.time_name(),
+            Table::Log(_) => None,
+        }
     }
 
     /// Sets the times of the rows; no row has been read yet.
@@ -244,12 +266,12 @@ impl ForeignFile {
         }
     }
 
-    /// Rows so far that the filters left out.
-    pub fn not_chosen(&self) -> u64 {
+    /// Rows so far that the filters chose, and those that they left out.
+    pub fn chosen(&self) -> [u64; 2] {
         match &self.table {
-            Table::Text(table) => table.left_out(),
-            Table::Parquet(table) => table.filters.left_out,
-            Table::Log(_) => 0,
+            Table::Text(table) => table.filters().counts(),
+            Table::Parquet(table) => table.filters.counts(),
+            Table::Log(_) => [0; 2],
         }
     }
 
@@ -324,6 +346,9 @@ impl ForeignFile {
                 }
                 Err(Unreadable::File(error)) => return Err(error),
             }
+            if self.skip_empty && self.seen.is_empty(row) {
+                continue;
+            }
             let zero_stamp = self.has_time() && row.stamp.value == 0.0;
             if self
                 .seen
@@ -331,7 +356,9 @@ impl ForeignFile {
             {
                 continue;
             }
-            row.stamp = self.stamps.next(row.stamp);
+            if !self.counts_samples() {
+                row.stamp = self.stamps.next(row.stamp);
+            }
             let Some(clock) = &mut self.clock else {
                 return Ok(true);
             };
@@ -358,7 +385,7 @@ impl ForeignFile {
         let at = |path: &Path| format!("{}, row {number}", path.display());
         let time = match self.source {
             TimeSource::Stamp => self.cells.stamp.value,
-            TimeSource::Sample(cell, rate) => self.cells.numbers[cell] / rate,
+            TimeSource::Sample(cell) => self.cells.numbers[cell],
             // A broken row was a sample too, and took its time.
             TimeSource::Rows(rate) => self.broken.rows as f64 / rate,
         };
@@ -381,7 +408,10 @@ impl ForeignFile {
                 let place = format!("{}, column {}", at(&self.path), cell.column.name());
                 Unreadable::row(number, Fault::Reading, place, refusal)
             })?;
-            row.values.push(value);
+            let missing = cell.column == Column::Temperature
+                && self.seen.is_zero_temperature(number_in_file, value)
+                && self.empty_zero_temperatures;
+            row.values.push(if missing { f64::NAN } else { value });
         }
         row.step = -1;
         if self.has_step {
@@ -391,10 +421,12 @@ impl ForeignFile {
             })?;
         }
         row.number = number;
-        row.stamp = self.cells.stamp;
+        row.stamp = match self.source {
+            TimeSource::Sample(_) => Stamp::from(self.counter.next(time)),
+            TimeSource::Stamp | TimeSource::Rows(_) => self.cells.stamp,
+        };
         row.t_s = match self.source {
-            TimeSource::Stamp => 0.0,
-            TimeSource::Sample(cell, rate) => self.counter.next(self.cells.numbers[cell]) / rate,
+            TimeSource::Stamp | TimeSource::Sample(_) => 0.0,
             TimeSource::Rows(_) => time,
         };
         Ok(true)

@@ -1,7 +1,6 @@
 //! Several files as one recording: each row of the first with what the others have at that time.
 
 use std::collections::VecDeque;
-use std::path::Path;
 
 use super::first_pass;
 use super::foreign::{ForeignFile, HowToRead};
@@ -12,6 +11,7 @@ use super::row::Row;
 use super::sequence_position::SequencePosition;
 use super::step_inputs::StepInputs;
 use super::summary::ImportSummary;
+use super::thermometer::{LeftOut, Zeros};
 use super::time::{TimeSummary, Times};
 use crate::batch::Batch;
 use crate::columns::{Column, Columns, Layout};
@@ -26,11 +26,15 @@ const BATCH: usize = 1 << 14;
 fn other_rate(times: &Times, given: f64) -> Option<String> {
     let summary = &times.summary;
     let off = given / summary.rate_hz - 1.0;
-    (off.abs() > 1e-3).then(|| {
-        format!(
+    (off.abs() > 1e-3).then(|| match summary.counter {
+        true => format!(
+            "{}: the counter rises by {:.0} or more from row to row, so by {given} Hz there are {} rows a second: if {given} Hz is the rate of the rows, multiply it by {:.0}",
+            summary.file, 1.0 + off, summary.rate_hz, 1.0 + off
+        ),
+        false => format!(
             "{}: the rate of the time stamps is {} Hz, but {given} Hz were given: the stamps are used; to use the rate instead, skip the time column",
             summary.file, summary.rate_hz
-        )
+        ),
     })
 }
 
@@ -44,6 +48,8 @@ pub(super) struct JoinedFiles {
     /// Pause that separates two steps, s.
     step_gap_s: Option<f64>,
     followers: Vec<Follower>,
+    /// Whether all of them are the same file, of which each takes other rows or columns.
+    one_file: bool,
     pub rate_hz: f64,
     pub columns: Columns,
     /// Column of each value, in the order in which the files give them.
@@ -53,16 +59,19 @@ pub(super) struct JoinedFiles {
 }
 
 impl JoinedFiles {
-    /// Opens the files of `options` and finds their times and columns. `left_out`: whether to leave out the gyro and the accelerometer.
-    pub fn open(options: &ImportOptions, left_out: [bool; 2]) -> Result<Self> {
+    /// Opens the files of `options` and finds their times and columns, without `left_out`.
+    pub fn open(options: &ImportOptions, left_out: LeftOut) -> Result<Self> {
         let mut warnings = options.preset_warnings.clone();
-        let mut first = ForeignFile::open(&options.files[0], &options.how(0))?;
+        let how = |source: usize| HowToRead {
+            empty_zero_temperatures: left_out.zero_temperatures,
+            ..options.how(source)
+        };
+        let mut first = ForeignFile::open(options.file(0), &how(0))?;
         let mut time = Vec::new();
         let mut first_times: Option<Times> = None;
         let rate_hz = match first.has_time() {
             true => {
-                let how = options.how(0);
-                let times = first_pass::times(&options.files[0], &how, options.rate_hz, None)?;
+                let times = first_pass::times(options.file(0), &how(0), options.rate_hz, None)?;
                 let rate_hz = times.summary.rate_hz;
                 warnings.extend(options.rate_hz.and_then(|given| other_rate(&times, given)));
                 time.push(times.summary.clone());
@@ -78,17 +87,17 @@ impl JoinedFiles {
         let polled = first_times.as_ref().filter(|t| t.summary.polled.is_some());
         let resampler = polled.map(|times| Resampler::new(times.period_s()));
         let mut followers = Vec::new();
-        let others = (1..options.files.len()).map(|index| (index, 0));
+        let others = (1..options.sources()).map(|index| (index, 0));
         let mut waiting: VecDeque<(usize, usize)> = (1..first.parts)
             .map(|part| (0, part))
             .chain(others)
             .collect();
         while let Some((index, part)) = waiting.pop_front() {
-            let path = &options.files[index];
+            let path = options.file(index);
             let how = HowToRead {
                 rate_hz: options.rate_hz.or(Some(rate_hz)),
                 part,
-                ..options.how(index)
+                ..how(index)
             };
             let mut file = ForeignFile::open(path, &how)?;
             if part == 0 {
@@ -121,7 +130,11 @@ impl JoinedFiles {
             .collect();
         let mut inputs = StepInputs::of(options)?;
         let mut names: Vec<&str> = vec![Column::Time.name()];
-        let kept = |column: &&Column| !matches!(column, Column::Raw(c) if left_out[c / 3]);
+        let kept = |column: &&Column| match column {
+            Column::Raw(c) => !left_out.sensors[c / 3],
+            Column::Temperature => !left_out.thermometer,
+            _ => true,
+        };
         names.extend(order.iter().filter(kept).map(|column| column.name()));
         let by_pauses = options.step_gap_s.is_some();
         if by_pauses && first.has_step() {
@@ -175,7 +188,7 @@ impl JoinedFiles {
         }
         if let Some(inputs) = &mut inputs {
             let irregular = first_times.filter(|_| resampler.is_some());
-            inputs.count_rows(&options.files[0], &options.how(0), irregular)?;
+            inputs.count_rows(options.file(0), &options.how(0), irregular)?;
         }
         Ok(Self {
             summary: ImportSummary {
@@ -195,14 +208,14 @@ impl JoinedFiles {
             place: None,
             step_gap_s: options.step_gap_s,
             followers,
+            one_file: options.has_one_file_for_all(),
         })
     }
 
-    /// The manifest of the recording at `out`, without its sources and steps.
-    pub fn manifest(&self, options: &ImportOptions, out: &Path) -> Manifest {
-        let device = options.device.clone().unwrap_or_else(|| file_name(out));
+    /// The manifest of the recording, without its sources and steps.
+    pub fn manifest(&self, options: &ImportOptions) -> Manifest {
         let mut manifest = Manifest::new(
-            device,
+            options.unit(),
             self.rate_hz,
             options.gravity_mps2,
             options.raw_unit,
@@ -287,13 +300,31 @@ impl JoinedFiles {
         }
     }
 
-    /// Whether gyro and accelerometer read only zeros in one of the files.
-    pub fn dead_sensors(&self) -> [bool; 2] {
-        [0, 1].map(|s| self.files().any(|file| file.seen.dead()[s].is_some()))
+    /// What is to be left out, because it is no reading in one of the files.
+    pub fn to_leave_out(&self) -> LeftOut {
+        let any = |is: &dyn Fn(&ForeignFile) -> bool| self.files().any(is);
+        LeftOut {
+            sensors: [0, 1].map(|s| any(&|file| file.seen.dead()[s].is_some())),
+            thermometer: any(&|file| matches!(file.seen.zero_temperatures(), Zeros::Throughout(_))),
+            zero_temperatures: any(&|file| {
+                matches!(file.seen.zero_temperatures(), Zeros::Missing(_))
+            }),
+        }
     }
 
     fn files(&self) -> impl Iterator<Item = &ForeignFile> {
         self.followers.iter().map(|f| &f.file).chain([&self.first])
+    }
+
+    /// Rows that no source has chosen. Sources of one file choose by other values of a column, so a row that one of them leaves out may be another's.
+    fn not_chosen(&self) -> u64 {
+        let counts: Vec<[u64; 2]> = self.files().map(ForeignFile::chosen).collect();
+        let all = counts.iter().map(|[kept, left]| kept + left);
+        let kept: u64 = counts.iter().map(|[kept, _]| kept).sum();
+        match self.one_file {
+            true => all.max().unwrap_or(0).saturating_sub(kept),
+            false => counts.iter().map(|[_, left]| left).sum(),
+        }
     }
 
     /// Counts and warnings of all files, once they have been read and `rows` written.
@@ -320,6 +351,9 @@ impl JoinedFiles {
                 summary.warnings.extend(warning);
             }
         }
+        let not_chosen = self.not_chosen();
+        let summary = &mut self.summary;
+        summary.not_chosen = not_chosen;
         let of_loops = summary.time.iter().filter_map(TimeSummary::of_loop);
         summary.warnings.extend(of_loops.collect::<Vec<_>>());
         if summary.interpolated > 0 {

@@ -5,34 +5,41 @@
 use std::path::Path;
 
 use super::readings::{Choice, Readings};
+use super::time::Decimal;
 use super::{ardupilot, px4, ros};
 use crate::error::{Argument, Error, Result};
 
-/// A format: the endings of its files, and their reader.
+/// A format: the endings of its files, the unit in which it counts time, and its reader, which converts the stamps to ns.
 struct LogFormat {
     endings: &'static [&'static str],
+    unit: Decimal,
     read: fn(&Path, Choice<'_>) -> Result<Vec<Readings>>,
 }
 
 const FORMATS: [LogFormat; 5] = [
     LogFormat {
         endings: &["bag"],
+        unit: Decimal::Nanosecond,
         read: ros::read_bag,
     },
     LogFormat {
         endings: &["mcap"],
+        unit: Decimal::Nanosecond,
         read: ros::read_mcap,
     },
     LogFormat {
         endings: &["db3"],
+        unit: Decimal::Nanosecond,
         read: ros::read_db3,
     },
     LogFormat {
         endings: &["ulg"],
+        unit: Decimal::Microsecond,
         read: px4::read,
     },
     LogFormat {
         endings: &["bin"],
+        unit: Decimal::Microsecond,
         read: ardupilot::read,
     },
 ];
@@ -51,6 +58,11 @@ fn format(path: &Path) -> Option<&'static LogFormat> {
 /// Whether a file is such a log, by its ending. The readings of logs are in rad/s and m/s², their stamps in ns.
 pub fn is_log(path: &Path) -> bool {
     format(path).is_some()
+}
+
+/// Unit in which the log at `path` counts time.
+pub(super) fn unit(path: &Path) -> Option<Decimal> {
+    format(path).map(|format| format.unit)
 }
 
 /// The readings of a log: one set for the whole unit, or one for each sensor if these have separate clocks, the faster one first.

@@ -5,6 +5,7 @@ mod assignment;
 mod binary;
 mod broken;
 mod codes;
+mod comment_signs;
 mod counter;
 mod faces;
 mod first_pass;
@@ -38,6 +39,7 @@ mod summary;
 #[cfg(all(test, feature = "parquet"))]
 mod tests;
 mod text_table;
+mod thermometer;
 mod time;
 mod two_sources;
 #[cfg(not(feature = "bags"))]
@@ -55,6 +57,7 @@ use std::path::Path;
 pub use assignment::{ColumnList, Offset, Role, Scale};
 pub use broken::{BrokenKind, BrokenLimit, BrokenRows};
 pub use codes::{TwosComplement, Zero};
+pub use comment_signs::CommentSigns;
 pub use faces::Face;
 pub use inputs::Inputs;
 pub use log::is_log;
@@ -68,6 +71,8 @@ pub use time::{Decimal, Jitter, Rounds, TimeSummary};
 
 use joined::JoinedFiles;
 use options::source;
+use sequence::import_sequence;
+use thermometer::{LeftOut, repeated};
 
 use super::writer::Writer;
 use crate::error::Result;
@@ -83,40 +88,27 @@ pub fn import(
         return pose_means::import_means(options, out);
     }
     if options.is_sequence() {
-        return sequence::import_sequence(options, out, progress);
+        return repeated(|left_out| import_sequence(options, out, &progress, left_out));
     }
     // Only reading all rows shows that a sensor reads nothing but zeros. This is rare, so the import is then repeated without the sensor.
-    let mut left_out = [false; 2];
-    loop {
-        match import_sensors(options, out, &progress, left_out)? {
-            Outcome::Done(summary) => return Ok(*summary),
-            Outcome::NotConnected(sensors) => left_out = sensors,
-        }
-    }
+    repeated(|left_out| import_joined(options, out, &progress, left_out))
 }
 
-/// Outcome of an import.
-enum Outcome {
-    Done(Box<ImportSummary>),
-    /// Nothing was written, because these sensors (gyro, accelerometer) read only zeros.
-    NotConnected([bool; 2]),
-}
-
-/// Imports without the sensors (gyro, accelerometer) that `left_out` marks.
-fn import_sensors(
+/// Imports files side by side, without `left_out`. If more is to be left out, writes nothing and returns all of it.
+fn import_joined(
     options: &ImportOptions,
     out: &Path,
     progress: &impl Fn(f64),
-    left_out: [bool; 2],
-) -> Result<Outcome> {
+    left_out: LeftOut,
+) -> Result<std::result::Result<ImportSummary, LeftOut>> {
     let mut import = JoinedFiles::open(options, left_out)?;
-    let mut manifest = import.manifest(options, out);
+    let mut manifest = import.manifest(options);
     manifest.check("import")?;
     let mut writer = Writer::create(out, import.columns, options.format, options.replace)?;
     import.run(&mut writer, progress)?;
-    let dead = import.dead_sensors();
-    if writer.rows() > 0 && left_out == [false; 2] && dead != left_out {
-        return Ok(Outcome::NotConnected(dead));
+    let dead = import.to_leave_out();
+    if writer.rows() > 0 && left_out == LeftOut::default() && dead != left_out {
+        return Ok(Err(dead));
     }
     import.finish_summary(writer.rows(), &manifest)?;
     for file in options.files.iter().chain(&options.inputs) {
@@ -127,5 +119,5 @@ fn import_sensors(
     }
     manifest.step_labels = std::mem::take(&mut import.first.labels).into_labels();
     import.summary.recording = writer.finish(&manifest)?.display().to_string();
-    Ok(Outcome::Done(Box::new(import.summary)))
+    Ok(Ok(import.summary))
 }

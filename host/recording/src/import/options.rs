@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::assignment::{ColumnList, Offset, Scale};
 use super::broken::BrokenLimit;
 use super::codes::{TwosComplement, Zero};
+use super::comment_signs::{CommentSigns, TextFormat};
 use super::faces::Face;
 use super::foreign::HowToRead;
 use super::preset::{Chosen, PresetUse};
@@ -17,6 +18,7 @@ use crate::manifest::{RawUnit, Reference, Source, check_gravity, check_rate};
 use crate::separator::Separator;
 use crate::signed_low_byte::SignedLowByte;
 use crate::turntable::Turntable;
+use crate::unit_name::UNNAMED;
 use crate::writer::SampleFormat;
 
 /// What to import and how.
@@ -24,10 +26,12 @@ use crate::writer::SampleFormat;
 pub struct ImportOptions {
     /// Files; the later ones are joined onto the times of the first.
     pub files: Vec<PathBuf>,
-    /// One list for each file; none if the headers have the names of a recording.
+    /// One list for each file; none if the headers have the names of a recording. A single file may have several, for sensors in separate columns or rows.
     pub columns: Vec<ColumnList>,
     /// Separator of text files; detected if `None`.
     pub separator: Option<Separator>,
+    /// Characters that begin the comment lines of text files.
+    pub comments: CommentSigns,
     /// Sample rate in Hz. Files without time stamps need it; for others it decides between two possible units of the stamps.
     pub rate_hz: Option<f64>,
     /// Unit of the time stamps; detected if `None`.
@@ -48,11 +52,12 @@ pub struct ImportOptions {
     pub twos_complements: Vec<TwosComplement>,
     /// Codes at an input of 0, subtracted before any factor; several for the same column add up.
     pub zeros: Vec<Zero>,
-    /// Topic of a log; without it, the only one with messages of an inertial unit.
-    pub topic: Option<String>,
+    /// Topics of a log: one, or those of gyro and accelerometer. Without them, the only one with messages of an inertial unit, or the only two that
+    /// have one sensor each.
+    pub topics: Vec<String>,
     /// Which of several sensors of a topic of a log; without it, the only one.
     pub instance: Option<u32>,
-    /// Name of the unit; without it, the name of the recording.
+    /// Name of the unit; without it, [`UNNAMED`].
     pub device: Option<String>,
     /// Latitude in degrees.
     pub latitude_deg: Option<f64>,
@@ -66,7 +71,8 @@ pub struct ImportOptions {
     pub faces: Vec<Face>,
     /// A longer pause than this, in s, begins a new step; `None` if a column numbers the steps, or they are found later.
     pub step_gap_s: Option<f64>,
-    /// Filters of text and Parquet files: a row is read if it satisfies all of them.
+    /// Filters of text and Parquet files: a row is read if it satisfies all of them. If one column is to have several values, each value chooses the
+    /// rows of one list of columns.
     pub filters: Vec<RowFilter>,
     /// How many rows that cannot be read may be left out.
     pub skip_broken: BrokenLimit,
@@ -94,6 +100,7 @@ impl ImportOptions {
             files,
             columns: Vec::new(),
             separator: None,
+            comments: CommentSigns::default(),
             rate_hz: None,
             time_unit: None,
             gravity_mps2,
@@ -104,7 +111,7 @@ impl ImportOptions {
             signed_low_bytes: Vec::new(),
             twos_complements: Vec::new(),
             zeros: Vec::new(),
-            topic: None,
+            topics: Vec::new(),
             instance: None,
             device: None,
             latitude_deg: None,
@@ -145,7 +152,8 @@ impl ImportOptions {
             return refuse("no file is given".to_owned(), "name the files to import");
         }
         let one_for_all = self.is_sequence() && lists == 1;
-        if lists != 0 && lists != files && !one_for_all {
+        let of_one_file = files == 1 && !self.is_sequence() && !self.means;
+        if lists != 0 && lists != files && !one_for_all && !of_one_file {
             return refuse(
                 format!("{files} files but {lists} lists of columns are given"),
                 "give one list of columns for each file, in their order",
@@ -202,6 +210,7 @@ impl ImportOptions {
                 "give a table with only these rows",
             );
         }
+        self.check_filters()?;
         if let Some(rate) = self.rate_hz {
             check_rate(rate, "import, sample_rate_hz")
                 .map_err(|e| e.about(Argument::SampleRate))?;
@@ -222,6 +231,11 @@ impl ImportOptions {
             }
         }
         Ok(())
+    }
+
+    /// Name of the unit.
+    pub(super) fn unit(&self) -> &str {
+        self.device.as_deref().unwrap_or(UNNAMED)
     }
 
     /// Whether the files follow one another.
@@ -254,6 +268,9 @@ impl ImportOptions {
         }
         if let Some(separator) = self.separator {
             option("--separator", separator.to_string());
+        }
+        if self.comments != CommentSigns::default() {
+            option("--comment", self.comments.to_string());
         }
         if let Some(rate) = self.rate_hz {
             option("--rate-hz", rate.to_string());
@@ -292,7 +309,7 @@ impl ImportOptions {
         for filter in &self.filters {
             option("--where", filter.to_string());
         }
-        if let Some(topic) = &self.topic {
+        for topic in &self.topics {
             option("--topic", topic.clone());
         }
         if let Some(instance) = self.instance {
@@ -310,24 +327,90 @@ impl ImportOptions {
         arguments
     }
 
-    pub(super) fn how(&self, file: usize) -> HowToRead<'_> {
-        HowToRead {
-            list: self.columns.get(file),
+    /// How the lines of text files are to be read.
+    pub(super) fn text_format(&self) -> TextFormat {
+        TextFormat {
             separator: self.separator,
+            comments: self.comments,
+        }
+    }
+
+    /// Number of sources of rows: the files, or the lists of columns of a single file with several.
+    pub(super) fn sources(&self) -> usize {
+        match self.has_one_file_for_all() {
+            true => self.columns.len(),
+            false => self.files.len(),
+        }
+    }
+
+    /// The file of a source.
+    pub(super) fn file(&self, source: usize) -> &Path {
+        let file = if self.has_one_file_for_all() {
+            0
+        } else {
+            source
+        };
+        &self.files[file]
+    }
+
+    /// Whether each list of columns takes other columns or rows of the only file.
+    pub(super) fn has_one_file_for_all(&self) -> bool {
+        self.files.len() == 1 && self.columns.len() > 1
+    }
+
+    /// The filters of a source. If one column is to have several values, each value belongs to one source, in their order.
+    fn filters(&self, source: usize) -> Vec<RowFilter> {
+        let own = |filter: &&RowFilter| {
+            let values: Vec<&RowFilter> = self.values(filter).collect();
+            values.len() < 2 || values.get(source) == Some(filter)
+        };
+        self.filters.iter().filter(own).cloned().collect()
+    }
+
+    /// The filters of the column of `filter`.
+    fn values<'a>(&'a self, filter: &'a RowFilter) -> impl Iterator<Item = &'a RowFilter> {
+        let all = self.filters.iter();
+        all.filter(move |other| other.column() == filter.column())
+    }
+
+    /// Refuses filters of one column with several values unless each belongs to a source.
+    fn check_filters(&self) -> Result<()> {
+        for filter in &self.filters {
+            let values = self.values(filter).count();
+            if values > 1 && (values != self.sources() || self.is_sequence()) {
+                let problem = format!(
+                    "the column {} is to have {values} values, but no row has two",
+                    filter.column()
+                );
+                let remedy = "choose one value, or give a list of columns for the rows of each";
+                return Err(Error::new("import", problem, remedy)
+                    .about(Argument::Where)
+                    .about(Argument::Columns));
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn how(&self, source: usize) -> HowToRead<'_> {
+        HowToRead {
+            list: self.columns.get(source),
+            format: self.text_format(),
             scales: &self.scales,
             offsets: &self.offsets,
             signed_low_bytes: &self.signed_low_bytes,
             twos_complements: &self.twos_complements,
             zeros: &self.zeros,
-            filters: &self.filters,
+            filters: self.filters(source),
             choice: Choice {
-                topic: self.topic.as_deref(),
+                topics: &self.topics,
                 instance: self.instance,
             },
             part: 0,
             rate_hz: self.rate_hz,
             time_unit: self.time_unit,
             skip_broken: self.skip_broken,
+            empty_zero_temperatures: false,
+            skip_empty: self.has_one_file_for_all(),
         }
     }
 }

@@ -117,6 +117,13 @@ pub(super) fn first_rows(path: &Path, most: usize) -> Result<(Vec<String>, Vec<V
 }
 
 impl ParquetTable {
+    /// Name of the column with the time stamps.
+    pub fn time_name(&self) -> Option<String> {
+        let time = Some(Role::Column(Column::Time));
+        let mut columns = self.columns.iter();
+        columns.find(|c| c.role == time).map(|c| c.name.clone())
+    }
+
     /// Opens the file; without `list` its columns must have the names of a recording's. Rows that do not satisfy `filters` are skipped.
     pub fn open(
         path: &Path,
@@ -235,7 +242,7 @@ impl ParquetTable {
             self.at += 1;
             self.row += 1;
             let chosen = self.filtered.iter().map(|column| column.text(at));
-            if self.filtered.is_empty() || self.filters.keep(chosen) {
+            if self.filtered.is_empty() || self.filters.keep_cells(chosen) {
                 break at;
             }
         };

@@ -1,6 +1,7 @@
 //! Implausible readings: rows padded with zeros, impossible temperatures, and readings that are repeated or come from two sources.
 
 use super::row::Row;
+use super::thermometer::{ZeroTally, Zeros};
 use super::two_sources::TwoSources;
 use crate::columns::Column;
 use crate::columns::RAW_COLUMNS;
@@ -12,6 +13,8 @@ use crate::no_temperature::NoTemperatures;
 const USUAL_C: std::ops::RangeInclusive<f64> = -100.0..=200.0;
 /// Possible temperatures in °C, from absolute zero on. Counts of a converter are mostly outside.
 const POSSIBLE_C: std::ops::RangeInclusive<f64> = -273.15..=1000.0;
+/// Sensors have rows of their own if each is alone in more than this share of the rows.
+const APART_SHARE: f64 = 0.2;
 /// Remedy for a column that is not in °C.
 const CONVERT: &str = "convert it to degrees Celsius (counts of an MPU-6050 or MPU-9150: a factor of 0.00294118 and an offset of 36.53), or skip the column";
 
@@ -30,6 +33,8 @@ pub(super) struct Plausibility {
     pub padding: u64,
     /// Rows in which only the accelerometer has zeros.
     empty_accel: u64,
+    /// Rows in which only the gyro has a reading, and those in which only the accelerometer has one.
+    alone: [u64; 2],
     /// Whether each of the six channels has shown a value other than 0.
     alive: [bool; 6],
     rows: u64,
@@ -39,6 +44,7 @@ pub(super) struct Plausibility {
     lowest_c: f64,
     highest_c: f64,
     no_temperatures: NoTemperatures,
+    zero_temperatures: ZeroTally,
 }
 
 impl Plausibility {
@@ -60,13 +66,21 @@ impl Plausibility {
             temperature,
             padding: 0,
             empty_accel: 0,
+            alone: [0; 2],
             alive: [false; 6],
             rows: 0,
             held: Default::default(),
             lowest_c: f64::INFINITY,
             highest_c: f64::NEG_INFINITY,
             no_temperatures: NoTemperatures::default(),
+            zero_temperatures: ZeroTally::default(),
         }
+    }
+
+    /// Whether `row` has no reading of gyro and accelerometer.
+    pub fn is_empty(&self, row: &Row) -> bool {
+        let mut all = self.sensors.iter().flatten();
+        all.all(|(place, _)| row.values[*place].is_nan())
     }
 
     /// Whether `row` is padding of a buffer, or comes from a time when nothing was connected. Other rows are counted and checked; impossible values
@@ -79,6 +93,12 @@ impl Plausibility {
             |sensor: &[(usize, usize)]| sensor.iter().all(|(place, _)| row.values[*place] == 0.0);
         let [gyro, accel] = &self.sensors;
         let no_force = accel.len() == 3 && zero(accel);
+        let empty =
+            |sensor: &[(usize, usize)]| sensor.iter().all(|(place, _)| row.values[*place].is_nan());
+        if !gyro.is_empty() && !accel.is_empty() {
+            self.alone[0] += u64::from(!empty(gyro) && empty(accel));
+            self.alone[1] += u64::from(empty(gyro) && !empty(accel));
+        }
         let padding = match accel.is_empty() {
             false => no_force && zero(gyro),
             true => gyro.len() == 3 && zero(gyro) && zero_stamp && begun,
@@ -108,6 +128,17 @@ impl Plausibility {
             row.values[place] = self.temperature(row.values[place], row.number);
         }
         false
+    }
+
+    /// Counts a cell of the thermometer with its reading, °C, and returns whether the cell is a zero.
+    pub fn is_zero_temperature(&mut self, cell: f64, reading_c: f64) -> bool {
+        self.zero_temperatures.push(cell, reading_c);
+        cell == 0.0
+    }
+
+    /// Zeros of the thermometer that are no temperatures.
+    pub fn zero_temperatures(&self) -> Zeros {
+        self.zero_temperatures.found()
     }
 
     /// The temperature `c` of a row, or NaN if it is impossible.
@@ -171,6 +202,14 @@ impl Plausibility {
             warnings.extend(held.map(|words| format!("{place}: {words}")));
         }
         warnings.extend(self.two_sources.warning(place));
+        warnings.extend(self.two_sources.overflows(place));
+        let apart = |rows: &u64| *rows as f64 > APART_SHARE * self.rows as f64;
+        if self.alone.iter().all(apart) {
+            let [gyro, accel] = self.alone;
+            warnings.push(format!(
+                "{place}: {gyro} rows have the gyro alone and {accel} the accelerometer alone, so no turn is complete: give a list of columns with the time for each, and they are joined on it"
+            ));
+        }
         if self.padding > 0 {
             warnings.push(format!(
                 "{place}: {} left out as padding: all readings are exactly 0",
@@ -197,6 +236,17 @@ impl Plausibility {
         }
         let none = self.no_temperatures.warning();
         warnings.extend(none.map(|none| format!("{place}, column temp_c: {none}")));
+        warnings.extend(match self.zero_temperatures() {
+            Zeros::None => None,
+            Zeros::Missing(count) => Some(format!(
+                "{place}, column temp_c: it is exactly 0 in {}, far from all other temperatures: left empty, because the thermometer did not answer",
+                rows(count)
+            )),
+            Zeros::Throughout(count) => Some(format!(
+                "{place}, column temp_c: it is exactly 0 in all of its {}: there is no thermometer, and the column is left out",
+                rows(count)
+            )),
+        });
         let range = [self.lowest_c, self.highest_c];
         if range[0] <= range[1] && !range.iter().all(|c| USUAL_C.contains(c)) {
             let [low, high] = range;

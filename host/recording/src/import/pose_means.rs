@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::assignment::{ColumnList, Offset, Role, Scale};
 use super::broken::Unreadable;
+use super::comment_signs::TextFormat;
 use super::log::is_log;
-use super::options::{ImportOptions, file_name, source};
+use super::options::{ImportOptions, source};
 use super::plausibility::no_temperature;
 use super::text_table::{Cells, TextTable};
 use super::{ImportSummary, SkippedLines};
@@ -73,7 +74,7 @@ impl PoseMeans {
             ));
         }
         let path = directory.join(MEANS_FILE);
-        let table = Table::read(&path, None, Some(Separator::Comma), (&[], &[]))?;
+        let table = Table::read(&path, None, Some(Separator::Comma).into(), (&[], &[]))?;
         if table.poses.iter().any(|pose| !pose.label.is_empty()) {
             manifest.step_labels = table.poses.iter().map(|p| p.label.clone()).collect();
         }
@@ -99,13 +100,13 @@ impl Table {
     fn read(
         path: &Path,
         list: Option<&ColumnList>,
-        separator: Option<Separator>,
+        format: TextFormat,
         factors: (&[Scale], &[Offset]),
     ) -> Result<Table> {
         let refuse = |problem: String, remedy: &str| {
             Err(Error::new(path.display(), problem, remedy).about(Argument::Columns))
         };
-        let mut table = TextTable::open(path, list, separator, &[])?;
+        let mut table = TextTable::open(path, list, format, &[])?;
         let roles = table.roles();
         let has = |role: Role| roles.contains(&role);
         let timed = [Role::Column(Column::Time), Role::Sample];
@@ -273,7 +274,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
     }
     let list = options.columns.first();
     let factors = (&options.scales[..], &options.offsets[..]);
-    let table = Table::read(path, list, options.separator, factors)?;
+    let table = Table::read(path, list, options.text_format(), factors)?;
     if options.reference == Reference::Table && table.columns.reference == [false; 6] {
         return Err(Error::new(
             path.display(),
@@ -282,9 +283,8 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
         )
         .about(Argument::Reference));
     }
-    let device = options.device.clone().unwrap_or_else(|| file_name(out));
     let mut manifest = Manifest::new(
-        device,
+        options.unit(),
         options.rate_hz.unwrap_or(f64::NAN),
         options.gravity_mps2,
         options.raw_unit,

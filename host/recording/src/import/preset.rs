@@ -327,7 +327,7 @@ impl Layout {
         let more = format!("{},{}", self.columns, self.optional);
         if !self.optional.is_empty()
             && let Ok(more) = more.parse()
-            && TextTable::open(path, Some(&more), separator, &[]).is_ok()
+            && TextTable::open(path, Some(&more), separator.into(), &[]).is_ok()
         {
             return self.timed(path, more, separator);
         }
@@ -340,7 +340,7 @@ impl Layout {
         list: ColumnList,
         separator: Option<Separator>,
     ) -> Result<ColumnList> {
-        let mut table = TextTable::open(path, Some(&list), separator, &[])?;
+        let mut table = TextTable::open(path, Some(&list), separator.into(), &[])?;
         let mut cells = Cells::default();
         let row = match table.next(&mut cells) {
             // The import itself reports this.

@@ -6,9 +6,9 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::binary::{refuse_binary, without_zeros};
+use super::comment_signs::CommentSigns;
 use super::log::is_log;
 use super::parquet_table;
-use super::text_table::without_comment_sign;
 use crate::cell;
 use crate::csv_file::BOM;
 use crate::error::{Error, Result};
@@ -70,7 +70,8 @@ pub fn preview(path: &Path, separator: Option<Separator>) -> Result<Preview> {
 }
 
 fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Preview> {
-    let comment = |line: &[u8]| matches!(line.trim_ascii().first(), Some(b'#' | b'%'));
+    let signs = CommentSigns::default();
+    let comment = |line: &[u8]| signs.begins(line).is_some();
     let shown: Vec<&[u8]> = lines
         .iter()
         .filter(|line| !line.trim_ascii().is_empty() && !comment(line))
@@ -84,9 +85,9 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Preview> {
         record.iter().map(text).collect::<Vec<String>>()
     };
     let number = |cell: &String| {
-        let point = match separator {
-            Separator::Comma => cell.clone(),
-            _ => cell.replacen(',', ".", 1),
+        let point = match separator.separates(b',') {
+            true => cell.clone(),
+            false => cell.replacen(',', ".", 1),
         };
         cell::number(point.as_bytes()).is_ok_and(f64::is_finite)
     };
@@ -100,7 +101,7 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Preview> {
     let above = lines[..first]
         .iter()
         .rev()
-        .map(|line| cells(without_comment_sign(line)));
+        .map(|line| cells(signs.skipped(line)));
     let mut headers = above.filter(|row| row.len() == width && numbers(row) == 0);
     let rows = lines[first..].iter().filter(|line| is_row(line));
     Some(Preview {

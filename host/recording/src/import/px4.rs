@@ -27,6 +27,8 @@ const HEADER: u64 = 16;
 
 /// The topics that are read.
 const COMBINED: &str = "sensor_combined";
+/// Integrals of gyro and accelerometer, one instance for each unit, calibrated like `sensor_combined`; read only if it is chosen.
+const INTEGRATED: &str = "vehicle_imu";
 const SELECTION: &str = "sensor_selection";
 /// Topics of one sensor each: gyro and accelerometer.
 const RAW: [&str; 2] = ["sensor_gyro", "sensor_accel"];
@@ -42,6 +44,8 @@ struct Log {
     /// By name and instance.
     topics: BTreeMap<(&'static str, u32), Topic>,
     combined: Combined,
+    /// Instances of `vehicle_imu`, each with the parameters as they change between its samples.
+    integrated: BTreeMap<u32, (Combined, Parameters)>,
     /// Ids of the gyro and the accelerometer in use, each pair with the number of its first sample in `sensor_combined`.
     selected: Vec<(usize, [u32; 2])>,
     parameters: Parameters,
@@ -86,12 +90,10 @@ impl Log {
     fn take(&mut self, message: &Message<'_>) {
         match message {
             Message::ParameterMessage(ParameterMessage::Float(name, value, _)) => {
-                self.parameters
-                    .set(self.combined.stamps_ns.len(), name, f64::from(*value));
+                self.set(name, f64::from(*value));
             }
             Message::ParameterMessage(ParameterMessage::Int32(name, value, _)) => {
-                self.parameters
-                    .set(self.combined.stamps_ns.len(), name, f64::from(*value));
+                self.set(name, f64::from(*value));
             }
             Message::DropoutMessage(dropout) => {
                 self.dropouts += 1;
@@ -101,6 +103,12 @@ impl Log {
                 let taken = match data.flattened_format.message_name() {
                     COMBINED => self.combined.take(data),
                     SELECTION => self.select(data),
+                    INTEGRATED => {
+                        let instance = u32::from(data.multi_id.value());
+                        let now = || (Combined::default(), self.parameters.now());
+                        let (samples, _) = self.integrated.entry(instance).or_insert_with(now);
+                        samples.take_integrated(data)
+                    }
                     name => match RAW.into_iter().chain(FIFO).find(|raw| *raw == name) {
                         Some(raw) => {
                             let instance = u32::from(data.multi_id.value());
@@ -116,6 +124,14 @@ impl Log {
                 self.broken += u64::from(taken.is_none());
             }
             _ => {}
+        }
+    }
+
+    fn set(&mut self, name: &str, value: f64) {
+        self.parameters
+            .set(self.combined.stamps_ns.len(), name, value);
+        for (samples, parameters) in self.integrated.values_mut() {
+            parameters.set(samples.stamps_ns.len(), name, value);
         }
     }
 
@@ -143,7 +159,8 @@ impl Log {
             .iter()
             .filter(|((name, _), _)| RAW.contains(name));
         let raw = raw.map(|(_, topic)| topic.values.len()).max().unwrap_or(0);
-        let of_raw = match choice.topic {
+        let topic = choice.topic_of(path, &[&RAW, &FIFO])?;
+        let of_raw = match topic {
             None if has(FIFO) => FIFO,
             None if choice.instance.is_none() && combined > SPARSE * raw => {
                 return self.combined_readings(path, raw > 0);
@@ -152,12 +169,15 @@ impl Log {
             Some(COMBINED) if combined > 0 && choice.instance.is_none() => {
                 return self.combined_readings(path, false);
             }
+            Some(INTEGRATED) if !self.integrated.is_empty() => {
+                return self.integrated_readings(path, choice.instance);
+            }
             Some(topic) if FIFO.contains(&topic) => FIFO,
             Some(topic) if RAW.contains(&topic) => RAW,
             Some(_) => ["", ""],
         };
         if !has(of_raw) {
-            let what = choice.topic.unwrap_or("sensor of its own");
+            let what = topic.unwrap_or("sensor of its own");
             let problem = format!("the log has no {what}; it has: {}", self.listed());
             let remedy = "choose one of these, or log the raw sensors (SDLOG_PROFILE)";
             let error = Error::new(path.display(), problem, remedy);
@@ -172,11 +192,36 @@ impl Log {
             format!("{name} instance {instance} ({})", topic.named())
         });
         let combined = (!self.combined.stamps_ns.is_empty()).then(|| COMBINED.to_owned());
-        let all: Vec<String> = raw.chain(combined).collect();
+        let integrated = self.integrated.keys();
+        let integrated = integrated.map(|instance| format!("{INTEGRATED} instance {instance}"));
+        let all: Vec<String> = raw.chain(combined).chain(integrated).collect();
         match all.is_empty() {
             true => "no messages of inertial sensors".into(),
             false => all.join(", "),
         }
+    }
+
+    /// The instance to read, among those that `there` are.
+    fn instance(
+        &self,
+        path: &Path,
+        there: impl Iterator<Item = u32>,
+        wanted: Option<u32>,
+    ) -> Result<u32> {
+        let mut instances: Vec<u32> = there.collect();
+        instances.sort_unstable();
+        instances.dedup();
+        let problem = match (wanted, instances.as_slice()) {
+            (None, [only]) => return Ok(*only),
+            (Some(wanted), all) if all.contains(&wanted) => return Ok(wanted),
+            (Some(wanted), _) => format!(
+                "the log has no instance {wanted}; it has: {}",
+                self.listed()
+            ),
+            (None, _) => format!("the log has several sensors: {}", self.listed()),
+        };
+        let error = Error::new(path.display(), problem, "choose one of the instances");
+        Err(error.about(Argument::Instance))
     }
 
     /// The topics of gyro and accelerometer, of one instance.
@@ -186,29 +231,9 @@ impl Log {
         names: [&'static str; 2],
         instance: Option<u32>,
     ) -> Result<Vec<Readings>> {
-        let mut instances: Vec<u32> = self
-            .topics
-            .keys()
-            .filter(|(name, _)| names.contains(name))
-            .map(|(_, i)| *i)
-            .collect();
-        instances.sort_unstable();
-        instances.dedup();
-        let instance = match (instance, instances.as_slice()) {
-            (None, [only]) => *only,
-            (Some(wanted), all) if all.contains(&wanted) => wanted,
-            (wanted, _) => {
-                let problem = match wanted {
-                    Some(wanted) => format!(
-                        "the log has no instance {wanted}; it has: {}",
-                        self.listed()
-                    ),
-                    None => format!("the log has several sensors: {}", self.listed()),
-                };
-                let error = Error::new(path.display(), problem, "choose one of the instances");
-                return Err(error.about(Argument::Instance));
-            }
-        };
+        let of_topics = self.topics.keys();
+        let of_topics = of_topics.filter(|(name, _)| names.contains(name));
+        let instance = self.instance(path, of_topics.map(|(_, i)| *i), instance)?;
         let mut both: Vec<(usize, &'static str, &Topic)> = (0..)
             .zip(names)
             .filter_map(|(sensor, name)| Some((sensor, name, self.topics.get(&(name, instance))?)))
@@ -297,38 +322,35 @@ impl Log {
                 false => selected.collect(),
             }
         };
-        let gyro =
-            self.parameters
-                .undo(Sensor::Gyro, &ids(Sensor::Gyro), &self.combined.gyro, true);
-        let accel = self.parameters.undo(
-            Sensor::Accel,
-            &ids(Sensor::Accel),
-            &self.combined.accel,
-            true,
-        );
-        let mut readings = Readings::of_unit();
-        for (row, stamp) in self.combined.stamps_ns.iter().enumerate() {
-            readings.push(
-                *stamp,
-                gyro.values[row].into_iter().chain(accel.values[row]),
-            );
-        }
+        let ids = Sensor::ALL.map(ids);
         let why = match sparse {
             true => {
                 ", because the topics of the single sensors have too few samples (SDLOG_PROFILE)"
             }
             false => "",
         };
-        readings
-            .notes
-            .push(format!("{} samples of {COMBINED}{why}", readings.len()));
-        for (name, undone) in [("gyro", gyro), ("accel", accel)] {
-            readings.notes.push(format!("{name}: {}", undone.said));
-            readings
-                .warnings
-                .extend(undone.warnings.iter().map(|w| format!("{name}: {w}")));
-        }
-        Ok(vec![readings])
+        let what = format!("{COMBINED}{why}");
+        Ok(vec![uncalibrated(
+            &self.combined,
+            &self.parameters,
+            &ids,
+            &what,
+        )])
+    }
+
+    /// The readings of an instance of `vehicle_imu`.
+    fn integrated_readings(&self, path: &Path, wanted: Option<u32>) -> Result<Vec<Readings>> {
+        let instance = self.instance(path, self.integrated.keys().copied(), wanted)?;
+        let Some((samples, parameters)) = self.integrated.get(&instance) else {
+            return Ok(Vec::new());
+        };
+        let ids = Sensor::ALL.map(|sensor| {
+            let all = samples.devices.iter();
+            all.map(|(from, ids)| (*from, ids[sensor as usize]))
+                .collect()
+        });
+        let what = format!("{INTEGRATED} instance {instance}");
+        Ok(vec![uncalibrated(samples, parameters, &ids, &what)])
     }
 
     /// Warnings about what the logger lost and how the file ended.
@@ -356,6 +378,36 @@ impl Log {
         }
         warnings
     }
+}
+
+/// Calibrated `samples` of both sensors with PX4's calibration undone; `ids` are the devices of gyro and accelerometer, `what` the topic.
+fn uncalibrated(
+    samples: &Combined,
+    parameters: &Parameters,
+    ids: &[Vec<(usize, u32)>; 2],
+    what: &str,
+) -> Readings {
+    let [gyro, accel] = [
+        (Sensor::Gyro, &samples.gyro),
+        (Sensor::Accel, &samples.accel),
+    ]
+    .map(|(sensor, all)| parameters.undo(sensor, &ids[sensor as usize], all, true));
+    let mut readings = Readings::of_unit();
+    for (row, stamp) in samples.stamps_ns.iter().enumerate() {
+        readings.push(
+            *stamp,
+            gyro.values[row].into_iter().chain(accel.values[row]),
+        );
+    }
+    let count = readings.len();
+    readings.notes.push(format!("{count} samples of {what}"));
+    for (name, undone) in [("gyro", gyro), ("accel", accel)] {
+        readings.notes.push(format!("{name}: {}", undone.said));
+        let warnings = undone.warnings.iter();
+        let warnings = warnings.map(|warning| format!("{name}: {warning}"));
+        readings.warnings.extend(warnings);
+    }
+    readings
 }
 
 #[cfg(test)]

@@ -7,16 +7,35 @@ use super::assignment::Role;
 use super::text_table::Cells;
 use super::time::Stamp;
 use crate::columns::Column;
-use crate::error::Result;
+use crate::error::{Argument, Error, Result};
 use crate::in_order::reader_panicked;
 
 /// The chosen sensor in a log.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Choice<'a> {
-    /// Name of the topic or message; without it, the format decides.
-    pub topic: Option<&'a str>,
+    /// Names of topics or messages: one, or those of two sensors. Without them, the format decides.
+    pub topics: &'a [String],
     /// Number of the sensor among those of one topic.
     pub instance: Option<u32>,
+}
+
+impl<'a> Choice<'a> {
+    /// The only topic, or the first of several if these are among one of `sets`, which are read together.
+    pub fn topic_of(&self, path: &Path, sets: &[&[&str]]) -> Result<Option<&'a str>> {
+        let within = |set: &&[&str]| {
+            self.topics
+                .iter()
+                .all(|topic| set.contains(&topic.as_str()))
+        };
+        match self.topics.len() < 2 || sets.iter().any(within) {
+            true => Ok(self.topics.first().map(String::as_str)),
+            false => {
+                let problem = format!("{} are not read together", self.topics.join(" and "));
+                let remedy = "choose one topic, or those of one gyro and one accelerometer";
+                Err(Error::new(path.display(), problem, remedy).about(Argument::Topic))
+            }
+        }
+    }
 }
 
 /// Readings of one clock: those of a whole unit, or of one of its two sensors.

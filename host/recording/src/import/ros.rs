@@ -1,6 +1,9 @@
 //! Messages `sensor_msgs/Imu` of ROS 1 bags (version 2.0), of ROS 2 bags in SQLite files, and of MCAP files.
 //!
-//! Their time is the stamp of the header, which the driver has set. The time of reception is ignored.
+//! Their time is the stamp of the header, which the driver has set. Only if it sets none, the time of reception is used.
+//!
+//! Drivers whose gyro and accelerometer have separate clocks publish two topics, each with one half of the message: the other half is 0, or its
+//! covariance begins with -1, which the definition of the message reserves for this.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -9,6 +12,7 @@ use std::path::Path;
 
 use super::readings::{Choice, Readings, guarded};
 use super::sqlite::Database;
+use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 
 /// Bytes that are read at a time.
@@ -21,6 +25,10 @@ const LONGEST_RECORD: usize = 1 << 30;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Imu {
     stamp_ns: i64,
+    /// Time at which it was recorded.
+    received_ns: i64,
+    /// Whether the covariances of angular velocity and linear acceleration say that there are no readings.
+    absent: [bool; 2],
     /// Angular velocity, rad/s; linear acceleration, m/s².
     values: [f64; 6],
 }
@@ -67,7 +75,7 @@ struct Found {
 }
 
 impl Found {
-    fn message(&mut self, topic: u32, data: &[u8]) {
+    fn message(&mut self, topic: u32, received_ns: i64, data: &[u8]) {
         let Some(Topic {
             name,
             layout: Some(layout),
@@ -78,7 +86,7 @@ impl Found {
         };
         let messages = self.messages.entry(topic).or_default();
         match parse(data, *layout) {
-            Some(imu) => messages.push(imu),
+            Some(imu) => messages.push(Imu { received_ns, ..imu }),
             None => {
                 let number = messages.len() + 1;
                 self.broken
@@ -88,54 +96,146 @@ impl Found {
     }
 }
 
-/// The messages of the chosen topic; without a choice, those of the only one.
+/// The messages of the chosen topics; without a choice, those of the only one, or of the only gyro and the only accelerometer.
 fn chosen(path: &Path, mut found: Found, choice: Choice<'_>) -> Result<Vec<Readings>> {
     if choice.instance.is_some() {
         let problem = "an instance is given, but topics have no instances";
         let remedy = "leave it out, and choose the topic";
         return Err(Error::new(path.display(), problem, remedy).about(Argument::Topic));
     }
-    let number = choose(path, &found.topics, choice.topic)?;
+    let numbers = choose(path, &found, choice.topics)?;
     if let Some(message) = found.broken {
         let problem = format!("{message} is cut or is not a sensor_msgs/Imu");
         return Err(Error::new(path.display(), problem, "record it again"));
     }
-    let mut readings = Readings::of_unit();
-    for imu in found.messages.remove(&number).unwrap_or_default() {
-        readings.push(imu.stamp_ns, imu.values);
-    }
-    Ok(vec![readings])
+    let several = numbers.len() > 1;
+    let each = numbers.iter().map(|number| {
+        let messages = found.messages.remove(number).unwrap_or_default();
+        let name = &found.topics[number].name;
+        readings(name, &messages, several)
+    });
+    let mut all: Vec<Readings> = each.collect();
+    // The others are interpolated at the times of the first.
+    all.sort_by_key(|readings| std::cmp::Reverse(readings.len()));
+    Ok(all)
 }
 
-/// The number of the topic to read.
-fn choose(path: &Path, topics: &BTreeMap<u32, Topic>, wanted: Option<&str>) -> Result<u32> {
+/// The readings of the topic `name`; `several`: it is one of several that are joined.
+fn readings(name: &str, messages: &[Imu], several: bool) -> Readings {
+    let has = sensors(messages);
+    let mut readings = Readings::of(
+        (0..6)
+            .filter(|channel| has[channel / 3])
+            .map(Column::Raw)
+            .collect(),
+    );
+    let stamped = messages
+        .iter()
+        .any(|imu| imu.stamp_ns != messages[0].stamp_ns);
+    if !stamped && messages.len() > 1 {
+        readings.warnings.push(format!("{name}: all headers have the same stamp, so the times of reception are used, which are late by varying delays"));
+    }
+    for imu in messages {
+        let values = (0..6)
+            .filter(|channel| has[channel / 3])
+            .map(|c| imu.values[c]);
+        let stamp_ns = if stamped {
+            imu.stamp_ns
+        } else {
+            imu.received_ns
+        };
+        readings.push(stamp_ns, values);
+    }
+    if several || has != [true; 2] {
+        readings.notes.push(format!(
+            "{} messages of {name}, of which {} is read",
+            messages.len(),
+            contents(has)
+        ));
+    }
+    readings
+}
+
+/// Whether gyro and accelerometer have readings in `messages`. A half that is 0 throughout belongs to a driver that fills only the other one. If both
+/// halves are empty, both count as present, so that the import refuses them with their number.
+fn sensors(messages: &[Imu]) -> [bool; 2] {
+    let has = [0, 1].map(|sensor| {
+        messages.iter().any(|imu| {
+            let values = &imu.values[3 * sensor..3 * sensor + 3];
+            !imu.absent[sensor] && values.iter().any(|v| *v != 0.0 && !v.is_nan())
+        })
+    });
+    if has == [false; 2] { [true; 2] } else { has }
+}
+
+/// Which sensors there are, for people.
+fn contents(has: [bool; 2]) -> &'static str {
+    match has {
+        [true, false] => "the gyro",
+        [false, true] => "the accelerometer",
+        _ => "both sensors",
+    }
+}
+
+/// The numbers of the topics to read.
+fn choose(path: &Path, found: &Found, wanted: &[String]) -> Result<Vec<u32>> {
+    let topics = &found.topics;
     let list = |topics: Vec<&Topic>| {
         let each = topics.iter().map(|t| format!("{} ({})", t.name, t.kind));
         each.collect::<Vec<_>>().join(", ")
     };
+    let refuse = |problem: String, remedy: &str| {
+        Err(Error::new(path.display(), problem, remedy).about(Argument::Topic))
+    };
     let fits = topics.iter().filter(|(_, topic)| topic.layout.is_some());
-    let chosen: Vec<(&u32, &Topic)> = fits
-        .filter(|(_, topic)| wanted.is_none_or(|name| topic.name == name))
-        .collect();
-    let (problem, remedy) = match chosen.as_slice() {
-        [(number, _)] => return Ok(**number),
+    let fits: Vec<(&u32, &Topic)> = fits.collect();
+    let mut chosen = Vec::new();
+    for name in wanted {
+        match fits.iter().find(|(_, topic)| topic.name == *name) {
+            Some((number, _)) => chosen.push(**number),
+            None => {
+                let all = list(topics.values().collect());
+                let problem =
+                    format!("the file has no topic {name} with sensor_msgs/Imu; it has: {all}");
+                return refuse(problem, "choose another file or topic");
+            }
+        }
+    }
+    if !chosen.is_empty() {
+        return Ok(chosen);
+    }
+    let filled = |number: &u32| found.messages.get(number).map_or(&[][..], Vec::as_slice);
+    match fits.as_slice() {
+        [(number, _)] => return Ok(vec![**number]),
         [] => {
             let all = list(topics.values().collect());
-            let what = wanted.map_or("no topic".into(), |name| format!("no topic {name}"));
-            (
-                format!("the file has {what} with sensor_msgs/Imu; it has: {all}"),
-                "choose another file or topic",
-            )
+            let problem = format!("the file has no topic with sensor_msgs/Imu; it has: {all}");
+            return refuse(problem, "choose another file or topic");
         }
-        several => {
-            let all = list(several.iter().map(|(_, topic)| *topic).collect());
-            (
-                format!("several topics have sensor_msgs/Imu: {all}"),
-                "choose one of them",
-            )
-        }
+        _ => {}
+    }
+    let has: Vec<[bool; 2]> = fits.iter().map(|(n, _)| sensors(filled(n))).collect();
+    let only = |what: [bool; 2]| {
+        let mut those = (0..fits.len()).filter(|k| has[*k] == what);
+        those.next().filter(|_| those.next().is_none())
     };
-    Err(Error::new(path.display(), problem, remedy).about(Argument::Topic))
+    if let (Some(gyro), Some(accel), 2) = (only([true, false]), only([false, true]), fits.len()) {
+        return Ok(vec![*fits[gyro].0, *fits[accel].0]);
+    }
+    let each = fits.iter().zip(&has).map(|((number, topic), has)| {
+        let count = filled(number).len();
+        format!(
+            "{} ({}, {count} messages of {})",
+            topic.name,
+            topic.kind,
+            contents(*has)
+        )
+    });
+    let all = each.collect::<Vec<_>>().join(", ");
+    refuse(
+        format!("several topics have sensor_msgs/Imu: {all}"),
+        "choose one of them, or one with the gyro and one with the accelerometer",
+    )
 }
 
 fn damaged(path: &Path, error: &dyn std::fmt::Display) -> Error {
@@ -179,7 +279,8 @@ fn messages_of_bag(path: &Path) -> Result<Found> {
         };
         for message in chunk.messages() {
             if let MessageRecord::MessageData(message) = message.map_err(damaged)? {
-                found.message(message.conn_id, message.data);
+                let received_ns = i64::try_from(message.time).unwrap_or(i64::MAX);
+                found.message(message.conn_id, received_ns, message.data);
             }
         }
     }
@@ -244,7 +345,8 @@ fn messages_of_mcap(path: &Path) -> Result<Found> {
                         found.topics.insert(u32::from(channel.id), topic);
                     }
                     Record::Message { header, data } => {
-                        found.message(u32::from(header.channel_id), &data);
+                        let received_ns = i64::try_from(header.log_time).unwrap_or(i64::MAX);
+                        found.message(u32::from(header.channel_id), received_ns, &data);
                     }
                     _ => {}
                 }
@@ -291,6 +393,7 @@ fn messages_of_database(path: &Path) -> std::result::Result<Found, String> {
         Ok(())
     })?;
     let (topic, data) = (messages.column("topic_id")?, messages.column("data")?);
+    let received = messages.column("timestamp")?;
     database.each_row(messages, |row| {
         let number = u32::try_from(row.integer(topic)?).map_err(|_| "a message has no topic")?;
         // Other messages, such as images, are not read.
@@ -299,7 +402,7 @@ fn messages_of_database(path: &Path) -> std::result::Result<Found, String> {
             .get(&number)
             .is_some_and(|topic| topic.layout.is_some())
         {
-            found.message(number, &row.bytes(data)?);
+            found.message(number, row.integer(received)?, &row.bytes(data)?);
         }
         Ok(())
     })?;
@@ -367,10 +470,13 @@ fn parse(data: &[u8], layout: Layout) -> Option<Imu> {
     fields.at = fields.at.checked_add(frame)?;
     fields.f64s::<{ 4 + 9 }>()?;
     let [rx, ry, rz] = fields.f64s()?;
-    fields.f64s::<9>()?;
+    let [of_rate, ..] = fields.f64s::<9>()?;
     let [ax, ay, az] = fields.f64s()?;
+    let of_force = fields.f64s::<9>().map_or(0.0, |covariance| covariance[0]);
     Some(Imu {
         stamp_ns: seconds * 1_000_000_000 + i64::from(nanoseconds),
+        received_ns: 0,
+        absent: [of_rate, of_force].map(|first| first == -1.0),
         values: [rx, ry, rz, ax, ay, az],
     })
 }

@@ -72,8 +72,7 @@ impl fmt::Display for RowFilter {
 pub(super) struct RowFilters {
     filters: Vec<Tally>,
     kept: u64,
-    /// Rows that were left out.
-    pub left_out: u64,
+    left_out: u64,
 }
 
 #[derive(Debug)]
@@ -98,8 +97,35 @@ impl RowFilters {
         }
     }
 
-    /// Whether a row is kept; `cells` are those of the filters' columns, in the order of the filters.
-    pub fn keep<'a>(&mut self, cells: impl Iterator<Item = std::borrow::Cow<'a, str>>) -> bool {
+    /// Rows that were kept, and those that were left out.
+    pub fn counts(&self) -> [u64; 2] {
+        [self.kept, self.left_out]
+    }
+
+    /// Whether the row `cells` is kept; `at` are the positions of the filters' columns. A row that is too short for them is kept, so that it is reported
+    /// as broken.
+    pub fn keep(&mut self, at: &[usize], cells: &csv::ByteRecord) -> bool {
+        if at.iter().any(|at| *at >= cells.len()) {
+            self.kept += 1;
+            return true;
+        }
+        self.keep_cells(at.iter().map(|at| String::from_utf8_lossy(&cells[*at])))
+    }
+
+    /// Whether [`Self::keep`] would keep the row; it is not counted.
+    pub fn hold(&self, at: &[usize], cells: &csv::ByteRecord) -> bool {
+        let holds = |(tally, at): (&Tally, &usize)| {
+            let cell = cells.get(*at).map(String::from_utf8_lossy);
+            cell.is_none_or(|cell| tally.filter.holds(cell.trim()))
+        };
+        self.filters.iter().zip(at).all(holds)
+    }
+
+    /// [`Self::keep`] of a row whose `cells` of the filters' columns are given, in the order of the filters.
+    pub fn keep_cells<'a>(
+        &mut self,
+        cells: impl Iterator<Item = std::borrow::Cow<'a, str>>,
+    ) -> bool {
         let mut all = true;
         for (tally, cell) in self.filters.iter_mut().zip(cells) {
             let cell = cell.trim();

@@ -12,6 +12,7 @@ use super::options::{file_name, source};
 use super::sequence_position::SequencePosition;
 use super::step_inputs::StepInputs;
 use super::step_labels::StepLabels;
+use super::thermometer::LeftOut;
 use super::{ImportOptions, ImportSummary};
 use crate::columns::Columns;
 use crate::error::{Argument, Error, Result};
@@ -21,15 +22,20 @@ use crate::writer::Writer;
 /// Rates of two files may differ by this share: a loop without a timer is not equally fast each time.
 const ALIKE: f64 = 0.02;
 
-/// Imports the files of `options` one after the other.
+/// Imports the files of `options` one after the other, without `left_out`. If more is to be left out, writes nothing and returns all of it.
 pub(super) fn import_sequence(
     options: &ImportOptions,
     out: &Path,
-    progress: impl Fn(f64),
-) -> Result<ImportSummary> {
+    progress: &impl Fn(f64),
+    left_out: LeftOut,
+) -> Result<std::result::Result<ImportSummary, LeftOut>> {
     let labels = labels(options)?;
     let mut inputs: Option<StepInputs> = None;
     let mut open: Option<(Writer, Manifest, ImportSummary, Columns)> = None;
+    let mut without = LeftOut {
+        thermometer: true,
+        ..LeftOut::default()
+    };
     let (mut origin_s, mut after_s) = (0, f64::NEG_INFINITY);
     let count = options.files.len() as f64;
     for (step, path) in options.files.iter().enumerate() {
@@ -40,7 +46,7 @@ pub(super) fn import_sequence(
             preset_warnings: Vec::new(),
             ..options.clone()
         };
-        let mut import = JoinedFiles::open(&one, [false; 2])?;
+        let mut import = JoinedFiles::open(&one, left_out)?;
         if import.first.has_step() {
             let problem = "it has a column step, but in a sequence each file is a dwell";
             let remedy = "skip the column, or import this file alone";
@@ -59,7 +65,7 @@ pub(super) fn import_sequence(
         let (writer, manifest, summary, columns) = match &mut open {
             Some(open) => open,
             None => {
-                let mut manifest = import.manifest(options, out);
+                let mut manifest = import.manifest(options);
                 manifest.check("import")?;
                 manifest.step_labels = labels.clone();
                 let writer = Writer::create(out, import.columns, options.format, options.replace)?;
@@ -98,7 +104,8 @@ pub(super) fn import_sequence(
             progress((step as f64 + share) / count)
         })?;
         import.finish_summary(writer.rows(), manifest)?;
-        if let Some(sensor) = import.dead_sensors().iter().position(|dead| *dead) {
+        let dead = import.to_leave_out();
+        if let Some(sensor) = dead.sensors.iter().position(|dead| *dead) {
             let sensor = ["gyro", "accel"][sensor];
             let problem = format!("{sensor} is exactly 0 throughout: it was not connected");
             return Err(Error::new(
@@ -107,6 +114,9 @@ pub(super) fn import_sequence(
                 "leave the file out, or skip the columns",
             ));
         }
+        // A thermometer that answers in none of the files is none; in some, its zeros are missing answers.
+        without.thermometer &= dead.thermometer;
+        without.zero_temperatures |= dead.thermometer || dead.zero_temperatures;
         after_s = import.place.map_or(after_s, |place| place.last_s());
         manifest.sources.push(source(path)?);
         add(summary, import.summary);
@@ -122,6 +132,10 @@ pub(super) fn import_sequence(
             "name the files to import",
         ));
     };
+    without.zero_temperatures &= !without.thermometer;
+    if without != LeftOut::default() && left_out == LeftOut::default() {
+        return Ok(Err(without));
+    }
     if let Some(file) = &options.inputs {
         manifest.sources.push(source(file)?);
     }
@@ -129,7 +143,7 @@ pub(super) fn import_sequence(
     summary.warnings.extend(unused);
     summary.rows = writer.rows();
     summary.recording = writer.finish(&manifest)?.display().to_string();
-    Ok(summary)
+    Ok(Ok(summary))
 }
 
 /// Warnings about what six faces do not determine.

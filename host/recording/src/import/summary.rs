@@ -68,7 +68,6 @@ impl ImportSummary {
         self.warnings
             .extend(file.seen.warnings(&place, file.rate_hz()));
         self.padding += file.seen.padding;
-        self.not_chosen += file.not_chosen();
         for (sensor, rows) in ["gyro", "accel"].iter().zip(file.seen.dead()) {
             self.warnings.extend(rows.map(|rows| {
                 format!(
@@ -84,7 +83,7 @@ impl ImportSummary {
         }
         if file.stamp_wraps() > 0 {
             self.warnings.push(format!(
-                "{place}: the time stamps wrapped to 0 {}, like a counter of 16 to 32 bits, and were unwrapped",
+                "{place}: the time stamps wrapped to 0 {}, like a counter of 16 to 32 bits or a clock at midnight, and were unwrapped",
                 times(file.stamp_wraps())
             ));
         }

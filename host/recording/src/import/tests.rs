@@ -9,8 +9,11 @@ use super::*;
 use crate::error::Argument;
 
 mod broken;
+mod clocks;
+mod counters;
 mod logs;
 mod means;
+mod one_file;
 mod pauses;
 mod plausibility;
 mod presets;
@@ -18,6 +21,7 @@ mod rows;
 mod sequence;
 mod sources;
 mod stamps;
+mod thermometers;
 
 const BOTH: &str = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
 
@@ -115,7 +119,7 @@ fn metadata_headers_comments_and_blank_lines_are_skipped_and_counted() {
     assert_eq!(batch.raw[3], [1.0, 4.0]);
     assert_eq!(batch.t_s, [0.0, 0.01]);
     assert_eq!(manifest.sources[0].file, "a.txt");
-    assert_eq!(manifest.device, "out");
+    assert_eq!(manifest.device, crate::UNNAMED);
     assert!(
         manifest
             .imported_with

@@ -8,8 +8,9 @@ use super::SkippedLines;
 use super::assignment::{ColumnList, Role};
 use super::binary::{refuse_binary, without_zeros};
 use super::broken::{Fault, Unreadable};
+use super::comment_signs::{CommentSigns, TextFormat};
 use super::row_filter::{RowFilter, RowFilters};
-use super::time::Stamp;
+use super::time::{Stamp, calendar_time};
 use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
 use crate::csv_file::BOM;
@@ -37,12 +38,15 @@ pub(super) struct Cells {
 #[derive(Debug)]
 pub(super) struct TextTable {
     path: PathBuf,
+    comments: CommentSigns,
     reader: BufReader<Chain<Cursor<Vec<u8>>, File>>,
     separator: Separator,
     /// Position and role of each wanted cell.
     wanted: Vec<(usize, Role)>,
     /// Number of cells that a row must have; further cells must be empty.
     width: usize,
+    /// Names of the columns in the file; empty if it has none.
+    names: Vec<String>,
     filters: RowFilters,
     /// Position of the cell of each filter.
     filtered: Vec<usize>,
@@ -75,19 +79,27 @@ enum Kind {
     Other,
 }
 
-/// The line after blanks and signs of a comment: names may follow them.
-pub(super) fn without_comment_sign(line: &[u8]) -> &[u8] {
-    let skipped = |b: &u8| matches!(b, b'#' | b'%' | b' ' | b'\t');
-    let from = line.iter().position(|b| !skipped(b));
-    &line[from.unwrap_or(line.len())..]
+fn kind(line: &[u8], comments: CommentSigns) -> Kind {
+    match (line.trim_ascii().is_empty(), comments.begins(line)) {
+        (true, _) => Kind::Blank,
+        (false, Some(_)) => Kind::Comment,
+        (false, None) => Kind::Other,
+    }
 }
 
-fn kind(line: &[u8]) -> Kind {
-    match line.trim_ascii().first() {
-        None => Kind::Blank,
-        Some(b'#' | b'%') => Kind::Comment,
-        Some(_) => Kind::Other,
-    }
+/// Splits a line into cells. What a serial monitor puts before it (`15:04:23.125 -> 1,2,3`) is its first cell.
+fn split(separator: Separator, line: &[u8], cells: &mut csv::ByteRecord) {
+    const ARROW: &[u8] = b" -> ";
+    let arrow = line.windows(ARROW.len()).position(|part| part == ARROW);
+    let Some(at) = arrow.filter(|at| calendar_time(&line[..*at]).is_some()) else {
+        separator.split(line, cells);
+        return;
+    };
+    let mut rest = csv::ByteRecord::new();
+    separator.split(&line[at + ARROW.len()..], &mut rest);
+    cells.clear();
+    cells.push_field(line[..at].trim_ascii());
+    cells.extend(&rest);
 }
 
 impl TextTable {
@@ -96,7 +108,7 @@ impl TextTable {
     pub fn open(
         path: &Path,
         list: Option<&ColumnList>,
-        separator: Option<Separator>,
+        format: TextFormat,
         filters: &[RowFilter],
     ) -> Result<TextTable> {
         let io = |error: std::io::Error| Error::io(path, &error);
@@ -116,20 +128,23 @@ impl TextTable {
             .split(|&byte| byte == b'\n')
             .map(without_zeros)
             .collect();
-        let separator = separator.unwrap_or_else(|| {
+        let comments = format.comments;
+        let separator = format.separator.unwrap_or_else(|| {
             let shown: Vec<&[u8]> = lines
                 .iter()
-                .filter(|line| matches!(kind(line), Kind::Other))
+                .filter(|line| matches!(kind(line, comments), Kind::Other))
                 .copied()
                 .collect();
             Separator::detect(&shown)
         });
         let mut table = TextTable {
             path: path.to_owned(),
+            comments,
             reader: BufReader::new(Cursor::new(Vec::new()).chain(file)),
             separator,
             wanted: Vec::new(),
             width: 0,
+            names: Vec::new(),
             filters: RowFilters::new(filters),
             filtered: Vec::new(),
             line: Vec::new(),
@@ -142,9 +157,9 @@ impl TextTable {
             zero_bytes: 0,
             warnings: Vec::new(),
         };
-        table.find_rows(&lines, list)?;
         let position = |filter| table.position(filter, &lines);
         table.filtered = filters.iter().map(position).collect::<Result<_>>()?;
+        table.find_rows(&lines, list)?;
         let (_, file) = table.reader.into_inner().into_inner();
         let start = Cursor::new(head).chain(file);
         table.reader = BufReader::with_capacity(1 << 18, start);
@@ -154,6 +169,16 @@ impl TextTable {
     /// Roles in the order of [`Cells::numbers`].
     pub fn roles(&self) -> Vec<Role> {
         self.wanted.iter().map(|(_, role)| *role).collect()
+    }
+
+    /// Name of the column with the time stamps in the file, if it has names.
+    pub fn time_name(&self) -> Option<String> {
+        let time = self
+            .wanted
+            .iter()
+            .find(|(_, role)| *role == Role::Column(Column::Time));
+        let name = time.and_then(|(position, _)| self.names.get(*position));
+        name.filter(|name| !name.is_empty()).cloned()
     }
 
     /// Share of the file that has been read.
@@ -195,17 +220,17 @@ impl TextTable {
                 // Counted when the file was opened.
                 continue;
             }
-            match kind(&self.line) {
+            match kind(&self.line, self.comments) {
                 Kind::Blank => self.skipped.blank += 1,
                 Kind::Comment => self.skipped.comment += 1,
                 Kind::Other => {
-                    self.separator.split(&self.line, &mut self.record);
+                    split(self.separator, &self.line, &mut self.record);
                     // Spreadsheets end with rows of nothing but separators.
                     if self.record.iter().all(<[u8]>::is_empty) {
                         self.skipped.blank += 1;
                         continue;
                     }
-                    if !self.chosen() {
+                    if !self.filters.keep(&self.filtered, &self.record) {
                         continue;
                     }
                     if let Some(refusal) = self.misfit(&self.record, ended) {
@@ -219,9 +244,9 @@ impl TextTable {
         }
     }
 
-    /// Rows that the filters left out.
-    pub fn left_out(&self) -> u64 {
-        self.filters.left_out
+    /// The filters, with their counts.
+    pub fn filters(&self) -> &RowFilters {
+        &self.filters
     }
 
     /// At the end: refuses a value that no row had.
@@ -229,22 +254,15 @@ impl TextTable {
         self.filters.check(&self.path)
     }
 
-    /// Whether the filters keep the row. A row that is too short for them is kept, so that it is reported as broken.
-    fn chosen(&mut self) -> bool {
-        if self.filtered.iter().any(|at| *at >= self.record.len()) {
-            return true;
-        }
-        let cells = self.filtered.iter().map(|at| &self.record[*at]);
-        self.filters.keep(cells.map(String::from_utf8_lossy))
-    }
-
     /// Position of the column of `filter`: by its name in one of the first lines, or else by its number from the left.
     fn position(&self, filter: &RowFilter, lines: &[&[u8]]) -> Result<usize> {
         let mut record = csv::ByteRecord::new();
         let mut named = lines.iter().filter_map(|line| {
             self.separator
-                .split(without_comment_sign(line), &mut record);
-            filter.position(&texts(&record))
+                .split(self.comments.skipped(line), &mut record);
+            // The number of a column is no cell of a row.
+            let header = !self.mostly_numbers(record.iter());
+            header.then(|| filter.position(&texts(&record))).flatten()
         });
         named.next().or(filter.number()).ok_or_else(|| {
             let name = shorten(filter.column().as_bytes());
@@ -265,7 +283,7 @@ impl TextTable {
 
     /// Number in a cell. If commas do not separate cells, one comma is a decimal point.
     fn number(&self, cell: &[u8]) -> std::result::Result<f64, Refusal> {
-        if self.separator != Separator::Comma
+        if !self.separator.separates(b',')
             && !cell.contains(&b'.')
             && let Some(comma) = memchr::memchr(b',', cell)
         {
@@ -286,11 +304,17 @@ impl TextTable {
                 cells.numbers.push(f64::NAN);
                 continue;
             }
+            let time = role == Role::Column(Column::Time);
+            if time && let Some(stamp) = calendar_time(cell) {
+                cells.stamp = stamp;
+                cells.numbers.push(stamp.value);
+                continue;
+            }
             let number = self.number(cell).map_err(|refusal| {
                 let place = format!("{}, column {}", self.place(line), role.name());
                 Unreadable::row(line, Fault::Reading, place, refusal)
             })?;
-            if role == Role::Column(Column::Time) {
+            if time {
                 cells.stamp = Stamp::in_cell(cell, number);
             }
             cells.numbers.push(number);
@@ -335,9 +359,13 @@ impl TextTable {
         }
         let mut record = csv::ByteRecord::new();
         let mut misfit: Option<Misfit> = None;
+        // Rows that the filters leave out may come first, and have another width.
+        let mut left_out: Option<u64> = None;
         for (index, line) in lines.iter().enumerate() {
             let number = index as u64 + 1;
-            match kind(line) {
+            match kind(line, self.comments) {
+                // Counted when the rows are read.
+                Kind::Blank | Kind::Comment if left_out.is_some() => continue,
                 Kind::Blank => {
                     // The text after the last line break is not a line.
                     self.skipped.blank += u64::from(index + 1 < lines.len());
@@ -346,10 +374,12 @@ impl TextTable {
                 Kind::Comment => {
                     // Many programs write the names of the columns after a #.
                     self.separator
-                        .split(without_comment_sign(line), &mut record);
+                        .split(self.comments.skipped(line), &mut record);
                     let open = self.wanted.is_empty();
                     if open {
                         self.take_header(&texts(&record), list, number)?;
+                    } else if record.len() == self.width {
+                        self.names = texts(&record);
                     }
                     match open && !self.wanted.is_empty() {
                         true => self.skipped.header += 1,
@@ -357,7 +387,7 @@ impl TextTable {
                     }
                     continue;
                 }
-                Kind::Other => self.separator.split(line, &mut record),
+                Kind::Other => split(self.separator, line, &mut record),
             }
             if self.wanted.is_empty() {
                 let here = texts(&record);
@@ -365,14 +395,22 @@ impl TextTable {
                 if names.is_empty() || matches(list, &here) > matches(list, &names) {
                     names = here;
                 }
+            } else if self.mostly_numbers(record.iter())
+                && !self.filters.hold(&self.filtered, &record)
+            {
+                left_out.get_or_insert(number);
+                continue;
             } else {
                 let problem = match self.misfit(&record, true) {
                     Some(refusal) => refusal.problem,
                     None if self.is_row(&record) => {
-                        self.first_row = number;
+                        self.first_row = left_out.unwrap_or(number);
                         return Ok(());
                     }
-                    None => "it contains words".to_owned(),
+                    None => {
+                        self.names = texts(&record);
+                        "it contains words".to_owned()
+                    }
                 };
                 let data = self.mostly_numbers(record.iter());
                 if misfit.as_ref().is_none_or(|first| data && !first.data) {
@@ -383,7 +421,11 @@ impl TextTable {
                     });
                 }
             }
-            self.skipped.header += 1;
+            self.skipped.header += u64::from(left_out.is_none());
+        }
+        if let (Some(number), None) = (left_out, &misfit) {
+            self.first_row = number;
+            return Ok(());
         }
         let path = self.path.display();
         if self.wanted.is_empty() {
@@ -406,7 +448,8 @@ impl TextTable {
                     "name the columns to be imported",
                 ),
             };
-            return Err(Error::new(path, problem, remedy).about(Argument::Columns));
+            let error = Error::new(path, problem, remedy).about(Argument::Columns);
+            return Err(self.all_comments(lines).unwrap_or(error));
         }
         match misfit {
             Some(Misfit {
@@ -419,13 +462,40 @@ impl TextTable {
                 ),
                 "name every column, - for one to skip",
             )
-            .about(Argument::Columns)),
-            None => Err(Error::new(
-                path,
-                "the file has no row of data",
-                "record it again",
-            )),
+            .about(Argument::Columns)
+            .about(Argument::Separator)),
+            None => Err(self.all_comments(lines).unwrap_or_else(|| {
+                let problem = "the file has no row of data";
+                Error::new(path, problem, "record it again")
+            })),
         }
+    }
+
+    /// The refusal of a file whose lines are all comments, of which most contain numbers.
+    fn all_comments(&self, lines: &[&[u8]]) -> Option<Error> {
+        let filled = lines.iter().filter(|line| !line.trim_ascii().is_empty());
+        let signs: Option<Vec<u8>> = filled.map(|line| self.comments.begins(line)).collect();
+        let signs = signs.filter(|signs| !signs.is_empty())?;
+        let digits = |line: &&&[u8]| line.iter().any(u8::is_ascii_digit);
+        if 2 * lines.iter().filter(digits).count() < signs.len() {
+            return None;
+        }
+        let (sign, count) = (char::from(signs[0]), signs.len());
+        let problem = match signs.iter().all(|other| *other == signs[0]) {
+            true => {
+                format!("all of its {count} lines begin with {sign}, and are taken as comments")
+            }
+            false => {
+                format!("all of its {count} lines are taken as comments, by their first characters")
+            }
+        };
+        let problem = match self.length > HEAD {
+            true => problem.replace("its", "its first"),
+            false => problem,
+        };
+        let remedy = "if they contain the readings, say that no character begins a comment: none";
+        let place = self.path.display();
+        Some(Error::new(place, problem, remedy).about(Argument::Comment))
     }
 
     /// Takes the line as header if it has the wanted names.
@@ -476,6 +546,7 @@ impl TextTable {
             }
         }
         self.wanted = positions;
+        self.names = names.to_vec();
         let filled = |name: &&String| !name.is_empty();
         self.width = names
             .iter()

@@ -2,7 +2,7 @@
 
 use super::row::Row;
 use crate::columns::RAW_COLUMNS;
-use crate::error::{Error, Result};
+use crate::error::{Argument, Error, Result};
 
 /// Rows at the beginning that are searched for alternating sources.
 const WATCHED: usize = 20_000;
@@ -14,6 +14,9 @@ const LEAPING: f64 = 0.1;
 /// Fewest rows from which this is concluded.
 const FEWEST: usize = 100;
 
+/// Fewest jumps across all codes of 16 bits that are no single damaged readings.
+const FEWEST_ACROSS: usize = 3;
+
 /// Classes of the magnitude of specific force are a quarter of an octave wide.
 const CLASSES_PER_OCTAVE: f64 = 4.0;
 const CLASSES: usize = 800;
@@ -22,8 +25,10 @@ const CLASSES: usize = 800;
 const APART: usize = 4;
 const SMALLER: f64 = 0.01;
 const BETWEEN: f64 = 0.01;
-/// Magnitude relative to gravity that an accelerometer in m/s² may show: a class is a fifth wide, and bias and scale factor are some per cent.
+/// Median magnitude relative to gravity that an accelerometer in m/s² may show: bias and scale factor are some per cent, and the unit moves.
 const UNIT_GAIN: std::ops::Range<f64> = 0.67..1.5;
+/// A smaller median relative to gravity is that of readings without gravity: in g it would be 0.1.
+const NO_GRAVITY: f64 = 0.05;
 /// Least factor between the usual magnitudes of both groups.
 const FACTOR: f64 = 3.0;
 
@@ -36,6 +41,9 @@ pub(super) struct TwoSources {
     accel: Vec<usize>,
     /// Number of rows in each class of magnitude, and the first row of each.
     sizes: Vec<(u64, u64)>,
+    /// Magnitude of specific force in each row. Classes find groups; only the median tells how large a group's magnitude is, because at rest it may be
+    /// at the edge of a class.
+    magnitudes: Vec<f32>,
 }
 
 impl TwoSources {
@@ -46,6 +54,7 @@ impl TwoSources {
         Self {
             accel: accel.map(|(place, ..)| *place).collect(),
             sizes: vec![(0, 0); CLASSES],
+            magnitudes: Vec::new(),
             channels,
         }
     }
@@ -59,10 +68,10 @@ impl TwoSources {
         }
         if self.accel.len() == 3 {
             let squares = self.accel.iter().map(|place| row.values[*place].powi(2));
-            let octaves = 0.5 * squares.sum::<f64>().log2();
-            if octaves.is_finite() {
-                let class = (octaves * CLASSES_PER_OCTAVE) as i64 + CLASSES as i64 / 2;
-                let (rows, first) = &mut self.sizes[class.clamp(0, CLASSES as i64 - 1) as usize];
+            let magnitude = squares.sum::<f64>().sqrt() as f32;
+            if let Some(class) = class(magnitude) {
+                self.magnitudes.push(magnitude);
+                let (rows, first) = &mut self.sizes[class];
                 if *rows == 0 {
                     *first = row.number;
                 }
@@ -74,6 +83,12 @@ impl TwoSources {
     /// Refuses a file in which the readings jump back and forth.
     pub fn check(&self, place: &str) -> Result<()> {
         for (_, c, first) in &self.channels {
+            if across_16_bits(first, 0.0) >= FEWEST_ACROSS {
+                let problem = "negative readings are written as unsigned codes of 16 bits: near 0 they jump to 65535";
+                let remedy = format!("say that they are two's complement: {}=16", RAW_COLUMNS[*c]);
+                let column = format!("{place}, column {}", RAW_COLUMNS[*c]);
+                return Err(Error::new(column, problem, remedy).about(Argument::TwosComplement));
+            }
             let Some(share) = leaping(first) else {
                 continue;
             };
@@ -81,25 +96,40 @@ impl TwoSources {
                 "in {:.0} % of the rows the reading jumps away and returns in the next one: rows of two devices, or readings in two units, alternate",
                 100.0 * share
             );
-            let remedy =
-                "write the rows of each to a separate file, and import the files one by one";
-            return Err(Error::new(
-                format!("{place}, column {}", RAW_COLUMNS[*c]),
-                problem,
-                remedy,
-            ));
+            let column = format!("{place}, column {}", RAW_COLUMNS[*c]);
+            let remedy = "if a column says whose each row is, choose by it, with a list of columns for each; otherwise import the rows of each from a separate file";
+            return Err(Error::new(column, problem, remedy)
+                .about(Argument::Where)
+                .about(Argument::Columns));
         }
         Ok(())
     }
 
+    /// A warning for each channel whose signed readings of 16 bits jump from one end to the other.
+    pub fn overflows(&self, place: &str) -> Vec<String> {
+        let each = self.channels.iter().filter_map(|(_, c, first)| {
+            let jumps = across_16_bits(first, -32_768.0);
+            (jumps >= FEWEST_ACROSS).then(|| {
+                format!(
+                    "{place}: {} jumps {jumps} times from one end of 16 bits to the other: the firmware's integers overflow, and the sensor's range is too small for this motion, or its factor too large",
+                    RAW_COLUMNS[*c]
+                )
+            })
+        });
+        each.collect()
+    }
+
     /// A warning if specific forces given in m/s² mostly have another magnitude than `gravity_mps2`.
     pub fn wrong_unit(&self, place: &str, gravity_mps2: f64) -> Option<String> {
-        let most = (0..CLASSES).max_by_key(|class| self.sizes[*class].0)?;
-        let usual = size(most);
-        let known = self.sizes[most].0 > 0 && !UNIT_GAIN.contains(&(usual / gravity_mps2));
-        known.then(|| {
+        let usual = self.median(0..CLASSES)?;
+        if usual < NO_GRAVITY * gravity_mps2 {
+            return Some(format!(
+                "{place}: the median of the specific force is {usual:.3} m/s², although gravity is always there: a filter has removed it. Log the accelerometer with gravity"
+            ));
+        }
+        (!UNIT_GAIN.contains(&(usual / gravity_mps2))).then(|| {
             format!(
-                "{place}: the specific force is about {usual:.3} in most rows, but gravity is {gravity_mps2} m/s²: check unit and scale. Readings in g \
+                "{place}: the median of the specific force is {usual:.3}, but gravity is {gravity_mps2} m/s²: check unit and scale. Readings in g \
                  need the factor accel=9.80665, in mg accel=0.00980665; counts need another raw unit"
             )
         })
@@ -108,10 +138,6 @@ impl TwoSources {
     /// A warning if the accelerometer shows two magnitudes.
     pub fn warning(&self, place: &str) -> Option<String> {
         let all: u64 = self.sizes.iter().map(|(rows, _)| rows).sum();
-        let middle = |classes: std::ops::Range<usize>| {
-            let most = classes.max_by_key(|class| self.sizes[*class].0)?;
-            Some(size(most))
-        };
         let count = |classes: std::ops::Range<usize>| -> u64 {
             self.sizes[classes].iter().map(|(rows, _)| rows).sum()
         };
@@ -125,7 +151,8 @@ impl TwoSources {
             {
                 continue;
             }
-            let (Some(low), Some(high)) = (middle(below.clone()), middle(above.clone())) else {
+            let (Some(low), Some(high)) = (self.median(below.clone()), self.median(above.clone()))
+            else {
                 continue;
             };
             if high < FACTOR * low {
@@ -148,11 +175,35 @@ impl TwoSources {
         }
         None
     }
+
+    /// Median of the magnitudes in `classes`.
+    fn median(&self, classes: std::ops::Range<usize>) -> Option<f64> {
+        let within = |m: &f32| class(*m).is_some_and(|c| classes.contains(&c));
+        let mut own: Vec<f32> = self.magnitudes.iter().copied().filter(within).collect();
+        let middle = own.len() / 2;
+        let (_, median, _) =
+            (!own.is_empty()).then(|| own.select_nth_unstable_by(middle, f32::total_cmp))?;
+        Some(f64::from(*median))
+    }
 }
 
-/// Magnitude in the middle of a class.
-fn size(class: usize) -> f64 {
-    ((class as f64 + 0.5 - CLASSES as f64 / 2.0) / CLASSES_PER_OCTAVE).exp2()
+/// Class of a magnitude; `None` if it is 0 or unknown.
+fn class(magnitude: f32) -> Option<usize> {
+    let octaves = f64::from(magnitude).log2();
+    let class = (octaves * CLASSES_PER_OCTAVE).floor() as i64 + CLASSES as i64 / 2;
+    let within = class.clamp(0, CLASSES as i64 - 1) as usize;
+    octaves.is_finite().then_some(within)
+}
+
+/// How often whole `readings` within the codes of 16 bits, which begin at `lowest`, jump from one end of these codes to the other.
+fn across_16_bits(readings: &[f64], lowest: f64) -> usize {
+    const CODES: f64 = 65_536.0;
+    let mut known = readings.iter().filter(|reading| !reading.is_nan());
+    if !known.all(|r| r.fract() == 0.0 && (lowest..lowest + CODES).contains(r)) {
+        return 0;
+    }
+    let jumps = readings.windows(2).map(|w| (w[1] - w[0]).abs());
+    jumps.filter(|jump| *jump > 0.9 * CODES).count()
 }
 
 /// Share of readings that jump away and back, if it is large.

@@ -27,6 +27,10 @@ impl ParquetTable {
         match self.never {}
     }
 
+    pub fn time_name(&self) -> Option<String> {
+        match self.never {}
+    }
+
     pub fn progress(&self) -> f64 {
         match self.never {}
     }

@@ -14,7 +14,14 @@ fn fixture() -> PathBuf {
 }
 
 fn open(path: &Path, topic: Option<&str>, instance: Option<u32>) -> Result<Vec<Readings>> {
-    read(path, Choice { topic, instance })
+    let topics: Vec<String> = topic.into_iter().map(str::to_owned).collect();
+    read(
+        path,
+        Choice {
+            topics: &topics,
+            instance,
+        },
+    )
 }
 
 fn rows(readings: &mut Readings) -> Vec<(Stamp, Vec<f64>)> {

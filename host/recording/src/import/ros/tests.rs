@@ -2,6 +2,10 @@
 //! ms later; angular velocity (0.5 + i, -0.25 i, 3), linear acceleration (100 + i, 200, -9.5), frame `imu`. `imu.bag` is compressed with LZ4 and has
 //! a second topic, `/imu/raw`, with two messages. Both `imu.bag` and `imu.mcap` have one more topic, of strings. `imu.db3` has the three topics of
 //! `imu.bag`; its string of 9000 characters fills overflow pages.
+//!
+//! `halves.mcap` has the topics of a camera with separate clocks: `/gyro/sample`, 24 messages 5 ms apart with angular velocity (0.5 + i, -0.25 i, 3) and
+//! a covariance of the specific force that begins with -1; `/accel/sample`, 12 messages 10 ms apart from 1 ms later on with linear acceleration (100 + i,
+//! 200, -9.5) and zeros for the rest. The 12 messages of `unstamped.mcap` have headers without a stamp, and were received 5 ms apart.
 
 use std::path::PathBuf;
 
@@ -15,8 +19,13 @@ fn fixture(name: &str) -> PathBuf {
 }
 
 fn open(path: &Path, topic: Option<&str>) -> Result<Vec<Readings>> {
+    let topics: Vec<String> = topic.into_iter().map(str::to_owned).collect();
+    open_all(path, &topics)
+}
+
+fn open_all(path: &Path, topics: &[String]) -> Result<Vec<Readings>> {
     let choice = Choice {
-        topic,
+        topics,
         instance: None,
     };
     match path.extension().and_then(|ending| ending.to_str()) {
@@ -65,6 +74,54 @@ fn topics_are_listed_where_several_fit_or_none_does() {
         none.contains("/chatter (std_msgs/msg/String)") && none.contains("/imu ("),
         "{none}"
     );
+}
+
+/// Stamps and values of all rows.
+fn rows(readings: &mut Readings) -> Vec<(Stamp, Vec<f64>)> {
+    let mut cells = Cells::default();
+    let mut rows = Vec::new();
+    while readings.next(&mut cells).is_some() {
+        rows.push((cells.stamp, cells.numbers[1..].to_vec()));
+    }
+    rows
+}
+
+#[test]
+fn a_topic_of_the_gyro_and_one_of_the_accelerometer_are_read_as_two_sensors() {
+    const T0: i64 = 1_700_000_000_000_000_000;
+    let topics = ["/accel/sample", "/gyro/sample"].map(str::to_owned);
+    for chosen in [&topics[..], &[]] {
+        let mut all = open_all(&fixture("halves.mcap"), chosen).unwrap();
+        let [gyro, accel] = &mut all[..] else {
+            panic!("{} parts", all.len())
+        };
+        let (gyro, accel) = (rows(gyro), rows(accel));
+        assert_eq!((gyro.len(), accel.len()), (24, 12));
+        assert_eq!(
+            gyro[3],
+            (Stamp::from(T0 + 15_000_000), vec![3.5, -0.75, 3.0])
+        );
+        assert_eq!(
+            accel[3],
+            (Stamp::from(T0 + 31_000_000), vec![103.0, 200.0, -9.5])
+        );
+    }
+    // One of them alone has one sensor.
+    let mut alone = open(&fixture("halves.mcap"), Some("/gyro/sample")).unwrap();
+    assert_eq!((alone.len(), rows(&mut alone[0])[0].1.len()), (1, 3));
+    let error = open_all(
+        &fixture("halves.mcap"),
+        &["/gyro/sample", "/mag"].map(str::to_owned),
+    );
+    assert!(error.unwrap_err().to_string().contains("/mag"));
+}
+
+#[test]
+fn headers_without_stamps_leave_the_times_of_reception_with_a_warning() {
+    let mut all = open(&fixture("unstamped.mcap"), None).unwrap();
+    assert!(all[0].warnings[0].contains("/imu"), "{:?}", all[0].warnings);
+    let rows = rows(&mut all[0]);
+    assert_eq!(rows[11].0, Stamp::from(1_700_000_000_055_000_000));
 }
 
 #[test]

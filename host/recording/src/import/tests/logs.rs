@@ -20,6 +20,13 @@ fn the_two_sensors_of_a_log_are_joined_on_the_times_of_one() {
     options.instance = Some(1);
     let (summary, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!((summary.sample_rate_hz, summary.time.len()), (800.0, 2));
+    // Its times are TimeUS and SampleUS.
+    assert!(
+        summary
+            .time
+            .iter()
+            .all(|time| time.unit == Some(Decimal::Microsecond))
+    );
     assert_eq!(summary.rows, 47);
     assert!(batch.raw[0].iter().all(|x| (x - 0.5).abs() < 1e-6));
     assert!(batch.raw[4].iter().all(|y| (y - 2.0).abs() < 1e-6));
@@ -81,7 +88,8 @@ fn a_real_log_of_px4_is_a_recording() {
     // By pyulog: 7783 samples, 4 ms apart throughout, from 1710773350.354 s on.
     assert_eq!((summary.rows, summary.sample_rate_hz), (7783, 250.0));
     assert!((batch.t_s[7782] - batch.t_s[0] - 31.128).abs() < 1e-9);
-    assert_eq!(summary.time[0].gaps, 0);
+    let time = &summary.time[0];
+    assert_eq!((time.gaps, time.unit), (0, Some(Decimal::Microsecond)));
     // The last sample (-0.0232, 0.0091, -9.8122) m/s² with the calibration undone: no mounting, factors of 1, offsets (-0.0390, 0.0257, 0.0032) m/s².
     let last = [3, 4, 5].map(|c| batch.raw[c][7782]);
     let raw = [-0.062_249_2, 0.034_716_1, -9.809_044_8];

@@ -90,3 +90,50 @@ fn forces_in_si_that_are_not_of_the_size_of_gravity_are_said() {
         );
     }
 }
+
+#[test]
+fn unsigned_codes_of_negative_readings_are_named_with_their_bits_and_overflows_warned_of() {
+    let swing = |i: usize| (400.0 * (0.05 * i as f64).sin()) as i32;
+    let codes = |i: usize| [swing(i) as u16, 3, 9, 4, 2, 4096].map(u32::from);
+    let error = one_refused(&log(600, codes), BOTH);
+    assert!(error.contains("gyro_x=16"), "{error}");
+    let bench = Bench::new(&[("a.txt", &log(600, codes))]);
+    let mut options = bench.options(&["a.txt"], &[BOTH]);
+    options.twos_complements = vec!["gyro_x=16".parse().unwrap()];
+    let (_, batch, _) = bench.import(&options).unwrap();
+    assert_eq!(batch.raw[0][100], f64::from(swing(100)));
+    // A turn beyond the range of the firmware's integers.
+    let fast = |i: usize| (40_000.0 * (0.05 * i as f64).sin()) as i32;
+    let overflowing = |i: usize| [i32::from(fast(i) as i16), 3, 9, 4, 2, 4096];
+    let (summary, ..) = one(&log(600, overflowing), BOTH).unwrap();
+    assert!(warned(&summary, "gyro_x jumps"), "{summary:?}");
+}
+
+#[test]
+fn readings_without_gravity_are_named_and_the_magnitude_that_is_given_is_the_median() {
+    let si = |values: [f64; 3]| {
+        let text = log(300, |i| {
+            let [x, y, z] = values;
+            [
+                0.01 * (i % 5) as f64,
+                0.02,
+                0.01,
+                x + 0.001 * (i % 7) as f64,
+                y,
+                z,
+            ]
+        });
+        let bench = Bench::new(&[("a.txt", &text)]);
+        let mut options = bench.options(&["a.txt"], &[BOTH]);
+        options.raw_unit = RawUnit::Si;
+        options.rate_hz = Some(100.0);
+        bench.import(&options).unwrap().0
+    };
+    let summary = si([0.02, 0.01, 0.03]);
+    assert!(warned(&summary, "a filter has removed it"), "{summary:?}");
+    let summary = si([0.0, 0.0, 1007.0]);
+    assert!(warned(&summary, "is 1007.000"), "{summary:?}");
+    let summary = si([0.0, 0.0, 1.0]);
+    assert!(warned(&summary, "is 1.000"), "{summary:?}");
+    assert!(!warned(&si([0.1, 0.2, 9.6]), "specific force"));
+}

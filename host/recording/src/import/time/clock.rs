@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::counting::Counting;
 use super::gap::{Gap, Jitter};
 use super::polled::Rounds;
 use super::regular::{Irregular, Regular};
@@ -18,8 +19,10 @@ const FAR_S: f64 = 1e8;
 pub struct TimeSummary {
     /// File, without its folder.
     pub file: String,
-    /// Unit of the stamps; `None` if the given factor is another one.
+    /// Unit of the stamps; `None` if the given factor is another one, or if they count samples.
     pub unit: Option<Decimal>,
+    /// Whether the stamps count samples; the given rate then makes times of them.
+    pub counter: bool,
     /// Whether the unit was recognised instead of given.
     pub recognised: bool,
     /// Instant that was subtracted, in whole seconds.
@@ -77,6 +80,10 @@ pub(in super::super) struct Stamps {
 pub(in super::super) struct Known<'a> {
     /// Seconds per unit of the stamps.
     pub factor: Option<f64>,
+    /// Whether the stamps count samples, as given.
+    pub counter: bool,
+    /// Unit in which a log counts, whose reader converted the stamps; it is only reported.
+    pub native: Option<Decimal>,
     /// Given rate, Hz.
     pub rate_hz: Option<f64>,
     /// Name of the column in the file.
@@ -104,8 +111,12 @@ impl Times {
             });
         }
         let problem = |irregular| refused(path, irregular);
-        let interval =
-            Regular::interval(&stamps.since_first).ok_or_else(|| problem(Irregular::Short))?;
+        // Late hand-overs set few stamps back.
+        if 4 * moves(&stamps, |step| step < 0.0) > stamps.since_first.len() {
+            return Err(not_rising(path, &stamps, known));
+        }
+        let interval = Regular::interval(&stamps.since_first)
+            .ok_or_else(|| not_rising(path, &stamps, known))?;
         let seen = Seen {
             first: stamps.first.value,
             interval,
@@ -113,14 +124,8 @@ impl Times {
             rate_hz: known.rate_hz,
             name: known.name,
         };
-        let unit = match (known.factor, known.joined_to) {
-            (Some(factor), _) => Unit::of_factor(factor),
-            // One clock makes the stamps of both.
-            (None, Some(first)) if first.overlaps(&seen) => first.unit,
-            (None, _) => {
-                Unit::Decimal(Unit::recognise(&seen).map_err(|both| either(path, &seen, both))?)
-            }
-        };
+        let unit = unit(path, &stamps, &seen, known)?;
+        let counter = matches!(unit, Unit::Samples(_));
         let far = || {
             let first = unit.seconds(stamps.first.value);
             if first.abs() < FAR_S { 0 } else { first as i64 }
@@ -130,7 +135,11 @@ impl Times {
         for since in &mut stamps.since_first {
             *since = unit.seconds(*since);
         }
-        let mut regular = Regular::find(&stamps.since_first, known.rate_hz).map_err(problem)?;
+        let mut regular = match counter {
+            true => Regular::of_counter(&stamps.since_first),
+            false => Regular::find(&stamps.since_first, known.rate_hz),
+        }
+        .map_err(problem)?;
         let lasts_s = stamps.since_first.last().copied().unwrap_or_default();
         let longest_gap_s = regular.longest_gap_s(&stamps.since_first);
         regular.start_s += first_s;
@@ -140,11 +149,12 @@ impl Times {
                 .unwrap_or(path.as_os_str())
                 .to_string_lossy()
                 .into_owned(),
-            unit: match unit {
+            unit: known.native.or(match unit {
                 Unit::Decimal(unit) => Some(unit),
-                Unit::Other(_) => None,
-            },
-            recognised: known.factor.is_none(),
+                Unit::Other(_) | Unit::Samples(_) => None,
+            }),
+            counter,
+            recognised: known.factor.is_none() && !known.counter,
             origin_s,
             rate_hz: tidy(1.0 / regular.period_s),
             stamps_kept: regular.kept,
@@ -186,6 +196,106 @@ fn tidy(rate_hz: f64) -> f64 {
     format!("{rate_hz:.7e}").parse().unwrap_or(rate_hz)
 }
 
+/// The unit of `stamps`, which `seen` describes: given, that of the file to which they are joined, or recognised.
+fn unit(path: &Path, stamps: &Stamps, seen: &Seen<'_>, known: &Known<'_>) -> Result<Unit> {
+    let counter = |rate_hz: Option<f64>, problem: String, remedy: &str| {
+        let place = format!("{}, column t_s", path.display());
+        rate_hz
+            .map(Unit::Samples)
+            .ok_or_else(|| Error::new(place, problem, remedy).about(Argument::SampleRate))
+    };
+    if known.counter {
+        return counter(known.rate_hz, "it counts samples".into(), "give their rate");
+    }
+    match (known.factor, known.joined_to) {
+        (Some(factor), _) => return Ok(Unit::of_factor(factor)),
+        // One clock makes the stamps of both.
+        (None, Some(first)) if first.overlaps(seen) => return Ok(first.unit),
+        (None, _) => {}
+    }
+    match Counting::of(stamps, seen) {
+        Counting::Samples => {
+            let name = seen
+                .name
+                .map_or("it".to_owned(), |name| format!("{name:?}"));
+            let problem = format!(
+                "{name} contains whole numbers that mostly rise by 1: they count samples, and give no time"
+            );
+            counter(known.rate_hz, problem, "give the rate of the samples")
+        }
+        Counting::Either => Err(count_or_clock(path, stamps, seen)),
+        Counting::Clock => Ok(Unit::Decimal(
+            Unit::recognise(seen).map_err(|both| either(path, seen, both))?,
+        )),
+    }
+}
+
+/// Refusal of whole numbers that are a plausible clock and a plausible counter with losses.
+fn count_or_clock(path: &Path, stamps: &Stamps, seen: &Seen<'_>) -> Error {
+    let rows = stamps.since_first.len() as f64;
+    let missing = 100.0 * (1.0 - rows / (seen.lasts + 1.0));
+    let unit = Unit::recognise(seen).unwrap_or_else(|[_, coarse]| coarse);
+    let rate = three_digits(unit.per_second() as f64 / seen.interval);
+    Error::new(
+        format!("{}, column t_s", path.display()),
+        format!(
+            "it contains whole numbers whose smallest step is 1, without a period: a counter of samples of which {missing:.0} % are missing, or times in {unit} ({rate} Hz)"
+        ),
+        format!(
+            "if they count samples, import the column as sample and give the rate; if they are times, give the unit: {}",
+            unit.symbol()
+        ),
+    )
+    .about(Argument::Columns)
+    .about(Argument::SampleRate)
+    .about(Argument::TimeUnit)
+}
+
+/// Number of steps between stamps that are as `wanted`.
+fn moves(stamps: &Stamps, wanted: impl Fn(f64) -> bool) -> usize {
+    let pairs = stamps.since_first.windows(2);
+    pairs.filter(|pair| wanted(pair[1] - pair[0])).count()
+}
+
+/// Refusal of stamps that do not rise.
+fn not_rising(path: &Path, stamps: &Stamps, known: &Known<'_>) -> Error {
+    let rows = stamps.since_first.len() + stamps.repeats.len();
+    if rows < 2 {
+        return refused(path, Irregular::Short);
+    }
+    let (place, value) = (
+        format!("{}, column t_s", path.display()),
+        stamps.first.value,
+    );
+    let since = &stamps.since_first;
+    let [falling, rising] = [moves(stamps, |s| s < 0.0), moves(stamps, |s| s > 0.0)];
+    if 4 * falling > 3 * since.len() {
+        let last = value + since.last().copied().unwrap_or_default();
+        let problem = format!("the time falls from {value} to {last}: the last row comes first");
+        return Error::new(place, problem, "sort the rows by time");
+    }
+    if falling + rising > 0 {
+        let mean = value + since.iter().sum::<f64>() / since.len() as f64;
+        let problem = format!(
+            "the time rises in {rising} rows and falls in {falling}, about {}: these are intervals from row to row instead of times",
+            three_digits(mean)
+        );
+        let remedy = "skip the column and give the rate, or name another column as the time";
+        return Error::new(place, problem, remedy)
+            .about(Argument::Columns)
+            .about(Argument::SampleRate);
+    }
+    if known.native.is_some() {
+        let problem = format!("all {rows} messages have the same time");
+        return Error::new(place, problem, "record again, with a clock that runs");
+    }
+    let problem = format!("the time is {value} in all {rows} rows");
+    let remedy = "skip the column and give the rate, or name another column as the time";
+    Error::new(place, problem, remedy)
+        .about(Argument::Columns)
+        .about(Argument::SampleRate)
+}
+
 fn refused(path: &Path, irregular: Irregular) -> Error {
     match irregular {
         Irregular::Short => Error::new(
@@ -221,16 +331,25 @@ fn either(path: &Path, seen: &Seen<'_>, both: [Decimal; 2]) -> Error {
         )
     };
     let [fine, coarse] = both;
-    Error::new(
-        format!("{}, column t_s", path.display()),
-        format!(
-            "the times may be in {} or in {}",
-            reading(coarse),
-            reading(fine)
-        ),
-        format!("give the unit: {} or {}", coarse.symbol(), fine.symbol()),
-    )
-    .about(Argument::TimeUnit)
+    let refused = |problem: String, remedy: String| {
+        let place = format!("{}, column t_s", path.display());
+        Error::new(place, problem, remedy).about(Argument::TimeUnit)
+    };
+    let problem = format!(
+        "the times may be in {} or in {}",
+        reading(coarse),
+        reading(fine)
+    );
+    let remedy = format!("give the unit: {} or {}", coarse.symbol(), fine.symbol());
+    match (seen.interval, coarse) {
+        // A counter too rises by 1.
+        (0.9..1.5, Decimal::Second) => refused(
+            format!("{problem}, or count samples"),
+            format!("{remedy}; if they count samples, give the rate"),
+        )
+        .about(Argument::SampleRate),
+        _ => refused(problem, remedy),
+    }
 }
 
 /// A number with three significant digits.

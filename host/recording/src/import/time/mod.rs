@@ -1,6 +1,8 @@
 //! The time of foreign rows: the unit of their stamps, and the regular time behind them.
 
+mod calendar;
 mod clock;
+mod counting;
 mod gap;
 mod grid;
 mod polled;
@@ -12,6 +14,7 @@ pub use gap::Jitter;
 pub use polled::Rounds;
 pub use stamp::Decimal;
 
+pub(super) use calendar::parse as calendar_time;
 pub(super) use clock::{Clock, Known, Stamps, Times};
 pub(super) use polled::LONGEST;
 pub(super) use stamp::Stamp;

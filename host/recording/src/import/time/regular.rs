@@ -119,6 +119,36 @@ impl Regular {
         }
     }
 
+    /// The times of a counter of samples, whose `stamps` are its numbers over its rate, s. Each step of more than one period is a gap, however many
+    /// there are. A counter that rises by more than 1 at least has this step as its period.
+    pub fn of_counter(stamps: &[f64]) -> Result<Regular, Irregular> {
+        let steps = || stamps.windows(2).map(|pair| pair[1] - pair[0]);
+        let rising = steps().filter(|step| *step > 0.0);
+        let period_s = rising.fold(f64::INFINITY, f64::min);
+        if !period_s.is_finite() {
+            return Err(Irregular::Short);
+        }
+        if let Some(back) = steps().position(|step| step < 0.0) {
+            return Err(Irregular::SetBack(back + 1));
+        }
+        let gaps = (1..).zip(steps()).filter_map(|(row, step)| {
+            let missing = (step / period_s).round() as u64;
+            (missing > 1).then(|| Gap {
+                row,
+                missing: missing - 1,
+            })
+        });
+        Ok(Regular {
+            start_s: stamps[0],
+            period_s,
+            gaps: gaps.collect(),
+            kept: true,
+            polled: None,
+            jitter: Jitter::default(),
+            in_bursts_s: None,
+        })
+    }
+
     /// Stamps of a loop, which are kept.
     fn of_rounds(stamps: &[f64], rounds: Rounds) -> Regular {
         Regular {

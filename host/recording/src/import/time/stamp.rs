@@ -111,6 +111,8 @@ pub(in super::super) enum Unit {
     Decimal(Decimal),
     /// This many seconds, as given.
     Other(f64),
+    /// Samples of a counter at this rate, Hz.
+    Samples(f64),
 }
 
 /// Units that clocks count in.
@@ -140,7 +142,7 @@ impl Decimal {
     ];
 
     /// The unit that the name of a column ends with, as `timestamp_us` and `time [ms]` do.
-    fn in_name(name: &str) -> Option<Decimal> {
+    pub(super) fn in_name(name: &str) -> Option<Decimal> {
         let mut words = name.split(|c: char| !c.is_alphabetic());
         match words.rfind(|word| !word.is_empty())? {
             "s" | "sec" | "seconds" => Some(Decimal::Second),
@@ -231,19 +233,25 @@ impl Unit {
         known.map_or(Unit::Other(factor), Unit::Decimal)
     }
 
-    /// The unit of the stamps that `seen` describes, or the two possible ones, the finer one first.
-    ///
-    /// An epoch decides by its magnitude, else a known rate, else the unit that makes the rate plausible. Two units differ by a factor of 1000, so a
-    /// log of 2 Hz in microseconds looks like one of 2 kHz in nanoseconds. Then the name of the column may decide.
-    pub fn recognise(seen: &Seen<'_>) -> Result<Decimal, [Decimal; 2]> {
+    /// The unit of stamps that count from 1970, by their magnitude; `None` of others.
+    pub fn of_epoch(seen: &Seen<'_>) -> Option<Decimal> {
         let rate = |unit: &Decimal| unit.per_second() as f64 / seen.interval;
         let epoch = |unit: &Decimal| {
             EPOCH_S.contains(&(seen.first / unit.per_second() as f64)) && rate(unit) > SLOWEST_HZ
         };
         let mut epochs = Decimal::ALL.into_iter().filter(epoch);
-        if let Some(unit) = epochs.find(|unit| rate(unit) < RATES_HZ.end) {
+        epochs.find(|unit| rate(unit) < RATES_HZ.end)
+    }
+
+    /// The unit of the stamps that `seen` describes, or the two possible ones, the finer one first.
+    ///
+    /// An epoch decides by its magnitude, else a known rate, else the unit that makes the rate plausible. Two units differ by a factor of 1000, so a
+    /// log of 2 Hz in microseconds looks like one of 2 kHz in nanoseconds. Then the name of the column may decide.
+    pub fn recognise(seen: &Seen<'_>) -> Result<Decimal, [Decimal; 2]> {
+        if let Some(unit) = Self::of_epoch(seen) {
             return Ok(unit);
         }
+        let rate = |unit: &Decimal| unit.per_second() as f64 / seen.interval;
         if let Some(rate_hz) = seen.rate_hz {
             let off = |unit: &Decimal| (rate(unit) / rate_hz).ln().abs();
             let nearest = Decimal::ALL
@@ -276,6 +284,7 @@ impl Unit {
         match self {
             Unit::Decimal(unit) => value / unit.per_second() as f64,
             Unit::Other(factor) => value * factor,
+            Unit::Samples(rate_hz) => value / rate_hz,
         }
     }
 
@@ -284,6 +293,7 @@ impl Unit {
         match self {
             Unit::Decimal(unit) => seconds.saturating_mul(unit.per_second()),
             Unit::Other(factor) => (seconds as f64 / factor) as i64,
+            Unit::Samples(rate_hz) => (seconds as f64 * rate_hz) as i64,
         }
     }
 }

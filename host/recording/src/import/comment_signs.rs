@@ -1,0 +1,102 @@
+//! Characters that begin a comment line.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::cell::shorten;
+use crate::error::{Error, Result};
+use crate::separator::Separator;
+
+/// Characters of which any, at the beginning of a line, makes the line a comment. By default `#` and `%`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CommentSigns(u128);
+
+impl Default for CommentSigns {
+    fn default() -> Self {
+        Self(1 << b'#' | 1 << b'%')
+    }
+}
+
+impl CommentSigns {
+    /// The sign by which `line` is a comment, after blanks.
+    pub(super) fn begins(self, line: &[u8]) -> Option<u8> {
+        let first = *line.trim_ascii().first()?;
+        (first.is_ascii() && self.0 >> first & 1 == 1).then_some(first)
+    }
+
+    /// The line after blanks and signs of a comment: names may follow them.
+    pub(super) fn skipped(self, line: &[u8]) -> &[u8] {
+        let is_sign = |b: &u8| b.is_ascii_whitespace() || self.begins(&[*b]).is_some();
+        let from = line.iter().position(|b| !is_sign(b));
+        &line[from.unwrap_or(line.len())..]
+    }
+}
+
+impl FromStr for CommentSigns {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        if text == "none" {
+            return Ok(Self(0));
+        }
+        let sign = |b: &u8| b.is_ascii_punctuation() && !b"+-.".contains(b);
+        match !text.is_empty() && text.bytes().all(|b| sign(&b)) {
+            true => Ok(Self(text.bytes().fold(0, |all, b| all | 1 << b))),
+            false => Err(Error::new(
+                "signs of comments",
+                format!("{} does not begin a comment", shorten(text.as_bytes())),
+                "write the characters that begin a comment line, such as '#;', or none",
+            )),
+        }
+    }
+}
+
+impl fmt::Display for CommentSigns {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let all: String = (0..128_u8)
+            .filter(|b| self.0 >> b & 1 == 1)
+            .map(char::from)
+            .collect();
+        f.write_str(if all.is_empty() { "none" } else { &all })
+    }
+}
+
+/// What is given about the lines of a text file.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct TextFormat {
+    /// Separator of cells; detected if `None`.
+    pub separator: Option<Separator>,
+    pub comments: CommentSigns,
+}
+
+impl From<Option<Separator>> for TextFormat {
+    fn from(separator: Option<Separator>) -> Self {
+        Self {
+            separator,
+            ..Self::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signs_are_read_and_printed_alike_and_begin_comments() {
+        for text in ["#%", "#;", "!", "none"] {
+            assert_eq!(text.parse::<CommentSigns>().unwrap().to_string(), text);
+        }
+        let default = CommentSigns::default();
+        assert_eq!(default.begins(b"  % x"), Some(b'%'));
+        assert_eq!(default.skipped(b"## t, x"), b"t, x");
+        let none: CommentSigns = "none".parse().unwrap();
+        assert_eq!(
+            (none.begins(b"# x"), none.skipped(b" # x")),
+            (None, &b"# x"[..])
+        );
+        for text in ["", "a", "-", "#1"] {
+            assert!(text.parse::<CommentSigns>().is_err(), "{text}");
+        }
+    }
+}
