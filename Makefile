@@ -18,7 +18,7 @@ PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device m
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python
 
-.PHONY: help test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example papers blind bench budget device fuzz audit toolchain
+.PHONY: help data test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
@@ -130,6 +130,9 @@ faults: toolchain ## a session of the wizard with faults caused on purpose
 	@$(FIRMWARE) -q
 	$(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bins
 	target/debug/faults
+
+data: ## bring the public recordings, 27 MB, into $MIMU_DATA or ../shared/data, so that the tests on real units run
+	./tests/data.sh
 
 example: toolchain ## import and fit a recording: the best real one available, or the small one in tests/
 	$(CARGO) build --locked --release --bin mimu

@@ -11,6 +11,7 @@ mod module_circles;
 mod next_experiment;
 mod noise_of_the_bench;
 mod papers;
+mod public_data;
 mod ramps;
 mod real_ferraris;
 mod real_mikoff;
