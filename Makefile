@@ -141,8 +141,9 @@ example: toolchain ## import and fit a recording: the best real one available, o
 papers: toolchain ## compute every figure and plot of docs/papers.md
 	$(CARGO) run --locked --release -p mimu-tests --bin papers
 
-blind: toolchain ## undeclared effects on hundreds of units, and their diagnoses
+blind: toolchain ## undeclared effects on hundreds of units and in real recordings, and their diagnoses
 	$(CARGO) run --locked --release -p mimu-tests --bin blind
+	$(CARGO) run --locked --release -p mimu-tests --bin blind planted
 
 bench: toolchain ## rates and peak memory on four hours at 1 kHz, and of a diagnosis
 	$(CARGO) bench --locked -p mimu-cli --bench four_hours

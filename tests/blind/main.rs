@@ -10,9 +10,11 @@
 //! | `blind turning SEEDS CLEAN [NAME...]` | the first, on a plan that also turns gravity through the unit |
 //! | `blind joint SETS [FIRST]` | 2 to 9 sessions of one unit diagnosed together, and their file on another session; seeds from FIRST on |
 //! | `blind joint-warm-up SETS FIRST SESSIONS` | the same for digital units by hand, whose only effect is a warm-up of the accelerometer |
+//! | `blind planted SEEDS TIMES [NAME...]` | each effect planted SEEDS times, at TIMES the size of data sheets, in recordings by other people; NAMEs also select recordings |
 
 mod by_hand;
 mod joint;
+mod planted;
 mod slow_bias;
 
 use std::collections::BTreeMap;
@@ -110,7 +112,8 @@ fn main() {
     let joint = args.first().is_some_and(|a| a == "joint");
     let joint_warm_up = args.first().is_some_and(|a| a == "joint-warm-up");
     let slow = args.first().is_some_and(|a| a == "slow-bias");
-    if in_hands || turning || slow || joint || joint_warm_up {
+    let planted = args.first().is_some_and(|a| a == "planted");
+    if in_hands || turning || slow || joint || joint_warm_up || planted {
         args.remove(0);
     }
     let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
@@ -124,6 +127,10 @@ fn main() {
         );
     }
     let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
+    if planted {
+        let times = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(1.0);
+        return planted::run(number(0, 1), times, &chosen);
+    }
     if in_hands {
         by_hand::run(seeds, clean, &chosen);
         return slow_bias::run(seeds, &chosen);

@@ -8,6 +8,7 @@
 //! | [`slow_bias`]          | units by hand whose biases move with time or temperature, at once or with a lag |
 //! | [`coverage`]           | how often intervals contain the truth, from recording to fit      |
 //! | [`recordings`]         | recordings by other people                                        |
+//! | [`planted`]            | effects of the bench, planted in them                             |
 //! | `tests/all/`           | agreement of estimators, intervals, diagnosis, published results  |
 //! | `papers/`, `blind/`    | figures of `docs/papers.md`; units with undeclared effects        |
 //! | `board/`, `counted/`, `no_panic/` | separate crates: the firmware's image on the emulated board, the cost of its loops, freedom from panics |
@@ -18,5 +19,6 @@ pub mod blind;
 pub mod by_hand;
 pub mod coverage;
 pub mod joint;
+pub mod planted;
 pub mod recordings;
 pub mod slow_bias;

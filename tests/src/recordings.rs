@@ -86,10 +86,10 @@ impl Foreign<'_> {
     }
 }
 
-/// The session with an Xsens MTi that was published with IMU-TK, calibrated; `None` if the data are missing.
-pub fn xsens() -> Option<Fit> {
+/// The session with an Xsens MTi that was published with IMU-TK; `None` if the data are missing.
+pub fn xsens_session() -> Option<Foreign<'static>> {
     let folder = data_set("imu_tk_xsens")?;
-    let foreign = Foreign {
+    Some(Foreign {
         files: vec![
             (folder.join("xsens_acc.mat"), "t_s,accel_x,accel_y,accel_z"),
             (folder.join("xsens_gyro.mat"), "t_s,gyro_x,gyro_y,gyro_z"),
@@ -99,22 +99,32 @@ pub fn xsens() -> Option<Fit> {
         raw_unit: RawUnit::Count,
         scales: &[],
         inputs: None,
-    };
-    Some(foreign.fit(Method::LeastSquares).expect("it can be fitted"))
+    })
 }
 
-/// One of the five MPU-9150 of A. Mikov et al. (ICINS 2020), calibrated; `None` if the data are missing.
-pub fn mikoff(unit: usize) -> Option<Fit> {
+/// [`xsens_session`], calibrated.
+pub fn xsens() -> Option<Fit> {
+    let fit = xsens_session()?.fit(Method::LeastSquares);
+    Some(fit.expect("it can be fitted"))
+}
+
+/// One of the five MPU-9150 of A. Mikov et al. (ICINS 2020); `None` if the data are missing.
+pub fn mikoff_session(unit: usize) -> Option<Foreign<'static>> {
     let file = data_set("mikoff_mpu9150x5")?.join(format!("imu{unit}.log"));
-    let foreign = Foreign {
+    Some(Foreign {
         files: vec![(file, "accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z")],
         rate_hz: Some(100.0),
         gravity_mps2: 9.81,
         raw_unit: RawUnit::Si,
         scales: &[],
         inputs: None,
-    };
-    Some(foreign.fit(Method::LeastSquares).expect("it can be fitted"))
+    })
+}
+
+/// [`mikoff_session`], calibrated.
+pub fn mikoff(unit: usize) -> Option<Fit> {
+    let fit = mikoff_session(unit)?.fit(Method::LeastSquares);
+    Some(fit.expect("it can be fitted"))
 }
 
 /// `matrix = U Q` with U upper triangular, its diagonal positive, and Q orthogonal.

@@ -147,11 +147,13 @@ impl Active {
 
 /// The sensors of the unit with an effect.
 #[derive(Clone, Copy)]
-pub(crate) struct Sensors<'a> {
-    pub(crate) gyro: &'a TriadTruth,
-    pub(crate) accel: &'a TriadTruth,
+pub struct Sensors<'a> {
+    /// Gyros.
+    pub gyro: &'a TriadTruth,
+    /// Accelerometer.
+    pub accel: &'a TriadTruth,
     /// Nominal reference of the converter for analog sensors, V.
-    pub(crate) converter_reference_nominal_v: f64,
+    pub converter_reference_nominal_v: f64,
 }
 
 /// Inputs for building an effect.
@@ -279,8 +281,8 @@ impl EffectTruth {
             .map(|p| (p, self.values[p.key].as_slice()))
     }
 
-    /// Starts the effect in a unit.
-    pub(crate) fn activate(&self, sensors: Sensors<'_>, seed: u64, dt_s: f64) -> Active {
+    /// Starts the effect in a unit whose steps are `dt_s` apart. The seed determines its random numbers.
+    pub fn activate(&self, sensors: Sensors<'_>, seed: u64, dt_s: f64) -> Active {
         let spec = spec(self.id).expect("made from a spec");
         (spec.build)(&Build {
             effect: self,

@@ -1,0 +1,72 @@
+//! The published Xsens session in two halves of time: the effect is sought in one and judged by the other.
+
+use mimu::diagnose::{Diagnosis, Recordings, diagnose};
+use mimu::fit::Options;
+use mimu::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
+use mimu_tests::recordings::{Foreign, xsens_session};
+
+/// The two halves; `None` if the data are missing.
+fn halves() -> Option<[Prepared; 2]> {
+    let session = xsens_session()?;
+    let half = |second: bool| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let files = session.files.iter().map(|(file, columns)| {
+            let text = std::fs::read_to_string(file).expect("the file was there a moment ago");
+            let lines: Vec<&str> = text.lines().collect();
+            let (first, last) = lines.split_at(lines.len() / 2);
+            let part = folder.path().join(file.file_name().expect("a file"));
+            std::fs::write(&part, if second { last } else { first }.join("\n")).expect("written");
+            (part, *columns)
+        });
+        let foreign = Foreign {
+            files: files.collect(),
+            ..session.clone()
+        };
+        let recording = foreign.import(&folder).expect("importable");
+        Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable")
+    };
+    Some([false, true].map(half))
+}
+
+fn judged(first: Prepared, second: Prepared) -> Diagnosis {
+    let recordings = Recordings {
+        second: Some(second),
+        ..first.into()
+    };
+    diagnose(recordings, Options::IN_SAMPLE).expect("a diagnosis")
+}
+
+#[test]
+fn an_effect_found_in_either_half_of_a_real_session_lowers_the_error_of_the_other() {
+    let Some([a, b]) = halves() else { return };
+    let found = [judged(a.clone(), b.clone()), judged(b, a)].map(|diagnosis| {
+        let accepted: Vec<_> = diagnosis
+            .sensors
+            .iter()
+            .flat_map(|s| s.decision.accepted.clone())
+            .collect();
+        let [one] = &accepted[..] else {
+            panic!("{accepted:?}")
+        };
+        assert_eq!(one.chosen.candidate.id(), "gyro_g_sensitivity");
+        let on_other = one.second.expect("turns and rests judge it");
+        println!(
+            "turns of the other half: {:.3} deg without it, {:.3} deg with it",
+            on_other.rms_before.to_degrees(),
+            on_other.rms_after.to_degrees()
+        );
+        assert!(on_other.shows && on_other.rms_after < 0.5 * on_other.rms_before);
+        one.clone()
+    });
+    // The coefficients agree: nine squares in units of their sigmas, below what chance exceeds once in a thousand.
+    let [a, b] = &found;
+    assert_eq!([a.effect.values.len(), b.effect.values.len()], [9, 9]);
+    let square = |i: usize| {
+        let variance = a.covariance[(i, i)] + b.covariance[(i, i)];
+        (a.effect.values[i] - b.effect.values[i]).powi(2) / variance
+    };
+    let chi2: f64 = (0..9).map(square).sum();
+    println!("chi-square of the differences {chi2:.1}");
+    assert!(chi2 < 27.9);
+}
