@@ -21,7 +21,7 @@ cd "$out"
 show() { printf '\n$ mimu %s\n' "${*##*/}"; "$mimu" "$@"; }
 show import "$accel" "$gyro" \
     --columns t_s,accel_x,accel_y,accel_z --columns t_s,gyro_x,gyro_y,gyro_z \
-    --gravity "$gravity" --raw-unit count --reference gravity -o by-hand
+    --gravity "$gravity" --raw-unit count --reference gravity --device by-hand -o by-hand
 show fit by-hand -o cal.toml
 printf '\n$ head -25 cal.toml\n'
 head -25 cal.toml

@@ -49,7 +49,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("by-hand") / "by-hand"
     done = run(
         "import", EXAMPLE / "accel.txt", EXAMPLE / "gyro.txt", "--columns", "t_s,accel_x,accel_y,accel_z", "--columns",
-        "t_s,gyro_x,gyro_y,gyro_z", "--gravity", "9.80665", "--raw-unit", "count", "--reference", "gravity", "-o", path,
+        "t_s,gyro_x,gyro_y,gyro_z", "--gravity", "9.80665", "--raw-unit", "count", "--reference", "gravity", "--device", "by-hand",
+        "-o", path,
     )
     assert done.returncode == 0, done.stderr
     return path

@@ -34,7 +34,7 @@ use crate::quantity::Sensor;
 use crate::triad::Covariance;
 use crate::warning::Warning;
 use mimu_recording::error::Result;
-use mimu_recording::{Manifest, RawUnit, Reference, parse_toml, read_text};
+use mimu_recording::{Manifest, RawUnit, Reference, UNNAMED, are_two_units, parse_toml, read_text};
 
 /// Version of the layout of a calibration at one temperature.
 const FORMAT: &str = "mimu-calibration/1";
@@ -321,8 +321,15 @@ impl Calibration {
         match (&self.unit_id, manifest.unit_id()) {
             (Some(ours), Some(theirs)) => (!ours.eq_ignore_ascii_case(theirs))
                 .then(|| Warning::OtherUnit(ours.clone(), theirs.into())),
-            _ => (ours != theirs).then_some(Warning::OtherDevice(ours, theirs)),
+            _ => are_two_units(&ours, &theirs).then_some(Warning::OtherDevice(ours, theirs)),
         }
+    }
+
+    /// A note if only a person knows that it belongs to the unit of the recording, because one of the two names no unit.
+    pub fn unnamed_unit(&self, manifest: &Manifest) -> Option<Warning> {
+        let numbered = self.unit_id.is_some() && manifest.unit_id().is_some();
+        let unnamed = [&self.device, &manifest.device].map(|name| name == UNNAMED);
+        (!numbered && unnamed != [false; 2]).then_some(Warning::UnnamedUnit(unnamed))
     }
 
     /// Covariance of the inverse model of `sensor`: C by rows, then o. `None` if [it is not known](Self::is_uncertain).

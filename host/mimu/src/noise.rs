@@ -23,7 +23,7 @@ use crate::signal::ramp::ramps;
 use crate::warning::Warning;
 use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
+use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit, are_two_units};
 
 /// Noise of one raw channel from a record at rest, at one temperature or several (fang, Table 5).
 #[derive(Debug, Clone, PartialEq)]
@@ -237,7 +237,7 @@ impl Noise {
         dwells: &[Dwell],
         warnings: &mut Vec<Warning>,
     ) -> Result<()> {
-        if file.device != manifest.device {
+        if are_two_units(&file.device, &manifest.device) {
             let (file, recording) = (file.device.clone(), manifest.device.clone());
             warnings.push(Warning::NoiseOfAnother(file, recording));
         }

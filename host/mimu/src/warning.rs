@@ -155,6 +155,8 @@ pub enum Warning {
     OtherUnit(String, String),
     /// Names of the calibration's unit and of the recording's.
     OtherDevice(String, String),
+    /// Whether the calibration and the recording name no unit.
+    UnnamedUnit([bool; 2]),
     /// The calibration was made from the recording.
     SameRecording,
     /// Samples outside the temperatures of the calibration, of so many; the range, °C; the farthest, K; whether there are curves, and

@@ -3,8 +3,8 @@
 use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::extent;
-use mimu_recording::Reference;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{Reference, are_two_units};
 use serde::Serialize;
 
 use crate::basis::{CURVATURE_SPAN, Shape};
@@ -213,7 +213,7 @@ fn check_verifying(sessions: &[Session], verify: &[Session]) -> Result<()> {
         return Ok(());
     };
     for other in verify {
-        if other.device != first.device {
+        if are_two_units(&other.device, &first.device) {
             let problem = format!(
                 "this recording belongs to {:?}, not to {:?}",
                 other.device, first.device

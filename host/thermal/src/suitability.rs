@@ -1,6 +1,7 @@
 //! Recordings that no curves can be estimated from: what is wrong with them, and what to do.
 
 use mimu::quantity::{duration, significant};
+use mimu_recording::are_two_units;
 use mimu_recording::error::{Argument, Error, Result};
 
 use crate::basis::SLOPE_SPAN;
@@ -28,7 +29,7 @@ pub fn check_alike(sessions: &[Session]) -> Result<()> {
     for other in &sessions[1..] {
         let alike = match (&first.unit_id, &other.unit_id) {
             (Some(a), Some(b)) => a.eq_ignore_ascii_case(b),
-            _ => first.device == other.device,
+            _ => !are_two_units(&first.device, &other.device),
         };
         if !alike {
             let problem = format!(
@@ -159,6 +160,18 @@ impl Spans {
                 ),
                 "hold the unit still at more temperatures, or declare that it was at rest",
                 true,
+            )
+        } else if column[0] == column[1] {
+            let problem = match column[0] {
+                0.0 => "it is exactly 0 in every row: there is no thermometer".to_owned(),
+                c => format!(
+                    "it is {c} °C in every row: the thermometer does not answer, or the value was typed in"
+                ),
+            };
+            (
+                problem,
+                "record a thermometer near the sensors, or use `mimu fit`, which needs none",
+                false,
             )
         } else {
             (

@@ -10,8 +10,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::Calibration;
 use crate::judgement::Judgement;
 use crate::quantity::{AXES, Sensor};
-use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{RawUnit, are_two_units};
 
 /// Probability that any parameter is named as changed although none has changed.
 const FALSE_CHANGE: f64 = 0.05;
@@ -85,7 +85,7 @@ pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
         }
         let same = match (&first.unit_id, &other.unit_id) {
             (Some(a), Some(b)) => a.eq_ignore_ascii_case(b),
-            _ => first.device == other.device,
+            _ => !are_two_units(&first.device, &other.device),
         };
         if !same {
             notes.push(format!(

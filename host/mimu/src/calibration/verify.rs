@@ -191,7 +191,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     })
 }
 
-/// Refuses a calibration for another raw unit; returns a warning about one of another device. `place` is the recording.
+/// Refuses a calibration for another raw unit; returns a warning about one of another device, or of an unnamed one. `place` is the recording.
 pub(crate) fn check_unit(
     calibration: &Calibration,
     manifest: &Manifest,
@@ -208,7 +208,8 @@ pub(crate) fn check_unit(
             "import it in the other unit, or use the calibration of this unit",
         ));
     }
-    Ok(calibration.other_unit(manifest))
+    let other = calibration.other_unit(manifest);
+    Ok(other.or_else(|| calibration.unnamed_unit(manifest)))
 }
 
 /// The recording without the effects of the calibration, if it has any.

@@ -47,7 +47,7 @@ use crate::recording_problem::OfRecording;
 use crate::triad::{Part, Triad};
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{RawUnit, Reference, two_units};
 
 /// Result of a diagnosis in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -266,7 +266,7 @@ impl Recordings<'_> {
             )
             .about(Argument::Accept));
         }
-        let (unit, raw_unit) = (&self.first.manifest.device, self.first.manifest.raw_unit);
+        let raw_unit = self.first.manifest.raw_unit;
         for other in self.later() {
             if other.manifest.raw_unit != raw_unit {
                 return Err(Error::new(
@@ -304,13 +304,11 @@ impl Recordings<'_> {
                 "effects belong to one unit: give the calibration of this unit; if it is the same unit, write the same name as device in both files",
             ));
         }
-        let mut recordings = self
-            .later()
-            .map(|r| (r.manifest.device.as_str(), r.place.as_str()));
-        if let Some((device, place)) = recordings.find(|(d, _)| d != unit) {
+        if let Some((unit, device, at)) = two_units(all().map(|r| r.manifest.device.as_str())) {
+            let place = all().nth(at).map_or("recordings", |r| r.place.as_str());
             return Err(Error::new(
                 place,
-                format!("device is {device:?}, but that of the first recording is {unit:?}"),
+                format!("device is {device:?}, but that of another recording is {unit:?}"),
                 "effects belong to one unit: give recordings of one unit; if they are of one unit, import both with the same device name, or correct it in recording.toml",
             ));
         }

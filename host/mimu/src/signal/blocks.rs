@@ -267,6 +267,11 @@ impl Condensed {
         let summary = recording.for_each_batch(progress, |batch| condenser.push(batch))?;
         let mut condensed = condenser.finish()?;
         condensed.sha256 = summary.sha256;
+        // Stamps with jitter have slightly different rates by different means. Only a rate that somebody gave can be contradicted.
+        if recording.manifest.has_rate_of_stamps() {
+            let by_stamps = |warning: &Warning| !matches!(warning, Warning::RateOff(..));
+            condensed.warnings.retain(by_stamps);
+        }
         let read = summary.warnings.into_iter().map(Warning::Reading);
         condensed.warnings.splice(0..0, read);
         Ok(condensed)

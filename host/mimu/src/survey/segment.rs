@@ -7,7 +7,7 @@ use crate::quantity::plural;
 use crate::signal::blocks::extent;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Column, Recording};
+use mimu_recording::{Column, Manifest, Recording};
 
 /// Least number of samples: a model needs five octaves of averaging time up to a quarter of the record, and half the record.
 pub(super) const FEWEST: usize = 64;
@@ -67,7 +67,7 @@ impl Segment {
         Self::without_gap(
             &t[rows.clone()],
             rows.start,
-            recording.manifest.sample_rate_hz,
+            &recording.manifest,
             place,
             warnings,
         )
@@ -77,10 +77,11 @@ impl Segment {
     fn without_gap(
         t: &[f64],
         first: usize,
-        rate_hz: f64,
+        manifest: &Manifest,
         place: &str,
         warnings: &mut Vec<Warning>,
     ) -> Result<Self> {
+        let rate_hz = manifest.sample_rate_hz;
         let at = |i: usize| format!("{place}, data row {}, t_s", first + i + 1);
         if t.len() < FEWEST {
             return Err(Error::new(
@@ -133,7 +134,7 @@ impl Segment {
             );
             return Err(Error::new(format!("{place}, t_s"), problem, remedy));
         }
-        if off.abs() > RATE_OFF[1] {
+        if off.abs() > RATE_OFF[1] && !manifest.has_rate_of_stamps() {
             warnings.push(Warning::RateOff(1.0 / period_s, 100.0 * off, rate_hz));
         }
         let mut rows = 0..t.len();

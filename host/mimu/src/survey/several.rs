@@ -2,8 +2,8 @@
 
 use super::{Options, Survey, survey};
 use crate::calibration::Calibration;
-use mimu_recording::Recording;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{Recording, are_two_units};
 
 /// The noise of each recording; see [`survey`].
 ///
@@ -46,7 +46,7 @@ pub fn survey_all(
 fn refuse_another_unit(first: &Recording, other: &Recording) -> Result<()> {
     let (one, two) = (&first.manifest, &other.manifest);
     let place = |recording: &Recording| recording.samples.display().to_string();
-    let (what, here, there) = if one.device != two.device {
+    let (what, here, there) = if are_two_units(&one.device, &two.device) {
         (
             "device",
             format!("{:?}", two.device),

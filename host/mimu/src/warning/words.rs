@@ -53,7 +53,7 @@ impl fmt::Display for Warning {
             Self::Of(sensor, warning) => write!(f, "{sensor}: {warning}"),
             Self::Channel(name, warning) => write!(f, "{name}: {warning}"),
             Self::Reading(warning) => write!(f, "{warning}"),
-            Self::RateOff(hz, off, given) => write!(f, "the rate of the time stamps is {hz:.3} Hz, {off:+.2} % off the given {given} Hz; the stamps are used"),
+            Self::RateOff(hz, off, given) => write!(f, "the rate of the time stamps is {hz:.3} Hz, {off:+.2} % off the {given} Hz of its recording.toml; the stamps are used"),
             Self::Gaps(count, missing_s, row) => write!(f, "{}, {missing_s:.3} s missing in all, the first before data row {row}: turns are not integrated across gaps", plural(*count, "gap")),
             Self::Repeated(1) => f.write_str("1 row repeats the row before, time included: left out"),
             Self::Repeated(n) => write!(f, "{n} rows repeat the row before, time included: left out"),
@@ -199,6 +199,14 @@ impl fmt::Display for Warning {
             Self::Dead(why) => write!(f, "{why}: it has no noise and is left out of a noise file; {CHECK_WIRING}"),
             Self::OffLevel(angle) => write!(f, "the errors are perpendicular to the known force, as if the dwells were off level by {} deg rms: level the faces, or use only the magnitude of gravity (reference = \"gravity\")", degrees(*angle)),
             Self::OtherUnit(ours, theirs) => write!(f, "the calibration belongs to unit {ours}, the recording to unit {theirs}"),
+            Self::UnnamedUnit(unnamed) => {
+                let who = match unnamed {
+                    [true, true] => "calibration and recording name no unit",
+                    [true, false] => "the calibration names no unit",
+                    [false, _] => "the recording names no unit",
+                };
+                write!(f, "{who}, so they are taken to belong to one; to have this checked, give each import the name of its unit")
+            }
             Self::OtherDevice(ours, theirs) => write!(f, "the calibration belongs to {ours:?}, the recording to {theirs:?}"),
             Self::SameRecording => f.write_str("the calibration was made from this recording: the figures say nothing about new data"),
             Self::OutOfRange([count, of], [from, to], farthest, curves) => {

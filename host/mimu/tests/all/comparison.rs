@@ -2,6 +2,8 @@
 
 use mimu::calibration::Calibration;
 use mimu::calibration::comparison::{Comparison, compare};
+use mimu::warning::Warning;
+use mimu_recording::{Manifest, RawUnit, Reference, UNNAMED};
 use mimu_rig::random::Random;
 
 /// Standard deviation of a bias, V.
@@ -85,4 +87,25 @@ fn other_units_and_other_readings_are_said() {
     assert!(found.notes[0].contains("two"), "{:?}", found.notes);
     let alone = compare(&[a]).unwrap_err().to_string();
     assert!(alone.contains("only one"), "{alone}");
+}
+
+#[test]
+fn a_unit_without_a_name_contradicts_no_name_and_a_note_says_that_nobody_checked() {
+    let recording =
+        |device: &str| Manifest::new(device, 100.0, 9.81, RawUnit::Volt, Reference::Gravity);
+    let [named, unnamed] = ["one", UNNAMED].map(|device| calibration([2.5; 3], device));
+    for (of, with, note) in [
+        (&unnamed, "one", Some([true, false])),
+        (&unnamed, UNNAMED, Some([true, true])),
+        (&named, UNNAMED, Some([false, true])),
+        (&named, "one", None),
+    ] {
+        let manifest = recording(with);
+        assert_eq!(of.other_unit(&manifest), None, "{with}");
+        let expected = note.map(Warning::UnnamedUnit);
+        assert_eq!(of.unnamed_unit(&manifest), expected, "{with}");
+    }
+    assert!(named.other_unit(&recording("two")).is_some());
+    let both = [("a".to_string(), named), ("b".to_string(), unnamed)];
+    assert!(compare(&both).unwrap().notes.is_empty());
 }
