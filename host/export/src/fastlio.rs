@@ -32,7 +32,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let rate = options.noise.rate_hz(noise);
     let mut export = Export::new("fastlio", from);
     export.formulas.push(format!(
-        "Variances of one sample at {rate:.3} Hz: acc_cov = N^2 rate, b_acc_cov = K^2 rate, and so for the gyro; the worst axis, {} % interval of N and K behind each.",
+        "Variances of one sample at {rate:.3} Hz: acc_cov = N^2 rate, b_acc_cov = K^2 rate, and so for the gyro; the worst axis, with the {} % interval behind each.",
         100.0 * noise.confidence
     ));
     export
@@ -52,7 +52,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         ("b_gyr_cov", "(rad/s^2)^2", &densities.gyro.walk),
     ];
     for (key, unit, density) in keys {
-        let variance = density.value * density.value * rate;
+        let variance = |density: f64| density * density * rate;
         out.push_str(&line(indent, key, variance, unit, density));
     }
     export.content = out.into_bytes();

@@ -110,9 +110,9 @@ pub fn write_densities(out: &mut String, indent: &str, densities: &PerSensor<Den
         };
         let Densities { white, walk } = &densities[sensor];
         let key = format!("{prefix}_noise_density");
-        out.push_str(&line(indent, &key, white.value, units[0], white));
+        out.push_str(&line(indent, &key, |density| density, units[0], white));
         let key = format!("{prefix}_random_walk");
-        out.push_str(&line(indent, &key, walk.value, units[1], walk));
+        out.push_str(&line(indent, &key, |density| density, units[1], walk));
     }
 }
 

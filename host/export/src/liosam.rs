@@ -55,7 +55,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         ("imuGyrBiasN", "rad/s^2/sqrt(Hz)", &densities.gyro.walk),
     ];
     for (key, unit, density) in keys {
-        out.push_str(&line(indent, key, density.value, unit, density));
+        out.push_str(&line(indent, key, |density| density, unit, density));
     }
     let (gravity, source) = options.gravity.gravity(from);
     let _ = writeln!(out, "{indent}imuGravity: {gravity:.6}  # m/s^2, {source}");

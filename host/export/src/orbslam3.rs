@@ -39,7 +39,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         ("IMU.AccWalk", "m/s^3/sqrt(Hz)", &densities.accel.walk),
     ];
     for (key, unit, density) in keys {
-        out.push_str(&line("", key, density.value, unit, density));
+        out.push_str(&line("", key, |density| density, unit, density));
     }
     let rate = options.rate_hz(noise);
     let _ = match (rate - rate.round()).abs() < 0.0005 {

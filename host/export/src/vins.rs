@@ -38,7 +38,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let rate = options.noise.rate_hz(noise);
     let mut export = Export::new("vins", from);
     export.formulas.push(format!(
-        "Of one sample at {rate:.3} Hz: acc_n = N sqrt(rate), acc_w = K sqrt(rate), and so for the gyro; the worst axis, {} % interval of N and K behind each.",
+        "Of one sample at {rate:.3} Hz: acc_n = N sqrt(rate), acc_w = K sqrt(rate), and so for the gyro; the worst axis, with the {} % interval behind each.",
         100.0 * noise.confidence
     ));
     export.notes.push("VINS treats the two readings at the ends of an interval as independent. Multiplied by 1.41, acc_n and gyr_n give the right covariance.".into());
@@ -53,7 +53,13 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         ("gyr_w", "rad/s^2", &densities.gyro.walk),
     ];
     for (key, unit, density) in keys {
-        out.push_str(&line("", key, density.value * rate.sqrt(), unit, density));
+        out.push_str(&line(
+            "",
+            key,
+            |density| density * rate.sqrt(),
+            unit,
+            density,
+        ));
     }
     let (gravity, source) = options.gravity.gravity(from);
     out.push_str(&format!("g_norm: {gravity:.6}  # m/s^2, {source}\n"));

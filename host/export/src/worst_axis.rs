@@ -52,8 +52,12 @@ pub struct GravityOptions {
 pub struct Worst {
     /// Value, SI.
     pub value: f64,
-    /// Axis and interval, or another origin.
-    pub comment: String,
+    /// Ends of its interval, SI, if it was measured.
+    pub interval: Option<[f64; 2]>,
+    /// Axis, or another origin.
+    pub origin: String,
+    /// What else there is to say of it.
+    pub remark: Option<String>,
 }
 
 /// White noise and random walk of a triad.
@@ -122,10 +126,23 @@ impl WalkOptions {
     }
 }
 
-/// A line of YAML: the value that a program takes, its unit, and the density that it was computed from.
-pub fn line(indent: &str, key: &str, value: f64, unit: &str, from: &Worst) -> String {
-    let value = yaml::scientific(value, 6);
-    format!("{indent}{key}: {value}  # {unit}, {}\n", from.comment)
+/// A line of YAML: the value that a program takes, which `convert` makes of the density `from`, its unit, and its interval in the same unit.
+pub fn line(
+    indent: &str,
+    key: &str,
+    convert: impl Fn(f64) -> f64,
+    unit: &str,
+    from: &Worst,
+) -> String {
+    let value = yaml::scientific(convert(from.value), 6);
+    let mut comment = from.origin.clone();
+    if let Some([lower, upper]) = from.interval.map(|ends| ends.map(&convert)) {
+        comment += &format!(": {lower:.2e} to {upper:.2e}");
+    }
+    if let Some(remark) = &from.remark {
+        comment += &format!("; {remark}");
+    }
+    format!("{indent}{key}: {value}  # {unit}, {comment}\n")
 }
 
 /// The largest coefficient of `term` among the axes of `sensor`, with a comment.
@@ -148,11 +165,16 @@ fn worst(
         let problem = format!("its unit is {}, not {}", other.found, sensor.unit());
         return Err(other.refused(format!("{place}, channel {}", first.name), problem));
     }
-    let mut largest: Option<(f64, String)> = None;
+    let mut largest: Option<Worst> = None;
     let mut missing: Vec<(&NoiseChannel, &str)> = Vec::new();
-    let mut take = |value: f64, said: String| {
-        if largest.as_ref().is_none_or(|(v, _)| value > *v) {
-            largest = Some((value, said));
+    let mut take = |value: f64, interval: Option<[f64; 2]>, origin: String| {
+        if largest.as_ref().is_none_or(|worst| value > worst.value) {
+            largest = Some(Worst {
+                value,
+                interval,
+                origin,
+                remark: None,
+            });
         }
     };
     for channel in channels {
@@ -162,33 +184,36 @@ fn worst(
         match (channel.get(term), bound) {
             (Ok(c), _) => take(
                 gain * c.value,
-                format!("{name}: {:.2e} to {:.2e}", gain * c.lower, gain * c.upper),
+                Some([gain * c.lower, gain * c.upper]),
+                name.clone(),
             ),
             (Err(_), Some(bound)) if term == Term::K && fallback.is_none() => {
-                take(
-                    gain * bound,
-                    format!("{name}: not seen, the upper end of its interval"),
-                );
+                let origin = format!("{name}: not seen, the upper end of its interval");
+                take(gain * bound, None, origin);
             }
             (Err(why), _) => missing.push((channel, why)),
         }
     }
-    let found = |value, comment| Ok(Worst { value, comment });
-    if let (Some((value, said)), true) = (&largest, missing.is_empty()) {
-        return found(*value, said.clone());
-    }
+    let largest = match (largest, missing.is_empty()) {
+        (Some(worst), true) => return Ok(worst),
+        (largest, _) => largest,
+    };
     let names: Vec<&str> = missing.iter().map(|(c, _)| c.name.as_str()).collect();
     if let Some(fallback) = fallback {
+        let unseen = format!("not seen on {}", names.join(", "));
         // Uses the larger of the two: axes with a visible walk do not limit that of the others.
-        return match largest {
-            Some((value, said)) if value >= fallback => {
-                found(value, format!("{said}; not seen on {}", names.join(", ")))
-            }
-            _ => found(
-                fallback,
-                format!("given by hand: not seen on {}", names.join(", ")),
-            ),
-        };
+        return Ok(match largest.filter(|worst| worst.value >= fallback) {
+            Some(worst) => Worst {
+                remark: Some(unseen),
+                ..worst
+            },
+            None => Worst {
+                value: fallback,
+                interval: None,
+                origin: format!("given by hand: {unseen}"),
+                remark: None,
+            },
+        });
     }
     let (channel, why) = missing[0];
     let remedy = match term {
