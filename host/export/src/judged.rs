@@ -82,12 +82,6 @@ pub fn errors_of(calibration: &Calibration) -> Vec<Remaining> {
     Sensor::BOTH.into_iter().filter_map(of).collect()
 }
 
-/// The error of the output of `sensor` that was measured on unseen data, SI; `None` if none was, or of another quantity.
-pub fn held_out(calibration: &Calibration, sensor: Sensor) -> Option<f64> {
-    let judged = calibration.table(sensor)?.judged.as_ref()?;
-    judged.held_out_rms.filter(|_| judged.unit == sensor.unit())
-}
-
 /// The error of curves at rest: `rms` raw, in the unit of `cubics`.
 pub fn error_of_curves(cubics: &BiasCubics, rms: f64) -> Remaining {
     let factors = cubics.conversion.si_per_raw.map(f64::abs);

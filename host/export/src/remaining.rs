@@ -16,8 +16,6 @@ use mimu_recording::error::Result;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-use crate::judged::held_out;
-
 /// Number of temperatures at which curves are compared with one model.
 const TEMPERATURES: usize = 101;
 /// Number of inputs along an axis at which effects are evaluated.
@@ -184,6 +182,12 @@ fn at_input(sensor: Sensor) -> &'static str {
 fn inputs(sensor: Sensor) -> impl Iterator<Item = Vector3<f64>> {
     let size = input(sensor);
     (0..6).map(move |k| Vector3::ith(k / 2, if k % 2 == 0 { size } else { -size }))
+}
+
+/// The error of the output of `sensor` that was measured on unseen data, SI; `None` if none was, or of another quantity.
+fn held_out(calibration: &Calibration, sensor: Sensor) -> Option<f64> {
+    let judged = calibration.table(sensor)?.judged.as_ref()?;
+    judged.held_out_rms.filter(|_| judged.unit == sensor.unit())
 }
 
 /// Half of the 95 % interval of the calibrated output, from the covariance of C and o. If unseen data erred by more, that error: intervals include
