@@ -4,8 +4,8 @@
 //! forward matrix, and therefore a column of C. Row factors would be wrong by drift times misalignment: 1 % of each make 100 ppm.
 //!
 //! Between nodes each number is a cubic Hermite segment with the values and derivatives of both nodes. Drifts of MEMS sensors are cubics of
-//! the temperature (niu). Straight lines between 16 nodes miss these by 18 deg/h; Hermite segments represent a cubic exactly, and have no
-//! kink at the nodes.
+//! the temperature (niu). Straight lines between 16 nodes miss the bias of his gyro z by 5.4 deg/h over his -10 to 70 °C, and by 18 deg/h over -40 to
+//! 85 °C. Hermite segments represent a cubic exactly, and have no kink at the nodes.
 //!
 //! Outside the nodes a cubic diverges with the third power. There each number continues along the slope of the end node for [`BEYOND_C`]
 //! and is constant beyond.

@@ -96,7 +96,7 @@ def fit(
     recordings: Recording | Sequence[Recording],
     *,
     verify: Recording | Sequence[Recording] = (),
-    estimator: Literal["joint", "cubic", "nodes", "ramp-niu", "soak", "soak-fang"] = "joint",
+    estimator: Literal["joint", "cubic", "nodes", "ramp-niu", "soak", "soak-fang", "soak-constant-m"] = "joint",
     lag_s: float | None = None,
     range_c: tuple[float, float] | None = None,
     base: Calibration | None = None,

@@ -72,6 +72,7 @@ fn estimator(name: &str) -> PyResult<Estimator> {
         Estimator::Classic(Classic::RampNiu),
         Estimator::Classic(Classic::Soak),
         Estimator::Classic(Classic::SoakAsPrinted),
+        Estimator::Classic(Classic::SoakConstantM),
     ];
     let found = all.into_iter().find(|estimator| estimator.name() == name);
     found.ok_or_else(|| {

@@ -19,6 +19,8 @@ fn request() -> Request {
         shape: Shape::Cubic,
         kelvin_per_min: 2.0,
         set_points: 9,
+        both_ways: false,
+        course: Vec::new(),
         soak_s: 1800.0,
         dwell_s: 20.0,
         largest_dps: 50.0,

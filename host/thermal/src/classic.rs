@@ -2,7 +2,7 @@
 
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Argument, Error, Result};
-use nalgebra::{Matrix4, Matrix4x3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Matrix4x3, Vector3};
 
 use crate::basis::Shape;
 use crate::curves::TriadCurves;
@@ -19,6 +19,8 @@ const ALONG: f64 = 0.98;
 const REST: f64 = 0.004;
 /// Time between two plateaus of a soak, s, and the shortest plateau.
 const PLATEAU_S: f64 = 120.0;
+/// Temperature at which the constant misalignments are measured, °C: fang, section 4.1.
+const CONSTANT_C: f64 = 25.0;
 
 /// An estimator of the literature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +33,8 @@ pub enum Classic {
     Soak,
     /// The same by fang (33), (34) as printed: one scalar per pose, misalignments taken from elsewhere.
     SoakAsPrinted,
+    /// fang (31), (32): `K(T) M + b(T)`. M comes from all scalars of the plateau nearest 25 °C; at the others only K and b are fitted.
+    SoakConstantM,
 }
 
 impl Classic {
@@ -41,6 +45,7 @@ impl Classic {
             Self::RampNiu => "ramp-niu",
             Self::Soak => "soak",
             Self::SoakAsPrinted => "soak-fang",
+            Self::SoakConstantM => "soak-constant-m",
         }
     }
 }
@@ -58,17 +63,24 @@ pub fn estimate(
     if sessions.iter().map(rows).sum::<usize>() == 0 {
         return Ok(None);
     }
+    let constant = match classic {
+        Classic::SoakConstantM => misalignment(sessions, sensor),
+        _ => None,
+    };
     let mut points = Vec::new();
     for session in sessions {
         let groups = match classic {
             Classic::Nodes => by_temperature(session, sensor),
             Classic::RampNiu => cycles(session, sensor),
-            Classic::Soak | Classic::SoakAsPrinted => plateaus(session, sensor),
+            Classic::Soak | Classic::SoakAsPrinted | Classic::SoakConstantM => {
+                plateaus(session, sensor)
+            }
         };
         points.extend(groups.iter().filter_map(|group| {
             let numbers = match (classic, sensor) {
                 (Classic::RampNiu, Sensor::Gyro) => gyro_of_cycle(group),
                 (Classic::SoakAsPrinted, _) => six_positions(group),
+                (Classic::SoakConstantM, _) => scale_and_bias(group, constant.as_ref()?),
                 _ => affine(group),
             };
             let (numbers, variances) = numbers?;
@@ -238,6 +250,57 @@ fn six_positions(rows: &[&Row]) -> Option<Numbers> {
         }
     }
     Some(scaled(rows, numbers, variances))
+}
+
+/// M and the variances of its elements, from the plateau nearest [`CONSTANT_C`] that determines all twelve numbers.
+fn misalignment(sessions: &[Session], sensor: Sensor) -> Option<[Matrix3<f64>; 2]> {
+    let each = sessions.iter().flat_map(|session| {
+        let groups = plateaus(session, sensor);
+        let fitted = groups.into_iter().filter_map(|group| {
+            let off = (mean_temperature(session, &group) - CONSTANT_C).abs();
+            Some((off, affine(&group)?))
+        });
+        fitted.collect::<Vec<_>>()
+    });
+    let (_, (p, variances)) = each.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some([
+        Matrix3::from_fn(|j, i| p[3 * j + i] / p[4 * j]),
+        Matrix3::from_fn(|j, i| variances[3 * j + i] / (p[4 * j] * p[4 * j])),
+    ])
+}
+
+/// fang (31), (32): k and b of each axis by least squares of its readings over `M x`, with M known.
+fn scale_and_bias(rows: &[&Row], [m, m_variances]: &[Matrix3<f64>; 2]) -> Option<Numbers> {
+    let (mut numbers, mut variances) = ([0.0; 12], [0.0; 12]);
+    let n: f64 = rows.iter().map(|r| r.samples).sum();
+    for j in 0..3 {
+        let (mut sx, mut sxx, mut sy, mut sxy) = (0.0, 0.0, 0.0, 0.0);
+        for r in rows {
+            let (x, y) = ((m * r.input)[j], r.raw[j]);
+            sx += r.samples * x;
+            sxx += r.samples * x * x;
+            sy += r.samples * y;
+            sxy += r.samples * x * y;
+        }
+        let determinant = n * sxx - sx * sx;
+        if !(determinant > 1e-4 * n * sxx) {
+            return None;
+        }
+        let k = (n * sxy - sx * sy) / determinant;
+        for i in 0..3 {
+            numbers[3 * j + i] = k * m[(j, i)];
+            variances[3 * j + i] = n / determinant * m[(j, i)] * m[(j, i)];
+        }
+        numbers[9 + j] = (sy - k * sx) / n;
+        variances[9 + j] = sxx / determinant;
+    }
+    let (numbers, mut variances) = scaled(rows, numbers, variances);
+    for j in 0..3 {
+        for i in (0..3).filter(|i| *i != j) {
+            variances[3 * j + i] += numbers[4 * j] * numbers[4 * j] * m_variances[(j, i)];
+        }
+    }
+    Some((numbers, variances))
 }
 
 /// Variances of unit noise times that of a sample, from neighbouring rows of a dwell.

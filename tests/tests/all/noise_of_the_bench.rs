@@ -1,5 +1,6 @@
 //! Noise coefficients that `mimu allan` computes for units of the virtual bench, through their filters and converters.
 
+use mimu::plan::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
 use mimu::survey::{Options, Part, Survey, survey};
 use mimu_allan::Deviation;
@@ -78,4 +79,62 @@ fn white_noise_bias_instability_and_random_walk_are_within_their_intervals() {
         assert!(inside[i] + 6 >= told[i], "{term:?} inside {}", inside[i]);
     }
     assert!(strange.len() <= 2, "{strange:?}");
+}
+
+/// fang, Table 5 at 25 °C (V²) and Table 4 (V per deg/s and per m/s²).
+const FANG_VARIANCES: [[f64; 3]; 2] = [[1.27e-5, 0.92e-5, 1.92e-5], [3.57e-5, 4.23e-5, 2.47e-5]];
+const FANG_SCALES: [[f64; 3]; 2] = [[5.07e-3, 5.09e-3, 5.17e-3], [80.80e-3, 80.14e-3, 80.84e-3]];
+
+#[test]
+fn means_of_samples_behind_the_filters_of_fangs_parts_scatter_as_the_budget_says() {
+    const RATE_HZ: usize = 1000;
+    const SECONDS: usize = 300;
+    let mut random = Random::new(1, "unit");
+    let mut file: RigFile = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    for axes in [&mut file.unit.gyro_axes, &mut file.unit.accel_axes] {
+        (axes.instability_si, axes.walk_si) = (Some([0.0; 3]), Some([0.0; 3]));
+    }
+    (file.converter.bits, file.converter.noise_codes) = (Some(24), Some(0.0));
+    let truth = RigTruth::resolve(&file, 1).unwrap();
+    let plan = format!(
+        "format = \"mimu-plan/1\"\nsample_rate_hz = {RATE_HZ}.0\ncarrier = \"table\"\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = {SECONDS}.0\n"
+    );
+    let plan = Plan::parse(Source::new("plan", plan)).unwrap();
+    let rows = mimu_rig::record::samples(&plan, &truth, 1).unwrap();
+    let rows: Vec<[[f64; 3]; 2]> = rows
+        .filter(|r| r.instant.step.is_some())
+        .map(|r| [r.readings.gyro, r.readings.accel])
+        .collect();
+    for sensor in Sensor::BOTH {
+        let mut density = 0.0;
+        for (axis, (table_5, scale)) in FANG_VARIANCES[sensor as usize]
+            .iter()
+            .zip(FANG_SCALES[sensor as usize])
+            .enumerate()
+        {
+            let of = |r: &[[f64; 3]; 2]| r[sensor as usize][axis];
+            let mean = rows.iter().map(of).sum::<f64>() / rows.len() as f64;
+            let variance =
+                rows.iter().map(|r| (of(r) - mean).powi(2)).sum::<f64>() / rows.len() as f64;
+            let seconds: Vec<f64> = rows
+                .chunks_exact(RATE_HZ)
+                .map(|second| second.iter().map(of).sum::<f64>() / RATE_HZ as f64)
+                .collect();
+            let steps = seconds
+                .windows(2)
+                .map(|w| (w[1] - w[0]).powi(2))
+                .sum::<f64>();
+            let of_a_second = steps / 2.0 / (seconds.len() - 1) as f64;
+            density += of_a_second / variance * table_5 / scale.powi(2) / 3.0;
+        }
+        let n = DwellNoise::fang(sensor).n
+            * if sensor == Sensor::Gyro {
+                1f64.to_degrees()
+            } else {
+                1.0
+            };
+        // Three axes of 300 means scatter by 3 %; the RC filter behind the accelerometer makes 2 %, the different scale factors 1 %.
+        let ratio = n / density.sqrt();
+        assert!((0.9..1.1).contains(&ratio), "{sensor}: {ratio}");
+    }
 }

@@ -116,6 +116,8 @@ enum EstimatorArg {
     Soak,
     /// Soak by fang (33), (34) as printed: one scalar a pose
     SoakFang,
+    /// Soak by fang (31), (32): scale factors and biases at each plateau, misalignments of the plateau nearest 25 °C
+    SoakConstantM,
 }
 
 impl EstimatorArg {
@@ -127,6 +129,7 @@ impl EstimatorArg {
             Self::RampNiu => Estimator::Classic(Classic::RampNiu),
             Self::Soak => Estimator::Classic(Classic::Soak),
             Self::SoakFang => Estimator::Classic(Classic::SoakAsPrinted),
+            Self::SoakConstantM => Estimator::Classic(Classic::SoakConstantM),
         }
     }
 }

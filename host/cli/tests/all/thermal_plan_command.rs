@@ -100,3 +100,34 @@ fn people_read_what_is_refused_and_what_is_inseparable() {
         "{text}"
     );
 }
+
+#[test]
+fn a_course_and_a_soak_both_ways_reach_the_plan() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, json) = planned(
+        folder.path(),
+        "--procedure niu --course 25,-35:30,75:60,-35:30",
+    );
+    // niu, Table 2, profile 1, as in the bench's plans/niu-ramp.toml: s, °C.
+    let known = [
+        [0.0, 25.0],
+        [1800.0, -35.0],
+        [3600.0, -35.0],
+        [6900.0, 75.0],
+        [10500.0, 75.0],
+        [13800.0, -35.0],
+        [15600.0, -35.0],
+    ];
+    assert_eq!(plan.chamber, known);
+    assert_eq!(json["range_c"], serde_json::json!([-35.0, 75.0]));
+    Table::new(&plan, &TableTruth::ideal()).unwrap();
+    let (plan, _) = planned(
+        folder.path(),
+        "--procedure soak --range -30..70 --points 11 --both-ways",
+    );
+    assert_eq!(plan.rounds, 22);
+    let refused = mimu(folder.path(), "--procedure soak --course 25,-35:30");
+    assert_eq!(refused.status.code(), Some(1));
+    let usage = mimu(folder.path(), "--procedure niu --course warm");
+    assert_eq!(usage.status.code(), Some(2));
+}

@@ -34,6 +34,11 @@ pub struct Request {
     pub kelvin_per_min: f64,
     /// Set points of a soak.
     pub set_points: usize,
+    /// Whether a soak returns through its set points: niu, Table 2, measures each after heating and after cooling.
+    pub both_ways: bool,
+    /// Temperatures of the chamber on a ramp, °C, and the time at each, s: niu's three profiles (Table 2), for example. Rounds begin at the
+    /// first. Empty: from the lower end of the range to the upper and back.
+    pub course: Vec<[f64; 2]>,
     /// Time at a set point of a soak, or before a ramp and at its end, s.
     pub soak_s: f64,
     /// Length of a dwell, s.
@@ -75,10 +80,12 @@ pub struct Planned {
 /// Plans a procedure.
 ///
 /// # Errors
-/// A span that determines no such curve; too few set points; a set point that is too short for its dwells; more than two days.
+/// A span that determines no such curve; too few set points; a set point that is too short for its dwells; a course that does not fit the procedure
+/// or the range; more than two days.
 pub fn plan(request: &Request) -> Result<Planned> {
     let [from, to] = request.range_c;
     let curves = check_span(to - from, request.shape)?;
+    check_course(request)?;
     let schedule = Schedule::of(request)?;
     let duration_s = schedule.duration_s();
     if duration_s > LONGEST_S {
@@ -142,6 +149,40 @@ const INSEPARABLE_AT_REST: [&str; 3] = [
     "all other scale factors and cross terms: nothing excites them",
     "warm-up since power-on, lag of the dies and slope over temperature: one ramp at one rate changes all three together; return at another rate, or soak and measure again",
 ];
+
+/// Refuses a course for a procedure that has its own, one outside the range, and a return without set points.
+fn check_course(request: &Request) -> Result<()> {
+    let refuse = |what: &str, problem: String, remedy: &str| Err(Error::new(what, problem, remedy));
+    let name = request.procedure.name();
+    let ramps = matches!(request.procedure, Procedure::Niu | Procedure::Ramp);
+    let [from, to] = request.range_c;
+    match request.course.as_slice() {
+        _ if request.both_ways && request.procedure != Procedure::Soak => refuse(
+            "return through the set points",
+            format!("the procedure {name} has no set points"),
+            "choose the procedure soak",
+        ),
+        [] => Ok(()),
+        _ if !ramps => refuse(
+            "course of the chamber",
+            format!("the procedure {name} has its own"),
+            "leave the course out, or choose niu or ramp",
+        ),
+        [_] => refuse(
+            "course of the chamber",
+            "one temperature is no ramp".into(),
+            "give the temperatures that the chamber turns round at",
+        ),
+        course => match course.iter().find(|[c, _]| !(from..=to).contains(&c)) {
+            Some([c, _]) => refuse(
+                "course of the chamber",
+                format!("{c} °C is outside the range of {from} to {to} °C"),
+                "widen the range",
+            ),
+            None => Ok(()),
+        },
+    }
+}
 
 /// Refuses a span that does not determine such a curve; otherwise returns the name of the curve.
 fn check_span(kelvin: f64, shape: Shape) -> Result<&'static str> {

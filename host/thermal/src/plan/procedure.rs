@@ -152,14 +152,17 @@ fn soak(request: &Request) -> Result<Schedule> {
     }
     let apart = (to - from) / (n - 1) as f64;
     let round_s = request.soak_s + apart / request.kelvin_per_min * 60.0;
-    let points = (0..n).flat_map(|k| {
-        let (t, c) = (k as f64 * round_s, from + k as f64 * apart);
+    let up = 0..n;
+    let down = up.clone().rev().filter(|_| request.both_ways);
+    let points: Vec<usize> = up.chain(down).collect();
+    let corners = points.iter().enumerate().flat_map(|(k, point)| {
+        let (t, c) = (k as f64 * round_s, from + *point as f64 * apart);
         [[t, c], [t + request.soak_s, c]]
     });
     Ok(Schedule {
-        chamber_c: points.collect(),
+        chamber_c: corners.collect(),
         lead_in_s: request.soak_s - round.length_s,
-        rounds: n,
+        rounds: points.len(),
         round_s,
         waits: true,
         steps: round.steps,
@@ -167,27 +170,28 @@ fn soak(request: &Request) -> Result<Schedule> {
     })
 }
 
-/// Up, held, and down again, with as many rounds as fit.
+/// The requested course, or up, held, and down again, with as many rounds as fit.
 fn sweep(request: &Request, round: Round) -> Schedule {
     let [from, to] = request.range_c;
-    let ramp_s = (to - from) / request.kelvin_per_min * 60.0;
     let soak_s = request.soak_s;
-    let ends = [
-        soak_s,
-        soak_s + ramp_s,
-        2.0 * soak_s + ramp_s,
-        2.0 * (soak_s + ramp_s),
-    ];
-    let chamber_c = vec![
-        [0.0, from],
-        [ends[0], from],
-        [ends[1], to],
-        [ends[2], to],
-        [ends[3], from],
-    ];
-    // A round at each end of the range belongs to it.
-    let lead_in_s = (soak_s - round.length_s).max(0.0);
-    let rounds = ((ends[3] - lead_in_s) / round.length_s).ceil() + 1.0;
+    let usual = [[from, soak_s], [to, soak_s], [from, 0.0]];
+    let (course, lead_in_s) = match request.course.as_slice() {
+        // A round at each end of the range belongs to it.
+        [] => (&usual[..], (soak_s - round.length_s).max(0.0)),
+        given => (given, 0.0),
+    };
+    let (mut chamber_c, mut t) = (Vec::<[f64; 2]>::new(), 0.0);
+    for [temp_c, held_s] in course {
+        if let Some([_, before]) = chamber_c.last() {
+            t += (temp_c - before).abs() / request.kelvin_per_min * 60.0;
+        }
+        chamber_c.push([t, *temp_c]);
+        if *held_s > 0.0 {
+            t += held_s;
+            chamber_c.push([t, *temp_c]);
+        }
+    }
+    let rounds = ((t - lead_in_s) / round.length_s).ceil() + 1.0;
     Schedule {
         chamber_c,
         lead_in_s,

@@ -16,6 +16,8 @@ fn request(procedure: Procedure) -> Request {
         shape: Shape::Cubic,
         kelvin_per_min: 2.0,
         set_points: 4,
+        both_ways: false,
+        course: Vec::new(),
         soak_s: 3600.0,
         dwell_s: 20.0,
         largest_dps: 50.0,
@@ -148,4 +150,96 @@ fn spans_that_determine_no_such_curve_are_refused_with_the_reason() {
     let mut line = request(Procedure::Soak);
     range(35.0, Shape::Line)(&mut line);
     assert_eq!(plan(&line).unwrap().curves, "line");
+}
+
+#[test]
+fn the_chamber_follows_the_three_profiles_of_niu() {
+    // niu, Table 2: °C and minutes held; 2 K/min. The durations are sums of the table's times.
+    let profiles = [
+        (
+            vec![[25.0, 0.0], [-35.0, 30.0], [75.0, 60.0], [-35.0, 30.0]],
+            260.0,
+        ),
+        (
+            vec![[25.0, 0.0], [75.0, 30.0], [-35.0, 30.0], [75.0, 30.0]],
+            225.0,
+        ),
+        (
+            vec![
+                [25.0, 0.0],
+                [75.0, 40.0],
+                [25.0, 20.0],
+                [-35.0, 30.0],
+                [25.0, 30.0],
+            ],
+            230.0,
+        ),
+    ];
+    for (course, minutes) in profiles {
+        let mut asked = request(Procedure::Niu);
+        (asked.range_c, asked.dwell_s) = ([-35.0, 75.0], 9.0);
+        asked.course = course.iter().map(|[c, min]| [*c, 60.0 * min]).collect();
+        let found = plan(&asked).unwrap();
+        let end_s = found.schedule.chamber_c.last().unwrap()[0];
+        near(end_s, 60.0 * minutes, 1e-9);
+        // Rounds of 152 s go on until the end, and at most two longer.
+        let beyond = found.duration_s - end_s;
+        assert!((0.0..304.0).contains(&beyond), "{beyond}");
+        let held: Vec<f64> = course
+            .iter()
+            .filter(|[_, min]| *min > 0.0)
+            .map(|[_, min]| 60.0 * min)
+            .collect();
+        let flat = found.schedule.chamber_c.windows(2);
+        let flat = flat
+            .filter(|w| w[0][1] == w[1][1])
+            .map(|w| w[1][0] - w[0][0]);
+        assert_eq!(flat.collect::<Vec<_>>(), held);
+        assert!(
+            found
+                .sensors
+                .iter()
+                .all(|s| s.at.iter().all(|at| at.bias.is_some()))
+        );
+    }
+}
+
+#[test]
+fn a_soak_both_ways_meets_each_set_point_after_heating_and_after_cooling() {
+    let mut asked = request(Procedure::Soak);
+    let [one, both] = [false, true].map(|both_ways| {
+        asked.both_ways = both_ways;
+        plan(&asked).unwrap()
+    });
+    assert_eq!(both.dwells, 2 * one.dwells);
+    let schedule = &both.schedule;
+    let at: Vec<f64> = (0..schedule.rounds)
+        .map(|k| schedule.temp_c(schedule.lead_in_s + k as f64 * schedule.round_s))
+        .collect();
+    assert_eq!(at, [0.0, 20.0, 40.0, 60.0, 60.0, 40.0, 20.0, 0.0]);
+    // Twice the dwells of white noise.
+    for (one, both) in one.sensors.iter().zip(&both.sensors) {
+        near(
+            one.at[1].bias.unwrap() / both.at[1].bias.unwrap(),
+            2f64.sqrt(),
+            1e-6,
+        );
+    }
+}
+
+#[test]
+fn a_course_that_does_not_fit_the_procedure_or_the_range_is_refused() {
+    let refused = |procedure, change: &dyn Fn(&mut Request)| {
+        let mut asked = request(procedure);
+        change(&mut asked);
+        plan(&asked).unwrap_err().to_string()
+    };
+    let course = |r: &mut Request| r.course = vec![[0.0, 0.0], [60.0, 0.0]];
+    assert!(refused(Procedure::Soak, &course).contains("soak has its own"));
+    assert!(refused(Procedure::RestRamp, &course).contains("rest-ramp has its own"));
+    let beyond = |r: &mut Request| r.course = vec![[0.0, 0.0], [61.0, 0.0]];
+    assert!(refused(Procedure::Ramp, &beyond).contains("61 °C is outside"));
+    let one = |r: &mut Request| r.course = vec![[0.0, 0.0]];
+    assert!(refused(Procedure::Niu, &one).contains("no ramp"));
+    assert!(refused(Procedure::Ramp, &|r| r.both_ways = true).contains("no set points"));
 }

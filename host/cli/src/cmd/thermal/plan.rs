@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
+use mimu::signal::blocks::extent;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 use mimu_thermal::basis::Shape;
@@ -24,6 +25,9 @@ pub(super) struct PlanArgs {
     /// Temperatures of the chamber, °C
     #[arg(long, value_name = "FROM..TO", default_value = "-10..70", allow_hyphen_values = true, value_parser = range)]
     range: [f64; 2],
+    /// Temperatures of the chamber in turn, °C, each with the minutes it is held, for niu and ramp; 25,-35:30,75:60,-35:30 is niu's first profile
+    #[arg(long, value_name = "C[:MIN],...", value_delimiter = ',', allow_hyphen_values = true, value_parser = held, conflicts_with_all = ["range", "soak"])]
+    course: Vec<[f64; 2]>,
     /// Curves of all parameters over temperature, for the prediction
     #[arg(long, value_enum, default_value = "cubic")]
     curves: CurvesArg,
@@ -33,6 +37,9 @@ pub(super) struct PlanArgs {
     /// Set points of a soak
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=100))]
     points: u16,
+    /// Return through the set points of a soak, as niu does
+    #[arg(long)]
+    both_ways: bool,
     /// Time at each set point, or before and after a ramp, min [default: 60 for a soak, 30 for the others]
     #[arg(long, value_name = "MIN", value_parser = |t: &str| number(t, 0.0, 2880.0))]
     soak: Option<f64>,
@@ -84,6 +91,17 @@ fn range(text: &str) -> std::result::Result<[f64; 2], String> {
     }
 }
 
+/// A temperature, °C, and the time that it is held, s.
+fn held(text: &str) -> std::result::Result<[f64; 2], String> {
+    let (temp_c, min) = text.split_once(':').unwrap_or((text, "0"));
+    match (temp_c.parse(), min.parse::<f64>()) {
+        (Ok(c), Ok(min)) if (-100.0..=300.0).contains(&c) && (0.0..=2880.0).contains(&min) => {
+            Ok([c, 60.0 * min])
+        }
+        _ => Err("write a temperature and the minutes it is held, as -35:30".into()),
+    }
+}
+
 impl PlanArgs {
     fn request(&self) -> Result<Request> {
         let procedure = match self.procedure {
@@ -112,13 +130,18 @@ impl PlanArgs {
         };
         Ok(Request {
             procedure,
-            range_c: self.range,
+            range_c: match self.course.as_slice() {
+                [] => self.range,
+                course => extent(course.iter().map(|[temp_c, _]| *temp_c)),
+            },
             shape: match self.curves {
                 CurvesArg::Line => Shape::Line,
                 CurvesArg::Cubic => Shape::Cubic,
             },
             kelvin_per_min: self.rate,
             set_points: usize::from(self.points),
+            both_ways: self.both_ways,
+            course: self.course.clone(),
             soak_s: 60.0 * self.soak.unwrap_or(usual_min),
             dwell_s: self.dwell.unwrap_or(usual_s),
             largest_dps: self.table_rate,

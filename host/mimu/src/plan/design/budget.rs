@@ -26,19 +26,41 @@ pub struct DwellNoise {
 
 /// Time up to which fang, section 3, finds noise white, s.
 const FANG_WHITE_S: f64 = 20.0;
+/// Samples per second, fang, section 3.
+const FANG_RATE_HZ: f64 = 1000.0;
 
 impl DwellNoise {
-    /// Of fang's sensors. N from the variances of Table 5 at 25 °C, taken to be those of samples at 1 kHz,
-    /// and the scale factors of Table 4, both averaged over the axes; B such that the floor is reached at 20
-    /// s (section 3: white noise within, drift beyond; no number for B is given); K = 0.
+    /// Of fang's sensors: N from the variances of Table 5 at 25 °C and the scale factors of Table 4, averaged over the axes; B
+    /// such that the floor is reached at 20 s (section 3: white noise within, drift beyond; no number for B is given); K = 0.
+    ///
+    /// The parts filter their outputs, so samples at 1 kHz repeat each other, and a mean over a dwell averages less than their
+    /// number suggests. N is the density that such samples have at low frequencies ([`filtered_density`]): 0.065 deg/s/√Hz and
+    /// 0.29 mg/√Hz. Independent samples with these variances would have 0.023 and 0.23. The data sheets give 0.1 deg/s/√Hz
+    /// and 0.35 mg/√Hz one-sided, which are an N of 0.071 and 0.25.
+    ///
+    /// The paper does not give the filters: 40 Hz is that of the ADXRS300 with the capacitor of its data sheet; 350, 350 and
+    /// 150 Hz are those inside the MMA7260QT.
     pub fn fang(sensor: Sensor) -> Self {
-        let (variances, scales, si) = match sensor {
-            Sensor::Gyro => ([1.27, 0.92, 1.92], [5.07, 5.09, 5.17], 1f64.to_radians()),
-            Sensor::Accel => ([3.57, 4.23, 2.47], [80.80, 80.14, 80.84], 1.0),
+        let (variances, scales, filters_hz, si) = match sensor {
+            Sensor::Gyro => (
+                [1.27, 0.92, 1.92],
+                [5.07, 5.09, 5.17],
+                [40.0; 3],
+                1f64.to_radians(),
+            ),
+            Sensor::Accel => (
+                [3.57, 4.23, 2.47],
+                [80.80, 80.14, 80.84],
+                [350.0, 350.0, 150.0],
+                1.0,
+            ),
         };
-        let volts = (variances.iter().sum::<f64>() / 3.0 * 1e-5).sqrt();
+        let densities = variances.iter().zip(filters_hz);
+        let density = densities
+            .map(|(v, hz)| filtered_density(v * 1e-5, hz, FANG_RATE_HZ))
+            .sum::<f64>();
         let volts_per_unit = scales.iter().sum::<f64>() / 3.0 * 1e-3;
-        let n = volts / volts_per_unit * si * 1e-3f64.sqrt();
+        let n = (density / 3.0).sqrt() / volts_per_unit * si;
         Self {
             n,
             b: n / (FANG_WHITE_S * FLOOR).sqrt(),
@@ -118,6 +140,15 @@ impl DwellNoise {
         let a = self.allan();
         [a.white / dwell_s, a.flicker, a.walk * dwell_s].map(|v| v / a.variance(dwell_s))
     }
+}
+
+/// N² of samples with `variance` at `rate_hz` of white noise behind a single-pole filter of `corner_hz`.
+///
+/// Neighbouring samples correlate by `a = exp(-2π f_c/f_s)`, so the mean of many has `(1 + a)/(1 - a)` times the variance that
+/// independent ones would have. The factor is 8.0 for 40 Hz at 1 kHz.
+fn filtered_density(variance: f64, corner_hz: f64, rate_hz: f64) -> f64 {
+    let a = (-std::f64::consts::TAU * corner_hz / rate_hz).exp();
+    variance / rate_hz * (1.0 + a) / (1.0 - a)
 }
 
 /// One way to spend the time.
