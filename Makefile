@@ -138,8 +138,9 @@ example: toolchain ## import and fit a recording: the best real one available, o
 	$(CARGO) build --locked --release --bin mimu
 	./tests/example.sh target/release/mimu
 
-papers: toolchain ## compute every figure and plot of docs/papers.md
+papers: toolchain ## compute every table and plot of docs/papers.md, and every table of the studies in docs/thermal.md (hours)
 	$(CARGO) run --locked --release -p mimu-tests --bin papers
+	$(CARGO) run --locked --release -p mimu-tests --features studies --bin thermal -- write
 
 blind: toolchain ## undeclared effects on hundreds of units and in real recordings, and their diagnoses
 	$(CARGO) run --locked --release -p mimu-tests --bin blind

@@ -13,8 +13,8 @@ use mimu_rig::motion::Carrier as _;
 use mimu_rig::plan::Plan;
 use nalgebra::Vector3;
 
-use crate::page::{Block, Table, significant};
 use crate::plot::{Band, Chart, Line, Mark};
+use mimu_tests::page::{Block, Table, significant};
 
 /// Number of poses of the session by hand that the designs are compared with.
 const BY_HAND: usize = 38;

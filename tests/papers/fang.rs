@@ -14,7 +14,7 @@ use mimu_rig::ideal::{self, FANG_TABLE_3, Ideal};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::page::{Block, Table, significant};
+use mimu_tests::page::{Block, Table, significant};
 
 /// Runs of the Monte Carlo.
 const RUNS: u64 = 1000;

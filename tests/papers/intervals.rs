@@ -2,7 +2,7 @@
 
 use mimu_tests::coverage::{Dwells, Tally, by_hand, with_a_table};
 
-use crate::page::{Block, Table};
+use mimu_tests::page::{Block, Table};
 
 /// Recordings of each kind.
 const RUNS: u64 = 1000;

@@ -1,225 +1,8 @@
 //! niu: consistency of its tables, and curves of the units that are made from them.
 
-use crate::page::{Block, Table, significant};
-
-/// A row of a table: its name and its figures.
-type Row<const N: usize> = (&'static str, [f64; N]);
-
-/// Table 4, MTi-G: rms error against the soak at -10, 10, 30, 50 and 70 °C, and the largest; deg/h, µg, ppm.
-const TABLE_4: [Row<6>; 24] = [
-    ("b_gx", [353.0, 214.0, 137.0, 87.0, 158.0, 353.0]),
-    ("b_gy", [224.0, 85.0, 204.0, 286.0, 5.0, 286.0]),
-    ("b_gz", [215.0, 182.0, 144.0, 114.0, 130.0, 215.0]),
-    ("δs_gx", [891.0, 1442.0, 655.0, 286.0, 1255.0, 1442.0]),
-    ("δs_gy", [906.0, 1005.0, 936.0, 528.0, 402.0, 1005.0]),
-    ("δs_gz", [256.0, 307.0, 155.0, 180.0, 953.0, 953.0]),
-    ("n_xy", [364.0, 778.0, 612.0, 157.0, 361.0, 778.0]),
-    ("n_xz", [1070.0, 393.0, 429.0, 525.0, 259.0, 1070.0]),
-    ("n_yx", [353.0, 512.0, 265.0, 39.0, 949.0, 949.0]),
-    ("n_yz", [345.0, 271.0, 375.0, 209.0, 1224.0, 1224.0]),
-    ("n_zx", [412.0, 307.0, 83.0, 339.0, 1071.0, 1071.0]),
-    ("n_zy", [145.0, 96.0, 108.0, 221.0, 287.0, 287.0]),
-    ("b_ax", [1050.0, 367.0, 271.0, 442.0, 662.0, 1050.0]),
-    ("b_ay", [801.0, 1176.0, 1166.0, 1049.0, 949.0, 1176.0]),
-    ("b_az", [1146.0, 639.0, 688.0, 1030.0, 1166.0, 1166.0]),
-    ("δs_ax", [20.0, 23.0, 17.0, 44.0, 50.0, 50.0]),
-    ("δs_ay", [21.0, 64.0, 26.0, 33.0, 45.0, 64.0]),
-    ("δs_az", [18.0, 39.0, 19.0, 21.0, 34.0, 39.0]),
-    ("m_xy", [16.0, 21.0, 17.0, 25.0, 33.0, 33.0]),
-    ("m_xz", [142.0, 229.0, 250.0, 259.0, 310.0, 310.0]),
-    ("m_yx", [37.0, 28.0, 32.0, 36.0, 34.0, 37.0]),
-    ("m_yz", [29.0, 104.0, 66.0, 31.0, 121.0, 121.0]),
-    ("m_zx", [12.0, 49.0, 21.0, 20.0, 91.0, 91.0]),
-    ("m_zy", [85.0, 41.0, 55.0, 67.0, 123.0, 123.0]),
-];
-
-/// Table 6, the same for the NV-IMU100.
-const TABLE_6: [Row<6>; 24] = [
-    ("b_gx", [5.0, 1.0, 1.0, 0.0, 2.0, 5.0]),
-    ("b_gy", [0.0, 1.0, 1.0, 2.0, 3.0, 3.0]),
-    ("b_gz", [3.0, 2.0, 1.0, 4.0, 4.0, 4.0]),
-    ("δs_gx", [411.0, 585.0, 328.0, 72.0, 363.0, 585.0]),
-    ("δs_gy", [2143.0, 2039.0, 1310.0, 372.0, 190.0, 2143.0]),
-    ("δs_gz", [297.0, 467.0, 544.0, 353.0, 792.0, 792.0]),
-    ("n_xy", [598.0, 571.0, 473.0, 430.0, 578.0, 598.0]),
-    ("n_xz", [40.0, 92.0, 44.0, 141.0, 37.0, 141.0]),
-    ("n_yx", [874.0, 522.0, 497.0, 538.0, 403.0, 874.0]),
-    ("n_yz", [57.0, 41.0, 20.0, 47.0, 113.0, 113.0]),
-    ("n_zx", [103.0, 81.0, 40.0, 42.0, 30.0, 103.0]),
-    ("n_zy", [40.0, 51.0, 40.0, 42.0, 30.0, 103.0]),
-    ("b_ax", [4133.0, 3520.0, 3417.0, 3036.0, 1337.0, 4133.0]),
-    ("b_ay", [1634.0, 1368.0, 704.0, 924.0, 2325.0, 2325.0]),
-    ("b_az", [829.0, 2170.0, 1514.0, 1101.0, 3860.0, 3860.0]),
-    ("δs_ax", [95.0, 62.0, 49.0, 68.0, 90.0, 95.0]),
-    ("δs_ay", [115.0, 607.0, 450.0, 120.0, 265.0, 607.0]),
-    ("δs_az", [179.0, 146.0, 135.0, 153.0, 226.0, 226.0]),
-    ("m_xy", [380.0, 443.0, 490.0, 523.0, 511.0, 523.0]),
-    ("m_xz", [223.0, 106.0, 41.0, 16.0, 16.0, 223.0]),
-    ("m_yx", [547.0, 398.0, 472.0, 521.0, 313.0, 521.0]),
-    ("m_yz", [169.0, 149.0, 124.0, 50.0, 134.0, 169.0]),
-    ("m_zx", [161.0, 83.0, 102.0, 87.0, 135.0, 161.0]),
-    ("m_zy", [205.0, 112.0, 100.0, 110.0, 69.0, 205.0]),
-];
-
-/// Table 9: A0 to A3 of the MTi-G, then of the NV-IMU100, as printed; T in °C; deg/h, µg, ppm.
-const TABLE_9: [Row<8>; 24] = [
-    (
-        "b_gx",
-        [-31.0, -13.65, 0.177, 0.00142, -4.0, -0.06, 0.003, -3.24712],
-    ),
-    (
-        "b_gy",
-        [1.0, -15.33, 0.26, -0.00136, 5.0, 0.03, -0.002, 1.56754],
-    ),
-    (
-        "b_gz",
-        [-2112.0, 45.24, -0.682, 0.00352, 1.0, 0.1, -0.009, 0.00012],
-    ),
-    (
-        "δs_gx",
-        [
-            -3108.0, 1.31, 0.232, -0.01783, 752.0, 14.18, -1.288, 0.02144,
-        ],
-    ),
-    (
-        "δs_gy",
-        [
-            -1380.0, 119.62, 0.107, -0.00931, -377.0, -44.18, 4.715, -0.02033,
-        ],
-    ),
-    (
-        "δs_gz",
-        [
-            -4541.0, 232.23, -1.134, -0.01477, -2211.0, 71.96, 2.405, -0.01435,
-        ],
-    ),
-    (
-        "n_xy",
-        [
-            611.0, 17.2, -0.906, 0.00896, -2304.0, 11.76, -0.069, -0.00083,
-        ],
-    ),
-    (
-        "n_xz",
-        [4527.0, -18.12, -0.733, 0.01023, 483.0, 3.4, 0.234, -0.00288],
-    ),
-    (
-        "n_yx",
-        [701.0, -8.14, 0.077, 0.00111, 3344.0, -0.77, 0.053, -0.00069],
-    ),
-    (
-        "n_yz",
-        [
-            -3371.0, 39.47, 0.62, -0.0081, 1081.0, 11.43, -0.229, 0.00277,
-        ],
-    ),
-    (
-        "n_zx",
-        [
-            -2017.0, -10.81, -0.783, 0.00761, -1699.0, 3.48, 0.201, -0.0023,
-        ],
-    ),
-    (
-        "n_zy",
-        [593.0, 6.73, -0.293, 0.00813, -1939.0, 4.98, -0.008, 0.00038],
-    ),
-    (
-        "b_ax",
-        [
-            -1472.0, -37.02, 0.12, 0.01575, -23074.0, 365.76, -0.808, -0.03441,
-        ],
-    ),
-    (
-        "b_ay",
-        [
-            2758.0, -6.76, 0.443, -0.00128, 7069.0, 169.46, -7.247, 0.07519,
-        ],
-    ),
-    (
-        "b_az",
-        [
-            411.0, 38.25, -0.876, 0.0036, -16897.0, -27.51, 13.616, -0.17003,
-        ],
-    ),
-    (
-        "δs_ax",
-        [
-            -100.0, 7.71, -0.073, 0.00034, -3003.0, 25.52, -0.472, 0.0035,
-        ],
-    ),
-    (
-        "δs_ay",
-        [102.0, 5.25, -0.09, 0.00055, -2650.0, -8.41, -0.361, 0.00814],
-    ),
-    (
-        "δs_az",
-        [
-            157.0, 4.32, -0.108, 0.00038, -3509.0, 12.56, 0.565, -0.00513,
-        ],
-    ),
-    (
-        "m_xy",
-        [
-            -174.0, -1.77, 0.026, 0.00052, -6614.0, -6.55, -0.221, 0.00287,
-        ],
-    ),
-    (
-        "m_xz",
-        [
-            9996.0, -1.75, -0.129, 0.00149, -10539.0, 4.26, 0.195, -0.00179,
-        ],
-    ),
-    (
-        "m_yx",
-        [372.0, 1.5, -0.037, -3e-05, 3858.0, -10.07, 0.429, -0.00387],
-    ),
-    (
-        "m_yz",
-        [7648.0, 8.42, 0.017, -0.00088, 9956.0, 5.03, -0.257, 0.00261],
-    ),
-    (
-        "m_zx",
-        [
-            -4158.0, -15.85, 0.095, -0.00034, 5713.0, -11.62, 0.127, -0.00103,
-        ],
-    ),
-    (
-        "m_zy",
-        [
-            -3530.0, -7.14, -0.032, 0.00018, -5912.0, -4.28, -0.109, 0.00071,
-        ],
-    ),
-];
-
-/// Table 10, MTi-G: rms and mean compensated, rms and mean uncompensated; deg/h and µg.
-const TABLE_10: [Row<4>; 6] = [
-    ("gyro x", [220.0, 15.0, 284.0, 23.0]),
-    ("gyro y", [289.0, 124.0, 264.0, -37.0]),
-    ("gyro z", [418.0, -279.0, 2164.0, -1974.0]),
-    ("accel x", [2341.0, -2147.0, 3697.0, -3287.0]),
-    ("accel y", [2081.0, -2023.0, 1490.0, 1256.0]),
-    ("accel z", [1416.0, 1219.0, 1951.0, 1852.0]),
-];
-
-/// Section 5.2, MTi-G: rms compensated and uncompensated.
-const SECTION_5_2: [[f64; 2]; 6] = [
-    [189.0, 279.0],
-    [254.0, 197.0],
-    [418.0, 2167.0],
-    [2342.0, 3697.0],
-    [2259.0, 1097.0],
-    [1055.0, 11130.0],
-];
-
-/// Table 11, NV-IMU100: as Table 10.
-const TABLE_11: [Row<4>; 6] = [
-    ("gyro x", [29.0, 4.0, 41.0, 29.0]),
-    ("gyro y", [44.0, 27.0, 314.0, 294.0]),
-    ("gyro z", [48.0, -36.0, 50.0, 32.0]),
-    ("accel x", [2253.0, -6105.0, 17356.0, -16665.0]),
-    ("accel y", [1687.0, -823.0, 9516.0, 9287.0]),
-    ("accel z", [5410.0, 4781.0, 6894.0, -4403.0]),
-];
+use mimu_rig::random::Random;
+use mimu_tests::niu::{SECTION_5_2, TABLE_4, TABLE_6, TABLE_9, TABLE_10, TABLE_11};
+use mimu_tests::page::{Block, Table, significant};
 
 /// Drifts over -10 to 70 °C from Tables 5 (MTi-G) and 7 (NV-IMU100); the key is the beginning of the names in Table 9.
 const DRIFTS: [(&str, &str, [f64; 2]); 6] = [
@@ -379,6 +162,168 @@ fn contradictions() -> Table {
     table
 }
 
+/// A test of Table 8: a gyro turning at 10 deg/s about its axis, or an accelerometer at rest along it, in one direction or the other.
+struct Direction {
+    name: &'static str,
+    /// deg/h or µg, signed.
+    input: f64,
+    /// Of bias and scale factor in Table 9, and of the rows of Tables 10 and 11.
+    names: [&'static str; 3],
+}
+
+/// The two directions of each kind of test.
+const DIRECTIONS: [Direction; 4] = [
+    Direction {
+        name: "accelerometers, axis up (Table 8), µg",
+        input: 1e6,
+        names: ["b_a", "δs_a", "accel"],
+    },
+    Direction {
+        name: "axis down (5.1), µg",
+        input: -1e6,
+        names: ["b_a", "δs_a", "accel"],
+    },
+    Direction {
+        name: "gyros at +10 deg/s, deg/h",
+        input: RATE,
+        names: ["b_g", "δs_g", "gyro"],
+    },
+    Direction {
+        name: "at -10 deg/s, deg/h",
+        input: -RATE,
+        names: ["b_g", "δs_g", "gyro"],
+    },
+];
+
+/// Rms distance over the axes between the raw mean by Table 9 and the printed one, for each direction of the tests; MTi-G, NV-IMU100, both.
+fn means_by_direction() -> [[f64; 3]; 4] {
+    DIRECTIONS.each_ref().map(|direction| {
+        let [bias, scale, row] = direction.names;
+        let squares = [(0, &TABLE_10), (1, &TABLE_11)].map(|(unit, printed)| {
+            let axes = ["x", "y", "z"].map(|axis| {
+                let of = |name: &str| course(cubic(&format!("{name}{axis}"), unit, MENDED));
+                let (bias, scale) = (of(bias), of(scale));
+                let both = bias.iter().zip(&scale);
+                let error: Vec<f64> = both.map(|(b, s)| b + 1e-6 * s * direction.input).collect();
+                let named = format!("{row} {axis}");
+                let printed = printed.iter().find(|r| r.0 == named).expect("a row").1[3];
+                moments(&error)[0] - printed
+            });
+            axes.iter().map(|e| e * e).sum::<f64>()
+        });
+        let [a, b] = squares;
+        [a / 3.0, b / 3.0, (a + b) / 6.0].map(f64::sqrt)
+    })
+}
+
+/// Which direction of the tests of Table 8 agrees with the printed means.
+fn directions() -> Table {
+    let mut table = Table::new(&["test", "MTi-G", "NV-IMU100", "both"]);
+    for (direction, distances) in DIRECTIONS.iter().zip(means_by_direction()) {
+        let cells = distances.map(|d| format!("{d:.0}"));
+        table.row([direction.name.to_string()].into_iter().chain(cells));
+    }
+    table
+}
+
+/// White noise of the gyro in 3.3, deg/√h.
+const ARW: f64 = 3.0;
+/// Length of a position, of a turn, s, and angle of a turn, deg (3.2).
+const POSITION_S: f64 = 10.0;
+const TURN_S: f64 = 9.0;
+const TURN_DEG: f64 = 90.0;
+/// Positions and turns of a scheme.
+const EACH: usize = 8;
+/// Simulated schemes, and samples a second.
+const SCHEMES: u64 = 400;
+const RATE_HZ: f64 = 100.0;
+
+/// What the noise of the gyro does to the results of one scheme: by niu's 3.3, and in schemes simulated sample by sample that are evaluated by
+/// (a.7) to (a.10).
+fn noise_of_a_scheme() -> Table {
+    let per_root_s = ARW / 60.0;
+    let sigma = per_root_s * RATE_HZ.sqrt();
+    let (mut pair, mut single, mut all, mut scale) = (0.0, 0.0, 0.0, 0.0);
+    for run in 0..SCHEMES {
+        let mut random = Random::new(run, "niu scheme");
+        let mut mean_of = |seconds: f64| {
+            let n = (seconds * RATE_HZ) as usize;
+            (0..n).map(|_| sigma * random.normal()).sum::<f64>() / n as f64
+        };
+        let rests: [f64; EACH] = std::array::from_fn(|_| mean_of(POSITION_S));
+        let turns = [(); 2].map(|()| mean_of(TURN_S) * TURN_S);
+        let squared = |x: f64| x * x / SCHEMES as f64;
+        // (a.7): x from the positions with x up and down. (a.8): z from one position.
+        pair += squared((rests[0] + rests[1]) / 2.0);
+        single += squared(rests[2]);
+        all += squared(rests.iter().sum::<f64>() / EACH as f64);
+        // (a.9): half the difference of the integrals of both turns.
+        scale += squared((turns[0] - turns[1]) / 2.0 / TURN_DEG);
+    }
+    let bias = |positions: f64| per_root_s / (positions * POSITION_S).sqrt() * 3600.0;
+    let by_formula = per_root_s * TURN_S.sqrt() / 2f64.sqrt() / TURN_DEG * 1e6;
+    let mut table = Table::new(&[
+        "noise of one scheme",
+        "printed (3.3)",
+        "by formula",
+        "simulated",
+    ]);
+    for (name, printed, formula, simulated) in [
+        (
+            "bias, all eight positions, deg/h",
+            "about 20",
+            bias(8.0),
+            all.sqrt() * 3600.0,
+        ),
+        (
+            "b_x, b_y by (a.7), two positions, deg/h",
+            "-",
+            bias(2.0),
+            pair.sqrt() * 3600.0,
+        ),
+        (
+            "b_z by (a.8), one position, deg/h",
+            "-",
+            bias(1.0),
+            single.sqrt() * 3600.0,
+        ),
+        (
+            "scale factor, one turn each way, ppm",
+            "about 1200",
+            by_formula,
+            scale.sqrt() * 1e6,
+        ),
+    ] {
+        let figures = [formula, simulated].map(significant);
+        table.row(
+            [name.to_string(), printed.to_string()]
+                .into_iter()
+                .chain(figures),
+        );
+    }
+    table
+}
+
+/// Largest distance of straight lines between 16 even nodes from the bias curves of the MTi-G's gyros, deg/h.
+fn lines_between_nodes() -> Table {
+    let mut table = Table::new(&["16 nodes over, °C", "b_gx, deg/h", "b_gy", "b_gz"]);
+    for [from, to] in [[-10.0, 70.0], [-40.0, 85.0]] {
+        let step = (to - from) / 15.0;
+        let cells = ["b_gx", "b_gy", "b_gz"].map(|name| {
+            let a = cubic(name, 0, 1.0);
+            let at = |t: f64| a[0] + t * (a[1] + t * (a[2] + t * a[3]));
+            let off = (0..1500).map(|k| {
+                let (node, share) = (from + step * f64::from(k / 100), 0.01 * f64::from(k % 100));
+                let line = at(node) + share * (at(node + step) - at(node));
+                (at(node + share * step) - line).abs()
+            });
+            significant(off.fold(0.0, f64::max))
+        });
+        table.row([format!("{from} to {to}")].into_iter().chain(cells));
+    }
+    table
+}
+
 /// All blocks of this study.
 pub fn blocks() -> Vec<Block> {
     vec![
@@ -386,5 +331,8 @@ pub fn blocks() -> Vec<Block> {
         Block::table("niu, drifts", &drifts()),
         Block::table("niu, powers of ten", &powers()),
         Block::table("niu, contradictions", &contradictions()),
+        Block::table("niu, directions", &directions()),
+        Block::table("niu, noise of a scheme", &noise_of_a_scheme()),
+        Block::table("niu, nodes", &lines_between_nodes()),
     ]
 }

@@ -8,7 +8,7 @@ use mimu::plan::design::schemes::Scheme;
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
 
-use crate::page::{Block, Table, significant};
+use mimu_tests::page::{Block, Table, significant};
 
 /// Sigmas of the parameters that `belongs` selects: one number, or the lowest and the highest.
 fn sigmas(judged: &Judgement, belongs: impl Fn(&str) -> bool) -> String {

@@ -9,10 +9,10 @@ use mimu_rig::ideal::Inverse;
 use mimu_rig::random::Random;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use crate::page::{Block, Table, significant};
+use mimu_tests::page::{Block, Table, significant};
 
 /// Runs of the Monte Carlo.
-const RUNS: u64 = 1000;
+pub const RUNS: u64 = 1000;
 
 /// Table 1, five repeats: k_g11 to k_g33 by rows, then the offsets. The table's unit is rad/s, but only deg/s agrees with its Table 3.
 const TABLE_1: [[f64; 5]; 12] = [
@@ -46,19 +46,6 @@ const TABLE_2: [[f64; 5]; 12] = [
     [0.28710, 0.256601, 0.27716, 0.25291, 0.25164],
 ];
 
-/// Table 3, deg/s, as printed: input about x, y, z; error of x, y, z; lowest and highest.
-const TABLE_3_BEFORE: [[[f64; 2]; 3]; 3] = [
-    [[0.004, 0.288], [-7.305, -7.185], [-3.474, 2.825]],
-    [[-3.445, 3.738], [-0.364, 0.4684], [-4.829, 4.105]],
-    [[-37.773, 37.959], [-1.174, 1.607], [-17.449, 16.48]],
-];
-/// The same after calibration by the proposed method.
-const TABLE_3_AFTER: [[[f64; 2]; 3]; 3] = [
-    [[-0.142, 0.144], [-0.005, 0.034], [-0.081, 0.039]],
-    [[-0.005, 0.014], [-0.15, 0.162], [0.007, 0.069]],
-    [[-0.149, 0.218], [-0.214, 0.358], [-2.954, 4.838]],
-];
-
 fn mean(repeats: &[f64; 5]) -> f64 {
     repeats.iter().sum::<f64>() / 5.0
 }
@@ -69,26 +56,37 @@ fn scatter(repeats: &[f64; 5]) -> f64 {
 }
 
 /// Inverse model `x = C u + o` with the averages of a table.
-fn averages(table: &[[f64; 5]; 12]) -> Affine<f64> {
+pub fn averages(table: &[[f64; 5]; 12]) -> Affine<f64> {
     Affine {
         matrix: Matrix3::from_fn(|i, j| mean(&table[3 * i + j])),
         offset: Vector3::from_fn(|i, _| mean(&table[9 + i])),
     }
 }
 
+/// An estimator of a triad.
+pub type Estimator = fn(&[Observation]) -> Result<Estimated, Failure>;
+
 /// One of the two experiments: inputs in the paper's units, its repeats and its estimator.
-struct Experiment {
-    inputs: Vec<Vector3<f64>>,
-    table: &'static [[f64; 5]; 12],
-    estimator: fn(&[Observation]) -> Result<Estimated, Failure>,
+pub struct Experiment {
+    /// Known inputs of the dwells.
+    pub inputs: Vec<Vector3<f64>>,
+    /// What the linear sensors would need as inputs to read the same. Equal to the inputs, except for a sensor that is not linear.
+    pub sensed: Vec<Vector3<f64>>,
+    /// Its five repeats.
+    pub table: &'static [[f64; 5]; 12],
+    /// The paper's estimator.
+    pub estimator: Estimator,
 }
 
-fn gyro() -> Experiment {
+/// The multirate tests.
+pub fn gyro() -> Experiment {
     let settings = Scheme::XuRates.settings(Sensor::Gyro).expect("rates");
+    let inputs: Vec<Vector3<f64>> = (settings.iter())
+        .map(|s| (s.rate * s.up).map(f64::to_degrees))
+        .collect();
     Experiment {
-        inputs: (settings.iter())
-            .map(|s| (s.rate * s.up).map(f64::to_degrees))
-            .collect(),
+        sensed: inputs.clone(),
+        inputs,
         table: &TABLE_1,
         estimator: opposite_rates,
     }
@@ -96,8 +94,10 @@ fn gyro() -> Experiment {
 
 fn accel() -> Experiment {
     let settings = Scheme::Xu33.settings(Sensor::Accel).expect("poses");
+    let inputs: Vec<Vector3<f64>> = settings.iter().map(|s| s.up).collect();
     Experiment {
-        inputs: settings.iter().map(|s| s.up).collect(),
+        sensed: inputs.clone(),
+        inputs,
         table: &TABLE_2,
         estimator: inverse_form,
     }
@@ -105,20 +105,27 @@ fn accel() -> Experiment {
 
 impl Experiment {
     /// Dwell means of a unit, with independent noise `sigma` in the readings.
-    fn dwells(&self, unit: &Affine<f64>, sigma: [f64; 3], random: &mut Random) -> Vec<Observation> {
+    pub fn dwells(
+        &self,
+        unit: &Affine<f64>,
+        sigma: [f64; 3],
+        random: &mut Random,
+    ) -> Vec<Observation> {
         let truth = Inverse {
             matrix: std::array::from_fn(|i| std::array::from_fn(|j| unit.matrix[(i, j)])),
             offset: unit.offset.into(),
         };
         let truth = truth.forward(sigma).expect("regular");
-        let read = |(dwell, input): (usize, &Vector3<f64>)| Observation {
-            dwell,
-            raw: truth.read((*input).into(), 1, random).into(),
-            variance: Vector3::from(sigma).map(|s| s * s),
-            input: *input,
-            change: Vector3::zeros(),
-        };
-        self.inputs.iter().enumerate().map(read).collect()
+        let each = self.inputs.iter().zip(&self.sensed);
+        let read =
+            |(dwell, (input, sensed)): (usize, (&Vector3<f64>, &Vector3<f64>))| Observation {
+                dwell,
+                raw: truth.read((*sensed).into(), 1, random).into(),
+                variance: Vector3::from(sigma).map(|s| s * s),
+                input: *input,
+                change: Vector3::zeros(),
+            };
+        each.enumerate().map(read).collect()
     }
 
     /// Sigmas of the twelve parameters for dwell means with unit noise, from the estimator's own covariance.
@@ -135,7 +142,7 @@ impl Experiment {
     ///
     /// Five repeats determine a scatter to 35 %. The noise is the largest that no scatter of its row contradicts: the smallest ratio of scatter to
     /// gain.
-    fn noise(&self) -> ([f64; 3], [f64; 12]) {
+    pub fn noise(&self) -> ([f64; 3], [f64; 12]) {
         let gains = self.gains();
         let row = |k: usize| if k < 9 { k / 3 } else { k - 9 };
         let sigma = [0, 1, 2].map(|i| {
@@ -153,8 +160,17 @@ impl Experiment {
         (sigma, rest)
     }
 
+    /// The paper's estimator and two others.
+    pub fn estimators(&self) -> [(&'static str, Estimator); 3] {
+        [
+            ("xu's inverse form", self.estimator),
+            ("least squares, forward form", |o| least_squares(o, None)),
+            ("Kalman bank", |o| kalman(o, None)),
+        ]
+    }
+
     /// The unit on one day: the averages plus a random change from repeat to repeat.
-    fn of_the_day(&self, rest: &[f64; 12], random: &mut Random) -> Affine<f64> {
+    pub fn of_the_day(&self, rest: &[f64; 12], random: &mut Random) -> Affine<f64> {
         let mut unit = averages(self.table);
         for k in 0..12 {
             let off = rest[k] * random.normal();
@@ -227,12 +243,7 @@ fn simulated(experiment: &Experiment) -> [f64; 12] {
 /// Errors of the estimators against the unit of the day: rms over all elements of C and over o, and the share of intervals that contain the truth.
 fn estimators(experiment: &Experiment) -> Table {
     let (sigma, rest) = experiment.noise();
-    type Estimator = fn(&[Observation]) -> Result<Estimated, Failure>;
-    let all: [(&str, Estimator); 3] = [
-        ("xu's inverse form", experiment.estimator),
-        ("least squares, forward form", |o| least_squares(o, None)),
-        ("Kalman bank", |o| kalman(o, None)),
-    ];
+    let all = experiment.estimators();
     let mut table = Table::new(&[
         "estimator",
         "rms error of C",
@@ -273,71 +284,6 @@ fn estimators(experiment: &Experiment) -> Table {
     table
 }
 
-/// Lowest and highest difference of input minus output over the rates about one axis.
-fn range(
-    inputs: &[Vector3<f64>],
-    about: usize,
-    of: usize,
-    output: impl Fn(&Vector3<f64>) -> Vector3<f64>,
-) -> [f64; 2] {
-    let along = |x: &&Vector3<f64>| x[about] != 0.0;
-    let errors = inputs.iter().filter(along).map(|x| x[of] - output(x)[of]);
-    errors.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], e| {
-        [low.min(e), high.max(e)]
-    })
-}
-
-/// Table 3 recomputed. Before calibration: from the averages of Table 1 alone.
-fn before_and_after() -> Table {
-    let experiment = gyro();
-    let unit = averages(experiment.table);
-    let (sigma, rest) = experiment.noise();
-    let c = unit.matrix.try_inverse().expect("regular");
-    // After calibration: the range over the rates of one verification; the ends are averaged over the runs.
-    let mut after = [[[0.0; 2]; 3]; 3];
-    for run in 0..RUNS {
-        let mut random = Random::new(run, "xu after");
-        let unit = experiment.of_the_day(&rest, &mut random);
-        let found = (experiment.estimator)(&experiment.dwells(&unit, sigma, &mut random));
-        let model = found.expect("determined").triad.inverse;
-        let verification = experiment.dwells(&unit, sigma, &mut random);
-        for about in 0..3 {
-            for of in 0..3 {
-                let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
-                for o in verification.iter().filter(|o| o.input[about] != 0.0) {
-                    let e = o.input[of] - model.apply(&o.raw)[of];
-                    ends = [ends[0].min(e), ends[1].max(e)];
-                }
-                for k in 0..2 {
-                    after[about][of][k] += ends[k] / RUNS as f64;
-                }
-            }
-        }
-    }
-    let mut table = Table::new(&[
-        "input, error of",
-        "before, printed",
-        "before, from Table 1",
-        "after, printed",
-        "after, from noise",
-    ]);
-    let ends = |e: [f64; 2]| format!("{:.3} to {:.3}", e[0], e[1]);
-    let axes = ["x", "y", "z"];
-    for about in 0..3 {
-        for of in 0..3 {
-            let before = range(&experiment.inputs, about, of, |x| c * (x - unit.offset));
-            table.row([
-                format!("{}, {}", axes[about], axes[of]),
-                ends(TABLE_3_BEFORE[about][of]),
-                ends(before),
-                ends(TABLE_3_AFTER[about][of]),
-                ends(after[about][of]),
-            ]);
-        }
-    }
-    table
-}
-
 /// How much regression on the noisy side shrinks C: the largest ratio, among the axes, of noise variance to mean squared input.
 fn attenuation(experiment: &Experiment) -> f64 {
     let (sigma, _) = experiment.noise();
@@ -373,6 +319,5 @@ pub fn blocks() -> Vec<Block> {
         },
         block("xu, gyro estimators", estimators(&g)),
         block("xu, accelerometer estimators", estimators(&a)),
-        block("xu, table 3", before_and_after()),
     ]
 }

@@ -9,6 +9,8 @@
 //! | [`coverage`]           | how often intervals contain the truth, from recording to fit      |
 //! | [`recordings`]         | recordings by other people                                        |
 //! | [`planted`]            | effects of the bench, planted in them                             |
+//! | [`niu`]                | niu's tables                                                      |
+//! | [`page`]               | tables in documents, between markers                              |
 //! | `tests/all/`           | agreement of estimators, intervals, diagnosis, published results  |
 //! | `papers/`, `blind/`    | figures of `docs/papers.md`; units with undeclared effects        |
 //! | `board/`, `counted/`, `no_panic/` | separate crates: the firmware's image on the emulated board, the cost of its loops, freedom from panics |
@@ -19,6 +21,8 @@ pub mod blind;
 pub mod by_hand;
 pub mod coverage;
 pub mod joint;
+pub mod niu;
+pub mod page;
 pub mod planted;
 pub mod recordings;
 pub mod slow_bias;

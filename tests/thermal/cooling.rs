@@ -4,6 +4,7 @@
 //! beside bare polynomials. Outside the fitted temperatures the polynomials continue to bend, and the estimators' curves continue along their slope.
 
 use mimu::quantity::Sensor;
+use mimu_tests::page::{Block, Table};
 use mimu_tests::recordings::data_set;
 use mimu_thermal::basis::Shape;
 use mimu_thermal::points::{Point, curves};
@@ -106,34 +107,44 @@ fn predicted(curve: Curve, fitted: &[&Burst], held: &[&Burst]) -> Vec<Vector3<f6
     }
 }
 
-/// Prints the errors of lines and curves on the bursts.
-pub fn run() {
-    let Some(bursts) = bursts() else {
-        println!("no recordings (set MIMU_DATA)");
-        return;
-    };
-    let [low, high] = [f64::min, f64::max].map(|f| bursts.iter().map(|b| b.temp_c).reduce(f));
-    let noise = bursts.iter().map(|b| b.variance.sum() / 3.0).sum::<f64>() / bursts.len() as f64;
-    println!(
-        "{} bursts, {:.1} to {:.1} °C (origin unknown), noise of a burst's mean {:.5} deg/s\n",
-        bursts.len(),
-        low.unwrap_or(f64::NAN),
-        high.unwrap_or(f64::NAN),
-        noise.sqrt().to_degrees()
-    );
+/// Place of the table in the document.
+pub const NAMES: [&str; 1] = ["thermal, cooling"];
+
+/// Errors of lines and curves on the bursts. Without the recording the document keeps its table.
+pub fn blocks(_runs: u64) -> Vec<Block> {
+    let text = bursts().map(|bursts| {
+        let variances = bursts.iter().map(|b| b.variance.sum() / 3.0).sum::<f64>();
+        let noise = (variances / bursts.len() as f64).sqrt().to_degrees();
+        eprintln!("{} bursts, noise of a mean {noise:.4} deg/s", bursts.len());
+        table(&bursts).markdown()
+    });
+    vec![Block {
+        name: NAMES[0],
+        text,
+    }]
+}
+
+fn table(bursts: &[Burst]) -> Table {
     let interleaved = (0..PARTS).map(|part| (0..bursts.len()).map(|k| k % PARTS == part).collect());
     let interleaved: Vec<Vec<bool>> = interleaved.collect();
-    println!("rms of what is held out, deg/s (over that of the line)\n");
-    println!("| curve | every fourth burst | last 7 | last 8 | last 9 | last 10 |");
-    println!("|---|---|---|---|---|---|");
+    let mut table = Table::new(&[
+        "curve",
+        "every fourth burst",
+        "last 7",
+        "last 8",
+        "last 9",
+        "last 10",
+    ]);
     let mut of_line = [f64::NAN; 5];
     for (name, curve) in [
         ("line", Curve::Polynomial(1)),
         ("parabola", Curve::Polynomial(2)),
         ("cubic", Curve::Polynomial(3)),
-        ("estimator's line", Curve::Of(Shape::Line)),
-        ("estimator's cubic", Curve::Of(Shape::Cubic)),
-        ("estimator's spline", Curve::Of(Shape::Spline)),
+        (
+            "`cubic`, extended by its slope at the ends",
+            Curve::Of(Shape::Cubic),
+        ),
+        ("penalised spline", Curve::Of(Shape::Spline)),
     ] {
         let miss = |masks: &[Vec<bool>]| {
             let (mut squares, mut n) = (Vector3::zeros(), 0.0);
@@ -163,11 +174,20 @@ pub fn run() {
         if of_line[0].is_nan() {
             of_line = rms;
         }
-        let cells: Vec<String> = rms
-            .iter()
-            .zip(of_line)
-            .map(|(r, line)| format!("{r:.4} ({:.2})", r / line))
-            .collect();
-        println!("| {name} | {} |", cells.join(" | "));
+        let cells = rms.iter().zip(of_line).map(|(r, line)| match name {
+            "line" => format!("{r:.4}"),
+            _ => format!("{r:.4} ({})", ratio(r / line)),
+        });
+        table.row([name.to_string()].into_iter().chain(cells));
+    }
+    table
+}
+
+/// Two significant digits.
+fn ratio(x: f64) -> String {
+    if x < 1.0 {
+        format!("{x:.2}")
+    } else {
+        format!("{x:.1}")
     }
 }

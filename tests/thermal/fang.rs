@@ -3,6 +3,8 @@
 use mimu::quantity::Sensor;
 use mimu::triad::Forward;
 use mimu_core::compensation::Affine;
+use mimu_rig::rig_file::RigFile;
+use mimu_tests::page::{Block, Table};
 use mimu_thermal::classic::Classic;
 use mimu_thermal::fit::{Estimator, Options, fit};
 use mimu_thermal::joint::Joint;
@@ -22,34 +24,39 @@ const Z_UP: i32 = 4;
 enum Model {
     /// As they are.
     AsFitted,
-    /// Scale factors and biases of the curves; misalignments from all scalars in the middle of the range, constant over temperature (fang, 4.4).
+    /// Scale factors and biases of the printed equations; misalignments from all scalars in the middle of the range, constant over temperature.
     WithM,
     /// The model of the middle of the range at all temperatures.
     OneTemperature,
 }
 
-const ROWS: [(&str, Estimator, Model); 5] = [
+const ROWS: [(&str, Estimator, Model); 6] = [
     (
-        "all 18 scalars, at the middle temperature alone",
+        "all 18 scalars of a triad, at one temperature",
         Estimator::Classic(Classic::Soak),
         Model::OneTemperature,
     ),
     (
-        "fang (33), (34) as printed",
+        "(33), (34) as printed (`soak-fang`)",
         Estimator::Classic(Classic::SoakAsPrinted),
         Model::AsFitted,
     ),
     (
-        "the same, with M of the middle temperature",
+        "the same, with M of one temperature",
         Estimator::Classic(Classic::SoakAsPrinted),
         Model::WithM,
+    ),
+    (
+        "(31), (32) with M constant (`soak-constant-m`)",
+        Estimator::Classic(Classic::SoakConstantM),
+        Model::AsFitted,
     ),
     (
         "all 18 scalars of each plateau (`soak`)",
         Estimator::Classic(Classic::Soak),
         Model::AsFitted,
     ),
-    ("joint", Estimator::Joint, Model::AsFitted),
+    ("`joint`", Estimator::Joint, Model::AsFitted),
 ];
 
 /// Errors of one run: accelerometer with z up, on all faces, gyro on the faces, gyro at rates.
@@ -57,8 +64,16 @@ type Errors = [Vec<Vector3<f64>>; 4];
 
 const DEG_PER_H: f64 = 180.0 / std::f64::consts::PI * 3600.0;
 
-/// Prints the tables.
-pub fn run(runs: u64) {
+/// Places of the tables in the document.
+pub const NAMES: [&str; 3] = [
+    "thermal, fang, noise alone",
+    "thermal, fang, off the axes",
+    "thermal, fang, wander",
+];
+
+/// The tables, over `runs` soaks of each kind: with the noise of Table 5 alone; with the unit off the axes of the table by 2, -3 and 5 mm; with biases
+/// that wander too, as the data sheets say.
+pub fn blocks(runs: u64) -> Vec<Block> {
     let (plan, file) = (
         read("plans/fang-soak.toml"),
         unit(&read("rigs/fang-soak.toml"), 1),
@@ -70,40 +85,40 @@ pub fn run(runs: u64) {
     }
     let mut centred = white.clone();
     centred.table.offset_mm = [0.0; 3];
-    for (name, file) in [
-        (
-            "noise of Table 5 alone, the unit where the axes of the table meet",
-            &centred,
-        ),
-        ("the same, the unit off the axes by 2, -3 and 5 mm", &white),
-        ("biases that wander by the data sheets too", &file),
-    ] {
-        let each = (0..runs)
-            .into_par_iter()
-            .map(|k| once(&session(&plan, file, 100 + k), &truth));
-        let each: Vec<Vec<Errors>> = each.collect();
-        println!("\n{name}, {runs} soaks, rms over runs and temperatures:\n");
-        println!(
-            "| | accelerometer, z up, x / y / z, mm/s² | six faces, mm/s² | gyro, at rest, deg/h | gyro, at 50 deg/s, deg/h |"
-        );
-        println!("|---|---|---|---|---|");
-        for (row, (name, ..)) in ROWS.iter().enumerate() {
-            let all = |kind: usize| -> Vec<Vector3<f64>> {
-                each.iter()
-                    .flat_map(|r| r[row][kind].iter().copied())
-                    .collect()
-            };
-            let axes = rms(&all(0)).map(|e| format!("{:.2}", 1e3 * e));
-            let axes = axes.as_slice().join(" / ");
-            let whole = |kind, unit| (rms(&all(kind)).norm_squared() / 3.0).sqrt() * unit;
-            println!(
-                "| {name} | {axes} | {:.2} | {:.0} | {:.0} |",
-                whole(1, 1e3),
-                whole(2, DEG_PER_H),
-                whole(3, DEG_PER_H)
-            );
-        }
+    let variants = NAMES.into_iter().zip([&centred, &white, &file]);
+    let block = |(name, file)| Block::table(name, &table(runs, &plan, file, &truth));
+    variants.map(block).collect()
+}
+
+fn table(runs: u64, plan: &str, file: &RigFile, truth: &Session) -> Table {
+    let each = (0..runs)
+        .into_par_iter()
+        .map(|k| once(&session(plan, file, 100 + k), truth));
+    let each: Vec<Vec<Errors>> = each.collect();
+    let mut table = Table::new(&[
+        "estimator",
+        "accel, z up, x / y / z, mm/s²",
+        "six faces, mm/s²",
+        "gyro at rest, deg/h",
+        "at 50 deg/s, deg/h",
+    ]);
+    for (row, (name, ..)) in ROWS.iter().enumerate() {
+        let all = |kind: usize| -> Vec<Vector3<f64>> {
+            each.iter()
+                .flat_map(|r| r[row][kind].iter().copied())
+                .collect()
+        };
+        let axes = rms(&all(0)).map(|e| format!("{:.1}", 1e3 * e));
+        let whole = |kind, unit| (rms(&all(kind)).norm_squared() / 3.0).sqrt() * unit;
+        table.row([
+            name.to_string(),
+            axes.as_slice().join(" / "),
+            format!("{:.1}", whole(1, 1e3)),
+            format!("{:.0}", whole(2, DEG_PER_H)),
+            format!("{:.0}", whole(3, DEG_PER_H)),
+        ]);
     }
+    table
 }
 
 fn once(noisy: &Session, truth: &Session) -> Vec<Errors> {
@@ -117,19 +132,10 @@ fn once(noisy: &Session, truth: &Session) -> Vec<Errors> {
             .expect("it is fitted")
             .joint
     };
-    let (soak, printed, joint) = (
-        by(Estimator::Classic(Classic::Soak)),
-        by(Estimator::Classic(Classic::SoakAsPrinted)),
-        by(Estimator::Joint),
-    );
-    let each = ROWS.iter().map(|(_, estimator, model)| {
-        let own = match estimator {
-            Estimator::Classic(Classic::Soak) => &soak,
-            Estimator::Classic(_) => &printed,
-            _ => &joint,
-        };
-        errors(own, &soak, *model, truth)
-    });
+    let soak = by(Estimator::Classic(Classic::Soak));
+    let each = ROWS
+        .iter()
+        .map(|(_, estimator, model)| errors(&by(*estimator), &soak, *model, truth));
     each.collect()
 }
 

@@ -1,18 +1,22 @@
-//! Errors of the estimates over temperature, their bounds, and how often their intervals contain the truth: the table of `docs/thermal.md`.
+//! Studies over temperature: the tables of `docs/thermal.md`. `make papers` computes all of them and inserts them.
 //!
-//! `cargo run --release -p mimu-tests --features studies --bin thermal -- RUNS`, or one of
+//! `cargo run --release -p mimu-tests --features studies --bin thermal --` with one of
 //!
 //! | command | what |
 //! |---|---|
-//! | `estimators RUNS` | estimators side by side, on a soak and on a ramp |
+//! | `dies [RUNS]` | errors of the joint estimate, their bounds, and how often its intervals contain the truth |
+//! | `estimators [RUNS]` | estimators side by side, on a soak and on a ramp |
+//! | `fang [RUNS]` | fang's soak, with and without misalignments |
+//! | `compensation` | niu's six tests of compensation, by the device's arithmetic |
+//! | `sweep [RUNS]` | poses spread over the sphere while the temperature goes up and down, with the default unit |
 //! | `cooling` | lines against curvature on a recording that only cools |
-//! | `compensation [FOLDER]` | niu's six tests of compensation, by the device's arithmetic |
-//! | `fang RUNS` | fang's soak, with and without misalignments |
-//! | `planned RUNS` | what `mimu thermal plan --procedure ramp` promises |
-//! | `sweep RUNS` | poses spread over the sphere while the temperature goes up and down, with the default unit |
+//! | `planned [RUNS]` | what `mimu thermal plan --procedure ramp` promises |
+//! | `board FOLDER` | files for the tests of compensation on the emulated board |
+//! | `write [COMMAND ...]` | these tables, or all, into the document, each with the number of runs of the document |
 
 mod compensation;
 mod cooling;
+mod dies;
 mod fang;
 mod on_bench;
 mod planned;
@@ -23,48 +27,128 @@ mod study;
 mod sweep;
 
 use std::path::Path;
+use std::process::ExitCode;
 
-use simulation::Experiment;
-use study::{Study, print_header};
+use mimu_tests::page::{Block, filled};
 
-fn main() {
+/// A command that computes tables.
+struct Study {
+    command: &'static str,
+    /// Runs of the document's tables.
+    runs: u64,
+    /// Places of its tables in the document.
+    names: &'static [&'static str],
+    blocks: fn(u64) -> Vec<Block>,
+}
+
+const STUDIES: [Study; 7] = [
+    Study {
+        command: "dies",
+        runs: 200,
+        names: &dies::NAMES,
+        blocks: dies::blocks,
+    },
+    Study {
+        command: "estimators",
+        runs: 20,
+        names: &side_by_side::NAMES,
+        blocks: side_by_side::blocks,
+    },
+    Study {
+        command: "fang",
+        runs: 1,
+        names: &fang::NAMES,
+        blocks: fang::blocks,
+    },
+    Study {
+        command: "compensation",
+        runs: 1,
+        names: &compensation::NAMES,
+        blocks: compensation::blocks,
+    },
+    Study {
+        command: "sweep",
+        runs: 20,
+        names: &sweep::NAMES,
+        blocks: sweep::blocks,
+    },
+    Study {
+        command: "cooling",
+        runs: 1,
+        names: &cooling::NAMES,
+        blocks: cooling::blocks,
+    },
+    Study {
+        command: "planned",
+        runs: 8,
+        names: &planned::NAMES,
+        blocks: planned::blocks,
+    },
+];
+
+fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let count = |k: usize| arguments.get(k).and_then(|a| a.parse().ok());
-    match arguments.first().map_or("", String::as_str) {
-        "estimators" => side_by_side::run(count(1).unwrap_or(40)),
-        "compensation" => compensation::run(arguments.get(1).map(Path::new)),
-        "cooling" => cooling::run(),
-        "fang" => fang::run(count(1).unwrap_or(10)),
-        "planned" => planned::run(count(1).unwrap_or(20)),
-        "sweep" => sweep::run(count(1).unwrap_or(20)),
-        _ => coverage(count(0).unwrap_or(200), arguments.get(1)),
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            eprintln!("thermal: {problem}");
+            ExitCode::from(1)
+        }
     }
 }
 
-/// Errors of the joint estimate and how often its intervals contain the truth; `only` selects an experiment.
-fn coverage(runs: u64, only: Option<&String>) {
-    let wanted = |name: &str| only.is_none_or(|o| name.contains(o.as_str()));
-    print_header(runs);
-    for (name, lag_s, whole) in [
-        ("lag 60 s, whole cycle", 60.0, true),
-        ("lag 20 s, whole cycle", 20.0, true),
-        ("lag 180 s, whole cycle", 180.0, true),
-        ("die leads by 30 s, whole cycle", -30.0, true),
-        ("lag 60 s, half a cycle", 60.0, false),
-    ] {
-        if wanted(name) {
-            let study = Study::new(name, Experiment::ramp(lag_s, whole));
-            study.run_joint(runs);
-            if lag_s == 60.0 {
-                study.run_without_lag(runs);
-            }
+fn run(arguments: &[String]) -> Result<(), Box<dyn std::error::Error>> {
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match words.as_slice() {
+        ["write", wanted @ ..] => write(wanted),
+        ["board", folder] => {
+            compensation::write_for_board(Path::new(folder));
+            Ok(())
         }
+        [command, runs @ ..] => {
+            let study = found(command)?;
+            let runs = match runs.first() {
+                Some(runs) => runs.parse()?,
+                None => study.runs,
+            };
+            for block in (study.blocks)(runs) {
+                let text = block.text.unwrap_or_else(|| "no recording".into());
+                println!("{}\n\n{text}", block.name);
+            }
+            Ok(())
+        }
+        [] => Err(format!("give a command: {}", commands()).into()),
     }
-    if wanted("wander") {
-        let walk = Experiment {
-            walk: 0.03,
-            ..Experiment::ramp(60.0, true)
-        };
-        Study::new("lag 60 s, whole cycle, biases that wander", walk).run_joint(runs);
+}
+
+fn commands() -> String {
+    STUDIES.each_ref().map(|s| s.command).join(", ") + ", board or write"
+}
+
+fn found(command: &str) -> Result<&'static Study, String> {
+    let study = STUDIES.iter().find(|s| s.command == command);
+    study.ok_or_else(|| format!("{command:?} is no command; choose {}", commands()))
+}
+
+/// Computes the studies `wanted`, or all, and inserts their tables. Each study is written as soon as it is ready.
+fn write(wanted: &[&str]) -> Result<(), Box<dyn std::error::Error>> {
+    for command in wanted {
+        found(command)?;
     }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/thermal.md");
+    for study in &STUDIES {
+        if !wanted.is_empty() && !wanted.contains(&study.command) {
+            continue;
+        }
+        let mut blocks = (study.blocks)(study.runs);
+        let others = STUDIES.iter().filter(|s| s.command != study.command);
+        blocks.extend(
+            others
+                .flat_map(|s| s.names)
+                .map(|name| Block { name, text: None }),
+        );
+        let document = std::fs::read_to_string(&path)?;
+        std::fs::write(&path, filled("docs/thermal.md", &document, &blocks)?)?;
+    }
+    Ok(())
 }

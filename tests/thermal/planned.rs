@@ -2,6 +2,7 @@
 
 use mimu::plan::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
+use mimu_tests::page::{Block, Table};
 use mimu_thermal::basis::Shape;
 use mimu_thermal::fit::{Estimator, Options, fit};
 use mimu_thermal::joint::Joint;
@@ -29,8 +30,11 @@ fn request() -> Request {
     }
 }
 
-/// Prints predicted and found values of the worst axis: deg/h, ppm and ppm; µg, ppm and ppm.
-pub fn run(runs: u64) {
+/// Place of the table in the document.
+pub const NAMES: [&str; 1] = ["thermal, planned"];
+
+/// Predicted and found values of the worst axis.
+pub fn blocks(runs: u64) -> Vec<Block> {
     let planned = plan(&request()).expect("a plan");
     let text = to_toml(&planned, request().sample_rate_hz);
     let mut file = unit(&read("rigs/fang-soak.toml"), 1);
@@ -42,6 +46,7 @@ pub fn run(runs: u64) {
         file.curves.gyro.noise_at_c_raw,
         file.curves.accel.noise_at_c_raw,
     ) = (None, None);
+    file.converter.bits = Some(24);
     for (axes, noise) in [&mut file.unit.gyro_axes, &mut file.unit.accel_axes]
         .into_iter()
         .zip(request().noise)
@@ -65,8 +70,15 @@ pub fn run(runs: u64) {
     let each: Vec<Joint> = each.collect();
     // The curves of this unit are cubics, so a fit without noise is the truth.
     let truth = by(session(&text, &noiseless(&file), 1));
-    println!("{runs} recordings: promised, rms of the errors of one cubic (of their mean)\n");
-    println!("| sensor, °C | bias | scale factor | cross terms |\n|---|---|---|---|");
+    let mut table = Table::new(&[
+        "sensor, temperature",
+        "bias, deg/h or µg: predicted",
+        "found",
+        "scale factor, ppm: predicted",
+        "found",
+        "cross terms, µrad: predicted",
+        "found",
+    ]);
     for prediction in &planned.sensors {
         let sensor = prediction.sensor as usize;
         let bias = [180.0 / std::f64::consts::PI * 3600.0, 1e6 / 9.80665][sensor];
@@ -85,7 +97,6 @@ pub fn run(runs: u64) {
                 .iter()
                 .map(|joint| numbers(joint) - numbers(&truth))
                 .collect();
-            let mean = errors.iter().sum::<SVector<f64, 12>>() / runs as f64;
             let squares = errors
                 .iter()
                 .map(|e| e.map(|x| x * x))
@@ -98,24 +109,15 @@ pub fn run(runs: u64) {
             ];
             let cells = kinds.map(|(promised, kind, unit)| {
                 let relative = |k: usize| unit / gains[if k < 9 { k / 3 } else { k - 9 }];
-                let worst = |of: &dyn Fn(usize) -> f64| {
-                    kind.iter()
-                        .map(|k| of(*k) * relative(*k))
-                        .fold(0.0, f64::max)
-                };
-                format!(
-                    "{:.1}, {:.1} ({:.1})",
-                    promised.unwrap_or(f64::NAN) * unit,
-                    worst(&|k| squares[k].sqrt()),
-                    worst(&|k| mean[k].abs())
-                )
+                let worst = kind
+                    .iter()
+                    .map(|k| squares[*k].sqrt() * relative(*k))
+                    .fold(0.0, f64::max);
+                [promised.unwrap_or(f64::NAN) * unit, worst].map(|v| format!("{v:.0}"))
             });
-            println!(
-                "| {}, {:.0} | {} |",
-                prediction.sensor,
-                at.temp_c,
-                cells.join(" | ")
-            );
+            let name = format!("{}, {:.0} °C", prediction.sensor, at.temp_c);
+            table.row([name].into_iter().chain(cells.into_iter().flatten()));
         }
     }
+    vec![Block::table(NAMES[0], &table)]
 }

@@ -3,6 +3,7 @@
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::{Batch, Manifest};
+use mimu_tests::page::{Block, Table};
 use mimu_thermal::classic::Classic;
 use mimu_thermal::fit::{Estimator, Options, fit};
 use mimu_thermal::session::Session;
@@ -18,51 +19,67 @@ const LAG_S: f64 = 60.0;
 /// Name, estimator, and whether its lag is given as zero.
 type Row = (&'static str, Estimator, bool);
 
-const ON_SOAK: [Row; 2] = [
-    ("soak", Estimator::Classic(Classic::Soak), false),
-    ("joint", Estimator::Joint, false),
+const ON_SOAK: [Row; 3] = [
+    ("`soak`", Estimator::Classic(Classic::Soak), false),
+    (
+        "`soak-constant-m`",
+        Estimator::Classic(Classic::SoakConstantM),
+        false,
+    ),
+    ("`joint`", Estimator::Joint, false),
 ];
 const ON_RAMP: [Row; 5] = [
-    ("joint", Estimator::Joint, false),
-    ("joint, without a lag", Estimator::Joint, true),
-    ("one cubic", Estimator::Cubic, false),
-    ("nodes", Estimator::Classic(Classic::Nodes), false),
-    ("ramp-niu", Estimator::Classic(Classic::RampNiu), false),
+    ("`joint`", Estimator::Joint, false),
+    ("`joint --lag 0`", Estimator::Joint, true),
+    ("`cubic`", Estimator::Cubic, false),
+    ("`nodes`", Estimator::Classic(Classic::Nodes), false),
+    ("`ramp-niu`", Estimator::Classic(Classic::RampNiu), false),
 ];
 
-/// Prints all tables.
-pub fn run(runs: u64) {
-    println!("{runs} runs, lag {LAG_S} s, worst axis, rms over -4 to 66 °C\n");
-    println!(
-        "| recording | chamber, h | estimator | gyro bias, deg/h | scale, ppm | cross terms, ppm | accel bias, µg | scale, ppm | cross terms, ppm | 95 % intervals that hold the truth, % |"
-    );
-    println!("|---|---|---|---|---|---|---|---|---|---|");
+/// Place of the table in the document.
+pub const NAMES: [&str; 1] = ["thermal, estimators"];
+
+/// The table, over `runs` recordings of each kind.
+pub fn blocks(runs: u64) -> Vec<Block> {
+    let mut out = Table::new(&[
+        "recording",
+        "h",
+        "estimator",
+        "gyro bias, deg/h",
+        "scale, ppm",
+        "cross terms, ppm",
+        "accel bias, µg",
+        "scale, ppm",
+        "cross terms, ppm",
+        "95 % intervals that contain the truth, %",
+    ]);
     let of_soak = |seed| soak::record(LAG_S, seed);
-    table(runs, "soak", soak::HOURS, &of_soak, &ON_SOAK);
-    for (name, whole) in [("ramp, whole cycle", true), ("ramp, half a cycle", false)] {
+    table(runs, ("soak", soak::HOURS), &of_soak, &ON_SOAK, &mut out);
+    for (name, whole) in [("whole cycle", true), ("half a cycle", false)] {
         let experiment = Experiment::ramp(LAG_S, whole);
         let hours = experiment.corners.last().map_or(0.0, |c| c.0) / 3600.0;
         let of_ramp = |seed| experiment.record(seed);
-        table(runs, name, hours, &of_ramp, &ON_RAMP);
-        for (bound_of, lag) in [("lag unknown", true), ("lag known", false)] {
-            let bound = bound(&experiment, lag);
-            print(
-                name,
-                hours,
-                &format!("Cramér-Rao bound, {bound_of}"),
-                &bound,
-                "",
+        table(runs, (name, hours), &of_ramp, &ON_RAMP, &mut out);
+        for (known, lag) in [("lag unknown", true), ("lag known", false)] {
+            let name_of = format!("Cramér-Rao bound, {known}");
+            row(
+                &mut out,
+                (name, hours),
+                &name_of,
+                &bound(&experiment, lag),
+                "-",
             );
         }
     }
+    vec![Block::table(NAMES[0], &out)]
 }
 
 fn table(
     runs: u64,
-    name: &str,
-    hours: f64,
+    (name, hours): (&str, f64),
     record: &(impl Fn(u64) -> (Manifest, Batch) + Sync),
     rows: &[Row],
+    out: &mut Table,
 ) {
     // All estimators use the same recordings; each is made and read once.
     let each = (0..runs).into_par_iter().map(|seed| {
@@ -88,19 +105,30 @@ fn table(
         if good.len() < runs.len() {
             let why = runs.iter().find_map(|r| r[k].as_ref().err());
             let refused = runs.len() - good.len();
-            println!(
+            eprintln!(
                 "{name}, {estimator}: {refused} refused: {}",
                 why.map_or("", |w| w)
             );
         }
         if !good.is_empty() {
             let held = shares(&good).map(|s| format!("{s:.0}")).join(", ");
-            print(name, hours, estimator, &rms(&good), &held);
+            row(out, (name, hours), estimator, &rms(&good), &held);
         }
     }
 }
 
-fn print(name: &str, hours: f64, estimator: &str, errors: &[f64; 6], held: &str) {
-    let cells = errors.map(|e| format!("{e:.1}")).join(" | ");
-    println!("| {name} | {hours:.2} | {estimator} | {cells} | {held} |");
+fn row(
+    table: &mut Table,
+    (name, hours): (&str, f64),
+    estimator: &str,
+    errors: &[f64; 6],
+    held: &str,
+) {
+    let start = [
+        name.to_string(),
+        format!("{hours:.2}"),
+        estimator.to_string(),
+    ];
+    let cells = errors.map(|e| format!("{e:.1}"));
+    table.row(start.into_iter().chain(cells).chain([held.to_string()]));
 }

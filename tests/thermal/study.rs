@@ -34,20 +34,20 @@ struct Outcome {
     lag: f64,
     lag_width: f64,
     lag_inside: bool,
-    lag_determined: bool,
 }
 
-/// Heading of the table.
-pub fn print_header(runs: u64) {
-    println!(
-        "worst axis, rms over {} to {} °C, {runs} runs",
-        temps()[0],
-        temps()[14]
-    );
-    println!(
-        "{:58}  bias, scale, cross: gyro deg/h ppm ppm; accel µg ppm ppm",
-        ""
-    );
+/// What many runs of one estimator on one experiment give, in the units of the table.
+pub struct Summary {
+    /// Rms errors of the worst axis: bias, scale factors, cross terms of gyro and accelerometer.
+    pub errors: [f64; 6],
+    /// Their Cramér-Rao bounds with an unknown lag.
+    pub bounds: [f64; 6],
+    /// Share of the 95 % intervals that contain the truth, %.
+    pub held: [f64; 6],
+    /// Mean, scatter and mean interval width of the lag, s.
+    pub lag_s: [f64; 3],
+    /// Share of its intervals that contain the truth, %.
+    pub lag_held: f64,
 }
 
 impl Study {
@@ -59,27 +59,23 @@ impl Study {
         }
     }
 
-    /// The joint estimate, with the Cramér-Rao bound.
-    pub fn run_joint(&self, runs: u64) {
-        let outcomes = self.run(runs, Choice::JOINT);
-        let errors = self.print("joint", &outcomes);
-        if self.experiment.walk == 0.0 {
-            let bound = bound(&self.experiment, true);
-            print_row("  Cramér-Rao bound", &bound);
-            let ratio: Vec<String> = (0..6)
-                .map(|k| format!("{:.2}", errors[k] / bound[k]))
-                .collect();
-            println!("{:58}  {}", "  error over bound", ratio.join("  "));
-        }
+    /// As in the table.
+    pub fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    /// The joint estimate.
+    pub fn joint(&self, runs: u64) -> Summary {
+        self.summary(&self.run(runs, Choice::JOINT))
     }
 
     /// The same with the dies' temperature taken to be the thermometer's.
-    pub fn run_without_lag(&self, runs: u64) {
+    pub fn without_lag(&self, runs: u64) -> Summary {
         let choice = Choice {
             lag_s: Some(0.0),
             ..Choice::JOINT
         };
-        self.print("without a lag", &self.run(runs, choice));
+        self.summary(&self.run(runs, choice))
     }
 
     fn run(&self, runs: u64, choice: Choice) -> Vec<Outcome> {
@@ -102,33 +98,25 @@ impl Study {
             lag: lag.value,
             lag_width: lag.upper - lag.lower,
             lag_inside: (lag.lower..=lag.upper).contains(&true_lag),
-            lag_determined: lag.is_determined(),
         }
     }
 
-    fn print(&self, estimator: &str, outcomes: &[Outcome]) -> [f64; 6] {
+    fn summary(&self, outcomes: &[Outcome]) -> Summary {
         let n = outcomes.len() as f64;
         let each: Vec<&Errors> = outcomes.iter().map(|o| &o.errors).collect();
-        let errors = rms(&each);
-        print_row(&format!("{}, {estimator}", self.name), &errors);
-        let shares = shares(&each).map(|s| format!("{s:.1}"));
-        println!(
-            "{:58}  {} %",
-            "  intervals of 95 % that hold the truth",
-            shares.join("  ")
-        );
-        let lag = outcomes.iter().map(|o| o.lag).sum::<f64>() / n;
-        let sd = (outcomes.iter().map(|o| (o.lag - lag).powi(2)).sum::<f64>() / n).sqrt();
-        let count =
-            |f: fn(&Outcome) -> bool| 100.0 * outcomes.iter().filter(|o| f(o)).count() as f64 / n;
-        println!(
-            "{:58}  mean {lag:.2} s, scatter {sd:.2} s, mean interval {:.2} s wide, holds it in {:.1} %, determined in {:.1} %",
-            "  lag",
-            outcomes.iter().map(|o| o.lag_width).sum::<f64>() / n,
-            count(|o| o.lag_inside),
-            count(|o| o.lag_determined)
-        );
-        errors
+        let mean = |of: &dyn Fn(&Outcome) -> f64| outcomes.iter().map(of).sum::<f64>() / n;
+        let lag = mean(&|o| o.lag);
+        Summary {
+            errors: rms(&each),
+            bounds: bound(&self.experiment, true),
+            held: shares(&each),
+            lag_s: [
+                lag,
+                mean(&|o| (o.lag - lag).powi(2)).sqrt(),
+                mean(&|o| o.lag_width),
+            ],
+            lag_held: mean(&|o| 100.0 * f64::from(u8::from(o.lag_inside))),
+        }
     }
 }
 
@@ -220,9 +208,4 @@ fn worst(squared: &[Vec<[f64; 12]>; 2]) -> [f64; 6] {
         let rms = |n: &usize| (all.iter().map(|t| t[*n]).sum::<f64>() / all.len() as f64).sqrt();
         units[k] * numbers.iter().map(rms).fold(0.0, f64::max)
     })
-}
-
-fn print_row(name: &str, figures: &[f64; 6]) {
-    let each: Vec<String> = figures.iter().map(|f| format!("{f:.1}")).collect();
-    println!("{name:58}  {}", each.join("  "));
 }

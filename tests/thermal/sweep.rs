@@ -9,6 +9,7 @@ use mimu::quantity::Sensor;
 use mimu_allan::model::FLOOR;
 use mimu_allan::variance::AllanModel;
 use mimu_rig::rig_file::RigFile;
+use mimu_tests::page::{Block, Table};
 use mimu_thermal::basis::Shape;
 use mimu_thermal::fit::{Estimator, Options, ThermalFit, fit};
 use mimu_thermal::regression::{AxisNoise, Normal, Problem};
@@ -40,72 +41,124 @@ type At = (f64, SVector<f64, 12>);
 
 /// Of one seed: for each of the six kinds the errors and their standard deviations, claimed and planned.
 struct Outcome {
-    verdict: String,
+    /// Whether no kind of standard deviation is wrong.
+    right: bool,
     numbers: [Vec<[f64; 3]>; 6],
 }
 
-/// Prints a table of seeds for each variant.
-pub fn run(runs: u64) {
+/// Places of the tables in the document.
+pub const NAMES: [&str; 2] = ["thermal, sweep", "thermal, sweep, accelerometer"];
+
+/// The tables: `runs` seeds as they are, without and with the noise at rest; fewer of the variants.
+pub fn blocks(runs: u64) -> Vec<Block> {
     let rig = read("rigs/thermal.toml");
     let lagging = "[[effect]]\nid = \"gyro_thermal_lag\"\n";
     let without = rig.replace(lagging, "");
     assert_ne!(rig, without, "the rig file has the effect");
     let plan = read("plans/thermal.toml");
-    let chamber = plan
-        .split("chamber_c = ")
-        .nth(1)
-        .and_then(|s| s.lines().next());
-    println!("chamber: {}", chamber.unwrap_or_default());
     let still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n";
     let still = format!("[unit.gyro_axes]\n{still}[unit.accel_axes]\n{still}[[effect]]");
     let white = without.replacen("[[effect]]", &still, 1);
-    for (name, text, stated) in [
-        ("as it is", &rig, false),
-        ("as it is, with the noise at rest (--noise)", &rig, true),
-        ("without gyro_thermal_lag", &without, false),
-        ("without it and without wander", &white, false),
-    ] {
-        println!(
-            "\n{name}: rms of errors over their standard deviations, then errors (planned sigma): bias, scale, cross terms"
-        );
-        // The first variant is the question; the others explain the result.
-        let runs = if text == &rig { runs } else { runs.min(FEWER) };
-        let each = (1..=runs)
-            .into_par_iter()
-            .map(|seed| once(&plan, text, stated, seed));
-        let outcomes: Vec<Outcome> = each.collect();
-        for (k, o) in outcomes.iter().enumerate() {
-            println!("| {} | {} | {}", k + 1, o.verdict, cells(&[o]));
-        }
-        println!("| all | | {}", cells(&outcomes.iter().collect::<Vec<_>>()));
+    let of = |text: &str, stated: bool, runs: u64| -> Vec<Outcome> {
+        let each = (1..=runs).into_par_iter();
+        each.map(|seed| once(&plan, text, stated, seed)).collect()
+    };
+    let [first, second] = NAMES;
+    vec![
+        Block::table(first, &units(&of(&rig, false, runs), &of(&rig, true, runs))),
+        Block::table(
+            second,
+            &variants(&of(&without, false, FEWER), &of(&white, false, FEWER)),
+        ),
+    ]
+}
+
+/// Rms, in figures of the table; `-` if not determined.
+fn cell(outcomes: &[Outcome], kind: usize, of: impl Fn(&[f64; 3]) -> f64) -> String {
+    let all = outcomes.iter().flat_map(|o| &o.numbers[kind]);
+    let (sum, n) = all.fold((0.0, 0.0), |(s, n), e| (s + of(e).powi(2), n + 1.0));
+    let rms: f64 = f64::sqrt(sum / n);
+    match rms {
+        x if !x.is_finite() => "-".into(),
+        x if x < 10.0 => format!("{x:.1}"),
+        x if x < 1000.0 => format!("{x:.0}"),
+        x => format!("{:.0}", 100.0 * (x / 100.0).round()),
     }
 }
 
-fn cells(outcomes: &[&Outcome]) -> String {
-    let mut out = String::new();
-    for kind in 0..6 {
-        let all: Vec<&[f64; 3]> = outcomes.iter().flat_map(|o| &o.numbers[kind]).collect();
-        if all.is_empty() {
-            out.push_str(" - |");
-            continue;
-        }
-        let rms = |of: &dyn Fn(&[f64; 3]) -> f64| {
-            (all.iter().map(|n| of(n).powi(2)).sum::<f64>() / all.len() as f64).sqrt()
+/// Share of the 95 % intervals that contain the truth, %.
+fn held(outcomes: &[Outcome], kind: usize) -> String {
+    let all: Vec<&[f64; 3]> = outcomes.iter().flat_map(|o| &o.numbers[kind]).collect();
+    let inside = all.iter().filter(|n| n[0].abs() <= 1.96 * n[1]).count();
+    format!("{:.0}", 100.0 * inside as f64 / all.len() as f64)
+}
+
+fn units(bare: &[Outcome], stated: &[Outcome]) -> Table {
+    let mut table = Table::new(&[
+        &format!("{} seeds", bare.len()),
+        "gyro bias, deg/h",
+        "scale, ppm",
+        "cross terms, ppm",
+        "accel bias, µg",
+        "scale, ppm",
+        "cross terms, ppm",
+    ]);
+    let kinds = 0..6;
+    let mut row = |name: String, cells: Vec<String>| table.row([name].into_iter().chain(cells));
+    for (with, outcomes) in [("", bare), ("with `--noise`: ", stated)] {
+        let each = |of: fn(&[f64; 3]) -> f64| -> Vec<String> {
+            kinds.clone().map(|k| cell(outcomes, k, of)).collect()
         };
-        let held = all.iter().filter(|n| n[0].abs() <= 1.96 * n[1]).count();
-        let _ = write!(
-            out,
-            " {:.1}, {:.0} %, {:.1} ({}) |",
-            rms(&|n| n[0] / n[1]),
-            100.0 * held as f64 / all.len() as f64,
-            rms(&|n| n[0]),
-            match rms(&|n| n[2]) {
-                planned if planned.is_finite() => format!("{planned:.1}"),
-                _ => "not determined".into(),
-            }
+        row(format!("{with}rms error"), each(|n| n[0]));
+        if with.is_empty() {
+            let name = "planned by the information matrix of cubics";
+            row(name.into(), each(|n| n[2]));
+        }
+        row(
+            format!("{with}error over its claimed standard deviation, rms"),
+            each(|n| n[0] / n[1]),
+        );
+        row(
+            format!("{with}95 % intervals that contain the truth, %"),
+            kinds.clone().map(|k| held(outcomes, k)).collect(),
+        );
+        row(
+            format!("{with}units that are right, of {}", outcomes.len()),
+            {
+                let right = outcomes.iter().filter(|o| o.right).count();
+                let mut cells = vec![String::new(); 6];
+                cells[0] = right.to_string();
+                cells
+            },
         );
     }
-    out
+    table
+}
+
+fn variants(without: &[Outcome], white: &[Outcome]) -> Table {
+    let mut table = Table::new(&[
+        &format!("accelerometer, {FEWER} seeds"),
+        "bias, µg",
+        "scale, ppm",
+        "cross terms, ppm",
+    ]);
+    let accel = 3..6;
+    for (name, outcomes) in [
+        ("without `gyro_thermal_lag`", without),
+        ("without it and without wander of the biases", white),
+    ] {
+        let cells = accel
+            .clone()
+            .map(|k| format!("{}, {} %", cell(outcomes, k, |n| n[0]), held(outcomes, k)));
+        table.row([name.to_string()].into_iter().chain(cells));
+    }
+    let cells = accel.map(|k| cell(white, k, |n| n[2]));
+    table.row(
+        ["planned without wander".to_string()]
+            .into_iter()
+            .chain(cells),
+    );
+    table
 }
 
 fn once(plan: &str, rig: &str, stated: bool, seed: u64) -> Outcome {
@@ -120,10 +173,13 @@ fn once(plan: &str, rig: &str, stated: bool, seed: u64) -> Outcome {
         range_c: None,
     };
     match fit(vec![recorded.clone()], &[], options) {
-        Err(refused) => Outcome {
-            verdict: format!("refused: {refused}"),
-            numbers: Default::default(),
-        },
+        Err(refused) => {
+            eprintln!("seed {seed}: refused: {refused}");
+            Outcome {
+                right: false,
+                numbers: Default::default(),
+            }
+        }
         Ok(found) => judged(&found, &recorded, &file, seed),
     }
 }
@@ -194,15 +250,13 @@ fn judged(found: &ThermalFit, recorded: &Session, file: &RigFile, seed: u64) -> 
     let bad: Vec<&str> = bad.collect();
     let lags_s = found.joint.profiles.as_ref().map(|p| p.lag.value);
     let (gyro, accel) = (lags_s.gyro, lags_s.accel);
+    eprintln!(
+        "seed {seed}: {}, lags {gyro:.1}, {accel:.1} s, wrong: {}",
+        found.verdict.name(),
+        bad.join(", ")
+    );
     Outcome {
-        verdict: format!(
-            "{}, lags {gyro:.1}, {accel:.1} s, {}",
-            found.verdict.name(),
-            match bad.is_empty() {
-                true => "right".into(),
-                false => format!("wrong: {}", bad.join(", ")),
-            }
-        ),
+        right: bad.is_empty(),
         numbers,
     }
 }

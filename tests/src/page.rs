@@ -1,4 +1,4 @@
-//! The document: prose that people write, and between markers the output of this program.
+//! Documents of prose that people write, with the output of programs between markers.
 
 use std::fmt::Write as _;
 
@@ -73,7 +73,7 @@ impl Table {
     }
 }
 
-/// `x` to three significant digits, in the style of docs/papers.md: with an exponent from seven digits on.
+/// `x` to three significant digits, in the style of these documents: with an exponent from seven digits on.
 pub fn significant(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
@@ -85,8 +85,11 @@ pub fn significant(x: f64) -> String {
     }
 }
 
-/// `document` with every block in its place. Blocks and places must match one to one.
-pub fn filled(document: &str, blocks: &[Block]) -> Result<String, String> {
+/// `document` with every block in its place; `name` is that of the document. Blocks and places must match one to one.
+///
+/// # Errors
+/// A block without a place, or a place without a block.
+pub fn filled(name: &str, document: &str, blocks: &[Block]) -> Result<String, String> {
     let mut out = document.to_string();
     for block in blocks {
         let (open, close) = (
@@ -95,12 +98,12 @@ pub fn filled(document: &str, blocks: &[Block]) -> Result<String, String> {
         );
         let start = out
             .find(&open)
-            .ok_or(format!("docs/papers.md has no place {open:?}"))?
+            .ok_or(format!("{name} has no place {open:?}"))?
             + open.len();
         let end = out
             .find(&close)
             .filter(|end| *end >= start)
-            .ok_or(format!("docs/papers.md has no {close:?}"))?;
+            .ok_or(format!("{name} has no {close:?}"))?;
         if let Some(text) = &block.text {
             out.replace_range(start..end, &format!("\n{}\n\n", text.trim_end()));
         }
@@ -108,7 +111,7 @@ pub fn filled(document: &str, blocks: &[Block]) -> Result<String, String> {
     let places = out.matches("<!-- /").count();
     if places != blocks.len() {
         return Err(format!(
-            "docs/papers.md has {places} places for {} blocks",
+            "{name} has {places} places for {} blocks",
             blocks.len()
         ));
     }

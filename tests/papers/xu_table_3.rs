@@ -1,0 +1,322 @@
+//! xu: Table 3 and Figs. 4 to 6, the errors over the rates. They show that the gyro about z is not linear; this file also follows what comes of that.
+
+use mimu::diagnose::diagnose;
+use mimu::fit::Options;
+use mimu::plan::design::schemes::Scheme;
+use mimu::quantity::Sensor;
+use mimu_rig::located::Source;
+use mimu_rig::random::Random;
+use mimu_rig::rig_file::{EffectFile, RigFile};
+use mimu_rig::table::TableTruth;
+use mimu_tests::bench::recorded;
+use mimu_tests::page::{Block, Table, significant};
+use nalgebra::Vector3;
+
+use crate::plot::{Figure, Line, Panel};
+use crate::xu::{Experiment, RUNS, averages, gyro};
+
+/// Table 3, deg/s, as printed: input about x, y, z; error of x, y, z; lowest and highest.
+const TABLE_3_BEFORE: [[[f64; 2]; 3]; 3] = [
+    [[0.004, 0.288], [-7.305, -7.185], [-3.474, 2.825]],
+    [[-3.445, 3.738], [-0.364, 0.4684], [-4.829, 4.105]],
+    [[-37.773, 37.959], [-1.174, 1.607], [-17.449, 16.48]],
+];
+/// The same after calibration by the proposed method.
+const TABLE_3_AFTER: [[[f64; 2]; 3]; 3] = [
+    [[-0.142, 0.144], [-0.005, 0.034], [-0.081, 0.039]],
+    [[-0.005, 0.014], [-0.15, 0.162], [0.007, 0.069]],
+    [[-0.149, 0.218], [-0.214, 0.358], [-2.954, 4.838]],
+];
+
+/// Largest rate about z, deg/s.
+const LARGEST: f64 = 3600.0;
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The multirate tests with a gyro z that is not linear.
+///
+/// After calibration (z, z) is not symmetric about zero: half the difference of its ends is odd in the rate, and their mean is even. The odd part is a
+/// cubic minus its best line, which C contains; the even part is a square, which no pair of opposite rates shows. Its sign over the rates is that of
+/// the ends before calibration, where half the span is 17.0 deg/s and 20.2 by Table 1.
+fn bent() -> Experiment {
+    let mut experiment = gyro();
+    let [square, cube, line] = coefficients(&experiment);
+    for sensed in &mut experiment.sensed {
+        let w = sensed.z / LARGEST;
+        sensed.z += square * w * w + cube * (w.powi(3) - line * w);
+    }
+    experiment
+}
+
+/// Of the square and the cube of the rate over 3600 deg/s, deg/s, and of the best line through that cube.
+fn coefficients(experiment: &Experiment) -> [f64; 3] {
+    let [low, high] = TABLE_3_AFTER[2][2];
+    let rates = experiment.inputs.iter().map(|x| x.z / LARGEST);
+    let power = |p: i32| rates.clone().map(|w| w.powi(p)).sum::<f64>();
+    let line = power(4) / power(2);
+    [-0.5 * (high + low), 0.5 * (high - low) / (1.0 - line), line]
+}
+
+/// Ends of the errors, input minus output, over the rates about each axis.
+type Ends = [[[f64; 2]; 3]; 3];
+
+/// Input minus output of each dwell.
+type Errors = Vec<(Vector3<f64>, Vector3<f64>)>;
+
+fn ends(errors: &Errors) -> Ends {
+    std::array::from_fn(|about| {
+        std::array::from_fn(|of| {
+            let along = errors.iter().filter(|(input, _)| input[about] != 0.0);
+            along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (_, e)| {
+                [low.min(e[of]), high.max(e[of])]
+            })
+        })
+    })
+}
+
+/// Before calibration, from the averages of Table 1 alone.
+fn before(experiment: &Experiment) -> Errors {
+    let unit = averages(experiment.table);
+    let c = unit.matrix.try_inverse().expect("regular");
+    let each = experiment.inputs.iter().zip(&experiment.sensed);
+    each.map(|(input, sensed)| (*input, input - c * (sensed - unit.offset)))
+        .collect()
+}
+
+/// After calibration, in one verification. The noise is that of linear gyros: the repeats of Table 1 do not see a nonlinearity that all share.
+fn after(experiment: &Experiment, run: u64) -> Errors {
+    let (sigma, rest) = gyro().noise();
+    let mut random = Random::new(run, "xu after");
+    let unit = experiment.of_the_day(&rest, &mut random);
+    let found = (experiment.estimator)(&experiment.dwells(&unit, sigma, &mut random));
+    let model = found.expect("determined").triad.inverse;
+    let verification = experiment.dwells(&unit, sigma, &mut random);
+    let error = |o: &mimu::estimate::Observation| (o.input, o.input - model.apply(&o.raw));
+    verification.iter().map(error).collect()
+}
+
+/// The ends after calibration, averaged over the runs.
+fn mean_after(experiment: &Experiment) -> Ends {
+    let mut mean = Ends::default();
+    for run in 0..RUNS {
+        let one = ends(&after(experiment, run));
+        for (mean, one) in mean.as_flattened_mut().iter_mut().zip(one.as_flattened()) {
+            for k in 0..2 {
+                mean[k] += one[k] / RUNS as f64;
+            }
+        }
+    }
+    mean
+}
+
+/// Table 3 recomputed.
+fn table_3() -> Table {
+    let (linear, bent) = (gyro(), bent());
+    let (before, noise, after) = (
+        ends(&before(&linear)),
+        mean_after(&linear),
+        mean_after(&bent),
+    );
+    let mut table = Table::new(&[
+        "input, error of",
+        "before, printed",
+        "before, from Table 1",
+        "after, printed",
+        "after, from noise",
+        "after, z not linear",
+    ]);
+    let range = |e: [f64; 2]| format!("{:.3} to {:.3}", e[0], e[1]);
+    for about in 0..3 {
+        for of in 0..3 {
+            let columns = [&TABLE_3_BEFORE, &before, &TABLE_3_AFTER, &noise, &after];
+            let cells = columns.map(|ends| range(ends[about][of]));
+            let name = format!("{}, {}", AXES[about], AXES[of]);
+            table.row([name].into_iter().chain(cells));
+        }
+    }
+    table
+}
+
+/// Table 3 before calibration with its misprints corrected: (x, y) has lost the sign of its upper end, and (z, x) and (z, y) are exchanged.
+fn corrected() -> Ends {
+    let mut ends = TABLE_3_BEFORE;
+    ends[0][1][1] = -ends[0][1][1];
+    ends[2].swap(0, 1);
+    ends
+}
+
+/// The middle between the ends is the bias, and half their distance the error of the matrix: both against Table 1.
+fn middles() -> Table {
+    let mut table = Table::new(&[
+        "error of, input about",
+        "half the span, printed",
+        "from Table 1",
+        "middle, printed",
+        "from Table 1",
+        "middle after calibration, printed",
+    ]);
+    let (printed, ours) = (corrected(), ends(&before(&gyro())));
+    let half = |e: [f64; 2]| format!("{:.3}", 0.5 * (e[1] - e[0]));
+    let middle = |e: [f64; 2]| format!("{:.3}", 0.5 * (e[0] + e[1]));
+    for of in 0..3 {
+        for about in 0..3 {
+            table.row([
+                format!("{}, {}", AXES[of], AXES[about]),
+                half(printed[about][of]),
+                half(ours[about][of]),
+                middle(printed[about][of]),
+                middle(ours[about][of]),
+                middle(TABLE_3_AFTER[about][of]),
+            ]);
+        }
+    }
+    table
+}
+
+/// Errors of the offset, axis by axis, for linear gyros and with the square in z.
+fn offsets() -> Table {
+    let mut table = Table::new(&[
+        "estimator",
+        "linear: o_x, deg/s",
+        "o_y",
+        "o_z",
+        "z not linear: o_x",
+        "o_y",
+        "o_z",
+    ]);
+    let both = [gyro(), bent()];
+    for k in 0..3 {
+        let cells = both.each_ref().map(|experiment| {
+            let (sigma, rest) = gyro().noise();
+            let mut squares = Vector3::zeros();
+            for run in 0..RUNS {
+                let mut random = Random::new(run, "xu estimators");
+                let unit = experiment.of_the_day(&rest, &mut random);
+                let dwells = experiment.dwells(&unit, sigma, &mut random);
+                let (_, estimator) = experiment.estimators()[k];
+                let found = estimator(&dwells).expect("determined").triad.inverse;
+                squares += (found.offset - unit.offset).map(|e| e * e / RUNS as f64);
+            }
+            squares.map(|s| significant(s.sqrt()))
+        });
+        let [linear, bent] = cells.map(|c| -> [String; 3] { c.into() });
+        let name = both[0].estimators()[k].0.to_string();
+        table.row([name].into_iter().chain(linear).chain(bent));
+    }
+    table
+}
+
+/// Figs. 4 to 6: errors over the rates about each axis, before and after calibration, in one run.
+pub fn figure() -> Figure {
+    let bent = bent();
+    let errors = [before(&bent), after(&bent, 0)];
+    let mut panels = Vec::new();
+    for (errors, when) in errors.iter().zip(["before", "after"]) {
+        for about in 0..3 {
+            let line = |of: usize| {
+                let along = errors.iter().filter(|(x, _)| x[about] != 0.0);
+                let mut points: Vec<(f64, f64)> = along.map(|(x, e)| (x[about], e[of])).collect();
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                Line {
+                    name: format!("error of {}", AXES[of]),
+                    points,
+                }
+            };
+            panels.push(Panel {
+                title: format!("{when}, rate about {}", AXES[about]),
+                x: "rate, deg/s".into(),
+                y: "input minus output, deg/s".into(),
+                lines: (0..3).map(line).collect(),
+            });
+        }
+    }
+    Figure {
+        file: "xu-rates.svg".into(),
+        columns: 3,
+        panels,
+    }
+}
+
+/// The unit of `rig/rigs/xu.toml` with this gyro z on the bench, measured by the paper's steps 1 to 6, and diagnosed.
+fn effects() -> Table {
+    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../rig/rigs/xu.toml");
+    let text = std::fs::read_to_string(rig).expect("the bench's file");
+    let mut file = RigFile::parse(&Source::new("xu", text)).expect("a rig file");
+    file.table = TableTruth {
+        max_rate_dps: [LARGEST; 3],
+        ..TableTruth::ideal()
+    };
+    let [square, cube, _] = coefficients(&gyro());
+    // The bench gives sizes at 300 deg/s.
+    for (id, size) in [
+        ("gyro_scale_quadratic", square / 12f64.powi(2)),
+        ("gyro_scale_cubic", cube / 12f64.powi(3)),
+    ] {
+        let parameters = format!("dps_at_300dps = [0.0, 0.0, {size:?}]");
+        file.effect.push(EffectFile {
+            id: id.into(),
+            parameters: parameters.parse().expect("TOML"),
+        });
+    }
+    let mut plan =
+        String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n");
+    let rates = Scheme::XuRates.settings(Sensor::Gyro).expect("rates");
+    let poses = Scheme::Xu33.settings(Sensor::Accel).expect("poses");
+    for setting in rates.iter().chain(&poses) {
+        let up: [f64; 3] = setting.up.into();
+        let rate_dps = setting.rate.to_degrees();
+        plan += &format!("[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = 10.0\n");
+    }
+    let prepared = recorded(&plan, &file, 1);
+    let found = diagnose(prepared.into(), Options::IN_SAMPLE).expect("diagnosed");
+    let mut table = Table::new(&["gyro", "(z, z), deg/s", "square at 3600 deg/s", "cube"]);
+    let range = |fit: &mimu::fit::Fit| {
+        let model = fit
+            .sensor(Sensor::Gyro)
+            .expect("a gyro")
+            .estimated
+            .triad
+            .inverse;
+        let dwells = fit.prepared.observations(Sensor::Gyro);
+        let errors = dwells.iter().map(|o| {
+            let [input, output] = [o.input, model.apply(&o.raw)].map(|v| v.map(f64::to_degrees));
+            (input.map(f64::round), input - output)
+        });
+        let [low, high] = ends(&errors.collect())[2][2];
+        format!("{low:.3} to {high:.3}")
+    };
+    let size = |id: &str, power: i32| {
+        let one = found.effects.iter().find(|e| e.candidate.id() == id);
+        let value = one.map(|e| e.values[2] * (LARGEST.to_radians()).powi(power));
+        value.map_or("not found".into(), |v| significant(v.to_degrees()))
+    };
+    table.row([
+        "truth".to_string(),
+        "-".into(),
+        significant(square),
+        significant(cube),
+    ]);
+    table.row([
+        "affine".to_string(),
+        range(&found.before),
+        "-".into(),
+        "-".into(),
+    ]);
+    table.row([
+        "with the effects found".to_string(),
+        range(&found.after),
+        size("gyro_scale_quadratic", 2),
+        size("gyro_scale_cubic", 3),
+    ]);
+    table
+}
+
+/// All blocks of this study.
+pub fn blocks() -> Vec<Block> {
+    let block = |name, table| Block::table(name, &table);
+    vec![
+        block("xu, table 3", table_3()),
+        block("xu, middles", middles()),
+        block("xu, offsets", offsets()),
+        block("xu, effects", effects()),
+    ]
+}
