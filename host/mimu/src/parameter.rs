@@ -52,6 +52,16 @@ impl ParameterKind {
 }
 
 impl TriadParameter {
+    /// Whether it is a bias, in either direction of the model.
+    pub fn is_bias(self) -> bool {
+        let Self(kind, k) = self;
+        match kind {
+            ParameterKind::Bias | ParameterKind::BiasAndGravity => true,
+            ParameterKind::Inverse => k >= 9,
+            _ => false,
+        }
+    }
+
     /// Axis, or the pair of axes; for the inverse model the name of the element.
     pub fn axis(self) -> String {
         let Self(kind, k) = self;

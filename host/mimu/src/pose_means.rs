@@ -65,6 +65,7 @@ impl Prepared {
                 Sensor::BOTH.map(|s| means.poses.iter().all(|p| knows_noise(p, s))),
             ),
             place: means.place.clone(),
+            bias_removal: None,
             lever_arm_m: 0.0,
         })
     }

@@ -11,6 +11,7 @@ use crate::estimate::{Failure, Observation};
 use crate::noise::Noise;
 use crate::noise::noise_file::NoiseFile;
 use crate::quantity::Sensor;
+use crate::signal::bias_removal::{self, BiasRemoval};
 use crate::signal::blocks::Condensed;
 use crate::signal::contrast::{Contrast, contrasts};
 use crate::signal::course::Course;
@@ -35,6 +36,8 @@ pub struct Prepared {
     pub noise: Noise,
     /// Path of the samples, for messages.
     pub place: String,
+    /// What the firmware did to the gyro's bias, if that shows. A high-pass filter is undone in [`Self::condensed`].
+    pub bias_removal: Option<BiasRemoval>,
     /// See [`Prepared::beside_axis`].
     pub(crate) lever_arm_m: f64,
 }
@@ -103,6 +106,11 @@ impl Prepared {
             let remedy = "write the t_s of the power-on to recording.toml, or remove the key";
             return Err(Error::new(place, problem, remedy));
         }
+        let by_hand = manifest.reference == Reference::Gravity;
+        let bias_removal = by_hand.then(|| bias_removal::find(&condensed)).flatten();
+        if let Some(BiasRemoval::HighPass(filter)) = &bias_removal {
+            condensed = filter.undo(condensed);
+        }
         let mut dwells = Dwells::find(&condensed, &manifest, finding)
             .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
         let at = manifest.latitude_deg;
@@ -110,6 +118,9 @@ impl Prepared {
         dwells.warnings.extend(gravity);
         let in_si = unit_in_si::at_rest(&dwells.list, &manifest);
         dwells.warnings.extend(in_si);
+        dwells
+            .warnings
+            .extend(bias_removal.map(Warning::BiasRemoved));
         let noise = Noise::within(&dwells.list, &condensed, &dwells.rails);
         Ok(Self {
             manifest,
@@ -117,6 +128,7 @@ impl Prepared {
             dwells,
             noise,
             place,
+            bias_removal,
             lever_arm_m: 0.0,
         })
     }

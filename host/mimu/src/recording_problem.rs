@@ -61,6 +61,8 @@ pub enum Seen {
     EmptySamples,
     /// Values of the thermometer that cannot be temperatures.
     Temperatures,
+    /// Firmware removes the bias of the gyro.
+    BiasRemoved,
 }
 
 impl Seen {
@@ -85,6 +87,7 @@ impl Seen {
                 Self::EmptySamples
             }
             Warning::NoTemperatures(_) => Self::Temperatures,
+            Warning::BiasRemoved(_) => Self::BiasRemoved,
             _ => return None,
         })
     }
@@ -100,6 +103,7 @@ impl Seen {
             Self::Gaps => "gaps",
             Self::EmptySamples => "empty_samples",
             Self::Temperatures => "temperatures",
+            Self::BiasRemoved => "bias_removed",
         }
     }
 }

@@ -12,6 +12,7 @@ use serde::{Serialize, Serializer};
 
 use crate::fault::Fault;
 use crate::quantity::{Sensor, normal_gravity};
+use crate::signal::bias_removal::BiasRemoval;
 
 /// Range of the difference of local gravity from normal gravity at sea level, m/s²: heights of up to 5500 m subtract 0.017, and depths of
 /// 400 m add 0.001. Anomalies of the Earth's field are up to 0.003 either way (0.005 on a few peaks and islands).
@@ -68,6 +69,8 @@ pub enum Warning {
     NotCounts(f64, &'static str, &'static str),
     /// Reading of a gyro at rest, rad/s, that is larger than any bias.
     Turning(f64),
+    /// Firmware removes the bias of the gyro before it is recorded.
+    BiasRemoved(BiasRemoval),
     /// Calibrated rate at rest, rad/s rms, by which dwells differ.
     Restless(f64),
     /// Unit of the noise file, and that of the recording.

@@ -136,6 +136,7 @@ fn triad_table(model: &Affine<f32>, sensor: Sensor) -> Option<TriadTable> {
         frame: "body".into(),
         C: rows(&matrix),
         o: exact(&offset),
+        bias_removed: None,
         sigma_C: None,
         sigma_o: None,
         interval_C: None,

@@ -27,6 +27,7 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
         | Warning::OtherUnit(..)
         | Warning::OtherDevice(..)
         | Warning::Dead(_)
+        | Warning::BiasRemoved(_)
         | Warning::RunAtEnd(..)
         | Warning::CalmEnd(..) => Some(JudgementKind::Suspect),
         Warning::NoResiduals

@@ -131,7 +131,7 @@ pub struct SensorFitResult {
     /// How it was estimated.
     pub estimator: &'static str,
     /// `C_xx` to `o_z` (raw to SI, `x = C u + o`), then as physical quantities: `scale_`, `bias_`, `misalignment_` of x, y, z and
-    /// `non_orthogonality_` of yz, zy, zx.
+    /// `non_orthogonality_` of yz, zy, zx. Without `o_` and `bias_` of a gyro whose bias the firmware removes.
     pub parameters: Vec<Parameter>,
     /// Root mean square of the residuals, in [`Self::unit`].
     pub rms: f64,
@@ -391,16 +391,19 @@ impl Parameter {
     fn list(fit: &Fit, found: &SensorFit) -> Vec<Self> {
         let raw = fit.prepared.manifest.raw_unit;
         let all = parameters(&found.estimated.triad, found.sensor, raw).into_iter();
-        all.map(|(of, e, unit)| Self {
-            of,
-            name: of.to_string(),
-            value: e.value,
-            sigma: e.sigma,
-            lower: e.value - e.interval,
-            upper: e.value + e.interval,
-            unit,
-        })
-        .collect()
+        // What is left of a bias that firmware removed belongs to the firmware.
+        let removed = found.sensor == Sensor::Gyro && fit.prepared.bias_removal.is_some();
+        all.filter(|(of, ..)| !(removed && of.is_bias()))
+            .map(|(of, e, unit)| Self {
+                of,
+                name: of.to_string(),
+                value: e.value,
+                sigma: e.sigma,
+                lower: e.value - e.interval,
+                upper: e.value + e.interval,
+                unit,
+            })
+            .collect()
     }
 }
 

@@ -92,6 +92,7 @@ impl fmt::Display for Warning {
             }
             Self::NotCounts(scale, unit, remedy) => write!(f, "raw_unit = \"count\", but the readings are fractions, and the fit gives {} of them per SI unit: they are in {unit}; import them with {remedy}", significant(*scale)),
             Self::Turning(rate) => write!(f, "at rest it reads {} deg/s, more than any bias: the unit turns evenly, or the readings are in deg/s", degrees(*rate)),
+            Self::BiasRemoved(removal) => write!(f, "gyro: {removal}; its scale factors and angles are calibrated, but the bias is not that of the sensor, so none is given"),
             Self::Restless(rms) => write!(f, "from dwell to dwell the calibrated rate at rest differs by {} deg/s rms, more than any bias: in some dwells the unit turned evenly, about the vertical if the accelerometer shows nothing; leave these dwells out", degrees(*rms)),
             Self::OtherGravity([ours, theirs], mean, contradicted) => {
                 let ppm = 1e6 * (theirs / ours - 1.0).abs();
