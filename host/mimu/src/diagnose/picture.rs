@@ -207,10 +207,8 @@ fn tracks(rows: &Rows, sample: impl Fn(usize, f64) -> Sample) -> Vec<Track> {
                 .skip(direction)
                 .step_by(directions)
                 .collect();
-            let sigma = |r: usize| {
-                let i = r - stratum.rows.start;
-                stratum.known[(i, i)].sqrt()
-            };
+            let variances = stratum.known_variances();
+            let sigma = |r: usize| variances[r - stratum.rows.start].sqrt();
             all.push(Track {
                 name: match (directions, direction) {
                     (1, _) => stratum.name.to_string(),

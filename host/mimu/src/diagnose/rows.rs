@@ -25,6 +25,7 @@ use std::sync::OnceLock;
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen, Vector3};
 
+use crate::diagnose::columns::beside;
 use crate::effects::fitted::FittedEffect;
 use crate::effects::quantity::Conditions;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
@@ -52,10 +53,10 @@ pub struct Stratum {
     pub rows: Range<usize>,
     /// Known covariance, unit of the rows squared.
     pub known: DMatrix<f64>,
-    /// Part of each row's variance that comes from errors of the reference instead of noise; `None` if there is none.
+    /// Part of each row's variance that comes from errors of the reference, which are among [`Self::open`]; `None` if there is none.
     pub by_reference: Option<DVector<f64>>,
-    /// Factor of the covariance that the uncertainty of a given matrix adds to all rows: this times its transpose, unit of the rows squared. `None`
-    /// if there is none, or if it is negligible.
+    /// Factor of the covariance by errors that all rows share, unit of the rows: this times its transpose is added to the known covariance. They are
+    /// the errors of the forces that judge turns, and of a given matrix. `None` if there are none, or if they are negligible.
     pub open: Option<DMatrix<f64>>,
     /// Covariance of a random walk with K = 1 unit/√s between the rows; `None` if the rows are not dwell means.
     pub random_walk: Option<DMatrix<f64>>,
@@ -108,6 +109,38 @@ pub struct Session<'a> {
     pub accel: Option<Affine<f64>>,
     /// Errors of its forces, if these judge the gyro.
     pub forces: Option<&'a ForceErrors>,
+}
+
+/// Variances of the rows of a covariance with this factor.
+fn row_variances(factor: &DMatrix<f64>) -> DVector<f64> {
+    DVector::from_iterator(factor.nrows(), factor.row_iter().map(|r| r.norm_squared()))
+}
+
+impl Stratum {
+    /// Known variance of its rows, unit of the rows squared.
+    pub fn known_variances(&self) -> DVector<f64> {
+        let known = self.known.diagonal();
+        match &self.open {
+            Some(open) => known + row_variances(open),
+            None => known,
+        }
+    }
+
+    /// The known covariance; with that of the errors that all rows share, if there are at most `few` rows.
+    pub fn with_open(&self, few: usize) -> Cow<'_, DMatrix<f64>> {
+        match &self.open {
+            Some(open) if self.rows.len() <= few => {
+                Cow::Owned(&self.known + open * open.transpose())
+            }
+            _ => Cow::Borrowed(&self.known),
+        }
+    }
+
+    /// Whether its rows are independent, apart from the errors that all share and a random walk.
+    pub fn is_independent(&self) -> bool {
+        let count = self.known.nrows();
+        (0..count).all(|j| (0..count).all(|i| i == j || self.known[(i, j)] == 0.0))
+    }
 }
 
 impl Session<'_> {
@@ -234,7 +267,12 @@ impl Rows {
                 .map(|r| r.norm_squared())
                 .fold(0.0, f64::max);
             // If the input is constant, a bias absorbs an error of the matrix.
-            stratum.open = (most > NEGLIGIBLE * stratum.known.diagonal().min()).then_some(open);
+            if most > NEGLIGIBLE * stratum.known.diagonal().min() {
+                stratum.open = Some(match &stratum.open {
+                    Some(others) => beside(others, &open),
+                    None => open,
+                });
+            }
         }
     }
 

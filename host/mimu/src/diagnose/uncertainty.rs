@@ -1,6 +1,6 @@
 //! Uncertainty that the coefficients of effects add to the affine parameters beside them, and to the forces that a gyro is judged by.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
 
 use super::decision::Decision;
 use super::rows::{ForceErrors, Rows, Session};
@@ -117,11 +117,14 @@ pub fn of_forces(session: &Session, magnitudes: &Rows, decision: &Decision) -> O
     }
     let scale = DVector::from_fn(normal.nrows(), |k, _| normal[(k, k)].sqrt());
     let scaled = normal.map_with_location(|i, j, v| v / (scale[i] * scale[j]));
-    let inverse = scaled.cholesky()?.inverse();
-    let parameters = inverse.map_with_location(|i, j, v| v / (scale[i] * scale[j]));
+    // The covariance of the parameters is the inverse of L Lᵀ.
+    let factor = scaled.cholesky()?.unpack();
+    let one = DMatrix::identity(factor.nrows(), factor.nrows());
+    let inverse = factor.solve_lower_triangular(&one)?.transpose();
+    let parameters = inverse.map_with_location(|i, _, v| v / scale[i]);
     Some(ForceErrors {
         dwells,
-        covariance: &columns * parameters * columns.transpose(),
+        factor: columns * parameters,
     })
 }
 
@@ -138,9 +141,14 @@ pub fn of_given_forces(prepared: &Prepared, covariance: &Covariance) -> ForceErr
             by[(3 * i + k, 9 + k)] = 1.0;
         }
     }
+    // By its eigenvalues: a parameter that is exactly known has none.
+    let eigen = covariance.symmetric_eigen();
+    let sigmas = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+    let factor = eigen.eigenvectors * SMatrix::from_diagonal(&sigmas);
+    let factor = DMatrix::from_fn(12, 12, |i, j| factor[(i, j)]);
     ForceErrors {
         dwells: poses.iter().map(|o| o.dwell).collect(),
-        covariance: &by * covariance * by.transpose(),
+        factor: by * factor,
     }
 }
 

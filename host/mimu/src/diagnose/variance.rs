@@ -3,6 +3,7 @@
 //! A drift of the bias differs from a random walk only in being a straight line. So a random walk that is not known is part of the null hypothesis.
 
 mod factor;
+mod walk;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
@@ -11,6 +12,7 @@ use super::rows::Rows;
 use factor::{Axes, Factor, Separable};
 
 pub use factor::{DecorrelatedChoice, Whitener};
+pub use walk::CommonWalk;
 
 /// Variance components of each stratum beside the known covariance.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +62,7 @@ pub struct VarianceModel<'a> {
     /// Axes in which the rows of a stratum without a random walk are independent, whatever the extra white variance. Where a random walk is sought,
     /// only the rows' own axes serve; `None` if the rows are not independent in these.
     axes: Vec<Option<Axes>>,
-    /// Factor of the covariance by the uncertainty of a given matrix, in these axes.
+    /// Factor of the covariance by the errors that all rows share, in these axes. In a small stratum the axes contain it.
     open: Vec<Option<DMatrix<f64>>>,
     /// The random walk that is sought in each stratum, if its covariance is separable.
     separable: Vec<Option<Separable>>,
@@ -83,19 +85,24 @@ impl<'a> VarianceModel<'a> {
             typical: rows
                 .strata
                 .iter()
-                .map(|s| (mean(&s.known), s.random_walk.as_ref().map_or(0.0, mean)))
+                .map(|s| {
+                    let known = s.known_variances().mean().max(1e-30);
+                    (known, s.random_walk.as_ref().map_or(0.0, mean))
+                })
                 .collect(),
         };
         variance.axes = (0..rows.strata.len())
             .into_par_iter()
             .map(|s| match variance.seeks_random_walk(s) {
                 true => Axes::as_they_stand(&rows.strata[s].known),
-                false => Some(Axes::of(&rows.strata[s].known)),
+                false => Some(Axes::of(&rows.strata[s].with_open(FEW))),
             })
             .collect();
         variance.open = (0..rows.strata.len())
             .map(|s| {
-                let mut open = rows.strata[s].open.clone()?;
+                let stratum = &rows.strata[s];
+                let folded = !variance.seeks_random_walk(s) && stratum.rows.len() <= FEW;
+                let mut open = stratum.open.clone().filter(|_| !folded)?;
                 let count = open.nrows();
                 if let Some(axes) = &variance.axes[s] {
                     axes.rotate(&mut open.rows_mut(0, count));
@@ -147,14 +154,13 @@ impl<'a> VarianceModel<'a> {
     pub fn variances(&self, at: &Components) -> DVector<f64> {
         let mut out = DVector::zeros(self.rows.y.len());
         for (s, stratum) in self.rows.strata.iter().enumerate() {
+            let known = stratum.known_variances();
             for (i, row) in stratum.rows.clone().enumerate() {
                 let random_walk = stratum
                     .random_walk
                     .as_ref()
                     .map_or(0.0, |unit| unit[(i, i)]);
-                let open = stratum.open.as_ref();
-                out[row] = stratum.known[(i, i)]
-                    + open.map_or(0.0, |o| o.row(i).norm_squared())
+                out[row] = known[i]
                     + at.extra_white[s]
                     + at.random_walk[s] * random_walk
                     + 1e-12 * self.typical[s].0;
@@ -172,7 +178,7 @@ impl<'a> VarianceModel<'a> {
         }
     }
 
-    /// The same without the uncertainty of a given matrix.
+    /// The same without the errors that all rows share, unless the axes contain them.
     fn factor_of_noise(&self, s: usize, extra_white: f64, random_walk: f64) -> Option<Factor> {
         let stratum = &self.rows.strata[s];
         let floor = 1e-12 * self.typical[s].0;
@@ -216,22 +222,48 @@ impl<'a> VarianceModel<'a> {
                 .iter()
                 .map(|r| r - stratum.rows.start)
                 .collect();
-            let mut v = stratum.known.select_rows(&rows).select_columns(&rows);
-            if let Some(unit) = &stratum.random_walk {
-                v += unit.select_rows(&rows).select_columns(&rows) * at.random_walk[s];
+            if rows.is_empty() {
+                continue;
             }
-            if let Some(open) = &stratum.open {
-                let open = open.select_rows(&rows);
-                v += &open * open.transpose();
-            }
-            for i in 0..v.nrows() {
-                v[(i, i)] += at.extra_white[s] + 1e-12 * self.typical[s].0;
-            }
-            if !rows.is_empty() {
-                parts.push((from, Cholesky::new(v)?));
-            }
+            let noise = self.noise_of(s, [at.extra_white[s], at.random_walk[s]], &rows)?;
+            let factor = match &stratum.open {
+                Some(open) => noise.beside(&open.select_rows(&rows))?,
+                None => noise,
+            };
+            parts.push((from..to, factor));
         }
         Some(DecorrelatedChoice { parts })
+    }
+
+    /// Factor of the noise of some `rows` of stratum `s`, not rotated.
+    fn noise_of(
+        &self,
+        s: usize,
+        [extra_white, random_walk]: [f64; 2],
+        rows: &[usize],
+    ) -> Option<Factor> {
+        let stratum = &self.rows.strata[s];
+        let added = extra_white + 1e-12 * self.typical[s].0;
+        let separable = match random_walk > 0.0 {
+            true => self.separable[s].as_ref().map(|w| w.of_rows(rows)),
+            false => None,
+        };
+        if stratum.is_independent() && (random_walk == 0.0 || separable.is_some()) {
+            let variances = rows.iter().map(|i| stratum.known[(*i, *i)] + added);
+            let variances = DVector::from_iterator(rows.len(), variances);
+            return match separable {
+                Some(walk) => walk.factor(random_walk, &variances),
+                None => Some(Factor::Diagonal(variances.map(f64::sqrt))),
+            };
+        }
+        let mut v = stratum.known.select_rows(rows).select_columns(rows);
+        if let Some(unit) = &stratum.random_walk {
+            v += unit.select_rows(rows).select_columns(rows) * random_walk;
+        }
+        for i in 0..v.nrows() {
+            v[(i, i)] += added;
+        }
+        Cholesky::new(v).map(Factor::Full)
     }
 
     fn stratum(
@@ -385,6 +417,9 @@ impl<'a> VarianceModel<'a> {
     }
 }
 
+/// Largest stratum whose shared errors are folded into its known covariance. Each level of the noise that is tried then takes one division a row;
+/// but the axes take ten times n³, which is seconds from 300 rows on.
+const FEW: usize = 300;
 /// Most rounds over the components.
 const SWEEPS: usize = 12;
 /// Drop in deviance below which the rounds end.

@@ -16,6 +16,8 @@ const PARAMETERS: usize = 4;
 const FEWEST: usize = 12;
 /// Largest share of dwells that may be slow turns; beyond it, it is unknown which dwells are rests.
 const MOST: f64 = 0.25;
+/// One of so many dwells is removed at once, so that the number of fits does not grow with that of the dwells.
+const AT_ONCE: usize = 128;
 /// Probability that any dwell of a recording at rest is mistaken for a turn because of noise.
 const FALSE_ALARM: f64 = 1e-3;
 /// Least limit on a deviation, in sigmas of the scatter: biases wander from dwell to dwell, and their tails are longer than those of noise.
@@ -62,12 +64,15 @@ fn of_channel(readings: &[Reading], c: usize) -> Vec<usize> {
         let Some(fit) = Fit::of(readings, &kept, c) else {
             return Vec::new();
         };
-        let worst = (0..kept.len()).max_by(|a, b| {
-            let [a, b] = [a, b].map(|i| fit.deleted(&readings[kept[*i]], c));
-            a.total_cmp(&b)
-        });
-        let Some(worst) = worst else { break };
-        kept.remove(worst);
+        let deleted = kept.iter().map(|k| fit.deleted(&readings[*k], c));
+        let mut order: Vec<(usize, f64)> = deleted.enumerate().collect();
+        order.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let count = (n / AT_ONCE).clamp(1, kept.len() - least);
+        let mut worst: Vec<usize> = order[..count].iter().map(|(at, _)| *at).collect();
+        worst.sort_unstable();
+        for at in worst.into_iter().rev() {
+            kept.remove(at);
+        }
     }
     loop {
         let Some(fit) = Fit::of(readings, &kept, c) else {

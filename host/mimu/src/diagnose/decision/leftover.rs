@@ -154,7 +154,7 @@ pub(super) fn leftover(
         let worse = bare.deviance - last.deviance;
         // Both components are at their bound under the null hypothesis, so chi-square of two degrees of freedom is conservative.
         let p = (-0.5 * worse).exp() * rows.strata.len() as f64;
-        let floor = stratum.known.diagonal().mean().sqrt();
+        let floor = stratum.known_variances().mean().sqrt();
         let far = strength > WANDERS * floor;
         if p > FALSE_LEFTOVER && jump.is_none() && (stratum.wander_known || !far) {
             continue;

@@ -9,24 +9,25 @@ use crate::estimate::turn::Turn;
 pub struct ForceErrors {
     /// Index of each dwell, ascending.
     pub dwells: Vec<usize>,
-    /// Covariance, three rows for each of them, (m/s²)².
-    pub covariance: DMatrix<f64>,
+    /// Factor of their covariance, three rows for each of them, m/s²: the covariance is this times its transpose. It has few columns, one for each
+    /// uncertain parameter, so that its size grows with the number of dwells instead of its square.
+    pub factor: DMatrix<f64>,
 }
 
 impl ForceErrors {
-    /// Covariance of turns' direction errors. Each component comes with its turn, and its derivatives by the force
+    /// Factor of the covariance of turns' direction errors, rad. Each component comes with its turn, and its derivatives by the force
     /// before and after.
     pub fn of_turns(&self, components: &[(&Turn, [Vector3<f64>; 2])]) -> DMatrix<f64> {
-        let mut by = DMatrix::zeros(components.len(), self.covariance.nrows());
+        let mut out = DMatrix::zeros(components.len(), self.factor.ncols());
         for (row, (turn, ends)) in components.iter().enumerate() {
             for (dwell, end) in [turn.from, turn.to].iter().zip(ends) {
                 if let Ok(at) = self.dwells.binary_search(dwell) {
-                    for k in 0..3 {
-                        by[(row, 3 * at + k)] += end[k];
-                    }
+                    let added = end.transpose() * self.factor.fixed_rows::<3>(3 * at);
+                    let mut row = out.row_mut(row);
+                    row += added;
                 }
             }
         }
-        &by * &self.covariance * by.transpose()
+        out
     }
 }

@@ -6,7 +6,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SVector, Vector3};
 
 use super::build::{Builder, Part};
-use super::{ForceErrors, Row, RowFigure, Stratum};
+use super::{ForceErrors, Row, RowFigure, Stratum, row_variances};
 use crate::effects::quantity::Conditions;
 use crate::estimate::Observation;
 use crate::estimate::chains::Chains;
@@ -267,12 +267,9 @@ impl Builder<'_> {
                 axis: None,
                 session: 0,
                 rows: 0..m,
-                known: DMatrix::from_diagonal(&DVector::from_vec(turn_variances))
-                    + by_reference
-                        .as_ref()
-                        .map_or_else(|| DMatrix::zeros(m, m), DMatrix::clone),
-                by_reference: by_reference.map(|v| v.diagonal()),
-                open: None,
+                known: DMatrix::from_diagonal(&DVector::from_vec(turn_variances)),
+                by_reference: by_reference.as_ref().map(row_variances),
+                open: by_reference,
                 random_walk: None,
                 wander_known: true,
                 within: false,

@@ -80,6 +80,40 @@ impl Rows {
         self.weighted(axes, &since.collect::<Vec<_>>())
     }
 
+    /// First and last of the times of each recording's conditions, s since it began; zeros for one without rows.
+    pub fn spans(&self) -> Vec<[f64; 2]> {
+        let mut spans = vec![[f64::INFINITY, f64::NEG_INFINITY]; self.first.len() - 1];
+        for (t_s, (session, _)) in self.quantities().t_s.iter().zip(&self.block) {
+            let [from, to] = &mut spans[*session];
+            (*from, *to) = (from.min(*t_s), to.max(*t_s));
+        }
+        let known = |span: [f64; 2]| if span[0] <= span[1] { span } else { [0.0; 2] };
+        spans.into_iter().map(known).collect()
+    }
+
+    /// Steps of a bias of recording `session` that rise from 0 to 1 within `length_s` from each of the `starts` on, which follow each other at that
+    /// distance: a column for each as an error of x, then of y and of z.
+    pub fn ramps(&self, session: usize, starts: &[f64], length_s: f64) -> DMatrix<f64> {
+        let count = starts.len();
+        let t_s = &self.quantities().t_s;
+        let mut columns = DMatrix::zeros(self.rows.len(), 3 * count);
+        for (r, row) in self.rows.iter().enumerate() {
+            for (k, weight) in row.conditions.clone().zip(&row.weights) {
+                if self.block[k].0 != session {
+                    continue;
+                }
+                let begun = starts.partition_point(|start| *start < t_s[k]);
+                for (step, start) in starts[..begun].iter().enumerate() {
+                    let risen = ((t_s[k] - start) / length_s).min(1.0);
+                    for axis in 0..3 {
+                        columns[(r, axis * count + step)] += weight[axis] * risen;
+                    }
+                }
+            }
+        }
+        columns
+    }
+
     /// Columns of an error of each of `axes` with `values`, one for each of the conditions.
     fn weighted(&self, axes: &[usize], values: &[f64]) -> DMatrix<f64> {
         let mut columns = DMatrix::zeros(self.rows.len(), axes.len());

@@ -1,5 +1,7 @@
 //! Factors of covariances: what decorrelates rows.
 
+use std::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix, DMatrixViewMut, DVector, Dyn, Matrix2, SymmetricEigen, Vector2};
 
 use super::VarianceModel;
@@ -89,6 +91,14 @@ impl Separable {
         })
     }
 
+    /// The covariance of some of the rows, in ascending order.
+    pub(super) fn of_rows(&self, rows: &[usize]) -> Self {
+        Self {
+            sums: rows.iter().map(|i| self.sums[*i]).collect(),
+            variances: self.variances.select_rows(rows),
+        }
+    }
+
     /// Factor of `size` times this covariance plus independent noise of the variances `beside`; `None` if the sum is not positive.
     pub(super) fn factor(&self, size: f64, beside: &DVector<f64>) -> Option<Factor> {
         let mut steps = Vec::with_capacity(self.sums.len());
@@ -152,11 +162,20 @@ impl Factor {
         if !white.iter().all(|v| v.is_finite()) {
             return None;
         }
-        let svd = white.svd(true, false);
+        // By the eigenvectors of the small normal matrix: a singular value decomposition of all rows for each level of the noise took most of the time of
+        // 1000 dwells. What is small beside the noise is lost in its rounding, and needs no decorrelation.
+        let eigen = SymmetricEigen::new(white.tr_mul(&white));
+        let counts = |k: &usize| eigen.eigenvalues[*k] > NEGLIGIBLE;
+        let kept: Vec<usize> = (0..white.ncols()).filter(counts).collect();
+        let variances = eigen.eigenvalues.select_rows(&kept);
+        let mut into = eigen.eigenvectors.select_columns(&kept);
+        for (mut column, variance) in into.column_iter_mut().zip(variances.iter()) {
+            column /= variance.sqrt();
+        }
         Some(Self::Common {
             noise: Box::new(self),
-            directions: svd.u?,
-            variances: svd.singular_values.map(|s| s * s),
+            directions: white * into,
+            variances,
         })
     }
 
@@ -212,6 +231,9 @@ impl Factor {
     }
 }
 
+/// Variance along a direction of common errors, relative to that of the noise, below which it is neglected.
+const NEGLIGIBLE: f64 = 1e-8;
+
 /// Decorrelates rows.
 pub struct Whitener<'a> {
     pub(super) variance: &'a VarianceModel<'a>,
@@ -238,18 +260,17 @@ impl Whitener<'_> {
 
 /// Decorrelates a choice of rows.
 pub struct DecorrelatedChoice {
-    pub(super) parts: Vec<(usize, Cholesky<f64, Dyn>)>,
+    pub(super) parts: Vec<(Range<usize>, Factor)>,
 }
 
 impl DecorrelatedChoice {
     /// `matrix`, a row for each of the chosen rows, decorrelated and in sigmas.
     pub fn whiten(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let mut out = matrix.clone();
-        for (from, factor) in &self.parts {
-            let count = factor.l_dirty().nrows();
-            let mut part = matrix.rows(*from, count).into_owned();
-            factor.l_dirty().solve_lower_triangular_mut(&mut part);
-            out.rows_mut(*from, count).copy_from(&part);
+        for (rows, factor) in &self.parts {
+            let mut part = matrix.rows_range(rows.clone()).into_owned();
+            factor.whiten(&mut part);
+            out.rows_range_mut(rows.clone()).copy_from(&part);
         }
         out
     }
