@@ -1,6 +1,7 @@
 //! Estimators and diagnosis from recording to result, on the virtual bench and on real units.
 
 mod agreement;
+mod bias_removal;
 mod coverage;
 mod diagnosis;
 mod few_poses;
@@ -22,6 +23,7 @@ mod record_player;
 mod recording_problems;
 mod several_recordings;
 mod signed_low_byte;
+mod slow_biases;
 mod stated_noise;
 mod strong_nonlinearity;
 mod temperature;

@@ -4,6 +4,7 @@ mod acceptance;
 mod hold_out;
 mod in_time;
 mod leftover;
+mod limit;
 mod model;
 mod nonlinear;
 mod reading;
@@ -33,6 +34,7 @@ use acceptance::Acceptance;
 use in_time::others_in_time;
 use leftover::leftover;
 pub(super) use leftover::noisier;
+use limit::name_limits;
 use reading::of_readings;
 use together::together;
 use tried::candidates;
@@ -119,6 +121,8 @@ pub struct Decision {
     pub reference_rms: f64,
     /// Accepted effects whose physics the rows do not decide.
     pub undecided: Vec<Undecided>,
+    /// Number of ends of dwells at which a jump of a bias was sought, and number of all.
+    pub jumps_sought: [usize; 2],
     /// Notes on the accepted effects for the user.
     pub notes: Vec<Note>,
     /// Number of rows, and of affine parameters that they determine first. A judgement can only use their difference.
@@ -245,6 +249,7 @@ pub fn decide(
         let mut failed_any = false;
         // Effects are judged with the coefficients that would be stored.
         search.complete(&mut kept, &mut with);
+        name_limits(&search, &mut kept, &mut with, &failures);
         // Effects that are not accepted are removed, the last in the list first.
         while let Some(failed) = judge.first_to_fail(&kept, &with, &passed)? {
             failed_any = true;
@@ -339,6 +344,11 @@ pub fn decide(
         });
         from += count;
     }
+    // A walk at random has steps that look like jumps.
+    jumps.retain(|one| {
+        let beside_it: Vec<Chosen> = kept.iter().chain([one]).cloned().collect();
+        judge.wanders([&kept, &beside_it], one, &with).is_none()
+    });
     // Beside the jumps that were found: otherwise every slow effect would seem to explain a little of them.
     let with_jumps: Vec<Chosen> = kept.iter().chain(&jumps).cloned().collect();
     let all = match jumps.is_empty() {
@@ -426,6 +436,7 @@ pub fn decide(
         undecided: undecided(&search, &kept),
         notes: [notes(rows, &kept), one_at_these_inputs].concat(),
         rows: [rows.y.len(), search.basis.ncols()],
+        jumps_sought: [dwell_ends.len(); 2],
         omnibus_p,
     })
 }
@@ -449,7 +460,7 @@ fn known_in(rows: &Rows) -> [f64; 2] {
         let count = judged.count();
         let by_reference = stratum.by_reference.as_ref();
         let by_reference = by_reference.map_or(0.0, |v| v.rows(0, count).sum());
-        sums[0] += stratum.known.diagonal().rows(0, count).sum() - by_reference;
+        sums[0] += stratum.known.diagonal().rows(0, count).sum();
         sums[1] += by_reference;
     }
     sums

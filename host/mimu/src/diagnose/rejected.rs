@@ -39,6 +39,8 @@ pub enum Reason {
     /// It lowers the held-out error, but has no known physics, and neither a second recording nor the user confirms it: the
     /// probability by chance.
     Suggestion(f64),
+    /// A bias that walks at random explains the rows as well: the probability by chance beside such a walk.
+    RandomWalk(f64),
     /// It was not chosen in the search.
     NotChosen(NotChosen),
     /// The calibration file with it errs more on this recording.
@@ -119,6 +121,14 @@ impl fmt::Display for Reason {
                 f,
                 "its evidence depends on one dwell and those in the same pose: without them, {}",
                 p_value(*p)
+            ),
+            Self::RandomWalk(p) => write!(
+                f,
+                "a bias that wanders at random explains the residuals as well: beside such a bias, {}",
+                match *p > CHANCE {
+                    true => "it is no better than chance".into(),
+                    false => p_value(*p),
+                }
             ),
             Self::Suggestion(p) => write!(
                 f,

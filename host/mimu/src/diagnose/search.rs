@@ -355,6 +355,12 @@ impl<'a> Search<'a> {
         judged
     }
 
+    /// The candidate of a named effect with all of its coefficients that the rows determine; `None` if it is not tried.
+    pub(super) fn candidate_of(&self, effect: &Effect) -> Option<&Candidate> {
+        let mut all = self.candidates.iter();
+        all.find(|c| matches!(c.kind, CandidateKind::Effect(e) if e == effect))
+    }
+
     /// How much lower the score is with `law` in place of `one` beside `rest`; negative if it is higher.
     pub fn worse_with(&self, law: &'static Effect, one: &Chosen, rest: &[Chosen]) -> Option<f64> {
         let null = self.fit(rest)?;

@@ -24,6 +24,7 @@ const ONSET: Option<NonlinearParameter> = Some(NonlinearParameter {
     from: 5.0,
     to: 200.0,
     role: Role::Scale,
+    limit: None,
 });
 
 const CREEP: [Coefficient; 3] = each(Regressor::Logarithm(Time), 1.0);

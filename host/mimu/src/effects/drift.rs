@@ -8,12 +8,17 @@ use crate::quantity::Sensor;
 const HOUR_S: f64 = 3600.0;
 
 /// A die of some tens of milliwatts and its package settle within minutes.
-const SETTLING: Option<NonlinearParameter> = Some(NonlinearParameter {
-    name: "time_constant_s",
-    from: 20.0,
-    to: 1200.0,
-    role: Role::Scale,
-});
+///
+/// The beginning of a settling that takes far longer than the recording is a straight line.
+const fn settling(line: &'static str) -> Option<NonlinearParameter> {
+    Some(NonlinearParameter {
+        name: "time_constant_s",
+        from: 20.0,
+        to: 1200.0,
+        role: Role::Scale,
+        limit: Some(line),
+    })
+}
 
 /// Time counts from the middle of the session, and no calibration stores the drift, because nobody knows how far a line continues. With a drift of 3
 /// deg/s/h counted from power-on, a session an hour away had 5.5 times the error that it had without.
@@ -49,7 +54,7 @@ pub(super) const EFFECTS: &[Effect] = &[
         sensor: Sensor::Gyro,
         about: "the bias settles exponentially since power-on",
         coefficients: &each(SETTLED, 0.5 * DPS),
-        parameter: SETTLING,
+        parameter: settling("gyro_bias_drift"),
         size: "0.5 deg/s (assumed)",
         needs: SETTLES,
         taken_for: "drift, thermal bias",
@@ -59,7 +64,7 @@ pub(super) const EFFECTS: &[Effect] = &[
         sensor: Sensor::Accel,
         about: "the bias settles exponentially since power-on",
         coefficients: &each(SETTLED, 5.0 * MG),
-        parameter: SETTLING,
+        parameter: settling("accel_bias_drift"),
         size: "5 mg (assumed)",
         needs: SETTLES,
         taken_for: "drift, thermal bias",

@@ -31,6 +31,9 @@ pub struct NonlinearParameter {
     pub to: f64,
     /// Its role.
     pub role: Role,
+    /// Id of the effect that this one becomes as the parameter grows without bound; `None` if there is none. If the rows leave the parameter open
+    /// towards this limit, the limit is named: it explains them as well, with one number less.
+    pub limit: Option<&'static str>,
 }
 
 /// One coefficient.

@@ -77,6 +77,22 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_limit_of_an_effect_is_a_simpler_effect_of_the_same_sensor_and_axes() {
+        for effect in all() {
+            let Some(limit) = effect.parameter.and_then(|p| p.limit) else {
+                continue;
+            };
+            let limit = by_id(limit).expect(effect.id);
+            assert_eq!(limit.sensor, effect.sensor, "{}", effect.id);
+            assert!(limit.parameter.is_none(), "{}", effect.id);
+            for coefficient in effect.of_unit() {
+                let mut alike = limit.of_unit().filter(|c| c.axis == coefficient.axis);
+                assert!(alike.next().is_some(), "{}", effect.id);
+            }
+        }
+    }
+
     /// The lists and the device agree on how often an effect has to be evaluated.
     #[test]
     fn the_device_folds_what_moves_with_temperature_and_time_only() {

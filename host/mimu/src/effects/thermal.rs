@@ -51,12 +51,16 @@ const fn behind(slope: f64, at_start: f64) -> [Coefficient; 6] {
 
 const SCALE: [Coefficient; 3] = each(times(Temperature, Input), 3e-4);
 
-const LAG: Option<NonlinearParameter> = Some(NonlinearParameter {
-    name: "lag_s",
-    from: 5.0,
-    to: 600.0,
-    role: Role::Lag,
-});
+/// A temperature that lags by far more than the recording lasts is constant, so its difference from the thermometer's is that of the thermal bias.
+const fn lag(bias: &'static str) -> Option<NonlinearParameter> {
+    Some(NonlinearParameter {
+        name: "lag_s",
+        from: 5.0,
+        to: 600.0,
+        role: Role::Lag,
+        limit: Some(bias),
+    })
+}
 
 const SWEEP: &str = "temp_c, and the dwells at temperatures 20 °C apart";
 const RAMP: &str = "temp_c, and a ramp up and down at some °C a minute";
@@ -130,7 +134,7 @@ pub(super) const EFFECTS: &[Effect] = &[
         about: "die and package lag behind the thermometer: a loop on ramps",
         // At the start: some kelvins of self-heating.
         coefficients: &behind(0.1 * DPS, 0.3 * DPS),
-        parameter: LAG,
+        parameter: lag("gyro_thermal_bias"),
         size: "as the thermal bias; at the start 0.3 deg/s",
         needs: RAMP,
         taken_for: "thermal bias, on a one-way ramp",
@@ -140,7 +144,7 @@ pub(super) const EFFECTS: &[Effect] = &[
         sensor: Sensor::Accel,
         about: "die and package lag behind the thermometer: a loop on ramps",
         coefficients: &behind(2.0 * MG, 6.0 * MG),
-        parameter: LAG,
+        parameter: lag("accel_thermal_bias"),
         size: "as the thermal bias; at the start 6 mg",
         needs: RAMP,
         taken_for: "thermal bias, on a one-way ramp",

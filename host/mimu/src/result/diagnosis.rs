@@ -123,6 +123,8 @@ pub struct SensorDiagnosisResult {
     pub explained: Option<f64>,
     /// Notes on the accepted effects for the user.
     pub notes: Vec<Note>,
+    /// Number of ends of dwells at which a jump of a bias was sought, and number of all: in a long recording not at every one.
+    pub jumps_sought: [usize; 2],
     /// Residuals that the model is fitted to.
     pub rows: usize,
     /// Affine parameters that they determine first.
@@ -269,6 +271,7 @@ fn figures(d: &Diagnosis, found: &SensorDiagnosis) -> SensorDiagnosisResult {
         reference_rms: decision.reference_rms,
         explained: decision.explained(),
         notes: decision.notes.clone(),
+        jumps_sought: decision.jumps_sought,
         rows: decision.rows[0],
         affine_parameters: decision.rows[1],
         omnibus_chance: decision.omnibus_p,

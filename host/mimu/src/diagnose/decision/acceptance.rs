@@ -9,8 +9,9 @@ use super::second::second;
 use super::{LEVERAGE, SURVIVES, Second, coefficients_of, held_out, rms};
 use crate::diagnose::rejected::{ErrorRms, Reason};
 use crate::diagnose::rows::Rows;
-use crate::diagnose::search::{Chosen, Search};
-use crate::diagnose::variance::Fitted;
+use crate::diagnose::search::{Chosen, FALSE_LISTED, Search};
+use crate::diagnose::variance::{CommonWalk, Fitted};
+use crate::effects::candidate::CandidateKind;
 use crate::effects::fitted::FittedEffect;
 use crate::fit::Split;
 
@@ -141,7 +142,8 @@ impl<'a> Acceptance<'a> {
                 _ => self
                     .not_held_out(&both, (split, with), &kept[at], seconds[at])
                     .or_else(|| self.below_noise([&rest, kept]))
-                    .or_else(|| self.lost_with_a_dwell([&rest, kept], &kept[at], with)),
+                    .or_else(|| self.lost_with_a_dwell([&rest, kept], &kept[at], with))
+                    .or_else(|| self.wanders([&rest, kept], &kept[at], with)),
             };
             if let Some(why) = why {
                 return Some(Some(Failed {
@@ -215,6 +217,29 @@ impl<'a> Acceptance<'a> {
         let [rest, kept] = models.map(|m| self.search.model(m));
         let p = chance_without_a_dwell(self.search, one, [&rest, &kept], with)?;
         (p > SURVIVES).then_some(Reason::LostWithDwell(p))
+    }
+
+    /// Why `one`, which only the second of the `models` has, does not explain more than a bias that wanders at random.
+    pub fn wanders(&self, models: [&[Chosen]; 2], one: &Chosen, with: &Fitted) -> Option<Reason> {
+        let jumps = matches!(one.candidate.kind, CandidateKind::Jump { .. });
+        if !(jumps || one.candidate.is_slow_bias()) {
+            return None;
+        }
+        let walk = CommonWalk::of(self.rows)?;
+        let columns = models.map(|m| self.search.model(m));
+        let deviances = columns.each_ref().map(|columns| {
+            let variance = &self.search.variance;
+            variance.deviance_beside_walk(columns, &walk, &with.components)
+        });
+        let [Some(without), Some(with)] = deviances else {
+            return None;
+        };
+        let before = columns[0].ncols();
+        let drop = without - with;
+        let p = self
+            .search
+            .chance(drop, one.columns.ncols(), before, &one.candidate);
+        (p > FALSE_LISTED).then_some(Reason::RandomWalk(p))
     }
 
     /// Removes suggestions from `kept`: products without known physics that neither the second recording nor the user confirms.

@@ -163,7 +163,12 @@ impl Search<'_> {
 
     /// For chosen effect `k` beside the others: the drop in deviance, its probability by chance corrected for the number of tests, and
     /// the fit without it.
-    fn without(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Option<(f64, f64, Fitted)> {
+    pub(in crate::diagnose) fn without(
+        &self,
+        chosen: &[Chosen],
+        k: usize,
+        now: &Fitted,
+    ) -> Option<(f64, f64, Fitted)> {
         let mut rest = chosen.to_vec();
         let one = rest.remove(k);
         let without = self.fit(&rest)?;
