@@ -24,6 +24,13 @@ pub fn of_calibration(calibration: &Calibration, export: &Export) -> Vec<String>
                 table.raw_unit, table.unit, table.frame
             ));
         }
+        let effects = calibration.effects_of(sensor);
+        if !effects.is_empty() {
+            lines.push(format!(
+                "{sensor}: right only with the effects {}: x = C (u - S e) + o, with e their error and S the scale factors",
+                effects.join(", ")
+            ));
+        }
     }
     lines.extend(notes_and_remaining(export));
     lines

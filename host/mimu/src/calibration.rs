@@ -304,6 +304,12 @@ impl Calibration {
         &self.effects
     }
 
+    /// Ids of the effects of `sensor`. Its C and o were fitted together with them, and are right only with them.
+    pub fn effects_of(&self, sensor: Sensor) -> Vec<String> {
+        let own = self.effects.iter().filter(|e| e.sensor() == sensor);
+        own.map(FittedEffect::id).collect()
+    }
+
     /// The table of `sensor`.
     pub fn table(&self, sensor: Sensor) -> Option<&TriadTable> {
         match sensor {

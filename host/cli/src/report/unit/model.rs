@@ -16,7 +16,7 @@ pub fn section(calibration: &Calibration) -> Markup {
             @if let Some(table) = calibration.table(sensor) {
                 h3 class="sensor" { (spoken(sensor)) }
                 (physical(table))
-                (matrix(sensor, table))
+                (matrix(sensor, table, &calibration.effects_of(sensor)))
             }
         }
     }
@@ -85,15 +85,23 @@ fn digits(value: f64) -> String {
     }
 }
 
-fn matrix(sensor: Sensor, table: &TriadTable) -> Markup {
+fn matrix(sensor: Sensor, table: &TriadTable, effects: &[String]) -> Markup {
     let input = match sensor {
         Sensor::Gyro => "rate",
         Sensor::Accel => "specific force",
     };
+    let formula = match effects.is_empty() {
+        true => "C u + o",
+        false => "C (u - S e) + o",
+    };
     html! {
         div class="scroll" { table {
             caption {
-                "To apply it: " (input) " = C u + o, with u the reading in " (table.raw_unit.to_string()) "; " (table.direction) ", in " (table.unit)
+                "To apply it: " (input) " = " (formula) ", with u the reading in " (table.raw_unit.to_string()) "; " (table.direction) ", in " (table.unit)
+                @if !effects.is_empty() {
+                    ". e is the error by " (effects.join(", ")) ", in " (table.unit)
+                    "; S is diagonal, and converts it to readings by the scale factors. C and o are right only with these effects"
+                }
             }
             thead { tr { th { "axis" } th class="n" { "C, x" } th class="n" { "C, y" } th class="n" { "C, z" } th class="n" { "o" } } }
             tbody {
