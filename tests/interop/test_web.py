@@ -38,6 +38,9 @@ def test_the_example_gives_what_the_command_gives(page, tmp_path):
     diagnosis = json.loads(run("diagnose", "rec", "--json", "-", cwd=tmp_path))
     same(json.loads(taken_away(page, "fit.json")), fit, "fit")
     same(json.loads(taken_away(page, "diagnosis.json")), diagnosis, "diagnosis")
+    judgement = diagnosis["judgement"]
+    assert page.inner_text("#judgement") == f"{judgement['kind'].capitalize()}: {judgement['reason']}."
+    assert page.eval_on_selector("#judgement", "shown => shown.previousElementSibling.id") == "result-title"
     assert page.inner_text("#verdict").startswith("Clean")
     assert diagnosis["verdict"] == "clean"
     assert f"{len(fit['dwells'])} poses" in page.inner_text("#next")
@@ -68,10 +71,11 @@ def test_columns_are_taken_by_their_names_and_can_be_corrected(page, tmp_path):
     page.wait_for_selector("#columns:not([hidden])")
     shown = page.eval_on_selector_all("#files select", "all => all.map(select => select.value)")
     assert shown == ["t_s", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
+    # No name has a unit: gravity is 9.8, and turns as the gyro reads in rad/s.
     assert page.input_value("#accel-unit") == "m/s²"
+    assert page.input_value("#gyro-unit") == "rad/s"
     page.select_option("#role-0-4", "accel_y")
     page.select_option("#role-0-5", "accel_x")
-    page.select_option("#gyro-unit", "rad/s")
     page.fill("#gravity", "9.80665")
     calibrate(page)
     assert page.inner_text("#error") == ""
@@ -83,6 +87,25 @@ def test_columns_are_taken_by_their_names_and_can_be_corrected(page, tmp_path):
     assert numpy.allclose(diagonal, [1.005, 0.998, 1.01], atol=2e-3)
 
 
+@pytest.mark.parametrize(("gyro", "accel"), [("deg/s", "g"), ("rad/s", "m/s²"), ("mdeg/s", "mg")])
+def test_units_are_those_in_which_gravity_is_gravity_and_turns_as_the_gyro_reads(page, tmp_path, gyro, accel):
+    per_si = {"rad/s": 1, "deg/s": 180 / numpy.pi, "mdeg/s": 180e3 / numpy.pi, "m/s²": 1, "g": 1 / web_logs.G, "mg": 1e3 / web_logs.G}
+    rows = web_logs.by_hand()
+    rows[:, 1:4] *= per_si[gyro]
+    rows[:, 4:] *= per_si[accel]
+    web_logs.write_csv(tmp_path / "log.csv", rows)
+    page.set_input_files("#file", tmp_path / "log.csv")
+    page.wait_for_selector("#columns:not([hidden])")
+    assert [page.input_value(f"#{sensor}-unit") for sensor in ["gyro", "accel"]] == [gyro, accel]
+    page.fill("#gravity", "9.80665")
+    calibrate(page)
+    assert page.inner_text("#error") == ""
+    fit = json.loads(taken_away(page, "fit.json"))
+    for sensor, made in [("gyro", [1.01, 0.99, 1.02]), ("accel", [1.005, 0.998, 1.01])]:
+        scale = [p["value"] for p in fit["sensors"][sensor]["parameters"] if p["name"].startswith("scale_")]
+        assert numpy.allclose(scale, made, atol=4e-3), (sensor, scale)
+
+
 def test_a_parquet_file_is_read(page, tmp_path):
     web_logs.write_csv(tmp_path / "log.csv", web_logs.by_hand())
     # mimu's own recordings are compressed with zstd.
@@ -92,7 +115,6 @@ def test_a_parquet_file_is_read(page, tmp_path):
     )  # fmt: skip
     page.set_input_files("#file", tmp_path / "rec" / "samples.parquet")
     page.wait_for_selector("#columns:not([hidden])")
-    page.select_option("#gyro-unit", "rad/s")
     calibrate(page)
     assert page.inner_text("#error") == ""
     ours = json.loads(taken_away(page, "fit.json"))["sensors"]
@@ -110,7 +132,6 @@ def test_several_recordings_of_a_unit_are_diagnosed_as_by_the_command(page, tmp_
     page.set_input_files("#file", [tmp_path / "day-1.csv", tmp_path / "day-2.csv"])
     page.wait_for_selector("#columns:not([hidden])")
     page.select_option("#several", several)
-    page.select_option("#gyro-unit", "rad/s")
     page.fill("#gravity", "9.80665")
     calibrate(page)
     assert page.inner_text("#error") == ""
@@ -192,6 +213,10 @@ def test_noise_of_a_unit_at_rest_gives_the_file_of_an_estimator(page, tmp_path):
     web_logs.write_csv(tmp_path / "rest.csv", rows)
     page.set_input_files("#file", tmp_path / "rest.csv")
     page.wait_for_selector("#columns:not([hidden])")
+    # At rest nothing shows the unit of a gyro, so nothing begins before it is chosen.
+    assert page.input_value("#gyro-unit") == ""
+    page.click("#noise")
+    assert page.is_hidden("#work")
     page.select_option("#gyro-unit", "rad/s")
     page.click("#noise")
     page.wait_for_selector("#away:not([hidden])", timeout=PATIENCE)
@@ -203,6 +228,45 @@ def test_noise_of_a_unit_at_rest_gives_the_file_of_an_estimator(page, tmp_path):
     density = float(next(line for line in text.splitlines() if line.startswith("gyroscope_noise_density")).split(":")[1].split("#")[0])
     # White noise of 2 mrad/s at 100 Hz.
     assert abs(density / (2e-3 / numpy.sqrt(100)) - 1) < 0.05
+
+
+def test_noise_and_calibration_of_different_units_are_kept_apart(page, tmp_path):
+    page.click("#example")
+    page.wait_for_selector("#away:not([hidden])", timeout=PATIENCE)
+    random = numpy.random.default_rng(3)
+    rows = numpy.zeros((60_000, 7))
+    rows[:, 0] = numpy.arange(len(rows)) / 100
+    rows[:, 1:4] = random.normal(0, 2e-3, (len(rows), 3))
+    rows[:, 4:] = random.normal([0, 0, 9.80665], 2e-2, (len(rows), 3))
+    web_logs.write_csv(tmp_path / "rest.csv", rows)
+
+    def kalibr():
+        page.select_option("#gyro-unit", "rad/s")
+        page.click("#noise")
+        page.wait_for_selector("#work:not([hidden]) #progress[hidden]", state="attached", timeout=PATIENCE)
+        assert page.inner_text("#error") == ""
+        page.select_option("#format", label="Kalibr (imu.yaml)")
+        with page.expect_download() as download:
+            page.click("#export")
+        return pathlib.Path(download.value.path()).read_text()
+
+    def density(text):
+        line = next(line for line in text.splitlines() if line.startswith("accelerometer_noise_density"))
+        return float(line.split(":")[1].split("#")[0])
+
+    page.set_input_files("#file", tmp_path / "rest.csv")
+    page.wait_for_selector("#columns:not([hidden])")
+    text = kalibr()
+    assert abs(density(text) / (2e-2 / numpy.sqrt(100)) - 1) < 0.05
+    assert "accelerometers:" not in text and "unit rest" in page.inner_text("#made-from")
+    # Said to be the unit of the example, whose calibration is for counts.
+    page.set_input_files("#file", tmp_path / "rest.csv")
+    page.wait_for_selector("#columns:not([hidden])")
+    page.select_option("#unit", "1")
+    text = kalibr()
+    assert abs(density(text) / (2e-2 / numpy.sqrt(100)) - 1) < 0.05
+    assert "accelerometers:" not in text
+    assert "count" in page.inner_text("#warnings") and "kept apart" in page.inner_text("#made-from")
 
 
 def test_work_can_be_cancelled_and_begun_again(page, tmp_path):

@@ -125,7 +125,7 @@ function showLine({ shown, names, rows, columns, by_readings: guessed, si }) {
       return item;
     }),
   );
-  if (!board.asked && si) $("board-unit").value = "SI";
+  if (!board.asked) $("board-unit").value = si === null ? "" : si ? "SI" : "count";
   $("line-taken").textContent = guessed
     ? "The lines have no names, so they were guessed from the readings at rest. Check them: accelerometer and gyro are easily exchanged."
     : "By the names that the board writes. Correct what is wrong.";

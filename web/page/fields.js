@@ -27,8 +27,8 @@ export const FIELD_OF = {
   "--steps": "more-fit", "--only": "more-fit", "--keep": "more-fit",
 };
 
-/** Shows the columns of `looked`, the answer of `columns`, each with its guessed role. */
-export function show(looked) {
+/** Shows the columns of `looked`, the answer of `columns`, each with its guessed role, and `units`, from which the log may be. */
+export function show(looked, units) {
   const lists = looked.files.map((file, k) => {
     const columns = file.roles.map((role, at) => {
       const name = file.names[at] ?? `column ${at + 1}`;
@@ -60,10 +60,13 @@ export function show(looked) {
         : "By the names in the file. Correct what is wrong.";
   const say = (id, value) => ($(id).value = value);
   const of = (key) => files.map((file) => file[key]).find(Boolean);
-  const si = preset?.raw_unit === "SI";
-  say("accel-unit", si ? "m/s²" : (of("accel_unit") ?? "count"));
-  say("gyro-unit", si ? "rad/s" : (of("gyro_unit") ?? "count"));
+  for (const [sensor, si] of [["accel", "m/s²"], ["gyro", "rad/s"]]) {
+    say(`${sensor}-unit`, preset?.raw_unit === "SI" ? si : (preset?.raw_unit ?? looked.units[sensor]?.unit ?? ""));
+    $(`${sensor}-unit`).onchange = follow;
+  }
   say("time-unit", preset ? "" : (of("time_unit") ?? ""));
+  $("unit").replaceChildren(...units.map(({ name, from }, value) => made("option", { value, textContent: value ? `${name} again, as ${from}` : `a new unit, ${name}` })));
+  $("unit-field").hidden = units.length < 2;
   follow();
 
   function follow() {
@@ -72,6 +75,8 @@ export function show(looked) {
     const log = files.some((file) => file.log);
     $("accel-unit-field").hidden = log || !has("accel_");
     $("gyro-unit-field").hidden = log || !has("gyro_");
+    for (const sensor of ["accel", "gyro"]) $(`${sensor}-unit`).required = !$(`${sensor}-unit-field`).hidden;
+    $("units-by").textContent = log || preset?.raw_unit ? "" : unitsBy(looked.units, has);
     $("time-unit-field").hidden = log || !has("t_s");
     $("rate-field").hidden = log;
     const timeless = !log && !has("t_s");
@@ -81,6 +86,18 @@ export function show(looked) {
     $("several-field").hidden = files.length < 2;
     if (has("ref_")) say("reference", "table");
   }
+}
+
+/** Why the units are what they are, and what is open. */
+function unitsBy(units, has) {
+  const present = [["Accelerometer", "accel"], ["Gyro", "gyro"]].filter(([, sensor]) => has(`${sensor}_`));
+  const lines = present.filter(([, sensor]) => units[sensor]).map(([name, sensor]) => {
+    const { unit, reason } = units[sensor];
+    return `${name}: ${reason}${unit ? "" : "; choose the unit"}.`;
+  });
+  const si = present.map(([, sensor]) => $(`${sensor}-unit`).value in TO_SI[sensor]);
+  if (si.includes(true) && si.includes(false)) lines.push("A recording has one unit for both sensors: if only one of them is in SI, both are imported as counts.");
+  return lines.join(" ");
 }
 
 /** Role of each column of each file. */
@@ -96,11 +113,10 @@ export function cut(text) {
 /** How several files belong together: joined, one pose each, or separate recordings. */
 export const several = (looked) => (looked.files.length > 1 ? $("several").value : "");
 
-/** The arguments of `mimu import` without its output, for each recording that the files of `looked` make. */
-export function imports(looked, names) {
+/** The arguments of `mimu import` without its output, for each recording of the unit `device` that the files of `looked` make. */
+export function imports(looked, names, device) {
   const roles = chosen();
   const alone = ["joint", "verify"].includes(several(looked));
-  const device = names[0].replace(/\.[^.]*$/, "");
   if (!alone) return [importArguments(looked, names, roles, device)];
   return names.map((name, k) => importArguments({ ...looked, files: [looked.files[k]] }, [name], [roles[k]], device, alone));
 }

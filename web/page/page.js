@@ -8,10 +8,16 @@ import { Cancelled, Program, Refused, load } from "./program.js";
 import { sphere } from "./sphere.js";
 
 /**
- * The files that were dropped last and what was found in them, or a later session with a board; and the results from these and earlier ones, as
- * the text of each file.
+ * The files that were dropped last and what was found in them, or a later session with a board; the units with results, those of them that were
+ * `offered` for these files beside a new one, `dropped`; and the `unit` at work.
  */
-const state = { files: [], looked: null, session: null, recordings: ["rec"], program: null, calibration: null, noise: null, from: {}, example: false };
+const state = { files: [], looked: null, session: null, recordings: ["rec"], program: null, units: [], offered: [], dropped: null, unit: null, example: false };
+
+/** A unit without results. `calibration` and `noise` become { text, rawUnit, from }: a file, the unit of the readings that it is for, and the name of their log. */
+const newUnit = (name) => ({ name, calibration: null, noise: null });
+
+/** The results that `unit` has, by the names of their files. */
+const resultsOf = (unit) => ["calibration", "noise"].filter((of) => unit[of]).map((of) => [`${of}.toml`, unit[of]]);
 
 /** Text in which each argument of the command links to the field that sets it. */
 function withFields(text, fields = FIELD_OF) {
@@ -88,7 +94,9 @@ async function open(files) {
     const mimu = await program();
     const done = await mimu.run("columns", ...state.files.map(({ name }) => name));
     state.looked = JSON.parse(done.stdout);
-    show(state.looked);
+    Object.assign(state, { dropped: newUnit(state.files[0].name.replace(/\.[^.]*$/, "")), offered: [...state.units] });
+    const known = state.offered.map((unit) => ({ name: unit.name, from: resultsOf(unit).at(-1)[1].from }));
+    show(state.looked, [state.dropped, ...known]);
     $("columns").hidden = false;
     $("columns-title").focus();
   });
@@ -123,8 +131,8 @@ async function compute(steps) {
   $("result").hidden = true;
   $("work").hidden = $("progress").hidden = false;
   $("work-title").focus();
-  for (const id of ["steps", "errors", "warnings", "allan", "trace", "sphere", "kept", "next", "exported", "verdict"]) $(id).replaceChildren();
-  for (const id of ["report-part", "away", "pictures", "verdict"]) $(id).hidden = true;
+  for (const id of ["steps", "errors", "warnings", "allan", "trace", "sphere", "kept", "next", "exported", "verdict", "judgement"]) $(id).replaceChildren();
+  for (const id of ["report-part", "away", "pictures", "verdict", "judgement"]) $(id).hidden = true;
   await guarded(async () => {
     try {
       await steps(await program());
@@ -138,7 +146,9 @@ async function compute(steps) {
 /** Imports the dropped files as the form says. */
 async function imported(mimu) {
   const names = state.files.map(({ name }) => name);
-  const all = imports(state.looked, names);
+  const again = Number($("unit").value);
+  state.unit = again ? state.offered[again - 1] : state.dropped;
+  const all = imports(state.looked, names, state.unit.name);
   state.recordings = all.map((_, k) => (k ? `rec-${k + 1}` : "rec"));
   for (const [k, args] of all.entries()) {
     await step(all.length > 1 ? `Import of ${names[k]}` : "Import", () => mimu.run(...args, "-o", state.recordings[k]));
@@ -169,16 +179,19 @@ async function fitted(mimu, name, more, verify = [], others = []) {
   picture(JSON.parse(view.stdout));
   $("result").hidden = false;
   if (fit instanceof Refused) throw fit;
-  state.calibration = await mimu.text("cal.toml");
-  state.from["calibration.toml"] = name;
-  warn((await mimu.json("fit.json")).warnings);
+  keepResult("calibration", await mimu.text("cal.toml"), await rawUnit(mimu), name);
+  const fitted = await mimu.json("fit.json");
+  judge(fitted);
+  warn(fitted.warnings);
   $("errors").replaceChildren(printed("mimu fit", fit));
   const shared = more.filter((_, k) => more[k] !== "--only" && more[k - 1] !== "--only");
   const page = ["-o", "calibration.toml", "--json", "diagnosis.json", "--page", "diagnosis.html"];
   const found = await step("Diagnosis", () => mimu.run("diagnose", rec, ...others, ...page, ...shared, ...verify.slice(0, 2))).catch(refusal);
   if (!(found instanceof Refused)) {
-    state.calibration = await mimu.text("calibration.toml");
-    warn((await mimu.json("diagnosis.json")).warnings);
+    state.unit.calibration.text = await mimu.text("calibration.toml");
+    const diagnosed = await mimu.json("diagnosis.json");
+    judge(diagnosed);
+    warn(diagnosed.warnings);
     verdict(await mimu.text("diagnosis.html"));
     const given = ["--calibration", "calibration.toml", ...verify, ...optionsOf(more, OF_REPORT)];
     await step("Report", () => mimu.run("report", rec, ...others, ...given, "-o", "report.html"));
@@ -191,7 +204,7 @@ async function fitted(mimu, name, more, verify = [], others = []) {
 /** Calibrates from the recordings of a session with the board called `name`. */
 async function finished(files, name) {
   cancel();
-  Object.assign(state, { files: [], session: { files }, recordings: ["session/calibration"] });
+  Object.assign(state, { files: [], session: { files }, recordings: ["session/calibration"], unit: newUnit(name) });
   $("columns").hidden = true;
   const verify = files.has("verification/samples.csv") ? ["--verify", "session/verification"] : [];
   await compute((mimu) => fitted(mimu, `the session with ${name}`, [], verify));
@@ -199,14 +212,19 @@ async function finished(files, name) {
 
 async function noise(mimu) {
   await imported(mimu);
-  const by = state.calibration ? ["--calibration", "before.toml"] : [];
-  if (state.calibration) await mimu.write("before.toml", state.calibration);
+  const before = state.unit.calibration;
+  const unit = await rawUnit(mimu);
+  const fits = before?.rawUnit === unit;
+  if (before && !fits) warn([`The calibration of ${state.unit.name} is for readings in ${before.rawUnit}, and this log is in ${unit}: the noise is computed without it.`]);
+  const by = fits ? ["--calibration", "before.toml"] : [];
+  if (fits) await mimu.write("before.toml", before.text);
   const files = ["-o", "noise.toml", "--json", "allan.json", "--plot", "allan.svg"];
   const done = await step("Allan deviation", () => mimu.run("allan", "rec", ...files, ...by));
   if (state.recordings.length > 1) warn([`The noise is that of ${state.files[0].name} alone.`]);
-  state.noise = await mimu.text("noise.toml");
-  state.from["noise.toml"] = state.files[0].name;
-  warn((await mimu.json("allan.json")).warnings);
+  keepResult("noise", await mimu.text("noise.toml"), unit, state.files[0].name);
+  const found = await mimu.json("allan.json");
+  judge(found);
+  warn(found.warnings);
   const plot = new DOMParser().parseFromString(await mimu.text("allan.svg"), "image/svg+xml").documentElement;
   $("allan").replaceChildren(document.importNode(plot, true), printed("mimu allan", done));
   $("result").hidden = false;
@@ -255,6 +273,13 @@ function picture(view) {
   $("next").textContent = `${view.poses.length} poses: the direction that is up, in the body frame. Equal areas. ${most}`;
 }
 
+/** Shows the judgement of a result, before anything else of it. */
+function judge({ judgement: { kind, reason } }) {
+  $("judgement").className = `judged ${kind}`;
+  $("judgement").replaceChildren(made("strong", { textContent: kind }), `: ${reason}.`);
+  $("judgement").hidden = false;
+}
+
 /** Shows the verdict and the errors of a diagnosis. */
 function verdict(html) {
   const parsed = new DOMParser().parseFromString(html, "text/html");
@@ -286,11 +311,28 @@ function save(name, bytes) {
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
 }
 
+/** Unit of the readings of the recording at work. */
+async function rawUnit(mimu) {
+  return /^raw_unit = "(.*)"$/m.exec(await mimu.text(`${state.recordings[0]}/recording.toml`))[1];
+}
+
+/** Keeps a result for the unit at work. */
+function keepResult(of, text, rawUnit, from) {
+  state.unit[of] = { text, rawUnit, from };
+  if (!state.units.includes(state.unit)) state.units.push(state.unit);
+}
+
+/** Results of the unit from which one export can be made: all of them, or those for readings in the unit of the last log. */
+async function together(mimu) {
+  const unit = await rawUnit(mimu);
+  return resultsOf(state.unit).filter(([, result]) => result.rawUnit === unit);
+}
+
 /** Offers the files made from this recording, and the formats for which the results suffice. */
 async function keep(mimu, files) {
-  const ours = { "calibration.toml": state.calibration, "noise.toml": state.noise };
-  for (const [name, text] of Object.entries(ours)) if (text) await mimu.write(name, text);
-  const all = [...Object.keys(ours), ...files].map((name) => [name, name]);
+  const results = await together(mimu);
+  for (const [name, { text }] of results) await mimu.write(name, text);
+  const all = [...results.map(([name]) => name), ...files].map((name) => [name, name]);
   for (const [k, rec] of state.recordings.entries()) {
     const names = [...(await mimu.read(rec)).keys()];
     all.push(...names.map((name) => [`${rec}/${name}`, k ? `${rec}-${name}` : name]));
@@ -302,11 +344,15 @@ async function keep(mimu, files) {
     button.addEventListener("click", () => guarded(async () => save(name, await mimu.read(from))));
     $("kept").append(button);
   }
-  const option = ({ name, file, of }, k) => made("option", { value: k, textContent: `${name} (${file})`, disabled: !state[of] });
+  const has = (of) => results.some(([name]) => name === `${of}.toml`);
+  const option = ({ name, file, of }, k) => made("option", { value: k, textContent: `${name} (${file})`, disabled: !has(of) });
   $("format").replaceChildren(...FORMATS.map(option));
-  $("format").value = FORMATS.findIndex(({ of }) => state[of]);
-  const from = Object.entries(state.from).map(([file, of]) => `${file} is from ${of}.`);
-  if (!state.noise) from.push("Formats of estimators (Kalibr, OpenVINS ...) are made from noise: drop a recording at rest, and press “Noise of a unit at rest”.");
+  $("format").value = FORMATS.findIndex(({ of }) => has(of));
+  const from = resultsOf(state.unit).map(([name, result]) => {
+    const apart = results.some(([file]) => file === name) ? "" : "; its readings are in another unit than those of this log, so it is kept apart";
+    return `${name} is that of the unit ${state.unit.name}, from ${result.from}, for readings in ${result.rawUnit}${apart}.`;
+  });
+  if (!has("noise")) from.push("Formats of estimators (Kalibr, OpenVINS ...) are made from noise: drop a recording at rest, and press “Noise of a unit at rest”.");
   $("made-from").textContent = from.join(" ");
   $("away").hidden = false;
   $("result-title").focus();
@@ -317,7 +363,7 @@ async function takeAway() {
   $("exported").replaceChildren();
   await guarded(async () => {
     const mimu = state.program;
-    const from = ["calibration", "noise"].filter((of) => state[of]).flatMap((of) => [`--${of}`, `${of}.toml`]);
+    const from = (await together(mimu)).flatMap(([name]) => [`--${name.split(".")[0]}`, name]);
     const of = args.map((argument) => (argument === "rec" ? state.recordings[0] : argument));
     const done = await mimu.run("export", ...of, ...from, "-o", file);
     save(file, await mimu.read(file));
@@ -353,7 +399,7 @@ $("columns").addEventListener("submit", (event) => {
   event.preventDefault();
   compute(calibrate);
 });
-$("noise").addEventListener("click", () => compute(noise));
+$("noise").addEventListener("click", () => $("columns").reportValidity() && compute(noise));
 addEventListener("dragover", (event) => {
   event.preventDefault();
   $("drop").classList.add("over");

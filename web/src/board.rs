@@ -6,7 +6,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_wizard::text_line::numbers;
 use serde::Serialize;
 
-use crate::columns::{Guess, guess};
+use crate::columns::{Guess, Units, guess};
 
 /// Last lines that are examined; earlier ones may be a greeting.
 const LOOKED_AT: usize = 200;
@@ -26,8 +26,8 @@ pub struct Lines {
     columns: Vec<&'static str>,
     /// Whether the roles follow from the readings alone.
     by_readings: bool,
-    /// Whether the readings are in SI by their names.
-    si: bool,
+    /// Whether the readings are in SI; `None` if one sensor's are, and those of the other may be.
+    si: Option<bool>,
 }
 
 /// The label of each number of a line, if each has one (`ax:1,ay:2`).
@@ -123,7 +123,11 @@ fn look(text: &str, seconds: f64) -> Lines {
     };
     found.columns = guessed.roles.iter().enumerate().map(column).collect();
     found.by_readings = guessed.by_readings;
-    found.si = guessed.gyro_unit == Some("rad/s") && guessed.accel_unit == Some("m/s²");
+    found.si = match Units::of(&[&guessed], std::slice::from_ref(&rows)).known() {
+        [Some("rad/s"), Some("m/s²")] => Some(true),
+        [None, Some("m/s²")] => None,
+        _ => Some(false),
+    };
     found.rows = rows[rows.len().saturating_sub(SHOWN)..].to_vec();
     found
 }

@@ -4,6 +4,7 @@
 //! readings is the accelerometer, because gravity is large compared with the rate of a unit at rest. This may be wrong for readings with a large
 //! bias, so the page asks to check it.
 
+use mimu_recording::units::{Series, UnitFound, accel_unit, gyro_unit};
 use serde::Serialize;
 
 /// Units in which a triad or the time may be written, with the spellings in the names of columns.
@@ -37,7 +38,7 @@ pub struct Guess {
     pub roles: Vec<&'static str>,
     /// Unit of the gyro, if the names of its columns contain it.
     pub gyro_unit: Option<&'static str>,
-    /// Unit of the accelerometer, by the names of its columns or the magnitude of its readings.
+    /// Unit of the accelerometer, if the names of its columns contain it.
     pub accel_unit: Option<&'static str>,
     /// Unit of the time stamps, if the name of their column contains it.
     pub time_unit: Option<&'static str>,
@@ -161,9 +162,6 @@ pub fn guess(file: &str, names: &[String], rows: &[Vec<f64>]) -> Guess {
         unit(&named(&["t_s"]), &TIME_UNITS),
     ];
     [guess.gyro_unit, guess.accel_unit, guess.time_unit] = found;
-    if guess.accel_unit.is_none() {
-        guess.accel_unit = by_size(&guess.roles, rows);
-    }
     guess
 }
 
@@ -239,31 +237,70 @@ fn by_readings(file: &str, width: usize, rows: &[Vec<f64>]) -> Guess {
     }
 }
 
-/// Unit of an accelerometer, if the median magnitude of its readings is one g in it.
-fn by_size(roles: &[&'static str], rows: &[Vec<f64>]) -> Option<&'static str> {
-    let at: Vec<usize> = ACCEL
-        .iter()
-        .filter_map(|axis| roles.iter().position(|role| role == axis))
-        .collect();
-    if at.len() < 3 {
-        return None;
+/// Units of both sensors of the files: by the readings, and by the names where the readings leave it open.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Units {
+    gyro: Option<UnitFound>,
+    accel: Option<UnitFound>,
+}
+
+impl Units {
+    /// Of the first file with each sensor; `rows` are the numbers of each file.
+    pub fn of(guesses: &[&Guess], rows: &[Vec<Vec<f64>>]) -> Self {
+        let files = || guesses.iter().zip(rows);
+        let first = |sensor: &[&'static str; 3]| {
+            files().find_map(|(guess, rows)| Some((*guess, series(guess, rows, sensor)?)))
+        };
+        let [gyro, accel] = [first(&GYRO), first(&ACCEL)];
+        let none = Series::default();
+        let forces = accel.as_ref().map_or(&none, |(_, series)| series);
+        Self {
+            gyro: gyro.map(|(guess, series)| gyro_unit(&series, forces, guess.gyro_unit)),
+            accel: accel
+                .as_ref()
+                .map(|(guess, series)| accel_unit(series, guess.accel_unit)),
+        }
     }
-    let mut sizes: Vec<f64> = rows
-        .iter()
-        .map(|row| {
-            at.iter()
-                .map(|k| row.get(*k).map_or(f64::NAN, |v| v * v))
-                .sum::<f64>()
-                .sqrt()
-        })
-        .filter(|size| size.is_finite())
-        .collect();
-    sizes.sort_by(f64::total_cmp);
-    match *sizes.get(sizes.len() / 2)? {
-        9.3..10.3 => Some("m/s²"),
-        0.93..1.07 => Some("g"),
-        _ => None,
+
+    /// Unit of gyro and accelerometer, if they are known.
+    pub fn known(&self) -> [Option<&'static str>; 2] {
+        [&self.gyro, &self.accel].map(|found| found.as_ref()?.unit)
     }
+}
+
+/// The readings of a sensor, if all its axes have a column.
+fn series(guess: &Guess, rows: &[Vec<f64>], sensor: &[&'static str; 3]) -> Option<Series> {
+    let at = |role: &str| guess.roles.iter().position(|r| *r == role);
+    let [x, y, z] = [at(sensor[0])?, at(sensor[1])?, at(sensor[2])?];
+    let cell = |row: &Vec<f64>, at: usize| row.get(at).copied().unwrap_or(f64::NAN);
+    let times: Vec<f64> = at("t_s").map_or(Vec::new(), |t| {
+        rows.iter().map(|row| cell(row, t)).collect()
+    });
+    let unit_s = match guess.time_unit {
+        Some("ms") => Some(1e-3),
+        Some("us") => Some(1e-6),
+        Some("ns") => Some(1e-9),
+        Some(_) => Some(1.0),
+        None => clock_unit_s(&times),
+    };
+    Some(Series {
+        t_s: unit_s.map_or(Vec::new(), |unit_s| {
+            times.iter().map(|t| t * unit_s).collect()
+        }),
+        readings: rows
+            .iter()
+            .map(|row| [x, y, z].map(|at| cell(row, at)))
+            .collect(),
+    })
+}
+
+/// Unit of time stamps, s, of the four that make the sample rate that of an inertial unit: 3 to 3000 Hz.
+fn clock_unit_s(times: &[f64]) -> Option<f64> {
+    let rate = mimu_recording::usual_rate_hz(times).ok()?;
+    let units = [1.0, 1e-3, 1e-6, 1e-9];
+    units
+        .into_iter()
+        .find(|unit| (3.2..3200.0).contains(&(rate / unit)))
 }
 
 #[cfg(test)]
@@ -340,32 +377,48 @@ mod tests {
     }
 
     #[test]
-    fn units_are_read_from_names_or_from_one_gravity() {
+    fn readings_decide_units_and_names_only_where_they_agree() {
         let names = [
             "Time (ms)",
             "Gyroscope x (deg/s)",
             "Gyroscope y (deg/s)",
             "Gyroscope z (deg/s)",
-            "ax",
-            "ay",
-            "az",
+            "ax (m/s2)",
+            "ay (m/s2)",
+            "az (m/s2)",
         ];
         let names: Vec<String> = names.iter().map(|n| n.to_string()).collect();
-        let found = guess(
-            "log.csv",
-            &names,
-            &[vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.6, 0.8]],
-        );
-        assert_eq!(
-            [found.gyro_unit, found.accel_unit, found.time_unit],
-            [Some("deg/s"), Some("g"), Some("ms")]
-        );
-        let counts = guess(
-            "log.csv",
-            &names,
-            &[vec![0.0, 0.0, 0.0, 0.0, 300.0, 0.0, 16384.0]],
-        );
-        assert_eq!(counts.accel_unit, None);
+        let units = |gyro: f64, z: f64| {
+            let row = |k: usize| vec![10.0 * k as f64, gyro, 0.0, -gyro, 0.0, 0.0, z];
+            let rows: Vec<Vec<f64>> = (0..50).map(row).collect();
+            let found = guess("log.csv", &names, &rows);
+            assert_eq!(found.time_unit, Some("ms"));
+            Units::of(&[&found], &[rows]).known()
+        };
+        assert_eq!(units(0.5, 9.7), [Some("deg/s"), Some("m/s²")]);
+        // Readings in g under a name with m/s², and counts under both.
+        assert_eq!(units(0.5, 0.99), [Some("deg/s"), Some("g")]);
+        assert_eq!(units(300.0, 16384.0), [Some("count"), Some("count")]);
+    }
+
+    #[test]
+    fn two_files_on_one_clock_show_the_unit_of_the_gyro_by_turns() {
+        // A turn by 0.5 rad/s about x, in files of their own, with stamps in microseconds and no names.
+        let at = |k: usize| 0.01 * k as f64;
+        let angle = |t: f64| if t < 2.0 { 0.0 } else { 0.5 * (t - 2.0) };
+        let rate = |t: f64| if t < 2.0 { 0.01 } else { 0.51 };
+        let gyro = (0..500).map(|k| vec![1e6 * at(k), rate(at(k)).to_degrees(), 0.1, 0.2]);
+        let accel = (0..500).map(|k| {
+            let (sin, cos) = angle(at(k)).sin_cos();
+            vec![1e6 * at(k), 0.05, 9.8 * sin, 9.8 * cos]
+        });
+        let rows: Vec<Vec<Vec<f64>>> = vec![gyro.collect(), accel.collect()];
+        let guesses = [
+            guess("gyro.txt", &[], &rows[0]),
+            guess("acc.txt", &[], &rows[1]),
+        ];
+        let units = Units::of(&[&guesses[0], &guesses[1]], &rows);
+        assert_eq!(units.known(), [Some("deg/s"), Some("m/s²")]);
     }
 
     #[test]

@@ -25,6 +25,10 @@ use serde::Serialize;
 
 /// Rows of a file that the page shows.
 const SHOWN: usize = 4;
+/// Rows of a file by which its units are judged: ten minutes at 100 Hz, and a minute at 1 kHz.
+const JUDGED: usize = 60_000;
+/// Rows at its beginning by which the roles of its columns are guessed.
+const NAMED: usize = 200;
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().collect();
@@ -72,6 +76,8 @@ struct Dropped {
     /// The preset that all of them fit.
     preset: Option<Recognised>,
     files: Vec<DroppedFile>,
+    /// Units of the readings.
+    units: columns::Units,
 }
 
 #[derive(Serialize)]
@@ -98,20 +104,17 @@ fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
         true => None,
         false => Preset::choose(None, paths, None)?,
     };
-    let mut files = Vec::new();
+    let (mut files, mut numbers) = (Vec::new(), Vec::new());
     for (k, path) in paths.iter().enumerate() {
-        let mut preview = preview(path, None)?;
+        let mut preview = preview(path, None, JUDGED)?;
         let number = |cell: &String| cell.replacen(',', ".", 1).parse().unwrap_or(f64::NAN);
-        let rows: Vec<Vec<f64>> = preview
-            .rows
-            .iter()
-            .map(|row| row.iter().map(number).collect())
-            .collect();
+        let rows = preview.rows.iter();
+        let rows: Vec<Vec<f64>> = rows.map(|row| row.iter().map(number).collect()).collect();
         preview.rows.truncate(SHOWN);
         let file = path.file_name().unwrap_or_default().to_string_lossy();
         let mut guess = match preview.log {
             true => columns::Guess::default(),
-            false => columns::guess(&file, &preview.names, &rows),
+            false => columns::guess(&file, &preview.names, &rows[..rows.len().min(NAMED)]),
         };
         if let Some(list) = chosen.as_ref().and_then(|chosen| chosen.columns.get(k)) {
             guess.roles = roles(list, &preview.names);
@@ -121,6 +124,7 @@ fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
             preview,
             guess,
         });
+        numbers.push(rows);
     }
     let preset = chosen.map(|chosen| Recognised {
         name: chosen.used.name,
@@ -132,7 +136,13 @@ fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
             .map(|scale| scale.to_string())
             .collect(),
     });
-    Ok(Dropped { preset, files })
+    let guesses: Vec<&columns::Guess> = files.iter().map(|file| &file.guess).collect();
+    let units = columns::Units::of(&guesses, &numbers);
+    Ok(Dropped {
+        preset,
+        files,
+        units,
+    })
 }
 
 /// Role of each column that a preset has chosen.

@@ -9,6 +9,7 @@
 pub mod error;
 pub mod result_file;
 pub mod signed_low_byte;
+pub mod units;
 
 mod batch;
 mod cell;

@@ -14,10 +14,8 @@ use crate::csv_file::BOM;
 use crate::error::{Error, Result};
 use crate::separator::Separator;
 
-/// Bytes that are read at the start.
-const HEAD: u64 = 1 << 18;
-/// Most rows that are shown.
-const ROWS: usize = 200;
+/// Bytes that are read at the start for each row: a longer row is rare.
+const ROW: u64 = 512;
 
 /// The beginning of a foreign file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -30,11 +28,11 @@ pub struct Preview {
     pub rows: Vec<Vec<String>>,
 }
 
-/// Looks at the beginning of a file; `separator` as in an import.
+/// Looks at the first `most` rows of a file; `separator` as in an import.
 ///
 /// # Errors
 /// The file cannot be read, is of another kind, or has no line of numbers.
-pub fn preview(path: &Path, separator: Option<Separator>) -> Result<Preview> {
+pub fn preview(path: &Path, separator: Option<Separator>, most: usize) -> Result<Preview> {
     let ending = path.extension().unwrap_or_default();
     if is_log(path) {
         return Ok(Preview {
@@ -43,7 +41,7 @@ pub fn preview(path: &Path, separator: Option<Separator>) -> Result<Preview> {
         });
     }
     if ending.eq_ignore_ascii_case("parquet") {
-        let (names, rows) = parquet_table::first_rows(path, ROWS)?;
+        let (names, rows) = parquet_table::first_rows(path, most)?;
         return Ok(Preview {
             log: false,
             names,
@@ -53,15 +51,16 @@ pub fn preview(path: &Path, separator: Option<Separator>) -> Result<Preview> {
     let io = |error: std::io::Error| Error::io(path, &error);
     let file = std::fs::File::open(path).map_err(io)?;
     let mut head = Vec::new();
-    file.take(HEAD).read_to_end(&mut head).map_err(io)?;
+    let enough = (1 << 16) + ROW * most as u64;
+    file.take(enough).read_to_end(&mut head).map_err(io)?;
     refuse_binary(path, &head)?;
     let head = head.strip_prefix(BOM).unwrap_or(&head);
     let mut lines: Vec<&[u8]> = head.split(|b| *b == b'\n').map(without_zeros).collect();
     // The last one may be cut.
-    if head.len() as u64 >= HEAD - BOM.len() as u64 {
+    if head.len() as u64 >= enough - BOM.len() as u64 {
         lines.pop();
     }
-    of_lines(&lines, separator).ok_or_else(|| {
+    of_lines(&lines, separator, most).ok_or_else(|| {
         let problem = "no line is a row of numbers";
         let remedy =
             "give a text file with one sample a line, Parquet, or a log with its usual ending";
@@ -69,7 +68,7 @@ pub fn preview(path: &Path, separator: Option<Separator>) -> Result<Preview> {
     })
 }
 
-fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Preview> {
+fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Option<Preview> {
     let signs = CommentSigns::default();
     let comment = |line: &[u8]| signs.begins(line).is_some();
     let shown: Vec<&[u8]> = lines
@@ -107,7 +106,7 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Preview> {
     Some(Preview {
         log: false,
         names: headers.next().unwrap_or_default(),
-        rows: rows.take(ROWS).map(|line| cells(line)).collect(),
+        rows: rows.take(most).map(|line| cells(line)).collect(),
     })
 }
 
@@ -117,7 +116,7 @@ mod tests {
 
     fn of(text: &str) -> Preview {
         let lines: Vec<&[u8]> = text.lines().map(str::as_bytes).collect();
-        of_lines(&lines, None).unwrap()
+        of_lines(&lines, None, 10).unwrap()
     }
 
     #[test]
@@ -134,7 +133,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("letter.txt");
         std::fs::write(&path, "Dear Sir,\nyours, faithfully\n").unwrap();
-        let line = preview(&path, None).unwrap_err().to_string();
+        let line = preview(&path, None, 10).unwrap_err().to_string();
         assert!(
             line.contains("letter.txt: no line is a row of numbers"),
             "{line}"
