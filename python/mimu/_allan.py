@@ -7,7 +7,7 @@ from typing import Literal
 
 from mimu import _mimu
 from mimu._mimu import Calibration, Noise, Recording
-from mimu._result import Array, Result, typed
+from mimu._result import Array, Judgement, Result, judged, typed
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,8 @@ class Allan(Result):
     _native: _mimu.Allan
 
     channels: list[Channel]
+    #: Whether it may be used.
+    judgement: Judgement
     #: Warnings, one sentence each.
     warnings: list[str]
     device: str
@@ -62,6 +64,7 @@ class Allan(Result):
         super().__init__(native)
         data = self.to_dict()
         self.channels = [typed(Channel, channel) for channel in data["channels"]]
+        self.judgement = judged(data)
         self.warnings = data["warnings"]
         self.device = data["device"]
 

@@ -9,7 +9,7 @@ from mimu import _mimu
 from mimu._fit import Keep, Steps, _keep
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._recording import several
-from mimu._result import Result, typed
+from mimu._result import Judgement, Result, judged, typed
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,8 @@ class Diagnosis(Result):
     not_excited: list[NotExcited]
     leftover: list[Leftover]
     sensors: dict[str, SensorDiagnosis]
+    #: Whether it may be used.
+    judgement: Judgement
     #: Warnings, one sentence each.
     warnings: list[str]
     device: str
@@ -98,6 +100,7 @@ class Diagnosis(Result):
         self.not_excited = [typed(NotExcited, effect) for effect in data["not_excited"]]
         self.leftover = [typed(Leftover, item) for item in data["leftover"]]
         self.sensors = {name: typed(SensorDiagnosis, sensor) for name, sensor in data["sensors"].items()}
+        self.judgement = judged(data)
         self.warnings = data["warnings"]
         self.device = data["device"]
 

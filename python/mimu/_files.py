@@ -11,7 +11,7 @@ from mimu._arguments import arguments
 from mimu._fit import Steps
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._recording import Path
-from mimu._result import Result, typed
+from mimu._result import Judgement, Result, judged, typed
 
 
 def load(path: Path) -> Calibration:
@@ -48,6 +48,8 @@ class Verification(Result):
     _native: _mimu.Verification
 
     sensors: dict[str, SensorVerification]
+    #: Whether it may be used.
+    judgement: Judgement
     #: Warnings, one sentence each.
     warnings: list[str]
 
@@ -55,6 +57,7 @@ class Verification(Result):
         super().__init__(native)
         data = self.to_dict()
         self.sensors = {name: typed(SensorVerification, sensor) for name, sensor in data["sensors"].items()}
+        self.judgement = judged(data)
         self.warnings = data["warnings"]
 
     def __str__(self) -> str:

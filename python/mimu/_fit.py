@@ -10,7 +10,7 @@ import numpy as np
 
 from mimu import _mimu
 from mimu._mimu import Calibration, Noise, Recording
-from mimu._result import Array, Result, typed
+from mimu._result import Array, Judgement, Result, judged, typed
 
 Steps = Literal["given", "found"]
 Sensor = Literal["gyro", "accel"]
@@ -117,6 +117,8 @@ class Fit(Result):
     held_out: dict[str, Figures]
     #: All dwells, used or not.
     dwells: list[Dwell]
+    #: Whether it may be used.
+    judgement: Judgement
     #: Warnings, one sentence each.
     warnings: list[str]
     device: str
@@ -128,6 +130,7 @@ class Fit(Result):
         self.gyro, self.accel = (SensorFit._of(sensors[s]) if s in sensors else None for s in ("gyro", "accel"))
         self.held_out = {name: typed(Figures, sensor) for name, sensor in sensors.items()}
         self.dwells = [typed(Dwell, dwell) for dwell in data["dwells"]]
+        self.judgement = judged(data)
         self.warnings = data["warnings"]
         self.device = data["device"]
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import types
-from dataclasses import fields, is_dataclass
+import warnings
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Protocol, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -12,6 +13,19 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Whether a result may be used, with the one reason."""
+
+    #: ``"good"``, ``"untested"`` (the data cannot contradict it), ``"suspect"`` (unit, rate, sign, range or columns of the input), ``"unexplained"``
+    #: (errors beyond the noise) or ``"misfit"`` (the model does not describe the readings).
+    kind: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.reason}"
 
 
 class Native(Protocol):
@@ -40,6 +54,15 @@ class Result:
 def typed(cls: type[T], data: Any) -> T:
     """``data`` of a JSON as a ``cls``."""
     return cast(T, _value(cls, data))
+
+
+def judged(data: dict[str, Any]) -> Judgement:
+    """The judgement in the JSON of a result. One that is suspect is also a warning of Python, because its numbers look good."""
+    judgement = typed(Judgement, data["judgement"])
+    if judgement.kind == "suspect":
+        # Its reader has called a function that has made a result that has called this.
+        warnings.warn(str(judgement), stacklevel=4)
+    return judgement
 
 
 def _value(hint: Any, data: Any) -> Any:

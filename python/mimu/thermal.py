@@ -10,7 +10,7 @@ from mimu import _mimu
 from mimu._fit import Steps
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._recording import several
-from mimu._result import Array, Result, typed
+from mimu._result import Array, Judgement, Result, judged, typed
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,8 @@ class ThermalFit(Result):
     sensors: dict[str, SensorThermal]
     #: By sensor and parameter: ``gyro_bias_x``, ``accel_C_xx``.
     curves: dict[str, Curve]
+    #: Whether it may be used.
+    judgement: Judgement
     #: Warnings, one sentence each.
     warnings: list[str]
     device: str
@@ -73,6 +75,7 @@ class ThermalFit(Result):
         self.range_c = (data["range_c"][0], data["range_c"][1])
         self.sensors = {name: typed(SensorThermal, sensor) for name, sensor in data["sensors"].items()}
         self.curves = {curve["name"]: typed(Curve, curve) for curve in data["curves"]}
+        self.judgement = judged(data)
         self.warnings = data["warnings"]
         self.device = data["device"]
 

@@ -280,6 +280,7 @@ impl Recording {
             None => usual_rate_hz(&t.to_vec()?).map_err(|error| raised(py, &error))?,
         };
         let (gravity_mps2, warning) = gravity_at(gravity, latitude_deg, reference);
+        let of_rate = Warning::of_rate(rate_hz).map(|warning| warning.to_string());
         let mut manifest = Manifest::new(device, rate_hz, gravity_mps2, unit, reference);
         manifest.latitude_deg = latitude_deg;
         manifest.power_on_s = power_on_s;
@@ -299,7 +300,7 @@ impl Recording {
             source: Source::Samples(Arc::new(made)),
             arrays: Some(arrays),
             imported: None,
-            warnings: warning.into_iter().collect(),
+            warnings: warning.into_iter().chain(of_rate).collect(),
             folder: None,
         })
     }

@@ -53,6 +53,7 @@ pub struct Options {
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let mut export = Export::new("kalibr", from);
+    export.notes.extend(from.other_device());
     export.formulas.push(format!(
         "Continuous-time densities of the worst axis; {} % interval behind each.",
         100.0 * noise.confidence

@@ -50,6 +50,8 @@ use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::calibration::thermal_biases::ThermalBiases;
 use mimu::noise::noise_file::NoiseFile;
+use mimu::quantity::{Sensor, significant};
+use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};
 use serde::Serialize;
 
@@ -102,6 +104,9 @@ pub enum Format {
     /// The bytes that a device stores, for programs with mimu-core
     Core,
 }
+
+/// Largest share by which two scale factors of one unit differ: temperature and age change it by less.
+const OTHER_SCALE: f64 = 0.1;
 
 /// Sources of an export.
 #[derive(Debug, Clone, Copy, Default)]
@@ -177,6 +182,52 @@ impl Sources<'_> {
         })
     }
 
+    /// Refuses noise of other readings than those that the calibration is for: one of the two then belongs to another unit, or to the unit with another
+    /// range. Noise of calibrated readings in SI fits every calibration.
+    fn check_same_readings(&self) -> Result<()> {
+        let (Some((calibration, file)), Some(noise)) = (self.calibration, self.noise) else {
+            return Ok(());
+        };
+        for channel in &noise.channel {
+            let at = RAW_COLUMNS.iter().position(|name| *name == channel.name);
+            let scaled = channel.raw_unit.as_ref().zip(channel.scale_factor);
+            let (Some(at), Some((unit, scale))) = (at, scaled) else {
+                continue;
+            };
+            let Some(table) = calibration.table(Sensor::BOTH[at / 3]) else {
+                continue;
+            };
+            let ours = table.physical.scale_factor[at % 3];
+            let raw = table.raw_unit.to_string();
+            if *unit == raw && ((scale / ours).abs() - 1.0).abs() < OTHER_SCALE {
+                continue;
+            }
+            return Err(Error::new(
+                format!("{}, channel {}", noise.place, channel.name),
+                format!(
+                    "it was computed with a scale factor of {} {unit} per {}, and that of {file} is {} {raw}",
+                    significant(scale),
+                    channel.unit,
+                    significant(ours)
+                ),
+                "give noise and calibration of the same unit",
+            )
+            .about(Argument::Noise));
+        }
+        Ok(())
+    }
+
+    /// A note if calibration and noise have the names of different units.
+    pub(crate) fn other_device(&self) -> Option<String> {
+        let ((calibration, _), noise) = self.calibration.zip(self.noise)?;
+        (calibration.device != noise.device).then(|| {
+            format!(
+                "The calibration belongs to {:?} and the noise to {:?}: use the file only if these are one unit.",
+                calibration.device, noise.device
+            )
+        })
+    }
+
     /// The noise of the unit.
     ///
     /// # Errors
@@ -227,6 +278,7 @@ impl Format {
     /// # Errors
     /// A source is missing, or the format cannot store the calibration or the noise, as each module describes.
     pub fn export(&self, from: &Sources) -> Result<Export> {
+        from.check_same_readings()?;
         match self {
             Self::C(options) => c::export(from, options),
             Self::Kalibr(options) => kalibr::export(from, options),

@@ -63,6 +63,7 @@ pub struct Options {
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let mut export = Export::new("openvins", from);
+    export.notes.extend(from.other_device());
     let (half, model) = match options.model {
         Model::Kalibr => (Triangle::Lower, "kalibr"),
         Model::Rpng => (Triangle::Upper, "rpng"),

@@ -175,6 +175,7 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     let at_none = rated.as_ref().and_then(|r| r.exclude_dwells(&mut prepared));
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
+    warnings.extend(prepared.implausible_rate());
     warnings.extend(without_temperature(&prepared));
     warnings.extend(at_none);
     let mut sensors = match (prepared.manifest.reference, &rated) {

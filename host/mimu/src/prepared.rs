@@ -307,6 +307,13 @@ impl Prepared {
         self.manifest.raw_unit == mimu_recording::RawUnit::Si
     }
 
+    /// A warning if the samples have a rate that no inertial unit has.
+    pub(crate) fn implausible_rate(&self) -> Option<Warning> {
+        let rate_hz = self.condensed.period_s.recip();
+        let of_samples = !self.manifest.means;
+        of_samples.then(|| Warning::of_rate(rate_hz)).flatten()
+    }
+
     /// Noise variances of the magnitude of specific force in each of `poses`, (m/s²)², and whether the noise is known.
     fn magnitude_noise(&self, accel: &Affine<f64>, poses: &[Observation]) -> (Vec<f64>, bool) {
         if self.noise.is_by_channel(Sensor::Accel) {

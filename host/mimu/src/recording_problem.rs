@@ -55,6 +55,8 @@ pub enum Seen {
     HeldReadings,
     /// Time stamps at another rate than the recording's.
     Clock,
+    /// A sample rate that no inertial unit has.
+    SampleRate,
     /// Times without samples.
     Gaps,
     /// Samples without a reading.
@@ -70,7 +72,11 @@ impl Seen {
     fn of(warning: &Warning) -> Option<Self> {
         Some(match warning {
             Warning::Of(_, warning) | Warning::Channel(_, warning) => return Self::of(warning),
-            Warning::NotSi(..) | Warning::NotCounts(..) | Warning::Turning(_) => Self::Unit,
+            Warning::NotSi(..)
+            | Warning::NotCounts(..)
+            | Warning::Turning(_)
+            | Warning::CalibrationOfOther(_)
+            | Warning::NoisierThanGyros(_) => Self::Unit,
             Warning::Dead(_) => Self::DeadChannel,
             Warning::EndOfConverter(..) | Warning::RunAtEnd(..) | Warning::CalmEnd(..) => {
                 Self::Rails
@@ -82,6 +88,7 @@ impl Seen {
             | Warning::DwellsNotUsed(_, Fault::Stuck(_), _)
             | Warning::TurnNotUsed(_, _, Some(Fault::Stuck(_))) => Self::HeldReadings,
             Warning::RateOff(..) => Self::Clock,
+            Warning::ImplausibleRate(_) => Self::SampleRate,
             Warning::Gaps(..) | Warning::TurnNotUsed(_, _, None) => Self::Gaps,
             Warning::Empty(..) | Warning::DwellsNotUsed(_, Fault::Missing(_), _) => {
                 Self::EmptySamples
@@ -100,6 +107,7 @@ impl Seen {
             Self::Clipping => "clipping",
             Self::HeldReadings => "held_readings",
             Self::Clock => "clock",
+            Self::SampleRate => "sample_rate",
             Self::Gaps => "gaps",
             Self::EmptySamples => "empty_samples",
             Self::Temperatures => "temperatures",
@@ -148,7 +156,8 @@ impl RecordingProblem {
         let turns = fit
             .sensor(Sensor::Gyro)
             .filter(|g| g.figure == Figure::Direction);
-        if turns.is_some() && rate_hz < SLOW_HZ {
+        let implausible = Warning::of_rate(rate_hz).is_some();
+        if turns.is_some() && rate_hz < SLOW_HZ && !implausible {
             all.push(Self::SlowForTurns(rate_hz));
         }
         let missing = accel

@@ -9,6 +9,7 @@ mod masking;
 mod segment;
 mod several;
 mod suitability;
+mod suspect;
 pub mod unit;
 mod values;
 
@@ -23,7 +24,6 @@ use self::values::{Read, Values};
 use crate::calibration::Calibration;
 use crate::quantity::Sensor;
 use crate::signal::no_temperature;
-use crate::signal::unit_in_si::of_sizes;
 use crate::warning::{CHECK_WIRING, Warning};
 use mimu_allan::deviation::Integrated;
 use mimu_allan::model::{
@@ -208,13 +208,14 @@ pub fn survey(
             CHECK_WIRING,
         ));
     }
-    let sizes = Sensor::BOTH.map(|sensor| {
-        let of_sensor = judged.iter().filter(|(i, _)| sensor.channels().contains(i));
-        let levels: Vec<f64> = of_sensor.map(|(_, seen)| seen.level()).collect();
-        let square = levels.iter().map(|level| level * level).sum::<f64>();
-        (levels.len() == 3).then(|| square.sqrt())
-    });
-    warnings.extend(of_sizes(sizes, &recording.manifest));
+    let levels = judged.iter().map(|(i, seen)| (*i, seen.level())).collect();
+    warnings.extend(suspect::input(
+        &recording.manifest,
+        calibration,
+        segment.period_s,
+        levels,
+    ));
+    warnings.extend(suspect::noise(&channels));
     suitability::refuse_motion(&judged, &segment, options.part, &place, &mut warnings)?;
     Ok(Survey {
         recording: recording.directory.display().to_string(),

@@ -18,6 +18,9 @@ use crate::signal::bias_removal::BiasRemoval;
 /// 400 m add 0.001. Anomalies of the Earth's field are up to 0.003 either way (0.005 on a few peaks and islands).
 const GRAVITY_OFF_MPS2: [f64; 2] = [-0.020, 0.005];
 
+/// Sample rates of inertial units, Hz. The fastest parts give 32 kHz; 0.05 Hz are 50 Hz whose stamps are in ms.
+const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=40e3;
+
 /// What a person should know. JSON contains it as a sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Warning {
@@ -29,6 +32,12 @@ pub enum Warning {
     Reading(mimu_recording::Warning),
     /// Rate of the time stamps, Hz, its difference in per cent from the rate in the manifest, and that rate, Hz.
     RateOff(f64, f64, f64),
+    /// Sample rate that no inertial unit has, Hz.
+    ImplausibleRate(f64),
+    /// How many times gravity the specific force at rest is with the given calibration.
+    CalibrationOfOther(f64),
+    /// White noise, rad/s/√Hz, that exceeds that of any gyro.
+    NoisierThanGyros(f64),
     /// Gaps, the missing time in all, s, and the first data row after one.
     Gaps(u64, f64, u64),
     /// Rows that repeat the row before.
@@ -211,6 +220,12 @@ impl Warning {
         let off = gravity_mps2 - normal_gravity(latitude_deg);
         let [least, most] = GRAVITY_OFF_MPS2;
         (off < least || off > most).then_some(Self::Gravity(gravity_mps2, latitude_deg))
+    }
+
+    /// A warning if no inertial unit is sampled at `rate_hz`: the time stamps are then in another unit. A log over temperature may have a
+    /// sample a minute, but it is neither integrated nor judged by its noise.
+    pub fn of_rate(rate_hz: f64) -> Option<Self> {
+        (!RATES_HZ.contains(&rate_hz)).then_some(Self::ImplausibleRate(rate_hz))
     }
 
     /// This warning, about channel `c`.

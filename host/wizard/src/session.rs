@@ -274,9 +274,10 @@ impl OpenSession<'_> {
             let created = self.wizard.units[k]
                 .folder
                 .created(Part::Verification, now)?;
-            let calibration = Calibration::of(&fitted, &[], &created)?;
+            let mut calibration = Calibration::of(&fitted, &[], &created)?;
             let other = prepared(&self.file(k, Part::Verification.name()))?;
             let judged = self.judged(k, &other, &calibration, &fitted, Part::Verification)?;
+            calibration.judgement = Some(judged.judgement.clone());
             let rough = judged.rough().filter(|_| judged.passed());
             match &rough {
                 Some(why) => {

@@ -3,6 +3,7 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::{SensorVerification, verify};
 use mimu::fit::Fit;
+use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
 use mimu::quantity::{Figure, Sensor};
 use mimu::signal::stillness::STILL_FACTOR;
@@ -107,6 +108,8 @@ impl SensorJudged {
 /// Figures of a calibration from the verification.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judged {
+    /// The judgement of the calibration: of its fit and of its errors here.
+    pub judgement: Judgement,
     /// Figures of each sensor.
     pub sensors: Vec<SensorJudged>,
     /// Why it must not be stored.
@@ -176,10 +179,25 @@ fn judged(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> R
         }
     }
     Ok(Judged {
+        judgement: judgement(calibration.judgement.clone(), found.judgement, &broken),
         sensors,
         broken,
         warnings: found.warnings,
     })
+}
+
+/// The judgement of a calibration whose fit and verification are judged so; `broken`: why it must not be stored. If the data of the fit could not
+/// contradict it, the verification has.
+fn judgement(fitted: Option<Judgement>, verified: Judgement, broken: &[String]) -> Judgement {
+    let broken = broken
+        .first()
+        .map(|why| Judgement::new(JudgementKind::Misfit, why));
+    let fitted = fitted.filter(|fitted| fitted.kind != JudgementKind::Untested);
+    let others = broken.into_iter().chain(fitted);
+    others.fold(
+        verified,
+        |worst, next| if next.kind > worst.kind { next } else { worst },
+    )
 }
 
 #[cfg(test)]
@@ -203,6 +221,7 @@ mod tests {
             of(Sensor::Accel, accel, 6e-3, 0.6),
         ];
         Judged {
+            judgement: Judgement::new(JudgementKind::Good, "a test"),
             broken: sensors.iter().filter_map(SensorJudged::broken).collect(),
             sensors,
             warnings: Vec::new(),
@@ -215,6 +234,21 @@ mod tests {
         let cubic = judged(1.2e-4, 0.167, 0.167);
         assert!(cubic.passed() && cubic.rough().is_some_and(|why| why.starts_with("accel")));
         assert_eq!(judged(1.2e-4, 8e-3, 7e-3).rough(), None);
+    }
+
+    #[test]
+    fn a_verification_supersedes_that_a_fit_is_untested_and_nothing_supersedes_a_broken_calibration()
+     {
+        use JudgementKind::{Good, Misfit, Suspect, Unexplained, Untested};
+        let of = |fitted, verified, broken: &[String]| {
+            let judged = |kind| Judgement::new(kind, kind);
+            judgement(Some(judged(fitted)), judged(verified), broken).kind
+        };
+        assert_eq!(of(Untested, Good, &[]), Good);
+        assert_eq!(of(Good, Untested, &[]), Untested);
+        assert_eq!(of(Suspect, Good, &[]), Suspect);
+        assert_eq!(of(Suspect, Unexplained, &[]), Unexplained);
+        assert_eq!(of(Good, Good, &["worse than before".into()]), Misfit);
     }
 
     #[test]

@@ -13,8 +13,9 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use mimu_recording::{MANIFEST_FILE, Recording};
 
-use crate::arguments::{JsonArgs, VerboseArgs};
+use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs};
 use crate::output::{check_outputs, now, print, progress};
+use crate::status::Status;
 
 #[derive(Args)]
 pub struct AllanArgs {
@@ -51,6 +52,8 @@ pub struct AllanArgs {
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
+    strict: StrictArgs,
+    #[command(flatten)]
     verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
@@ -80,7 +83,7 @@ fn confidence(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
-pub fn run(args: &AllanArgs) -> Result<()> {
+pub fn run(args: &AllanArgs) -> Result<Status> {
     if args.plot.is_some() && args.recordings.len() > 1 {
         return Err(Error::new(
             "--plot",
@@ -155,5 +158,7 @@ pub fn run(args: &AllanArgs) -> Result<()> {
         staged.push(stage(path, plot::svg(&result))?);
         text.push_str(&format!("\nplot: {}\n", path.display()));
     }
-    print(&args.json, &text, &result, staged)
+    print(&args.json, &text, &result, staged)?;
+    let judgement = result.judgement.as_ref();
+    Ok(judgement.map_or(Status::Done, |judgement| args.strict.status(judgement)))
 }

@@ -11,15 +11,19 @@ use crate::report::text::{warn, warn_within};
 
 /// Result of `mimu allan`: the coefficients of the first recording, or with `verbose` a block with everything for each.
 pub fn allan_text(result: &AllanResult, verbose: bool) -> String {
+    let judged = match &result.judgement {
+        Some(judgement) => format!("judgement: {judgement}\n"),
+        None => String::new(),
+    };
     if verbose {
         let block = |recording| recording_text(result, recording, true);
         let blocks: Vec<String> = result.recordings.iter().map(block).collect();
-        return blocks.join("\n");
+        return judged + &blocks.join("\n");
     }
     let Some(first) = result.recordings.first() else {
         return String::new();
     };
-    let mut out = recording_text(result, first, false);
+    let mut out = judged + &recording_text(result, first, false);
     let others = result.recordings.len() - 1;
     if others > 0 {
         let others = plural(others as u64, "more recording");

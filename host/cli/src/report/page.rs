@@ -3,6 +3,7 @@
 //! A page is valid XML too, so that any parser can read it. Each number is a `data` element with the value from the JSON.
 
 use maud::{Markup, PreEscaped, html};
+use mimu::judgement::Judgement;
 use mimu::quantity::{Sensor, significant};
 
 use super::svg::raised;
@@ -36,6 +37,12 @@ pub fn page(title: &str, main: &Markup) -> String {
         }
     };
     page.into_string() + "\n"
+}
+
+/// A judgement, as the first thing of a page.
+pub(super) fn judged(judgement: &Judgement) -> Markup {
+    let kind = judgement.kind.name();
+    html! { p class={ "judged " (kind) } { strong { (kind) } ": " (judgement.reason) "." } }
 }
 
 /// A number in readable form, with the value from the JSON.

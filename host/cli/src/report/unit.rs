@@ -15,7 +15,7 @@ use mimu::result::diagnosis::DiagnosisResult;
 use mimu_recording::error::Result;
 
 use super::diagnosis::Sections;
-use super::page::{Made, page};
+use super::page::{Made, judged, page};
 
 /// Contents of the page.
 pub struct UnitReport<'a> {
@@ -45,7 +45,11 @@ pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
     let calibration = unit.calibration;
     let main = html! {
         h1 { "Inertial unit " (calibration.device) }
-        @if let Some(found) = found { (found.verdict()) }
+        @match (found, &calibration.judgement) {
+            (Some(found), _) => (found.verdict()),
+            (None, Some(judgement)) => (judged(judgement)),
+            (None, None) => {}
+        }
         (identity(unit, made))
         (contents(unit))
         @if let Some(noise) = unit.noise {

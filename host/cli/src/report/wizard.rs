@@ -101,7 +101,8 @@ pub(crate) fn progress_line(progress: &Progress) -> String {
 }
 
 fn judged_lines(judged: &Judged) -> Vec<String> {
-    let mut lines: Vec<String> = judged.sensors.iter().map(judged_line).collect();
+    let mut lines = vec![format!("judgement: {}", judged.judgement)];
+    lines.extend(judged.sensors.iter().map(judged_line));
     lines.extend(
         judged
             .broken

@@ -7,6 +7,7 @@ mod design_command;
 mod device;
 mod diagnosis_page;
 mod diagnosis_text;
+mod doubtful_input;
 mod effects;
 mod export_over_temperature;
 mod fuzz;

@@ -82,6 +82,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let manifest = &prepared.manifest;
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
+    warnings.extend(prepared.implausible_rate());
     warnings.extend(check_unit(calibration, manifest, &prepared.place)?);
     let same_recording = calibration.recording.sha256.as_ref() == Some(&prepared.condensed.sha256);
     if same_recording {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::TOOL;
+use crate::judgement::Judgement;
 use crate::noise::noise_file::{FileCoefficient, NOISE_FORMAT, NoiseChannel, NoiseFile};
 use crate::quantity::Sensor;
 use crate::survey::{Channel, Survey};
@@ -25,6 +26,8 @@ pub struct AllanResult {
     pub tool: &'static str,
     /// Unit under test.
     pub device: Option<String>,
+    /// The judgement; null without a recording.
+    pub judgement: Option<Judgement>,
     /// Kind of deviation: Allan, modified Allan or Hadamard.
     pub kind: Option<&'static str>,
     /// Probability of each interval.
@@ -205,6 +208,7 @@ impl AllanResult {
             format: "mimu-allan/1",
             tool: TOOL,
             device: first.map(|s| s.device.clone()),
+            judgement: Judgement::of_surveys(surveys),
             kind: first.map(|s| s.options.kind.name()),
             confidence: first.map(|s| s.options.confidence),
             sample_rate_hz: single.map(|s| s.sample_rate_hz),
@@ -229,7 +233,7 @@ impl AllanResult {
         Some(NoiseFile {
             format: NOISE_FORMAT.into(),
             created: Some(created.to_owned()),
-            judgement: None,
+            judgement: self.judgement.clone(),
             device: self.device.clone()?,
             sample_rate_hz: self.recordings.first()?.sample_rate_hz,
             duration_s: lengths.fold(f64::INFINITY, f64::min),

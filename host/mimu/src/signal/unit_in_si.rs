@@ -9,7 +9,7 @@ use crate::signal::dwell::Dwell;
 use crate::warning::Warning;
 
 /// Readings in SI with a gain beyond this, or below its inverse, have a wrong unit or time base: sensors are within ten per cent.
-const GAIN: f64 = 1.3;
+pub(crate) const GAIN: f64 = 1.3;
 /// No gyro's bias is larger, rad/s: 40 deg/s, twice what the data sheet of an MPU-6050 allows.
 const LARGEST_BIAS: f64 = 0.7;
 
@@ -52,6 +52,7 @@ fn said_of(
         Sensor::Gyro if figure == Figure::RateMagnitude && rpm(270.0 / 200.0) => {
             "was the turntable at 45 rpm while the rate of 33 1/3 rpm is given?"
         }
+        Sensor::Gyro if by_turns && near(1000.0) => "the time stamps are in ms, and must be in s",
         // The gyro is integrated over the turns: time stamps that run twice as fast halve the scale factor.
         Sensor::Gyro if by_turns && (0.1..10.0).contains(&scale) => {
             "check the time stamps and the unit: if the stamps or the sample rate are wrong by this factor, so is every integrated angle"

@@ -72,7 +72,7 @@ impl OpenSession<'_> {
         let created = self.wizard.units[k]
             .folder
             .created(Part::Confirmation, now)?;
-        let made = Calibration::of(&fitted, &found, &created)?;
+        let mut made = Calibration::of(&fitted, &found, &created)?;
         let both = (
             mimu::calibration::verify::verify(other, &plain.calibration),
             mimu::calibration::verify::verify(other, &made),
@@ -88,6 +88,7 @@ impl OpenSession<'_> {
         let next = next_experiment::next(&diagnosis);
         let judged = judged.as_ref().map(|both| ("verification", both));
         let result = DiagnosisResult::of(&diagnosis, &next, judged);
+        made.judgement = Some(result.judgement.clone());
         let page = self.file(k, "diagnosis.html");
         let folder = self.wizard.units[k].folder.path.clone();
         stage(&page, (self.page)(&result, &folder)?)?.publish()?;
@@ -154,7 +155,7 @@ impl OpenSession<'_> {
         or_cancelled!(self.wizard.dwells(Part::Confirmation, &steps).await);
         self.finish()?;
         for ((k, found), plain) in (0..).zip(found).zip(plain) {
-            let Some(found) = found else { continue };
+            let Some(mut found) = found else { continue };
             let by = prepared(&self.file(k, Part::Confirmation.name()))?;
             let judged = self.judged(
                 k,
@@ -163,6 +164,7 @@ impl OpenSession<'_> {
                 &found.fitted,
                 Part::Confirmation,
             )?;
+            found.calibration.judgement = Some(judged.judgement.clone());
             if !judged.passed() {
                 continue;
             }

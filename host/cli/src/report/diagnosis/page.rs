@@ -19,7 +19,7 @@ use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
 use crate::hint;
-use crate::report::page::{Made, number, page, spoken};
+use crate::report::page::{Made, judged, number, page, spoken};
 use tables::chance;
 
 /// One sensor's figures and drawings.
@@ -66,7 +66,7 @@ impl<'a> Sections<'a> {
         accel.map(|s| s.picture)
     }
 
-    /// Faults of the recording, then the verdict, in a sentence for each sensor.
+    /// The judgement, faults of the recording, and the verdict, in a sentence for each sensor.
     pub fn verdict(&self) -> Markup {
         first(self.d)
     }
@@ -154,9 +154,10 @@ pub fn body(d: &DiagnosisResult, made: &Made) -> Result<Markup> {
     })
 }
 
-/// Faults of the recording, and the verdict.
+/// The judgement, faults of the recording, and the verdict.
 fn first(d: &DiagnosisResult) -> Markup {
     html! {
+        (judged(&d.judgement))
         @if !d.recording_problems.is_empty() {
             h2 { "Problems of " (if d.has_several() { "these recordings" } else { "this recording" }) }
             ul { @for OfRecording { recording, problem } in &d.recording_problems {

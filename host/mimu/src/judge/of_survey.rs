@@ -1,0 +1,83 @@
+//! The judgement of noise at rest.
+
+use super::errors::BEYOND_NOISE;
+use super::input;
+use crate::judgement::{Judgement, JudgementKind};
+use crate::quantity::{duration, plural, significant};
+use crate::survey::{Channel, Survey};
+use crate::warning::Warning;
+use mimu_allan::model::Term;
+
+/// Largest share by which the upper end of the interval of white noise may exceed it: estimators are tuned by its size.
+const WIDEST_WHITE: f64 = 0.1;
+
+impl Judgement {
+    /// The judgement of the noise of a unit in one or more recordings: the worst that their warnings and their channels lead to. `None` without a
+    /// recording.
+    ///
+    /// `Untested`: a channel is too short for a model, or its white noise is not seen or not to within 10 %. `Unexplained`: the terms of the model do not describe its curve.
+    pub fn of_surveys(surveys: &[Survey]) -> Option<Self> {
+        let by_input = surveys
+            .iter()
+            .flat_map(|s| &s.warnings)
+            .filter_map(of_warning);
+        let channels = || surveys.iter().flat_map(|s| &s.channels);
+        let by_channel = channels().filter_map(of_channel);
+        let shortest_s = surveys.iter().map(|s| s.span_s[1] - s.span_s[0]);
+        let good = Self::new(
+            JudgementKind::Good,
+            format!(
+                "the model describes the noise of {} in {} at rest",
+                plural(channels().count() as u64, "channel"),
+                duration(shortest_s.reduce(f64::min)?)
+            ),
+        );
+        Self::worst(by_input.chain(by_channel).chain([good]))
+    }
+}
+
+fn of_warning(warning: &Warning) -> Option<Judgement> {
+    let kind = match warning {
+        // Recordings and calibrations of one unit often have different names; another unit shows in the specific force.
+        Warning::OtherDevice(..) => None,
+        Warning::Moves(..) => Some(JudgementKind::Suspect),
+        other => input::of_warning(other),
+    };
+    Some(Judgement::new(kind?, warning))
+}
+
+fn of_channel(channel: &Channel) -> Option<Judgement> {
+    if channel.dead.is_some() {
+        return None; // there is a warning about it
+    }
+    let Some(model) = &channel.model else {
+        let reason = format!(
+            "{}: the record is too short for a noise model",
+            channel.name
+        );
+        return Some(Judgement::new(JudgementKind::Untested, reason));
+    };
+    if let Some(factor) = model.excess.map(f64::sqrt).filter(|f| *f > BEYOND_NOISE) {
+        let reason = format!(
+            "{}: the terms of the noise model miss the curve by {} times its uncertainty",
+            channel.name,
+            significant(factor)
+        );
+        return Some(Judgement::new(JudgementKind::Unexplained, reason));
+    }
+    let reason = match model.get(Term::N) {
+        Ok(n) => {
+            let wider = n.upper / n.value - 1.0;
+            if wider <= WIDEST_WHITE {
+                return None;
+            }
+            format!(
+                "white noise may be {} % larger (95 %): record for longer",
+                significant(100.0 * wider)
+            )
+        }
+        Err(unseen) => format!("no white noise: {}", channel.unit.reason(Term::N, unseen)),
+    };
+    let reason = format!("{}: {reason}", channel.name);
+    Some(Judgement::new(JudgementKind::Untested, reason))
+}
