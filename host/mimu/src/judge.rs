@@ -5,11 +5,9 @@
 //! | [`errors`] | error figures, by the input and by the noise |
 //! | [`input`] | whether the input is what it is declared to be |
 //! | `of_fit` | a fit |
-//! | `of_survey` | noise at rest |
 //!
 //! A verification, a diagnosis and curves over temperature are judged where they are made, by the same functions.
 
 pub mod errors;
 pub mod input;
 mod of_fit;
-mod of_survey;

@@ -5,6 +5,7 @@
 
 mod ahead;
 mod columns;
+mod judged;
 mod masking;
 mod segment;
 mod several;
