@@ -123,7 +123,7 @@ pub fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
 }
 
 /// One flaw of real recordings; the seed selects which.
-fn flaw(seed: u64) -> FlawsTruth {
+pub fn flaw(seed: u64) -> FlawsTruth {
     let none = FlawsTruth::default();
     match seed / 2 % 6 {
         0 => FlawsTruth {

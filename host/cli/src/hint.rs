@@ -125,6 +125,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Comment => "--comment",
         Argument::Separator => "--separator",
         Argument::TwosComplement => "--twos-complement",
+        Argument::Rows => "--rows of mimu import",
         Argument::Instance => "--instance",
         Argument::Preset => "--preset",
         Argument::Means => "--means",

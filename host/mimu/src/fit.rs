@@ -161,6 +161,9 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         )
         .about(Argument::Only));
     }
+    if let Some(fault) = &prepared.dwells.fault {
+        return Err(fault.refusal(&prepared.place));
+    }
     plausible::check_readings(&prepared)?;
     let mut with_all = PerSensor::default();
     if prepared.manifest.reference == Reference::Gravity {

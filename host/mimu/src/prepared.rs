@@ -16,8 +16,9 @@ use crate::signal::blocks::Condensed;
 use crate::signal::contrast::{Contrast, contrasts};
 use crate::signal::course::Course;
 use crate::signal::dwell::{Dwell, Dwells, Fault, LeftOut};
+use crate::signal::dwells_of_files;
 use crate::signal::rails::refuse_dead_channels;
-use crate::signal::stillness::Finding;
+use crate::signal::stillness::{Finding, Steps};
 use crate::signal::unit_in_si;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
@@ -73,7 +74,7 @@ impl Prepared {
     }
 
     fn of_condensed(
-        manifest: Manifest,
+        mut manifest: Manifest,
         mut condensed: Condensed,
         finding: Finding,
         place: String,
@@ -96,6 +97,11 @@ impl Prepared {
             without_joins(&mut condensed);
         }
         refuse_dead_channels(&condensed, &place)?;
+        let on_turntable = manifest.reference == Reference::TurntableRate;
+        if manifest.is_joined() && on_turntable && finding.steps == Steps::AsRecorded {
+            dwells_of_files::number(&mut condensed, &mut manifest, finding.still_factor)
+                .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
+        }
         if let (Some(power), Some(first)) = (manifest.power_on_s, condensed.blocks.first())
             && power > first.start_s
         {

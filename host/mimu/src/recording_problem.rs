@@ -13,6 +13,7 @@ use crate::fit::{Fit, SensorFit, faces_not_up};
 use crate::prepared::Prepared;
 use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::signal::blocks::extent;
+use crate::signal::dwell::Change;
 use crate::warning::Warning;
 use mimu_recording::RawUnit;
 
@@ -65,6 +66,10 @@ pub enum Seen {
     Temperatures,
     /// Firmware removes the bias of the gyro.
     BiasRemoved,
+    /// Another range of the accelerometer from some row on.
+    RangeChange,
+    /// Columns that change places at some row.
+    ColumnsMoved,
 }
 
 impl Seen {
@@ -95,6 +100,10 @@ impl Seen {
             }
             Warning::NoTemperatures(_) => Self::Temperatures,
             Warning::BiasRemoved(_) => Self::BiasRemoved,
+            Warning::LogFault(fault) => match fault.change {
+                Change::Range(_) => Self::RangeChange,
+                Change::Columns(..) => Self::ColumnsMoved,
+            },
             _ => return None,
         })
     }
@@ -112,6 +121,8 @@ impl Seen {
             Self::EmptySamples => "empty_samples",
             Self::Temperatures => "temperatures",
             Self::BiasRemoved => "bias_removed",
+            Self::RangeChange => "range_change",
+            Self::ColumnsMoved => "columns_moved",
         }
     }
 }

@@ -13,6 +13,7 @@ use serde::{Serialize, Serializer};
 use crate::fault::Fault;
 use crate::quantity::{Sensor, normal_gravity};
 use crate::signal::bias_removal::BiasRemoval;
+use crate::signal::dwell::LogFault;
 
 /// Range of the difference of local gravity from normal gravity at sea level, m/s²: heights of up to 5500 m subtract 0.017, and depths of
 /// 400 m add 0.001. Anomalies of the Earth's field are up to 0.003 either way (0.005 on a few peaks and islands).
@@ -50,6 +51,8 @@ pub enum Warning {
     Dead(String),
     /// A sensor that is slower than its log, of this many rows a second.
     Held(Sensor, Held, f64),
+    /// A row from which on the readings mean something else.
+    LogFault(LogFault),
     /// Dwells that were cut at their ends, and by how much in all, s.
     DwellsCut(u64, f64),
     /// Dwells that are poses of the accelerometer but not rests of the gyro.

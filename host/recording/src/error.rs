@@ -82,7 +82,7 @@ pub enum Argument {
     Topic,
     /// Which of several sensors in a log.
     Instance,
-    /// Which rows of a foreign file are read.
+    /// Which rows of a foreign file are read, by the value of a column.
     Where,
     /// Characters that begin a comment.
     Comment,
@@ -90,6 +90,8 @@ pub enum Argument {
     Separator,
     /// Columns of unsigned codes in two's complement.
     TwosComplement,
+    /// The first and the last data row that are read.
+    Rows,
     /// Software or device whose files are read.
     Preset,
     /// Whether rows are means instead of samples.

@@ -58,8 +58,8 @@ pub use held::{Held, HeldReadings};
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, Decimal, Face,
     ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse,
-    Preview, Role, Rounds, RowFilter, Scale, SkippedLines, TimeSummary, TwosComplement, Zero,
-    import, is_log, preview,
+    Preview, Role, Rounds, RowFilter, RowRange, Scale, SkippedLines, TimeSummary, TwosComplement,
+    Zero, import, is_log, preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};

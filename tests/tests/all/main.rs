@@ -4,6 +4,7 @@ mod agreement;
 mod bias_removal;
 mod coverage;
 mod diagnosis;
+mod dwells_found;
 mod few_poses;
 mod flaws;
 mod joint;

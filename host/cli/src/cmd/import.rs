@@ -10,7 +10,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
     BrokenLimit, ColumnList, CommentSigns, Decimal, Face, ImportOptions, ImportSummary, Offset,
-    Preset, RawUnit, Reference, RowFilter, SampleFormat, Scale, Separator, Turntable,
+    Preset, RawUnit, Reference, RowFilter, RowRange, SampleFormat, Scale, Separator, Turntable,
     TurntableRate, TwosComplement, Zero, import, is_log, rate_error,
 };
 
@@ -61,6 +61,9 @@ pub(crate) struct ImportArgs {
     /// satisfy all, unless they are values of one column: then each belongs to a list of --columns
     #[arg(long = "where", value_name = "COLUMN=VALUE", conflicts_with = "means")]
     filters: Vec<RowFilter>,
+    /// Import only these data rows, the first and the last included, counted from 1: `..8799` for those before a fault in row 8800, `8800..`
+    #[arg(long, value_name = "FIRST..LAST", conflicts_with = "means")]
+    rows: Option<RowRange>,
     /// Sample rate, Hz. Files without a time column need it; in others it checks the rate of the stamps, and decides if stamps in bursts
     /// are ambiguous
     #[arg(long, allow_negative_numbers = true)]
@@ -257,6 +260,7 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         sequence: args.sequence,
         faces,
         filters: args.filters,
+        rows: args.rows,
         skip_broken: args.skip_broken.unwrap_or_default(),
         format: args.format,
         replace: args.replace,

@@ -62,7 +62,11 @@ pub fn import_text(summary: &ImportSummary) -> String {
             "row",
             "interpolated from another file",
         ),
-        (summary.not_chosen, "row", "left out: not chosen by --where"),
+        (
+            summary.not_chosen,
+            "row",
+            "left out: not chosen by --where or --rows",
+        ),
         (summary.padding, "row", "left out: all readings are 0"),
         (summary.empty_cells, "raw cell", "empty"),
     ];

@@ -6,6 +6,9 @@
 
 use crate::quantity::Sensor;
 use crate::signal::increment::{Increment, Integrator};
+use crate::signal::jump::Jump;
+pub(crate) use crate::signal::moments::pool;
+pub use crate::signal::moments::{Moments, Rails};
 use crate::signal::no_temperature;
 use crate::signal::quantisation_step::QuantisationFinder;
 use crate::signal::signed_low_byte;
@@ -30,136 +33,6 @@ const WHOLE: f64 = 0.1;
 const PAUSE: f64 = 8.0;
 /// After this many rows a recording is refused if its blocks hardly condense it: the rest could fill the memory.
 const LOOK_AFTER: u64 = 100_000;
-
-/// Moments of one raw channel over one block.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Moments {
-    /// Number of samples that are numbers.
-    pub n: u32,
-    /// Their mean, raw units.
-    pub mean: f64,
-    /// Sum of squared deviations from the mean.
-    pub m2: f64,
-    /// Smallest sample.
-    pub min: f64,
-    /// Largest sample.
-    pub max: f64,
-    /// How many samples equal `min`.
-    pub at_min: u32,
-    /// How many samples equal `max`.
-    pub at_max: u32,
-    /// Longest run of identical samples.
-    pub run: u32,
-    /// The value of that run.
-    pub run_value: f64,
-    /// Number of neighbours that are equal.
-    pub repeats: u32,
-}
-
-impl Moments {
-    fn of(samples: &[f64]) -> Self {
-        let mut n = 0u32;
-        let mut sum = 0.0;
-        let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
-        for &u in samples {
-            if u.is_finite() {
-                n += 1;
-                sum += u;
-                min = min.min(u);
-                max = max.max(u);
-            }
-        }
-        if n == 0 {
-            return Self::default();
-        }
-        let mean = sum / f64::from(n);
-        let (mut m2, mut at_min, mut at_max) = (0.0, 0, 0);
-        for &u in samples {
-            if u.is_finite() {
-                m2 += (u - mean) * (u - mean);
-                at_min += u32::from(u == min);
-                at_max += u32::from(u == max);
-            }
-        }
-        let (mut run, mut run_value, mut repeats, mut length) = (1, samples[0], 0, 1);
-        for pair in samples.windows(2) {
-            if pair[0] == pair[1] {
-                repeats += 1;
-                length += 1;
-                if length > run {
-                    (run, run_value) = (length, pair[1]);
-                }
-            } else {
-                length = 1;
-            }
-        }
-        Self {
-            n,
-            mean,
-            // The mean of a constant may be rounded, which would leave a variance.
-            m2: if min == max { 0.0 } else { m2 },
-            min,
-            max,
-            at_min,
-            at_max,
-            run,
-            run_value,
-            repeats,
-        }
-    }
-
-    /// These moments without the samples at the rails, and the number of those samples.
-    pub fn without_rails(&self, rails: Rails) -> (Self, u32) {
-        let mut kept = *self;
-        let mut masked = 0;
-        if rails.low.is_some_and(|rail| self.min < rail)
-            || rails.high.is_some_and(|rail| self.max > rail)
-        {
-            // Beyond a declared rail. The moments do not show how many samples are, so all are masked.
-            (kept.n, masked) = (0, self.n);
-            return (kept, masked);
-        }
-        let ends = [
-            (rails.low, self.min, self.at_min),
-            (rails.high, self.max, self.at_max),
-        ];
-        for (rail, extreme, count) in ends {
-            if rail != Some(extreme) || masked == self.n {
-                continue;
-            }
-            let (n, k) = (f64::from(kept.n), f64::from(count));
-            masked += count;
-            if count >= kept.n {
-                kept.n = 0;
-                continue;
-            }
-            let mean = (n * kept.mean - k * extreme) / (n - k);
-            kept.m2 -= k * (extreme - kept.mean).powi(2) + (n - k) * (mean - kept.mean).powi(2);
-            kept.m2 = kept.m2.max(0.0);
-            kept.mean = mean;
-            kept.n -= count;
-        }
-        (kept, masked)
-    }
-}
-
-/// The values beyond which a converter cannot read, raw units.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Rails {
-    /// Lower rail, if it was declared or reached.
-    pub low: Option<f64>,
-    /// Upper rail, if it was declared or reached.
-    pub high: Option<f64>,
-}
-
-impl Rails {
-    /// Whether a sample of `moments` is at a rail, or beyond.
-    pub fn touched_by(&self, moments: &Moments) -> bool {
-        moments.n > 0
-            && (self.low.is_some_and(|rail| moments.min <= rail)
-                || self.high.is_some_and(|rail| moments.max >= rail))
-    }
-}
 
 /// A reference or temperature channel over one block; not a number if any sample is missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -217,6 +90,8 @@ pub struct Block {
     pub after_gap: bool,
     /// Gyro x, y, z, accelerometer x, y, z, raw.
     pub raw: [Moments; 6],
+    /// The largest change of the accelerometer's reading between two samples.
+    pub jump: Jump,
     /// Known inputs: rates (deg/s), specific forces (m/s²).
     pub reference: [Level; 6],
     /// Temperature, °C.
@@ -311,6 +186,8 @@ struct Condenser {
     open: Batch,
     open_after_gap: bool,
     last: Option<(f64, i32)>,
+    /// The accelerometer's last sample before the open block.
+    accel: Option<[f64; 3]>,
     integrator: Option<Integrator>,
     intervals: Intervals,
     quantisation_steps: [QuantisationFinder; 6],
@@ -343,6 +220,7 @@ impl Condenser {
             open: Batch::default(),
             open_after_gap: false,
             last: None,
+            accel: None,
             integrator: integrate.then(|| Integrator::new(period_s)),
             intervals: Intervals::default(),
             quantisation_steps: Default::default(),
@@ -525,6 +403,17 @@ impl Condenser {
                 self.out.missing[c] += column.len() as u64 - u64::from(raw[c].n);
             }
         }
+        let accel = Sensor::Accel.channels();
+        let last = |column: &Vec<f64>| column.last().copied();
+        let before = self.accel.filter(|_| !self.open_after_gap);
+        let jump = Jump::of(&open.raw[accel.clone()], open.first_row, before);
+        self.accel = match &open.raw[accel] {
+            [x, y, z] => last(x)
+                .zip(last(y))
+                .zip(last(z))
+                .map(|((x, y), z)| [x, y, z]),
+            _ => None,
+        };
         self.out.blocks.push(Block {
             first_row: open.first_row,
             rows: open.t_s.len() as u32,
@@ -533,6 +422,7 @@ impl Condenser {
             step: open.step.first().copied().unwrap_or(0),
             after_gap: self.open_after_gap,
             raw,
+            jump,
             reference: [0, 1, 2, 3, 4, 5].map(|c| Level::of(&open.reference[c])),
             temp_c: Level::of(&open.temp_c),
         });
@@ -657,24 +547,6 @@ pub fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
 
 /// A range of blocks, with its step if that is given.
 pub(crate) type StepBlocks = (Option<i32>, std::ops::Range<usize>);
-
-/// Pooled moments of several blocks; extremes are not kept.
-pub(crate) fn pool(parts: impl Iterator<Item = Moments>) -> Moments {
-    parts.fold(Moments::default(), |a, b| {
-        let n = a.n + b.n;
-        if n == 0 {
-            return a;
-        }
-        let (na, nb) = (f64::from(a.n), f64::from(b.n));
-        let shift = b.mean - a.mean;
-        Moments {
-            n,
-            mean: a.mean + shift * nb / f64::from(n),
-            m2: a.m2 + b.m2 + shift * shift * na * nb / f64::from(n),
-            ..a
-        }
-    })
-}
 
 /// The `share` quantile; reorders `values`.
 pub(crate) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {

@@ -11,6 +11,7 @@ use crate::fault::SHORTEST_S;
 use crate::quantity::{PerSensor, Sensor};
 use crate::signal::blocks::{Condensed, Level, Rails, StepBlocks, pool, quantile};
 use crate::signal::course::{Course, Motion, motion};
+pub use crate::signal::log_fault::{Change, LogFault};
 use crate::signal::rails::{self, longest_run_by_chance};
 use crate::signal::ramp::ramps;
 use crate::signal::rest::{self, Rest};
@@ -163,6 +164,8 @@ pub struct Dwells {
     pub list: Vec<Dwell>,
     /// How they were found; `None` if the `step` column gives them.
     pub detection: Option<Detection>,
+    /// A row from which on the readings mean something else; no fit uses such a recording.
+    pub fault: Option<LogFault>,
     /// Rails of the six channels, as declared or as found.
     pub rails: [Rails; 6],
     /// Longest run of equal samples that chance explains, of the six channels; infinite if there is no such limit.
@@ -198,21 +201,25 @@ impl Dwells {
         };
         let at_rest = finding.steps == Steps::AtRest;
         let by_hand = manifest.reference == Reference::Gravity;
-        let (ranges, detection) = if given {
-            (by_step(condensed), None)
+        let (ranges, detection, fault) = if given {
+            (by_step(condensed), None, None)
         } else if at_rest {
-            (vec![(None, 0..condensed.blocks.len())], None)
+            (vec![(None, 0..condensed.blocks.len())], None, None)
         } else {
-            let (mut ranges, detection) =
-                stillness::find(condensed, manifest, finding.still_factor)?;
-            if by_hand {
-                let (cut, blocks) = rest::walk_in(&mut ranges, condensed);
-                if cut > 0 {
-                    let in_all_s = blocks as f64 * detection.block_s;
-                    warnings.push(Warning::DwellsCut(cut, in_all_s));
-                }
+            let found = stillness::find(condensed, manifest, finding.still_factor)?;
+            let (mut ranges, detection) = (found.ranges, found.detection);
+            let ends = match manifest.reference {
+                Reference::Gravity => Some(rest::AT_ENDS),
+                Reference::TurntableRate => Some(rest::AT_ENDS_OF_TURNS),
+                Reference::Table => None,
+            };
+            let (cut, blocks) =
+                ends.map_or((0, 0), |ends| rest::walk_in(&mut ranges, condensed, ends));
+            if cut > 0 && by_hand {
+                let in_all_s = blocks as f64 * detection.block_s;
+                warnings.push(Warning::DwellsCut(cut, in_all_s));
             }
-            (ranges, Some(detection))
+            (ranges, Some(detection), found.fault)
         };
         let mut list: Vec<Dwell> = ranges
             .into_iter()
@@ -269,10 +276,12 @@ impl Dwells {
             leave_out_turning(&mut list, condensed);
             warnings.extend(mark_slow_turns(&mut list));
         }
+        warnings.extend(fault.map(Warning::LogFault));
         warn(&list, manifest, &mut warnings);
         Ok(Self {
             list,
             detection,
+            fault,
             rails,
             longest_run,
             left_out: Vec::new(),

@@ -12,7 +12,9 @@ use crate::signal::blocks::{Condensed, OF_MEDIAN, StepBlocks, pool, quantile};
 const GROUP: usize = 3;
 /// Largest deviation of a group at an end from the middle of its dwell, relative to the usual deviation in the middles. A linear drift over
 /// the dwell reaches 3.5 at the ends.
-const AT_ENDS: f64 = 5.0;
+pub(crate) const AT_ENDS: f64 = 5.0;
+/// The same for even turns of a turntable. A wobble reaches 1.4, and a motor that approaches its rate exponentially would enter the mean.
+pub(crate) const AT_ENDS_OF_TURNS: f64 = 2.5;
 /// Largest deviation of a dwell from its neighbours, relative to the usual one.
 const AMONG_DWELLS: f64 = 8.0;
 /// Largest trend at the first and the last dwells, relative to that next to them: twice, for a warm-up that slows down within three dwells.
@@ -63,8 +65,12 @@ fn in_middle(condensed: &Condensed, middle: &Range<usize>, c: usize) -> Vec<f64>
 }
 
 /// Trims the segments at both ends until gyro and accelerometer read what they read in the middle. Returns the number of segments that were
-/// cut, and of blocks removed.
-pub(crate) fn walk_in(segments: &mut [StepBlocks], condensed: &Condensed) -> (u64, u64) {
+/// cut, and of blocks removed; `at_ends` is the largest deviation of an end, as [`AT_ENDS`].
+pub(crate) fn walk_in(
+    segments: &mut [StepBlocks],
+    condensed: &Condensed,
+    at_ends: f64,
+) -> (u64, u64) {
     let (mut cut, mut blocks) = (vec![0_usize; segments.len()], 0);
     let mut ends: Vec<[usize; 2]> = vec![[0; 2]; segments.len()];
     for c in (0..6).filter(|&c| condensed.has_raw[c]) {
@@ -87,7 +93,7 @@ pub(crate) fn walk_in(segments: &mut [StepBlocks], condensed: &Condensed) -> (u6
                 let rms = (squares / own[end].len() as f64).sqrt();
                 (
                     mean(condensed, middles[end].clone(), c),
-                    AT_ENDS * pooled.max(rms),
+                    at_ends * pooled.max(rms),
                 )
             });
             let off = |from: usize, (level, limit): (f64, f64)| {

@@ -1,12 +1,16 @@
-//! Finds dwells that are not numbered: segments in which no channel varies.
+//! Finds dwells that are not numbered: segments with one level and a scatter no larger than that of noise.
+
+use std::ops::Range;
 
 use serde::Serialize;
 
 use crate::fault::SHORTEST_S;
 use crate::quantity::Sensor;
-use crate::signal::blocks::{
-    Block, Condensed, Level, OF_MEDIAN, StepBlocks, extent, pool, quantile,
-};
+use crate::signal::blocks::{Condensed, Level, StepBlocks, extent, quantile};
+use crate::signal::change_point;
+use crate::signal::log_fault::{self, LogFault};
+use crate::signal::rate_at_rest::RateAtRest;
+use crate::signal::window::{Window, in_bursts, windows};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, Reference};
 
@@ -82,11 +86,24 @@ pub struct Detection {
     pub floor: [f64; 6],
 }
 
+/// What [`find`] found.
+#[derive(Debug, Clone)]
+pub(crate) struct Segmentation {
+    /// The still segments, in order.
+    pub ranges: Vec<StepBlocks>,
+    /// The thresholds; if the log has a fault, those before it.
+    pub detection: Detection,
+    /// A fault of the log: no calibration holds before and after it.
+    pub fault: Option<LogFault>,
+}
+
+/// Finds the still segments of a recording. The part before a fault of the log and the part after it are searched separately, because each
+/// has its own noise.
 pub(crate) fn find(
     condensed: &Condensed,
     manifest: &Manifest,
     factor: f64,
-) -> Result<(Vec<StepBlocks>, Detection)> {
+) -> Result<Segmentation> {
     let blocks = &condensed.blocks;
     let block_s = blocks.iter().map(|b| b.rows).max().unwrap_or(1) as f64 * condensed.period_s;
     let width = ((WINDOW_S / block_s).round() as usize).max(2);
@@ -99,231 +116,307 @@ pub(crate) fn find(
     }
     let channels: Vec<usize> = (0..6).filter(|&c| condensed.has_raw[c]).collect();
     let bursts = manifest.reference == Reference::Gravity && in_bursts(blocks);
-    let windows = windows(blocks, width, &channels, bursts);
-    let mut floor = [0.0; 6];
-    for &c in &channels {
-        let mut of_channel: Vec<f64> = windows
-            .iter()
-            .flatten()
-            .map(|w| w.variance[c])
-            .filter(|v| *v > 0.0)
-            .collect();
-        // A noiseless simulation has no floor: then anything that varies at all is motion.
-        floor[c] = quantile(&mut of_channel, 0.05).unwrap_or(0.0);
-    }
-    // A hand at rest trembles in angle but hardly in force.
-    let by_hand = manifest.reference == Reference::Gravity && condensed.has_raw[3];
-    let gyro = if by_hand {
-        GYRO_TREMOR * factor
-    } else {
-        factor
-    };
-    let factors = [gyro, gyro, gyro, factor, factor, factor];
-    let quiet = |w: &Window| {
-        channels
-            .iter()
-            .all(|&c| w.variance[c] <= factors[c] * floor[c])
-    };
-    let at_rest: Vec<&Window> = windows.iter().flatten().filter(|w| quiet(w)).collect();
-    let rates = Sensor::Gyro
-        .channels()
-        .filter(|&c| by_hand && condensed.has_raw[c]);
-    let rates: Vec<_> = rates
-        .map(|c| (c, RateAtRest::of(&at_rest, c, (factor * floor[c]).sqrt())))
-        .collect();
-    let turning = |w: &Window| rates.iter().any(|(c, rate)| !rate.has(w, *c));
-    let spans = reference_spans(condensed);
-    let mut still = vec![false; blocks.len()];
-    for (i, window) in windows.iter().enumerate() {
-        let Some(window) = window else { continue };
-        let quiet = quiet(window) && !turning(window);
-        let constant = manifest.reference == Reference::Gravity
-            || constant_input(blocks[i..i + width].iter().map(|b| &b.reference), &spans);
-        if quiet && constant {
-            still[i..i + width].fill(true);
-        }
-    }
-    // Two dwells of a table may follow each other without a disturbed window between them.
-    let guard = (GUARD_S / block_s).round() as usize;
-    let mut ranges = Vec::new();
-    let mut start = None;
-    for i in 0..=blocks.len() {
-        let open = i < blocks.len()
-            && still[i]
-            && (start.is_none()
-                || ((bursts || !blocks[i].after_gap)
-                    && same_input(&blocks[i - 1].reference, &blocks[i].reference, &spans)));
-        match (open, start) {
-            (true, None) => start = Some(i),
-            (false, Some(from)) => {
-                // At the ends of the recording there is no motion to guard against.
-                let from = if from == 0 { 0 } else { from + guard };
-                let to = if i == blocks.len() {
-                    i
-                } else {
-                    i.saturating_sub(guard)
-                };
-                if to > from {
-                    ranges.push((None, from..to));
-                }
-                start = (i < blocks.len() && still[i]).then_some(i);
-            }
-            _ => {}
-        }
-    }
-    let detection = Detection {
+    let search = Search {
+        condensed,
+        reference: manifest.reference,
+        factor,
+        width,
+        // The ends of turns are cut by their level.
+        guard: match manifest.reference {
+            Reference::TurntableRate => 0,
+            Reference::Gravity | Reference::Table => (GUARD_S / block_s).round() as usize,
+        },
         block_s,
-        window_s: width as f64 * block_s,
-        guard_s: guard as f64 * block_s,
-        shortest_s: SHORTEST_S,
-        still_factor: factor,
-        gyro_still_factor: gyro,
-        floor: floor.map(f64::sqrt),
+        spans: reference_spans(condensed),
+        windows: windows(blocks, width, &channels, bursts),
+        channels,
+        bursts,
     };
-    Ok((ranges, detection))
+    let (ranges, detection) = search.still(0..blocks.len());
+    let by_hand = manifest.reference == Reference::Gravity && condensed.has_raw[3];
+    let fault = by_hand
+        .then(|| log_fault::find(&search.quiet(), condensed, manifest))
+        .flatten();
+    let Some(found) = &fault else {
+        return Ok(Segmentation {
+            ranges,
+            detection,
+            fault,
+        });
+    };
+    let (mut ranges, detection) = search.still(0..found.block);
+    ranges.extend(search.still(found.block + 1..blocks.len()).0);
+    Ok(Segmentation {
+        ranges,
+        detection,
+        fault,
+    })
 }
 
-/// This many bursts are a way of recording; fewer pauses are a loss of samples.
-const BURSTS: usize = 20;
-/// Largest median of the bursts, and smallest median of the pauses between them, s. Longer bursts show by themselves that they are still,
-/// and are separate dwells. Joined, 25 bursts of 5 s in a cooling chamber became four dwells whose noise was their drift.
-const BURST_S: f64 = 2.0;
-const PAUSE_S: f64 = 1.0;
-
-/// Whether samples were taken in short bursts, with pauses. A single burst may be too short to show that it is still; joined with its
-/// neighbours it is long enough.
-fn in_bursts(blocks: &[Block]) -> bool {
-    let starts = (1..blocks.len()).filter(|i| blocks[*i].after_gap);
-    let starts: Vec<usize> = [0].into_iter().chain(starts).collect();
-    let ends = starts[1..].iter().copied().chain([blocks.len()]);
-    let mut lengths: Vec<f64> = starts
-        .iter()
-        .zip(ends)
-        .map(|(from, to)| blocks[to - 1].last_s - blocks[*from].start_s)
-        .collect();
-    let mut pauses: Vec<f64> = starts[1..]
-        .iter()
-        .map(|i| blocks[*i].start_s - blocks[i - 1].last_s)
-        .collect();
-    let median = |values: &mut Vec<f64>| quantile(values, 0.5);
-    starts.len() >= BURSTS
-        && median(&mut lengths).is_some_and(|s| s < BURST_S)
-        && median(&mut pauses).is_some_and(|s| s > PAUSE_S)
-}
-
-/// Mean and variance of the six raw channels over [`WINDOW_S`], and the temperature.
-struct Window {
-    mean: [f64; 6],
-    variance: [f64; 6],
-    temp_c: f64,
-}
-
-/// The window that begins at each block; `None` where there is a gap in it, unless samples come in bursts.
-fn windows(
-    blocks: &[Block],
+/// A search for still segments.
+struct Search<'a> {
+    condensed: &'a Condensed,
+    reference: Reference,
+    factor: f64,
+    /// Blocks of a window.
     width: usize,
-    channels: &[usize],
+    /// Blocks that are left out at both ends of a segment.
+    guard: usize,
+    block_s: f64,
+    spans: [f64; 6],
+    windows: Vec<Option<Window>>,
+    channels: Vec<usize>,
     bursts: bool,
-) -> Vec<Option<Window>> {
-    let window = |window: &[Block]| {
-        let (mut mean, mut variance) = ([0.0; 6], [0.0; 6]);
-        for &c in channels {
-            let pooled = pool(window.iter().map(|b| b.raw[c]));
-            mean[c] = pooled.mean;
-            variance[c] = match pooled.n {
-                0 | 1 => f64::INFINITY,
-                n => pooled.m2 / f64::from(n - 1),
+}
+
+impl Search<'_> {
+    /// Whether hands turn the unit, and an accelerometer shows it.
+    fn by_hand(&self) -> bool {
+        self.reference == Reference::Gravity && self.condensed.has_raw[3]
+    }
+
+    /// The windows that lie in the blocks `part`, with their first blocks.
+    fn windows_in(&self, part: &Range<usize>) -> impl Iterator<Item = (usize, &Window)> {
+        let last = (part.end + 1).saturating_sub(self.width);
+        let starts = part.start..last.max(part.start);
+        starts.filter_map(move |i| Some((i, self.windows[i].as_ref()?)))
+    }
+
+    /// Largest variance of the gyro in a still window, relative to the quietest. A hand at rest trembles in angle but hardly in force.
+    fn gyro_factor(&self) -> f64 {
+        match self.by_hand() {
+            true => GYRO_TREMOR * self.factor,
+            false => self.factor,
+        }
+    }
+
+    /// Largest variances of a still window, if `floor` are those of the quietest.
+    fn limits(&self, floor: &[f64; 6]) -> [f64; 6] {
+        let mut limits = floor.map(|f| self.factor * f);
+        for c in Sensor::Gyro.channels() {
+            limits[c] = self.gyro_factor() * floor[c];
+        }
+        limits
+    }
+
+    /// Segments that hardly vary, whatever the gyro reads: rests before and after a fault of the log.
+    fn quiet(&self) -> Vec<Range<usize>> {
+        let part = 0..self.condensed.blocks.len();
+        let Some(floor) = Floor::of(self, &part) else {
+            return Vec::new();
+        };
+        let mut limits = self.limits(&floor.variance);
+        for c in Sensor::Accel.channels() {
+            limits[c] *= OTHER_RANGE;
+        }
+        let quiet = |_, w: &Window| self.channels.iter().all(|&c| w.variance[c] <= limits[c]);
+        self.segments(&part, quiet)
+    }
+
+    /// The still segments among the blocks `part`.
+    fn still(&self, part: Range<usize>) -> (Vec<StepBlocks>, Detection) {
+        let floor = Floor::of(self, &part);
+        let variance = floor.as_ref().map_or([0.0; 6], |floor| floor.variance);
+        let limits = self.limits(&variance);
+        let detection = Detection {
+            block_s: self.block_s,
+            window_s: self.width as f64 * self.block_s,
+            guard_s: self.guard as f64 * self.block_s,
+            shortest_s: SHORTEST_S,
+            still_factor: self.factor,
+            gyro_still_factor: self.gyro_factor(),
+            floor: variance.map(f64::sqrt),
+        };
+        let rests = floor.as_ref().is_some_and(|floor| floor.is_of_rests);
+        if self.reference == Reference::Gravity && !rests {
+            return (Vec::new(), detection);
+        }
+        let turntable = Turntable::of(self, &part, &limits);
+        let quiet = |w: &Window| match &turntable {
+            Some(turntable) => turntable.is_even(w, &limits, &self.channels),
+            None => self.channels.iter().all(|&c| w.variance[c] <= limits[c]),
+        };
+        let at_rest: Vec<&Window> = self.windows_in(&part).map(|(_, w)| w).collect();
+        let at_rest: Vec<&Window> = at_rest.into_iter().filter(|w| quiet(w)).collect();
+        let rates: Vec<(usize, RateAtRest)> = Sensor::Gyro
+            .channels()
+            .filter(|&c| self.by_hand() && self.condensed.has_raw[c])
+            .map(|c| {
+                let margin = (self.factor * variance[c]).sqrt();
+                (c, RateAtRest::of(&at_rest, c, margin))
+            })
+            .collect();
+        let turning = |w: &Window| rates.iter().any(|(c, rate)| !rate.has(w, *c));
+        let blocks = &self.condensed.blocks;
+        let constant = |i: usize| {
+            let levels = blocks[i..i + self.width].iter().map(|b| &b.reference);
+            self.reference == Reference::Gravity || constant_input(levels, &self.spans)
+        };
+        let mut segments = self.segments(&part, |i, w| quiet(w) && !turning(w) && constant(i));
+        // A table's inputs are known, and end a dwell where they change. A gyro's level at rest also moves with its bias.
+        let by_level = match self.reference {
+            Reference::Gravity => Sensor::Accel.channels(),
+            Reference::TurntableRate => Sensor::Gyro.channels(),
+            Reference::Table => 0..0,
+        };
+        change_point::split(&mut segments, self.condensed, by_level, self.width);
+        let guarded = segments.into_iter().filter_map(|segment| {
+            // At the ends of the recording there is no motion to guard against.
+            let from = match segment.start {
+                0 => 0,
+                start => start + self.guard,
             };
-        }
-        Window {
-            mean,
-            variance,
-            temp_c: window[width / 2].temp_c.mean,
-        }
-    };
-    let whole = |w: &[Block]| bursts || !w[1..].iter().any(|b| b.after_gap);
-    blocks
-        .windows(width)
-        .map(|w| whole(w).then(|| window(w)))
-        .collect()
-}
+            let to = match segment.end == blocks.len() {
+                true => segment.end,
+                false => segment.end.saturating_sub(self.guard),
+            };
+            (to > from).then_some((None, from..to))
+        });
+        (guarded.collect(), detection)
+    }
 
-/// If the temperature varies by less than this over all windows, K, it moves a bias by no more than hands do.
-const LEVELS_FROM_K: f64 = 5.0;
-/// Least width, K, and least number of windows (one minute) of a temperature bin with one level: a turn in a bin is then the smaller part
-/// of it.
-const LEVEL_K: f64 = 1.0;
-const LEVEL_WINDOWS: usize = 600;
-/// Largest deviation of a window at rest from its level, in sigmas of all windows.
-const REACH_SIGMAS: f64 = 5.0;
-
-/// Range of a channel's mean reading in windows at rest: the median of the quiet windows, plus or minus a margin and five of their standard
-/// deviations, which include a drift of the bias.
-///
-/// A turn about the vertical does not show in the accelerometer, and a slow one hardly in the variance of the gyro. A bias that follows the
-/// temperature looks like such a turn, so each window is compared with others at the same temperature, from which only a turn differs.
-struct RateAtRest {
-    /// Temperature and median reading, by temperature; a single pair if the temperature hardly changes.
-    levels: Vec<(f64, f64)>,
-    reach: f64,
-}
-
-impl RateAtRest {
-    fn of(at_rest: &[&Window], c: usize, margin: f64) -> Self {
-        let mut by_temp: Vec<(f64, f64)> = at_rest.iter().map(|w| (w.temp_c, w.mean[c])).collect();
-        by_temp.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let ends = by_temp.first().zip(by_temp.last());
-        let changes = ends.is_some_and(|(a, b)| b.0 - a.0 > LEVELS_FROM_K);
-        let mut bins: Vec<&[(f64, f64)]> = Vec::new();
-        let mut from = 0;
-        for i in 0..by_temp.len() {
-            let full = changes
-                && i - from >= LEVEL_WINDOWS
-                && by_temp[i].0 - by_temp[from].0 >= LEVEL_K
-                && by_temp.len() - i >= LEVEL_WINDOWS;
-            if full {
-                bins.push(&by_temp[from..i]);
-                from = i;
+    /// The segments of `part` that windows cover which `is_still` accepts. Two blocks belong to one segment if a window contains both: two
+    /// poses that follow each other without a pause are still up to their border, and only a window across it shows the change.
+    fn segments(
+        &self,
+        part: &Range<usize>,
+        is_still: impl Fn(usize, &Window) -> bool,
+    ) -> Vec<Range<usize>> {
+        let blocks = &self.condensed.blocks;
+        let (mut still, mut joined) = (vec![false; part.len()], vec![false; part.len()]);
+        for (i, window) in self.windows_in(part) {
+            if is_still(i, window) {
+                let from = i - part.start;
+                still[from..from + self.width].fill(true);
+                joined[from + 1..from + self.width].fill(true);
             }
         }
-        bins.push(&by_temp[from..]);
-        let level = |bin: &&[(f64, f64)]| {
-            let median = |of: fn(&(f64, f64)) -> f64| {
-                let mut values: Vec<f64> = bin.iter().map(of).collect();
-                quantile(&mut values, 0.5)
+        let mut segments: Vec<Range<usize>> = Vec::new();
+        for i in part.clone().filter(|i| still[i - part.start]) {
+            let continues = |last: &Range<usize>| {
+                last.end == i
+                    && joined[i - part.start]
+                    && (self.bursts || !blocks[i].after_gap)
+                    && same_input(&blocks[i - 1].reference, &blocks[i].reference, &self.spans)
             };
-            Some((median(|w| w.0)?, median(|w| w.1)?))
-        };
-        let mut rate = Self {
-            levels: bins.iter().filter_map(level).collect(),
-            reach: f64::INFINITY,
-        };
-        let mut deviations: Vec<f64> = at_rest
-            .iter()
-            .map(|w| (w.mean[c] - rate.level(w.temp_c)).abs())
-            .collect();
-        let sigma = OF_MEDIAN * quantile(&mut deviations, 0.5).unwrap_or(0.0);
-        rate.reach = margin + REACH_SIGMAS * sigma;
-        rate
-    }
-
-    /// Interpolated linearly between the levels of the nearest temperatures; beyond them, extrapolated through the last two.
-    fn level(&self, temp_c: f64) -> f64 {
-        let [first, .., last] = self.levels.as_slice() else {
-            return self.levels.first().map_or(0.0, |l| l.1);
-        };
-        if !temp_c.is_finite() {
-            return 0.5 * (first.1 + last.1);
+            match segments.last_mut() {
+                Some(last) if continues(last) => last.end = i + 1,
+                _ => segments.push(i..i + 1),
+            }
         }
-        let k = self.levels.partition_point(|l| l.0 < temp_c);
-        let k = k.clamp(1, self.levels.len() - 1);
-        let [(t0, a), (t1, b)] = [self.levels[k - 1], self.levels[k]];
-        a + (b - a) * (temp_c - t0) / (t1 - t0)
+        segments
+    }
+}
+
+/// The quietest windows.
+struct Floor {
+    /// Variance of each channel in them, raw units squared; zero if nothing varies.
+    variance: [f64; 6],
+    /// Whether they are rests: their variance is that of noise.
+    is_of_rests: bool,
+}
+
+/// Factor for the accelerometer's variance where a fault of the log is searched: in counts, noise is four times as large in a range a quarter
+/// as wide.
+const OTHER_RANGE: f64 = 16.0;
+/// Share of the windows that are the quietest.
+const QUIETEST: f64 = 0.05;
+/// Windows are alike if the product of their variances, without that of the channel that stands out most, differs by at most this factor:
+/// that of two in each of five.
+const ALIKE: f64 = 32.0;
+/// If the variance of a channel in the windows that are quietest in the other channels exceeds its own floor by this factor, the channel
+/// has become quiet in a part of the recording: shorted, at a rail, or exchanged for another. Below this factor [`STILL_FACTOR`] accepts the
+/// other part nearly as well. Hands that tremble reach 11 in the gyro, and columns that change places 20 to 90.
+const BECAME_QUIET: f64 = 12.0;
+/// Largest share of the variance of a window that may be between blocks, in the median of the channels, if it is noise. White noise at 100 Hz
+/// has 0.09, noise filtered at 5 Hz about 0.4, and the steps of somebody who walks 0.8 and more.
+const BETWEEN_BLOCKS: f64 = 0.7;
+
+impl Floor {
+    /// That of the windows in the blocks `part`; `None` if there are none.
+    fn of(search: &Search, part: &Range<usize>) -> Option<Self> {
+        let windows: Vec<&Window> = search.windows_in(part).map(|(_, w)| w).collect();
+        let positive = |windows: &[&Window], c: usize| -> Vec<f64> {
+            let variances = windows.iter().map(|w| w.variance[c]);
+            variances.filter(|v| *v > 0.0).collect()
+        };
+        let mut variance = [0.0; 6];
+        for &c in &search.channels {
+            // A noiseless simulation has no floor: then anything that varies at all is motion.
+            let quietest = quantile(&mut positive(&windows, c), QUIETEST);
+            variance[c] = quietest.unwrap_or(0.0);
+        }
+        // Of a coarse channel some windows are constant; they are no quieter than those that alternate between two codes.
+        let score = |w: &Window| {
+            let varying = search.channels.iter().filter(|c| variance[**c] > 0.0);
+            let ratios = varying.map(|&c| (w.variance[c] / variance[c]).max(0.1).ln());
+            let (sum, largest) = ratios.fold((0.0, 0.0), |(sum, largest): (f64, f64), ratio| {
+                (sum + ratio, largest.max(ratio))
+            });
+            sum - largest
+        };
+        let scores: Vec<f64> = windows.iter().map(|w| score(w)).collect();
+        let limit = quantile(&mut scores.clone(), QUIETEST)? + f64::ln(ALIKE);
+        let scored = windows.iter().zip(&scores);
+        let together: Vec<&Window> = scored
+            .filter(|(_, score)| **score <= limit)
+            .map(|(w, _)| *w)
+            .collect();
+        for &c in &search.channels {
+            let noise = |w: &&&Window| w.between[c] <= BETWEEN_BLOCKS;
+            let noise: Vec<&Window> = together.iter().filter(noise).copied().collect();
+            let usual = quantile(&mut positive(&noise, c), 0.9).unwrap_or(0.0);
+            if usual > BECAME_QUIET * variance[c] {
+                variance[c] = usual;
+            }
+        }
+        let between = |c: usize| {
+            let mut shares: Vec<f64> = together.iter().map(|w| w.between[c]).collect();
+            quantile(&mut shares, 0.5).unwrap_or(0.0)
+        };
+        let mut shares: Vec<f64> = search.channels.iter().map(|c| between(*c)).collect();
+        let noiseless = variance == [0.0; 6];
+        let is_of_rests = noiseless || quantile(&mut shares, 0.5)? <= BETWEEN_BLOCKS;
+        Some(Self {
+            variance,
+            is_of_rests,
+        })
+    }
+}
+
+/// Largest standard deviation of an even turn, as a share of its rate: platters of record players wobble and change their speed by 0.1 to
+/// 0.2 %.
+const WOBBLE: f64 = 3e-3;
+
+/// What a gyro reads at rest on a turntable. A turning platter wobbles a hundred times more than a unit at rest.
+struct Turntable {
+    at_rest: [f64; 3],
+}
+
+impl Turntable {
+    fn of(search: &Search, part: &Range<usize>, limits: &[f64; 6]) -> Option<Self> {
+        let gyro = Sensor::Gyro.channels();
+        if search.reference != Reference::TurntableRate {
+            return None;
+        }
+        let quiet: Vec<&Window> = search.windows_in(part).map(|(_, w)| w).collect();
+        let quiet = |c: usize| -> Vec<f64> {
+            let still = |w: &&&Window| gyro.clone().all(|c| w.variance[c] <= limits[c]);
+            quiet.iter().filter(still).map(|w| w.mean[c]).collect()
+        };
+        Some(Self {
+            at_rest: [0, 1, 2].map(|c| quantile(&mut quiet(c), 0.5).unwrap_or(0.0)),
+        })
     }
 
-    fn has(&self, window: &Window, c: usize) -> bool {
-        let off = window.mean[c] - self.level(window.temp_c);
-        self.levels.is_empty() || off.abs() <= self.reach
+    /// Whether the unit rests or turns evenly. In a turn nothing is expected of an accelerometer.
+    fn is_even(&self, w: &Window, limits: &[f64; 6], channels: &[usize]) -> bool {
+        let rate = Sensor::Gyro.channels().map(|c| w.mean[c] - self.at_rest[c]);
+        let wobble = WOBBLE * WOBBLE * rate.map(|r| r * r).sum::<f64>();
+        let gyro = Sensor::Gyro.channels();
+        let turns = gyro.clone().all(|c| wobble > limits[c]);
+        let mut judged = channels.iter().filter(|c| !turns || gyro.contains(*c));
+        judged.all(|&c| w.variance[c] <= limits[c] + wobble * f64::from(u8::from(c < 3)))
     }
 }
 

@@ -62,6 +62,7 @@ impl fmt::Display for Warning {
             Self::Repeated(n) => write!(f, "{n} rows repeat the row before, time included: left out"),
             Self::Empty(count, channel) => write!(f, "{} of {channel} empty or not a number: masked", plural(*count, "sample")),
             Self::Held(sensor, held, rate_hz) => f.write_str(&held.words(sensor.name(), *rate_hz)),
+            Self::LogFault(fault) => write!(f, "from data row {} on {}: no calibration holds before and after it", fault.row + 1, fault.change),
             Self::DwellsCut(count, s) => write!(f, "{} cut at the ends, by {s:.1} s in all: the unit was moving there", plural(*count, "dwell")),
             Self::SlowTurns(steps) => write!(f, "{} ({}) used as a pose only, not as a rest of the gyro: neither its bias in the other dwells nor g-sensitivity explains its reading; the unit probably turned slowly about the vertical", plural(steps.len() as u64, "dwell"), steps.join(", ")),
             Self::DwellsNotUsed(names, fault, sensor) => {

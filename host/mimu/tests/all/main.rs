@@ -7,4 +7,5 @@ mod lever_arm;
 mod moving_input;
 mod off_level;
 mod over_temperature;
+mod segmentation;
 mod written_files;

@@ -14,6 +14,7 @@ use super::plausibility::Plausibility;
 use super::readings::{Choice, Readings};
 use super::row::Row;
 use super::row_filter::RowFilter;
+use super::row_range::RowRange;
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
 use super::time::{Clock, Decimal, Stamp, Times};
@@ -34,6 +35,8 @@ pub(super) struct HowToRead<'a> {
     pub zeros: &'a [Zero],
     /// Which rows are wanted.
     pub filters: Vec<RowFilter>,
+    /// Which of these rows are wanted, by their numbers; all if `None`.
+    pub rows: Option<RowRange>,
     /// Which sensor of a log is wanted.
     pub choice: Choice<'a>,
     /// Which of the readings of a log, counted from 0.
@@ -86,6 +89,9 @@ pub(super) struct ForeignFile {
     pub labels: StepLabels,
     /// Rows so far, and those that could not be read.
     pub broken: BrokenTally,
+    rows: Option<RowRange>,
+    /// Rows so far that are outside it.
+    outside: u64,
 }
 
 #[derive(Debug)]
@@ -206,6 +212,8 @@ impl ForeignFile {
             before: Row::default(),
             labels: StepLabels::default(),
             broken: BrokenTally::new(how.skip_broken),
+            rows: how.rows,
+            outside: 0,
         })
     }
 
@@ -266,13 +274,14 @@ impl ForeignFile {
         }
     }
 
-    /// Rows so far that the filters chose, and those that they left out.
+    /// Rows so far that the filters chose, and those that they or the range left out.
     pub fn chosen(&self) -> [u64; 2] {
-        match &self.table {
+        let [chosen, left_out] = match &self.table {
             Table::Text(table) => table.filters().counts(),
             Table::Parquet(table) => table.filters.counts(),
             Table::Log(_) => [0; 2],
-        }
+        };
+        [chosen, left_out + self.outside]
     }
 
     /// Zero bytes around its lines so far.
@@ -328,7 +337,15 @@ impl ForeignFile {
     /// error lists all kinds.
     pub fn next(&mut self, row: &mut Row) -> Result<bool> {
         loop {
-            match self.read(row) {
+            let read = self.read(row);
+            let number = self.broken.rows + 1;
+            let is_row = matches!(read, Ok(true) | Err(Unreadable::Row(_)));
+            if is_row && self.rows.is_some_and(|rows| !rows.contains(number)) {
+                self.broken.rows = number;
+                self.outside += 1;
+                continue;
+            }
+            match read {
                 Ok(true) => self.broken.rows += 1,
                 Ok(false) => {
                     self.broken.check()?;

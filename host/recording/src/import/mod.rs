@@ -29,6 +29,7 @@ mod ros;
 mod rotation;
 mod row;
 mod row_filter;
+mod row_range;
 mod sequence;
 mod sequence_position;
 #[cfg(feature = "bags")]
@@ -66,6 +67,7 @@ pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};
 pub use preview::{Preview, preview};
 pub use row_filter::RowFilter;
+pub use row_range::RowRange;
 pub use summary::{ImportSummary, SkippedLines};
 pub use time::{Decimal, Jitter, Rounds, TimeSummary};
 

@@ -11,6 +11,7 @@ use super::foreign::HowToRead;
 use super::preset::{Chosen, PresetUse};
 use super::readings::Choice;
 use super::row_filter::RowFilter;
+use super::row_range::RowRange;
 use super::time::Decimal;
 use crate::digest;
 use crate::error::{Argument, Error, Result};
@@ -74,6 +75,8 @@ pub struct ImportOptions {
     /// Filters of text and Parquet files: a row is read if it satisfies all of them. If one column is to have several values, each value chooses the
     /// rows of one list of columns.
     pub filters: Vec<RowFilter>,
+    /// Which data rows of the first file are read, or of each file of a sequence; all if `None`.
+    pub rows: Option<RowRange>,
     /// How many rows that cannot be read may be left out.
     pub skip_broken: BrokenLimit,
     /// Whether each row is the mean over a pose or a step instead of a sample.
@@ -121,6 +124,7 @@ impl ImportOptions {
             faces: Vec::new(),
             step_gap_s: None,
             filters: Vec::new(),
+            rows: None,
             skip_broken: BrokenLimit::None,
             means: false,
             preset: None,
@@ -202,6 +206,12 @@ impl ImportOptions {
             return refuse(
                 "codes are read in single samples, but these are means".to_owned(),
                 "import the samples, or give the means as readings",
+            );
+        }
+        if self.means && self.rows.is_some() {
+            return refuse(
+                "rows are chosen by their numbers, but this is a table of means".to_owned(),
+                "give a table with only these rows",
             );
         }
         if self.means && !self.filters.is_empty() {
@@ -309,6 +319,9 @@ impl ImportOptions {
         for filter in &self.filters {
             option("--where", filter.to_string());
         }
+        if let Some(rows) = self.rows {
+            option("--rows", rows.to_string());
+        }
         for topic in &self.topics {
             option("--topic", topic.clone());
         }
@@ -401,6 +414,7 @@ impl ImportOptions {
             twos_complements: &self.twos_complements,
             zeros: &self.zeros,
             filters: self.filters(source),
+            rows: self.rows.filter(|_| source == 0),
             choice: Choice {
                 topics: &self.topics,
                 instance: self.instance,

@@ -45,7 +45,7 @@ pub struct ImportSummary {
     pub dropped_in_gaps: u64,
     /// Rows with values interpolated from another file.
     pub interpolated: u64,
-    /// Rows that the filters left out.
+    /// Rows that the filters or the range left out.
     pub not_chosen: u64,
     /// Rows left out as padding, because all of their readings are 0.
     pub padding: u64,

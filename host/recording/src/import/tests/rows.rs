@@ -117,3 +117,24 @@ fn rows_of_a_parquet_file_are_chosen_alike() {
     options.filters = vec!["range=4".parse().unwrap()];
     assert!(bench.refused(&options).contains("accel_x"));
 }
+
+#[test]
+fn the_rows_before_and_after_a_fault_are_imported_apart() {
+    let row = |i: u64| format!("{},{i},0,1\n", 10 * i);
+    let text = (0..60).map(row).collect::<String>();
+    let bench = Bench::new(&[("a.csv", &format!("ms,a,b,c\n{text}"))]);
+    for (rows, first, count) in [("..20", 0.0, 20), ("21..", 20.0, 40), ("5..30", 4.0, 26)] {
+        let mut options = bench.options(&["a.csv"], &[LIST]);
+        options.rows = Some(rows.parse().unwrap());
+        options.rate_hz = Some(100.0);
+        let (summary, batch, manifest) = bench.import(&options).unwrap();
+        assert_eq!((summary.rows, summary.not_chosen), (count, 60 - count));
+        assert_eq!(batch.raw[3][0], first);
+        let arguments = manifest.imported_with.windows(2);
+        let given = ["--rows".to_owned(), rows.to_owned()];
+        assert!(arguments.into_iter().any(|w| w == given));
+    }
+    let mut options = bench.options(&["a.csv"], &[LIST]);
+    options.rows = Some("61..".parse().unwrap());
+    assert!(bench.import(&options).is_err());
+}

@@ -1,0 +1,379 @@
+//! Dwells found in simulated logs that are hard to segment, and faults of logs that rests show.
+
+use mimu::fit::{Options, fit};
+use mimu::quantity::Sensor;
+use mimu::recording_problem::RecordingProblem;
+use mimu::signal::dwell::Change;
+use mimu::signal::stillness::STILL_FACTOR;
+use mimu::turntable::RatedDwells;
+use mimu::{Manifest, Prepared, RawUnit, Reference, Samples};
+use mimu_recording::{Turntable, TurntableRate};
+use mimu_rig::random::Random;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+const G: f64 = 9.80665;
+const RATE_HZ: f64 = 100.0;
+/// Counts per g and per rad/s, as of an MPU-6050.
+const PER_G: f64 = 16384.0;
+const PER_RATE: f64 = 131.0 * 57.29578;
+/// Standard deviations of a sample, counts.
+const NOISE: [f64; 2] = [45.0, 7.0];
+/// Bias of the gyro, counts.
+const BIAS: [f64; 3] = [261.0, 157.0, 366.0];
+
+/// A unit in the hands of somebody, and what it has recorded.
+struct Log {
+    attitude: Rotation3<f64>,
+    random: Random,
+    samples: Samples,
+}
+
+impl Log {
+    fn new(seed: u64) -> Self {
+        Self {
+            attitude: Rotation3::identity(),
+            random: Random::new(seed, "log"),
+            samples: Samples::default(),
+        }
+    }
+
+    fn unit_vector(&mut self) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| self.random.normal()).normalize()
+    }
+
+    /// Records one sample while the body turns at `rate`, rad/s, and accelerates by `motion`, m/s², both in its own axes.
+    fn sample(&mut self, rate: Vector3<f64>, motion: Vector3<f64>) {
+        let force = self.attitude.inverse() * Vector3::new(0.0, 0.0, G) + motion;
+        let gyro = Vector3::from(BIAS) + PER_RATE * rate;
+        let accel = Vector3::new(-340.0, 170.0, -195.0) + PER_G / G * force;
+        let t_s = self.samples.t_s.len() as f64 / RATE_HZ;
+        self.samples.t_s.push(t_s);
+        for k in 0..3 {
+            let noise = [NOISE[1], NOISE[0]].map(|sigma| sigma * self.random.normal());
+            self.samples.raw[k].push((gyro[k] + noise[0]).round());
+            self.samples.raw[3 + k].push((accel[k] + noise[1]).round());
+        }
+        self.attitude *= Rotation3::new(rate / RATE_HZ);
+    }
+
+    fn rest(&mut self, s: f64) {
+        for _ in 0..(s * RATE_HZ) as usize {
+            self.sample(Vector3::zeros(), Vector3::zeros());
+        }
+    }
+
+    /// A turn by `angle` about a random axis that begins and ends gently.
+    fn turn(&mut self, angle: f64, s: f64) {
+        let axis = self.unit_vector();
+        let n = (s * RATE_HZ) as usize;
+        for i in 0..n {
+            let phase = std::f64::consts::TAU * (i as f64 + 0.5) / n as f64;
+            self.sample(axis * (angle / s * (1.0 - phase.cos())), Vector3::zeros());
+        }
+    }
+
+    /// Rests in `poses` poses, with turns between them.
+    fn session(mut self, poses: usize) -> Samples {
+        self.rest(4.0);
+        for _ in 1..poses {
+            let angle = 1.0 + self.random.uniform();
+            self.turn(angle, 1.3);
+            self.rest(2.6);
+        }
+        self.samples
+    }
+}
+
+fn by_hand(samples: &Samples) -> mimu_recording::error::Result<Prepared> {
+    let manifest = Manifest::new("u", RATE_HZ, G, RawUnit::Count, Reference::Gravity);
+    Prepared::of(manifest, samples, STILL_FACTOR)
+}
+
+fn first_rows(samples: &Samples, rows: usize) -> Samples {
+    Samples {
+        t_s: samples.t_s[..rows].to_vec(),
+        raw: samples.raw.each_ref().map(|column| column[..rows].to_vec()),
+        ..Samples::default()
+    }
+}
+
+fn used(prepared: &Prepared) -> usize {
+    let list = prepared.dwells.list.iter();
+    list.filter(|d| Sensor::BOTH.iter().all(|s| d.faults[*s].is_none()))
+        .count()
+}
+
+/// Poses of `rows` samples of an accelerometer alone, in counts, one directly after another; every other one is `near` (rad) to the one
+/// before.
+fn abutting(seed: u64, poses: usize, rows: usize, near: f64) -> Samples {
+    let mut log = Log::new(seed);
+    for pose in 0..poses {
+        let turn = match pose % 2 {
+            // About a level axis: a turn about the vertical is none for an accelerometer.
+            1 => {
+                let up = log.attitude.inverse() * Vector3::z();
+                let level = log.unit_vector().cross(&up).normalize();
+                Rotation3::new(near * level)
+            }
+            _ => Rotation3::new(log.unit_vector() * (0.5 + 2.0 * log.random.uniform())),
+        };
+        log.attitude *= turn;
+        log.rest(rows as f64 / RATE_HZ);
+    }
+    let Samples { t_s, mut raw, .. } = log.samples;
+    raw[..3].iter_mut().for_each(Vec::clear);
+    Samples {
+        t_s,
+        raw,
+        ..Samples::default()
+    }
+}
+
+#[test]
+fn poses_that_follow_one_another_without_a_pause_are_dwells_of_their_own_down_to_two_degrees() {
+    for (rows, seed) in [(240, 1), (243, 2)] {
+        let samples = abutting(seed, 24, rows, 2f64.to_radians());
+        let found = by_hand(&samples).unwrap().dwells.list;
+        assert_eq!(found.len(), 24, "{rows} rows each");
+        for (k, dwell) in found.iter().enumerate() {
+            let pose = (k * rows) as u64..((k + 1) * rows) as u64;
+            let inside = pose.contains(&dwell.first_row)
+                && pose.contains(&(dwell.first_row + dwell.rows - 1));
+            assert!(inside, "{rows} rows each, dwell {k}: {dwell:?}");
+        }
+    }
+}
+
+#[test]
+fn a_rest_that_creeps_or_whose_bias_drifts_is_one_dwell() {
+    let mut log = Log::new(4);
+    for _ in 0..30 {
+        log.turn(1.5, 1.3);
+        // Ten seconds, in which a hand sinks by two degrees.
+        let level = (log.attitude.inverse() * Vector3::z()).cross(&log.unit_vector());
+        let creep = level.normalize() * 2f64.to_radians() / 10.0;
+        for _ in 0..1000 {
+            log.sample(creep, Vector3::zeros());
+        }
+    }
+    let found = by_hand(&log.samples).unwrap().dwells.list;
+    assert_eq!(found.len(), 30);
+}
+
+#[test]
+fn a_walk_without_a_rest_has_no_dwell() {
+    for seed in 1..=4 {
+        let mut log = Log::new(seed);
+        // Two steps a second. Heading, roll and pitch swing with the stride, the body bounces with each step, and each heel strike rings.
+        let heading = |i: usize| 0.3 * (i as f64 / 700.0).sin();
+        for i in 0..12_000 {
+            let stride = std::f64::consts::TAU * i as f64 / RATE_HZ;
+            let swing = 1.0 + 0.2 * log.random.normal();
+            let rate = Vector3::new(
+                0.8 * stride.sin() + 0.3 * (2.0 * stride).cos(),
+                0.5 * (2.0 * stride + 0.4).sin(),
+                heading(i) + 0.4 * stride.cos(),
+            ) * swing;
+            let heel = (-((i % 50) as f64) / 4.0).exp();
+            let bounce = Vector3::new(
+                0.8 * (2.0 * stride).sin(),
+                0.6 * stride.sin(),
+                2.0 * (2.0 * stride).cos() + 4.0 * heel,
+            );
+            // Posture swings about the upright.
+            log.attitude =
+                Rotation3::from_euler_angles(0.13 * stride.cos(), 0.05 * (2.0 * stride).cos(), 0.0);
+            log.sample(rate, bounce);
+        }
+        let found = by_hand(&log.samples).map(|p| p.dwells.list.len());
+        assert!(found.is_err(), "{seed}: {found:?}");
+    }
+}
+
+#[test]
+fn rests_before_a_channel_becomes_quiet_are_found() {
+    let samples = Log::new(5).session(30);
+    let all = used(&by_hand(&samples).unwrap());
+    assert_eq!(all, 30);
+    let mut quiet = samples.clone();
+    let half = samples.t_s.len() / 2;
+    // Its wire comes off, and what is left is the noise of the converter.
+    for u in &mut quiet.raw[4][half..] {
+        *u = (*u * 1e-6 + 3.0).round() + f64::from(*u as i32 % 2);
+    }
+    let found = by_hand(&quiet).unwrap().dwells.list;
+    let before = found.iter().filter(|d| (d.first_row as usize) < half);
+    assert!(before.count() >= 14, "{}", found.len());
+}
+
+#[test]
+fn the_row_in_which_the_accelerometers_range_changes_is_named_and_neither_part_is_fitted_as_the_whole()
+ {
+    for (seed, factor) in [(6, 2.0), (7, 0.5), (8, 4.0)] {
+        let mut samples = Log::new(seed).session(30);
+        // In a turn, and in a rest.
+        let row = [6000, 5210][seed as usize % 2];
+        for column in &mut samples.raw[3..] {
+            column[row..]
+                .iter_mut()
+                .for_each(|u| *u = (*u * factor).round());
+        }
+        let prepared = by_hand(&samples).unwrap();
+        let fault = prepared.dwells.fault.expect("a fault");
+        assert_eq!(
+            (fault.row, fault.change),
+            (row as u64, Change::Range(factor))
+        );
+        let problems = RecordingProblem::without_fit(&prepared);
+        assert!(problems.iter().any(|p| p.id() == "range_change"));
+        let refused = fit(prepared, Options::default()).expect_err("two ranges");
+        assert!(
+            refused.to_string().contains(&format!("row {}", row + 1)),
+            "{refused}"
+        );
+        let part = by_hand(&first_rows(&samples, row)).unwrap();
+        assert_eq!(part.dwells.fault, None);
+        assert!(fit(part, Options::default()).is_ok());
+    }
+}
+
+#[test]
+fn the_row_in_which_columns_change_places_is_named_and_the_part_before_it_is_a_session() {
+    let samples = Log::new(9).session(36);
+    // In the order of the file: accelerometer, gyro. Two bytes are lost, so each column holds its neighbour from there on.
+    let order = [3, 4, 5, 0, 1, 2];
+    let row = 7310;
+    let mut shifted = samples.clone();
+    for (k, c) in order.into_iter().enumerate() {
+        let from = &samples.raw[order[(k + 1) % 6]];
+        shifted.raw[c][row..].copy_from_slice(&from[row..]);
+    }
+    let prepared = by_hand(&shifted).unwrap();
+    let fault = prepared.dwells.fault.expect("a fault");
+    assert_eq!(
+        (fault.row, fault.change),
+        (row as u64, Change::Columns(5, 0))
+    );
+    let before = prepared.dwells.list.iter();
+    let before = before.filter(|d| (d.first_row as usize) < row).count();
+    let problems = RecordingProblem::without_fit(&prepared);
+    assert!(problems.iter().any(|p| p.id() == "columns_moved"));
+    assert!(fit(prepared, Options::default()).is_err());
+    let part = by_hand(&first_rows(&samples, row)).unwrap();
+    assert_eq!(used(&part), before);
+    assert!(fit(part, Options::default()).is_ok());
+}
+
+#[test]
+fn sessions_without_a_fault_of_the_log_have_none() {
+    for seed in 20..30 {
+        let prepared = by_hand(&Log::new(seed).session(25)).unwrap();
+        assert_eq!(prepared.dwells.fault, None);
+        assert_eq!(used(&prepared), 25);
+    }
+}
+
+/// A gyro in deg/s on a record player, in `orientations`: at rest, and at 200 and 270 deg/s, whose platter wobbles by 0.25 deg/s and
+/// approaches its rate exponentially. Between them a hand lays it in another orientation.
+fn on_a_record_player(seed: u64, orientations: usize) -> (Samples, Matrix3<f64>) {
+    let mut random = Random::new(seed, "player");
+    let scale = Matrix3::new(1.015, 0.0, 0.0, -0.010, 0.988, 0.0, 0.003, -0.009, 0.998);
+    let mut samples = Samples::default();
+    let mut put = |rate: Vector3<f64>, random: &mut Random| {
+        let raw = scale * rate + Vector3::new(-0.8, 0.5, 2.1);
+        samples.t_s.push(samples.t_s.len() as f64 / RATE_HZ);
+        for k in 0..3 {
+            let read = raw[k] + 0.06 * random.normal();
+            samples.raw[k].push(((read / 0.07).round() * 0.07).to_radians());
+        }
+    };
+    for rate in [0.0_f64, 200.0, 270.0] {
+        for _ in 0..orientations {
+            let up = Vector3::from_fn(|_, _| random.normal()).normalize();
+            let side = up
+                .cross(&Vector3::from_fn(|_, _| random.normal()))
+                .normalize();
+            for i in 0..300 {
+                let t = i as f64 / RATE_HZ;
+                let wobble = 0.25 * (rate.to_radians() * t).sin() * f64::from(u8::from(rate > 0.0));
+                let turned = rate * (1.0 - (-t / 0.25f64).exp());
+                put(up * turned + side * wobble, &mut random);
+            }
+            let mut hand = Vector3::zeros();
+            for _ in 0..130 {
+                hand = 0.9 * hand + 6.0 * Vector3::from_fn(|_, _| random.normal());
+                put(hand, &mut random);
+            }
+        }
+    }
+    (samples, scale)
+}
+
+#[test]
+fn a_turning_platter_that_wobbles_has_a_dwell_in_each_orientation() {
+    for seed in 1..=3 {
+        let (samples, scale) = on_a_record_player(seed, 16);
+        let mut manifest = Manifest::new("u", RATE_HZ, G, RawUnit::Si, Reference::TurntableRate);
+        let rates: Vec<TurntableRate> = ["200", "270"].map(|r| r.parse().unwrap()).into();
+        manifest.turntable = Some(Turntable::new(&rates, 1e-4));
+        let prepared = Prepared::of(manifest, &samples, STILL_FACTOR).unwrap();
+        let rated = RatedDwells::of(&prepared).unwrap();
+        for rate in 0..2 {
+            let found = rated.rate_of.iter().filter(|r| **r == rate).count();
+            assert_eq!(found, 16, "{seed}: at rate {rate}");
+        }
+        assert!(rated.rests.len() >= 16, "{}", rated.rests.len());
+        let fit = fit(prepared, Options::default()).unwrap();
+        let gyro = fit.sensor(Sensor::Gyro).unwrap();
+        let found = gyro.estimated.triad.forward.matrix;
+        for k in 0..3 {
+            let ratio = found.row(k).norm() / scale.row(k).norm();
+            assert!((ratio - 1.0).abs() < 1e-3, "{seed}, axis {k}: {ratio}");
+        }
+    }
+}
+
+#[test]
+fn files_of_a_sequence_hold_many_dwells_each_at_the_rate_of_the_file() {
+    let (mut samples, _) = on_a_record_player(4, 16);
+    let rows = samples.t_s.len() / 3;
+    for (row, t_s) in samples.t_s.iter_mut().enumerate() {
+        let file = row / rows;
+        *t_s += 10.0 * file as f64;
+        samples.step.push(file as i32);
+    }
+    let mut manifest = Manifest::new("u", RATE_HZ, G, RawUnit::Si, Reference::TurntableRate);
+    manifest.imported_with = vec!["--sequence".into()];
+    manifest.step_labels = ["rest", "33", "45"].map(String::from).into();
+    let rates = |rest: &str| -> Vec<TurntableRate> {
+        [rest, "33=200", "45=270"]
+            .map(|r| r.parse().unwrap())
+            .into()
+    };
+    manifest.turntable = Some(Turntable::new(&rates("rest=0"), 1e-4));
+    let prepared = Prepared::of(manifest.clone(), &samples, STILL_FACTOR).unwrap();
+    let rated = RatedDwells::of(&prepared).unwrap();
+    let names = |dwell: usize| {
+        let step = prepared.dwells.list[dwell].step;
+        prepared.manifest.step_name(step)
+    };
+    for (o, rate) in rated.turning.iter().zip(&rated.rate_of) {
+        let file = ["33/", "45/"][*rate];
+        assert!(names(o.dwell).starts_with(file), "{}", names(o.dwell));
+    }
+    assert!(
+        rated
+            .rests
+            .iter()
+            .all(|r| names(r.dwell).starts_with("rest/"))
+    );
+    for rate in 0..2 {
+        let found = rated.rate_of.iter().filter(|r| **r == rate).count();
+        assert_eq!(found, 16, "at rate {rate}");
+    }
+    // A name that is no file is still refused.
+    manifest.turntable = Some(Turntable::new(&rates("stand=0"), 1e-4));
+    let prepared = Prepared::of(manifest, &samples, STILL_FACTOR).unwrap();
+    let refused = RatedDwells::of(&prepared).expect_err("no such file");
+    assert!(refused.to_string().contains("stand"), "{refused}");
+}
