@@ -9,10 +9,12 @@
 //! | `blind slow-bias SEEDS [NAME...]` | biases that follow time or temperature, at once or with a lag, for each grade |
 //! | `blind turning SEEDS CLEAN [NAME...]` | the first, on a plan that also turns gravity through the unit |
 //! | `blind joint SETS [FIRST]` | 2 to 9 sessions of one unit diagnosed together, and their file on another session; seeds from FIRST on |
+//! | `blind earth RUNS [NAME...]` | the Earth's rate in the biases of gyros on a table, with the latitude and without it |
 //! | `blind joint-warm-up SETS FIRST SESSIONS` | the same for digital units by hand, whose only effect is a warm-up of the accelerometer |
 //! | `blind planted SEEDS TIMES [NAME...]` | each effect planted SEEDS times, at TIMES the size of data sheets, in recordings by other people; NAMEs also select recordings |
 
 mod by_hand;
+mod earth;
 mod joint;
 mod planted;
 mod slow_bias;
@@ -115,6 +117,11 @@ fn main() {
     let planted = args.first().is_some_and(|a| a == "planted");
     if in_hands || turning || slow || joint || joint_warm_up || planted {
         args.remove(0);
+    }
+    if args.first().is_some_and(|a| a == "earth") {
+        let runs = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(100);
+        let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
+        return earth::run(runs, &chosen);
     }
     let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
     let (seeds, clean): (u64, u64) = (number(0, 20), number(1, 200));

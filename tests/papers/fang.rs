@@ -1,7 +1,8 @@
 //! fang, section 5.1: its Table 3 and noise, with its six and nine positions and with our own designs.
 
-use mimu::estimate::known_input::{kalman, least_squares, six_positions};
-use mimu::estimate::{Estimated, Observation};
+use mimu::estimate::known_input::{kalman, least_squares};
+use mimu::estimate::six_positions::six_positions;
+use mimu::estimate::{EarthShare, Estimated, Observation};
 use mimu::plan::design::Problem;
 use mimu::plan::design::model::{Model, Setting, Terms};
 use mimu::plan::design::reach::Fixture;
@@ -90,6 +91,7 @@ impl Contender {
             raw: truth.read((*up).into(), n, random).into(),
             variance: Vector3::repeat(SIGMA * SIGMA / f64::from(n)),
             input: *up,
+            earth: EarthShare::NONE,
             change: Vector3::zeros(),
         };
         self.positions.iter().enumerate().map(dwell).collect()

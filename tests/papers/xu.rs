@@ -1,7 +1,7 @@
 //! xu: its schedules, Tables 1 and 2 as truth, and the scatter of its five repeats as noise.
 
 use mimu::estimate::known_input::{inverse_form, kalman, least_squares, opposite_rates};
-use mimu::estimate::{Estimated, Failure, Observation};
+use mimu::estimate::{EarthShare, Estimated, Failure, Observation};
 use mimu::plan::design::schemes::Scheme;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
@@ -123,6 +123,7 @@ impl Experiment {
                 raw: truth.read((*sensed).into(), 1, random).into(),
                 variance: Vector3::from(sigma).map(|s| s * s),
                 input: *input,
+                earth: EarthShare::NONE,
                 change: Vector3::zeros(),
             };
         each.enumerate().map(read).collect()

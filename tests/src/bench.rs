@@ -56,11 +56,9 @@ pub fn parameters(model: &AffineFile) -> SVector<f64, 12> {
     mimu::triad::vector(&matrix, &Vector3::from(model.bias))
 }
 
-/// A unit of the usual parts with their noise and the given affine models, on a table without flaws on an Earth that does not turn. The only
-/// remaining errors are noise.
+/// A unit of the usual parts with their noise and the given affine models, on a table without flaws. The only remaining errors are noise.
 pub fn clean(gyro: AffineFile, accel: AffineFile) -> RigFile {
     let mut file = RigFile {
-        earth_rate: Some(false),
         table: TableTruth::ideal(),
         ..RigFile::default()
     };

@@ -118,7 +118,6 @@ pub fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
         file.unit.accel_axes.instability_si = Some([5e-4; 3]);
         file.unit.accel_axes.walk_si = Some([1e-5; 3]);
     }
-    file.earth_rate = Some(true);
     with_effects(file, ids, seed)
 }
 

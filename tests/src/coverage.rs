@@ -261,7 +261,6 @@ pub fn on_a_record_player(runs: u64, rate_error: f64) -> Vec<Tally> {
             bench::accel(&mut random),
         );
         let mut file = bench::clean(gyro, accel);
-        file.earth_rate = Some(true);
         let sigma = rate_error / 1.96;
         let off = std::array::from_fn(|_| sigma * random.normal());
         let plan = bench::record_player_plan(14, off, seed);

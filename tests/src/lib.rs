@@ -7,6 +7,7 @@
 //! | [`joint`]              | several sessions of one unit together, and their file on another session |
 //! | [`slow_bias`]          | units by hand whose biases move with time or temperature, at once or with a lag |
 //! | [`coverage`]           | how often intervals contain the truth, from recording to fit      |
+//! | [`earth`]              | the Earth's rate in the biases of gyros on a table                |
 //! | [`recordings`]         | recordings by other people                                        |
 //! | [`planted`]            | effects of the bench, planted in them                             |
 //! | [`niu`]                | niu's tables                                                      |
@@ -20,6 +21,7 @@ pub mod bench;
 pub mod blind;
 pub mod by_hand;
 pub mod coverage;
+pub mod earth;
 pub mod joint;
 pub mod niu;
 pub mod page;

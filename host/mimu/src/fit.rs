@@ -5,6 +5,7 @@ mod by_gravity;
 pub(crate) mod by_rate;
 pub mod change;
 mod determined;
+mod earth;
 mod hold_out;
 mod known;
 mod lever_arm;
@@ -189,6 +190,9 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     let mut changes = Vec::new();
     for sensor in &mut sensors {
         plausible::check(&prepared, sensor)?;
+        sensor
+            .warnings
+            .extend(earth::in_intervals(&prepared, sensor));
     }
     let by_magnitude = |s: &&SensorFit| s.figure == Figure::GravityMagnitude;
     let accel = sensors.iter().find(by_magnitude);

@@ -59,7 +59,7 @@ impl Prepared {
             left_out: Vec::new(),
             keep: Keep::default(),
         };
-        Ok(Self {
+        let prepared = Self {
             manifest,
             condensed: condensed.into(),
             dwells,
@@ -69,7 +69,9 @@ impl Prepared {
             place: means.place.clone(),
             bias_removal: None,
             lever_arm_m: 0.0,
-        })
+            earth_on_table: None,
+        };
+        Ok(prepared.with_earth())
     }
 }
 

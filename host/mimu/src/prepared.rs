@@ -5,9 +5,10 @@ use std::sync::Arc;
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::estimate::earth::Earth;
+use crate::estimate::earth::{Earth, poses};
+use crate::estimate::earth_on_table::EarthOnTable;
 use crate::estimate::turn::{Motion, Rest, Turn};
-use crate::estimate::{Failure, Observation};
+use crate::estimate::{EarthShare, Failure, Observation, known_input, magnitude};
 use crate::noise::Noise;
 use crate::noise::noise_file::NoiseFile;
 use crate::quantity::Sensor;
@@ -41,6 +42,8 @@ pub struct Prepared {
     pub bias_removal: Option<BiasRemoval>,
     /// See [`Prepared::beside_axis`].
     pub(crate) lever_arm_m: f64,
+    /// The Earth's rate in the dwells on a table; `None` without a table or a gyro.
+    pub earth_on_table: Option<Arc<EarthOnTable>>,
 }
 
 impl Prepared {
@@ -128,7 +131,7 @@ impl Prepared {
             .warnings
             .extend(bias_removal.map(Warning::BiasRemoved));
         let noise = Noise::within(&dwells.list, &condensed, &dwells.rails);
-        Ok(Self {
+        let prepared = Self {
             manifest,
             condensed: Arc::new(condensed),
             dwells,
@@ -136,7 +139,41 @@ impl Prepared {
             place,
             bias_removal,
             lever_arm_m: 0.0,
-        })
+            earth_on_table: None,
+        };
+        Ok(prepared.with_earth())
+    }
+
+    /// With the Earth's rate in the dwells on a table.
+    pub(crate) fn with_earth(mut self) -> Self {
+        self.earth_on_table = self.find_earth().map(Arc::new);
+        self
+    }
+
+    fn find_earth(&self) -> Option<EarthOnTable> {
+        if self.manifest.reference != Reference::Table || !self.has(Sensor::Gyro) {
+            return None;
+        }
+        let observations = self.observations(Sensor::Gyro);
+        let gyro = known_input::least_squares(&observations, None).ok();
+        let gyro = gyro.map(|g| g.triad.inverse);
+        let known_force = self.condensed.has_reference[Sensor::Accel.channels()].contains(&true);
+        let accel = match self.is_in_si() {
+            _ if known_force || !self.has(Sensor::Accel) => None,
+            true => Some(Affine::identity()),
+            false => {
+                let poses = self.observations_of(Sensor::Accel, |d| !d.spins() && !d.turn);
+                magnitude::first_guess(&poses, self.manifest.gravity_mps2)
+            }
+        };
+        let Self {
+            manifest,
+            condensed,
+            dwells,
+            ..
+        } = self;
+        let (gyro, accel) = (gyro.as_ref(), accel.as_ref());
+        Some(EarthOnTable::of(manifest, condensed, dwells, gyro, accel))
     }
 
     /// Uses the noise of a record at rest instead of that within the dwells. Errors: see [`Noise::use_noise_at_rest`].
@@ -183,28 +220,48 @@ impl Prepared {
         self
     }
 
-    /// Usable dwells of `sensor`; if there is a table, those with a known input.
+    /// Usable dwells of `sensor`; if there is a table, those with a known input. The input of a gyro includes the Earth's rate.
     pub fn observations(&self, sensor: Sensor) -> Vec<Observation> {
         let table = self.manifest.reference == Reference::Table;
-        let usable = self
-            .dwells
-            .list
-            .iter()
-            .enumerate()
-            // A turn of known angle is not a pose.
-            .filter(|(_, d)| d.faults[sensor].is_none() && (table || !d.turn));
-        usable
-            .filter_map(|(i, d)| {
+        // A turn of known angle is not a pose.
+        self.observations_of(sensor, |d| {
+            if table {
+                d.input(sensor).is_some()
+            } else {
+                !d.turn
+            }
+        })
+    }
+
+    /// The usable dwells of `sensor` that `used` accepts.
+    fn observations_of(&self, sensor: Sensor, used: impl Fn(&Dwell) -> bool) -> Vec<Observation> {
+        let all = self.dwells.list.iter().enumerate();
+        all.filter(|(_, d)| d.faults[sensor].is_none() && used(d))
+            .map(|(i, d)| {
                 let input = d.input(sensor);
-                (input.is_some() || !table).then(|| Observation {
+                let earth = self.earth_rate(sensor, i, None);
+                Observation {
                     dwell: i,
                     raw: d.raw_mean(sensor),
                     variance: self.noise.of_mean(sensor, d),
-                    input: input.unwrap_or_else(|| Vector3::repeat(f64::NAN)),
+                    input: input.unwrap_or_else(|| Vector3::repeat(f64::NAN)) + earth.known,
+                    earth,
                     change: self.mean_change(sensor, d),
-                })
+                }
             })
             .collect()
+    }
+
+    /// The Earth's rate that `sensor` senses in a dwell on a table: the mean over the dwell, or the sum of its blocks with `weights`.
+    pub fn earth_rate(&self, sensor: Sensor, dwell: usize, weights: Option<&[f64]>) -> EarthShare {
+        let earth = self.earth_on_table.as_deref();
+        match earth.filter(|_| sensor == Sensor::Gyro) {
+            Some(earth) => match weights {
+                Some(weights) => earth.weighted(dwell, weights),
+                None => earth.mean(dwell),
+            },
+            None => EarthShare::NONE,
+        }
     }
 
     /// Course of the known inputs through a dwell.
@@ -250,11 +307,13 @@ impl Prepared {
             let of_half = self.noise.variance(from + k, tau_s, dwell.temp_c);
             of_half * tau_s / dwell.averaged_s(sensor)
         });
+        let earth = self.earth_rate(sensor, contrast.dwell, Some(&contrast.weights));
         Some(Observation {
             dwell: contrast.dwell,
             raw,
             variance,
-            input,
+            input: input + earth.known,
+            earth,
             change,
         })
     }
@@ -284,6 +343,7 @@ impl Prepared {
                 variance: o.variance,
                 rate: earth.rate(&up),
                 rate_variance: earth.variance(&up),
+                vertical_variance: earth.vertical_variance(&up),
             }
         };
         let observations = self.observations(Sensor::Gyro).into_iter();
@@ -293,6 +353,36 @@ impl Prepared {
             !dwell.turns_slowly || dwells.keep.keeps(dwell.step)
         };
         observations.filter(rests).map(rest).collect()
+    }
+
+    /// Dwells in which the gyro is at rest without a table, with the Earth's rate as their input. `accel` gives the direction up. In one pose the heading
+    /// may be the same, and then so is the unknown part of the rate.
+    pub fn at_rest_on_the_ground(&self, accel: Option<&Affine<f64>>) -> Vec<Observation> {
+        let earth = self.earth();
+        let observations = self.observations(Sensor::Gyro);
+        let up = |o: &Observation| match accel {
+            Some(accel) => accel.apply(&self.dwells.list[o.dwell].raw_mean(Sensor::Accel)),
+            None => Vector3::zeros(),
+        };
+        let ups: Vec<Vector3<f64>> = observations.iter().map(up).collect();
+        let poses = match accel {
+            Some(_) => poses(&ups),
+            None => vec![0; ups.len()],
+        };
+        let each = observations.into_iter().zip(&ups).zip(poses);
+        let at_rest = each.map(|((o, up), heading)| {
+            let known = earth.rate(up);
+            Observation {
+                input: known,
+                earth: EarthShare {
+                    known,
+                    heading,
+                    by: earth.unknown(up),
+                },
+                ..o
+            }
+        });
+        at_rest.collect()
     }
 
     /// Time of the power-on on the clock of the recording, s: from the manifest, or else that of the first sample.

@@ -106,6 +106,7 @@ impl RatedDwells {
                     variance: o.variance,
                     rate: Vector3::zeros(),
                     rate_variance: Vector3::repeat(earth::RATE * earth::RATE / 3.0),
+                    vertical_variance: Vector3::zeros(),
                 }),
             }
         }
@@ -290,6 +291,7 @@ fn assigned(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::EarthShare;
 
     /// Readings at these rates, deg/s, in these directions, by a gyro whose scale factors differ by 10 % and whose bias is 2048 counts.
     fn readings(of: &[(f64, [f64; 3])]) -> Vec<Observation> {
@@ -300,6 +302,7 @@ mod tests {
                 + Vector3::repeat(2048.0),
             variance: Vector3::zeros(),
             input: Vector3::repeat(f64::NAN),
+            earth: EarthShare::NONE,
             change: Vector3::zeros(),
         };
         of.iter().map(reading).collect()

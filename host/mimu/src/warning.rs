@@ -74,6 +74,10 @@ pub enum Warning {
     /// Gravity of the calibration and of the recording, m/s²; the mean magnitude of the calibrated force at rest, and whether it agrees with the
     /// former.
     OtherGravity([f64; 2], f64, bool),
+    /// The Earth's rate is in the intervals of the gyro's biases, because no latitude is given.
+    NoLatitude,
+    /// The horizontal component of the Earth's rate is in the intervals of the gyro's biases, because the heading was lost this often.
+    HeadingLost(usize),
     /// Readings in SI: whether they are at rest (and include biases), how many times their input they are, and the likely cause.
     NotSi(bool, f64, &'static str),
     /// Readings that are declared as counts, but are fractions and have the scale factor of a unit: their number per SI unit, the unit that they

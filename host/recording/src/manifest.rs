@@ -146,7 +146,7 @@ pub struct Manifest {
     pub gravity_mps2: f64,
     /// Unit of the raw columns.
     pub raw_unit: RawUnit,
-    /// Latitude in degrees, north positive. Kept with the recording; no fit subtracts the Earth's rate.
+    /// Latitude in degrees, north positive: estimates subtract the Earth's rate from a gyro's input. The known rates are those against the ground.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub latitude_deg: Option<f64>,
     /// What is known of the true input.

@@ -144,10 +144,17 @@ fn along(v: &Vector3<f64>) -> Option<(usize, bool)> {
 fn cycles(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
     let mut out = Vec::new();
     let mut open: Vec<&Row> = Vec::new();
+    let mut faces: Vec<(usize, bool)> = session.rows[sensor].iter().filter_map(face).collect();
+    faces.sort_unstable();
+    faces.dedup();
     for dwell in session.rows[sensor].chunk_by(|a, b| a.step == b.step) {
         open.extend(dwell);
         let complete = match sensor {
-            Sensor::Gyro => gyro_of_cycle(&open).is_some(),
+            // Every pose of the session: an axis that points both ways does so in every cycle.
+            Sensor::Gyro => {
+                let seen = |of: &(usize, bool)| open.iter().any(|r| face(r) == Some(*of));
+                faces.iter().all(seen) && gyro_of_cycle(&open).is_some()
+            }
             // Five poses: x and y up and down, z down.
             Sensor::Accel => {
                 let seen = |axis: usize, up: bool| {
@@ -167,6 +174,16 @@ fn cycles(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
     out
 }
 
+/// Whether a row is at rest, but for the Earth.
+fn at_rest(row: &Row) -> bool {
+    (row.input - row.earth.known).norm() < REST
+}
+
+/// The signed axis that is up in a row at rest.
+fn face(row: &Row) -> Option<(usize, bool)> {
+    at_rest(row).then(|| along(&row.up)).flatten()
+}
+
 type Numbers = ([f64; 12], [f64; 12]);
 
 /// Mean reading and samples of the rows that `of` picks.
@@ -180,15 +197,15 @@ fn mean(rows: &[&Row], of: impl Fn(&Row) -> bool) -> Option<(Vector3<f64>, Vecto
     (n > 0.0).then(|| (raw / n, input / n, n))
 }
 
-/// niu (a.7) to (a.10), reconstructed from the surrounding text, which lacks the equations: biases from rest, the Earth's rate subtracted
-/// by the known input; scale factors and cross terms from turns both ways. The gyro alone does not show poses, so all rests are averaged,
-/// while niu pairs opposite ones.
+/// niu (a.7) to (a.10), reconstructed from the surrounding text, which lacks the equations.
+///
+/// The bias of an axis comes from the rests with that axis vertical. If it points up and down in the cycle, the two are averaged, and the Earth's rate
+/// cancels (a.7). If it points one way only, as z does on niu's table, the vertical component at the latitude is subtracted (a.8), which the known input
+/// contains. Neither depends on the heading. Scale factors and cross terms come from turns both ways, in which the Earth's rate cancels (a.9), (a.10).
 fn gyro_of_cycle(rows: &[&Row]) -> Option<Numbers> {
-    let (bias, earth, n) = mean(rows, |r| r.input.norm() < REST)?;
     let (mut numbers, mut variances) = ([0.0; 12], [0.0; 12]);
     for i in 0..3 {
-        let turning =
-            |up: bool| move |r: &Row| r.input.norm() >= REST && along(&r.input) == Some((i, up));
+        let turning = |up: bool| move |r: &Row| !at_rest(r) && along(&r.input) == Some((i, up));
         let (plus, x_plus, n_plus) = mean(rows, turning(true))?;
         let (minus, x_minus, n_minus) = mean(rows, turning(false))?;
         let change = x_plus[i] - x_minus[i];
@@ -198,9 +215,19 @@ fn gyro_of_cycle(rows: &[&Row]) -> Option<Numbers> {
         }
     }
     for j in 0..3 {
-        let known: f64 = (0..3).map(|i| numbers[3 * j + i] * earth[i]).sum();
-        numbers[9 + j] = bias[j] - known;
-        variances[9 + j] = 1.0 / n;
+        let gain = Vector3::from_fn(|i, _| numbers[3 * j + i]);
+        let both = [true, false].map(|up| mean(rows, |r| face(r) == Some((j, up))));
+        // Without known forces all rests count alike.
+        let any = || mean(rows, |r| at_rest(r) && r.up.x.is_nan());
+        let ways: Vec<_> = both.into_iter().chain([any()]).flatten().collect();
+        if ways.is_empty() {
+            return None;
+        }
+        let count = ways.len() as f64;
+        for (raw, input, n) in ways {
+            numbers[9 + j] += (raw[j] - gain.dot(&input)) / count;
+            variances[9 + j] += 1.0 / (n * count * count);
+        }
     }
     Some(scaled(rows, numbers, variances))
 }
@@ -208,14 +235,18 @@ fn gyro_of_cycle(rows: &[&Row]) -> Option<Numbers> {
 /// Least squares of all twelve numbers, niu (a.6) for the accelerometer.
 fn affine(rows: &[&Row]) -> Option<Numbers> {
     let mut gram = Matrix4::zeros();
+    let mut by_table = Matrix4::zeros();
     let mut with = Matrix4x3::zeros();
     for r in rows {
         let x = r.input.push(1.0);
         gram += x * x.transpose() * r.samples;
         with += x * r.raw.transpose() * r.samples;
+        let x = (r.input - r.earth.known).push(1.0);
+        by_table += x * x.transpose() * r.samples;
     }
-    let scale = gram.diagonal().map(|d| 1.0 / d.max(1e-300).sqrt());
-    let correlation = Matrix4::from_fn(|i, j| gram[(i, j)] * scale[i] * scale[j]);
+    // The Earth turns far too slowly to show a scale factor.
+    let scale = by_table.diagonal().map(|d| 1.0 / d.max(1e-300).sqrt());
+    let correlation = Matrix4::from_fn(|i, j| by_table[(i, j)] * scale[i] * scale[j]);
     if correlation.symmetric_eigenvalues().min() < 1e-4 {
         return None;
     }

@@ -1,6 +1,7 @@
 //! `mimu thermal fit` from memory: curves by one of the estimators, judged.
 
 use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node};
+use mimu::estimate::earth::RATE;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::extent;
 use mimu_recording::error::{Argument, Error, Result};
@@ -141,6 +142,7 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         warnings.push(Warning::WithoutNoise);
     }
     check_range(&joint, options.range_c)?;
+    warnings.extend(earth_in_intervals(&sessions, &joint));
     let judged = PerSensor::from_fn(|sensor| judge(&sessions, verify, &joint, sensor));
     let misfits = |j: &Judged| {
         let [own, floor] = rms(&j.errors);
@@ -181,6 +183,17 @@ fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<Warning>) -
     }
     warnings.push(Warning::CurvatureRefused(curve / line));
     estimate(sessions, choice(Shape::Line))
+}
+
+/// The warning that the Earth's rate is in the intervals of the gyro's biases: on a table without a latitude, unless the noise is larger.
+fn earth_in_intervals(sessions: &[Session], joint: &Joint) -> Option<Warning> {
+    let unknown = |s: &Session| s.reference == Reference::Table && s.latitude_deg.is_none();
+    let curves = joint.curves[Sensor::Gyro].as_ref()?;
+    let triad = curves.triad(0.5 * (curves.range_c[0] + curves.range_c[1]))?;
+    let sigma = |axis: usize| triad.inverse_covariance[(9 + axis, 9 + axis)].sqrt();
+    let matters = (0..3).any(|axis| sigma(axis) < RATE);
+    let warned = matters && sessions.iter().any(unknown);
+    warned.then_some(Warning::Recording(mimu::warning::Warning::NoLatitude))
 }
 
 fn of_literature(sessions: &[Session], classic: Classic) -> Result<Joint> {

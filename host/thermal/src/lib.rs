@@ -32,6 +32,7 @@ pub mod classic;
 pub mod compare;
 pub mod coverage;
 pub mod curves;
+mod earth;
 mod evaluator;
 pub mod excitation;
 pub mod extrapolation;

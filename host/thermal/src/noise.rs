@@ -22,13 +22,17 @@ const LARGEST_RATIO: f64 = 1e4;
 /// Least drop in deviance for wander: two parameters at the price of Akaike's criterion.
 const DEVIANCE: f64 = 4.0;
 
+/// Inputs that differ by less are the same, SI: about a vertical axis a table turns twice the horizontal rate of the Earth through the axes.
+const SAME_INPUT: f64 = 2.0 * mimu::estimate::earth::RATE;
+
 /// White noise of rows of weight 1, SI², from the differences of neighbouring rows of a dwell, in which nothing else moves. `None` if no
 /// dwell has two.
 pub fn white(problem: &Problem) -> Option<[f64; 3]> {
     let (mut sum, mut n) = (Vector3::zeros(), 0.0);
     for pair in problem.rows.windows(2) {
         let [a, b] = [&pair[0], &pair[1]];
-        if a.offset == b.offset && a.step == b.step && (a.input - b.input).norm() < 1e-9 {
+        let change = (a.input - b.input).norm();
+        if a.offset == b.offset && a.step == b.step && change < SAME_INPUT {
             let difference = b.reading - a.reading;
             sum += difference.component_mul(&difference) / (1.0 / a.weight + 1.0 / b.weight);
             n += 1.0;
@@ -56,7 +60,8 @@ pub fn estimate(
             correlation_s,
             parts,
         };
-        let normal = Normal::of(problem, axis, dies, &relative, |_| true);
+        let mut normal = Normal::of(problem, axis, dies, &relative, |_| true);
+        normal.earth_precision = before.white;
         let solved = solve(problem, penalties, axis, &normal, &scaled)?;
         let free: usize = problem
             .parts(axis)

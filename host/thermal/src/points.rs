@@ -36,6 +36,7 @@ pub fn curves(sensor: Sensor, points: &[Point], shape: Shape) -> Option<TriadCur
         null: Vector3::from_fn(|i, _| mean(9 + i)),
         bases: CurveKind::ALL.map(|_| basis.clone()),
         offsets: 1,
+        headings: 0,
         biases_only: false,
         samples: 1.0,
         taken_off: 0.0,
@@ -81,5 +82,6 @@ fn normal(problem: &Problem, axis: usize, points: &[Point]) -> Normal {
         squares,
         log_det: 0.0,
         rows: points.len() as f64,
+        earth_precision: 1.0,
     }
 }

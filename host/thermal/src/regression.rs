@@ -4,15 +4,20 @@
 //! temperature ([`Basis`]), and the first session has no offset b_js. Readings are scaled by a first affine fit, so that the same curve of
 //! any sensor has the same size: biases in SI, the rest as ratios.
 
+use std::ops::Range;
+
 use mimu::quantity::Sensor;
 use mimu_allan::model::FLOOR;
 use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Error, Result};
-use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Vector3, Vector4};
 
 use crate::basis::{Basis, Shape};
 use crate::excitation;
 use crate::session::Session;
+
+/// Most headings of a session whose numbers of the Earth's rate are estimated.
+const MOST_HEADINGS: usize = 8;
 
 /// The parameter whose temperature dependence a curve is; smoothness is estimated for each kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +48,8 @@ pub struct ProblemRow {
     pub weight: f64,
     /// Known input, SI; zero where only biases are estimated.
     pub input: Vector3<f64>,
+    /// The unknown part of the Earth's rate: its heading among those of the problem, and the rate by one standard deviation of its three numbers.
+    pub earth: Option<(usize, Matrix3<f64>)>,
     /// Reading minus [`Problem::null`], over [`Problem::gain`], minus the share [`Problem::taken_off`] of the input.
     pub reading: Vector3<f64>,
     /// Number of the dwell in its session.
@@ -64,6 +71,8 @@ pub struct Problem {
     pub bases: [Basis; 3],
     /// Number of bias offsets with the first, which is zero: one for each power-on, and in recordings without a table one for each pose.
     pub offsets: usize,
+    /// Number of headings. Each has three unknown numbers of the Earth's rate, whose likeliest values are part of the inputs.
+    pub headings: usize,
     /// Whether only biases are estimated: nothing is known of the input, or it does not excite the rest.
     pub biases_only: bool,
     /// Samples of the row of weight 1.
@@ -99,7 +108,18 @@ impl Problem {
         biases_only: bool,
     ) -> Result<Self> {
         let (mut rows, mut offsets) = (Vec::new(), 0);
+        let mut headings = 0;
         for (k, session) in sessions.iter().enumerate() {
+            let unknown = session.rows[sensor].iter().filter(|r| r.earth.is_unknown());
+            let own = unknown.map(|r| r.earth.heading + 1).max().unwrap_or(0);
+            // More are noise that the residuals show.
+            let own = if own > MOST_HEADINGS || biases_only {
+                0
+            } else {
+                own
+            };
+            let first = headings;
+            headings += own;
             rows.extend(session.rows[sensor].iter().map(|r| ProblemRow {
                 session: k,
                 offset: offsets + session.poses_before(sensor, r.middle_s),
@@ -110,6 +130,7 @@ impl Problem {
                 } else {
                     r.input
                 },
+                earth: (r.earth.heading < own).then_some((first + r.earth.heading, r.earth.by)),
                 reading: r.raw,
                 step: r.step,
             }));
@@ -124,10 +145,20 @@ impl Problem {
             null: Vector3::zeros(),
             bases: CurveKind::ALL.map(|_| Basis::new(shape, range)),
             offsets,
+            headings,
             biases_only,
             samples,
             taken_off: 0.0,
         };
+        if !biases_only {
+            // The Earth turns far too slowly to show a scale factor.
+            let rows = sessions.iter().flat_map(|s| &s.rows[sensor]);
+            let products = rows.map(|r| {
+                let x = (r.input - r.earth.known).push(1.0);
+                x * x.transpose() * r.samples
+            });
+            excitation::check(&products.sum(), sensor)?;
+        }
         problem.scale()?;
         Ok(problem)
     }
@@ -147,7 +178,6 @@ impl Problem {
                     *with += x * r.reading[k] * r.weight;
                 }
             }
-            excitation::check(&gram, self.sensor)?;
             let inverse = gram.try_inverse().unwrap_or_else(Matrix4::zeros);
             for k in 0..3 {
                 let fitted = inverse * with[k];
@@ -192,14 +222,17 @@ impl Problem {
         curves.collect()
     }
 
-    /// Number of columns of `axis`: its curves, then the bias offsets except the first.
+    /// Number of columns of `axis`: its curves, the numbers of the Earth's rate, then the bias offsets except the first.
     pub fn columns(&self, axis: usize) -> usize {
-        let curves: usize = self
-            .parts(axis)
-            .iter()
-            .map(|p| self.basis(p.kind).functions())
-            .sum();
-        curves + self.offsets - 1
+        self.earth_columns(axis).end + self.offsets - 1
+    }
+
+    /// Columns of the numbers of the Earth's rate.
+    pub fn earth_columns(&self, axis: usize) -> Range<usize> {
+        let parts = self.parts(axis);
+        let curves = parts.iter().map(|p| self.basis(p.kind).functions());
+        let from = curves.sum();
+        from..from + 3 * self.headings
     }
 
     /// Writes the entries of `row` of `axis` at the die's temperature `temp_c`, then the reading at [`Self::columns`].
@@ -221,6 +254,11 @@ impl Problem {
             }
         }
         let columns = self.columns(axis);
+        if let Some((heading, by)) = &row.earth {
+            let from = self.earth_columns(axis).start + 3 * heading;
+            let each = by.row(axis).into_iter().copied().enumerate();
+            out.extend(each.filter(|(_, v)| *v != 0.0).map(|(k, v)| (from + k, v)));
+        }
         if row.offset > 0 {
             out.push((columns - self.offsets + row.offset, 1.0));
         }
@@ -283,6 +321,8 @@ pub struct Normal {
     pub log_det: f64,
     /// Number of rows.
     pub rows: f64,
+    /// Prior precision of the numbers of the Earth's rate in units of the rows' variance: 1, unless that is relative.
+    pub earth_precision: f64,
 }
 
 impl Normal {
@@ -374,6 +414,7 @@ impl Normal {
             squares: both[(p, p)],
             log_det,
             rows,
+            earth_precision: 1.0,
         }
     }
 }

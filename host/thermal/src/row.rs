@@ -1,5 +1,6 @@
 //! Rows, to which the curves are fitted: means of segments within a dwell.
 
+use mimu::estimate::EarthShare;
 use nalgebra::Vector3;
 
 /// Mean of a segment within one dwell.
@@ -11,8 +12,12 @@ pub struct Row {
     pub samples: f64,
     /// Raw reading.
     pub raw: Vector3<f64>,
-    /// Known input, SI; not a number where it is unknown.
+    /// Known input, SI, for a gyro with the likeliest rate of the Earth; not a number where it is unknown.
     pub input: Vector3<f64>,
+    /// The Earth's rate in it.
+    pub earth: EarthShare,
+    /// Direction up in body axes; not a number where no force is known.
+    pub up: Vector3<f64>,
     /// Number of the dwell.
     pub step: i32,
 }
@@ -25,6 +30,8 @@ impl Row {
         self.middle_s += share * (other.middle_s - self.middle_s);
         self.raw += share * (other.raw - self.raw);
         self.input += share * (other.input - self.input);
+        self.earth.known += share * (other.earth.known - self.earth.known);
+        self.earth.by += share * (other.earth.by - self.earth.by);
         self.samples = samples;
     }
 }

@@ -1,5 +1,6 @@
 //! One recording, from power-on to power-off, as rows: means of some seconds with their known input, and the thermometer.
 
+use mimu::estimate::EarthShare;
 use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::{Block, Condensed};
@@ -10,6 +11,7 @@ use mimu_recording::{RawUnit, Reference};
 use nalgebra::Vector3;
 
 use crate::bias_jumps::{self, BiasJump};
+use crate::earth;
 use crate::excitation::tells_apart;
 use crate::row::Row;
 use crate::thermometer::Thermometer;
@@ -50,6 +52,8 @@ pub struct Session {
     pub reference: Reference,
     /// Local gravity, m/s².
     pub gravity_mps2: f64,
+    /// Latitude, degrees, if it is known.
+    pub latitude_deg: Option<f64>,
     /// SHA-256 of the samples file.
     pub sha256: String,
     /// Samples a second.
@@ -93,7 +97,8 @@ impl Session {
         let thermometer = Thermometer::of(condensed, manifest.power_on_s, &prepared.place)?;
         let found = condensed.warnings.iter().chain(&prepared.dwells.warnings);
         let mut warnings: Vec<Warning> = found.cloned().map(Warning::Recording).collect();
-        let rows = PerSensor::from_fn(|sensor| rows(prepared, sensor));
+        let mut rows = PerSensor::from_fn(|sensor| rows(prepared, sensor));
+        earth::complete(&mut rows[Sensor::Gyro]);
         let moved_s = match manifest.reference {
             Reference::Gravity => {
                 let moves = moves(&rows[Sensor::Accel]);
@@ -122,6 +127,7 @@ impl Session {
             raw_unit: manifest.raw_unit,
             reference: manifest.reference,
             gravity_mps2: manifest.gravity_mps2,
+            latitude_deg: manifest.latitude_deg,
             sha256: condensed.sha256.clone(),
             rate_hz: 1.0 / condensed.period_s,
             thermometer,
@@ -199,22 +205,22 @@ fn rows(prepared: &Prepared, sensor: Sensor) -> Vec<Row> {
     if !prepared.has(sensor) {
         return Vec::new();
     }
-    let usable = prepared.dwells.list.iter();
-    let usable: Vec<&Dwell> = usable.filter(|d| d.faults[sensor].is_none()).collect();
+    let usable = prepared.dwells.list.iter().enumerate();
+    let usable: Vec<(usize, &Dwell)> = usable.filter(|(_, d)| d.faults[sensor].is_none()).collect();
     // Readings of an input that moves within a dwell are late or early by some milliseconds. Over a whole turn that cancels for the gyro,
     // but not for a rotating force.
-    let stands = usable.iter().any(|d| !d.moves(sensor) && !d.turn);
+    let stands = usable.iter().any(|(_, d)| !d.moves(sensor) && !d.turn);
     // A turning unit senses a centripetal force from an unknown lever arm: 2 mm at 50 deg/s are 1.5 mm/s², four times the residuals of
     // curves through rest alone. Rates are needed only if the poses at rest do not distinguish everything.
     let at_rest = |d: &&Dwell| d.reference[..3].iter().map(|r| r * r).sum::<f64>() < RATE * RATE;
     let forces = usable
         .iter()
-        .copied()
+        .map(|(_, d)| *d)
         .filter(|d| at_rest(d) && !d.moves(sensor) && !d.turn);
     let forces = forces.map(|d| Vector3::from_column_slice(&d.reference[3..]));
     let leave_rates = sensor == Sensor::Accel && tells_apart(forces);
     let mut rows = Vec::new();
-    for dwell in usable {
+    for (index, dwell) in usable {
         if leave_rates && !at_rest(&dwell) {
             continue;
         }
@@ -223,13 +229,16 @@ fn rows(prepared: &Prepared, sensor: Sensor) -> Vec<Row> {
             continue;
         }
         let length_s = if whole { f64::INFINITY } else { ROW_S };
-        rows.extend(of_dwell(prepared, sensor, dwell, length_s));
+        rows.extend(of_dwell(prepared, sensor, index, length_s));
     }
     rows
 }
 
-fn of_dwell(prepared: &Prepared, sensor: Sensor, dwell: &Dwell, length_s: f64) -> Vec<Row> {
+fn of_dwell(prepared: &Prepared, sensor: Sensor, index: usize, length_s: f64) -> Vec<Row> {
     let condensed = &prepared.condensed;
+    let dwell = &prepared.dwells.list[index];
+    let earth = prepared.earth_on_table.as_deref();
+    let earth = earth.filter(|_| sensor == Sensor::Gyro);
     let known = prepared.manifest.reference == Reference::Table;
     let mut rows: Vec<Row> = Vec::new();
     let mut open = Open {
@@ -243,7 +252,7 @@ fn of_dwell(prepared: &Prepared, sensor: Sensor, dwell: &Dwell, length_s: f64) -
     };
     let count = (dwell.duration_s / length_s).round().max(least);
     let samples = dwell.rows as f64 / count;
-    for block in &condensed.blocks[dwell.blocks.clone()] {
+    for (k, block) in condensed.blocks[dwell.blocks.clone()].iter().enumerate() {
         if open.rows > 0.0 && (open.rows + 0.5 * f64::from(block.rows) > samples || block.after_gap)
         {
             let length = open.rows;
@@ -268,7 +277,8 @@ fn of_dwell(prepared: &Prepared, sensor: Sensor, dwell: &Dwell, length_s: f64) -
             .channels()
             .any(|c| block.raw[c].n < block.rows || rails[c].touched_by(&block.raw[c]));
         if !clipped {
-            open.add(block, sensor, known);
+            let earth = earth.map_or(EarthShare::NONE, |earth| earth.at(index, k));
+            open.add(block, sensor, known, earth);
         }
     }
     let whole = !open.rest;
@@ -287,10 +297,12 @@ struct Open {
     time: f64,
     raw: Vector3<f64>,
     input: Vector3<f64>,
+    force: Vector3<f64>,
+    earth: EarthShare,
 }
 
 impl Open {
-    fn add(&mut self, block: &Block, sensor: Sensor, known: bool) {
+    fn add(&mut self, block: &Block, sensor: Sensor, known: bool, earth: EarthShare) {
         let n = f64::from(block.rows);
         let from = sensor.channels().start;
         self.rows += n;
@@ -301,6 +313,13 @@ impl Open {
             (true, Sensor::Gyro) => block.reference[from + k].mean.to_radians(),
             (true, Sensor::Accel) => block.reference[from + k].mean,
         });
+        self.input += n * earth.known;
+        self.force += n * Vector3::from_fn(|k, _| block.reference[3 + k].mean);
+        self.earth = EarthShare {
+            known: self.earth.known + n * earth.known,
+            by: self.earth.by + n * earth.by,
+            heading: earth.heading,
+        };
     }
 
     /// The row, unless it is too short or its input should be known but is not; `gap`: samples are missing after it.
@@ -312,6 +331,12 @@ impl Open {
             samples: open.rows,
             raw: open.raw / open.rows,
             input: open.input / open.rows,
+            earth: EarthShare {
+                known: open.earth.known / open.rows,
+                by: open.earth.by / open.rows,
+                ..open.earth
+            },
+            up: open.force.normalize(),
             step,
         };
         let burst = (open.after_gap && open.rows >= FEWEST_IN_BURST || open.rest) && gap;

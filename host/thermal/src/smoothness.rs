@@ -158,6 +158,9 @@ pub fn solve(
         block += penalties.precision(k, &smoothness[k]);
         determinants -= penalties.determinant(k, &smoothness[k])?.0;
     }
+    for column in problem.earth_columns(axis) {
+        matrix[(column, column)] += normal.earth_precision;
+    }
     let factor = Cholesky::new(matrix)?;
     let coefficients = factor.solve(&normal.with);
     determinants += log_det(&factor);

@@ -1,7 +1,7 @@
 //! Estimators that must agree, and models that must be inverse to each other.
 
-use mimu::estimate::Observation;
 use mimu::estimate::known_input::{inverse_form, kalman, least_squares, opposite_rates};
+use mimu::estimate::{EarthShare, Observation};
 use mimu::noise::wander::Slow;
 use mimu::triad::{Angles, Triad};
 use mimu_rig::ideal::Ideal;
@@ -52,6 +52,7 @@ fn on_a_table(unit: &Ideal, n: u32, random: &mut Random) -> Vec<Observation> {
             raw: unit.read(input.into(), n, random).into(),
             variance,
             input,
+            earth: EarthShare::NONE,
             change: Vector3::zeros(),
         })
         .collect()

@@ -1,10 +1,9 @@
 //! Errors and intervals of the estimators on units whose truth is known: a 95 % interval must contain the truth in 95 % of the cases, for each
 //! parameter.
 
-use mimu::estimate::known_input::{
-    inverse_form, kalman, least_squares, opposite_rates, six_positions,
-};
-use mimu::estimate::{Estimated, Failure, Observation};
+use mimu::estimate::known_input::{inverse_form, kalman, least_squares, opposite_rates};
+use mimu::estimate::six_positions::six_positions;
+use mimu::estimate::{EarthShare, Estimated, Failure, Observation};
 use mimu::fit::{Method, Options, fit};
 use mimu::quantity::Sensor;
 use mimu::signal::blocks::Condensed;
@@ -60,6 +59,7 @@ fn on_a_table(unit: &Ideal, random: &mut Random) -> Vec<Observation> {
             raw: unit.read(input.into(), 1000, random).into(),
             variance: Vector3::from(unit.sigma).map(|s| s * s / 1000.0),
             input,
+            earth: EarthShare::NONE,
             change: Vector3::zeros(),
         })
         .collect()

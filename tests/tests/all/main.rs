@@ -5,6 +5,7 @@ mod bias_removal;
 mod coverage;
 mod diagnosis;
 mod dwells_found;
+mod earth;
 mod few_poses;
 mod flaws;
 mod joint;

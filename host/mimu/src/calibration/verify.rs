@@ -12,8 +12,8 @@ use serde::Serialize;
 use crate::calibration::Calibration;
 use crate::calibration::die_temperature::{at_one_temperature, outside};
 use crate::effects::removal::{removable, remove_within};
-use crate::estimate::Observation;
 use crate::estimate::turn::{Turn, direction_error};
+use crate::estimate::{Observation, earth_shared};
 use crate::fit::by_rate::variances;
 use crate::fit::refuse_wrong_gravity;
 use crate::fit::uncalibrated::{errors, exceeds};
@@ -315,7 +315,8 @@ fn known(
     sensor: Sensor,
     calibrated: &Affine<f64>,
 ) -> Option<SensorVerification> {
-    let observations = prepared.observations(sensor);
+    let forward = Forward::of(calibrated)?;
+    let observations = earth_shared::likely(&prepared.observations(sensor), &forward.matrix);
     let errors = |model: &Affine<f64>| -> Vec<f64> {
         observations
             .iter()

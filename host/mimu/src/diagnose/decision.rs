@@ -458,9 +458,10 @@ fn known_in(rows: &Rows) -> [f64; 2] {
     for stratum in &rows.strata {
         let judged = stratum.rows.clone().take_while(|r| *r < rows.judged.0);
         let count = judged.count();
-        let by_reference = stratum.by_reference.as_ref();
-        let by_reference = by_reference.map_or(0.0, |v| v.rows(0, count).sum());
-        sums[0] += stratum.known.diagonal().rows(0, count).sum();
+        let part = |of: &Option<DVector<f64>>| of.as_ref().map_or(0.0, |v| v.rows(0, count).sum());
+        let by_reference = part(&stratum.by_reference);
+        let known = stratum.known.diagonal().rows(0, count).sum();
+        sums[0] += known - part(&stratum.by_earth);
         sums[1] += by_reference;
     }
     sums

@@ -328,7 +328,8 @@ fn matrices(recordings: &Recordings) -> Option<[Option<Affine<f64>>; 2]> {
     let never_turned = match first.manifest.reference {
         Reference::Gravity | Reference::TurntableRate => !first.has(Sensor::Accel),
         Reference::Table => Sensor::BOTH.iter().all(|s| {
-            let inputs: Vec<_> = first.observations(*s).iter().map(|o| o.input).collect();
+            let dwells = first.dwells.list.iter();
+            let inputs: Vec<_> = dwells.filter_map(|d| d.input(*s)).collect();
             inputs.windows(2).all(|w| w[0] == w[1])
         }),
     };

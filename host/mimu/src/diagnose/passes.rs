@@ -63,7 +63,8 @@ pub(super) fn session(prepared: &Prepared, [gyro, accel]: [Option<Affine<f64>>; 
 fn later_session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) -> Session<'a> {
     let own = [0, 1].map(|i| {
         let known = models[i]?;
-        let own = session_bias::estimate(prepared, Sensor::BOTH[i], &known);
+        let accel = models[1].as_ref();
+        let own = session_bias::estimate(prepared, Sensor::BOTH[i], &known, accel);
         Some(own.map_or(known, |e| e.triad.inverse))
     });
     session(prepared, own)

@@ -55,6 +55,8 @@ pub struct Stratum {
     pub known: DMatrix<f64>,
     /// Part of each row's variance that comes from errors of the reference, which are among [`Self::open`]; `None` if there is none.
     pub by_reference: Option<DVector<f64>>,
+    /// Part of each row's known variance that comes from the unknown rate of the Earth, whose likeliest value is not in the rows; `None` if there is none.
+    pub by_earth: Option<DVector<f64>>,
     /// Factor of the covariance by errors that all rows share, unit of the rows: this times its transpose is added to the known covariance. They are
     /// the errors of the forces that judge turns, and of a given matrix. `None` if there are none, or if they are negligible.
     pub open: Option<DMatrix<f64>>,
@@ -181,6 +183,8 @@ pub struct Rows {
     by_matrix: DMatrix<f64>,
     /// Strata, which cover the rows in order.
     pub strata: Vec<Stratum>,
+    /// Whether the vertical component of the Earth's rate is to be found: by hand without a latitude. On a table without one it is in the covariance.
+    pub earth_unknown: bool,
     /// What the error figures are about.
     pub figure: RowFigure,
     /// Number of rows, from the first on, that the error figures include; and how many of these count as one dwell or turn.

@@ -5,7 +5,9 @@
 //! after a turn. Without this noise, 10 of 18 clean units of three grades, turned by hand, were not called clean: 0.003 deg/s is more than the noise
 //! of a mean over 2.5 s of any gyro below 0.005 deg/s/√Hz.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
+
+use super::turn::across;
 
 /// Rate of the Earth, rad/s (WGS 84).
 pub const RATE: f64 = 7.292_115e-5;
@@ -15,6 +17,8 @@ pub const RATE: f64 = 7.292_115e-5;
 pub struct Earth {
     /// About the vertical, up positive, rad/s; 0 if the latitude is unknown, and `earth_rate` is then an effect to be found.
     vertical: f64,
+    /// Mean square of its error, rad²/s².
+    vertical_error: f64,
     /// Mean square of the rate along each of two level directions, rad²/s².
     level: f64,
 }
@@ -28,6 +32,10 @@ impl Earth {
         });
         Self {
             vertical: RATE * sin,
+            vertical_error: match latitude_deg {
+                Some(_) => 0.0,
+                None => RATE * RATE / 3.0,
+            },
             level: 0.5 * RATE * RATE * cos2,
         }
     }
@@ -41,6 +49,23 @@ impl Earth {
     pub fn variance(&self, up: &Vector3<f64>) -> Vector3<f64> {
         let level = |up: Vector3<f64>| up.map(|u| self.level * (1.0 - u * u));
         unit(up).map_or_else(|| Vector3::repeat(self.level), level)
+    }
+
+    /// Variance of the vertical part on each axis, rad²/s²; zero if the latitude is known.
+    pub fn vertical_variance(&self, up: &Vector3<f64>) -> Vector3<f64> {
+        unit(up).map_or_else(Vector3::zeros, |up| up.map(|u| self.vertical_error * u * u))
+    }
+
+    /// Standard deviations of the unknown part of the rate, as columns in body axes: two across `up`, and one along it. If `up` is unknown, the rate has
+    /// any direction.
+    pub fn unknown(&self, up: &Vector3<f64>) -> Matrix3<f64> {
+        match unit(up) {
+            Some(up) => {
+                let [a, b] = across(&up).map(|side| side * self.level.sqrt());
+                Matrix3::from_columns(&[a, b, up * self.vertical_error.sqrt()])
+            }
+            None => Matrix3::from_diagonal_element(RATE / 3f64.sqrt()),
+        }
     }
 
     /// Variance of each of the two components of gravity's direction after a turn of this duration, rad².

@@ -4,10 +4,11 @@ use mimu_core::compensation::Affine;
 use mimu_core::kalman::Filter;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
+use super::inputs::{design, span};
 use super::least_squares::{
     Errors, Group, Observability, Scatter, extra_variance, extra_variance_of, solve_groups,
 };
-use super::{Addition, Estimated, Failure, Observation};
+use super::{Addition, Estimated, Failure, Observation, earth_shared};
 use crate::observable::Observable;
 use crate::quantity::AXES;
 use crate::triad::{Covariance, Forward, Part, Triad};
@@ -17,29 +18,14 @@ use crate::warning::Warning;
 const OPPOSITE_SHARE: f64 = 0.01;
 /// An input below this share of the largest is rest.
 const REST_SHARE: f64 = 1e-3;
-/// An input is along an axis if its part across is below this share.
-const ALONG_SHARE: f64 = 0.02;
-
-/// Size of the largest input: the unit in which designs are judged.
-pub(super) fn span<'a>(observations: impl IntoIterator<Item = &'a Observation>) -> f64 {
-    observations
-        .into_iter()
-        .map(|o| o.input.norm())
-        .fold(0.0, f64::max)
-        .max(f64::MIN_POSITIVE)
-}
-
-/// Rows `[1, x, y, z]`, inputs in units of `span`.
-fn design(observations: &[Observation], span: f64) -> DMatrix<f64> {
-    DMatrix::from_fn(observations.len(), 4, |i, j| match j {
-        0 => 1.0,
-        _ => observations[i].input[j - 1] / span,
-    })
-}
 
 /// Whether the inputs determine `[b, P1, P2, P3]`, fang (29), (30). The same for all three sensors.
 pub fn observability(observations: &[Observation]) -> Result<Observability, Failure> {
-    let found = Observability::of(&design(observations, span(observations)));
+    let without: Vec<Observation> = observations
+        .iter()
+        .map(Observation::without_earth)
+        .collect();
+    let found = Observability::of(&design(&without, span(&without)));
     complete(found, observations.len())
 }
 
@@ -81,21 +67,33 @@ pub(super) fn complete(found: Observability, dwells: usize) -> Result<Observabil
 }
 
 /// Known errors of the readings of sensor `axis`. `wander` is the covariance of errors that the means of all dwells share, by axis
-/// ([`crate::noise::Noise::wander`]); their variances contain it.
+/// ([`crate::noise::Noise::wander`]); their variances contain it. `forward` is the sensor's matrix, raw/SI, to about a per cent: the unknown part of the
+/// Earth's rate in the readings is this times that in the inputs.
 pub(super) fn errors(
     observations: &[Observation],
     axis: usize,
     wander: Option<&[DMatrix<f64>; 3]>,
+    forward: &Matrix3<f64>,
 ) -> Errors {
     let n = observations.len();
-    let variances = positive(DVector::from_fn(n, |i, _| observations[i].variance[axis]));
+    let mut variances = positive(DVector::from_fn(n, |i, _| observations[i].variance[axis]));
+    let factor = earth_shared::factor(observations, axis, forward, &mut variances);
     let Some(wander) = wander else {
-        return Errors::Independent(variances);
+        return match factor.ncols() {
+            0 => Errors::Independent(variances),
+            _ => Errors::Shared(variances, factor),
+        };
     };
-    Errors::Correlated(DMatrix::from_fn(n, n, |i, j| match i == j {
-        true => variances[i],
-        false => wander[axis][(observations[i].dwell, observations[j].dwell)],
-    }))
+    let mut covariance = &factor * factor.transpose();
+    for i in 0..n {
+        for j in 0..n {
+            covariance[(i, j)] += match i == j {
+                true => variances[i],
+                false => wander[axis][(observations[i].dwell, observations[j].dwell)],
+            };
+        }
+    }
+    Errors::Correlated(covariance)
 }
 
 /// Least squares in the forward form, fang (15), (17): `u = P x + b`, sensor by sensor.
@@ -109,10 +107,11 @@ pub fn least_squares(
     let observability = observability(observations)?;
     let span = span(observations);
     let design = design(observations, span);
+    let forward_matrix = earth_shared::rough_forward(observations);
     let mut axes = Vec::new();
     for axis in 0..3 {
         let raw = DVector::from_fn(observations.len(), |i, _| observations[i].raw[axis]);
-        let errors = errors(observations, axis, wander);
+        let errors = errors(observations, axis, wander, &forward_matrix);
         let group = Group {
             design: design.clone(),
             observations: raw,
@@ -126,7 +125,8 @@ pub fn least_squares(
             scatter: vec![(Observable::Axis(axis), scatter)],
         });
     }
-    forward(&axes, span, observability.condition)
+    let estimated = forward(&axes, span, observability.condition)?;
+    Ok(earth_shared::found(estimated, observations))
 }
 
 /// One scalar measurement of a filter: `raw = b + P x + noise`.
@@ -157,7 +157,7 @@ fn innovations(
                 .collect(),
             );
         }
-        Errors::Correlated(covariance) => covariance,
+        Errors::Correlated(_) | Errors::Shared(..) => errors.covariance(),
     };
     let n = observations.len();
     let root = (covariance + DMatrix::identity(n, n) * extra).cholesky()?;
@@ -190,8 +190,9 @@ pub fn kalman(
     let observability = observability(observations)?;
     let span = span(observations);
     let dof = observations.len() as f64 - 4.0;
+    let forward_matrix = earth_shared::rough_forward(observations);
     let axis = |axis: usize| {
-        let errors = errors(observations, axis, wander);
+        let errors = errors(observations, axis, wander, &forward_matrix);
         let known = DVector::from_fn(observations.len(), |i, _| observations[i].variance[axis]);
         let floor = positive(known).max();
         let mut scatter = Scatter {
@@ -234,7 +235,8 @@ pub fn kalman(
         }
     };
     let axes = (0..3).map(axis).collect::<Result<Vec<_>, _>>()?;
-    forward(&axes, span, observability.condition)
+    let estimated = forward(&axes, span, observability.condition)?;
+    Ok(earth_shared::found(estimated, observations))
 }
 
 /// The estimate of one sensor.
@@ -290,6 +292,7 @@ pub(super) fn forward(
         scatter,
         condition,
         delays: None,
+        earth: Vec::new(),
         notes: Vec::new(),
     })
 }
@@ -471,6 +474,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         scatter,
         condition: observability.condition,
         delays: None,
+        earth: Vec::new(),
         notes,
     })
 }
@@ -599,88 +603,7 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
         scatter,
         condition: observability.condition,
         delays: None,
-        notes: Vec::new(),
-    })
-}
-
-/// The classical six positions, as baseline: every axis up and down, or turned both ways. Scale factor
-/// `(u⁺ - u⁻) / (x⁺ - x⁻)` and bias `(u⁺ + u⁻) / 2` of each sensor by itself; misalignments are taken to be zero.
-///
-/// If none is repeated, the two positions of a sensor leave its two parameters no residual. Its readings in the other four then show whether the
-/// model holds: with faces 4 degrees off level and a misalignment of 2, they were off by 438 mm/s², while the noise of the two positions alone gave a
-/// bias of ± 0.15 mg.
-pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure> {
-    let mut model = Forward {
-        matrix: Matrix3::zeros(),
-        bias: Vector3::zeros(),
-    };
-    let (mut parts, mut scatter) = (Vec::new(), Vec::new());
-    for axis in 0..3 {
-        let mut covariance = Covariance::zeros();
-        let mut ends = [(0.0, 0.0, 0.0, 0.0); 2]; // sums of reading, input, variance; number
-        let mut used = Vec::new();
-        let along = |o: &&Observation| {
-            let size = o.input.norm();
-            size > 1e-3 * span(observations)
-                && o.input[axis].abs() > size * (1.0 - ALONG_SHARE * ALONG_SHARE).sqrt()
-        };
-        for o in observations.iter().filter(along) {
-            let end = &mut ends[usize::from(o.input[axis] > 0.0)];
-            end.0 += o.raw[axis];
-            end.1 += o.input[axis];
-            end.2 += o.variance[axis];
-            end.3 += 1.0;
-            used.push(o);
-        }
-        if ends.iter().any(|e| e.3 == 0.0) {
-            return Err(Failure::Undetermined {
-                parameters: format!("scale factor and bias {} (six-position method)", AXES[axis]),
-                add: format!(
-                    "add dwells with {0} along +{0} and -{0}, or use least squares",
-                    AXES[axis]
-                )
-                .into(),
-            });
-        }
-        let [mut down, mut up] = ends.map(|e| (e.0 / e.3, e.1 / e.3, e.2 / (e.3 * e.3)));
-        let (width, middle) = (up.1 - down.1, up.1 + down.1);
-        let scale = (up.0 - down.0) / width;
-        model.matrix[(axis, axis)] = scale;
-        model.bias[axis] = 0.5 * (up.0 + down.0 - scale * middle);
-        // Repeated positions show errors beyond the noise; if there are none, those along the other axes do.
-        if used.len() == 2 {
-            used = observations.iter().collect();
-        }
-        let residuals: Vec<f64> = used
-            .iter()
-            .map(|o| o.raw[axis] - scale * o.input[axis] - model.bias[axis])
-            .collect();
-        let variances: Vec<f64> = used
-            .iter()
-            .map(|o| o.variance[axis].max(f64::MIN_POSITIVE))
-            .collect();
-        let of_axis = extra_variance(&residuals, &variances, used.len() as f64 - 2.0);
-        down.2 += of_axis.extra_variance / ends[0].3;
-        up.2 += of_axis.extra_variance / ends[1].3;
-        scatter.push((Observable::Axis(axis), of_axis));
-        // Bias at the middle of the two inputs, which is zero to the table's repeatability.
-        covariance[(4 * axis, 4 * axis)] = (up.2 + down.2) / (width * width);
-        covariance[(9 + axis, 9 + axis)] = 0.25 * (up.2 + down.2);
-        let both = 0.5 * (up.2 - down.2) / width;
-        covariance[(4 * axis, 9 + axis)] = both;
-        covariance[(9 + axis, 4 * axis)] = both;
-        parts.push(Part {
-            covariance,
-            dof: of_axis.variance_dof(),
-        });
-    }
-    let triad = Triad::from_forward(model, parts)
-        .ok_or_else(|| Failure::NoSolution("a sensor does not respond".into()))?;
-    Ok(Estimated {
-        triad,
-        scatter,
-        condition: 1.0,
-        delays: None,
+        earth: Vec::new(),
         notes: Vec::new(),
     })
 }

@@ -98,6 +98,9 @@ pub enum Errors {
     Independent(DVector<f64>),
     /// With this covariance.
     Correlated(DMatrix<f64>),
+    /// Independent ones with these variances, beside a few unknown numbers that all share: the factor (a row for each observation) times its
+    /// transpose is added to the covariance. Its cost grows with the number of observations, that of a covariance with the cube.
+    Shared(DVector<f64>, DMatrix<f64>),
 }
 
 impl Errors {
@@ -122,6 +125,33 @@ impl Errors {
                     .l_dirty()
                     .solve_lower_triangular(rows)
             }
+            Self::Shared(variances, factor) => {
+                let independent = Self::Independent(variances.clone());
+                let mut rows = independent.whitened(extra, rows)?;
+                let factor = independent.whitened(extra, factor)?;
+                // (I + Z Z')^(-1/2) = I + U ((1 + l)^(-1/2) - 1) U', where U and l are the eigenvectors and eigenvalues of Z Z'.
+                let eigen = factor.tr_mul(&factor).symmetric_eigen();
+                for (k, value) in eigen.eigenvalues.iter().enumerate() {
+                    if *value > 1e-12 * eigen.eigenvalues.max() {
+                        let unit = &factor * eigen.eigenvectors.column(k) / value.sqrt();
+                        let shrunk = (1.0 + value).sqrt().recip() - 1.0;
+                        let along = rows.tr_mul(&unit) * shrunk;
+                        rows += unit * along.transpose();
+                    }
+                }
+                Some(rows)
+            }
+        }
+    }
+
+    /// The covariance of so many observations.
+    pub(super) fn covariance(&self) -> DMatrix<f64> {
+        match self {
+            Self::Independent(variances) => DMatrix::from_diagonal(variances),
+            Self::Correlated(covariance) => covariance.clone(),
+            Self::Shared(variances, factor) => {
+                DMatrix::from_diagonal(variances) + factor * factor.transpose()
+            }
         }
     }
 
@@ -132,7 +162,7 @@ impl Errors {
                 let terms = residuals.iter().zip(variances.iter());
                 terms.map(|(r, v)| r * r / (v + extra)).sum()
             }
-            Self::Correlated(_) => {
+            Self::Correlated(_) | Self::Shared(..) => {
                 let rows = DMatrix::from_column_slice(residuals.len(), 1, residuals.as_slice());
                 let white = self.whitened(extra, &rows);
                 white.map_or(f64::NAN, |r| r.norm_squared())

@@ -402,6 +402,7 @@ pub fn estimate(
         scatter: found,
         condition: shape.condition,
         delays: None,
+        earth: Vec::new(),
         notes,
     })
 }

@@ -2,7 +2,8 @@
 //!
 //! | module            | reference | what it is                                               |
 //! |-------------------|-----------|----------------------------------------------------------|
-//! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form, six positions |
+//! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form |
+//! | [`six_positions`] | table     | scale factors and biases from six positions               |
 //! | [`moving_input`]  | table     | the same least squares if inputs move within dwells        |
 //! | [`magnitude`]     | gravity, turntable | accelerometer from the magnitude of gravity over many poses; gyro from that of a turntable's rate |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
@@ -10,15 +11,21 @@
 //! | [`turn`]          | gravity   | one turn, and the direction of gravity predicted after it |
 //! | [`chains`]        | gravity   | dwells that turns connect one to the next                 |
 //! | [`earth`]         | gravity   | the Earth's rate in the gyro's readings                   |
+//! | [`earth_on_table`] | table    | the same through the dwells of a table                    |
+//! | [`earth_shared`]  | table     | what is unknown of it, shared by dwells                   |
 //! | [`least_squares`] | both      | the algebra under all of them                            |
 
 pub mod chains;
 pub mod earth;
+pub mod earth_on_table;
+pub mod earth_shared;
+mod inputs;
 pub mod known_input;
 pub mod least_squares;
 pub mod magnitude;
 pub mod moving_input;
 pub mod rotation;
+pub mod six_positions;
 pub mod turn;
 pub mod with_turns;
 
@@ -28,6 +35,7 @@ use crate::observable::Observable;
 use crate::quantity::Sensor;
 use crate::triad::Triad;
 use crate::warning::Warning;
+pub use earth_on_table::EarthShare;
 use least_squares::Scatter;
 
 /// Row and column of the six elements of a lower triangular C, which magnitudes determine.
@@ -42,10 +50,22 @@ pub struct Observation {
     pub raw: Vector3<f64>,
     /// Variance of `raw` by the noise within dwells, raw units squared.
     pub variance: Vector3<f64>,
-    /// The same of the true input in SI; not a number if only the magnitude of gravity is known.
+    /// The same of the known input in SI, for a gyro with the known part of the Earth's rate; not a number if only the magnitude of gravity is known.
     pub input: Vector3<f64>,
+    /// The Earth's rate: its known part, which the input includes, and the rest.
+    pub earth: EarthShare,
     /// The same of the rate of change of the true input, SI/s; zero if it is constant.
     pub change: Vector3<f64>,
+}
+
+impl Observation {
+    /// The known input without the Earth's rate. It decides what an experiment determines: the Earth turns far too slowly for a scale factor.
+    pub fn without_earth(&self) -> Self {
+        Self {
+            input: self.input - self.earth.known,
+            ..*self
+        }
+    }
 }
 
 /// Delays of the readings of three axes behind the reference, s.
@@ -70,6 +90,8 @@ pub struct Estimated {
     pub condition: f64,
     /// Delays of the readings, if moving inputs determine them.
     pub delays: Option<Delays>,
+    /// The unknown numbers of the Earth's rate, if known inputs contain it: by heading, in standard deviations.
+    pub earth: Vec<Vector3<f64>>,
     /// What a person should know.
     pub notes: Vec<Warning>,
 }
@@ -85,7 +107,9 @@ impl Estimated {
             None => Vector3::zeros(),
         };
         let inverse = &self.triad.inverse;
-        inverse.matrix * (o.raw + behind) + inverse.offset * bias - o.input
+        let earth = self.earth.get(o.earth.heading);
+        let input = o.input + earth.map_or_else(Vector3::zeros, |e| o.earth.by * e);
+        inverse.matrix * (o.raw + behind) + inverse.offset * bias - input
     }
 }
 

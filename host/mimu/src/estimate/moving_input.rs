@@ -4,13 +4,14 @@
 //! of the filters of the sensor and the clocks of table and converter. Half a millisecond at 200 deg/s is an error of 17 mm/s², a hundred times the
 //! uncertainty of the means. So each axis also has a delay: `u = b + P (x - τ ẋ)`.
 
-use nalgebra::{DMatrix, DVector, RowVector3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, RowVector3, Vector3};
 
-use super::known_input::{AxisEstimate, complete, errors, forward, positive, span};
+use super::inputs::span;
+use super::known_input::{AxisEstimate, complete, errors, forward, positive};
 use super::least_squares::{
     Errors, Group, Observability, POORLY_DETERMINED, Scatter, Solution, solve_groups,
 };
-use super::{Delays, Estimated, Failure, Observation};
+use super::{Delays, Estimated, Failure, Observation, earth_shared};
 use crate::observable::Observable;
 use crate::warning::Warning;
 
@@ -84,17 +85,33 @@ pub fn least_squares(
         parts: [means, sums],
         span: span(means.iter().chain(sums)),
     };
-    let found = Observability::of(&all.whole(0.0, None));
+    let [a, b] = all
+        .parts
+        .map(|part| -> Vec<Observation> { part.iter().map(Observation::without_earth).collect() });
+    let without = Experiment {
+        parts: [&a[..], &b[..]],
+        span: all.span,
+    };
+    let found = Observability::of(&without.whole(0.0, None));
     let observability = complete(found, means.len())?;
     let singular = || Failure::NoSolution("the design is singular".into());
     let mut axes = Vec::new();
     let mut delays = [Vector3::zeros(); 2];
     let mut told = true;
     for axis in 0..3 {
-        let variances = DVector::from_fn(sums.len(), |i, _| sums[i].variance[axis]);
+        let first = [means, sums].map(|part| {
+            let variances = DVector::from_fn(part.len(), |i, _| part[i].variance[axis]);
+            Errors::Independent(positive(variances))
+        });
+        let (solution, _) = all.solve(axis, &first, 0.0, None).ok_or_else(singular)?;
+        let mut forward_matrix = Matrix3::zeros();
+        forward_matrix.set_row(axis, &all.forward(&solution));
+        // The unknown part of the Earth's rate hardly differs within a dwell, so in a sum it counts as independent.
+        let earth = |o: &Observation| (forward_matrix.row(axis) * o.earth.by).norm_squared();
+        let variance = |i: usize, _| sums[i].variance[axis] + earth(&sums[i]);
         let errors = [
-            errors(means, axis, wander),
-            Errors::Independent(positive(variances)),
+            errors(means, axis, wander, &forward_matrix),
+            Errors::Independent(positive(DVector::from_fn(sums.len(), variance))),
         ];
         let (mut solution, mut scatter) =
             all.solve(axis, &errors, 0.0, None).ok_or_else(singular)?;
@@ -135,5 +152,5 @@ pub fn least_squares(
     } else {
         estimated.notes.push(Warning::NoDelay);
     }
-    Ok(estimated)
+    Ok(earth_shared::found(estimated, means))
 }

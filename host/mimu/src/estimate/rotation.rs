@@ -170,7 +170,7 @@ pub fn estimate(
         });
         let rest = rest.iter().zip(&chains.of_rest).flat_map(|(o, chain)| {
             let earth = o.rate_variance * if chain.is_some() { 0.0 } else { 1.0 };
-            let v = squared * o.variance + earth;
+            let v = squared * o.variance + earth + o.vertical_variance;
             [v.x, v.y, v.z]
         });
         turns.chain(rest).map(|v| v.max(1e-20)).collect()
@@ -294,6 +294,7 @@ pub fn estimate(
         scatter,
         condition,
         delays: None,
+        earth: Vec::new(),
         notes: Vec::new(),
     })
 }

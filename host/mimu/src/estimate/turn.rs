@@ -58,8 +58,10 @@ pub struct Rest {
     pub variance: Vector3<f64>,
     /// The known part of the rate, rad/s.
     pub rate: Vector3<f64>,
-    /// Variances of the unknown part, rad²/s².
+    /// Variances of the part that depends on the heading, rad²/s².
     pub rate_variance: Vector3<f64>,
+    /// Variances of the vertical part; zero if the latitude is known.
+    pub vertical_variance: Vector3<f64>,
 }
 
 /// Mean force and turn over two neighbouring blocks in motion, for the first guess.

@@ -226,6 +226,7 @@ impl JointFit<'_> {
             scatter: vec![(Observable::Magnitude, magnitude)],
             condition,
             delays: None,
+            earth: Vec::new(),
             notes: vec![Warning::WithTurns],
         })
     }

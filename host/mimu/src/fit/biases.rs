@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use super::hold_out::HoldOut;
 use super::sensor::Residual;
-use super::{Fit, Options, finish, plausible, refuse_wrong_gravity, session_bias};
+use super::{Fit, Options, earth, finish, plausible, refuse_wrong_gravity, session_bias};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::Sensor;
@@ -39,19 +39,26 @@ pub fn fit_biases(
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     let mut sensors = Vec::new();
+    let given_accel = given[Sensor::Accel as usize].filter(|_| prepared.has(Sensor::Accel));
     let given = Sensor::BOTH.into_iter().zip(given).zip(covariances);
     for ((sensor, known), covariance) in given {
         let Some(known) = known.filter(|_| prepared.has(sensor)) else {
             continue;
         };
-        let observations = prepared.observations(sensor);
+        let observations = match sensor {
+            Sensor::Gyro if prepared.manifest.reference != Reference::Table => {
+                prepared.at_rest_on_the_ground(given_accel.as_ref())
+            }
+            _ => prepared.observations(sensor),
+        };
         if observations.is_empty() {
             let unused = prepared.dwells.unused(sensor);
             warnings.push(Warning::NoDwell(unused).of(sensor));
             continue;
         }
         refuse_wrong_gravity(&prepared, sensor, &observations)?;
-        let mut estimated = session_bias::estimate(&prepared, sensor, &known)
+        let accel = given_accel.as_ref();
+        let mut estimated = session_bias::estimate(&prepared, sensor, &known, accel)
             .map_err(|f| prepared.refused(f, sensor))?;
         if let Some(covariance) = covariance {
             let raw: Vector3<f64> = observations.iter().map(|o| o.raw).sum();
@@ -75,8 +82,7 @@ pub fn fit_biases(
         let residuals = observations.iter().zip(floors).map(|(o, floor)| {
             let is = inverse.apply(&o.raw);
             let value = match (reference, sensor) {
-                (Reference::Table, _) => is - o.input,
-                (_, Sensor::Gyro) => is,
+                (Reference::Table, _) | (_, Sensor::Gyro) => estimated.error(o, 1.0),
                 (_, Sensor::Accel) => {
                     Vector3::new(is.norm() - prepared.manifest.gravity_mps2, 0.0, 0.0)
                 }
@@ -123,6 +129,9 @@ pub fn fit_biases(
     }
     for sensor in &mut sensors {
         plausible::check_numbers(sensor)?;
+        sensor
+            .warnings
+            .extend(earth::in_intervals(&prepared, sensor));
     }
     Ok(Fit {
         prepared,

@@ -5,12 +5,15 @@ use nalgebra::{DMatrix, Vector3};
 use super::hold_out::{Refits, Split, determined};
 use super::sensor::{Residual, SensorFit, typical};
 use super::{Method, Options, finish, lever_arm, refuse_wrong_gravity, uncalibrated};
-use crate::estimate::{Observation, known_input, moving_input};
+use crate::estimate::{Observation, earth_shared, known_input, moving_input, six_positions};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
 use crate::triad::slope;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
+
+/// Rates that differ by less are the same, rad/s: a thousandth of the Earth's, whose subtraction leaves rounding errors.
+const SAME_RATE: f64 = 7e-8;
 
 pub(super) fn fit_known(
     prepared: &Prepared,
@@ -40,9 +43,11 @@ pub(super) fn fit_known(
                 }
                 (Method::LeastSquares, _) => known_input::least_squares(o, wander),
                 (Method::Kalman, _) => known_input::kalman(o, wander),
-                (Method::InverseForm, Sensor::Gyro) => known_input::opposite_rates(o),
+                (Method::InverseForm, Sensor::Gyro) => {
+                    earth_shared::apart(o, known_input::opposite_rates)
+                }
                 (Method::InverseForm, Sensor::Accel) => known_input::inverse_form(o),
-                (Method::SixPositions, _) => known_input::six_positions(o),
+                (Method::SixPositions, _) => earth_shared::apart(o, six_positions::six_positions),
             };
         let dwells = &prepared.dwells.list;
         let off_axis = sensor == Sensor::Accel && prepared.lever_arm_m > 0.0;
@@ -71,9 +76,10 @@ pub(super) fn fit_known(
             // A level cube does not determine the gyro, and a rate table hardly the accelerometer.
             Err(_)
                 if within.is_empty()
-                    && observations
-                        .iter()
-                        .all(|o| o.input == observations[0].input) =>
+                    && observations.iter().all(|o| {
+                        let [a, b] = [o, &observations[0]].map(|o| o.without_earth().input);
+                        (a - b).norm() < SAME_RATE
+                    }) =>
             {
                 missing.push(Warning::OneInput.of(sensor));
                 continue;

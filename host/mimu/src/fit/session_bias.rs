@@ -5,7 +5,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::estimate::least_squares::{Errors, Group, Scatter, Solution, solve_groups};
-use crate::estimate::{Estimated, Failure};
+use crate::estimate::{Estimated, Failure, earth_shared};
 use crate::observable::Observable;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Sensor;
@@ -20,12 +20,20 @@ const STEPS: usize = 6;
 ///
 /// If the input is known, and for a gyro at rest, by the mean error of each axis. For an accelerometer by the magnitude of gravity: a single pose
 /// does not show the bias across gravity, which then stays that of `known`.
+///
+/// At rest the input of a gyro is the Earth's rate, so that the bias is the sensor's at any latitude and in any pose. `accel` (raw to m/s²) shows the
+/// vertical; without it, and for the component that depends on the heading, the Earth's rate widens the intervals.
 pub fn estimate(
     prepared: &Prepared,
     sensor: Sensor,
     known: &Affine<f64>,
+    accel: Option<&Affine<f64>>,
 ) -> Result<Estimated, Failure> {
-    let observations = prepared.observations(sensor);
+    let at_rest = sensor == Sensor::Gyro && prepared.manifest.reference != Reference::Table;
+    let observations = match at_rest {
+        true => prepared.at_rest_on_the_ground(accel),
+        false => prepared.observations(sensor),
+    };
     let none = || Failure::NoSolution("no dwell can be used".into());
     if observations.is_empty() {
         return Err(none());
@@ -72,20 +80,21 @@ pub fn estimate(
     } else {
         for axis in 0..3 {
             let n = observations.len();
-            let input = |i: usize| match prepared.manifest.reference {
-                Reference::Table => observations[i].input[axis],
-                Reference::Gravity | Reference::TurntableRate => 0.0,
-            };
             let y = DVector::from_fn(n, |i, _| {
-                input(i) - (matrix.row(axis) * observations[i].raw)[(0, 0)]
+                observations[i].input[axis] - (matrix.row(axis) * observations[i].raw)[(0, 0)]
             });
-            let variances = DVector::from_fn(n, |i, _| {
+            let mut variances = DVector::from_fn(n, |i, _| {
                 si_covariance(&matrix, &observations[i].variance)[(axis, axis)]
             });
+            let in_si = Matrix3::identity();
+            let factor = earth_shared::factor(&observations, axis, &in_si, &mut variances);
             let (solution, [found]) = solve_groups(&[Group {
                 design: DMatrix::from_element(n, 1, 1.0),
                 observations: y,
-                errors: Errors::Independent(variances),
+                errors: match factor.ncols() {
+                    0 => Errors::Independent(variances),
+                    _ => Errors::Shared(variances, factor),
+                },
             }])
             .ok_or_else(none)?;
             offset[axis] = solution.parameters[0];
@@ -100,11 +109,13 @@ pub fn estimate(
     };
     let triad = Triad::from_inverse(Affine { matrix, offset }, vec![part])
         .ok_or_else(|| Failure::NoSolution("the given matrix is singular".into()))?;
+    let earth = earth_shared::numbers(&observations, &triad.forward.matrix);
     Ok(Estimated {
         triad,
         scatter,
         condition: 1.0,
         delays: None,
+        earth,
         notes: vec![Warning::MatrixGiven(false)],
     })
 }

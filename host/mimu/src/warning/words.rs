@@ -82,6 +82,12 @@ impl fmt::Display for Warning {
             Self::EndOfConverter(count, value) => write!(f, "{} at {value}, the end of a 16-bit converter: treated as a rail", plural(*count, "sample")),
             Self::RunAtEnd(high, value, longest, chance) => write!(f, "the {} value {value} occurs {longest} times in a row, and chance explains {chance:.0}: treated as a rail", extreme(*high)),
             Self::CalmEnd(high, from) => write!(f, "at its {} values, from {from} on, the noise vanishes: treated as a rail of the sensor", extreme(*high)),
+            Self::NoLatitude => f.write_str("no latitude is given, so the Earth's rate (0.004 deg/s, 15 deg/h) is unknown and in the intervals of the biases: give the latitude"),
+            Self::HeadingLost(times) => write!(
+                f,
+                "the heading of the table is lost {} between dwells (samples are missing there, or the gyro clips), so the horizontal component of the Earth's rate is in the intervals of the biases: record the table's motion without gaps",
+                plural(*times as u64, "time")
+            ),
             Self::Gravity(gravity, latitude) => {
                 let normal = normal_gravity(*latitude);
                 let ppm = ((gravity - normal) / normal * 1e6).abs();

@@ -48,6 +48,7 @@ fn of(request: &Request, schedule: &Schedule, sensor: Sensor) -> SensorPredictio
     let (rows, dies) = rows(request, schedule, sensor);
     let samples = rows.iter().map(|r| r.weight).fold(0.0, f64::max);
     let mut problem = Problem {
+        headings: 0,
         sensor,
         rows,
         gain: Vector3::repeat(1.0),
@@ -105,6 +106,7 @@ fn rows(request: &Request, schedule: &Schedule, sensor: Sensor) -> (Vec<ProblemR
                     middle_s,
                     weight: length_s * request.sample_rate_hz,
                     input,
+                    earth: None,
                     reading: Vector3::zeros(),
                     step: (round * schedule.steps.len() + k) as i32,
                 });

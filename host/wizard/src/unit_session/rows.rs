@@ -1,19 +1,14 @@
 //! Rows of a recording between two dwells, and the known inputs of a dwell.
 
-use mimu::estimate::earth::Earth;
 use mimu_recording::Batch;
 
 use crate::procedure::SessionConfig;
 use mimu_equipment::step::Step;
 
-/// Known inputs of a dwell on a table: rates, deg/s, and specific forces, m/s².
+/// Known inputs of a dwell on a table: rates against the ground, deg/s, and specific forces, m/s². The estimators add the Earth's rate.
 pub(super) fn known(step: &Step, config: &SessionConfig) -> [f64; 6] {
     let up = step.up();
-    // The heading of the table is unknown, so only the vertical component of the Earth's rate is known.
-    let earth = config
-        .latitude_deg
-        .map(|_| Earth::at(config.latitude_deg).rate(&up));
-    let rate = up * step.rate_dps + earth.unwrap_or_default().map(f64::to_degrees);
+    let rate = up * step.rate_dps;
     let force = up * config.gravity_mps2;
     [rate.x, rate.y, rate.z, force.x, force.y, force.z]
 }

@@ -12,12 +12,13 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
 
-use crate::estimate::Observation;
 use crate::estimate::least_squares::{Errors, Group, Observability, Solution, solve_groups};
 use crate::estimate::turn::{Turn, sensitivity};
+use crate::estimate::{Observation, earth_shared};
 use crate::fit::by_rate::variances;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Sensor;
+use crate::triad::Forward;
 use crate::turntable::RatedDwells;
 use mimu_recording::Reference;
 
@@ -128,7 +129,8 @@ pub(super) fn of(
 
 fn known(prepared: &Prepared, sensor: Sensor, model: &Affine<f64>) -> Option<Causes> {
     let mut rows = Vec::new();
-    for o in prepared.observations(sensor) {
+    let forward = Forward::of(model)?;
+    for o in earth_shared::likely(&prepared.observations(sensor), &forward.matrix) {
         let error = model.apply(&o.raw) - o.input;
         let covariance = si_covariance(&model.matrix, &o.variance);
         for k in 0..3 {

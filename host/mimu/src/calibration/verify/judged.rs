@@ -45,7 +45,8 @@ fn input_size(prepared: &Prepared, sensor: Sensor, figure: Figure) -> f64 {
         }
         Figure::Input => {
             let all = prepared.observations(sensor);
-            let squares: f64 = all.iter().map(|o| o.input.norm_squared()).sum();
+            let inputs = all.iter().map(|o| o.without_earth().input);
+            let squares: f64 = inputs.map(|x| x.norm_squared()).sum();
             (squares / (3 * all.len().max(1)) as f64).sqrt()
         }
     };

@@ -41,6 +41,9 @@ pub(super) fn candidates(
     };
     let mut listed: Vec<(usize, Regressor)> = Vec::new();
     for effect in effects::all().filter(|e| e.sensor == sensor) {
+        if !effect.is_error() && !rows.earth_unknown {
+            continue;
+        }
         let mut not_seen = || not_excited.push(effect);
         let Some(mut candidate) = Candidate::effect_in(effect, rows) else {
             not_seen();

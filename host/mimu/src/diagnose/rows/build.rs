@@ -30,6 +30,8 @@ pub(super) struct Part {
     pub biases: Vec<usize>,
     /// Strata.
     pub strata: Vec<Stratum>,
+    /// As in [`super::Rows`], of this recording.
+    pub earth_unknown: bool,
     /// What the judged rows are about.
     pub figure: RowFigure,
     /// As in [`super::Rows`].
@@ -222,6 +224,8 @@ impl Builder<'_> {
             by_matrix,
             biases,
             strata,
+            earth_unknown: self.prepared.manifest.latitude_deg.is_none()
+                && self.prepared.manifest.reference != Reference::Table,
             figure: figure.0,
             judged: (figure.1, figure.2),
             step: common_step(&self.prepared.condensed.quantisation_step[self.sensor.channels()]),

@@ -135,6 +135,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         by_matrix,
         nuisance: unit_columns(&nuisance),
         strata,
+        earth_unknown: parts.iter().all(|p| p.1.earth_unknown),
         figure,
         judged: (judged, together),
         step,

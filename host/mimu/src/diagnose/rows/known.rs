@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::build::{Builder, Part};
 use super::{Row, RowFigure, Stratum};
-use crate::estimate::Observation;
+use crate::estimate::{Observation, earth_shared};
 use crate::observable::{Observable, StratumName};
 use crate::quantity::Sensor;
 use crate::signal::contrast::Contrast;
@@ -25,7 +25,9 @@ impl Builder<'_> {
     ) -> Option<Part> {
         let forward = Forward::of(inverse)?;
         let (prepared, scale) = (self.prepared, self.scale);
-        let observations = prepared.observations(self.sensor);
+        let unknown = prepared.observations(self.sensor);
+        // The rows are errors after the likeliest rate of the Earth; its size remains in the covariance.
+        let observations = earth_shared::likely(&unknown, &forward.matrix);
         let n = observations.len();
         if n == 0 {
             return None;
@@ -83,10 +85,14 @@ impl Builder<'_> {
                 y.push((o.raw[axis] - predicted) / scale[axis]);
             }
             let s2 = scale[axis] * scale[axis];
-            let known = DMatrix::from_fn(n, n, |i, j| match (i == j, &wander) {
+            let mut known = DMatrix::from_fn(n, n, |i, j| match (i == j, &wander) {
                 (true, _) => observations[i].variance[axis] / s2,
                 (_, Some(w)) => w[axis][(dwells[i], dwells[j])] / s2,
                 _ => 0.0,
+            });
+            let by_earth = of_earth(&unknown, axis, &forward.matrix).map(|of_earth| {
+                known += &of_earth / s2;
+                of_earth.diagonal() / s2
             });
             strata.push(Stratum {
                 name: StratumName(Observable::Axis(axis), None),
@@ -95,6 +101,7 @@ impl Builder<'_> {
                 rows: axis * n..(axis + 1) * n,
                 known,
                 by_reference: None,
+                by_earth,
                 open: None,
                 random_walk: Some(random_walk.clone()),
                 wander_known: wander.is_some(),
@@ -123,6 +130,7 @@ impl Builder<'_> {
                 rows: from..y.len(),
                 known: DMatrix::from_diagonal(&known),
                 by_reference: None,
+                by_earth: None,
                 open: None,
                 random_walk: None,
                 wander_known: true,
@@ -171,6 +179,20 @@ impl Builder<'_> {
             moving: true,
         });
     }
+}
+
+/// Covariance of the readings of `axis` by the unknown part of the Earth's rate, raw units squared; `None` if there is none.
+fn of_earth(
+    observations: &[Observation],
+    axis: usize,
+    forward: &Matrix3<f64>,
+) -> Option<DMatrix<f64>> {
+    if !observations.iter().any(|o| o.earth.is_unknown()) {
+        return None;
+    }
+    let mut alone = DVector::zeros(observations.len());
+    let shared = earth_shared::factor(observations, axis, forward, &mut alone);
+    Some(DMatrix::from_diagonal(&alone) + &shared * shared.transpose())
 }
 
 /// What the bias and the matrix row of each axis of the forward model, in SI, add to the inverse model: C by rows, then o.

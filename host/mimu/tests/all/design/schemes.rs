@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use mimu::estimate::{Observation, known_input, magnitude};
+use mimu::estimate::{EarthShare, Observation, known_input, magnitude};
 use mimu::plan::design::judgement::Judgement;
 use mimu::plan::design::model::{GRAVITY, Model, Term, Terms};
 use mimu::plan::design::reach::{Fixture, Rates};
@@ -94,6 +94,7 @@ fn the_estimators_claim_the_sigmas_that_the_design_promised() {
             raw: s.up * GRAVITY,
             variance: Vector3::repeat(sigma * sigma),
             input: s.up * GRAVITY,
+            earth: EarthShare::NONE,
             change: Vector3::zeros(),
         })
         .collect();

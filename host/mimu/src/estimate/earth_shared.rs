@@ -1,0 +1,248 @@
+//! The unknown part of the Earth's rate in dwell means: a few numbers that all dwells of one heading share.
+//!
+//! Least squares and the Kalman bank take their covariance. Estimators without weights take the likeliest numbers as part of the inputs, and what
+//! remains unknown of them goes into their covariance.
+
+use nalgebra::{DMatrix, DVector, Matrix3, SVector, Vector3};
+
+use super::inputs::{design, span};
+use super::{EarthShare, Estimated, Failure, Observation};
+use crate::observable::Observable;
+use crate::triad::{Covariance, Part, Triad, vector};
+
+/// Places of the numbers of each heading that several observations share.
+fn places(observations: &[Observation]) -> (Vec<Option<usize>>, usize) {
+    let count = observations.iter().map(|o| o.earth.heading + 1).max();
+    let mut shared_by = vec![0; count.unwrap_or(0)];
+    let concerned = observations.iter().filter(|o| o.earth.is_unknown());
+    concerned.for_each(|o| shared_by[o.earth.heading] += 1);
+    let mut used = 0;
+    let place = |n: &i32| {
+        (*n > 1).then(|| {
+            used += 3;
+            used - 3
+        })
+    };
+    (shared_by.iter().map(place).collect(), used)
+}
+
+/// The readings of `axis` by the unknown numbers, one column for each that several observations share. The others are added to the `variances`.
+/// `forward` is the sensor's matrix, raw/SI.
+pub fn factor(
+    observations: &[Observation],
+    axis: usize,
+    forward: &Matrix3<f64>,
+    variances: &mut DVector<f64>,
+) -> DMatrix<f64> {
+    let (places, used) = places(observations);
+    let factor = factor_of_all(observations, axis, forward, &places, variances);
+    let kept: Vec<usize> = (0..used)
+        .filter(|k| factor.column(*k).amax() > 0.0)
+        .collect();
+    factor.select_columns(&kept)
+}
+
+/// The sensors' matrix, raw/SI, to about a per cent: without the unknown part of the Earth's rate. Zero if the inputs do not determine it.
+pub(super) fn rough_forward(observations: &[Observation]) -> Matrix3<f64> {
+    if !observations.iter().any(|o| o.earth.is_unknown()) {
+        return Matrix3::zeros();
+    }
+    let span = span(observations);
+    let readings = DMatrix::from_fn(observations.len(), 3, |i, k| observations[i].raw[k]);
+    let solved = design(observations, span).svd(true, true);
+    solved.solve(&readings, 1e-9).map_or_else(
+        |_| Matrix3::zeros(),
+        |by| Matrix3::from_fn(|axis, k| by[(k + 1, axis)] / span),
+    )
+}
+
+fn affine(observations: &[Observation]) -> DMatrix<f64> {
+    design(observations, span(observations))
+}
+
+/// The unknown numbers, in standard deviations: three for each heading that several observations share.
+struct Numbers {
+    places: Vec<Option<usize>>,
+    value: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+impl Numbers {
+    /// Their likeliest values by `observations`, together with those parameters that have columns in `design`. `forward` is the sensor's matrix, raw/SI,
+    /// and `extra` the variances of each axis beyond the noise, raw units squared.
+    fn of(
+        observations: &[Observation],
+        design: &DMatrix<f64>,
+        forward: &Matrix3<f64>,
+        extra: &[f64; 3],
+    ) -> Option<Self> {
+        let (places, used) = places(observations);
+        if used == 0 || !observations.iter().any(|o| o.earth.is_unknown()) {
+            return None;
+        }
+        // Without data the numbers are zero, with a variance of one.
+        let mut normal = DMatrix::identity(used, used);
+        let mut with = DVector::zeros(used);
+        for (axis, extra) in extra.iter().enumerate() {
+            let mut variances = DVector::from_fn(observations.len(), |i, _| {
+                observations[i].variance[axis] + extra
+            });
+            let factor = factor_of_all(observations, axis, forward, &places, &mut variances);
+            let floor = (1e-12 * variances.max()).max(f64::MIN_POSITIVE);
+            let weights = variances.map(|v| v.max(floor).sqrt().recip());
+            let weighted = |rows: &DMatrix<f64>| {
+                let mut rows = rows.clone();
+                for (mut row, weight) in rows.row_iter_mut().zip(weights.iter()) {
+                    row *= *weight;
+                }
+                rows
+            };
+            let readings = DMatrix::from_fn(observations.len(), 1, |i, _| {
+                let o = &observations[i];
+                o.raw[axis] - (forward.row(axis) * o.input)[(0, 0)]
+            });
+            // What the parameters explain says nothing about the numbers.
+            let basis = weighted(design).qr().q();
+            let beside = |rows: &DMatrix<f64>| {
+                let rows = weighted(rows);
+                &rows - &basis * basis.tr_mul(&rows)
+            };
+            let (factor, readings) = (beside(&factor), beside(&readings));
+            normal += factor.tr_mul(&factor);
+            with += factor.tr_mul(&readings).column(0);
+        }
+        let cholesky = normal.cholesky()?;
+        Some(Self {
+            places,
+            value: cholesky.solve(&with),
+            covariance: cholesky.inverse(),
+        })
+    }
+
+    /// By heading; zeros for a heading of one observation.
+    fn by_heading(&self) -> Vec<Vector3<f64>> {
+        let of = |place: &Option<usize>| {
+            place.map_or_else(Vector3::zeros, |from| {
+                Vector3::from_fn(|k, _| self.value[from + k])
+            })
+        };
+        self.places.iter().map(of).collect()
+    }
+}
+
+/// As [`factor`], with a column for each number, also if it is zero.
+fn factor_of_all(
+    observations: &[Observation],
+    axis: usize,
+    forward: &Matrix3<f64>,
+    places: &[Option<usize>],
+    variances: &mut DVector<f64>,
+) -> DMatrix<f64> {
+    let used = 3 * places.iter().flatten().count();
+    let mut out = DMatrix::zeros(observations.len(), used);
+    for (i, o) in observations.iter().enumerate() {
+        let row = forward.row(axis) * o.earth.by;
+        match places[o.earth.heading] {
+            Some(from) => out.view_mut((i, from), (1, 3)).copy_from(&row),
+            None => variances[i] += row.norm_squared(),
+        }
+    }
+    out
+}
+
+/// `estimated` with the unknown numbers in `observations`, which it was estimated from.
+pub(super) fn found(mut estimated: Estimated, observations: &[Observation]) -> Estimated {
+    let extra = [0, 1, 2].map(|axis| {
+        let mut scatter = estimated.scatter.iter();
+        let of_axis = scatter.find(|s| s.0 == Observable::Axis(axis));
+        of_axis.map_or(0.0, |s| s.1.extra_variance)
+    });
+    let design = affine(observations);
+    let numbers = Numbers::of(
+        observations,
+        &design,
+        &estimated.triad.forward.matrix,
+        &extra,
+    );
+    estimated.earth = numbers.map_or_else(Vec::new, |n| n.by_heading());
+    estimated
+}
+
+/// `o` with the unknown part of the Earth's rate, given by these numbers, in its known input.
+fn completed(o: &Observation, numbers: &Vector3<f64>) -> Observation {
+    let unknown = o.earth.by * numbers;
+    Observation {
+        input: o.input + unknown,
+        earth: EarthShare {
+            known: o.earth.known + unknown,
+            ..EarthShare::NONE
+        },
+        ..*o
+    }
+}
+
+/// The likeliest unknown numbers for a sensor with this `forward` matrix, raw/SI, and any bias: by heading, in standard deviations.
+pub fn numbers(observations: &[Observation], forward: &Matrix3<f64>) -> Vec<Vector3<f64>> {
+    let bias = DMatrix::from_element(observations.len(), 1, 1.0);
+    let numbers = Numbers::of(observations, &bias, forward, &[0.0; 3]);
+    numbers.map_or_else(Vec::new, |n| n.by_heading())
+}
+
+/// `observations` with the likeliest unknown part of the Earth's rate in their inputs, for a sensor with the matrix of `forward` and any bias.
+pub fn likely(observations: &[Observation], forward: &Matrix3<f64>) -> Vec<Observation> {
+    let numbers = numbers(observations, forward);
+    let own = |o: &Observation| numbers.get(o.earth.heading).copied();
+    let each = observations.iter();
+    each.map(|o| completed(o, &own(o).unwrap_or_else(Vector3::zeros)))
+        .collect()
+}
+
+/// An estimate by `estimator`, which takes independent errors only: the likeliest unknown numbers become part of the inputs, and what remains unknown of
+/// them part of the covariance.
+pub fn apart(
+    observations: &[Observation],
+    estimator: impl Fn(&[Observation]) -> Result<Estimated, Failure>,
+) -> Result<Estimated, Failure> {
+    let forward = rough_forward(observations);
+    let design = affine(observations);
+    let Some(numbers) = Numbers::of(observations, &design, &forward, &[0.0; 3]) else {
+        return estimator(observations);
+    };
+    let at = |value: &DVector<f64>| {
+        let with = |o: &Observation| {
+            let place = numbers.places[o.earth.heading];
+            let own = |k: usize| place.map_or(0.0, |from| value[from + k]);
+            let by = forward * o.earth.by;
+            let alone = f64::from(u8::from(place.is_none()));
+            Observation {
+                variance: o.variance
+                    + Vector3::from_fn(|axis, _| alone * by.row(axis).norm_squared()),
+                ..completed(o, &Vector3::new(own(0), own(1), own(2)))
+            }
+        };
+        let all: Vec<Observation> = observations.iter().map(with).collect();
+        estimator(&all)
+    };
+    let mut estimated = at(&numbers.value)?;
+    let parameters = |e: &Estimated| -> SVector<f64, 12> {
+        vector(&e.triad.inverse.matrix, &e.triad.inverse.offset)
+    };
+    let here = parameters(&estimated);
+    let mut by = DMatrix::zeros(12, numbers.value.len());
+    for k in 0..numbers.value.len() {
+        let mut moved = numbers.value.clone();
+        moved[k] += 1.0;
+        by.set_column(k, &(parameters(&at(&moved)?) - here));
+    }
+    let covariance = &by * &numbers.covariance * by.transpose();
+    let covariance = Covariance::from_fn(|i, j| covariance[(i, j)]);
+    let open = Part {
+        covariance,
+        dof: f64::INFINITY,
+    };
+    let parts = estimated.triad.inverse_parts().into_iter().chain([open]);
+    estimated.triad = Triad::from_inverse(estimated.triad.inverse, parts.collect())
+        .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
+    estimated.earth = numbers.by_heading();
+    Ok(estimated)
+}
