@@ -260,7 +260,7 @@ pub fn on_a_record_player(runs: u64, rate_error: f64) -> Vec<Tally> {
             bench::in_own_frame(bench::gyro(&mut random)),
             bench::accel(&mut random),
         );
-        let mut file = bench::clean(gyro, accel);
+        let file = bench::clean(gyro, accel);
         let sigma = rate_error / 1.96;
         let off = std::array::from_fn(|_| sigma * random.normal());
         let plan = bench::record_player_plan(14, off, seed);

@@ -406,7 +406,7 @@ mod tests {
         // A turn by 0.5 rad/s about x, in files of their own, with stamps in microseconds and no names.
         let at = |k: usize| 0.01 * k as f64;
         let angle = |t: f64| if t < 2.0 { 0.0 } else { 0.5 * (t - 2.0) };
-        let rate = |t: f64| if t < 2.0 { 0.01 } else { 0.51 };
+        let rate = |t: f64| -> f64 { if t < 2.0 { 0.01 } else { 0.51 } };
         let gyro = (0..500).map(|k| vec![1e6 * at(k), rate(at(k)).to_degrees(), 0.1, 0.2]);
         let accel = (0..500).map(|k| {
             let (sin, cos) = angle(at(k)).sin_cos();

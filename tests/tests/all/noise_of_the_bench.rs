@@ -117,7 +117,9 @@ fn means_of_samples_behind_the_filters_of_fangs_parts_scatter_as_the_budget_says
             let variance =
                 rows.iter().map(|r| (of(r) - mean).powi(2)).sum::<f64>() / rows.len() as f64;
             let seconds: Vec<f64> = rows
-                .chunks_exact(RATE_HZ)
+                .as_chunks::<RATE_HZ>()
+                .0
+                .iter()
                 .map(|second| second.iter().map(of).sum::<f64>() / RATE_HZ as f64)
                 .collect();
             let steps = seconds

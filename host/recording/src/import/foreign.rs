@@ -96,7 +96,7 @@ pub(super) struct ForeignFile {
 
 #[derive(Debug)]
 enum Table {
-    Text(TextTable),
+    Text(Box<TextTable>),
     Parquet(ParquetTable),
     Log(Readings),
 }
@@ -147,7 +147,12 @@ impl ForeignFile {
                 Table::Log(all.swap_remove(how.part))
             }
             true => Table::Parquet(ParquetTable::open(path, how.list, &how.filters)?),
-            false => Table::Text(TextTable::open(path, how.list, how.format, &how.filters)?),
+            false => Table::Text(Box::new(TextTable::open(
+                path,
+                how.list,
+                how.format,
+                &how.filters,
+            )?)),
         };
         let roles = match &table {
             Table::Text(table) => table.roles(),

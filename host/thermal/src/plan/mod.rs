@@ -173,7 +173,7 @@ fn check_course(request: &Request) -> Result<()> {
             "one temperature is no ramp".into(),
             "give the temperatures that the chamber turns round at",
         ),
-        course => match course.iter().find(|[c, _]| !(from..=to).contains(&c)) {
+        course => match course.iter().find(|[c, _]| !(from..=to).contains(c)) {
             Some([c, _]) => refuse(
                 "course of the chamber",
                 format!("{c} °C is outside the range of {from} to {to} °C"),

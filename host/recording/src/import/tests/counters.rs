@@ -11,7 +11,7 @@ fn arrived(sent: u64) -> Vec<u64> {
         state = state
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) % 3 != 0
+        !(state >> 33).is_multiple_of(3)
     };
     (1207..1207 + sent).filter(|n| kept(n)).collect()
 }

@@ -172,7 +172,7 @@ mod tests {
             state = state
                 .wrapping_mul(6_364_136_223_846_793_005)
                 .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) % 3 != 0
+            !(state >> 33).is_multiple_of(3)
         };
         let numbers: Vec<u64> = (0..9000).filter(|n| kept(n)).collect();
         from(
