@@ -83,9 +83,10 @@ impl Seen {
             | Warning::CalibrationOfOther(_)
             | Warning::NoisierThanGyros(_) => Self::Unit,
             Warning::Dead(_) => Self::DeadChannel,
-            Warning::EndOfConverter(..) | Warning::RunAtEnd(..) | Warning::CalmEnd(..) => {
-                Self::Rails
-            }
+            Warning::EndOfConverter(..)
+            | Warning::FullScale(..)
+            | Warning::RunAtEnd(..)
+            | Warning::CalmEnd(..) => Self::Rails,
             Warning::Clipped(_)
             | Warning::DwellsNotUsed(_, Fault::Saturated(_), _)
             | Warning::TurnNotUsed(_, _, Some(Fault::Saturated(_))) => Self::Clipping,

@@ -172,6 +172,8 @@ pub enum Warning {
     OffLevel(f64),
     /// Numbers of the calibration's unit and of the recording's.
     OtherUnit(String, String),
+    /// Number of readings at a value that is the full scale of a part, in SI.
+    FullScale(u64, f64),
     /// Names of the calibration's unit and of the recording's.
     OtherDevice(String, String),
     /// Whether the calibration and the recording name no unit.

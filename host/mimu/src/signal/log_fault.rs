@@ -20,6 +20,9 @@ const FEWEST: usize = 3;
 /// Largest difference between two levels of a gyro at rest, as a share of the range of the accelerometer's levels.
 const SAME_LEVEL: f64 = 0.03;
 
+/// One segment in so many of the shorter part may be on the wrong side of a change of columns.
+const MOST_WRONG: usize = 4;
+
 /// What changed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Change {
@@ -179,18 +182,26 @@ fn columns(still: &[Still], condensed: &Condensed) -> Option<([usize; 2], Change
         let s = &still[k];
         gyro.clone().any(|c| !same(s.mean[c], at_rest[c]))
     };
-    // Before the change hardly a segment departs, and from it on nearly all do: even turns are few, and so are poses in which the exchanged
-    // column happens to read the level of before.
+    // Before the change hardly a segment departs, and from it on most do: even turns are few, and so are poses in which the exchanged column
+    // happens to read the level of before. The change is where fewest segments are on the wrong side.
     let departing: Vec<bool> = (0..still.len()).map(departs).collect();
-    let count = |part: &Range<usize>| departing[part.clone()].iter().filter(|d| **d).count();
-    let parts = |first: usize| (0..first, first..still.len());
-    let first = (FEWEST..=still.len() - FEWEST).find(|first| {
-        let (before, after) = parts(*first);
-        departing[*first]
-            && 10 * count(&before) <= before.len()
-            && 10 * count(&after) >= 9 * after.len()
-    })?;
-    let (before, after) = parts(first);
+    let mut wrong = departing.iter().filter(|departs| !**departs).count();
+    let mut best: Option<(usize, usize)> = None;
+    for (first, departs) in departing.iter().enumerate() {
+        let between = (FEWEST..=still.len() - FEWEST).contains(&first);
+        if between && *departs && best.is_none_or(|(fewest, _)| wrong < fewest) {
+            best = Some((wrong, first));
+        }
+        match departs {
+            true => wrong += 1,
+            false => wrong -= 1,
+        }
+    }
+    let (wrong, first) = best?;
+    let (before, after) = (0..first, first..still.len());
+    if MOST_WRONG * wrong > before.len().min(after.len()) {
+        return None;
+    }
     let constant = |part: &Range<usize>, c: usize| span(part.clone(), c) <= SAME_LEVEL * widest;
     let constants = |part: &Range<usize>| (0..6).filter(|c| constant(part, *c)).collect::<Vec<_>>();
     if constants(&before) != gyro.collect::<Vec<_>>() {

@@ -4,7 +4,7 @@ use crate::quantity::{significant, unsigned_zero};
 use crate::signal::blocks::{Condensed, Moments, Rails, extent, quantile};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, RAW_COLUMNS};
+use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 
 /// Natural logarithm of the odds against a run of equal samples by chance in the whole recording.
 const RUN_LOG_ODDS: f64 = 14.0;
@@ -99,6 +99,45 @@ fn full_scale_log_odds(value: f64, step: Option<f64>) -> f64 {
     }
 }
 
+/// Full scales of gyros, deg/s, and of accelerometers, g, by data sheets.
+const FULL_SCALES_DPS: [f64; 13] = [
+    62.5, 75.0, 125.0, 150.0, 245.0, 250.0, 300.0, 450.0, 500.0, 1000.0, 2000.0, 2400.0, 4000.0,
+];
+const FULL_SCALES_G: [f64; 12] = [
+    1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0,
+];
+/// What drivers multiply g by, m/s².
+const GRAVITIES: [f64; 4] = [9.806_65, 9.80, 9.81, 9.807];
+/// Largest relative difference from a full scale: drivers and imports round their factors to six digits.
+const FULL_SCALE_SHARE: f64 = 3e-6;
+
+/// Whether a reading in SI is the full scale of a part. Readings in SI have no codes, but a motion seldom ends at exactly 250 deg/s.
+fn is_full_scale(value: f64, c: usize) -> bool {
+    let is = |full: f64| (value.abs() / full - 1.0).abs() < FULL_SCALE_SHARE;
+    match c < 3 {
+        true => FULL_SCALES_DPS.iter().any(|dps| is(dps.to_radians())),
+        false => GRAVITIES
+            .iter()
+            .any(|gravity| FULL_SCALES_G.iter().any(|g| is(g * gravity))),
+    }
+}
+
+/// Natural logarithm of the odds against readings in SI whose extreme `value` is a full scale by chance. Each axis of the sensor with the same extreme
+/// is evidence: before its first sample a part may read its full scale on all of them.
+fn si_log_odds(condensed: &Condensed, c: usize, value: f64) -> f64 {
+    if !is_full_scale(value, c) {
+        return 0.0;
+    }
+    let same = |o: &usize| {
+        let known = condensed.blocks.iter().map(|b| &b.raw[*o]);
+        let [low, high] = extent(known.filter(|m| m.n > 0).flat_map(|m| [m.min, m.max]));
+        let near = |end: f64| (end.abs() / value.abs() - 1.0).abs() < FULL_SCALE_SHARE;
+        near(low) || near(high)
+    };
+    let axes = (c / 3 * 3..c / 3 * 3 + 3).filter(|o| condensed.has_raw[*o]);
+    FULL_SCALE_LOG_ODDS * axes.filter(same).count() as f64
+}
+
 /// How often the extreme `value` occurs: in all, and in a row.
 fn count(moments: impl Iterator<Item = Moments>, value: f64) -> (u64, f64) {
     // Blocks are short: a run continues through blocks that contain only its value.
@@ -123,12 +162,27 @@ fn count(moments: impl Iterator<Item = Moments>, value: f64) -> (u64, f64) {
 }
 
 /// The warning that the extreme `value` of channel `c` is a rail of the converter, if it is one.
-fn converter_rail(condensed: &Condensed, c: usize, value: f64, high: bool) -> Option<Warning> {
+fn converter_rail(
+    condensed: &Condensed,
+    in_si: bool,
+    c: usize,
+    value: f64,
+    high: bool,
+) -> Option<Warning> {
     let moments = condensed.blocks.iter().map(|b| b.raw[c]);
     let (all, longest) = count(moments.filter(|m| m.n > 0), value);
-    let full_scale = full_scale_log_odds(value, condensed.quantisation_step[c]);
-    if full_scale > RUN_LOG_ODDS {
+    let of_codes = full_scale_log_odds(value, condensed.quantisation_step[c]);
+    let of_si = if in_si {
+        si_log_odds(condensed, c, value)
+    } else {
+        0.0
+    };
+    let full_scale = of_codes.max(of_si);
+    if of_codes > RUN_LOG_ODDS {
         return Some(Warning::EndOfConverter(all, value).of_channel(c));
+    }
+    if of_si > RUN_LOG_ODDS || of_si > 0.0 && longest > 1.0 {
+        return Some(Warning::FullScale(all, value).of_channel(c));
     }
     // Only runs at the extreme are tested, so the length of the recording does not matter.
     let chance = 1.0 + (RUN_LOG_ODDS - full_scale) / -share_of_repeats(condensed, c)?.ln();
@@ -144,6 +198,7 @@ pub(crate) fn find(
     warnings: &mut Vec<Warning>,
 ) -> [Rails; 6] {
     let mut rails = [Rails::default(); 6];
+    let in_si = manifest.raw_unit == RawUnit::Si;
     for (c, rail) in rails.iter_mut().enumerate() {
         if !condensed.has_raw[c] {
             continue;
@@ -166,7 +221,7 @@ pub(crate) fn find(
         }
         let ends = [(high, true, &mut rail.high), (low, false, &mut rail.low)];
         for (value, is_high, end) in ends {
-            if let Some(remark) = converter_rail(condensed, c, value, is_high) {
+            if let Some(remark) = converter_rail(condensed, in_si, c, value, is_high) {
                 warnings.push(remark);
                 *end = Some(value);
             } else if let Some(inner) =

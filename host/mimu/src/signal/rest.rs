@@ -38,6 +38,10 @@ fn usual(deviations: &[f64], condensed: &Condensed, c: usize) -> f64 {
         .max(rounding)
 }
 
+/// If the thermometer differs by more than this, K, between an end and the middle of a dwell, temperature explains other readings at the end. The
+/// rests of a session by hand differ by tenths of this.
+const WARMS_K: f64 = 0.5;
+
 /// Largest number of blocks that are tested at an end, and half the number that they are compared with: twenty seconds, because a dwell of
 /// an hour drifts.
 const LONGEST_END: usize = 200;
@@ -53,6 +57,18 @@ fn middles(range: &Range<usize>) -> Option<[Range<usize>; 2]> {
             range.end - quarter - half..range.end - quarter,
         ]
     })
+}
+
+/// Whether the temperature of blocks `end` differs from that of the middle of their dwell. Without a thermometer nothing is known of it.
+fn warms(condensed: &Condensed, end: Range<usize>, middle: &Range<usize>) -> bool {
+    let mean_c = |blocks: Range<usize>| {
+        let all = condensed.blocks[blocks].iter().map(|b| b.temp_c.mean);
+        let (sum, n) = all
+            .filter(|c| c.is_finite())
+            .fold((0.0, 0.0), |(sum, n), c| (sum + c, n + 1.0));
+        sum / n
+    };
+    (mean_c(end) - mean_c(middle.clone())).abs() > WARMS_K
 }
 
 /// Means of the groups of `middle`, minus the mean of all of it.
@@ -104,8 +120,15 @@ pub(crate) fn walk_in(
             let last = (outer..=range.end - 1)
                 .rev()
                 .find(|i| !off(i + 1 - GROUP, at_last));
+            let cut = |blocks: usize, end: Range<usize>, middle: &Range<usize>| match blocks {
+                0 => 0,
+                _ if warms(condensed, end, middle) => 0,
+                blocks => blocks,
+            };
             let begins = first.unwrap_or(inner) - range.start;
             let stops = range.end - last.map_or(outer, |i| i + 1);
+            let begins = cut(begins, range.start..range.start + GROUP, &middles[0]);
+            let stops = cut(stops, range.end - GROUP..range.end, &middles[1]);
             ends[k] = [ends[k][0].max(begins), ends[k][1].max(stops)];
         }
     }

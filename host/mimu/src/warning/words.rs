@@ -63,7 +63,7 @@ impl fmt::Display for Warning {
             Self::Empty(count, channel) => write!(f, "{} of {channel} empty or not a number: masked", plural(*count, "sample")),
             Self::Held(sensor, held, rate_hz) => f.write_str(&held.words(sensor.name(), *rate_hz)),
             Self::LogFault(fault) => write!(f, "from data row {} on {}: no calibration holds before and after it", fault.row + 1, fault.change),
-            Self::DwellsCut(count, s) => write!(f, "{} cut at the ends, by {s:.1} s in all: the unit was moving there", plural(*count, "dwell")),
+            Self::DwellsCut(count, s) => write!(f, "{} cut at the ends, by {s:.1} s in all: the readings change there, as while the unit moves", plural(*count, "dwell")),
             Self::SlowTurns(steps) => write!(f, "{} ({}) used as a pose only, not as a rest of the gyro: neither its bias in the other dwells nor g-sensitivity explains its reading; the unit probably turned slowly about the vertical", plural(steps.len() as u64, "dwell"), steps.join(", ")),
             Self::DwellsNotUsed(names, fault, sensor) => {
                 let verb = if names.len() == 1 { "is" } else { "are" };
@@ -80,6 +80,7 @@ impl fmt::Display for Warning {
             Self::Clipped(count) => write!(f, "{} within dwells at a rail of the converter: masked", plural(*count, "sample")),
             Self::DwellWithEffect(step, sensor, fault, effect) => write!(f, "dwell {step}: not used for the {sensor}: {fault}, and {effect} cannot be removed without it"),
             Self::EndOfConverter(count, value) => write!(f, "{} at {value}, the end of a 16-bit converter: treated as a rail", plural(*count, "sample")),
+            Self::FullScale(count, value) => write!(f, "{} at {value}, the full scale of a sensor: treated as a rail", plural(*count, "sample")),
             Self::RunAtEnd(high, value, longest, chance) => write!(f, "the {} value {value} occurs {longest} times in a row, and chance explains {chance:.0}: treated as a rail", extreme(*high)),
             Self::CalmEnd(high, from) => write!(f, "at its {} values, from {from} on, the noise vanishes: treated as a rail of the sensor", extreme(*high)),
             Self::NoLatitude => f.write_str("no latitude is given, so the Earth's rate (0.004 deg/s, 15 deg/h) is unknown and in the intervals of the biases: give the latitude"),

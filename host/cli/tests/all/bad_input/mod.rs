@@ -64,6 +64,20 @@ fn what_only_its_owner_can_judge_is_a_warning() {
             &["accel: raw_unit = \"SI\"", "1632 times"],
         ),
         (
+            "the first rows at the full scale of a gyro in SI",
+            by_hand,
+            |s| {
+                s.set("raw_unit", "\"SI\"");
+                scale(s, "accel", 1.0 / 1640.0);
+                scale(s, "gyro", 1.0 / 5000.0);
+                // As an import with a factor of six digits writes 250 deg/s.
+                for column in ["gyro_x", "gyro_y", "gyro_z"] {
+                    s.edit(column, 0..1, |_| 250.0 * 0.0174533);
+                }
+            },
+            &["gyro_y: 1 sample at 4.363325", "full scale"],
+        ),
+        (
             "nothing but poses on the table",
             || on_table_at(&[0.0], &[0, 1, 2]),
             |_| {},
