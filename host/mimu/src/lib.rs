@@ -54,6 +54,7 @@
 //!
 //! `Cargo.toml` needs this crate alone: `mimu = { path = "mimu/host/mimu" }`. Vectors and matrices are those of [`nalgebra`].
 
+pub mod bias_removal;
 pub mod calibration;
 pub mod diagnose;
 pub mod diagnosed;
@@ -63,6 +64,7 @@ mod fault;
 pub mod fit;
 pub mod judge;
 pub mod judgement;
+pub mod log_fault;
 pub mod noise;
 pub mod observable;
 pub mod parameter;

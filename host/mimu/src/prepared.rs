@@ -5,6 +5,7 @@ use std::sync::Arc;
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
+use crate::bias_removal::BiasRemoval;
 use crate::estimate::earth::{Earth, poses};
 use crate::estimate::earth_on_table::EarthOnTable;
 use crate::estimate::turn::{Motion, Rest, Turn};
@@ -12,7 +13,7 @@ use crate::estimate::{EarthShare, Failure, Observation, known_input, magnitude};
 use crate::noise::Noise;
 use crate::noise::noise_file::NoiseFile;
 use crate::quantity::Sensor;
-use crate::signal::bias_removal::{self, BiasRemoval};
+use crate::signal::bias_removal;
 use crate::signal::blocks::Condensed;
 use crate::signal::contrast::{Contrast, contrasts};
 use crate::signal::course::Course;

@@ -10,10 +10,10 @@ use mimu_recording::error::Error;
 use mimu_recording::{Held, NoTemperatures, RAW_COLUMNS};
 use serde::{Serialize, Serializer};
 
+use crate::bias_removal::BiasRemoval;
 use crate::fault::Fault;
+use crate::log_fault::LogFault;
 use crate::quantity::{Sensor, normal_gravity};
-use crate::signal::bias_removal::BiasRemoval;
-use crate::signal::dwell::LogFault;
 
 /// Range of the difference of local gravity from normal gravity at sea level, m/s²: heights of up to 5500 m subtract 0.017, and depths of
 /// 400 m add 0.001. Anomalies of the Earth's field are up to 0.003 either way (0.005 on a few peaks and islands).

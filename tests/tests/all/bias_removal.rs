@@ -2,13 +2,13 @@
 //!
 //! The firmware is written here, sample by sample, as a driver would: it acts on the counts that the bench's converter puts out.
 
+use mimu::bias_removal::BiasRemoval;
 use mimu::calibration::{Calibration, TriadTable};
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::recording_problem::RecordingProblem;
 use mimu::result::fit::FitResult;
-use mimu::signal::bias_removal::BiasRemoval;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::{Batch, Manifest, RawUnit, Reference};
 use mimu_rig::located::Source;

@@ -38,7 +38,7 @@ fn biases(range_c: [f64; 2], unit: &str) -> String {
     let [from, to] = range_c;
     let mut text = format!(
         "format = \"mimu-thermal-biases/1\"\ndevice = \"unit\"\ncreated = \"2026-01-02T03:04:05Z\"\ntool = \"test\"\n\
-         range_c = {range_c:?}\n[recording]\nraw_unit = \"{unit}\"\n"
+         range_c = {range_c:?}\n[judgement]\nkind = \"good\"\nreason = \"a test\"\n[recording]\nraw_unit = \"{unit}\"\n"
     );
     for k in 0..5 {
         let temp_c = from + (to - from) * f64::from(k) / 4.0;

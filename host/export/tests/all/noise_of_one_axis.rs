@@ -20,7 +20,7 @@ fn coefficient(value: f64, unit: &str) -> Option<FileCoefficient> {
 fn channel(k: usize) -> NoiseChannel {
     let (sensor, unit) = match k / 3 {
         0 => ("gyro", "rad/s"),
-        _ => ("accel", "m/s²"),
+        _ => ("accel", "m/s^2"),
     };
     let worse = 1.0 + (k % 3) as f64;
     NoiseChannel {

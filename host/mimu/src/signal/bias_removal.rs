@@ -4,44 +4,14 @@
 //! contain the bias of the sensor, so a calibration cannot give it. A high-pass also removes a share of every turn, as a scale factor
 //! that is too small would; its inverse is known, and is applied before the dwells are sought.
 
-pub mod high_pass;
-pub mod zeroed;
+mod high_pass;
+mod zeroed;
 
 use std::ops::Range;
 
-use crate::quantity::{Sensor, plus_minus, significant};
+use crate::bias_removal::{BiasRemoval, HighPass, Zeroed};
+use crate::quantity::Sensor;
 use crate::signal::blocks::{Block, Condensed, quantile};
-use high_pass::HighPass;
-use zeroed::Zeroed;
-
-/// What the firmware did to the gyro.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum BiasRemoval {
-    /// A first-order high-pass filter.
-    HighPass(HighPass),
-    /// The bias is learnt at rest and subtracted.
-    Zeroed(Zeroed),
-}
-
-impl std::fmt::Display for BiasRemoval {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match self {
-            Self::HighPass(filter) => write!(
-                f,
-                "the firmware has a high-pass filter with a time constant of {} s; its share of the turns is restored",
-                plus_minus(filter.time_constant_s, filter.half_width_s)
-            ),
-            Self::Zeroed(zeroed) => {
-                let [x, y, z] = zeroed.bias.map(significant);
-                write!(
-                    f,
-                    "the firmware learns the bias at rest and subtracts it: the rest from {:.1} s on begins at {x}, {y}, {z} and ends at zero, as all later ones",
-                    zeroed.from_s
-                )
-            }
-        }
-    }
-}
 
 /// Variance of a block at rest, relative to that of the quietest fifth.
 const STILL: f64 = 9.0;

@@ -8,10 +8,10 @@ use std::ops::Range;
 
 pub use crate::fault::Fault;
 use crate::fault::SHORTEST_S;
+pub use crate::log_fault::{Change, LogFault};
 use crate::quantity::{PerSensor, Sensor};
 use crate::signal::blocks::{Condensed, Level, Rails, StepBlocks, pool, quantile};
 use crate::signal::course::{Course, Motion, motion};
-pub use crate::signal::log_fault::{Change, LogFault};
 use crate::signal::rails::{self, longest_run_by_chance};
 use crate::signal::ramp::ramps;
 use crate::signal::rest::{self, Rest};

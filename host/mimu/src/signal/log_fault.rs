@@ -4,13 +4,12 @@
 //! so two magnitudes whose ratio is a power of two are two ranges. And a gyro at rest reads the same in every pose, while an accelerometer
 //! does not: if the columns with a constant level are others from some row on, columns have changed places.
 
-use std::fmt;
 use std::ops::Range;
 
+use crate::log_fault::{Change, LogFault};
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Condensed, pool, quantile};
-use mimu_recording::error::{Argument, Error};
-use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
+use mimu_recording::{Manifest, RawUnit};
 
 /// Ranges of accelerometers double from one to the next: 2, 4, 8, 16 g. Largest deviation of the ratio of two magnitudes at rest from a
 /// power of two, in powers of two: an offset of 0.1 g moves the magnitudes by up to a tenth.
@@ -22,58 +21,6 @@ const SAME_LEVEL: f64 = 0.03;
 
 /// One segment in so many of the shorter part may be on the wrong side of a change of columns.
 const MOST_WRONG: usize = 4;
-
-/// What changed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Change {
-    /// The accelerometer's readings at rest have another magnitude, this many times that before.
-    Range(f64),
-    /// The channel (0..6) reads what another read before.
-    Columns(usize, usize),
-}
-
-impl fmt::Display for Change {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Range(ratio) => write!(
-                f,
-                "the accelerometer reads {ratio} times as much at rest as before, so its range has changed"
-            ),
-            Self::Columns(now, before) => {
-                let [now, before] = [now, before].map(|c| RAW_COLUMNS[c]);
-                write!(
-                    f,
-                    "{now} reads what {before} read before, so the columns have changed places"
-                )
-            }
-        }
-    }
-}
-
-impl LogFault {
-    /// Why a recording with this fault is refused.
-    pub(crate) fn refusal(&self, place: &str) -> Error {
-        let row = self.row + 1;
-        let place = format!("{place}, data row {row}");
-        let problem = format!("from here on {}", self.change);
-        let remedy = format!(
-            "import the rows before it (..{}) or those from it on ({row}..) as a recording",
-            self.row
-        );
-        Error::new(place, problem, remedy).about(Argument::Rows)
-    }
-}
-
-/// A row from which on the readings mean something else.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LogFault {
-    /// First data row after the change, from 0.
-    pub row: u64,
-    /// Block that contains it.
-    pub(crate) block: usize,
-    /// What changed.
-    pub change: Change,
-}
 
 /// A still segment.
 struct Still {

@@ -5,10 +5,11 @@ use std::ops::Range;
 use serde::Serialize;
 
 use crate::fault::SHORTEST_S;
+use crate::log_fault::LogFault;
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Condensed, Level, StepBlocks, extent, quantile};
 use crate::signal::change_point;
-use crate::signal::log_fault::{self, LogFault};
+use crate::signal::log_fault;
 use crate::signal::rate_at_rest::RateAtRest;
 use crate::signal::window::{Window, in_bursts, windows};
 use mimu_recording::error::{Error, Result};

@@ -105,7 +105,10 @@ fn a_clean_recording_gives_the_truth_within_its_intervals_and_no_warning() {
     ] {
         let result = Place::with(&samples).fit(&arguments).json();
         right(&result);
-        assert_eq!(warnings(&result), [""; 0], "{arguments:?}");
+        // The recordings have no latitude, which a fit names wherever gravity is the only reference.
+        let others = |w: &String| !w.contains("latitude");
+        let warnings: Vec<String> = warnings(&result).into_iter().filter(others).collect();
+        assert_eq!(warnings, [""; 0], "{arguments:?}");
     }
 }
 

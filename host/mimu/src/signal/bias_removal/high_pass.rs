@@ -9,6 +9,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::GUARD;
+use crate::bias_removal::HighPass;
 use crate::signal::blocks::{Block, Condensed};
 use crate::triad::half_width_95;
 
@@ -21,17 +22,6 @@ const RATIO: f64 = 5.0;
 const AGREE: f64 = 0.1;
 /// Sigmas at which the decay within the rests has to show.
 const SEEN: f64 = 6.0;
-
-/// The filter of a recording.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HighPass {
-    /// Time constant, s.
-    pub time_constant_s: f64,
-    /// Half-width of its 95 % interval, s.
-    pub half_width_s: f64,
-    /// Restored reading at rest, raw: the unknown constant, which the restored signal does not contain.
-    level: [f64; 3],
-}
 
 /// Integral of the gyro, raw·s: at the end of each block.
 struct Integral {

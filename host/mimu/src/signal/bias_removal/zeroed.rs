@@ -7,6 +7,7 @@
 use std::ops::Range;
 
 use super::{GUARD, mean};
+use crate::bias_removal::Zeroed;
 use crate::signal::blocks::{Block, Moments};
 
 /// Length of the level that a rest begins with, in blocks: firmware needs about a second to know that it is still.
@@ -22,15 +23,6 @@ const ZERO: f64 = 0.1;
 const UNMOVED: f64 = 3.0;
 /// Fewest later rests.
 const FEWEST: usize = 3;
-
-/// The bias that firmware removed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Zeroed {
-    /// Instant from which on the rest reads its level before the bias was learnt, s.
-    pub from_s: f64,
-    /// That level: the bias, raw.
-    pub bias: [f64; 3],
-}
 
 /// Standard deviation of the mean of a block at rest, from successive differences, raw.
 fn noise(blocks: &[Block], rests: &[Range<usize>], c: usize) -> f64 {

@@ -9,6 +9,7 @@ use super::gap::{Gap, Jitter};
 use super::polled::Rounds;
 use super::regular::{Irregular, Regular};
 use super::stamp::{Decimal, Seen, Stamp, Unit};
+use super::stamps::Stamps;
 use crate::error::{Argument, Error, Result};
 
 /// Stamps beyond this many seconds are counted from the first whole second. Otherwise a double loses digits of the intervals between samples.
@@ -60,19 +61,6 @@ pub(in super::super) struct Times {
     /// Whether rows that repeat the one before are left out.
     pub drops_repeats: bool,
     pub summary: TimeSummary,
-}
-
-/// Stamps of a file, relative to the first, in its unit.
-#[derive(Default)]
-pub(in super::super) struct Stamps {
-    pub first: Stamp,
-    pub since_first: Vec<f64>,
-    /// Places in `since_first` of rows that repeat the one before.
-    pub repeats: Vec<usize>,
-    /// Rows with the stamp of the row before, but other values.
-    pub shared: u64,
-    /// How often they wrapped to 0.
-    pub wraps: u64,
 }
 
 /// What is known about the times of a file apart from its stamps.

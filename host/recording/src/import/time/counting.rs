@@ -3,9 +3,9 @@
 //! A packet counter rises by 1 from sample to sample and by more where samples were lost. Taken as milliseconds, a counter with a third of its samples
 //! lost is a plausible clock of 667 Hz, so whole numbers with steps of 1 are examined before their unit is.
 
-use super::clock::Stamps;
 use super::gap::quantile;
 use super::stamp::{Decimal, Seen, Unit};
+use super::stamps::Stamps;
 
 /// Least share of steps of 1. Of random losses this leaves out only those of more than nineteen samples in twenty.
 const SINGLE: f64 = 0.05;

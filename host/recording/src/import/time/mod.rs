@@ -8,6 +8,7 @@ mod grid;
 mod polled;
 mod regular;
 mod stamp;
+mod stamps;
 
 pub use clock::TimeSummary;
 pub use gap::Jitter;
@@ -15,6 +16,7 @@ pub use polled::Rounds;
 pub use stamp::Decimal;
 
 pub(super) use calendar::parse as calendar_time;
-pub(super) use clock::{Clock, Known, Stamps, Times};
+pub(super) use clock::{Clock, Known, Times};
 pub(super) use polled::LONGEST;
 pub(super) use stamp::Stamp;
+pub(super) use stamps::Stamps;
