@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 /// Smallest span of a die's temperature, K, that determines a slope.
 pub const SLOPE_SPAN: f64 = 10.0;
-/// Smallest span, K, that determines curvature.
+/// Over a smaller span, K, noise and drift look like curvature: a plan may not rely on it, and a fit needs evidence of it.
 pub const CURVATURE_SPAN: f64 = 20.0;
 /// Intended spacing of the knots, K: a cubic piece over it follows the curves of sensors, and the penalty smooths the rest.
 const KNOT_SPACING: f64 = 8.0;
@@ -21,17 +21,6 @@ pub enum Shape {
     Cubic,
     /// Cubic B-splines whose curvature is penalised.
     Spline,
-}
-
-impl Shape {
-    /// The richest shape that a span of `kelvin` allows.
-    pub fn allowed(kelvin: f64) -> Self {
-        match kelvin {
-            k if k < SLOPE_SPAN => Self::Constant,
-            k if k < CURVATURE_SPAN => Self::Line,
-            _ => Self::Spline,
-        }
-    }
 }
 
 /// Functions of a die's temperature that a curve is a sum of. Outside the range the curve continues along its slope.

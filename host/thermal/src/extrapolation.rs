@@ -22,15 +22,7 @@ pub fn compare(sessions: &[Session], lag_s: Option<f64>) -> Option<[f64; 2]> {
     }
     let miss = |shape| {
         let joint = estimate(&first, Choice { shape, lag_s }).ok()?;
-        let own = joint.recorded();
-        let same = own.map(|c| {
-            c.problem()
-                .basis(crate::regression::CurveKind::Bias)
-                .shape()
-        });
-        // If the span is too short for curvature, both fits are lines.
-        let rich = shape == Shape::Line || same.into_iter().all(|s| s == shape);
-        rich.then(|| last_third(sessions, &joint, &split)).flatten()
+        last_third(sessions, &joint, &split)
     };
     Some([miss(Shape::Line)?, miss(Shape::Spline)?])
 }

@@ -31,7 +31,7 @@ const START_OFFSET_K: f64 = 0.2;
 /// How the curves are estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Choice {
-    /// Richest shape of the curves; the span may allow less.
+    /// Shape of the curves.
     pub shape: Shape,
     /// A lag that is given, s; none to estimate it.
     pub lag_s: Option<f64>,
@@ -107,15 +107,7 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
     spans.check(sessions, &mut warnings)?;
     let range = spans.range();
     let span = range[1] - range[0];
-    let shape = match (choice.shape, Shape::allowed(span)) {
-        (_, Shape::Constant) | (Shape::Constant, _) => Shape::Constant,
-        (_, Shape::Line) | (Shape::Line, _) => Shape::Line,
-        (other, _) => other,
-    };
-    if shape != choice.shape {
-        warnings.push(Warning::StraightLines(span));
-    }
-    let evaluator = |sensor| Evaluator::new(sessions, sensor, shape);
+    let evaluator = |sensor| Evaluator::new(sessions, sensor, choice.shape);
     let mut triads = [evaluator(Sensor::Gyro)?, evaluator(Sensor::Accel)?];
     // A bias that jumps while the temperature moves looks like a lag of minutes: then the accelerometer alone determines the lag.
     let jumps = sessions.iter().any(|s| !s.bias_jumps.is_empty());

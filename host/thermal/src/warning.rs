@@ -25,8 +25,8 @@ pub enum Warning {
     Coverage(Sensor, Used),
     /// Temperatures that no recording crosses, °C.
     NotCrossed([f64; 2]),
-    /// Span of temperatures, K, that is too small for curvature.
-    StraightLines(f64),
+    /// Span of temperatures, K, over which the data do not show curvature, and the error of held-out dwells by curves over that by straight lines.
+    StraightLines(f64, Option<f64>),
     /// Error of curves in the last third of the recordings, relative to that of straight lines.
     CurvatureRefused(f64),
     /// The noise of the unit at rest is not known.
@@ -84,11 +84,20 @@ impl fmt::Display for Warning {
                 f,
                 "no recording crosses {low:.1} to {high:.1} °C: there the curves connect biases of different power-ons, and the intervals do not include their repeatability"
             ),
-            Self::StraightLines(span) => write!(
-                f,
-                "the recordings span {} K: curves are straight lines, because curvature needs 20 K",
-                significant(*span)
-            ),
+            Self::StraightLines(span, share) => {
+                let shows = match share {
+                    Some(share) => format!(
+                        "the held-out error of curves is {} times that of lines, and over less than 20 K drift looks like curvature",
+                        significant(*share)
+                    ),
+                    None => "nothing shows curvature over less than 20 K".into(),
+                };
+                write!(
+                    f,
+                    "the recordings span {} K: curves are straight lines, because {shows}",
+                    significant(*span)
+                )
+            }
             Self::CurvatureRefused(times) => write!(
                 f,
                 "curvature refused: fitted to the first two thirds, curves miss the last third by {} times as much as straight lines do. If the temperature goes one way only, a drift in time cannot be distinguished from curvature",

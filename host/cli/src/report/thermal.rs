@@ -19,7 +19,7 @@ pub(super) const SHOWN: usize = 5;
 pub(super) const VERDICT_ONE_WAY: &str = "the temperature goes one way only: lag and slope cannot be distinguished, and the intervals allow for any lag. A whole cycle of heating and cooling distinguishes them.";
 
 /// Description of the verdict `misfit`.
-pub(super) const VERDICT_MISFIT: &str = "the remaining errors far exceed the noise: something other than temperature and lag changes the readings, and the intervals do not include it.";
+pub(super) const VERDICT_MISFIT: &str = "the remaining errors far exceed the noise: something that these curves and the lag do not contain changes the readings, and the intervals do not include it.";
 
 /// Number of temperatures per line in a table of 100 columns.
 const ACROSS: usize = 3;
