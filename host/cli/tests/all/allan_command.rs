@@ -362,7 +362,7 @@ fn a_dead_channel_is_named_and_the_others_are_as_without_it() {
                     );
                     let noise = std::fs::read_to_string(folder.path().join("n.toml")).unwrap();
                     assert_eq!(noise.matches("[[channel]]").count(), 5, "{noise}");
-                    assert!(!noise.contains(name), "{noise}");
+                    assert!(!noise.contains(&format!("name = \"{name}\"")), "{noise}");
                 }
                 false => assert_eq!(channel, &whole["channels"][k]),
             }
