@@ -5,7 +5,7 @@
 //! recording before the planting is the reference of the one after it.
 //!
 //! The true motion comes from the readings by data-sheet sensitivities, the bias of the gyro at rest, and a fit of three sensitivities and three
-//! biases of the accelerometer to the magnitude of gravity ([`own_calibration`]). It shares no code with the calibrations under test.
+//! biases of the accelerometer to the magnitude of gravity (`own_calibration`). It shares no code with the calibrations under test.
 
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::fit::{Fit, Options};

@@ -44,8 +44,10 @@ fn without_a_latitude_the_rate_of_the_earth_is_in_the_intervals_and_named() {
 fn a_good_mems_gyro_on_a_table_is_not_off_by_the_rate_of_the_earth() {
     let (_, errors) = runs(Experiment::Table, true, 4);
     assert_covered(&errors);
-    let rms = errors.iter().map(|e| e[0] * e[0]).sum::<f64>() / errors.len() as f64;
-    assert!(rms.sqrt() < 1.5 * DEG_PER_H, "{errors:?}");
+    // The noise of the dwells leaves 1.5 deg/h. An Earth that is left in the bias adds 5 to 15.
+    let normal = errors.iter().map(|e| (e[0] / e[1]).powi(2)).sum::<f64>() / errors.len() as f64;
+    assert!(normal.sqrt() < 1.5, "{errors:?}");
+    assert!(errors.iter().all(|e| e[1] < 2.0 * DEG_PER_H), "{errors:?}");
 }
 
 #[test]

@@ -45,11 +45,14 @@ fn recorded(result: &ThermalResult) -> String {
 fn summary(result: &ThermalResult) -> String {
     let mut out = recorded(result) + "\n";
     let meaning = match result.verdict {
-        FitVerdict::Fitted => over_noise(result),
-        FitVerdict::OneWay => VERDICT_ONE_WAY.into(),
-        FitVerdict::Misfit => VERDICT_MISFIT.into(),
+        // The judgement says it with the figures.
+        FitVerdict::Fitted => None,
+        FitVerdict::OneWay => Some(VERDICT_ONE_WAY),
+        FitVerdict::Misfit => Some(VERDICT_MISFIT),
     };
-    let _ = writeln!(out, "verdict: {}: {meaning}", result.verdict.name());
+    if let Some(meaning) = meaning {
+        let _ = writeln!(out, "verdict: {}: {meaning}", result.verdict.name());
+    }
     let _ = writeln!(out, "judgement: {}\n", result.judgement);
     errors_text(&mut out, result);
     for (name, sensor) in result.sensors.present() {
@@ -65,22 +68,6 @@ fn summary(result: &ThermalResult) -> String {
     warn_within(&mut out, result.warnings.iter().map(hint::of_thermal), 2);
     out += "next: --page shows all curves, --verify judges them on another recording; --verbose prints more\n";
     out
-}
-
-/// Errors of the sensors relative to the noise.
-fn over_noise(result: &ThermalResult) -> String {
-    let ratio = |s: &SensorResult| Some(s.held_out_rms.or(s.rms)? / s.noise_floor?);
-    let each = result.sensors.present();
-    let known: Vec<String> = each
-        .filter_map(|(name, s)| Some(format!("{} ({name})", significant(ratio(s)?))))
-        .collect();
-    match known.is_empty() {
-        true => "no dwell shows the noise to compare the errors with".into(),
-        false => format!(
-            "the errors are {} times those of noise",
-            known.join(" and ")
-        ),
-    }
 }
 
 /// Errors and lags of both sensors in one table.

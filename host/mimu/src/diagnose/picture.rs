@@ -144,11 +144,17 @@ impl Picture {
             rms: rms(rows, &model.residuals),
             held_out_rms: model.held_out.as_ref().map_or(f64::NAN, |h| rms(rows, h)),
         };
-        let mut steps = vec![step("affine calibration".into(), first)];
+        // The first and the last model have the figures of the decision, which are those of a fit of them.
+        let decided = |adds: String, k: usize| Step {
+            adds,
+            rms: decision.rms[k],
+            held_out_rms: decision.held_out_rms[k],
+        };
+        let mut steps = vec![decided("affine calibration".into(), 0)];
         for n in 1..=kept.len() {
             let adds = kept[n - 1].candidate.id();
             steps.push(match n == kept.len() {
-                true => step(adds, last),
+                true => decided(adds, 1),
                 // The decision is on all effects together. For the table, the first ones are also fitted alone.
                 false => {
                     let tested = search.fit(&kept[..n])?;

@@ -25,6 +25,9 @@ const OUTLIER_COUNT: usize = 6;
 /// A residual below this share of the largest is rounding. Its dwell determines a parameter alone, so nothing contradicts it, and it must not count
 /// in the median: among six dwells three such made "2385361721304 times the median" of the others.
 const EXACT: f64 = 1e-9;
+/// So is one below this share of its noise, which three components have by chance once in 10⁹. Errors that dwells share, as that of the Earth's
+/// rate, pull a dwell that determines a parameter alone by that much from zero.
+const EXACT_BY_NOISE: f64 = 1e-3;
 /// Axes rotated by more than this, degrees, are more than a careless mounting.
 const TURNED_DEG: f64 = 20.0;
 
@@ -172,7 +175,10 @@ fn name(prepared: &Prepared, residual: &Residual) -> String {
 fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let mut sorted = worst_first(fit);
     let rounding = EXACT * sorted.first()?.value.norm();
-    sorted.retain(|r| r.value.norm() > rounding);
+    sorted.retain(|r| {
+        let size = r.value.norm();
+        size > rounding && !(size < EXACT_BY_NOISE * r.floor)
+    });
     if sorted.len() < OUTLIER_COUNT {
         return None;
     }

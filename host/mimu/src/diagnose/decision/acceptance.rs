@@ -10,7 +10,7 @@ use super::{LEVERAGE, SURVIVES, Second, coefficients_of, held_out, rms};
 use crate::diagnose::rejected::{ErrorRms, Reason};
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Chosen, FALSE_LISTED, Search};
-use crate::diagnose::variance::{CommonWalk, Fitted};
+use crate::diagnose::variance::{CommonWalk, Fitted, LikelihoodKind};
 use crate::effects::candidate::CandidateKind;
 use crate::effects::fitted::FittedEffect;
 use crate::fit::Split;
@@ -220,7 +220,7 @@ impl<'a> Acceptance<'a> {
     }
 
     /// Why `one`, which only the second of the `models` has, does not explain more than a bias that wanders at random.
-    pub fn wanders(&self, models: [&[Chosen]; 2], one: &Chosen, with: &Fitted) -> Option<Reason> {
+    pub fn wanders(&self, models: [&[Chosen]; 2], one: &Chosen, start: &Fitted) -> Option<Reason> {
         let jumps = matches!(one.candidate.kind, CandidateKind::Jump { .. });
         if !(jumps || one.candidate.is_slow_bias()) {
             return None;
@@ -229,11 +229,21 @@ impl<'a> Acceptance<'a> {
         let columns = models.map(|m| self.search.model(m));
         let deviances = columns.each_ref().map(|columns| {
             let variance = &self.search.variance;
-            variance.deviance_beside_walk(columns, &walk, &with.components)
+            variance.deviance_beside_walk(columns, &walk, &start.components)
         });
         let [Some(without), Some(with)] = deviances else {
             return None;
         };
+        // A weak drift is no more evident beside a walk than a walk beside the drift. What is as likely without any walk keeps its name: of twelve
+        // units with an accelerometer that drifts a little faster than data sheets say, none had one otherwise.
+        let alone = self.search.variance.fit(
+            &columns[1],
+            &start.components,
+            LikelihoodKind::Likelihood,
+        )?;
+        if alone.deviance <= without {
+            return None;
+        }
         let before = columns[0].ncols();
         let drop = without - with;
         let p = self

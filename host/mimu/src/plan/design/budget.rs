@@ -34,7 +34,7 @@ impl DwellNoise {
     /// such that the floor is reached at 20 s (section 3: white noise within, drift beyond; no number for B is given); K = 0.
     ///
     /// The parts filter their outputs, so samples at 1 kHz repeat each other, and a mean over a dwell averages less than their
-    /// number suggests. N is the density that such samples have at low frequencies ([`filtered_density`]): 0.065 deg/s/√Hz and
+    /// number suggests. N is the density that such samples have at low frequencies (`filtered_density`): 0.065 deg/s/√Hz and
     /// 0.29 mg/√Hz. Independent samples with these variances would have 0.023 and 0.23. The data sheets give 0.1 deg/s/√Hz
     /// and 0.35 mg/√Hz one-sided, which are an N of 0.071 and 0.25.
     ///
