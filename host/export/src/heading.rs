@@ -114,7 +114,7 @@ fn after_judgements(export: &Export) -> Vec<String> {
             &export.calibration_errors,
         ),
         (
-            "Errors that remain when a program uses this file, beside those:",
+            "What this format adds to those errors:",
             &export.remaining,
         ),
     ] {

@@ -21,7 +21,7 @@ struct CalibrationJson<'a> {
     calibration: &'a Calibration,
     /// Errors of the calibration itself.
     calibration_errors: Vec<Remaining>,
-    /// Errors that remain beside those, as far as they are known.
+    /// What the format adds to those errors, as far as it is known.
     remaining: Vec<Remaining>,
 }
 

