@@ -55,7 +55,8 @@ pub struct Stratum {
     pub known: DMatrix<f64>,
     /// Part of each row's variance that comes from errors of the reference, which are among [`Self::open`]; `None` if there is none.
     pub by_reference: Option<DVector<f64>>,
-    /// Part of each row's known variance that comes from the unknown rate of the Earth, whose likeliest value is not in the rows; `None` if there is none.
+    /// Part of the diagonal of [`Self::known`] that comes from the unknown rate of the Earth, whose likeliest value is not in the rows; `None` if there is
+    /// none.
     pub by_earth: Option<DVector<f64>>,
     /// Factor of the covariance by errors that all rows share, unit of the rows: this times its transpose is added to the known covariance. They are
     /// the errors of the forces that judge turns, and of a given matrix. `None` if there are none, or if they are negligible.
@@ -111,6 +112,24 @@ pub struct Session<'a> {
     pub accel: Option<Affine<f64>>,
     /// Errors of its forces, if these judge the gyro.
     pub forces: Option<&'a ForceErrors>,
+}
+
+/// Most columns of errors that rows share. The cost of a likelihood grows with the square of their number. Without a limit, 1000 dwells by hand, in 300
+/// poses of two or three that share the Earth's rate, took a dense factor of all dwells, and a diagnosis of minutes.
+const SHARED: usize = 48;
+
+/// The largest columns of the `factor` of a covariance that several rows share; the others are added to the variances of rows `alone`. `None` if there
+/// are none.
+fn shared_by_several(factor: &DMatrix<f64>, alone: &mut DVector<f64>) -> Option<DMatrix<f64>> {
+    let count = |k: usize| factor.column(k).iter().filter(|v| **v != 0.0).count();
+    let size = |k: usize| factor.column(k).norm_squared();
+    let mut several: Vec<usize> = (0..factor.ncols()).filter(|k| count(*k) > 1).collect();
+    several.sort_by(|a, b| size(*b).total_cmp(&size(*a)));
+    several.truncate(SHARED);
+    for k in (0..factor.ncols()).filter(|k| !several.contains(k)) {
+        *alone += factor.column(k).map(|v| v * v);
+    }
+    (!several.is_empty()).then(|| factor.select_columns(&several))
 }
 
 /// Variances of the rows of a covariance with this factor.

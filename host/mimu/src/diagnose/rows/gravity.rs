@@ -6,7 +6,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SVector, Vector3};
 
 use super::build::{Builder, Part};
-use super::{ForceErrors, Row, RowFigure, Stratum, row_variances};
+use super::{ForceErrors, Row, RowFigure, Stratum, row_variances, shared_by_several};
 use crate::effects::quantity::Conditions;
 use crate::estimate::Observation;
 use crate::estimate::chains::Chains;
@@ -56,35 +56,6 @@ fn lower_affine(observations: &[Observation]) -> Shapes {
         errors,
         parameters,
         by_matrix,
-    }
-}
-
-/// Most poses whose dwells share an error by the Earth's rate. Those with the most dwells are taken; in the others the errors of the dwells count as
-/// independent. The cost of a likelihood grows with the square of this number. Without a limit, 1000 dwells by hand, in 300 poses of two or three, took
-/// a dense factor of all dwells, and a diagnosis of minutes.
-const SHARING: usize = 48;
-
-/// The level part of the Earth's rate, which dwells in one pose share if the heading is the same.
-struct OfEarth {
-    /// First dwell in the pose of each dwell; `None` if the heading is known, or if a bias absorbs the Earth's rate in the only pose.
-    leaders: Vec<Option<usize>>,
-    /// Those with several dwells.
-    shared: Vec<usize>,
-}
-
-impl OfEarth {
-    /// `poses` are the first dwell in the pose of each; `known` says for a dwell whether the Earth's rate is among the parameters.
-    fn of(poses: &[usize], known: impl Fn(usize) -> bool) -> Self {
-        let in_one_pose = poses.iter().all(|p| *p == 0);
-        let leaders: Vec<Option<usize>> = (poses.iter().enumerate())
-            .map(|(i, leader)| (!in_one_pose && !known(i)).then_some(*leader))
-            .collect();
-        let count = |leader: usize| leaders.iter().filter(|l| **l == Some(leader)).count();
-        let several = (0..poses.len()).map(|i| (count(i), i)).filter(|(n, _)| *n > 1);
-        let mut shared: Vec<(usize, usize)> = several.collect();
-        shared.sort_by_key(|(n, i)| (std::cmp::Reverse(*n), *i));
-        let shared = shared.into_iter().take(SHARING).map(|(_, i)| i).collect();
-        Self { leaders, shared }
     }
 }
 
@@ -289,7 +260,9 @@ impl Builder<'_> {
                 [t.variance(mean_square) + earth; 2]
             })
             .collect();
-        let of_earth = OfEarth::of(&poses, |i| chains.of_rest[i].is_some());
+        // The pose of a dwell whose heading is unknown. In one pose a bias absorbs the Earth's rate.
+        let in_one_pose = poses.iter().all(|p| *p == 0);
+        let of_pose = |i: usize| (!in_one_pose && chains.of_rest[i].is_none()).then_some(poses[i]);
         let mut strata = Vec::new();
         if m > 0 {
             let by_reference = forces.map(|f| f.of_turns(&by_force));
@@ -331,20 +304,14 @@ impl Builder<'_> {
                 _ => 0.0,
             };
             let mut known = DMatrix::from_fn(n, n, noise);
-            for (i, leader) in of_earth.leaders.iter().enumerate() {
-                if let Some(leader) = leader
-                    && !of_earth.shared.contains(leader)
-                {
-                    known[(i, i)] += rest[*leader].rate_variance[axis];
-                }
-            }
-            let open = DMatrix::from_fn(n, of_earth.shared.len(), |i, k| {
-                let leader = of_earth.shared[k];
-                match of_earth.leaders[i] == Some(leader) {
-                    true => rest[leader].rate_variance[axis].sqrt(),
-                    false => 0.0,
-                }
+            // Dwells in one pose share the Earth's level rate if their heading is the same.
+            let of_earth = DMatrix::from_fn(n, n, |i, pose| match of_pose(i) == Some(pose) {
+                true => rest[pose].rate_variance[axis].sqrt(),
+                false => 0.0,
             });
+            let mut alone = DVector::zeros(n);
+            let open = shared_by_several(&of_earth, &mut alone);
+            known += DMatrix::from_diagonal(&alone);
             strata.push(Stratum {
                 name: StratumName(Observable::AtRest(axis), None),
                 axis: Some(axis),
@@ -353,7 +320,7 @@ impl Builder<'_> {
                 known,
                 by_reference: None,
                 by_earth: None,
-                open: Some(open).filter(|open| open.amax() > 0.0),
+                open,
                 random_walk: random_walk.clone(),
                 wander_known: wander.is_some(),
                 within: false,

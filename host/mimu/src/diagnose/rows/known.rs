@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::build::{Builder, Part};
-use super::{Row, RowFigure, Stratum};
+use super::{Row, RowFigure, Stratum, shared_by_several};
 use crate::estimate::{Observation, earth_shared};
 use crate::observable::{Observable, StratumName};
 use crate::quantity::Sensor;
@@ -90,10 +90,15 @@ impl Builder<'_> {
                 (_, Some(w)) => w[axis][(dwells[i], dwells[j])] / s2,
                 _ => 0.0,
             });
-            let by_earth = of_earth(&unknown, axis, &forward.matrix).map(|of_earth| {
-                known += &of_earth / s2;
-                of_earth.diagonal() / s2
-            });
+            let (mut by_earth, mut open) = (None, None);
+            if unknown.iter().any(|o| o.earth.is_unknown()) {
+                let mut alone = DVector::zeros(n);
+                let shared = earth_shared::factor(&unknown, axis, &forward.matrix, &mut alone);
+                open = shared_by_several(&shared, &mut alone).map(|shared| shared / scale[axis]);
+                alone /= s2;
+                known += DMatrix::from_diagonal(&alone);
+                by_earth = Some(alone);
+            }
             strata.push(Stratum {
                 name: StratumName(Observable::Axis(axis), None),
                 axis: Some(axis),
@@ -102,7 +107,7 @@ impl Builder<'_> {
                 known,
                 by_reference: None,
                 by_earth,
-                open: None,
+                open,
                 random_walk: Some(random_walk.clone()),
                 wander_known: wander.is_some(),
                 within: false,
@@ -179,20 +184,6 @@ impl Builder<'_> {
             moving: true,
         });
     }
-}
-
-/// Covariance of the readings of `axis` by the unknown part of the Earth's rate, raw units squared; `None` if there is none.
-fn of_earth(
-    observations: &[Observation],
-    axis: usize,
-    forward: &Matrix3<f64>,
-) -> Option<DMatrix<f64>> {
-    if !observations.iter().any(|o| o.earth.is_unknown()) {
-        return None;
-    }
-    let mut alone = DVector::zeros(observations.len());
-    let shared = earth_shared::factor(observations, axis, forward, &mut alone);
-    Some(DMatrix::from_diagonal(&alone) + &shared * shared.transpose())
 }
 
 /// What the bias and the matrix row of each axis of the forward model, in SI, add to the inverse model: C by rows, then o.
