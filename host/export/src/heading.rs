@@ -113,10 +113,7 @@ fn after_judgements(export: &Export) -> Vec<String> {
             "Errors of the calibration itself, which remain in every program:",
             &export.calibration_errors,
         ),
-        (
-            "What this format adds to those errors:",
-            &export.remaining,
-        ),
+        ("What this format adds to those errors:", &export.remaining),
     ] {
         if !errors.is_empty() {
             lines.push(head.into());

@@ -310,7 +310,9 @@ fn the_error_that_remains_is_that_of_scale_factors_cross_terms_and_lag() {
     let late = |t: f64| accel().bias_si(t)[1] - accel().bias_si(t - 2.0)[1];
     near(figure(1, "lag", "max"), late(60.0));
     let text = std::fs::read_to_string(folder.path().join("out.param")).unwrap();
-    assert!(text.contains("# What this format adds") && text.contains("lag of the dies, at 2 K/min"));
+    assert!(
+        text.contains("# What this format adds") && text.contains("lag of the dies, at 2 K/min")
+    );
 }
 
 #[test]

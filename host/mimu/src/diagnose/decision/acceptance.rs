@@ -236,11 +236,10 @@ impl<'a> Acceptance<'a> {
         };
         // A weak drift is no more evident beside a walk than a walk beside the drift. What is as likely without any walk keeps its name: of twelve
         // units with an accelerometer that drifts a little faster than data sheets say, none had one otherwise.
-        let alone = self.search.variance.fit(
-            &columns[1],
-            &start.components,
-            LikelihoodKind::Likelihood,
-        )?;
+        let alone =
+            self.search
+                .variance
+                .fit(&columns[1], &start.components, LikelihoodKind::Likelihood)?;
         if alone.deviance <= without {
             return None;
         }
