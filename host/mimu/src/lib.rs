@@ -67,6 +67,7 @@ pub mod judgement;
 pub mod log_fault;
 pub mod noise;
 pub mod observable;
+pub mod observation;
 pub mod parameter;
 pub mod plan;
 pub mod pose_means;

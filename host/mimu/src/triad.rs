@@ -158,14 +158,6 @@ pub struct Triad {
     forward_parts: Vec<Part>,
 }
 
-/// Derivatives of `along · (C u + o)` by C (rows first) and o: `along` itself, and its products with the raw reading `u`.
-pub fn slope(along: &Vector3<f64>, u: &Vector3<f64>) -> SVector<f64, 12> {
-    SVector::from_fn(|k, _| match k {
-        0..9 => along[k / 3] * u[k % 3],
-        _ => along[k - 9],
-    })
-}
-
 impl Triad {
     /// Variance, from the error of the inverse model, of a quantity whose derivatives by the twelve parameters are `by`.
     pub fn variance(&self, by: &SVector<f64, 12>) -> f64 {

@@ -6,8 +6,8 @@
 use nalgebra::Vector3;
 
 use crate::estimate::earth;
-use crate::estimate::turn::Rest;
 use crate::estimate::{Observation, magnitude};
+use crate::observation::turn::Rest;
 use crate::prepared::Prepared;
 use crate::quantity::{Sensor, significant};
 use crate::signal::dwell::Fault;

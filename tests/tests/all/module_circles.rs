@@ -8,13 +8,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates, as folders from the root of the repository.
-const CRATES: [&str; 11] = [
+const CRATES: [&str; 13] = [
     "core",
     "firmware",
     "host/recording",
+    "host/allan",
     "host/mimu",
     "host/thermal",
     "host/device",
+    "host/equipment",
     "host/export",
     "host/wizard",
     "host/cli",

@@ -12,12 +12,12 @@ use serde::Serialize;
 use crate::calibration::Calibration;
 use crate::calibration::die_temperature::{at_one_temperature, outside};
 use crate::effects::removal::{removable, remove_within};
-use crate::estimate::turn::{Turn, direction_error};
 use crate::estimate::{Observation, earth_shared};
 use crate::fit::by_rate::variances;
 use crate::fit::refuse_wrong_gravity;
 use crate::fit::uncalibrated::{errors, exceeds};
 use crate::judgement::Judgement;
+use crate::observation::turn::{Turn, TurnError};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::{PerSensor, Sensor, present};
@@ -421,7 +421,7 @@ fn turns(
     let errors = |turns: &[Turn], model: &Affine<f64>| -> Vec<f64> {
         turns
             .iter()
-            .map(|t| direction_error(t, model).norm())
+            .map(|t| TurnError::at(t, model).vector().norm())
             .collect()
     };
     let c2 = gyro.matrix.norm_squared() / 3.0;

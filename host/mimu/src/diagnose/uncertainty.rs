@@ -1,5 +1,6 @@
 //! Uncertainty that the coefficients of effects add to the affine parameters beside them, and to the forces that a gyro is judged by.
 
+use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
 
 use super::decision::Decision;
@@ -10,6 +11,7 @@ use crate::effects;
 use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Quantity;
+use crate::observation::vector;
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Part};
@@ -134,12 +136,8 @@ pub fn of_given_forces(prepared: &Prepared, covariance: &Covariance) -> ForceErr
     let poses = prepared.observations(Sensor::Accel);
     let mut by = DMatrix::zeros(3 * poses.len(), 12);
     for (i, o) in poses.iter().enumerate() {
-        for k in 0..3 {
-            for c in 0..3 {
-                by[(3 * i + k, 3 * k + c)] = o.raw[c];
-            }
-            by[(3 * i + k, 9 + k)] = 1.0;
-        }
+        let error = vector::at(&Affine::identity(), &o.raw, &Vector3::zeros());
+        by.rows_mut(3 * i, 3).copy_from(&error.by);
     }
     // By its eigenvalues: a parameter that is exactly known has none.
     let eigen = covariance.symmetric_eigen();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::turn::{Rest, Turn, across};
+use crate::observation::turn::{Rest, Turn, across};
 
 /// Dwells that turns connect one to the next. Within a chain the heading is known except for one angle. So the Earth's rate across the vertical is
 /// known except for two numbers, which are estimated.

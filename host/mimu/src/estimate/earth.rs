@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::turn::across;
+use crate::observation::turn::across;
 
 /// Rate of the Earth, rad/s (WGS 84).
 pub const RATE: f64 = 7.292_115e-5;

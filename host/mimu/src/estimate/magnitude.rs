@@ -10,9 +10,11 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::least_squares::{Linearized, Observability, Reweighted, minimize};
-use super::turn::Rest;
-use super::{Estimated, Failure, LOWER, Observation};
+use super::{Estimated, Failure, Observation, lower_triangular};
 use crate::observable::Observable;
+use crate::observation::magnitude::Magnitude;
+use crate::observation::turn::Rest;
+use crate::observation::{LOWER, free, from_centre, place, vector};
 use crate::quantity::{AXES, Sensor, plural};
 use crate::triad::{Part, Triad};
 use crate::warning::Warning;
@@ -224,48 +226,36 @@ pub fn estimate(
     // Magnitudes, rests by axes, levels.
     let ends = [n, n + 3 * rests.len()];
     let rows = ends[1] + levels;
-    let unpack = |p: &DVector<f64>| {
-        let mut c = Matrix3::zeros();
-        for (k, place) in LOWER.iter().enumerate() {
-            c[*place] = p[k];
-        }
-        (c, Vector3::new(p[6], p[7], p[8]))
-    };
     // All in units of the largest magnitude, so that parameters and columns are of order one.
     let linearize = |p: &DVector<f64>| {
-        let (c, o) = unpack(p);
+        let model = lower_triangular(p);
         let mut out = Linearized::zeros(rows, parameters);
         for i in 0..n {
-            let f = c * v[i] + o;
-            let up = f / f.norm();
             let level = known.level_of[i];
             let off = if levels > 0 {
                 p[PARAMETERS + level]
             } else {
                 0.0
             };
-            out.residuals[i] = f.norm() - shares[i] * (1.0 + off);
-            for (k, (row, column)) in LOWER.iter().enumerate() {
-                out.jacobian[(i, k)] = up[*row] * v[i][*column];
-            }
-            for k in 0..3 {
-                out.jacobian[(i, 6 + k)] = up[k];
-            }
+            let found = Magnitude::at(&model, &v[i], shares[i] * (1.0 + off));
+            out.residuals[i] = found.residual();
+            let by = free(&found.block.by(0), &LOWER).transpose();
+            out.jacobian
+                .view_mut((i, 0), (1, PARAMETERS))
+                .copy_from(&by);
             if levels > 0 {
                 out.jacobian[(i, PARAMETERS + level)] = -shares[i];
             }
         }
         for (r, u) in resting.iter().enumerate() {
-            let f = c * u + o - rests[r].rate / unit;
+            let block = vector::at(&model, u, &(rests[r].rate / unit));
             for axis in 0..3 {
                 let i = ends[0] + 3 * r + axis;
-                out.residuals[i] = f[axis];
-                for (k, (row, column)) in LOWER.iter().enumerate() {
-                    if *row == axis {
-                        out.jacobian[(i, k)] = u[*column];
-                    }
-                }
-                out.jacobian[(i, 6 + axis)] = 1.0;
+                out.residuals[i] = block.residual[axis];
+                let by = free(&block.by(axis), &LOWER).transpose();
+                out.jacobian
+                    .view_mut((i, 0), (1, PARAMETERS))
+                    .copy_from(&by);
             }
         }
         for l in 0..levels {
@@ -311,7 +301,7 @@ pub fn estimate(
     }
     let first = minimize(start.clone(), alike);
     // If the poses do not determine the angles between the sensors, the fit diverges towards C = 0 and |o| = g, which fits every pose.
-    let Some((mut p, _)) = first.filter(|(p, _)| is_triad(&unpack(p).0)) else {
+    let Some((mut p, _)) = first.filter(|(p, _)| is_triad(&lower_triangular(p).matrix)) else {
         let weak = weak_beside_scatter(&start, alike);
         return Err(weak.map_or_else(lost, |shape| undetermined(&shape, known.sensor)));
     };
@@ -334,15 +324,16 @@ pub fn estimate(
     }
     let covariance = last.covariance()?;
     // Back: x = m (C' (u - centre)/radius + o').
-    let (mut c, mut o) = unpack(&p);
+    let Affine {
+        matrix: mut c,
+        offset: mut o,
+    } = lower_triangular(&p);
     let scale = unit / sphere.radius;
     let mut change = SMatrix::<f64, 12, 9>::zeros();
-    for (k, (row, column)) in LOWER.iter().enumerate() {
-        change[(3 * row + column, k)] = scale;
-        change[(9 + row, k)] = -scale * sphere.centre[*column];
-    }
-    for k in 0..3 {
-        change[(9 + k, 6 + k)] = unit;
+    let about_zero = from_centre(&sphere.centre);
+    for (k, parameter) in LOWER.into_iter().enumerate() {
+        let per_unit = place(parameter).1.map_or(unit, |_| scale);
+        change.set_column(k, &(about_zero.column(parameter) * per_unit));
     }
     // Magnitudes do not show the sign of a row, and flipping rows keeps them: the raw reading decides. The diagonal has to be positive; the start
     // (the unit matrix) makes a negative one all but impossible.
@@ -417,8 +408,9 @@ const SKEWED: f64 = 0.5;
 const USELESS_SIGMA: f64 = 0.05;
 
 fn is_triad(c: &Matrix3<f64>) -> bool {
-    let mut off_diagonal = LOWER.iter().filter(|(i, j)| i != j);
-    off_diagonal.all(|&(i, j)| c[(i, j)].abs() < SKEWED * c[(i, i)].abs())
+    let off_diagonal = [(1, 0), (2, 0), (2, 1)];
+    let mut each = off_diagonal.into_iter();
+    each.all(|(i, j)| c[(i, j)].abs() < SKEWED * c[(i, i)].abs())
 }
 
 /// The parameters that the poses determine, but not better than [`USELESS_SIGMA`] with their own scatter: six faces up to a degree or two. The
@@ -428,7 +420,7 @@ fn weak_beside_scatter(
     evaluate: impl Fn(&DVector<f64>) -> Linearized,
 ) -> Option<Observability> {
     let by_axis: Vec<usize> = (0..PARAMETERS)
-        .filter(|k| LOWER.get(*k).is_none_or(|(i, j)| i == j))
+        .filter(|k| matches!(place(LOWER[*k]), (i, j) if j.is_none_or(|j| i == j)))
         .collect();
     let full = |q: &DVector<f64>| {
         let mut p = start.clone();
@@ -464,18 +456,16 @@ fn weak_beside_scatter(
 }
 
 fn undetermined(shape: &Observability, sensor: Sensor) -> Failure {
-    let name = |k: usize| match LOWER.get(k) {
-        Some((i, j)) => format!("C_{}{}", AXES[*i], AXES[*j]),
-        None => format!("o_{}", AXES[k - 6]),
+    let name = |k: usize| match place(LOWER[k]) {
+        (i, Some(j)) => format!("C_{}{}", AXES[i], AXES[j]),
+        (i, None) => format!("o_{}", AXES[i]),
     };
     let names: Vec<String> = shape.undetermined.iter().map(|(k, _)| name(*k)).collect();
     // Poses are missing along an axis whose scale factor or bias is undetermined.
     let weak: Vec<&str> = (0..3)
         .filter(|a| {
-            shape
-                .undetermined
-                .iter()
-                .any(|(k, _)| *k == 6 + a || LOWER.get(*k) == Some(&(*a, *a)))
+            let of_axis = |k: usize| matches!(place(LOWER[k]), (i, j) if i == *a && j.is_none_or(|j| j == *a));
+            shape.undetermined.iter().any(|(k, _)| of_axis(*k))
         })
         .map(|a| AXES[a])
         .collect();

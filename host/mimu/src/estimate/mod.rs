@@ -1,4 +1,4 @@
-//! Estimators: from dwell means and rotations to a calibrated triad with its covariance.
+//! Estimators: from dwell means and rotations to a calibrated triad with its covariance. Residuals and derivatives are those of [`crate::observation`].
 //!
 //! | module            | reference | what it is                                               |
 //! |-------------------|-----------|----------------------------------------------------------|
@@ -8,7 +8,6 @@
 //! | [`magnitude`]     | gravity, turntable | accelerometer from the magnitude of gravity over many poses; gyro from that of a turntable's rate |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
 //! | [`with_turns`]    | gravity   | accelerometer from magnitudes and turns together         |
-//! | [`turn`]          | gravity   | one turn, and the direction of gravity predicted after it |
 //! | [`chains`]        | gravity   | dwells that turns connect one to the next                 |
 //! | [`earth`]         | gravity   | the Earth's rate in the gyro's readings                   |
 //! | [`earth_on_table`] | table    | the same through the dwells of a table                    |
@@ -26,20 +25,30 @@ pub mod magnitude;
 pub mod moving_input;
 pub mod rotation;
 pub mod six_positions;
-pub mod turn;
 pub mod with_turns;
 
-use nalgebra::Vector3;
+use mimu_core::compensation::Affine;
+use nalgebra::{DVector, Matrix3, Vector3};
 
 use crate::observable::Observable;
+use crate::observation::{LOWER, place};
 use crate::quantity::Sensor;
 use crate::triad::Triad;
 use crate::warning::Warning;
 pub use earth_on_table::EarthShare;
 use least_squares::Scatter;
 
-/// Row and column of the six elements of a lower triangular C, which magnitudes determine.
-pub const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+/// The model with these values of the parameters [`LOWER`].
+fn lower_triangular(p: &DVector<f64>) -> Affine<f64> {
+    let (mut matrix, mut offset) = (Matrix3::zeros(), Vector3::zeros());
+    for (value, parameter) in p.iter().zip(LOWER) {
+        match place(parameter) {
+            (row, Some(column)) => matrix[(row, column)] = *value,
+            (row, None) => offset[row] = *value,
+        }
+    }
+    Affine { matrix, offset }
+}
 
 /// The mean of a dwell. If the input moves within the dwell, also another weighted sum over it, with weights that add to zero.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,9 +10,10 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::chains::Chains;
 use super::least_squares::{Linearized, Observability, Reweighted};
-use super::turn::{Motion, Rest, Rotations, Turn, across, between, by_forces};
 use super::{Estimated, Failure};
 use crate::observable::Observable;
+use crate::observation::turn::{Motion, Rest, Rotations, Turn, TurnError};
+use crate::observation::{ByTriad, from_centre, vector};
 use crate::quantity::AXES;
 use crate::triad::{Covariance, Part, Triad};
 
@@ -88,76 +89,76 @@ pub fn estimate(
     // Parameters of order one: C in units of its own size, o about the reading at rest.
     let unit = first.norm() / 3f64.sqrt();
     let rotations = Rotations::new(turns, &at_rest);
-    let directions: Vec<_> = turns
-        .iter()
-        .map(|t| (t.before.normalize(), t.after.normalize()))
-        .collect();
-    let unpack = |p: &DVector<f64>| {
-        (
-            Matrix3::from_fn(|i, j| unit * p[3 * i + j]),
-            Vector3::new(p[9], p[10], p[11]),
-        )
+    let unpack = |p: &DVector<f64>| Affine {
+        matrix: Matrix3::from_fn(|i, j| unit * p[3 * i + j]),
+        offset: Vector3::new(p[9], p[10], p[11]),
     };
+    let scale = ByTriad::from_fn(|k, _| if k < 9 { unit } else { 1.0 });
     let chains = Chains::of(turns, rest);
     let all = PARAMETERS + 2 * chains.count;
     let (n_turns, n_rest) = (2 * turns.len(), 3 * rest.len());
+    // The turns at some parameters.
+    let errors = |model: &Affine<f64>| -> Vec<TurnError> {
+        let turned = rotations.at(&model.matrix, &model.offset);
+        let each = turns.iter().zip(&turned);
+        each.map(|(turn, turned)| TurnError::of(turn, turned))
+            .collect()
+    };
     // Unweighted residuals and derivatives: rad, then rad/s.
     let linearize = |p: &DVector<f64>| {
-        let (c, o) = unpack(p);
+        let model = unpack(p);
         let mut out = Linearized::zeros(n_turns + n_rest, all);
-        let (r, j) = (&mut out.residuals, &mut out.jacobian);
-        let turned = rotations.at(&c, &o);
-        let level = chains.level(turns, turned.iter().map(|t| t.0));
-        for (t, (after, by)) in turned.iter().enumerate() {
-            let (before, measured) = &directions[t];
-            let error = between(&(after * before), measured);
-            for (k, e) in across(measured).iter().enumerate() {
-                let row = 2 * t + k;
-                r[row] = e.dot(&error);
-                if let (Some(chain), Some(level)) = (chains.of_turn[t], level.get(&turns[t].to)) {
-                    for (l, level) in level.iter().enumerate() {
+        let mut add =
+            |row: usize, residual: f64, by: ByTriad, chain: Option<usize>, level: [f64; 2]| {
+                let mut columns = out.jacobian.row_mut(row);
+                let own = by.component_mul(&scale);
+                columns
+                    .columns_mut(0, PARAMETERS)
+                    .copy_from(&own.transpose());
+                out.residuals[row] = residual;
+                if let Some(chain) = chain {
+                    for (l, by) in level.into_iter().enumerate() {
                         let column = PARAMETERS + 2 * chain + l;
-                        j[(row, column)] = -turns[t].duration_s * e.dot(level);
-                        r[row] += j[(row, column)] * p[column];
+                        columns[column] = by;
+                        out.residuals[row] += by * p[column];
                     }
                 }
-                for (column, by) in by.iter().enumerate() {
-                    let slope = by.transpose() * e;
-                    for i in 0..3 {
-                        if column < 3 {
-                            j[(row, 3 * i + column)] = unit * slope[i];
-                        } else {
-                            j[(row, 9 + i)] = slope[i];
-                        }
-                    }
-                }
+            };
+        let turned = errors(&model);
+        let level = chains.level(turns, turned.iter().map(|t| t.rotation));
+        for (t, error) in turned.iter().enumerate() {
+            let earth = chains.of_turn[t].zip(level.get(&turns[t].to));
+            for k in 0..2 {
+                let by = earth.map(|(_, level)| error.by_level(k, level, turns[t].duration_s));
+                let (residual, chain) = (error.block.residual[k], earth.map(|e| e.0));
+                add(
+                    2 * t + k,
+                    residual,
+                    error.block.by(k),
+                    chain,
+                    by.unwrap_or_default(),
+                );
             }
         }
-        for (s, observation) in rest.iter().enumerate() {
-            let u = observation.raw - at_rest;
-            let rate = c * u + o - observation.rate;
-            for i in 0..3 {
-                let row = n_turns + 3 * s + i;
-                r[row] = rate[i];
-                if let (Some(chain), Some(level)) =
-                    (chains.of_rest[s], level.get(&observation.dwell))
-                {
-                    for (l, level) in level.iter().enumerate() {
-                        let column = PARAMETERS + 2 * chain + l;
-                        j[(row, column)] = -level[i];
-                        r[row] -= level[i] * p[column];
-                    }
-                }
-                for k in 0..3 {
-                    j[(row, 3 * i + k)] = unit * u[k];
-                }
-                j[(row, 9 + i)] = 1.0;
+        for (s, o) in rest.iter().enumerate() {
+            let block = vector::at(&model, &(o.raw - at_rest), &o.rate);
+            let earth = chains.of_rest[s].zip(level.get(&o.dwell));
+            for axis in 0..3 {
+                let by = earth.map(|(_, level)| level.map(|level| -level[axis]));
+                let (residual, chain) = (block.residual[axis], earth.map(|e| e.0));
+                add(
+                    n_turns + 3 * s + axis,
+                    residual,
+                    block.by(axis),
+                    chain,
+                    by.unwrap_or_default(),
+                );
             }
         }
         out
     };
     let known = |p: &DVector<f64>| -> Vec<f64> {
-        let (c, _) = unpack(p);
+        let c = unpack(p).matrix;
         let squared = c.component_mul(&c);
         let mean = squared.sum() / 3.0;
         let turns = turns.iter().zip(&chains.of_turn).flat_map(|(t, chain)| {
@@ -177,19 +178,10 @@ pub fn estimate(
     };
     // Derivatives of the turns' residuals by C and o of the accelerometer.
     let by_accelerometer = |p: &DVector<f64>| {
-        let (c, o) = unpack(p);
         let mut by = DMatrix::zeros(n_turns, 12);
-        for (t, (turn, (after, _))) in turns.iter().zip(rotations.at(&c, &o)).enumerate() {
-            let (_, measured) = &directions[t];
-            for (k, e) in across(measured).iter().enumerate() {
-                for (side, raw) in by_forces(turn, &after, e).into_iter().zip(turn.raw) {
-                    for i in 0..3 {
-                        for j in 0..3 {
-                            by[(2 * t + k, 3 * i + j)] += side[i] * raw[j];
-                        }
-                        by[(2 * t + k, 9 + i)] += side[i];
-                    }
-                }
+        for (t, (turn, error)) in turns.iter().zip(errors(&unpack(p))).enumerate() {
+            for (k, columns) in error.by_accel(&turn.raw).iter().enumerate() {
+                by.row_mut(2 * t + k).copy_from(&columns.transpose());
             }
         }
         by
@@ -256,18 +248,12 @@ pub fn estimate(
             break;
         }
     }
-    let (matrix, at_zero) = unpack(&p);
+    let Affine { matrix, offset } = unpack(&p);
     let inverse = Affine {
         matrix,
-        offset: at_zero - matrix * at_rest,
+        offset: offset - matrix * at_rest,
     };
-    let mut change = SMatrix::<f64, 12, 12>::identity();
-    for i in 0..3 {
-        for k in 0..3 {
-            change[(3 * i + k, 3 * i + k)] = unit;
-            change[(9 + i, 3 * i + k)] = -unit * at_rest[k];
-        }
-    }
+    let change = from_centre(&at_rest) * SMatrix::from_diagonal(&scale);
     let in_unit = |m: &DMatrix<f64>| Covariance::from_fn(|i, j| m[(i, j)]);
     let own = of_groups
         .iter()

@@ -10,12 +10,14 @@
 //! accelerometer this way, so this fit is used only if the magnitude alone does not suffice.
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
+use nalgebra::{DVector, Matrix3, SMatrix, Vector3};
 
 use super::least_squares::{Linearized, Reweighted};
-use super::turn::{Rest, Rotations, Turn, across, between, by_forces};
-use super::{Estimated, Failure, LOWER, Observation};
+use super::{Estimated, Failure, Observation, lower_triangular};
 use crate::observable::Observable;
+use crate::observation::magnitude::Magnitude;
+use crate::observation::turn::{Rest, Rotations, Turn, TurnError};
+use crate::observation::{ByTriad, LOWER, free, place, vector};
 use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
 
@@ -56,75 +58,60 @@ impl JointFit<'_> {
             self.rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / self.rest.len().max(1) as f64;
         let unit = self.gyro.matrix.norm() / 3f64.sqrt();
         let rotations = Rotations::new(self.turns, &at_rest);
-        let unpack = |p: &DVector<f64>| {
-            let mut c = Matrix3::zeros();
-            for (k, place) in LOWER.iter().enumerate() {
-                c[*place] = p[k];
-            }
-            Models {
-                accel: Affine {
-                    matrix: c,
-                    offset: Vector3::new(p[6], p[7], p[8]),
-                },
-                gyro: Affine {
-                    matrix: Matrix3::from_fn(|i, j| unit * p[ACCEL + 3 * i + j]),
-                    offset: Vector3::new(p[18], p[19], p[20]),
-                },
-            }
+        let unpack = |p: &DVector<f64>| Models {
+            accel: lower_triangular(p),
+            gyro: Affine {
+                matrix: Matrix3::from_fn(|i, j| unit * p[ACCEL + 3 * i + j]),
+                offset: Vector3::new(p[18], p[19], p[20]),
+            },
         };
         let order_one = |raw: &Vector3<f64>| self.accel.apply(raw) / g;
         let rows = [self.poses.len(), 2 * self.turns.len(), 3 * self.rest.len()];
         let from = [0, rows[0], rows[0] + rows[1]];
+        let scale = ByTriad::from_fn(|k, _| if k < 9 { unit } else { 1.0 });
         // Residuals without weights: share of gravity, rad, rad/s.
         let linearize = |p: &DVector<f64>| {
             let Models { accel, gyro } = unpack(p);
             let mut out = Linearized::zeros(rows.iter().sum(), ALL);
             let (r, j) = (&mut out.residuals, &mut out.jacobian);
+            let mut by_accel = |row: usize, by: &ByTriad| {
+                let by = free(by, &LOWER).transpose();
+                j.view_mut((row, 0), (1, ACCEL)).copy_from(&by);
+            };
+            let mut own = Vec::with_capacity(rows[1] + rows[2]);
             for (row, o) in self.poses.iter().enumerate() {
-                let v = order_one(&o.raw);
-                let f = accel.apply(&v);
-                let up = f.normalize();
-                r[row] = f.norm() - 1.0;
-                by_accel(j, row, &up, &v);
+                let found = Magnitude::at(&accel, &order_one(&o.raw), 1.0);
+                r[row] = found.residual();
+                by_accel(row, &found.block.by(0));
             }
             let turned = rotations.at(&gyro.matrix, &gyro.offset);
-            for (t, (turn, (after, by))) in self.turns.iter().zip(turned).enumerate() {
-                let v = turn.raw.map(|raw| order_one(&raw));
+            for (t, (turn, turned)) in self.turns.iter().zip(&turned).enumerate() {
+                let raw = turn.raw.map(|raw| order_one(&raw));
+                let [before, after] = raw.map(|raw| accel.apply(&raw));
                 let turn = Turn {
-                    before: accel.apply(&v[0]),
-                    after: accel.apply(&v[1]),
+                    before,
+                    after,
                     ..*turn
                 };
-                let measured = turn.after.normalize();
-                let error = between(&(after * turn.before.normalize()), &measured);
-                for (k, e) in across(&measured).iter().enumerate() {
+                let error = TurnError::of(&turn, turned);
+                for (k, by) in error.by_accel(&raw).iter().enumerate() {
                     let row = from[1] + 2 * t + k;
-                    r[row] = e.dot(&error);
-                    for (side, v) in by_forces(&turn, &after, e).iter().zip(&v) {
-                        by_accel(j, row, side, v);
-                    }
-                    for (column, by) in by.iter().enumerate() {
-                        let slope = by.transpose() * e;
-                        for i in 0..3 {
-                            match column {
-                                0..3 => j[(row, ACCEL + 3 * i + column)] = unit * slope[i],
-                                _ => j[(row, 18 + i)] = slope[i],
-                            }
-                        }
-                    }
+                    r[row] = error.block.residual[k];
+                    by_accel(row, by);
+                    own.push((row, error.block.by(k)));
                 }
             }
             for (s, o) in self.rest.iter().enumerate() {
-                let u = o.raw - at_rest;
-                let rate = gyro.apply(&u) - o.rate;
-                for i in 0..3 {
-                    let row = from[2] + 3 * s + i;
-                    r[row] = rate[i];
-                    for k in 0..3 {
-                        j[(row, ACCEL + 3 * i + k)] = unit * u[k];
-                    }
-                    j[(row, 18 + i)] = 1.0;
+                let block = vector::at(&gyro, &(o.raw - at_rest), &o.rate);
+                for axis in 0..3 {
+                    let row = from[2] + 3 * s + axis;
+                    r[row] = block.residual[axis];
+                    own.push((row, block.by(axis)));
                 }
+            }
+            for (row, by) in own {
+                let by = by.component_mul(&scale).transpose();
+                j.view_mut((row, ACCEL), (1, 12)).copy_from(&by);
             }
             out
         };
@@ -193,14 +180,16 @@ impl JointFit<'_> {
         let condition = (eigen.max() / eigen.min()).sqrt();
         let mut change = SMatrix::<f64, 12, 9>::zeros();
         let Affine { matrix, offset } = self.accel;
-        for (k, (row, column)) in LOWER.iter().enumerate() {
-            for m in 0..3 {
-                change[(3 * row + m, k)] += matrix[(*column, m)];
+        for (k, parameter) in LOWER.into_iter().enumerate() {
+            match place(parameter) {
+                (row, Some(column)) => {
+                    for m in 0..3 {
+                        change[(3 * row + m, k)] += matrix[(column, m)];
+                    }
+                    change[(9 + row, k)] += offset[column];
+                }
+                (row, None) => change[(9 + row, k)] = g,
             }
-            change[(9 + row, k)] += offset[*column];
-        }
-        for k in 0..3 {
-            change[(9 + k, 6 + k)] = g;
         }
         let parts = (0..3).map(|g| {
             let own = found.at.part(&covariance, &groups.rows[g]);
@@ -229,15 +218,5 @@ impl JointFit<'_> {
             earth: Vec::new(),
             notes: vec![Warning::WithTurns],
         })
-    }
-}
-
-/// Adds to `row` of a Jacobian the derivatives of the force component along `side` by C and o of the accelerometer, at the reading `v`.
-fn by_accel(j: &mut DMatrix<f64>, row: usize, side: &Vector3<f64>, v: &Vector3<f64>) {
-    for (k, (i, column)) in LOWER.iter().enumerate() {
-        j[(row, k)] += side[*i] * v[*column];
-    }
-    for i in 0..3 {
-        j[(row, 6 + i)] += side[i];
     }
 }

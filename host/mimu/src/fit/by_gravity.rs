@@ -7,12 +7,14 @@ use super::determined::{faces_not_up, unseen_poses};
 use super::hold_out::{Refits, Split, determined};
 use super::sensor::{Residual, SensorFit, rms, typical};
 use super::{Options, finish, refuse_wrong_gravity, uncalibrated};
-use crate::estimate::turn::{Rest, Turn, direction_error, sensitivity};
 use crate::estimate::with_turns::JointFit;
 use crate::estimate::{Estimated, Failure, Observation, magnitude, rotation};
+use crate::observation::magnitude::Magnitude;
+use crate::observation::turn::{Rest, Turn, TurnError};
+use crate::observation::vector;
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
-use crate::triad::{Triad, slope};
+use crate::triad::Triad;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
@@ -58,7 +60,11 @@ pub(super) fn fit_gravity(
     let parts = options.holdout_blocks.min(poses.len());
     let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
     let size_error = |triad: &Triad, o: &Observation| {
-        Vector3::new(triad.inverse.apply(&o.raw).norm() - g, 0.0, 0.0)
+        Vector3::new(
+            Magnitude::at(&triad.inverse, &o.raw, g).residual(),
+            0.0,
+            0.0,
+        )
     };
     let mut residuals: Vec<Residual> = poses
         .iter()
@@ -77,8 +83,8 @@ pub(super) fn fit_gravity(
         let kept = |dwell: usize| part_of(split, dwell) != part;
         let refit = by_poses.without(&kept, with_turns.as_ref())?;
         let open = poses.iter().filter(|o| of_part(o)).map(|o| {
-            let up = accel.triad.inverse.apply(&o.raw).normalize();
-            refit.triad.variance(&slope(&up, &o.raw))
+            let error = Magnitude::at(&accel.triad.inverse, &o.raw, g);
+            refit.triad.variance(&error.block.by(0))
         });
         determined(open, typical, (Figure::GravityMagnitude, Sensor::Accel))?;
         Ok(refit)
@@ -289,7 +295,7 @@ fn fit_turns(
         .map(|t| Residual {
             dwell: t.to,
             within: false,
-            value: direction_error(t, &gyro.triad.inverse),
+            value: TurnError::at(t, &gyro.triad.inverse).vector(),
             held_out: None,
             floor: prepared.if_noise_known(&Sensor::BOTH, t.floor(mean_square)),
         })
@@ -310,8 +316,11 @@ fn fit_turns(
         let start = Some(&gyro.triad.inverse);
         let refit = rotation::estimate(&kept, &rest, &accel.triad, &[], start, g)?;
         let open = turns.iter().filter(|t| of_part(t.to)).map(|t| {
-            let columns = sensitivity(t, &gyro.triad.inverse).by_parameters(t);
-            columns.iter().map(|by| refit.triad.variance(by)).sum()
+            let block = TurnError::at(t, &gyro.triad.inverse).block;
+            [0, 1]
+                .map(|k| refit.triad.variance(&block.by(k)))
+                .iter()
+                .sum()
         });
         determined(open, typical, (Figure::Direction, Sensor::Gyro))?;
         Ok((refit, accel))
@@ -328,29 +337,24 @@ fn fit_turns(
                 after: force(turn.to),
                 ..*turn
             };
-            direction_error(&turn, &gyro.triad.inverse)
+            TurnError::at(&turn, &gyro.triad.inverse).vector()
         });
     }
     let static_rms = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
         let all: Vec<_> = rest.iter().filter_map(rate).collect();
         (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))
     };
-    let in_sample = static_rms(&|o| Some(gyro.triad.inverse.apply(&o.raw) - o.rate));
-    let at_rest = static_rms(&|o| {
-        let (refit, _) = without(o.dwell)?;
-        Some(refit.triad.inverse.apply(&o.raw) - o.rate)
-    });
-    let wide = turns
-        .iter()
-        .map(|t| direction_error(t, &gyro.triad.inverse).norm())
-        .fold(0.0, f64::max);
+    let at_rest = |gyro: &Triad, o: &Rest| vector::at(&gyro.inverse, &o.raw, &o.rate).residual;
+    let in_sample = static_rms(&|o| Some(at_rest(&gyro.triad, o)));
+    let held_at_rest = static_rms(&|o| Some(at_rest(&without(o.dwell)?.0.triad, o)));
+    let wide = residuals.iter().map(|r| r.value.norm()).fold(0.0, f64::max);
     let mut fit = finish(
         Sensor::Gyro,
         gyro,
         Figure::Direction,
         residuals,
         rest.len(),
-        in_sample.map(|r| (r, at_rest)),
+        in_sample.map(|r| (r, held_at_rest)),
         held.into(),
     );
     fit.uncalibrated_rms = uncalibrated::directions(prepared, &turns);

@@ -10,11 +10,12 @@ use super::hold_out::{Refits, Split, determined};
 use super::sensor::{Residual, SensorFit, rms, typical};
 use super::{Options, finish, uncalibrated};
 use crate::estimate::magnitude::{self, KnownMagnitudes};
-use crate::estimate::turn::Rest;
 use crate::estimate::{Estimated, Failure, Observation};
+use crate::observation::magnitude::Magnitude;
+use crate::observation::turn::Rest;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
-use crate::triad::{Triad, slope};
+use crate::triad::Triad;
 use crate::turntable::RatedDwells;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
@@ -89,7 +90,11 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         .collect();
     dwells.refuse_other_rate(prepared, &fitted)?;
     let error = |triad: &Triad, o: &Observation, rate: f64| {
-        Vector3::new(triad.inverse.apply(&o.raw).norm() - rate, 0.0, 0.0)
+        Vector3::new(
+            Magnitude::at(&triad.inverse, &o.raw, rate).residual(),
+            0.0,
+            0.0,
+        )
     };
     let rated: Vec<(&Observation, f64)> = dwells.turning.iter().zip(dwells.magnitudes()).collect();
     let floors = variances(&inverse, &dwells.turning);
@@ -115,8 +120,8 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
             .filter(|(o, _)| part_of(split, o.dwell) == part);
         let scale = dwells.rate_sigma;
         let open = open.map(|(o, rate)| {
-            let up = inverse.apply(&o.raw).normalize();
-            (refit.triad.variance(&slope(&up, &o.raw)) - (scale * rate).powi(2)).max(0.0)
+            let by = Magnitude::at(&inverse, &o.raw, *rate).block.by(0);
+            (refit.triad.variance(&by) - (scale * rate).powi(2)).max(0.0)
         });
         determined(open, typical, (Figure::RateMagnitude, Sensor::Gyro))?;
         Ok(refit)

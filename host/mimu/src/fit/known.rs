@@ -6,9 +6,9 @@ use super::hold_out::{Refits, Split, determined};
 use super::sensor::{Residual, SensorFit, typical};
 use super::{Method, Options, finish, lever_arm, refuse_wrong_gravity, uncalibrated};
 use crate::estimate::{Observation, earth_shared, known_input, moving_input, six_positions};
+use crate::observation::slope;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
-use crate::triad::slope;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 

@@ -7,11 +7,13 @@
 mod deletion;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3x2, Vector3};
 
 use super::by_gravity::POOR_POSES;
-use crate::estimate::turn::{Turn, sensitivity};
-use crate::estimate::{Estimated, LOWER, Observation, magnitude, rotation};
+use crate::estimate::{Estimated, Observation, magnitude, rotation};
+use crate::observation::magnitude::Magnitude;
+use crate::observation::turn::{Turn, TurnError};
+use crate::observation::{LOWER, free, vector};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{AXES, Sensor};
 use crate::signal::blocks::quantile;
@@ -129,18 +131,15 @@ fn fit_poses(prepared: &Prepared, poses: &[Observation]) -> Option<Estimated> {
 fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {
     let g = prepared.manifest.gravity_mps2;
     let variances = prepared.magnitude_variances(accel, poses);
-    let up: Vec<Vector3<f64>> = poses.iter().map(|o| accel.apply(&o.raw)).collect();
-    let rows = poses.iter().enumerate().map(|(k, o)| {
-        let direction = up[k].normalize();
-        // Derivatives by the lower triangle of C, which magnitudes determine, and by o.
-        let slope = |j: usize| match LOWER.get(j) {
-            Some((row, column)) => direction[*row] * o.raw[*column],
-            None => direction[j - 6],
-        };
+    let each = poses.iter().map(|o| Magnitude::at(accel, &o.raw, g));
+    let errors: Vec<Magnitude> = each.collect();
+    let rows = errors.iter().zip(variances).map(|(error, variance)| {
+        let mut by = DMatrix::zeros(3, LOWER.len());
+        by.set_row(0, &free(&error.block.by(0), &LOWER).transpose());
         Row {
-            error: Vector3::new(up[k].norm() - g, 0.0, 0.0),
-            by: DMatrix::from_fn(3, 9, |i, j| if i == 0 { slope(j) } else { 0.0 }),
-            variance: variances[k].max((1e-9 * g).powi(2)),
+            error: Vector3::new(error.residual(), 0.0, 0.0),
+            by,
+            variance: variance.max((1e-9 * g).powi(2)),
         }
     });
     let rows: Vec<Row> = rows.collect();
@@ -150,7 +149,7 @@ fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64
     // An effect that the model lacks shows in every pose near an axis, whichever end is up.
     let has_witness = |k: usize| {
         (0..poses.len()).any(|o| {
-            let cosine = up[o].normalize().dot(&up[k].normalize()).abs();
+            let cosine = errors[o].up.dot(&errors[k].up).abs();
             o != k && cosine > NEAR && found[o].1 > WITNESS
         })
     };
@@ -182,30 +181,28 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
     let Ok(gyro) = rotation::estimate(&turns, &rest, &accel.triad, &motions, None, g) else {
         return out;
     };
-    let Affine { matrix, offset } = gyro.triad.inverse;
+    let matrix = gyro.triad.inverse.matrix;
     let mean_square = matrix.norm_squared() / 3.0;
     let turned = |turn: &Turn| {
-        let found = sensitivity(turn, &gyro.triad.inverse);
-        let ([a, b], [by_a, by_b]) = (found.sides, found.by_parameters(turn));
+        let error = TurnError::at(turn, &gyro.triad.inverse);
+        let sides = Matrix3x2::from_columns(&error.sides);
+        let by = sides * error.block.by;
         Row {
-            error: a * found.error[0] + b * found.error[1],
-            by: DMatrix::from_fn(3, 12, |i, j| a[i] * by_a[j] + b[i] * by_b[j]),
+            error: error.vector(),
+            by: DMatrix::from_column_slice(3, 12, by.as_slice()),
             variance: (turn.variance(mean_square) + turn.earth_variance).max(1e-18),
         }
     };
     let mut rows: Vec<Row> = turns.iter().map(turned).collect();
-    rows.extend(
-        rest.iter().map(|o| Row {
-            error: matrix * o.raw + offset - o.rate,
-            by: DMatrix::from_fn(3, 12, |i, j| match j {
-                0..9 if j / 3 == i => o.raw[j % 3],
-                9.. if j - 9 == i => 1.0,
-                _ => 0.0,
-            }),
-            variance: ((si_covariance(&matrix, &o.variance).trace() + o.rate_variance.sum()) / 3.0)
-                .max(1e-24),
-        }),
-    );
+    rows.extend(rest.iter().map(|o| {
+        let block = vector::at(&gyro.triad.inverse, &o.raw, &o.rate);
+        let noise = si_covariance(&matrix, &o.variance).trace() + o.rate_variance.sum();
+        Row {
+            error: block.residual,
+            by: DMatrix::from_column_slice(3, 12, block.by.as_slice()),
+            variance: (noise / 3.0).max(1e-24),
+        }
+    }));
     let Some(found) = against_others(&rows, turns.len(), 2.0) else {
         return out;
     };

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use crate::estimate::least_squares::{Errors, Group, Scatter, Solution, solve_groups};
 use crate::estimate::{Estimated, Failure, earth_shared};
 use crate::observable::Observable;
+use crate::observation::magnitude::Magnitude;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Part, Triad};
@@ -49,10 +50,13 @@ pub fn estimate(
         let mut kept = DMatrix::zeros(3, 0);
         for _ in 0..STEPS {
             let model = Affine { matrix, offset };
-            let forces: Vec<Vector3<f64>> =
-                observations.iter().map(|o| model.apply(&o.raw)).collect();
-            let design = DMatrix::from_fn(forces.len(), 3, |i, k| forces[i][k] / forces[i].norm());
-            let y = DVector::from_iterator(forces.len(), forces.iter().map(|f| g - f.norm()));
+            let each = observations
+                .iter()
+                .map(|o| Magnitude::at(&model, &o.raw, g));
+            let errors: Vec<Magnitude> = each.collect();
+            let n = errors.len();
+            let design = DMatrix::from_fn(n, 3, |i, k| errors[i].block.by[(0, 9 + k)]);
+            let y = DVector::from_fn(n, |i, _| -errors[i].residual());
             // Directions of the bias that the poses show.
             let svd = design.clone().svd(false, true);
             let shown = svd.v_t.ok_or_else(none)?;

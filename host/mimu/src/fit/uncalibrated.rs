@@ -8,7 +8,8 @@ use nalgebra::Vector3;
 
 use super::sensor::{SensorFit, rms};
 use crate::estimate::Observation;
-use crate::estimate::turn::{Turn, direction_error};
+use crate::observation::magnitude::Magnitude;
+use crate::observation::turn::{Turn, TurnError};
 use crate::prepared::Prepared;
 use crate::quantity::Figure;
 use crate::warning::Warning;
@@ -30,9 +31,10 @@ pub(super) fn magnitudes(
     figure: Figure,
     known: &[(&Observation, f64)],
 ) -> Option<f64> {
-    let errors = known
-        .iter()
-        .map(|(o, magnitude)| Vector3::new(o.raw.norm() - magnitude, 0.0, 0.0));
+    let errors = known.iter().map(|(o, known)| {
+        let error = Magnitude::at(&Affine::identity(), &o.raw, *known);
+        Vector3::new(error.residual(), 0.0, 0.0)
+    });
     prepared.is_in_si().then(|| rms(figure, errors))
 }
 
@@ -45,7 +47,7 @@ pub(super) fn directions(prepared: &Prepared, turns: &[Turn]) -> Option<f64> {
             after,
             ..*turn
         };
-        direction_error(&turn, &Affine::identity())
+        TurnError::at(&turn, &Affine::identity()).vector()
     });
     prepared.is_in_si().then(|| rms(Figure::Direction, errors))
 }

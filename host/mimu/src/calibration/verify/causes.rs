@@ -13,9 +13,11 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
 
 use crate::estimate::least_squares::{Errors, Group, Observability, Solution, solve_groups};
-use crate::estimate::turn::{Turn, sensitivity};
 use crate::estimate::{Observation, earth_shared};
 use crate::fit::by_rate::variances;
+use crate::observation::magnitude::Magnitude;
+use crate::observation::turn::{Turn, TurnError};
+use crate::observation::{ByTriad, of_output, slope, vector};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Sensor;
 use crate::triad::Forward;
@@ -89,24 +91,25 @@ const OF_MAGNITUDE: usize = 9;
 /// Columns of d and of A.
 const OF_TRIAD: usize = 12;
 
-/// Derivatives of a component along `by` of `A x + d`, by d and the symmetric part of A.
-fn along(by: &Vector3<f64>, x: &Vector3<f64>) -> [f64; OF_MAGNITUDE] {
-    let mut row = [0.0; OF_MAGNITUDE];
-    row[..3].copy_from_slice(by.as_slice());
-    for (to, (i, j)) in row[3..].iter_mut().zip(SYMMETRIC) {
-        *to = by[i] * x[j];
-        if i != j {
-            *to += by[j] * x[i];
-        }
-    }
-    row
+/// Derivatives by d, then by A.
+fn all(by: &ByTriad) -> impl Iterator<Item = f64> {
+    (9..12).chain(0..9).map(|k| by[k])
 }
 
-/// Row of the magnitude error of one observation.
+/// Derivatives by d and the symmetric part of A.
+fn symmetric(by: &ByTriad) -> impl Iterator<Item = f64> {
+    let of_a = SYMMETRIC.map(|(i, j)| match i == j {
+        true => by[4 * i],
+        false => by[3 * i + j] + by[3 * j + i],
+    });
+    (9..12).map(|k| by[k]).chain(of_a)
+}
+
+/// Row of the magnitude error of one observation. Its derivatives are at the known magnitude: the measured one contains the error.
 fn of_magnitude(model: &Affine<f64>, raw: &Vector3<f64>, size: f64) -> (Vec<f64>, f64) {
-    let found = model.apply(raw);
-    let n = found.normalize();
-    (along(&n, &(n * size)).to_vec(), found.norm() - size)
+    let error = Magnitude::at(model, raw, size);
+    let by = slope(&error.up, &(error.up * size));
+    (symmetric(&by).collect(), error.residual())
 }
 
 /// The causes of the errors of `sensor`; `None` if the recording does not distinguish them.
@@ -131,14 +134,10 @@ fn known(prepared: &Prepared, sensor: Sensor, model: &Affine<f64>) -> Option<Cau
     let mut rows = Vec::new();
     let forward = Forward::of(model)?;
     for o in earth_shared::likely(&prepared.observations(sensor), &forward.matrix) {
-        let error = model.apply(&o.raw) - o.input;
+        let error = vector::at(model, &o.raw, &o.input).residual;
+        let by = vector::at(&Affine::identity(), &o.input, &o.input);
         let covariance = si_covariance(&model.matrix, &o.variance);
-        for k in 0..3 {
-            let mut row = vec![0.0; OF_TRIAD];
-            row[k] = 1.0;
-            (0..3).for_each(|j| row[3 + 3 * k + j] = o.input[j]);
-            rows.push((row, error[k], covariance[(k, k)]));
-        }
+        rows.extend([0, 1, 2].map(|k| (all(&by.by(k)).collect(), error[k], covariance[(k, k)])));
     }
     separate(&[Rows::of(rows, OF_TRIAD)], &[0..3, 3..12])
 }
@@ -202,23 +201,13 @@ fn by_turns(prepared: &Prepared, gyro: &Affine<f64>, accel: &Affine<f64>) -> Opt
 
 /// Rows of the two components of a turn's direction error: gyro, then accelerometer.
 fn turn_rows(turn: &Turn, gyro: &Affine<f64>, variance: f64) -> [(Vec<f64>, f64, f64); 2] {
-    let at = sensitivity(turn, gyro);
-    let by_model = at.by_parameters(turn);
+    let error = TurnError::at(turn, gyro);
+    let by_accel = error.by_accel(&[turn.before, turn.after]);
     [0, 1].map(|s| {
-        let by = &by_model[s];
         // The calibration is (1 + A) C and (1 + A) o + d of the true one.
-        let d = (0..3).map(|i| by[9 + i]);
-        let a = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));
-        let a = a.map(|(i, j)| {
-            let of_c: f64 = (0..3).map(|k| by[3 * i + k] * gyro.matrix[(j, k)]).sum();
-            of_c + by[9 + i] * gyro.offset[j]
-        });
-        let [before, after] = &at.by_force[s];
-        let of_accel = along(before, &turn.before)
-            .into_iter()
-            .zip(along(after, &turn.after))
-            .map(|(x, y)| x + y);
-        (d.chain(a).chain(of_accel).collect(), at.error[s], variance)
+        let by_gyro = of_output(&error.block.by(s), gyro);
+        let row = all(&by_gyro).chain(symmetric(&by_accel[s])).collect();
+        (row, error.block.residual[s], variance)
     })
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use crate::estimate::turn::Turn;
+use crate::observation::turn::Turn;
 
 /// Errors of an accelerometer's forces that several or all of its poses share.
 #[derive(Debug, Clone)]

@@ -3,60 +3,47 @@
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Matrix3, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::build::{Builder, Part};
 use super::{ForceErrors, Row, RowFigure, Stratum, row_variances, shared_by_several};
 use crate::effects::quantity::Conditions;
-use crate::estimate::Observation;
 use crate::estimate::chains::Chains;
 use crate::estimate::earth::poses;
-use crate::estimate::turn::sensitivity;
 use crate::observable::{Observable, StratumName};
+use crate::observation::magnitude::Magnitude;
+use crate::observation::turn::TurnError;
+use crate::observation::{ByTriad, LOWER, about, from_centre, vector};
 use crate::prepared::si_covariance;
 use crate::quantity::Sensor;
 
-/// Derivatives of an accelerometer's forces by its affine parameters.
+/// Derivatives of rows by the affine parameters of an accelerometer.
 struct Shapes {
-    /// Three rows for each observation.
-    errors: DMatrix<f64>,
+    /// By the parameters that the magnitude of gravity determines, about the mean reading.
+    nuisance: DMatrix<f64>,
     /// See [`Part::parameters`].
     parameters: DMatrix<f64>,
     /// By all nine elements of C, about the mean reading.
     by_matrix: DMatrix<f64>,
 }
 
-/// The nine parameters that the magnitude of gravity determines: C lower triangular, about the mean reading, then o.
-fn lower_affine(observations: &[Observation]) -> Shapes {
-    let lower = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-    let n = observations.len();
-    let centre = observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n.max(1) as f64;
-    let mut errors = DMatrix::zeros(3 * n, 9);
-    let mut by_matrix = DMatrix::zeros(3 * n, 9);
-    for (i, o) in observations.iter().enumerate() {
-        for (k, (r, c)) in lower.into_iter().enumerate() {
-            errors[(3 * i + r, k)] = o.raw[c] - centre[c];
-        }
-        for k in 0..3 {
-            errors[(3 * i + k, 6 + k)] = 1.0;
-            for c in 0..3 {
-                by_matrix[(3 * i + k, 3 * k + c)] = o.raw[c] - centre[c];
-            }
+impl Shapes {
+    /// Of rows with the derivatives `by`.
+    fn of(by: &[ByTriad], centre: &Vector3<f64>) -> Self {
+        let by: Vec<ByTriad> = by.iter().map(|by| about(by, centre)).collect();
+        let (n, change) = (by.len(), from_centre(centre));
+        Self {
+            nuisance: DMatrix::from_fn(n, LOWER.len(), |i, k| by[i][LOWER[k]]),
+            parameters: DMatrix::from_fn(12, LOWER.len(), |i, k| change[(i, LOWER[k])]),
+            by_matrix: DMatrix::from_fn(n, 9, |i, k| by[i][k]),
         }
     }
-    let mut parameters = DMatrix::zeros(12, 9);
-    for (k, (r, c)) in lower.into_iter().enumerate() {
-        parameters[(3 * r + c, k)] = 1.0;
-        parameters[(9 + r, k)] = -centre[c];
-    }
-    for k in 0..3 {
-        parameters[(9 + k, 6 + k)] = 1.0;
-    }
-    Shapes {
-        errors,
-        parameters,
-        by_matrix,
-    }
+}
+
+/// Mean of the readings.
+fn mean<'a>(readings: impl ExactSizeIterator<Item = &'a Vector3<f64>>) -> Vector3<f64> {
+    let count = readings.len().max(1) as f64;
+    readings.sum::<Vector3<f64>>() / count
 }
 
 impl Builder<'_> {
@@ -77,24 +64,14 @@ impl Builder<'_> {
             .iter()
             .map(|o| self.dwell(o.dwell, inverse.apply(&o.raw)))
             .collect();
-        let shapes = lower_affine(&observations);
-        let mut y = Vec::new();
-        let mut nuisance = DMatrix::zeros(n, 9);
-        let mut by_matrix = DMatrix::zeros(n, 9);
+        let (mut y, mut by) = (Vec::new(), Vec::new());
         for (i, o) in observations.iter().enumerate() {
-            let force = inverse.apply(&o.raw);
-            let up = force.normalize();
-            self.mean_row(o.dwell, &conditions[i], body.tr_mul(&up));
-            y.push(force.norm() - g);
-            let by_force = shapes.errors.rows(3 * i, 3);
-            nuisance
-                .row_mut(i)
-                .copy_from(&by_force.tr_mul(&up).transpose());
-            let by_force = shapes.by_matrix.rows(3 * i, 3);
-            by_matrix
-                .row_mut(i)
-                .copy_from(&by_force.tr_mul(&up).transpose());
+            let error = Magnitude::at(inverse, &o.raw, g);
+            self.mean_row(o.dwell, &conditions[i], body.tr_mul(&error.up));
+            y.push(error.residual());
+            by.push(error.block.by(0));
         }
+        let shapes = Shapes::of(&by, &mean(observations.iter().map(|o| &o.raw)));
         let variances = prepared.magnitude_variances(inverse, &observations);
         let strata = vec![Stratum {
             name: StratumName(Observable::Magnitude, None),
@@ -109,7 +86,7 @@ impl Builder<'_> {
             wander_known: prepared.noise.has_noise_at_rest(Sensor::Accel),
             within: false,
         }];
-        let nuisance = (nuisance, shapes.parameters, by_matrix);
+        let nuisance = (shapes.nuisance, shapes.parameters, shapes.by_matrix);
         self.finish(
             y,
             nuisance,
@@ -131,7 +108,11 @@ impl Builder<'_> {
                 self.mean_row(o.dwell, &conditions, body.row(k).transpose());
             }
         }
-        let shapes = lower_affine(&observations);
+        let errors = observations
+            .iter()
+            .map(|o| vector::at(inverse, &o.raw, &Vector3::zeros()));
+        let by: Vec<ByTriad> = errors.flat_map(|e| [0, 1, 2].map(|k| e.by(k))).collect();
+        let shapes = Shapes::of(&by, &mean(observations.iter().map(|o| &o.raw)));
         let strata = vec![Stratum {
             name: StratumName(Observable::Force, None),
             axis: None,
@@ -145,7 +126,7 @@ impl Builder<'_> {
             wander_known: true,
             within: false,
         }];
-        let nuisance = (shapes.errors, shapes.parameters, shapes.by_matrix);
+        let nuisance = (shapes.nuisance, shapes.parameters, shapes.by_matrix);
         self.finish(
             vec![0.0; n],
             nuisance,
@@ -178,8 +159,7 @@ impl Builder<'_> {
         };
         let mean_square = inverse.matrix.norm_squared() / 3.0;
         let mut y = Vec::new();
-        let (mut by_force, mut sides, mut rotations) = (Vec::new(), Vec::new(), Vec::new());
-        let mut turn_rows: Vec<SVector<f64, 12>> = Vec::new();
+        let (mut by_force, mut errors) = (Vec::new(), Vec::new());
         let blocks = &prepared.condensed.blocks;
         for turn in &turns {
             let first = self.conditions.len();
@@ -203,17 +183,14 @@ impl Builder<'_> {
                 self.block.push(at);
             }
             let conditions = first..self.conditions.len();
-            let found = sensitivity(turn, inverse);
-            rotations.push(found.rotation);
-            for (side, columns) in found.by_parameters(turn).into_iter().enumerate() {
-                let pieces = found.by.iter().zip(turn.increments);
+            let (error, by) = TurnError::with_increments(turn, inverse);
+            for side in 0..2 {
+                let pieces = by.iter().zip(turn.increments);
                 let weights = pieces
                     .map(|(by, piece)| body.tr_mul(&by[side]) * piece.duration_s)
                     .collect();
-                y.push(found.error[side]);
-                by_force.push((turn, found.by_force[side]));
-                sides.push(found.sides[side]);
-                turn_rows.push(columns);
+                y.push(error.block.residual[side]);
+                by_force.push((turn, error.by_force[side]));
                 self.rows.push(Row {
                     conditions: conditions.clone(),
                     weights,
@@ -221,6 +198,7 @@ impl Builder<'_> {
                     moving: false,
                 });
             }
+            errors.push(error);
         }
         let (m, n) = (y.len(), rest.len());
         let dwells: Vec<usize> = rest.iter().map(|o| o.dwell).collect();
@@ -229,25 +207,49 @@ impl Builder<'_> {
             .map(|d| self.dwell(*d, self.force(*d, accel)))
             .collect();
         let chains = Chains::of(&turns, &rest);
-        let level = chains.level(&turns, rotations.into_iter());
+        let level = chains.level(&turns, errors.iter().map(|e| e.rotation));
         let mut nuisance = DMatrix::zeros(m + 3 * n, 12 + 2 * chains.count);
-        for (row, columns) in turn_rows.iter().enumerate() {
-            for (k, v) in columns.iter().enumerate() {
-                nuisance[(row, k)] = *v;
-            }
-            let turn = row / 2;
-            if let (Some(chain), Some(level)) = (chains.of_turn[turn], level.get(&turns[turn].to)) {
-                for (l, level) in level.iter().enumerate() {
-                    let along = sides[row].dot(level);
-                    nuisance[(row, 12 + 2 * chain + l)] = turns[turn].duration_s * along;
+        let mut add = |row: usize, by: &ByTriad, chain: Option<usize>, by_level: [f64; 2]| {
+            let mut columns = nuisance.row_mut(row);
+            columns.columns_mut(0, 12).copy_from(&by.transpose());
+            for (l, by) in by_level.into_iter().enumerate() {
+                if let Some(chain) = chain {
+                    columns[12 + 2 * chain + l] = by;
                 }
+            }
+        };
+        for (t, (turn, error)) in turns.iter().zip(&errors).enumerate() {
+            let earth = chains.of_turn[t].zip(level.get(&turn.to));
+            for side in 0..2 {
+                let by = earth.map(|(_, level)| error.by_level(side, level, turn.duration_s));
+                let chain = earth.map(|e| e.0);
+                add(
+                    2 * t + side,
+                    &error.block.by(side),
+                    chain,
+                    by.unwrap_or_default(),
+                );
+            }
+        }
+        // The mean reading of all dwells at rest instead of each dwell's own, whose noise is in the row too. With the latter, a matrix
+        // of zeros would explain that noise wholly, and `rate_x` with coefficient -1 would correct the turns for it.
+        let at_rest = mean(rest.iter().map(|o| &o.raw));
+        let by_rest = vector::at(inverse, &at_rest, &Vector3::zeros());
+        for (i, o) in rest.iter().enumerate() {
+            let earth = chains.of_rest[i].zip(level.get(&o.dwell));
+            for axis in 0..3 {
+                let by = earth.map(|(_, level)| level.map(|level| -level[axis]));
+                let chain = earth.map(|e| e.0);
+                add(
+                    m + axis * n + i,
+                    &by_rest.by(axis),
+                    chain,
+                    by.unwrap_or_default(),
+                );
             }
         }
         let random_walk = (n > 0).then(|| self.random_walk(&dwells));
         let wander = prepared.noise.wander(Sensor::Gyro, &prepared.dwells.list);
-        // The mean reading of all dwells at rest instead of each dwell's own, whose noise is in the row too. With the latter, a matrix
-        // of zeros would explain that noise wholly, and `rate_x` with coefficient -1 would correct the turns for it.
-        let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n.max(1) as f64;
         let turn_variances: Vec<f64> = turns
             .iter()
             .zip(&chains.of_turn)
@@ -282,18 +284,8 @@ impl Builder<'_> {
         }
         for axis in 0..3 {
             for (i, o) in rest.iter().enumerate() {
-                let row = y.len();
                 self.mean_row(o.dwell, &conditions[i], body.row(axis).transpose());
-                y.push((inverse.apply(&o.raw) - o.rate)[axis]);
-                for k in 0..3 {
-                    nuisance[(row, 3 * axis + k)] = at_rest[k];
-                }
-                nuisance[(row, 9 + axis)] = 1.0;
-                if let (Some(chain), Some(level)) = (chains.of_rest[i], level.get(&o.dwell)) {
-                    for (l, level) in level.iter().enumerate() {
-                        nuisance[(row, 12 + 2 * chain + l)] = level[axis];
-                    }
-                }
+                y.push(vector::at(inverse, &o.raw, &o.rate).residual[axis]);
             }
             let c = inverse.matrix.row(axis);
             let noise = |i: usize, j: usize| match (i == j, &wander) {
@@ -331,10 +323,8 @@ impl Builder<'_> {
             m => (RowFigure::Direction, m, 2),
         };
         // A bias absorbs the constant part of an error of C.
-        let mut by_matrix = nuisance.columns(0, 9).into_owned();
-        for (k, mut column) in by_matrix.column_iter_mut().enumerate() {
-            column -= nuisance.column(9 + k / 3) * at_rest[k % 3];
-        }
+        let whole = nuisance.columns(0, 12);
+        let by_matrix = whole * DMatrix::from_fn(12, 9, |i, k| from_centre(&at_rest)[(i, k)]);
         // The direction of Earth rate belongs to the recording, as the biases do.
         let own = 9..nuisance.ncols();
         let nuisance = (nuisance, DMatrix::identity(12, own.end), by_matrix);

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use nalgebra::Vector3;
 
-use crate::estimate::LOWER;
+use crate::observation::{LOWER, free, place, slope};
 use crate::quantity::{AXES, Sensor};
 use crate::readable;
 use mimu_recording::Reference;
@@ -197,10 +197,8 @@ impl Model {
         let x = self.input(setting);
         match self.reference {
             Reference::Table => row.extend([1.0, x.x, x.y, x.z]),
-            // The error of the magnitude is up' (dC u + do), C lower triangular.
             Reference::Gravity | Reference::TurntableRate => {
-                row.extend(LOWER.map(|(i, j)| x[i] * x[j]));
-                row.extend([x.x, x.y, x.z]);
+                row.extend(&free(&slope(&setting.up, &x), &LOWER));
             }
         }
     }
@@ -215,11 +213,11 @@ impl Model {
             }
             (Reference::Table, Term::Cross) => row.extend([x.x * x.y, x.y * x.z, x.z * x.x]),
             (Reference::Gravity | Reference::TurntableRate, Term::Quadratic | Term::Cubic) => {
-                row.extend([0, 1, 2].map(|i| x[i].powi(power + 1)));
+                row.extend([0, 1, 2].map(|i| setting.up[i] * x[i].powi(power)));
             }
             (Reference::Gravity | Reference::TurntableRate, Term::Cross) => {
                 for i in 0..3 {
-                    row.extend(PRODUCTS.map(|(j, k)| x[i] * x[j] * x[k]));
+                    row.extend(PRODUCTS.map(|(j, k)| setting.up[i] * x[j] * x[k]));
                 }
             }
             (_, Term::GSensitivity) => row.extend([setting.up.x, setting.up.y, setting.up.z]),
@@ -261,8 +259,10 @@ impl Model {
                 list.extend((0..3).map(|j| matrix('P', regression, j)));
             }
             Reference::Gravity | Reference::TurntableRate => {
-                list.extend(LOWER.map(|(i, j)| matrix('C', i, j)));
-                list.extend((0..3).map(|i| bias('o', i)));
+                list.extend(LOWER.map(|k| match place(k) {
+                    (i, Some(j)) => matrix('C', i, j),
+                    (i, None) => bias('o', i),
+                }));
             }
         }
         let full = "ppm FS";

@@ -8,7 +8,7 @@ use crate::effects;
 use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::{Effect, NonlinearParameter};
 use crate::effects::quantity::{Conditions, Reading};
-use crate::estimate::LOWER;
+use crate::observation::{ByTriad, LOWER, slope};
 use crate::plan::design::information::{Inverse, Rows};
 use crate::plan::design::lack_of_fit::{ALIASED, extend, outside};
 use crate::quantity::Sensor;
@@ -220,13 +220,13 @@ fn problems(setup: &Setup, sensor: Sensor, states: &[Conditions]) -> Vec<Problem
         Sensor::Gyro => at.rate,
         Sensor::Accel => at.force,
     };
-    let problem = |measured: Vec<Vector3<f64>>, parameters: &[(usize, Option<usize>)]| {
+    let problem = |measured: Vec<Vector3<f64>>, parameters: &[usize]| {
         let mut affine = Vec::new();
-        for (axis, of) in parameters {
-            let each = states.iter().zip(&measured);
-            let column = each.map(|(at, m)| m[*axis] * of.map_or(1.0, |j| input(at)[j]));
-            let column: Vec<f64> = column.collect();
-            extend(&mut affine, DVector::from_vec(column));
+        let each = states.iter().zip(&measured);
+        let by: Vec<ByTriad> = each.map(|(at, along)| slope(along, &input(at))).collect();
+        for parameter in parameters {
+            let column = by.iter().map(|by| by[*parameter]);
+            extend(&mut affine, DVector::from_iterator(by.len(), column));
         }
         Problem {
             calibrates: affine.len() == parameters.len(),
@@ -236,14 +236,12 @@ fn problems(setup: &Setup, sensor: Sensor, states: &[Conditions]) -> Vec<Problem
     };
     let matrix = sensor == Sensor::Accel || setup.turns();
     if setup.reference == Reference::Gravity && sensor == Sensor::Accel {
-        let matrix = LOWER.iter().map(|(i, j)| (*i, Some(*j)));
-        let all: Vec<_> = matrix.chain((0..3).map(|i| (i, None))).collect();
         let up = states.iter().map(|at| at.force.normalize()).collect();
-        return vec![problem(up, &all)];
+        return vec![problem(up, &LOWER)];
     }
     let each = (0..3).map(|i| {
-        let row = (0..3).filter(|_| matrix).map(|j| (i, Some(j)));
-        let all: Vec<_> = std::iter::once((i, None)).chain(row).collect();
+        let row = (0..3).filter(|_| matrix).map(|j| 3 * i + j);
+        let all: Vec<usize> = std::iter::once(9 + i).chain(row).collect();
         problem(vec![Vector3::ith(i, 1.0); states.len()], &all)
     });
     each.collect()

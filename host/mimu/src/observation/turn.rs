@@ -6,8 +6,9 @@
 use std::cell::RefCell;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
+use super::{Block, ByTriad, place, slope};
 use crate::signal::increment::Increment;
 
 /// One turn from dwell to dwell.
@@ -78,6 +79,7 @@ pub struct Motion {
 }
 
 /// An increment with the reading at rest subtracted.
+#[derive(Debug, Clone, Copy)]
 struct Centred {
     integral: Vector3<f64>,
     coning: Vector3<f64>,
@@ -86,6 +88,7 @@ struct Centred {
 }
 
 impl Centred {
+    /// With the reading `rest` subtracted.
     fn new(increment: &Increment, rest: &Vector3<f64>) -> Self {
         let [integral, coning, moment] =
             [increment.integral, increment.coning, increment.moment].map(Vector3::from);
@@ -143,28 +146,39 @@ fn exponential(phi: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     (one + k * a + k2 * b, one - k * b + k2 * c)
 }
 
-/// Rotation over `pieces` under `ω = C (u - rest) + o`, as the matrix that transforms a direction from the body frame before into that after; and the
-/// derivatives of the turn (rad, in the frame after) by each column of C and by o.
+/// A turn under a calibration of the gyro.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Turned {
+    /// Transforms a direction from the body frame before the turn into that after it.
+    pub rotation: Matrix3<f64>,
+    /// Derivatives of the turn (rad, in the frame after) by each column of C and by o.
+    by: [Matrix3<f64>; 4],
+}
+
+/// The turn over `pieces` under `ω = C (u - rest) + o`. `each` is called with the index of each piece, and with the matrix that takes its rotation vector
+/// into the frame after the turn.
 fn integrate(
-    pieces: &[Centred],
+    pieces: impl DoubleEndedIterator<Item = Centred> + ExactSizeIterator,
     c: &Matrix3<f64>,
     o: &Vector3<f64>,
-) -> (Matrix3<f64>, [Matrix3<f64>; 4]) {
-    let cofactor = cofactor(c) * 0.5;
-    let mut after = Matrix3::identity();
+    mut each: impl FnMut(usize, &Matrix3<f64>),
+) -> Turned {
+    let half = cofactor(c) * 0.5;
+    let mut rotation = Matrix3::identity();
     let mut by = [Matrix3::zeros(); 4];
     // Backwards: the product of the later pieces transforms each piece into the frame at the end.
-    for piece in pieces.iter().rev() {
-        let phi = piece.rotation(c, o, &cofactor);
+    for (index, piece) in pieces.enumerate().rev() {
+        let phi = piece.rotation(c, o, &half);
         let (turn, right) = exponential(&phi);
-        let into = after * right;
+        let into = rotation * right;
         for (k, by) in by.iter_mut().take(3).enumerate() {
             *by += into * piece.integral[k];
         }
         by[3] += into * piece.duration;
-        after *= turn.transpose();
+        each(index, &into);
+        rotation *= turn.transpose();
     }
-    (after, by)
+    Turned { rotation, by }
 }
 
 /// If calibrations differ by less than this turn, rad, the rotations of one follow from those of the other to first order. The neglected term is half
@@ -175,19 +189,19 @@ const NEAR: f64 = 1e-4;
 struct Reference {
     c: Matrix3<f64>,
     o: Vector3<f64>,
-    turned: Vec<(Matrix3<f64>, [Matrix3<f64>; 4])>,
+    turned: Vec<Turned>,
 }
 
 /// The rotations of turns under calibrations that a fit tries one after the other. After the first few these are near each other, and are not
 /// integrated again: integrating took 80 % of the time of a fit of 36 turns with its held-out refits.
-pub(super) struct Rotations {
+pub(crate) struct Rotations {
     pieces: Vec<Vec<Centred>>,
     reference: RefCell<Option<Reference>>,
 }
 
 impl Rotations {
     /// The rotations of `turns`, with the reading at rest subtracted.
-    pub(super) fn new(turns: &[Turn], rest: &Vector3<f64>) -> Self {
+    pub(crate) fn new(turns: &[Turn], rest: &Vector3<f64>) -> Self {
         let centred = |turn: &Turn| {
             let pieces = turn.increments.iter();
             pieces.map(|i| Centred::new(i, rest)).collect()
@@ -198,25 +212,25 @@ impl Rotations {
         }
     }
 
-    /// The result of [`integrate`] for each turn under `ω = C (u - rest) + o`, sensitivities included.
-    pub(super) fn at(
-        &self,
-        c: &Matrix3<f64>,
-        o: &Vector3<f64>,
-    ) -> Vec<(Matrix3<f64>, [Matrix3<f64>; 4])> {
+    /// Each turn under `ω = C (u - rest) + o`.
+    pub(crate) fn at(&self, c: &Matrix3<f64>, o: &Vector3<f64>) -> Vec<Turned> {
         let mut reference = self.reference.borrow_mut();
         let near = reference.as_ref().and_then(|reference| {
             let (c, o) = (c - reference.c, o - reference.o);
-            let moved = reference.turned.iter().map(|(after, by)| {
+            let moved = reference.turned.iter().map(|Turned { rotation, by }| {
                 let by_c: Vector3<f64> = (0..3).map(|k| by[k] * c.column(k)).sum();
                 let more = by_c + by[3] * o;
                 let near = more.norm() <= NEAR;
-                near.then(|| (exponential(&-more).0 * after, *by))
+                near.then(|| Turned {
+                    rotation: exponential(&-more).0 * rotation,
+                    by: *by,
+                })
             });
             moved.collect::<Option<Vec<_>>>()
         });
         near.unwrap_or_else(|| {
-            let turned = self.pieces.iter().map(|p| integrate(p, c, o));
+            let whole = |pieces: &Vec<Centred>| integrate(pieces.iter().copied(), c, o, |_, _| ());
+            let turned = self.pieces.iter().map(whole);
             let turned: Vec<_> = turned.collect();
             *reference = Some(Reference {
                 c: *c,
@@ -228,85 +242,92 @@ impl Rotations {
     }
 }
 
-/// Rotation from the direction of gravity that a calibration predicts after the turn to the measured one, as a rotation vector (rad) in the body
-/// frame after it.
-pub fn direction_error(turn: &Turn, gyro: &Affine<f64>) -> Vector3<f64> {
-    let (c, o) = (&gyro.matrix, &gyro.offset);
-    let half = cofactor(c) * 0.5;
-    let mut after = Matrix3::identity();
-    for increment in turn.increments.iter().rev() {
-        let piece = Centred::new(increment, &Vector3::zeros());
-        after *= exponential(&piece.rotation(c, o, &half)).0.transpose();
-    }
-    between(&(after * turn.before.normalize()), &turn.after.normalize())
-}
-
-/// The direction error of a turn and its derivatives.
-#[derive(Debug, Clone)]
-pub struct Sensitivity {
+/// The error of the direction of gravity after a turn: the rotation from the direction that a calibration predicts to the measured one.
+#[derive(Debug, Clone, Copy)]
+pub struct TurnError {
     /// Transforms a direction from the body frame before the turn into that after it.
     pub rotation: Matrix3<f64>,
-    /// Directions of the two components of the error, body frame after the turn.
+    /// Directions of the two components of the error, across the measured direction, body frame after the turn.
     pub sides: [Vector3<f64>; 2],
+    /// The two components, rad, and their derivatives by the gyro.
+    pub block: Block<2>,
     /// Derivatives of each component by the force before and after the turn, rad/(m/s²).
     pub by_force: [[Vector3<f64>; 2]; 2],
-    /// The two components of the error, across the measured direction, rad.
-    pub error: [f64; 2],
-    /// Derivatives of the two components by the rotation vector of each increment, rad/rad, body frame.
-    pub by: Vec<[Vector3<f64>; 2]>,
 }
 
-impl Sensitivity {
-    /// Derivatives of each component by C of the gyro (rows first) and its o.
-    pub fn by_parameters(&self, turn: &Turn) -> [SVector<f64, 12>; 2] {
-        let mut columns = [SVector::zeros(); 2];
-        for (by, piece) in self.by.iter().zip(turn.increments) {
-            for (columns, by) in columns.iter_mut().zip(by) {
-                for i in 0..3 {
-                    for j in 0..3 {
-                        columns[3 * i + j] += by[i] * piece.integral[j];
-                    }
-                    columns[9 + i] += by[i] * piece.duration_s;
-                }
-            }
+impl TurnError {
+    /// Of a turn whose rotation is known.
+    pub(crate) fn of(turn: &Turn, turned: &Turned) -> Self {
+        let (before, measured) = (turn.before.normalize(), turn.after.normalize());
+        let rotation = turned.rotation;
+        let error = between(&(rotation * before), &measured);
+        let sides = across(&measured);
+        let by_gyro = sides.map(|side| {
+            let slopes = turned.by.map(|by| by.tr_mul(&side));
+            SVector::<f64, 12>::from_fn(|k, _| match place(k) {
+                (row, Some(column)) => slopes[column][row],
+                (row, None) => slopes[3][row],
+            })
+            .transpose()
+        });
+        Self {
+            rotation,
+            sides,
+            block: Block {
+                residual: SVector::from(sides.map(|side| side.dot(&error))),
+                by: SMatrix::from_rows(&by_gyro),
+            },
+            by_force: sides.map(|side| by_forces(turn, &rotation, &side)),
         }
-        columns
     }
-}
 
-/// [`direction_error`] in components, with its derivatives.
-pub fn sensitivity(turn: &Turn, gyro: &Affine<f64>) -> Sensitivity {
-    let (c, o) = (&gyro.matrix, &gyro.offset);
-    let half = cofactor(c) * 0.5;
-    let measured = turn.after.normalize();
-    let sides = across(&measured);
-    let mut after = Matrix3::identity();
-    let mut by = vec![[Vector3::zeros(); 2]; turn.increments.len()];
-    for (k, increment) in turn.increments.iter().enumerate().rev() {
-        let piece = Centred::new(increment, &Vector3::zeros());
-        let phi = piece.rotation(c, o, &half);
-        let (back, right) = exponential(&phi);
-        let into: Matrix3<f64> = after * right;
-        by[k] = sides.map(|e| into.tr_mul(&e));
-        after *= back.transpose();
+    /// Under the calibration `gyro`, raw to rad/s.
+    pub fn at(turn: &Turn, gyro: &Affine<f64>) -> Self {
+        Self::by_increments(turn, gyro, |_, _| ())
     }
-    let error = between(&(after * turn.before.normalize()), &measured);
-    Sensitivity {
-        rotation: after,
-        sides,
-        by_force: sides.map(|e| by_forces(turn, &after, &e)),
-        error: sides.map(|e| e.dot(&error)),
-        by,
+
+    /// The same with the derivatives of both components by the rotation vector of each increment, rad/rad, body frame.
+    pub fn with_increments(turn: &Turn, gyro: &Affine<f64>) -> (Self, Vec<[Vector3<f64>; 2]>) {
+        let sides = across(&turn.after.normalize());
+        let mut by = vec![[Vector3::zeros(); 2]; turn.increments.len()];
+        let error = Self::by_increments(turn, gyro, |k, into| {
+            by[k] = sides.map(|side| into.tr_mul(&side));
+        });
+        (error, by)
+    }
+
+    fn by_increments(
+        turn: &Turn,
+        gyro: &Affine<f64>,
+        each: impl FnMut(usize, &Matrix3<f64>),
+    ) -> Self {
+        let pieces = turn.increments.iter();
+        let pieces = pieces.map(|increment| Centred::new(increment, &Vector3::zeros()));
+        let turned = integrate(pieces, &gyro.matrix, &gyro.offset, each);
+        Self::of(turn, &turned)
+    }
+
+    /// The error as a rotation vector in the body frame after the turn, rad.
+    pub fn vector(&self) -> Vector3<f64> {
+        let [a, b] = self.sides;
+        a * self.block.residual[0] + b * self.block.residual[1]
+    }
+
+    /// Derivatives of both components by the accelerometer whose readings before and after the turn are `raw`.
+    pub fn by_accel(&self, raw: &[Vector3<f64>; 2]) -> [ByTriad; 2] {
+        self.by_force
+            .map(|[before, after]| slope(&before, &raw[0]) + slope(&after, &raw[1]))
+    }
+
+    /// Derivatives of component `k` by the Earth's level rate, whose two directions `level` are known in the body frame after a turn of `duration_s`.
+    pub fn by_level(&self, k: usize, level: &[Vector3<f64>; 2], duration_s: f64) -> [f64; 2] {
+        level.map(|level| -duration_s * self.sides[k].dot(&level))
     }
 }
 
 /// Derivatives of the component `e` of the direction error of a turn by the force before and after it; `rotation` transforms a direction from the
 /// body frame before into that after. Only the part of a force error across a direction moves the direction.
-pub(super) fn by_forces(
-    turn: &Turn,
-    rotation: &Matrix3<f64>,
-    e: &Vector3<f64>,
-) -> [Vector3<f64>; 2] {
+fn by_forces(turn: &Turn, rotation: &Matrix3<f64>, e: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let side = e.cross(&turn.after.normalize());
     let ends = [(turn.before, -rotation.tr_mul(&side)), (turn.after, side)];
     ends.map(|(force, side)| {
@@ -316,7 +337,7 @@ pub(super) fn by_forces(
 }
 
 /// Rotation vector that turns the unit vector `a` into `b` the shortest way.
-pub(super) fn between(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
+fn between(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
     let axis = a.cross(b);
     let sin = axis.norm();
     let angle = sin.atan2(a.dot(b));
@@ -328,7 +349,7 @@ pub(super) fn between(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
 }
 
 /// Two unit vectors across `w`.
-pub(super) fn across(w: &Vector3<f64>) -> [Vector3<f64>; 2] {
+pub(crate) fn across(w: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let pick = w.iamin();
     let e = w.cross(&Vector3::ith(pick, 1.0)).normalize();
     [e, w.cross(&e)]
@@ -389,14 +410,11 @@ mod tests {
             integral_variance: 0.0,
             duration_s: 1.0,
         };
-        let error = direction_error(
-            &turn,
-            &Affine {
-                matrix: c,
-                offset: o,
-            },
-        )
-        .norm();
+        let gyro = Affine {
+            matrix: c,
+            offset: o,
+        };
+        let error = TurnError::at(&turn, &gyro).vector().norm();
         // 1 ms samples of a rate with a curvature of 75 rad/s³ err by 1e-3²/12 * 75 rad in a second.
         assert!(error < 1e-5, "{error:e} rad");
     }
