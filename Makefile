@@ -18,7 +18,7 @@ PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device m
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python
 
-.PHONY: help data test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example papers blind bench budget device fuzz audit toolchain
+.PHONY: help data test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example papers blind bench budget count device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
@@ -121,8 +121,9 @@ nightly: toolchain blind fuzz web-tests ## what takes hours: more seeds, ten min
 DEMO ?= target/demo-$(SEED)
 SEED ?= 1
 demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is another unit with another effect
-	@$(FIRMWARE) -q
-	@$(CARGO) build --locked -q -p mimu-cli -p mimu-board-tests --bin mimu --bin demo
+	@echo "The firmware, the emulated board and the command are compiled first: some five minutes the first time, a minute after make test."
+	@$(FIRMWARE)
+	@$(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bin mimu --bin demo
 	@rm -rf $(DEMO)
 	@target/debug/demo $(SEED) $(DEMO)
 
@@ -150,6 +151,9 @@ bench: toolchain ## rates and peak memory on four hours at 1 kHz, and of a diagn
 	$(CARGO) bench --locked -p mimu-cli --bench four_hours
 	$(CARGO) bench --locked -p mimu-tests --bench diagnosis
 	$(CARGO) bench --locked -p mimu-rig --bench step
+
+count: ## lines of each crate, public items, long functions, files that an addition touches
+	@python3 tests/count.py
 
 budget: toolchain ## instructions, load and memory of the firmware, counted on the emulated board
 	$(FIRMWARE)

@@ -278,12 +278,12 @@ pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()>
                 magic.escape_ascii(),
                 MAGIC.escape_ascii()
             ),
-            "flash mimu-firmware (README, flashing), or choose another port",
+            "flash mimu-firmware (docs/device/board.md), or choose another port",
         )),
         Compatibility::DeviceOlder { usable: false } => Err(Error::device(
             port,
             format!("the device is older than this program: {versions}"),
-            "flash the firmware that belongs to this program (README, flashing)",
+            "flash the firmware that belongs to this program (docs/device/board.md)",
         )),
         Compatibility::DeviceNewer { usable: false } => Err(Error::device(
             port,

@@ -102,7 +102,7 @@ impl Line {
                 Err(Error::device(
                     self.port.name(),
                     "the device uses this program's protocol, but its greeting cannot be read",
-                    "flash the firmware that belongs to this program (README, flashing)",
+                    "flash the firmware that belongs to this program (docs/device/board.md)",
                 ))
             }
             None => Ok(answer),
