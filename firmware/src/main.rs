@@ -187,7 +187,7 @@ fn pipeline(
         let mut p = p.borrow_mut();
         p.powered_for(powered_for_ms);
         if let Some(pins_c) = pins_c {
-            p.pins_stand(pins_c);
+            p.set_temp_offsets(pins_c);
         }
     });
     let info = in_use.and_then(|(length, hash)| {

@@ -166,7 +166,7 @@ impl Pipeline {
     }
 
     /// Sets the stored offsets between the TEMP pins, °C. Call it before the first sample.
-    pub fn pins_stand(&mut self, pins_c: [f32; 3]) {
+    pub fn set_temp_offsets(&mut self, pins_c: [f32; 3]) {
         self.slow = Slow::of_pins(pins_c);
     }
 

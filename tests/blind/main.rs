@@ -62,7 +62,7 @@ struct Tally {
     at_floor: u32,
     /// The same with every fourth dwell held out instead of blocks of time.
     between: u32,
-    /// Right ones whose held-out error with the effects is at most 1.2 times that of the same unit with the same noise, but without the effect.
+    /// Right ones whose held-out error is at most 1.2 times that of the same unit, with the same noise, that lacks the effect.
     at_clean: u32,
 }
 

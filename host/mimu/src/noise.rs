@@ -247,7 +247,7 @@ impl Noise {
             let raw = manifest.raw_unit.to_string();
             let mut nodes = Vec::new();
             for channel in file.channel.iter().filter(|k| k.name == name) {
-                // Readings in SI have scale factors too. A file with a scale factor is in the calibrated unit: if the factor is 0.51, its
+                // A calibration of readings in SI has scale factors near 1. The noise in its file is that of calibrated readings: if the factor is 0.51, its
                 // noise is twice that of the readings.
                 let unit = match manifest.raw_unit {
                     RawUnit::Si if channel.raw_unit.as_ref() != Some(&raw) => {

@@ -16,8 +16,8 @@ use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Turntable};
 
-/// Expected standard deviations of the readings. At rest, relative to the largest rate: the bias wanders. At a rate, relative to it: scale
-/// factors differ from axis to axis.
+/// Expected standard deviation of a reading at rest over the largest rate, by the wander of the bias; and of a reading at a rate over that rate, by scale
+/// factors that differ from axis to axis.
 const REST_SIGMA: f64 = 0.02;
 const RATE_SIGMA: f64 = 0.06;
 /// Cost of a dwell at none of the rates, in squared sigmas.

@@ -189,8 +189,8 @@ pub enum Warning {
     NothingToJudge,
     /// Worse than the uncalibrated readings, or else than their mean scale factor and bias.
     Worse(bool),
-    /// Number of errors that do not show whether the calibration is better; whether they are of turns, or else of dwells; compared with
-    /// what, as in [`Self::Worse`].
+    /// The errors do not show whether the calibration is better. Their number; whether they are of turns (else of dwells); what they are compared with, as
+    /// in [`Self::Worse`].
     Undecided(u64, bool, bool),
     /// A calibration that lacks a sensor of the recording.
     NotCalibrated(Sensor),

@@ -16,7 +16,7 @@ const OF_MEDIAN: f64 = 1.4826;
 /// A jump of the bias.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BiasJump {
-    /// Middle of the time from the last row before to the first after, s.
+    /// Time, s: the middle between the last row before the jump and the first row after it.
     pub at_s: f64,
     /// Change of the reading without its trend, raw.
     pub change: Vector3<f64>,

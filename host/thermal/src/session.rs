@@ -29,8 +29,9 @@ const MOVED_SIGMAS: f64 = 6.0;
 const MOVED_DRIFTS: f64 = 2.0;
 /// Rows over which a drift is computed: half a minute.
 const DRIFT_ROWS: usize = 12;
-/// A change of the specific force by a smaller share hardly moves a gyro's bias: by 0.02 deg/s at 0.2 deg/s/g, the largest g-sensitivity of
-/// data sheets. An offset there would absorb a jump of the bias and hide it: one of 0.5 deg/s came with a change of the force by 0.05.
+/// Where the specific force changes by a larger share, the gyro gets an offset of its own, because force moves its bias. A smaller change moves it by at most
+/// 0.02 deg/s (0.2 deg/s/g is the largest g-sensitivity of data sheets), and an offset would hide a jump of the bias: one of 0.5 deg/s came with a
+/// change of the force by 0.05.
 const TILTED: f64 = 0.1;
 /// Slower than this, rad/s, a unit is at rest.
 const RATE: f64 = 0.02;

@@ -44,7 +44,7 @@ pub struct Regular {
     /// Whether times are by the board's clock.
     own_clock: bool,
     waiting: VecDeque<Timed>,
-    /// Tick of the next line if none is missing, and when it is due if it is delayed least.
+    /// Tick of the next line if none is missing, and the earliest time at which it may come.
     tick: u64,
     due_s: Option<f64>,
     last_s: Option<f64>,

@@ -56,7 +56,7 @@ pub struct Wizard<'a> {
 
 /// How a dwell ended.
 enum Stepped {
-    Had,
+    Done,
     Cancelled,
     Skipped,
     Redo(Step),
@@ -225,12 +225,12 @@ impl<'a> Wizard<'a> {
                 words: step.words(),
             });
             match self.step(&step).await? {
-                Stepped::Had if self.driver.is_person() => {
+                Stepped::Done if self.driver.is_person() => {
                     if self.goes_on(part, steps, &step).await? == Ended::Cancelled {
                         return Ok(Ended::Cancelled);
                     }
                 }
-                Stepped::Had => {}
+                Stepped::Done => {}
                 Stepped::Cancelled => {
                     self.driver.stop()?;
                     return Ok(Ended::Cancelled);
@@ -368,7 +368,7 @@ impl<'a> Wizard<'a> {
                 None => {}
             }
             if self.units.iter().all(|u| u.done) {
-                return Ok(Stepped::Had);
+                return Ok(Stepped::Done);
             }
             let wrong =
                 |u: &UnitSession| u.done || matches!(u.state.waiting, Some(Waiting::WrongPose(..)));

@@ -107,7 +107,7 @@ impl<'a> Selection<'a> {
         fitted.find(|m| !m.terms.contains(&(term as usize)))
     }
 
-    /// Terms that may replace `term`, or that it may replace, in a plausible model compared with the best.
+    /// Terms that the data do not distinguish from `term`: a plausible model has one of them where the best has `term`, or the other way round.
     pub fn instead_of(&self, term: Term) -> Vec<Term> {
         let (k, best) = (term as usize, self.best());
         let mut terms = Vec::new();

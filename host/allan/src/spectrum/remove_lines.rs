@@ -16,7 +16,7 @@ const ROUNDS: usize = 4;
 const STEADY: f64 = 0.3;
 /// A sinusoid with more than this multiple of the band's power does not belong to the band.
 const MUCH: f64 = 2.0;
-/// Largest share of a steady line's power outside its sinusoid, or twice the relative error of the power from noise, if that is larger.
+/// A line is steady if at most this share of its power is outside its sinusoid; or twice the relative error that noise gives the power, if that is larger.
 const BESIDE_IT: f64 = 0.1;
 /// Least amplitude of a sinusoid, in standard deviations of the noise's amplitude.
 const CERTAIN: f64 = 4.0;

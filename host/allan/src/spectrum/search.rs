@@ -119,7 +119,7 @@ impl Resolution {
         }
     }
 
-    /// Whether more of `bins` than a line has are above half of their `peak`.
+    /// Whether more of the `bins` are above half of their `peak` than a line, which has no width, would have.
     fn is_resolved(&self, bins: RangeInclusive<usize>, peak: usize) -> bool {
         let half = 0.5 * self.excess(peak);
         bins.filter(|b| self.excess(*b) > half)

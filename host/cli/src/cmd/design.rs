@@ -92,7 +92,7 @@ pub struct DesignArgs {
     /// White noise N, m/s² or rad/s per √Hz, or the noise file of the unit [default: that of fang's sensors]
     #[arg(long, value_name = "SI|FILE")]
     noise: Option<NoiseArg>,
-    /// Bias instability B, m/s² or rad/s [default: the mean that --noise gives in 20 s]
+    /// Bias instability B, m/s² or rad/s [default: such that its floor equals white noise in a mean of 20 s]
     #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 0.0, 1e3))]
     instability: Option<f64>,
     /// Random walk K, m/s² or rad/s per √s [default: 0]

@@ -133,7 +133,7 @@ fn move_sensor(out: &mut Prepared, prepared: &Prepared, from: usize, moved: &[Af
     }
     for dwell in &mut out.dwells.list {
         let range = dwell.blocks.clone();
-        // The temperature hardly drifts within a dwell, so the mean of the models of its blocks applies to its mean reading.
+        // The temperature hardly changes within a dwell. So the mean of its blocks' models, applied to its mean reading, is the mean of their results.
         let (mut matrix, mut offset) = (Matrix3::zeros(), Vector3::zeros());
         let share = 1.0 / range.len().max(1) as f64;
         for by in &moved[range] {

@@ -35,7 +35,7 @@ pub struct DeviceCalibration {
     pub range_c: Option<[f32; 2]>,
     /// As in [`OverTemperature::lags_s`].
     pub lags_s: Option<PerSensor<f32>>,
-    /// Errors that they lack. Converters of the axes of a triad are parts of one effect.
+    /// Effects. The converters of a triad's three axes are parts of one effect.
     pub effects: Vec<DeviceEffect<f32>>,
 }
 

@@ -112,8 +112,8 @@ pub struct Decision {
     pub held_out_rms: [f64; 2],
     /// How they were held out.
     pub split: Split,
-    /// The latter, with every fourth dwell held out instead. A block of time may be the only one with some range of temperatures, to which
-    /// the rest then extrapolates; between the dwells of the rest nothing is extrapolated.
+    /// Held-out rms with the effects if every fourth dwell is held out instead of a block of time. One block may be the only one at some temperatures;
+    /// without it the model is extrapolated to these. Every fourth dwell lies between others.
     pub interleaved_rms: f64,
     /// Error that noise alone would cause.
     pub noise_floor: f64,
@@ -349,7 +349,7 @@ pub fn decide(
         let beside_it: Vec<Chosen> = kept.iter().chain([one]).cloned().collect();
         judge.wanders([&kept, &beside_it], one, &with).is_none()
     });
-    // Beside the jumps that were found: otherwise every slow effect would seem to explain a little of them.
+    // The jumps that were found stay in the model: otherwise every slow effect would seem to explain a part of them.
     let with_jumps: Vec<Chosen> = kept.iter().chain(&jumps).cloned().collect();
     let all = match jumps.is_empty() {
         true => with.clone(),

@@ -273,8 +273,8 @@ impl Rows {
 
     /// Adds the uncertainty of a given matrix: the `covariance` of C by rows.
     ///
-    /// The strata are treated as independent, but all n recordings share this error. It is given n times its variance, because the mean of n
-    /// independent errors has 1/n of it.
+    /// All n recordings share this error, but their strata are treated as independent. The mean of n independent errors has 1/n of their variance, so
+    /// each gets n times the variance.
     fn leave_open(&mut self, covariance: SMatrix<f64, 9, 9>) {
         let mut sessions: Vec<usize> = self.strata.iter().map(|s| s.session).collect();
         sessions.sort_unstable();
@@ -400,8 +400,8 @@ impl Rows {
         out
     }
 
-    /// The conditions of rows [by dwell](Self::by_dwell), with `residuals` subtracted from the readings. A residual contains the noise of the dwell,
-    /// which is in the row too: any function of the noisy reading would seem to explain it. It also contains the error that is sought.
+    /// The conditions of rows [by dwell](Self::by_dwell), with `residuals` subtracted from the readings. The noise of a dwell is in its
+    /// reading and in its row. Any function of the noisy reading would seem to explain the row.
     pub fn conditions_without(&self, residuals: &DVector<f64>) -> Vec<Conditions> {
         let mut conditions = self.conditions.clone();
         for (row, residual) in self.rows.iter().zip(residuals.iter()) {

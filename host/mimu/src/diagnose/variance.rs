@@ -73,7 +73,7 @@ pub struct VarianceModel<'a> {
 }
 
 impl<'a> VarianceModel<'a> {
-    /// Of `rows`. If the wander is known, a random walk beside it is sought only with `all_random_walks`: it would absorb every slow effect.
+    /// Of `rows`. A random walk absorbs slow effects. So where the wander of the biases is known, one is sought only with `all_random_walks`.
     pub fn new(rows: &'a Rows, all_random_walks: bool) -> Self {
         let mean = |m: &DMatrix<f64>| m.diagonal().mean().max(1e-30);
         let mut variance = Self {

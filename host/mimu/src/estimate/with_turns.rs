@@ -174,7 +174,7 @@ impl JointFit<'_> {
         if (0..3).any(|k| !(c[(k, k)] > 0.0)) {
             return Err(lost());
         }
-        // Only of the accelerometer's parameters: their columns have one unit, those of the gyro any.
+        // Of the accelerometer's parameters alone, whose columns share one unit. Those of the gyro have others.
         let own = covariance.view((0, 0), (ACCEL, ACCEL)).into_owned();
         let eigen = own.symmetric_eigenvalues();
         let condition = (eigen.max() / eigen.min()).sqrt();

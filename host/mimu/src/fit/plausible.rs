@@ -22,8 +22,8 @@ const FOLLOWS_NOTHING: f64 = 0.3;
 const OUTLIER: f64 = 10.0;
 /// Fewer residuals have no meaningful median.
 const OUTLIER_COUNT: usize = 6;
-/// A residual below this share of the largest is rounding. Its dwell determines a parameter alone, so nothing contradicts it, and it must not count
-/// in the median: among six dwells three such made "2385361721304 times the median" of the others.
+/// A residual below this share of the largest is rounding: its dwell alone determines a parameter, so the fit meets it exactly. It must not count in the
+/// median: three such among six dwells made "2385361721304 times the median" of the others.
 const EXACT: f64 = 1e-9;
 /// So is one below this share of its noise, which three components have by chance once in 10⁹. Errors that dwells share, as that of the Earth's
 /// rate, pull a dwell that determines a parameter alone by that much from zero.

@@ -311,7 +311,7 @@ pub fn next(diagnosis: &Diagnosis) -> Next {
     });
     let (not_excited, listed): (Vec<_>, Vec<_>) = shown.unzip();
     let pairs = pairs(diagnosis);
-    let told = pairs.par_iter().map(|p| p.told_apart(diagnosis, &setup));
+    let told = pairs.par_iter().map(|p| p.distinguished(diagnosis, &setup));
     let (confused, apart): (Vec<_>, Vec<_>) = told.unzip();
     let (mut targets, mut not_in_plan) = (Vec::new(), Vec::new());
     for one in listed.into_iter().chain(apart) {
@@ -397,7 +397,7 @@ fn pairs(diagnosis: &Diagnosis) -> Vec<Pair<'_>> {
 }
 
 impl Pair<'_> {
-    fn told_apart(
+    fn distinguished(
         &self,
         diagnosis: &Diagnosis,
         setup: &Setup,

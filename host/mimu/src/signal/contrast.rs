@@ -64,7 +64,7 @@ pub(crate) fn contrasts(
     if !Sensor::BOTH.iter().any(|s| dwell.moves(*s)) {
         return Vec::new();
     }
-    // Scaled by this, the mean over the samples becomes a scalar product.
+    // With each block scaled by the root of its share of the samples, a mean over the samples is a scalar product.
     let root = DVector::from_iterator(course.share.len(), course.share.iter().map(|s| s.sqrt()));
     let mut spanned = vec![root.clone()];
     for function in functions(course) {

@@ -20,11 +20,11 @@ pub(crate) fn wrong_gain(
     gravity_mps2: f64,
     figure: Figure,
 ) -> Option<Warning> {
-    said_of(sensor, false, scale, gravity_mps2, figure)
+    warning(sensor, false, scale, gravity_mps2, figure)
 }
 
 /// As [`wrong_gain`], also for readings at rest: these include biases, so `scale` differs from the scale factors of a fit.
-fn said_of(
+fn warning(
     sensor: Sensor,
     at_rest: bool,
     scale: f64,
@@ -121,7 +121,7 @@ pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> 
     }
     let gravity = manifest.gravity_mps2;
     let force = force.and_then(|size| {
-        said_of(
+        warning(
             Sensor::Accel,
             true,
             size / gravity,

@@ -30,8 +30,8 @@ impl Suitability {
         known.clone().sum::<f64>() / known.count() as f64
     }
 
-    /// For a channel that begins `samples` later than the segment: nothing is known before that, and its means no longer match those of the
-    /// temperature in time.
+    /// For a channel that begins `samples` later than the segment: before that nothing is known, and its means no longer are at the times of those
+    /// of the temperature.
     pub fn begin_later(&mut self, samples: usize) {
         let windows = samples / self.window;
         self.moving.splice(0..0, vec![false; windows]);

@@ -49,7 +49,7 @@ pub(super) fn candidates(
             not_seen();
             continue;
         };
-        // Sigmas at which a coefficient of one would be seen, at the parameter that shows it best.
+        // How many sigmas a coefficient of 1 would be from zero, at the nonlinear parameter at which it shows best.
         let mut best = vec![0.0_f64; effect.coefficients.len()];
         for parameter in candidate.parameters() {
             let seen = across(&candidate.columns(rows, parameter));

@@ -61,7 +61,7 @@ impl Builder<'_> {
         let centre = readings.iter().sum::<Vector3<f64>>() / n as f64;
         let mut strata = Vec::new();
         // Writes a row of the nuisance: derivatives of an observation by the parameters of `axis`.
-        let mut owes =
+        let mut derivatives =
             |row: usize, o: &Observation, axis: usize, bias: f64, reading: Vector3<f64>| {
                 nuisance[(row, 4 * axis)] = bias;
                 for k in 0..3 {
@@ -79,7 +79,7 @@ impl Builder<'_> {
             };
         for axis in 0..3 {
             for (i, o) in observations.iter().enumerate() {
-                owes(y.len(), o, axis, 1.0, readings[i] - centre);
+                derivatives(y.len(), o, axis, 1.0, readings[i] - centre);
                 let predicted = readings[i][axis];
                 self.mean_row(o.dwell, &conditions[i], Vector3::ith(axis, 1.0));
                 y.push((o.raw[axis] - predicted) / scale[axis]);
@@ -118,7 +118,7 @@ impl Builder<'_> {
         for axis in 0..if within.is_empty() { 0 } else { 3 } {
             let from = y.len();
             for (contrast, o) in &within {
-                owes(y.len(), o, axis, 0.0, forward.matrix * o.input);
+                derivatives(y.len(), o, axis, 0.0, forward.matrix * o.input);
                 let place = dwells.partition_point(|d| *d < contrast.dwell);
                 self.contrast_row(contrast, &conditions[place], axis);
                 let predicted = (forward.matrix.row(axis) * o.input)[(0, 0)];

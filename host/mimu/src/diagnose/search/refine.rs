@@ -58,7 +58,7 @@ impl Beside<'_> {
         self.climb(candidate, (first.parameter, at_first), |columns| columns)
     }
 
-    /// The same for an unlisted alternative model. Only its part that the model does not contain yet is fitted, and has a cost.
+    /// The same for an unlisted alternative model. Only the part of it that is not in the model yet is fitted and costs degrees of freedom.
     pub fn law(&self, law: &Candidate, first: f64) -> Option<(f64, With)> {
         let part = |columns: DMatrix<f64>| independent_of(&columns, &self.model);
         let columns = part(law.columns(self.search.rows, first));

@@ -38,7 +38,7 @@ impl<P> Optimum<P> {
 
 /// Largest excess that is allowed over the region.
 pub const TOLERANCE: f64 = 1e-6;
-/// Largest excess aimed at on the candidates. It is smaller, so that an exact design that attains the optimum has an
+/// Largest excess on the candidates. It is smaller than [`TOLERANCE`], so that an exact design that attains the optimum has an
 /// efficiency of 1 to eight digits.
 const ON_CANDIDATES: f64 = 1e-8;
 /// Rounds of exchanges on one list of candidates.

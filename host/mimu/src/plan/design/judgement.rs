@@ -17,7 +17,7 @@ pub struct Determined {
     /// Its sigma, normalised: times [`Parameter::si`] in SI, times [`Parameter::shown`] in the unit for
     /// display. Infinite if undetermined.
     pub sigma: f64,
-    /// That over the sigma if all the other parameters were known: 1 if orthogonal to them. Its square is the
+    /// Sigma over that with all other parameters known: 1 if the parameter is orthogonal to them. Its square is the
     /// variance inflation factor.
     pub inflation: f64,
 }

@@ -35,8 +35,8 @@ pub trait Region: Sync {
 const STEPS: [f64; 2] = [0.1, 1e-7];
 /// Gain in a logarithm of a determinant below which it is rounding.
 const GAIN: f64 = 1e-13;
-/// Least gain of a move in a climb, over the square of its length. Without it a climb crept along a ridge for ever:
-/// if a table has an axis of symmetry, maxima are whole rings.
+/// Least gain of a move in a climb, divided by the square of its length. A table with an axis of symmetry has whole rings of maxima: without this
+/// limit a climb went round such a ring for ever.
 const SUFFICIENT: f64 = 1e-2;
 /// Most moves and halvings of a climb. If it ends by this, only a nearly level ridge is left to climb.
 const MOVES: usize = 300;

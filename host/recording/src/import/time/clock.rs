@@ -179,7 +179,7 @@ impl Times {
     }
 }
 
-/// A rate without the last digits, which come only from rounded time stamps.
+/// A rate without its last digits, which are rounding of the time stamps.
 fn tidy(rate_hz: f64) -> f64 {
     format!("{rate_hz:.7e}").parse().unwrap_or(rate_hz)
 }
