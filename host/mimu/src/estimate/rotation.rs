@@ -13,9 +13,9 @@ use super::least_squares::{Linearized, Observability, Reweighted};
 use super::{Estimated, Failure};
 use crate::observable::Observable;
 use crate::observation::turn::{Motion, Rest, Rotations, Turn, TurnError};
-use crate::observation::{ByTriad, from_centre, vector};
+use crate::observation::{ByTriad, from_centre};
 use crate::quantity::AXES;
-use crate::triad::{Covariance, Part, Triad};
+use crate::triad::{Covariance, Part, Triad, affine};
 
 /// Number of parameters: nine of C, three of o.
 pub const PARAMETERS: usize = 12;
@@ -54,6 +54,191 @@ fn guess(motions: &[Motion], rest: &Vector3<f64>, gravity: f64) -> Option<Matrix
     c.iter().all(|x| x.is_finite()).then_some(c)
 }
 
+/// The turns and rests of a gyro about its mean reading at rest. Parameters are of order one: C in units of its own size, o about that reading, and the
+/// Earth's level rate in each chain.
+struct ByTurns<'a> {
+    turns: &'a [Turn<'a>],
+    rest: &'a [Rest],
+    at_rest: Vector3<f64>,
+    /// Units of the twelve parameters.
+    scale: ByTriad,
+    rotations: Rotations,
+    chains: Chains,
+}
+
+impl<'a> ByTurns<'a> {
+    /// `size` is that of a row of C.
+    fn of(turns: &'a [Turn<'a>], rest: &'a [Rest], at_rest: Vector3<f64>, size: f64) -> Self {
+        Self {
+            turns,
+            rest,
+            at_rest,
+            scale: ByTriad::from_fn(|k, _| if k < 9 { size } else { 1.0 }),
+            rotations: Rotations::new(turns, &at_rest),
+            chains: Chains::of(turns, rest),
+        }
+    }
+
+    /// Numbers of rows of turns and of rests.
+    fn rows(&self) -> [usize; 2] {
+        [2 * self.turns.len(), 3 * self.rest.len()]
+    }
+
+    /// Number of parameters.
+    fn parameters(&self) -> usize {
+        PARAMETERS + 2 * self.chains.count
+    }
+
+    /// The parameters of a gyro with the matrix `first`.
+    fn start(&self, first: &Matrix3<f64>) -> DVector<f64> {
+        DVector::from_fn(self.parameters(), |k, _| match k {
+            0..9 => first[(k / 3, k % 3)] / self.scale[k],
+            _ => 0.0,
+        })
+    }
+
+    /// The gyro with these parameters: `ω = C (u - at_rest) + o`.
+    fn model(&self, p: &DVector<f64>) -> Affine<f64> {
+        affine(&ByTriad::from_fn(|k, _| self.scale[k] * p[k]))
+    }
+
+    fn errors(&self, model: &Affine<f64>) -> Vec<TurnError> {
+        let turned = self.rotations.at(&model.matrix, &model.offset);
+        let each = self.turns.iter().zip(&turned);
+        each.map(|(turn, turned)| TurnError::of(turn, turned))
+            .collect()
+    }
+
+    /// Unweighted residuals and derivatives: rad, then rad/s.
+    fn linearize(&self, p: &DVector<f64>) -> Linearized {
+        let model = self.model(p);
+        let errors = self.errors(&model);
+        let rows = (self.chains).rows(self.turns, &errors, self.rest, &model, &self.at_rest);
+        let mut out = Linearized::zeros(rows.len(), self.parameters());
+        for (row, found) in rows.iter().enumerate() {
+            out.residuals[row] = found.residual;
+            let own = found.by.component_mul(&self.scale).transpose();
+            out.jacobian.view_mut((row, 0), (1, 12)).copy_from(&own);
+            for (place, by) in found.by_level() {
+                let column = PARAMETERS + place;
+                out.jacobian[(row, column)] = by;
+                out.residuals[row] += by * p[column];
+            }
+        }
+        out
+    }
+
+    /// Known variances of the rows.
+    fn variances(&self, p: &DVector<f64>) -> Vec<f64> {
+        let c = self.model(p).matrix;
+        let squared = c.component_mul(&c);
+        let mean = squared.sum() / 3.0;
+        // In a chain the Earth's level rate is among the parameters.
+        let unknown = |chain: &Option<usize>| f64::from(u8::from(chain.is_none()));
+        let turns = self.turns.iter().zip(&self.chains.of_turn);
+        let turns =
+            turns.flat_map(|(t, chain)| [t.variance(mean) + unknown(chain) * t.earth_variance; 2]);
+        let rest = self.rest.iter().zip(&self.chains.of_rest);
+        let rest = rest.flat_map(|(o, chain)| {
+            let v = squared * o.variance + o.rate_variance * unknown(chain) + o.vertical_variance;
+            <[f64; 3]>::from(v)
+        });
+        turns.chain(rest).map(|v| v.max(1e-20)).collect()
+    }
+
+    /// Derivatives of the turns' residuals by C and o of the accelerometer.
+    fn by_accelerometer(&self, p: &DVector<f64>) -> DMatrix<f64> {
+        let mut by = DMatrix::zeros(self.rows()[0], 12);
+        let errors = self.errors(&self.model(p));
+        for (t, (turn, error)) in self.turns.iter().zip(errors).enumerate() {
+            for (k, columns) in error.by_accel(&turn.raw).iter().enumerate() {
+                by.row_mut(2 * t + k).copy_from(&columns.transpose());
+            }
+        }
+        by
+    }
+
+    /// The gyro at the parameters `p`, raw to rad/s, and what a unit of each of its twelve parameters adds to it.
+    fn about_zero(&self, p: &DVector<f64>) -> (Affine<f64>, Covariance) {
+        let Affine { matrix, offset } = self.model(p);
+        let inverse = Affine {
+            matrix,
+            offset: offset - matrix * self.at_rest,
+        };
+        let change = from_centre(&self.at_rest) * SMatrix::from_diagonal(&self.scale);
+        (inverse, change)
+    }
+}
+
+/// A fit so far.
+struct Round {
+    parameters: DVector<f64>,
+    condition: f64,
+    /// Covariance of all parameters by the scatter of each group.
+    of_groups: [DMatrix<f64>; 2],
+    /// What a unit of each of the accelerometer's parameters adds to the gyro's.
+    gain: DMatrix<f64>,
+}
+
+/// One minimum with the weights of `groups`, which are then estimated again; and whether they have converged.
+fn round(
+    by: &ByTurns,
+    start: DVector<f64>,
+    accel: &Triad,
+    groups: &mut Reweighted<2>,
+) -> Result<(Round, bool), Failure> {
+    let lost = || Failure::NoSolution("the fit of the gyro to the turns does not converge".into());
+    let variances = by.variances(&start);
+    let found = groups
+        .minimize(start, &variances, |p| by.linearize(p))
+        .ok_or_else(lost)?;
+    let (last, turns) = (&found.at, by.rows()[0]);
+    let shape = Observability::of(&last.jacobian.rows(0, turns).columns(0, 9).into_owned());
+    if !shape.is_complete() {
+        return Err(undetermined(&shape));
+    }
+    let covariance = last.covariance()?;
+    // Errors of the accelerometer's calibration are common to all turns. They go into the parameters in full, and into the size that residuals
+    // may have, but not into the weights.
+    let by_accel = by.by_accelerometer(&found.parameters);
+    let mut weighted = by_accel.clone();
+    for (mut row, weight) in weighted.row_iter_mut().zip(&found.weights) {
+        row *= *weight;
+    }
+    let gain = &covariance * last.jacobian.rows(0, turns).transpose() * weighted;
+    let rows = groups.rows.each_ref();
+    let of_groups = rows.map(|rows| last.part(&covariance, rows));
+    let of_accel = DMatrix::from_fn(12, 12, |i, j| accel.inverse_covariance[(i, j)]);
+    let common = (&by_accel * of_accel).component_mul(&by_accel).column_sum();
+    let mut allowed = variances;
+    for (allowed, common) in allowed.iter_mut().zip(&common) {
+        *allowed += common;
+    }
+    let converged = groups.update(&found, &covariance, &allowed, 1e-3);
+    let round = Round {
+        parameters: found.parameters,
+        condition: shape.condition,
+        of_groups,
+        gain,
+    };
+    Ok((round, converged))
+}
+
+fn undetermined(shape: &Observability) -> Failure {
+    let names: Vec<String> = shape
+        .undetermined
+        .iter()
+        .map(|(k, _)| format!("C_{}{}", AXES[k / 3], AXES[k % 3]))
+        .collect();
+    Failure::Undetermined {
+        parameters: names.join(", "),
+        add: "add turns about every axis, with that axis level and slanted: gravity does not show a turn about the vertical".into(),
+    }
+}
+
+/// Most rounds.
+const ROUNDS: usize = 30;
+
 /// Fits `ω = C u + o` to the turns and to the dwells (`rest`) together.
 ///
 /// The directions of gravity come from `accel`. Its errors are common to all turns, so its covariance is propagated into that of the gyro. (Without
@@ -86,190 +271,35 @@ pub fn estimate(
             )
         })?,
     };
-    // Parameters of order one: C in units of its own size, o about the reading at rest.
-    let unit = first.norm() / 3f64.sqrt();
-    let rotations = Rotations::new(turns, &at_rest);
-    let unpack = |p: &DVector<f64>| Affine {
-        matrix: Matrix3::from_fn(|i, j| unit * p[3 * i + j]),
-        offset: Vector3::new(p[9], p[10], p[11]),
-    };
-    let scale = ByTriad::from_fn(|k, _| if k < 9 { unit } else { 1.0 });
-    let chains = Chains::of(turns, rest);
-    let all = PARAMETERS + 2 * chains.count;
-    let (n_turns, n_rest) = (2 * turns.len(), 3 * rest.len());
-    // The turns at some parameters.
-    let errors = |model: &Affine<f64>| -> Vec<TurnError> {
-        let turned = rotations.at(&model.matrix, &model.offset);
-        let each = turns.iter().zip(&turned);
-        each.map(|(turn, turned)| TurnError::of(turn, turned))
-            .collect()
-    };
-    // Unweighted residuals and derivatives: rad, then rad/s.
-    let linearize = |p: &DVector<f64>| {
-        let model = unpack(p);
-        let mut out = Linearized::zeros(n_turns + n_rest, all);
-        let mut add =
-            |row: usize, residual: f64, by: ByTriad, chain: Option<usize>, level: [f64; 2]| {
-                let mut columns = out.jacobian.row_mut(row);
-                let own = by.component_mul(&scale);
-                columns
-                    .columns_mut(0, PARAMETERS)
-                    .copy_from(&own.transpose());
-                out.residuals[row] = residual;
-                if let Some(chain) = chain {
-                    for (l, by) in level.into_iter().enumerate() {
-                        let column = PARAMETERS + 2 * chain + l;
-                        columns[column] = by;
-                        out.residuals[row] += by * p[column];
-                    }
-                }
-            };
-        let turned = errors(&model);
-        let level = chains.level(turns, turned.iter().map(|t| t.rotation));
-        for (t, error) in turned.iter().enumerate() {
-            let earth = chains.of_turn[t].zip(level.get(&turns[t].to));
-            for k in 0..2 {
-                let by = earth.map(|(_, level)| error.by_level(k, level, turns[t].duration_s));
-                let (residual, chain) = (error.block.residual[k], earth.map(|e| e.0));
-                add(
-                    2 * t + k,
-                    residual,
-                    error.block.by(k),
-                    chain,
-                    by.unwrap_or_default(),
-                );
-            }
-        }
-        for (s, o) in rest.iter().enumerate() {
-            let block = vector::at(&model, &(o.raw - at_rest), &o.rate);
-            let earth = chains.of_rest[s].zip(level.get(&o.dwell));
-            for axis in 0..3 {
-                let by = earth.map(|(_, level)| level.map(|level| -level[axis]));
-                let (residual, chain) = (block.residual[axis], earth.map(|e| e.0));
-                add(
-                    n_turns + 3 * s + axis,
-                    residual,
-                    block.by(axis),
-                    chain,
-                    by.unwrap_or_default(),
-                );
-            }
-        }
-        out
-    };
-    let known = |p: &DVector<f64>| -> Vec<f64> {
-        let c = unpack(p).matrix;
-        let squared = c.component_mul(&c);
-        let mean = squared.sum() / 3.0;
-        let turns = turns.iter().zip(&chains.of_turn).flat_map(|(t, chain)| {
-            let earth = if chain.is_some() {
-                0.0
-            } else {
-                t.earth_variance
-            };
-            [t.variance(mean) + earth; 2]
-        });
-        let rest = rest.iter().zip(&chains.of_rest).flat_map(|(o, chain)| {
-            let earth = o.rate_variance * if chain.is_some() { 0.0 } else { 1.0 };
-            let v = squared * o.variance + earth + o.vertical_variance;
-            [v.x, v.y, v.z]
-        });
-        turns.chain(rest).map(|v| v.max(1e-20)).collect()
-    };
-    // Derivatives of the turns' residuals by C and o of the accelerometer.
-    let by_accelerometer = |p: &DVector<f64>| {
-        let mut by = DMatrix::zeros(n_turns, 12);
-        for (t, (turn, error)) in turns.iter().zip(errors(&unpack(p))).enumerate() {
-            for (k, columns) in error.by_accel(&turn.raw).iter().enumerate() {
-                by.row_mut(2 * t + k).copy_from(&columns.transpose());
-            }
-        }
-        by
-    };
-    let accel_covariance = DMatrix::from_fn(12, 12, |i, j| accel.inverse_covariance[(i, j)]);
-    let mut p = DVector::from_fn(all, |k, _| {
-        if k < 9 {
-            first[(k / 3, k % 3)] / unit
-        } else {
-            0.0
-        }
-    });
+    let by = ByTurns::of(turns, rest, at_rest, first.norm() / 3f64.sqrt());
+    let [n_turns, n_rest] = by.rows();
+    let mut p = by.start(&first);
     // The first weights: half a degree, and the scatter of the dwells.
-    let r = linearize(&p).residuals;
-    let of_rest = r.rows(n_turns, n_rest).norm_squared() / n_rest as f64;
+    let residuals = by.linearize(&p).residuals;
+    let of_rest = residuals.rows(n_turns, n_rest).norm_squared() / n_rest as f64;
     let mut groups = Reweighted::new(
         [0..n_turns, n_turns..n_turns + n_rest],
         [0.5f64.to_radians().powi(2), of_rest],
     );
-    let lost = || Failure::NoSolution("the fit of the gyro to the turns does not converge".into());
-    let mut gain = DMatrix::zeros(all, 12);
-    let mut of_groups = [(); 2].map(|()| DMatrix::zeros(all, all));
-    let mut condition = f64::INFINITY;
-    for round in 0..30 {
-        let variances = known(&p);
-        let found = groups.minimize(p, &variances, linearize).ok_or_else(lost)?;
-        let last = &found.at;
-        let turns_only = last.jacobian.rows(0, n_turns).columns(0, 9).into_owned();
-        let shape = Observability::of(&turns_only);
-        if !shape.is_complete() {
-            let names: Vec<String> = shape
-                .undetermined
-                .iter()
-                .map(|(k, _)| format!("C_{}{}", AXES[k / 3], AXES[k % 3]))
-                .collect();
-            return Err(Failure::Undetermined {
-                parameters: names.join(", "),
-                add: "add turns about every axis, with that axis level and slanted: gravity does not show a turn about the vertical".into(),
-            });
+    let mut count = 0;
+    let last = loop {
+        let (found, converged) = round(&by, p, accel, &mut groups)?;
+        count += 1;
+        if converged && count > 1 || count == ROUNDS {
+            break found;
         }
-        condition = shape.condition;
-        let covariance = last.covariance()?;
-        // Errors of the accelerometer's calibration are common to all turns. They go into the parameters in full, and into the size that residuals
-        // may have, but not into the weights.
-        let by = by_accelerometer(&found.parameters);
-        let mut weighted = by.clone();
-        for (mut row, weight) in weighted.row_iter_mut().zip(&found.weights) {
-            row *= *weight;
-        }
-        gain = &covariance * last.jacobian.rows(0, n_turns).transpose() * weighted;
-        of_groups = groups
-            .rows
-            .each_ref()
-            .map(|rows| last.part(&covariance, rows));
-        let common = (&by * &accel_covariance).component_mul(&by).column_sum();
-        let allowed: Vec<f64> = variances
-            .iter()
-            .enumerate()
-            .map(|(k, v)| v + common.get(k).copied().unwrap_or(0.0))
-            .collect();
-        let converged = groups.update(&found, &covariance, &allowed, 1e-3);
         p = found.parameters;
-        if converged && round > 0 {
-            break;
-        }
-    }
-    let Affine { matrix, offset } = unpack(&p);
-    let inverse = Affine {
-        matrix,
-        offset: offset - matrix * at_rest,
     };
-    let change = from_centre(&at_rest) * SMatrix::from_diagonal(&scale);
-    let in_unit = |m: &DMatrix<f64>| Covariance::from_fn(|i, j| m[(i, j)]);
-    let own = of_groups
-        .iter()
-        .zip(&groups.scatter)
-        .map(|(c, group)| Part {
-            covariance: in_unit(c),
-            dof: group.variance_dof(),
-        });
-    let gain = Covariance::from_fn(|i, j| gain[(i, j)]);
+    let (inverse, change) = by.about_zero(&last.parameters);
+    let own = last.of_groups.iter().zip(&groups.scatter);
+    let own = own.map(|(c, group)| Part {
+        covariance: Covariance::from_fn(|i, j| c[(i, j)]),
+        dof: group.variance_dof(),
+    });
+    let gain = Covariance::from_fn(|i, j| last.gain[(i, j)]);
     let of_accelerometer = accel.inverse_parts();
     let shared = of_accelerometer.iter().map(|part| part.seen_by(&gain));
     let parts = own.chain(shared).map(|part| part.seen_by(&change));
-    let scatter = [Observable::Turns, Observable::Rest]
-        .into_iter()
-        .zip(groups.scatter)
-        .collect();
     let triad = Triad::from_inverse(inverse, parts.collect()).ok_or_else(|| {
         Failure::NoSolution(
             "C is singular: the gyro does not respond to turns about some axis".into(),
@@ -277,8 +307,11 @@ pub fn estimate(
     })?;
     Ok(Estimated {
         triad,
-        scatter,
-        condition,
+        scatter: [Observable::Turns, Observable::Rest]
+            .into_iter()
+            .zip(groups.scatter)
+            .collect(),
+        condition: last.condition,
         delays: None,
         earth: Vec::new(),
         notes: Vec::new(),

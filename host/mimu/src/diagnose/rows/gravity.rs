@@ -207,45 +207,23 @@ impl Builder<'_> {
             .map(|d| self.dwell(*d, self.force(*d, accel)))
             .collect();
         let chains = Chains::of(&turns, &rest);
-        let level = chains.level(&turns, errors.iter().map(|e| e.rotation));
-        let mut nuisance = DMatrix::zeros(m + 3 * n, 12 + 2 * chains.count);
-        let mut add = |row: usize, by: &ByTriad, chain: Option<usize>, by_level: [f64; 2]| {
-            let mut columns = nuisance.row_mut(row);
-            columns.columns_mut(0, 12).copy_from(&by.transpose());
-            for (l, by) in by_level.into_iter().enumerate() {
-                if let Some(chain) = chain {
-                    columns[12 + 2 * chain + l] = by;
-                }
-            }
-        };
-        for (t, (turn, error)) in turns.iter().zip(&errors).enumerate() {
-            let earth = chains.of_turn[t].zip(level.get(&turn.to));
-            for side in 0..2 {
-                let by = earth.map(|(_, level)| error.by_level(side, level, turn.duration_s));
-                let chain = earth.map(|e| e.0);
-                add(
-                    2 * t + side,
-                    &error.block.by(side),
-                    chain,
-                    by.unwrap_or_default(),
-                );
-            }
-        }
+        let found = chains.rows(&turns, &errors, &rest, inverse, &Vector3::zeros());
         // The mean reading of all dwells at rest instead of each dwell's own, whose noise is in the row too. With the latter, a matrix
         // of zeros would explain that noise wholly, and `rate_x` with coefficient -1 would correct the turns for it.
         let at_rest = mean(rest.iter().map(|o| &o.raw));
         let by_rest = vector::at(inverse, &at_rest, &Vector3::zeros());
-        for (i, o) in rest.iter().enumerate() {
-            let earth = chains.of_rest[i].zip(level.get(&o.dwell));
-            for axis in 0..3 {
-                let by = earth.map(|(_, level)| level.map(|level| -level[axis]));
-                let chain = earth.map(|e| e.0);
-                add(
-                    m + axis * n + i,
-                    &by_rest.by(axis),
-                    chain,
-                    by.unwrap_or_default(),
-                );
+        let mut nuisance = DMatrix::zeros(m + 3 * n, 12 + 2 * chains.count);
+        for (k, row) in found.iter().enumerate() {
+            // Rests by axes.
+            let (to, by) = match k.checked_sub(m) {
+                None => (k, row.by),
+                Some(k) => (m + k % 3 * n + k / 3, by_rest.by(k % 3)),
+            };
+            nuisance
+                .view_mut((to, 0), (1, 12))
+                .copy_from(&by.transpose());
+            for (place, by) in row.by_level() {
+                nuisance[(to, 12 + place)] = by;
             }
         }
         let random_walk = (n > 0).then(|| self.random_walk(&dwells));
@@ -285,7 +263,7 @@ impl Builder<'_> {
         for axis in 0..3 {
             for (i, o) in rest.iter().enumerate() {
                 self.mean_row(o.dwell, &conditions[i], body.row(axis).transpose());
-                y.push(vector::at(inverse, &o.raw, &o.rate).residual[axis]);
+                y.push(found[m + 3 * i + axis].residual);
             }
             let c = inverse.matrix.row(axis);
             let noise = |i: usize, j: usize| match (i == j, &wander) {
