@@ -10,7 +10,7 @@
 //! | [`magnitude`] | error of a known magnitude: of gravity, or of a turntable's rate | by its triad |
 //! | [`turn`] | error of the direction of gravity after a turn, two components | by the gyro, by the forces before and after, and so by the accelerometer; by the Earth's level rate |
 //!
-//! A new kind is a file with a function that gives [`Block`], a row in this table, and a case in the tests of [`battery`].
+//! A new kind is a file with a function that gives [`Block`], a row in this table, and a case in the tests of `battery.rs`.
 
 #[cfg(test)]
 mod battery;
