@@ -35,6 +35,7 @@ def read(
     twos_complement: Mapping[str, int] | None = None,
     signed_low_byte: str | Sequence[str] | None = None,
     where: Mapping[str, Any] | None = None,
+    rows: str | None = None,
     topic: str | Sequence[str] | None = None,
     instance: int | None = None,
     means: bool = False,
@@ -61,7 +62,8 @@ def read(
     ``latitude`` in degrees, ``rate_hz`` in samples a second, ``step_gap`` in seconds. ``scale``, ``offset``, ``zero`` and
     ``twos_complement`` are by column or sensor: ``scale={"gyro": 0.0174533}``. ``faces`` maps the axis that was up to a file:
     ``{"+x": "a.csv", "-x": "b.csv", ...}``. For a turntable with known rates, give ``rate_dps="200,270"`` and ``rate_error="0.3%"``.
-    If a file has both sensors in different rows, give two lists of ``columns`` and ``where={"flag": [1, 2]}``. ``skip_broken=True`` leaves out up to 1 % of rows that cannot be read.
+    If a file has both sensors in different rows, give two lists of ``columns`` and ``where={"flag": [1, 2]}``. ``rows="..8799"`` reads these data rows
+    only. ``skip_broken=True`` leaves out up to 1 % of rows that cannot be read.
 
     The recording is written to ``output``, or to a temporary folder that is removed with it. Its ``imported`` and ``warnings`` are the results
     of the import.
@@ -71,7 +73,7 @@ def read(
     options: dict[str, Any] = dict(
         reference=reference, gravity=gravity, latitude=latitude, raw_unit=raw_unit, columns=columns, preset=preset, rate_hz=rate_hz,
         time_unit=time_unit, scale=scale, offset=offset, zero=zero, twos_complement=twos_complement, signed_low_byte=signed_low_byte,
-        where=where, topic=topic, instance=instance, means=means, sequence=sequence, faces=bool(faces), step_gap=step_gap, inputs=inputs,
+        where=where, rows=rows, topic=topic, instance=instance, means=means, sequence=sequence, faces=bool(faces), step_gap=step_gap, inputs=inputs,
         rate_dps=rate_dps, rate_error=rate_error, separator=separator, comment=comment, skip_broken=skip_broken, device=device, format=format, replace=replace,
     )
     named = [f"{face}={os.fspath(file)}" for face, file in (faces or {}).items()]
