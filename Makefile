@@ -121,7 +121,7 @@ nightly: toolchain blind fuzz web-tests ## what takes hours: more seeds, ten min
 DEMO ?= target/demo-$(SEED)
 SEED ?= 1
 demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is another unit with another effect
-	@echo "The firmware, the emulated board and the command are compiled first: some five minutes the first time, a minute after make test."
+	@echo "The firmware, the emulated board and the command are compiled first: some minutes the first time (five on two idle cores)."
 	@$(FIRMWARE)
 	@$(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bin mimu --bin demo
 	@rm -rf $(DEMO)
