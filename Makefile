@@ -139,7 +139,7 @@ example: toolchain ## import and fit a recording: the best real one available, o
 	$(CARGO) build --locked --release --bin mimu
 	./tests/example.sh target/release/mimu
 
-papers: toolchain ## compute every table and plot of docs/papers.md, and every table of the studies in docs/thermal.md (hours)
+papers: toolchain ## compute every table and plot in docs/papers, and every table of the studies in docs/thermal (hours)
 	$(CARGO) run --locked --release -p mimu-tests --bin papers
 	$(CARGO) run --locked --release -p mimu-tests --features studies --bin thermal -- write
 

@@ -19,7 +19,7 @@ struct Cli {
 
 /// Where to go on reading.
 const KEYS: &str =
-    "docs/bench.md has all keys of both files; rig/plans and rig/rigs have examples to copy.";
+    "docs/bench has all keys of both files; rig/plans and rig/rigs have examples to copy.";
 
 #[derive(Subcommand)]
 enum Command {

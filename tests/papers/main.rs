@@ -1,4 +1,4 @@
-//! `make papers`: computes every figure of docs/papers.md and inserts it.
+//! `make papers`: computes every figure of the pages in docs/papers and inserts it.
 //!
 //! People write the prose. This program makes the plots and the blocks between markers: `papers` writes them, `papers --check` compares them with the
 //! document. The check omits the intervals, which take longest and have their own tests; `papers --keep-intervals` writes everything else.
@@ -13,10 +13,17 @@ mod schemes;
 mod xu;
 mod xu_table_3;
 
-use std::path::Path;
 use std::process::ExitCode;
 
-use mimu_tests::page;
+use mimu_tests::page::{self, Pages};
+
+/// The pages with places for figures.
+const PAGES: [&str; 4] = [
+    "papers/fang.md",
+    "papers/xu.md",
+    "papers/niu.md",
+    "papers/designs.md",
+];
 
 fn main() -> ExitCode {
     let is_given = |flag: &str| std::env::args().any(|a| a == flag);
@@ -31,9 +38,7 @@ fn main() -> ExitCode {
 }
 
 fn run(check: bool, keep_intervals: bool) -> Result<(), Box<dyn std::error::Error>> {
-    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
-    let path = docs.join("papers.md");
-    let written = std::fs::read_to_string(&path)?;
+    let written = Pages::read(&PAGES)?;
     let (dwells, charts) = dwells::blocks();
     let mut blocks: Vec<page::Block> = fang::blocks()
         .into_iter()
@@ -48,21 +53,17 @@ fn run(check: bool, keep_intervals: bool) -> Result<(), Box<dyn std::error::Erro
         true => intervals::kept(),
         false => intervals::blocks(),
     });
-    let computed = page::filled("docs/papers.md", &written, &blocks)?;
+    let computed = written.filled(&blocks)?;
     if check {
-        let differs = written
-            .lines()
-            .zip(computed.lines())
-            .find(|(w, c)| !page::agree(w, c));
-        return match differs {
-            Some((w, c)) => Err(format!(
-                "docs/papers.md says\n  {w}\nand it comes out as\n  {c}\nrun make papers"
+        return match written.first_difference(&computed) {
+            Some([page, written, computed]) => Err(format!(
+                "docs/{page} says\n  {written}\nand it comes out as\n  {computed}\nrun make papers"
             )
             .into()),
             None => Ok(()),
         };
     }
-    let folder = docs.join("papers");
+    let folder = page::docs().join("papers");
     std::fs::create_dir_all(&folder)?;
     for chart in &charts {
         chart.draw(&folder)?;
@@ -70,6 +71,5 @@ fn run(check: bool, keep_intervals: bool) -> Result<(), Box<dyn std::error::Erro
     for figure in [convergence::figure(), xu_table_3::figure()] {
         figure.draw(&folder)?;
     }
-    std::fs::write(&path, computed)?;
-    Ok(())
+    Ok(computed.write()?)
 }

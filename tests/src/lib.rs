@@ -13,7 +13,7 @@
 //! | [`niu`]                | niu's tables                                                      |
 //! | [`page`]               | tables in documents, between markers                              |
 //! | `tests/all/`           | agreement of estimators, intervals, diagnosis, published results  |
-//! | `papers/`, `blind/`    | figures of `docs/papers.md`; units with undeclared effects        |
+//! | `papers/`, `blind/`    | figures of `docs/papers`; units with undeclared effects        |
 //! | `board/`, `counted/`, `no_panic/` | separate crates: the firmware's image on the emulated board, the cost of its loops, freedom from panics |
 //! | `example.sh`, `example/` | the commands of `make example`, and the small recording that it uses if the public ones are absent |
 

@@ -85,41 +85,82 @@ pub fn significant(x: f64) -> String {
     }
 }
 
-/// `document` with every block in its place; `name` is that of the document. Blocks and places must match one to one.
-///
-/// # Errors
-/// A block without a place, or a place without a block.
-pub fn filled(name: &str, document: &str, blocks: &[Block]) -> Result<String, String> {
-    let mut out = document.to_string();
-    for block in blocks {
-        let (open, close) = (
-            format!("<!-- {} -->\n", block.name),
-            format!("<!-- /{} -->", block.name),
-        );
-        let start = out
-            .find(&open)
-            .ok_or(format!("{name} has no place {open:?}"))?
-            + open.len();
-        let end = out
-            .find(&close)
-            .filter(|end| *end >= start)
-            .ok_or(format!("{name} has no {close:?}"))?;
-        if let Some(text) = &block.text {
-            out.replace_range(start..end, &format!("\n{}\n\n", text.trim_end()));
+/// Pages of `docs/` with places for blocks, by their names within that folder.
+pub struct Pages(Vec<(&'static str, String)>);
+
+impl Pages {
+    /// Reads the pages `names`.
+    ///
+    /// # Errors
+    /// A page that cannot be read.
+    pub fn read(names: &[&'static str]) -> Result<Self, String> {
+        let read = |name: &&'static str| {
+            let text = std::fs::read_to_string(docs().join(name));
+            text.map(|t| (*name, t))
+                .map_err(|e| format!("docs/{name}: {e}"))
+        };
+        names.iter().map(read).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// The pages with every block in its place. Blocks and places must match one to one.
+    ///
+    /// # Errors
+    /// A block without a place, or a place without a block.
+    pub fn filled(&self, blocks: &[Block]) -> Result<Self, String> {
+        let mut pages = self.0.clone();
+        for block in blocks {
+            let (open, close) = (
+                format!("<!-- {} -->\n", block.name),
+                format!("<!-- /{} -->", block.name),
+            );
+            let page = pages.iter_mut().find(|(_, text)| text.contains(&open));
+            let (name, out) = page.ok_or(format!("no page has a place {open:?}"))?;
+            let start = out.find(&open).unwrap_or_default() + open.len();
+            let end = out
+                .find(&close)
+                .filter(|end| *end >= start)
+                .ok_or(format!("docs/{name} has no {close:?}"))?;
+            if let Some(text) = &block.text {
+                out.replace_range(start..end, &format!("\n{}\n\n", text.trim_end()));
+            }
         }
+        let places: usize = pages.iter().map(|p| p.1.matches("<!-- /").count()).sum();
+        if places != blocks.len() {
+            let count = blocks.len();
+            return Err(format!("the pages have {places} places for {count} blocks"));
+        }
+        Ok(Self(pages))
     }
-    let places = out.matches("<!-- /").count();
-    if places != blocks.len() {
-        return Err(format!(
-            "{name} has {places} places for {} blocks",
-            blocks.len()
-        ));
+
+    /// The first line that differs in words or by more than 3 % in a number: its page, as it is here, and as it is in `other`.
+    pub fn first_difference<'a>(&'a self, other: &'a Self) -> Option<[&'a str; 3]> {
+        let mut pages = self.0.iter().zip(&other.0);
+        pages.find_map(|((name, here), (_, there))| {
+            let mut lines = here.lines().zip(there.lines());
+            let (a, b) = lines.find(|(a, b)| !agree(a, b))?;
+            Some([*name, a, b])
+        })
     }
-    Ok(out)
+
+    /// Writes the pages.
+    ///
+    /// # Errors
+    /// A page that cannot be written.
+    pub fn write(&self) -> Result<(), String> {
+        let mut each = self.0.iter();
+        each.try_for_each(|(name, text)| {
+            std::fs::write(docs().join(name), text).map_err(|e| format!("docs/{name}: {e}"))
+        })
+    }
+}
+
+/// The folder of the documents.
+pub fn docs() -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs")
 }
 
 /// Whether two lines have the same words and the same numbers to 3 %. The tolerance allows for machines whose sine rounds differently.
-pub fn agree(a: &str, b: &str) -> bool {
+fn agree(a: &str, b: &str) -> bool {
     let words = |line: &str| -> Vec<String> {
         let cells = line.replace('|', " ");
         cells.split_whitespace().map(ToString::to_string).collect()

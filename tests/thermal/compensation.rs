@@ -174,7 +174,7 @@ fn on_board(rig: &str) -> String {
 }
 
 /// Gyro x, y, z at 10 deg/s about that axis upright, then accelerometer x, y, z at rest with that axis down, as in the text of 5.1. (Table 8 has it
-/// up, which agrees worse with the means of Tables 10 and 11: docs/papers.md.)
+/// up, which agrees worse with the means of Tables 10 and 11: docs/papers/niu.md.)
 fn plan(test: usize, ramp_s: f64) -> String {
     let (rate_dps, along) = if test < 3 { (10.0, 1.0) } else { (0.0, -1.0) };
     let up: [f64; 3] = std::array::from_fn(|i| if i == test % 3 { along } else { 0.0 });

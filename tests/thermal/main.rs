@@ -1,4 +1,4 @@
-//! Studies over temperature: the tables of `docs/thermal.md`. `make papers` computes all of them and inserts them.
+//! Studies over temperature: the tables of the pages in `docs/thermal`. `make papers` computes all of them and inserts them.
 //!
 //! `cargo run --release -p mimu-tests --features studies --bin thermal --` with one of
 //!
@@ -10,9 +10,10 @@
 //! | `compensation` | niu's six tests of compensation, by the device's arithmetic |
 //! | `sweep [RUNS]` | poses spread over the sphere while the temperature goes up and down, with the default unit |
 //! | `cooling` | lines against curvature on a recording that only cools |
+//! | `repeatability` | niu's three ramps against his soak both ways |
 //! | `planned [RUNS]` | what `mimu thermal plan --procedure ramp` promises |
 //! | `board FOLDER` | files for the tests of compensation on the emulated board |
-//! | `write [COMMAND ...]` | these tables, or all, into the document, each with the number of runs of the document |
+//! | `write [COMMAND ...]` | these tables, or all, into the pages, each with the number of runs of the pages |
 
 mod compensation;
 mod cooling;
@@ -20,6 +21,7 @@ mod dies;
 mod fang;
 mod on_bench;
 mod planned;
+mod repeatability;
 mod side_by_side;
 mod simulation;
 mod soak;
@@ -29,19 +31,26 @@ mod sweep;
 use std::path::Path;
 use std::process::ExitCode;
 
-use mimu_tests::page::{Block, filled};
+use mimu_tests::page::{Block, Pages};
+
+/// The pages with places for tables.
+const PAGES: [&str; 3] = [
+    "thermal/measured.md",
+    "thermal/papers.md",
+    "thermal/planning.md",
+];
 
 /// A command that computes tables.
 struct Study {
     command: &'static str,
-    /// Runs of the document's tables.
+    /// Runs of the pages' tables.
     runs: u64,
-    /// Places of its tables in the document.
+    /// Places of its tables in the pages.
     names: &'static [&'static str],
     blocks: fn(u64) -> Vec<Block>,
 }
 
-const STUDIES: [Study; 7] = [
+const STUDIES: [Study; 8] = [
     Study {
         command: "dies",
         runs: 200,
@@ -83,6 +92,12 @@ const STUDIES: [Study; 7] = [
         runs: 8,
         names: &planned::NAMES,
         blocks: planned::blocks,
+    },
+    Study {
+        command: "repeatability",
+        runs: 1,
+        names: &repeatability::NAMES,
+        blocks: repeatability::blocks,
     },
 ];
 
@@ -135,7 +150,6 @@ fn write(wanted: &[&str]) -> Result<(), Box<dyn std::error::Error>> {
     for command in wanted {
         found(command)?;
     }
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/thermal.md");
     for study in &STUDIES {
         if !wanted.is_empty() && !wanted.contains(&study.command) {
             continue;
@@ -147,8 +161,7 @@ fn write(wanted: &[&str]) -> Result<(), Box<dyn std::error::Error>> {
                 .flat_map(|s| s.names)
                 .map(|name| Block { name, text: None }),
         );
-        let document = std::fs::read_to_string(&path)?;
-        std::fs::write(&path, filled("docs/thermal.md", &document, &blocks)?)?;
+        Pages::read(&PAGES)?.filled(&blocks)?.write()?;
     }
     Ok(())
 }

@@ -23,7 +23,7 @@ struct Cli {
 
 /// References for further reading.
 const KEYS: &str =
-    "docs/bench.md has all keys of both files; rig/plans and rig/rigs have examples to copy.";
+    "docs/bench has all keys of both files; rig/plans and rig/rigs have examples to copy.";
 
 #[derive(Subcommand)]
 enum Command {

@@ -1,4 +1,4 @@
-//! `docs/bench.md` against the code: exactly its keys, and the defaults.
+//! The pages in `docs/bench` against the code: exactly its keys, and the defaults.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -13,8 +13,9 @@ use mimu_rig::rig_file::RigFile;
 use mimu_rig::table::TableTruth;
 
 fn page() -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bench.md");
-    fs::read_to_string(path).unwrap()
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bench");
+    let read = |name| fs::read_to_string(folder.join(name)).unwrap();
+    ["plan.md", "rig.md", "effects.md"].map(read).concat()
 }
 
 /// Rows of the table after the first line that begins with `heading`: keys in backticks in the first cell, and the other cells.
@@ -148,12 +149,12 @@ fn the_page_has_every_effect_with_its_parameters() {
     for (id, cells) in &expected {
         let line = format!("| `{id}` | {} |", cells.join(" | ")).replace('¦', "\\|");
         let shown = documented.get(id);
-        assert_eq!(shown, Some(cells), "write to docs/bench.md:\n{line}\n");
+        assert_eq!(shown, Some(cells), "write to docs/bench:\n{line}\n");
     }
     for id in documented.keys() {
         assert!(
             expected.contains_key(id),
-            "docs/bench.md has {id}, which is no effect of the bench"
+            "docs/bench/effects.md has {id}, which is no effect of the bench"
         );
     }
 }

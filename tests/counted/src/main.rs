@@ -109,8 +109,34 @@ fn main() -> ! {
         }
         clean(&all);
     }
+    // xu's claim: what the forward model `u = P x + b` of both triads costs, with P⁻¹ kept and with an inverse for every sample.
+    let forward = black_box(Compensation {
+        gyro: affine(0.29),
+        accel: affine(0.08),
+    });
+    between(|| by_kept_inverse(&forward, &raw));
+    between(|| by_inverse(&forward, &raw));
     loop {
         cortex_m::asm::wfi();
+    }
+}
+
+/// `P⁻¹ (u - b)` with `P⁻¹` in place of the matrix and `b` in place of the offset.
+#[inline(never)]
+fn by_kept_inverse(model: &Compensation<f32>, raw: &Sample<f32>) -> Sample<f32> {
+    Sample {
+        gyro: model.gyro.matrix * (raw.gyro - model.gyro.offset),
+        accel: model.accel.matrix * (raw.accel - model.accel.offset),
+    }
+}
+
+/// `P⁻¹ (u - b)` with `P` in place of the matrix, inverted here.
+#[inline(never)]
+fn by_inverse(model: &Compensation<f32>, raw: &Sample<f32>) -> Sample<f32> {
+    let inverse = |p: &Matrix3<f32>| p.try_inverse().unwrap_or_default();
+    Sample {
+        gyro: inverse(&model.gyro.matrix) * (raw.gyro - model.gyro.offset),
+        accel: inverse(&model.accel.matrix) * (raw.accel - model.accel.offset),
     }
 }
 
