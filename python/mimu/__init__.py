@@ -24,13 +24,13 @@ from mimu._files import Export, SensorVerification, Verification, export, load, 
 from mimu._fit import Dwell, Figures, Fit, Parameter, SensorFit, fit
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._recording import read
-from mimu._result import Judgement
+from mimu._result import Judgement, Message
 
 __version__ = _version("mimu")
 
 __all__ = [
     "Allan", "Calibration", "Channel", "Coefficient", "CoefficientSigma", "Design", "Diagnosis", "Dwell", "Effect", "Error", "Export",
-    "Figures", "Fit", "Judgement", "Leftover", "NextExperiment", "Noise", "NoiseCoefficient", "NotExcited", "Parameter", "ParameterSigma",
+    "Figures", "Fit", "Judgement", "Leftover", "Message", "NextExperiment", "Noise", "NoiseCoefficient", "NotExcited", "Parameter", "ParameterSigma",
     "Recording", "Rejected", "SchemeComparison", "SensorDiagnosis", "SensorFit", "SensorVerification", "Shown", "Verification", "allan",
     "compare_schemes", "design", "diagnose", "export", "fit", "load", "load_noise", "next_experiment", "read", "thermal", "verify",
 ]

@@ -7,7 +7,7 @@ from typing import Literal
 
 from mimu import _mimu
 from mimu._mimu import Calibration, Noise, Recording
-from mimu._result import Array, Judgement, Result, judged, typed
+from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,8 @@ class Allan(Result):
     channels: list[Channel]
     #: Whether it may be used.
     judgement: Judgement
-    #: Warnings, one sentence each.
-    warnings: list[str]
+    #: Warnings, one sentence each, with its ``kind``.
+    warnings: list[Message]
     device: str
 
     def __init__(self, native: _mimu.Allan) -> None:
@@ -65,7 +65,7 @@ class Allan(Result):
         data = self.to_dict()
         self.channels = [typed(Channel, channel) for channel in data["channels"]]
         self.judgement = judged(data)
-        self.warnings = data["warnings"]
+        self.warnings = messages(data)
         self.device = data["device"]
 
     def __getitem__(self, name: str) -> Channel:

@@ -9,7 +9,7 @@ from mimu import _mimu
 from mimu._fit import Keep, Steps, _keep
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._recording import several
-from mimu._result import Judgement, Result, judged, typed
+from mimu._result import Judgement, Message, Result, judged, messages, typed
 
 
 @dataclass(frozen=True)
@@ -87,8 +87,8 @@ class Diagnosis(Result):
     sensors: dict[str, SensorDiagnosis]
     #: Whether it may be used.
     judgement: Judgement
-    #: Warnings, one sentence each.
-    warnings: list[str]
+    #: Warnings, one sentence each, with its ``kind``.
+    warnings: list[Message]
     device: str
 
     def __init__(self, native: _mimu.Diagnosis) -> None:
@@ -101,7 +101,7 @@ class Diagnosis(Result):
         self.leftover = [typed(Leftover, item) for item in data["leftover"]]
         self.sensors = {name: typed(SensorDiagnosis, sensor) for name, sensor in data["sensors"].items()}
         self.judgement = judged(data)
-        self.warnings = data["warnings"]
+        self.warnings = messages(data)
         self.device = data["device"]
 
     @property

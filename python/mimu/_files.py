@@ -11,7 +11,7 @@ from mimu._arguments import arguments
 from mimu._fit import Steps
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._recording import Path
-from mimu._result import Judgement, Result, judged, typed
+from mimu._result import Judgement, Message, Result, judged, messages, typed
 
 
 def load(path: Path) -> Calibration:
@@ -50,15 +50,15 @@ class Verification(Result):
     sensors: dict[str, SensorVerification]
     #: Whether it may be used.
     judgement: Judgement
-    #: Warnings, one sentence each.
-    warnings: list[str]
+    #: Warnings, one sentence each, with its ``kind``.
+    warnings: list[Message]
 
     def __init__(self, native: _mimu.Verification) -> None:
         super().__init__(native)
         data = self.to_dict()
         self.sensors = {name: typed(SensorVerification, sensor) for name, sensor in data["sensors"].items()}
         self.judgement = judged(data)
-        self.warnings = data["warnings"]
+        self.warnings = messages(data)
 
     def __str__(self) -> str:
         return self._native.text()

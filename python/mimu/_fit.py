@@ -10,7 +10,7 @@ import numpy as np
 
 from mimu import _mimu
 from mimu._mimu import Calibration, Noise, Recording
-from mimu._result import Array, Judgement, Result, judged, typed
+from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
 
 Steps = Literal["given", "found"]
 Sensor = Literal["gyro", "accel"]
@@ -119,8 +119,8 @@ class Fit(Result):
     dwells: list[Dwell]
     #: Whether it may be used.
     judgement: Judgement
-    #: Warnings, one sentence each.
-    warnings: list[str]
+    #: Warnings, one sentence each, with its ``kind``.
+    warnings: list[Message]
     device: str
 
     def __init__(self, native: _mimu.Fit) -> None:
@@ -131,7 +131,7 @@ class Fit(Result):
         self.held_out = {name: typed(Figures, sensor) for name, sensor in sensors.items()}
         self.dwells = [typed(Dwell, dwell) for dwell in data["dwells"]]
         self.judgement = judged(data)
-        self.warnings = data["warnings"]
+        self.warnings = messages(data)
         self.device = data["device"]
 
     @property

@@ -28,6 +28,28 @@ class Judgement:
         return f"{self.kind}: {self.reason}"
 
 
+class Message(str):
+    """A warning: the sentence, with its kind and what it is about. Programs rely on the kind and not on the sentence."""
+
+    #: As in ``"gaps"`` or ``"clipped"``.
+    kind: str
+    #: The sensor or channel: ``"gyro"``, ``"accel_x"``; None if it is about the whole.
+    about: str | None
+
+    def __new__(cls, message: str, kind: str = "", about: str | None = None) -> Message:
+        made = super().__new__(cls, message)
+        made.kind, made.about = kind, about
+        return made
+
+    def __getnewargs__(self) -> tuple[str, str, str | None]:  # type: ignore[override]
+        return str(self), self.kind, self.about
+
+
+def messages(data: dict[str, Any]) -> list[Message]:
+    """The warnings in the JSON of a result."""
+    return [Message(w["text"], w["kind"], w.get("about")) for w in data["warnings"]]
+
+
 class Native(Protocol):
     """A result of the compiled part."""
 

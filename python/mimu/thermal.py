@@ -10,7 +10,7 @@ from mimu import _mimu
 from mimu._fit import Steps
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._recording import several
-from mimu._result import Array, Judgement, Result, judged, typed
+from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ class ThermalFit(Result):
     curves: dict[str, Curve]
     #: Whether it may be used.
     judgement: Judgement
-    #: Warnings, one sentence each.
-    warnings: list[str]
+    #: Warnings, one sentence each, with its ``kind``.
+    warnings: list[Message]
     device: str
 
     def __init__(self, native: _mimu.ThermalFit) -> None:
@@ -76,7 +76,7 @@ class ThermalFit(Result):
         self.sensors = {name: typed(SensorThermal, sensor) for name, sensor in data["sensors"].items()}
         self.curves = {curve["name"]: typed(Curve, curve) for curve in data["curves"]}
         self.judgement = judged(data)
-        self.warnings = data["warnings"]
+        self.warnings = messages(data)
         self.device = data["device"]
 
     @property

@@ -254,7 +254,7 @@ function refusal(error) {
 function warn(warnings) {
   const known = new Set([...$("warnings").children].map((line) => line.textContent));
   for (const warning of warnings ?? []) {
-    const text = typeof warning === "string" ? warning : warning.message ?? JSON.stringify(warning);
+    const text = typeof warning === "string" ? warning : warning.text ?? JSON.stringify(warning);
     if (!known.has(text)) $("warnings").append(made("li", {}, ...withFields(text)));
   }
 }

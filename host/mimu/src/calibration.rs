@@ -328,9 +328,16 @@ impl Calibration {
     pub fn other_unit(&self, manifest: &Manifest) -> Option<Warning> {
         let (ours, theirs) = (self.device.clone(), manifest.device.clone());
         match (&self.unit_id, manifest.unit_id()) {
-            (Some(ours), Some(theirs)) => (!ours.eq_ignore_ascii_case(theirs))
-                .then(|| Warning::OtherUnit(ours.clone(), theirs.into())),
-            _ => are_two_units(&ours, &theirs).then_some(Warning::OtherDevice(ours, theirs)),
+            (Some(ours), Some(theirs)) => {
+                (!ours.eq_ignore_ascii_case(theirs)).then(|| Warning::OtherUnit {
+                    calibration: ours.clone(),
+                    recording: theirs.into(),
+                })
+            }
+            _ => are_two_units(&ours, &theirs).then_some(Warning::OtherDevice {
+                calibration: ours,
+                recording: theirs,
+            }),
         }
     }
 
@@ -338,7 +345,7 @@ impl Calibration {
     pub fn unnamed_unit(&self, manifest: &Manifest) -> Option<Warning> {
         let numbered = self.unit_id.is_some() && manifest.unit_id().is_some();
         let unnamed = [&self.device, &manifest.device].map(|name| name == UNNAMED);
-        (!numbered && unnamed != [false; 2]).then_some(Warning::UnnamedUnit(unnamed))
+        (!numbered && unnamed != [false; 2]).then_some(Warning::UnnamedUnit { unnamed })
     }
 
     /// Covariance of the inverse model of `sensor`: C by rows, then o. `None` if [it is not known](Self::is_uncertain).

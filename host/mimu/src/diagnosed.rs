@@ -71,7 +71,10 @@ pub fn diagnosed(
         match (before, after) {
             (Ok(before), Ok(after)) => judged = Some([before, after]),
             (Err(refusal), _) | (_, Err(refusal)) => {
-                let warning = Warning::NotJudged(Some(name.to_owned()), refusal);
+                let warning = Warning::NotJudged {
+                    recording: Some(name.to_owned()),
+                    why: refusal,
+                };
                 diagnosis.after.warnings.push(warning);
             }
         }
@@ -123,7 +126,10 @@ fn known(given: Option<&Calibration>, diagnosis: &mut Diagnosis) -> Vec<FittedEf
     let (kept, lost): (Vec<FittedEffect>, Vec<FittedEffect>) =
         all.partition(|effect| after.sensor(effect.sensor()).is_some());
     for effect in lost {
-        let warning = Warning::EffectLost(effect.id(), effect.sensor());
+        let warning = Warning::EffectLost {
+            effect: effect.id(),
+            sensor: effect.sensor(),
+        };
         after.warnings.push(warning);
     }
     kept

@@ -241,7 +241,11 @@ fn without_temperature(prepared: &Prepared) -> Option<Warning> {
             .filter(|t| t.is_finite())
     };
     let [low, high] = extent(temperatures());
-    (high - low > ISOTHERMAL_C).then_some(Warning::WithoutTemperature(low, high, None))
+    (high - low > ISOTHERMAL_C).then_some(Warning::WithoutTemperature {
+        low_c: low,
+        high_c: high,
+        sensor: None,
+    })
 }
 
 /// Fewer degrees of freedom than this do not reveal errors of the model.
@@ -276,7 +280,9 @@ fn finish(
         warnings.push(Warning::FewResiduals);
     }
     if estimated.condition > POORLY_DETERMINED {
-        warnings.push(Warning::PoorlyDetermined(estimated.condition));
+        warnings.push(Warning::PoorlyDetermined {
+            condition: estimated.condition,
+        });
     }
     if estimated.triad.inverse.matrix.determinant() < 0.0 {
         warnings.push(Warning::LeftHanded);

@@ -239,7 +239,7 @@ impl Noise {
     ) -> Result<()> {
         if are_two_units(&file.device, &manifest.device) {
             let (file, recording) = (file.device.clone(), manifest.device.clone());
-            warnings.push(Warning::NoiseOfAnother(file, recording));
+            warnings.push(Warning::NoiseOfAnother { file, recording });
         }
         let present = |c: &usize| dwells.iter().any(|d| d.raw[*c].n > 0);
         for c in (0..6).filter(present) {
@@ -290,7 +290,10 @@ impl Noise {
                 self.at_rest[c] = Some(at_rest);
             } else {
                 self.other[c] = Some(second);
-                let warning = Warning::NoisierThanFile(ratio.sqrt(), file.place.clone());
+                let warning = Warning::NoisierThanFile {
+                    times: ratio.sqrt(),
+                    file: file.place.clone(),
+                };
                 warnings.push(warning.of_channel(c));
             }
         }

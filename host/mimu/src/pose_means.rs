@@ -167,7 +167,13 @@ fn warnings(list: &[Dwell], means: &PoseMeans, has_raw: &[bool; 6]) -> Vec<Warni
         warnings.push(noise.of(sensor));
         let without = list.iter().filter(|d| d.faults[sensor].is_some()).count();
         if without > 0 {
-            warnings.push(Warning::MeansMissing(without, list.len()).of(sensor));
+            warnings.push(
+                Warning::MeansMissing {
+                    missing: without,
+                    rows: list.len(),
+                }
+                .of(sensor),
+            );
         }
         if sensor == Sensor::Gyro && means.manifest.reference == Reference::Gravity {
             warnings.push(Warning::MeansOfTurns.of(sensor));

@@ -471,11 +471,20 @@ impl Prepared {
                 .find(|l| l.sensor == Sensor::Gyro && [l.from, l.to] == [pair[0], pair[1]]);
             if let Some(left_out) = outlying {
                 let LeftOut { error, sigmas, .. } = *left_out;
-                refused.push(Warning::TurnLeftOut(a.step, b.step, error, sigmas));
+                refused.push(Warning::TurnLeftOut {
+                    from: a.step,
+                    to: b.step,
+                    error,
+                    sigmas,
+                });
                 continue;
             }
             if pieces.iter().any(|i| !i.whole) {
-                refused.push(Warning::TurnNotUsed(a.step, b.step, None));
+                refused.push(Warning::TurnNotUsed {
+                    from: a.step,
+                    to: b.step,
+                    fault: None,
+                });
                 continue;
             }
             let fault = Sensor::Gyro.channels().find_map(|c| {
@@ -492,7 +501,11 @@ impl Prepared {
                 stuck.then_some(Fault::Stuck(c))
             });
             if fault.is_some() {
-                refused.push(Warning::TurnNotUsed(a.step, b.step, fault));
+                refused.push(Warning::TurnNotUsed {
+                    from: a.step,
+                    to: b.step,
+                    fault,
+                });
                 continue;
             }
             let variance = |d: &crate::signal::dwell::Dwell| {
@@ -608,12 +621,14 @@ fn without_joins(condensed: &mut Condensed) {
     condensed.gaps = (gaps.len() as u64, gaps.iter().map(|g| g.0).sum());
     condensed
         .warnings
-        .retain(|w| !matches!(w, Warning::Gaps(..)));
+        .retain(|w| !matches!(w, Warning::Gaps { .. }));
     if let Some((_, row)) = gaps.first() {
         let (count, missing_s) = condensed.gaps;
-        condensed
-            .warnings
-            .push(Warning::Gaps(count, missing_s, row + 1));
+        condensed.warnings.push(Warning::Gaps {
+            count,
+            missing_s,
+            row: row + 1,
+        });
     }
 }
 

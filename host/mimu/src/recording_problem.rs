@@ -76,30 +76,46 @@ impl Seen {
     /// Kind of `warning`, if it is about a problem of the recording.
     fn of(warning: &Warning) -> Option<Self> {
         Some(match warning {
-            Warning::Of(_, warning) | Warning::Channel(_, warning) => return Self::of(warning),
-            Warning::NotSi(..)
-            | Warning::NotCounts(..)
-            | Warning::Turning(_)
-            | Warning::CalibrationOfOther(_)
-            | Warning::NoisierThanGyros(_) => Self::Unit,
-            Warning::Dead(_) => Self::DeadChannel,
-            Warning::EndOfConverter(..)
-            | Warning::FullScale(..)
-            | Warning::RunAtEnd(..)
-            | Warning::CalmEnd(..) => Self::Rails,
-            Warning::Clipped(_)
-            | Warning::DwellsNotUsed(_, Fault::Saturated(_), _)
-            | Warning::TurnNotUsed(_, _, Some(Fault::Saturated(_))) => Self::Clipping,
-            Warning::Held(..)
-            | Warning::DwellsNotUsed(_, Fault::Stuck(_), _)
-            | Warning::TurnNotUsed(_, _, Some(Fault::Stuck(_))) => Self::HeldReadings,
-            Warning::RateOff(..) => Self::Clock,
-            Warning::ImplausibleRate(_) => Self::SampleRate,
-            Warning::Gaps(..) | Warning::TurnNotUsed(_, _, None) => Self::Gaps,
-            Warning::Empty(..) | Warning::DwellsNotUsed(_, Fault::Missing(_), _) => {
-                Self::EmptySamples
+            Warning::Of { warning, .. } | Warning::Channel { warning, .. } => {
+                return Self::of(warning);
             }
-            Warning::NoTemperatures(_) => Self::Temperatures,
+            Warning::NotSi { .. }
+            | Warning::NotCounts { .. }
+            | Warning::Turning { .. }
+            | Warning::CalibrationOfOther { .. }
+            | Warning::NoisierThanGyros { .. } => Self::Unit,
+            Warning::Dead { .. } => Self::DeadChannel,
+            Warning::EndOfConverter { .. }
+            | Warning::FullScale { .. }
+            | Warning::RunAtEnd { .. }
+            | Warning::CalmEnd { .. } => Self::Rails,
+            Warning::Clipped { .. }
+            | Warning::DwellsNotUsed {
+                fault: Fault::Saturated(_),
+                ..
+            }
+            | Warning::TurnNotUsed {
+                fault: Some(Fault::Saturated(_)),
+                ..
+            } => Self::Clipping,
+            Warning::Held { .. }
+            | Warning::DwellsNotUsed {
+                fault: Fault::Stuck(_),
+                ..
+            }
+            | Warning::TurnNotUsed {
+                fault: Some(Fault::Stuck(_)),
+                ..
+            } => Self::HeldReadings,
+            Warning::RateOff { .. } => Self::Clock,
+            Warning::ImplausibleRate { .. } => Self::SampleRate,
+            Warning::Gaps { .. } | Warning::TurnNotUsed { fault: None, .. } => Self::Gaps,
+            Warning::Empty { .. }
+            | Warning::DwellsNotUsed {
+                fault: Fault::Missing(_),
+                ..
+            } => Self::EmptySamples,
+            Warning::NoTemperatures { .. } => Self::Temperatures,
             Warning::BiasRemoved(_) => Self::BiasRemoved,
             Warning::LogFault(fault) => match fault.change {
                 Change::Range(_) => Self::RangeChange,

@@ -148,7 +148,7 @@ pub fn survey(
             Read::Values(values) => values,
             Read::Dead(why) => {
                 next();
-                warnings.push(Warning::Dead(why.clone()).of_channel(i));
+                warnings.push(Warning::Dead { why: why.clone() }.of_channel(i));
                 channels.push(Channel::dead(i, units[done], why));
                 return Ok(());
             }
@@ -417,11 +417,17 @@ impl Channel {
         });
         let ramp = ramp.filter(|share| *share > RAMP_SHARE);
         let warning = match (heat, ramp) {
-            (Some((r, span_c)), _) => Warning::FollowsChamber(span_c, r),
-            (None, Some(share)) => Warning::Drifts(share, longest_s),
+            (Some((r, span_c)), _) => Warning::FollowsChamber {
+                span_c,
+                correlation: r,
+            },
+            (None, Some(share)) => Warning::Drifts { share, longest_s },
             (None, None) => return,
         };
-        warnings.push(Warning::Channel(self.name, Box::new(warning)));
+        warnings.push(Warning::Channel {
+            channel: self.name,
+            warning: Box::new(warning),
+        });
         if options.kind != Deviation::Hadamard {
             self.hadamard = Some(hadamard());
         }

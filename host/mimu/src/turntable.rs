@@ -141,7 +141,11 @@ impl RatedDwells {
         let step = |dwell: &usize| prepared.dwells.list[*dwell].step;
         let steps = self.others.iter().map(step);
         let names: Vec<String> = steps.map(|s| prepared.manifest.step_name(s)).collect();
-        (!names.is_empty()).then_some(Warning::DwellsNotUsed(names, Fault::OtherRate, None))
+        (!names.is_empty()).then_some(Warning::DwellsNotUsed {
+            dwells: names,
+            fault: Fault::OtherRate,
+            sensor: None,
+        })
     }
 
     /// Refuses a dwell whose rate in a fit of all dwells differs from its given rate; `fitted` are the fitted magnitudes, rad/s.

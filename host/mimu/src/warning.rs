@@ -3,17 +3,20 @@
 mod words;
 
 pub(crate) use words::CHECK_WIRING;
+use words::{degrees, extreme, off, open};
 
+use std::fmt::Display;
 use std::mem::discriminant;
 
 use mimu_recording::error::Error;
 use mimu_recording::{Held, NoTemperatures, RAW_COLUMNS};
+use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
 use crate::bias_removal::BiasRemoval;
 use crate::fault::Fault;
 use crate::log_fault::LogFault;
-use crate::quantity::{Sensor, normal_gravity};
+use crate::quantity::{Sensor, duration, normal_gravity, plural, significant};
 
 /// Range of the difference of local gravity from normal gravity at sea level, m/s²: heights of up to 5500 m subtract 0.017, and depths of
 /// 400 m add 0.001. Anomalies of the Earth's field are up to 0.003 either way (0.005 on a few peaks and islands).
@@ -22,204 +25,502 @@ const GRAVITY_OFF_MPS2: [f64; 2] = [-0.020, 0.005];
 /// Sample rates of inertial units, Hz. The fastest parts give 32 kHz; 0.05 Hz are 50 Hz whose stamps are in ms.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=40e3;
 
-/// What a person should know. JSON contains it as a sentence.
-#[derive(Debug, Clone, PartialEq)]
+/// What a person should know. JSON has its kind, what it is about, and the sentence.
+#[expect(
+    missing_docs,
+    reason = "the comment of a variant says what its fields are"
+)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Warning {
     /// One about a sensor.
-    Of(Sensor, Box<Warning>),
+    #[error("{sensor}: {warning}")]
+    Of {
+        sensor: Sensor,
+        warning: Box<Warning>,
+    },
     /// One about a channel.
-    Channel(&'static str, Box<Warning>),
+    #[error("{channel}: {warning}")]
+    Channel {
+        channel: &'static str,
+        warning: Box<Warning>,
+    },
+    /// One about a recording of several.
+    #[error("{recording}: {warning}")]
+    In {
+        recording: String,
+        warning: Box<Warning>,
+    },
     /// A warning from reading a recording.
+    #[error("{0}")]
     Reading(mimu_recording::Warning),
     /// Rate of the time stamps, Hz, its difference in per cent from the rate in the manifest, and that rate, Hz.
-    RateOff(f64, f64, f64),
+    #[error(
+        "the rate of the time stamps is {stamps_hz:.3} Hz, {off_percent:+.2} % off the {manifest_hz} Hz of its recording.toml; the stamps are used"
+    )]
+    RateOff {
+        stamps_hz: f64,
+        off_percent: f64,
+        manifest_hz: f64,
+    },
     /// Sample rate that no inertial unit has, Hz.
-    ImplausibleRate(f64),
+    #[error("{} Hz is not the sample rate of an inertial unit: are the times in ms or µs instead of s? All rates and the scale factors of the gyro would be wrong by the same factor", significant(*.rate_hz))]
+    ImplausibleRate { rate_hz: f64 },
     /// How many times gravity the specific force at rest is with the given calibration.
-    CalibrationOfOther(f64),
+    #[error("with the calibration the specific force at rest is {} times gravity: it belongs to another unit, or to readings in another unit", significant(*.times))]
+    CalibrationOfOther { times: f64 },
     /// White noise, rad/s/√Hz, that exceeds that of any gyro.
-    NoisierThanGyros(f64),
+    #[error("its white noise of {} deg/s/sqrt(Hz) exceeds that of any gyro: check whether the readings are in deg/s, and the calibration belongs to this unit", degrees(*.white))]
+    NoisierThanGyros { white: f64 },
     /// Gaps, the missing time in all, s, and the first data row after one.
-    Gaps(u64, f64, u64),
+    #[error("{}, {missing_s:.3} s missing in all, the first before data row {row}: turns are not integrated across gaps", plural(*.count, "gap"))]
+    Gaps {
+        count: u64,
+        missing_s: f64,
+        row: u64,
+    },
     /// Rows that repeat the row before.
-    Repeated(u64),
+    #[error(fmt = words::repeated)]
+    Repeated { rows: u64 },
     /// Samples of a channel that are empty or not a number.
-    Empty(u64, &'static str),
+    #[error("{} of {channel} empty or not a number: masked", plural(*.count, "sample"))]
+    Empty { count: u64, channel: &'static str },
     /// Samples of the thermometer that cannot be temperatures.
-    NoTemperatures(NoTemperatures),
+    #[error("temp_c: {}", .which.warning().unwrap_or_default())]
+    NoTemperatures { which: NoTemperatures },
     /// A channel without noise, and how it shows.
-    Dead(String),
+    #[error("{why}: it has no noise and is left out of a noise file; {CHECK_WIRING}")]
+    Dead { why: String },
     /// A sensor that is slower than its log, of this many rows a second.
-    Held(Sensor, Held, f64),
+    #[error(fmt = words::held)]
+    Held {
+        sensor: Sensor,
+        held: Held,
+        rate_hz: f64,
+    },
     /// A row from which on the readings mean something else.
+    #[error("from data row {} on {}: no calibration holds before and after it", .0.row + 1, .0.change)]
     LogFault(LogFault),
     /// Dwells that were cut at their ends, and by how much in all, s.
-    DwellsCut(u64, f64),
+    #[error("{} cut at the ends, by {cut_s:.1} s in all: the readings change there, as while the unit moves", plural(*.count, "dwell"))]
+    DwellsCut { count: u64, cut_s: f64 },
     /// Dwells that are poses of the accelerometer but not rests of the gyro.
-    SlowTurns(Vec<String>),
+    #[error("{} ({}) used as a pose only, not as a rest of the gyro: neither its bias in the other dwells nor g-sensitivity explains its reading; the unit probably turned slowly about the vertical", plural(.dwells.len() as u64, "dwell"), .dwells.join(", "))]
+    SlowTurns { dwells: Vec<String> },
     /// Dwells that are not used, and why: for both sensors alike or for one.
-    DwellsNotUsed(Vec<String>, Fault, Option<Sensor>),
+    #[error(fmt = words::dwells_not_used)]
+    DwellsNotUsed {
+        dwells: Vec<String>,
+        fault: Fault,
+        sensor: Option<Sensor>,
+    },
     /// Samples within dwells at a rail.
-    Clipped(u64),
+    #[error("{} within dwells at a rail of the converter: masked", plural(*.count, "sample"))]
+    Clipped { count: u64 },
     /// A dwell that is not used for a sensor, because an effect cannot be removed from it.
-    DwellWithEffect(i32, Sensor, Fault, String),
+    #[error(
+        "dwell {dwell}: not used for the {sensor}: {fault}, and {effect} cannot be removed without it"
+    )]
+    DwellWithEffect {
+        dwell: i32,
+        sensor: Sensor,
+        fault: Fault,
+        effect: String,
+    },
     /// How often a channel reads a value at the end of a converter, and that value.
-    EndOfConverter(u64, f64),
+    #[error("{} at {value}, the end of a 16-bit converter: treated as a rail", plural(*.count, "sample"))]
+    EndOfConverter { count: u64, value: f64 },
     /// Whether the highest value is a rail or the lowest, that value, how often it occurs in a row, and how often chance explains.
-    RunAtEnd(bool, f64, f64, f64),
+    #[error("the {} value {value} occurs {longest} times in a row, and chance explains {by_chance:.0}: treated as a rail", extreme(*.high))]
+    RunAtEnd {
+        high: bool,
+        value: f64,
+        longest: f64,
+        by_chance: f64,
+    },
     /// Whether the noise ends at the highest values or the lowest, and from which one on.
-    CalmEnd(bool, f64),
+    #[error("at its {} values, from {from} on, the noise vanishes: treated as a rail of the sensor", extreme(*.high))]
+    CalmEnd { high: bool, from: f64 },
     /// Gravity that no height explains, m/s², and the latitude, degrees.
-    Gravity(f64, f64),
+    #[error(fmt = words::gravity)]
+    Gravity {
+        gravity_mps2: f64,
+        latitude_deg: f64,
+    },
     /// Gravity of the calibration and of the recording, m/s²; the mean magnitude of the calibrated force at rest, and whether it agrees with the
     /// former.
-    OtherGravity([f64; 2], f64, bool),
+    #[error(fmt = words::other_gravity)]
+    OtherGravity {
+        gravity_mps2: [f64; 2],
+        force_mps2: f64,
+        contradicted: bool,
+    },
     /// The Earth's rate is in the intervals of the gyro's biases, because no latitude is given.
+    #[error(
+        "no latitude is given, so the Earth's rate (0.004 deg/s, 15 deg/h) is unknown and in the intervals of the biases: give the latitude"
+    )]
     NoLatitude,
     /// The horizontal component of the Earth's rate is in the intervals of the gyro's biases, because the heading was lost this often.
-    HeadingLost(usize),
+    #[error("the heading of the table is lost {} between dwells (samples are missing there, or the gyro clips), so the horizontal component of the Earth's rate is in the intervals of the biases: record the table's motion without gaps", plural(*.times as u64, "time"))]
+    HeadingLost { times: usize },
     /// Readings in SI: whether they are at rest (and include biases), how many times their input they are, and the likely cause.
-    NotSi(bool, f64, &'static str),
+    #[error(fmt = words::not_si)]
+    NotSi {
+        at_rest: bool,
+        times: f64,
+        cause: &'static str,
+    },
     /// Readings that are declared as counts, but are fractions and have the scale factor of a unit: their number per SI unit, the unit that they
     /// are in, and how to import them.
-    NotCounts(f64, &'static str, &'static str),
+    #[error("raw_unit = \"count\", but the readings are fractions, and the fit gives {} of them per SI unit: they are in {unit}; import them with {remedy}", significant(*.per_si))]
+    NotCounts {
+        per_si: f64,
+        unit: &'static str,
+        remedy: &'static str,
+    },
     /// Reading of a gyro at rest, rad/s, that is larger than any bias.
-    Turning(f64),
+    #[error("at rest it reads {} deg/s, more than any bias: the unit turns evenly, or the readings are in deg/s", degrees(*.rate))]
+    Turning { rate: f64 },
     /// Firmware removes the bias of the gyro before it is recorded.
+    #[error(
+        "gyro: {0}; its scale factors and angles are calibrated, but the bias is not that of the sensor, so none is given"
+    )]
     BiasRemoved(BiasRemoval),
     /// Calibrated rate at rest, rad/s rms, by which dwells differ.
-    Restless(f64),
+    #[error("from dwell to dwell the calibrated rate at rest differs by {} deg/s rms, more than any bias: in some dwells the unit turned evenly, about the vertical if the accelerometer shows nothing; leave these dwells out", degrees(*.rms))]
+    Restless { rms: f64 },
     /// Unit of the noise file, and that of the recording.
-    NoiseOfAnother(String, String),
+    #[error("the noise file belongs to {file:?}, the recording to {recording:?}")]
+    NoiseOfAnother { file: String, recording: String },
     /// How many times noisier a channel is within the dwells than the noise file says, and that file.
-    NoisierThanFile(f64, String),
+    #[error("within the dwells the mean over a second is {} times as noisy as in {file}, so the noise within the dwells is used", significant(*.times))]
+    NoisierThanFile { times: f64, file: String },
     /// Means without standard deviations.
+    #[error(
+        "the table has no standard deviations: the scatter about the fit is taken as the noise, and the noise floor is unknown"
+    )]
     MeansWithoutNoise,
     /// Means whose noise is taken to be white.
+    #[error(
+        "the noise of a mean is assumed to be white: the standard deviation over the root of the number of samples. Other noise in the means appears as scatter about the fit"
+    )]
     WhiteMeans,
     /// Number of rows of a table that lack the mean of an axis, and of all rows.
-    MeansMissing(usize, usize),
+    #[error("{missing} of {rows} rows lack the mean of an axis and are not used for it")]
+    MeansMissing { missing: usize, rows: usize },
     /// A gyro in a table of means whose only reference is gravity.
+    #[error(
+        "not calibrated: turns need samples, and this is a table of means; give it dwells at known rates (ref_rate_ columns, reference = \"table\"), or record samples"
+    )]
     MeansOfTurns,
     /// Range of temperatures that the model of both sensors or of one lacks, °C.
-    WithoutTemperature(f64, f64, Option<Sensor>),
+    #[error(fmt = words::without_temperature)]
+    WithoutTemperature {
+        low_c: f64,
+        high_c: f64,
+        sensor: Option<Sensor>,
+    },
     /// No dwell can be used, for these reasons.
-    NoDwell(String),
+    #[error("no dwell can be used{why}")]
+    NoDwell { why: String },
     /// No dwell has a known input, for these reasons.
-    NoInput(String),
+    #[error("not calibrated: no usable dwell has a known input{why}")]
+    NoInput { why: String },
     /// All dwells have one input.
+    #[error("not calibrated: all dwells have the same input")]
     OneInput,
     /// Given turns that are assumed to be exact.
+    #[error(
+        "angle and axis of the given turns are assumed to be exact; no interval includes their errors"
+    )]
     ExactTurns,
     /// Dwells whose input moves, and the method that uses their means alone.
-    MeansAlone(u64, &'static str),
+    #[error("{} {} an input that moves; {method} uses its mean only, least squares also how the readings follow it", plural(*.dwells, "dwell"), if *.dwells == 1 { "has" } else { "have" })]
+    MeansAlone { dwells: u64, method: &'static str },
     /// No turn lies between two usable dwells.
+    #[error("not calibrated: no turn connects two usable dwells")]
     NoTurn,
     /// A dwell that is not used for the accelerometer: its error, m/s², against what the others predict, and the same in sigmas.
-    DwellLeftOut(i32, f64, f64),
+    #[error("dwell {dwell} is not used for the accelerometer: {}, by {sigmas:.0} sigma of that prediction; to use it all the same, keep dwell {dwell}", off(*.error))]
+    DwellLeftOut { dwell: i32, error: f64, sigmas: f64 },
     /// A dwell that is kept for the accelerometer though it is suspect: its error, m/s², the parameter that the others hardly determine,
     /// and how many times as wide its interval would be without the dwell.
-    DwellKept(i32, f64, &'static str, f64),
+    #[error(fmt = words::dwell_kept)]
+    DwellKept {
+        dwell: i32,
+        error: f64,
+        parameter: &'static str,
+        wider: f64,
+    },
     /// A turn, from dwell to dwell, that is not used: its error, rad, against what the others predict, and the same in sigmas.
-    TurnLeftOut(i32, i32, f64, f64),
+    #[error("the turn from dwell {from} to {to} is not used: it ends {} deg from where the other turns predict, {sigmas:.0} sigma of that prediction; to use it all the same, keep dwell {to}", significant(.error.to_degrees()))]
+    TurnLeftOut {
+        from: i32,
+        to: i32,
+        error: f64,
+        sigmas: f64,
+    },
     /// A turn that is kept though it is suspect: the parameter that the others hardly determine, and how many times as wide its interval
     /// would be without the turn.
-    TurnKept(i32, i32, String, f64),
+    #[error("the turn from dwell {from} to {to} is kept, although it is suspect: {}; repeat it", open(.parameter, *.wider))]
+    TurnKept {
+        from: i32,
+        to: i32,
+        parameter: String,
+        wider: f64,
+    },
     /// A turn that cannot be integrated: by the fault of a channel, or because samples are missing.
-    TurnNotUsed(i32, i32, Option<Fault>),
+    #[error(fmt = words::turn_not_used)]
+    TurnNotUsed {
+        from: i32,
+        to: i32,
+        fault: Option<Fault>,
+    },
     /// Angle between gravity after a turn and its prediction, rad.
-    WideTurn(f64),
+    #[error("after one turn gravity is {:.0} degrees from its predicted direction: samples are missing or clipped, or the gyro's columns are wrong", .angle.to_degrees())]
+    WideTurn { angle: f64 },
     /// As many parameters as residuals.
+    #[error(
+        "there are as many parameters as residuals: neither the model nor the intervals can be judged, and the intervals include only the noise within dwells"
+    )]
     NoResiduals,
     /// Hardly more dwells than parameters.
+    #[error(
+        "there are hardly more dwells than parameters: the data cannot contradict the model, and the intervals include only the noise within dwells"
+    )]
     FewResiduals,
     /// Condition of a fit whose parameters are poorly determined.
-    PoorlyDetermined(f64),
+    #[error(
+        "the experiment determines some parameters poorly (condition {condition:.0}); their intervals say which"
+    )]
+    PoorlyDetermined { condition: f64 },
     /// Axes that form a left-handed triad.
+    #[error(
+        "the axes are left-handed: one axis of gyro or accelerometer has the wrong sign, or two are exchanged"
+    )]
     LeftHanded,
     /// Rates without an opposite.
-    NoOpposite(usize),
+    #[error("{rates} rates have no opposite and are not used by the inverse form")]
+    NoOpposite { rates: usize },
     /// A delay that is not distinguished from a misalignment.
+    #[error(
+        "a delay of the readings cannot be distinguished from a misalignment and is assumed to be zero: turn in both directions, or at several rates"
+    )]
     NoDelay,
     /// Poses that need the turns between them.
+    #[error(
+        "the poses alone hardly determine it, so the turns between them, as measured by the gyro, are used too"
+    )]
     WithTurns,
     /// A given matrix, and whether its intervals are known.
-    MatrixGiven(bool),
+    #[error(fmt = words::matrix_given)]
+    MatrixGiven { with_intervals: bool },
     /// Parts of a recording (blocks or not) that cannot be held out, and why the first cannot.
-    NotHeldOut(bool, Vec<usize>, String),
+    #[error(fmt = words::not_held_out)]
+    NotHeldOut {
+        blocks: bool,
+        parts: Vec<usize>,
+        why: String,
+    },
     /// One dwell in so many is held out in place of blocks, and why.
-    Interleaved(usize, Box<Warning>),
+    #[error("one dwell in {one_in} is held out instead of blocks: {why}")]
+    Interleaved { one_in: usize, why: Box<Warning> },
     /// Number of parameters that leaving out dwells or turns changes, of all parameters, and the largest changes.
-    LeftOutChanges(usize, usize, Vec<String>),
+    #[error(fmt = words::left_out_changes)]
+    LeftOutChanges {
+        changed: usize,
+        of: usize,
+        largest: Vec<String>,
+    },
     /// Errors of the uncalibrated and the calibrated readings, and their unit; whether the latter are held out; their number if they do not
     /// decide.
-    NoBetter([f64; 2], &'static str, bool, Option<usize>),
+    #[error(fmt = words::no_better)]
+    NoBetter {
+        errors: [f64; 2],
+        unit: &'static str,
+        held_out: bool,
+        undecided: Option<usize>,
+    },
     /// Directions without a pose nearby, and the errors there and in the poses, m/s².
-    UnseenPoses(Vec<String>, f64, f64),
+    #[error(fmt = words::unseen_poses)]
+    UnseenPoses {
+        directions: Vec<String>,
+        worst: f64,
+        typical: f64,
+    },
     /// Shares of the readings that models without and with temperature leave unexplained, and the mean temperature, °C.
-    FollowsTemperature(f64, f64, f64),
+    #[error(fmt = words::follows_temperature)]
+    FollowsTemperature {
+        without: f64,
+        with: f64,
+        mean_c: f64,
+    },
     /// Dwells, or else turns, that are outliers; the largest error, its unit, and its ratio to the median.
-    Outliers(bool, Vec<String>, f64, &'static str, f64),
+    #[error(fmt = words::outliers)]
+    Outliers {
+        turns: bool,
+        names: Vec<String>,
+        worst: f64,
+        unit: &'static str,
+        times: f64,
+    },
     /// Rates of the turntable, deg/s, and the error of each, as a share of it.
-    RateError(Vec<f64>, f64),
+    #[error(fmt = words::rate_error)]
+    RateError { rates_dps: Vec<f64>, share: f64 },
     /// Rate of the turntable, rad/s, that the other rates contradict, and the share by which the fit moves it.
-    RatesContradict(f64, f64),
+    #[error("the rates of the turntable contradict each other: by the fit, {} deg/s is {:+.2} % off; check the rates (33 1/3 rpm is 200 deg/s, 45 rpm is 270 deg/s) and their error", significant(.rate.to_degrees()), 100.0 * .off)]
+    RatesContradict { rate: f64, off: f64 },
     /// Why the rests on a turntable do not calibrate the accelerometer.
-    NoRestsToFit(String),
+    #[error(
+        "not calibrated, because the dwells at rest do not determine it ({why}); at the rates of the turntable it also senses an unknown centripetal force"
+    )]
+    NoRestsToFit { why: String },
     /// Angle between the axes and those that they are referred to, rad, and whether these are the table's.
-    Turned(f64, bool),
+    #[error(fmt = words::turned)]
+    Turned { angle: f64, to_table: bool },
     /// Angle by which the dwells appear to be off level, rad rms.
-    OffLevel(f64),
+    #[error("the errors are perpendicular to the known force, as if the dwells were off level by {} deg rms: level the faces, or use only the magnitude of gravity (reference = \"gravity\")", degrees(*.angle))]
+    OffLevel { angle: f64 },
     /// Numbers of the calibration's unit and of the recording's.
-    OtherUnit(String, String),
+    #[error("the calibration belongs to unit {calibration}, the recording to unit {recording}")]
+    OtherUnit {
+        calibration: String,
+        recording: String,
+    },
     /// Number of readings at a value that is the full scale of a part, in SI.
-    FullScale(u64, f64),
+    #[error("{} at {value}, the full scale of a sensor: treated as a rail", plural(*.count, "sample"))]
+    FullScale { count: u64, value: f64 },
     /// Names of the calibration's unit and of the recording's.
-    OtherDevice(String, String),
+    #[error("the calibration belongs to {calibration:?}, the recording to {recording:?}")]
+    OtherDevice {
+        calibration: String,
+        recording: String,
+    },
     /// Whether the calibration and the recording name no unit.
-    UnnamedUnit([bool; 2]),
+    #[error(fmt = words::unnamed_unit)]
+    UnnamedUnit { unnamed: [bool; 2] },
     /// The calibration was made from the recording.
+    #[error("the calibration was made from this recording: the figures say nothing about new data")]
     SameRecording,
     /// Samples outside the temperatures of the calibration, of so many; the range, °C; the farthest, K; whether there are curves, and
     /// how far they reach beyond it, K.
-    OutOfRange([u64; 2], [f64; 2], f64, Option<f64>),
+    #[error(fmt = words::out_of_range)]
+    OutOfRange {
+        samples: [u64; 2],
+        range_c: [f64; 2],
+        farthest_k: f64,
+        beyond_k: Option<f64>,
+    },
     /// A recording without temperature, and a calibration with curves.
+    #[error(
+        "the recording has no temp_c: the calibration's model at one temperature is used instead of its curves"
+    )]
     NoTemperature,
     /// The recording has nothing to judge a sensor by.
+    #[error("the recording has no data to judge it")]
     NothingToJudge,
     /// Worse than the uncalibrated readings, or else than their mean scale factor and bias.
-    Worse(bool),
+    #[error(fmt = words::worse)]
+    Worse { readings_in_si: bool },
     /// The errors do not show whether the calibration is better. Their number; whether they are of turns (else of dwells); what they are compared with, as
     /// in [`Self::Worse`].
-    Undecided(u64, bool, bool),
+    #[error(fmt = words::undecided)]
+    Undecided {
+        errors: u64,
+        turns: bool,
+        readings_in_si: bool,
+    },
     /// A calibration that lacks a sensor of the recording.
-    NotCalibrated(Sensor),
+    #[error("the calibration is not for the {sensor}: its columns are left out")]
+    NotCalibrated { sensor: Sensor },
     /// A calibration whose uncertainty is not known.
+    #[error(
+        "the calibration has no uncertainty, like one that was read from a device. Its matrix is taken as exact: an error of it may be found as an effect, and the intervals of a new calibration do not include it"
+    )]
     Uncertain,
     /// A recording that cannot judge the calibration, with its name if there are several, and why.
-    NotJudged(Option<String>, Error),
+    #[error(fmt = words::not_judged)]
+    NotJudged {
+        recording: Option<String>,
+        why: Error,
+    },
     /// An effect of the given calibration that is missing in the new one, because its sensor is not recorded.
-    EffectLost(String, Sensor),
+    #[error(
+        "{effect} of the calibration is missing in the new one, because the {sensor} was not recorded"
+    )]
+    EffectLost { effect: String, sensor: Sensor },
     /// Lines of the spectrum that are not steady.
+    #[error(
+        "unsteady lines were removed, and the spectrum still exceeds its floor: the coefficients contain part of that"
+    )]
     UnsteadyLines,
     /// Range of the temperature that a channel follows, °C, and the correlation.
-    FollowsChamber(f64, f64),
+    #[error("follows temp_c, which changes by {} °C (correlation {correlation:.2}): the long end of its curve shows temperature, not the sensor's noise", significant(*.span_c))]
+    FollowsChamber { span_c: f64, correlation: f64 },
     /// Share of a drift in the variance at an averaging time, s.
-    Drifts(f64, f64),
+    #[error("a drift makes {:.0} % of the variance at {}: the long end of its curve shows warm-up or the chamber, not noise", 100.0 * .share, duration(*.longest_s))]
+    Drifts { share: f64, longest_s: f64 },
     /// First data row with an empty cell; length of the segment that is used, s, and its first data row.
-    EmptyCells(usize, f64, usize),
+    #[error("empty cells, the first in data row {row}; the longest segment without any is used: {} from data row {from_row}", duration(*.length_s))]
+    EmptyCells {
+        row: usize,
+        length_s: f64,
+        from_row: usize,
+    },
     /// Samples that are masked, their share, and the instant of the first, s.
-    Disturbed(u64, f64, f64),
+    #[error("{}, {} % of the time, are disturbed, first at {first_s:.1} s: masked", plural(*.samples, "sample"), significant(100.0 * .share))]
+    Disturbed {
+        samples: u64,
+        share: f64,
+        first_s: f64,
+    },
     /// Windows in which the unit moves, of so many; their length, s; the first instant, s, and the channel.
-    Moves([usize; 2], f64, f64, &'static str),
+    #[error(fmt = words::moves)]
+    Moves {
+        windows: [usize; 2],
+        window_s: f64,
+        first_s: f64,
+        channel: &'static str,
+    },
     /// Gaps, the first one, s, and the data row after it; length of the segment that is used, s, and its beginning, s.
-    LongestStretch(u64, f64, usize, f64, f64),
+    #[error("{}, the first of {} before data row {row}; the longest segment without any is used: {} from {from_s:.3} s", plural(*.gaps, "gap"), duration(*.first_s), duration(*.length_s))]
+    LongestStretch {
+        gaps: u64,
+        first_s: f64,
+        row: usize,
+        length_s: f64,
+        from_s: f64,
+    },
 }
 
 impl Warning {
     /// This warning, about `sensor`.
     pub(crate) fn of(self, sensor: Sensor) -> Self {
-        Self::Of(sensor, Box::new(self))
+        Self::Of {
+            sensor,
+            warning: Box::new(self),
+        }
+    }
+
+    /// Its name: that of the variant, in small letters. Scripts rely on it, but not on the sentence.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Of { warning, .. } | Self::Channel { warning, .. } | Self::In { warning, .. } => {
+                warning.kind()
+            }
+            Self::Reading(warning) => warning.kind(),
+            _ => self.into(),
+        }
+    }
+
+    /// The sensor or the channel that it is about.
+    pub fn about(&self) -> Option<&'static str> {
+        match self {
+            Self::Of { sensor, .. } => Some(sensor.name()),
+            Self::Channel { channel, .. } => Some(channel),
+            Self::In { warning, .. } => warning.about(),
+            _ => None,
+        }
     }
 
     /// A warning if gravity, m/s², is impossible at the latitude, degrees. Nothing in a recording shows which of the two is wrong: the
@@ -228,30 +529,56 @@ impl Warning {
     pub fn of_gravity(gravity_mps2: f64, latitude_deg: f64) -> Option<Self> {
         let off = gravity_mps2 - normal_gravity(latitude_deg);
         let [least, most] = GRAVITY_OFF_MPS2;
-        (off < least || off > most).then_some(Self::Gravity(gravity_mps2, latitude_deg))
+        (off < least || off > most).then_some(Self::Gravity {
+            gravity_mps2,
+            latitude_deg,
+        })
     }
 
     /// A warning if no inertial unit is sampled at `rate_hz`: the time stamps are then in another unit. A log over temperature may have a
     /// sample a minute, but it is neither integrated nor judged by its noise.
     pub fn of_rate(rate_hz: f64) -> Option<Self> {
-        (!RATES_HZ.contains(&rate_hz)).then_some(Self::ImplausibleRate(rate_hz))
+        (!RATES_HZ.contains(&rate_hz)).then_some(Self::ImplausibleRate { rate_hz })
     }
 
     /// This warning, about channel `c`.
     pub(crate) fn of_channel(self, c: usize) -> Self {
-        Self::Channel(RAW_COLUMNS[c], Box::new(self))
+        Self::Channel {
+            channel: RAW_COLUMNS[c],
+            warning: Box::new(self),
+        }
     }
 
     /// Whether `other` is of the same kind, about the same sensor, with the same cause: then only one of the two need be printed.
     pub fn is_like(&self, other: &Self) -> bool {
         let same = discriminant(self) == discriminant(other);
         same && match (self, other) {
-            (Self::Of(s, one), Self::Of(t, other)) => s == t && one.is_like(other),
-            (Self::Channel(_, one), Self::Channel(_, other)) => one.is_like(other),
-            (Self::Reading(one), Self::Reading(other)) => discriminant(one) == discriminant(other),
-            (Self::DwellsNotUsed(_, f, s), Self::DwellsNotUsed(_, g, t)) => {
-                s == t && discriminant(f) == discriminant(g)
+            (
+                Self::Of {
+                    sensor: s,
+                    warning: one,
+                },
+                Self::Of {
+                    sensor: t,
+                    warning: other,
+                },
+            ) => s == t && one.is_like(other),
+            (Self::Channel { warning: one, .. }, Self::Channel { warning: other, .. }) => {
+                one.is_like(other)
             }
+            (Self::Reading(one), Self::Reading(other)) => discriminant(one) == discriminant(other),
+            (
+                Self::DwellsNotUsed {
+                    fault: f,
+                    sensor: s,
+                    ..
+                },
+                Self::DwellsNotUsed {
+                    fault: g,
+                    sensor: t,
+                    ..
+                },
+            ) => s == t && discriminant(f) == discriminant(g),
             _ => true,
         }
     }
@@ -259,7 +586,9 @@ impl Warning {
     /// If the warning is about a dwell or turn that was left out: the dwell to keep, so that it is used.
     pub fn left_out(&self) -> Option<i32> {
         match self {
-            Self::DwellLeftOut(step, ..) | Self::TurnLeftOut(_, step, ..) => Some(*step),
+            Self::DwellLeftOut { dwell: step, .. } | Self::TurnLeftOut { to: step, .. } => {
+                Some(*step)
+            }
             _ => None,
         }
     }
@@ -267,8 +596,28 @@ impl Warning {
 
 impl Serialize for Warning {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
+        as_data(self.kind(), self.about(), self, serializer)
     }
+}
+
+/// A warning as JSON has it: its kind, the sensor or channel that it is about, and the sentence.
+///
+/// # Errors
+/// Those of `serializer`.
+pub fn as_data<S: Serializer>(
+    kind: &str,
+    about: Option<&str>,
+    text: &dyn Display,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let mut data = serializer.serialize_struct("Warning", 3)?;
+    data.serialize_field("kind", kind)?;
+    match about {
+        Some(about) => data.serialize_field("about", about)?,
+        None => data.skip_field("about")?,
+    }
+    data.serialize_field("text", &format!("{text}"))?;
+    data.end()
 }
 
 #[cfg(test)]

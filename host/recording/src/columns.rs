@@ -129,7 +129,10 @@ impl Layout {
             let slot = Column::from_name(name);
             if slot.is_none() {
                 let name = super::cell::shorten(name.as_bytes());
-                warnings.push(Warning::UnknownColumn(place.into(), name.clone()));
+                warnings.push(Warning::UnknownColumn {
+                    place: place.into(),
+                    name: name.clone(),
+                });
             }
             slots.push(slot);
         }

@@ -98,7 +98,10 @@ impl Recording {
                 let mut file = CsvFile::open(&csv)?;
                 if manifest.unfinished {
                     let cut = file.leave_out_cut_row()? > 0;
-                    warnings.push(Warning::Unfinished(directory.to_owned(), cut));
+                    warnings.push(Warning::Unfinished {
+                        folder: directory.to_owned(),
+                        cut,
+                    });
                 }
                 (csv, file.layout.clone(), Samples::Csv(file))
             }

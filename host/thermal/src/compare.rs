@@ -81,7 +81,10 @@ pub fn compare(a: &Calibration, b: &Calibration) -> Result<Comparison> {
     }
     let mut warnings = Vec::new();
     if a.device != b.device {
-        warnings.push(Warning::TwoUnits(a.device.clone(), b.device.clone()));
+        warnings.push(Warning::TwoUnits {
+            one: a.device.clone(),
+            other: b.device.clone(),
+        });
     }
     let curves = Sensor::BOTH
         .into_iter()

@@ -81,7 +81,7 @@ pub fn check(sessions: &[Session], warnings: &mut Vec<Warning>) -> Result<()> {
             );
         }
         if samples.min(temperatures) < MOST {
-            warnings.push(Warning::Coverage(sensor, used));
+            warnings.push(Warning::Coverage { sensor, used });
         }
     }
     Ok(())

@@ -186,13 +186,18 @@ fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<Warning>) -
         let line = estimate(sessions, choice(Shape::Line))?;
         let share = share_of_held_out(sessions, &joint, &line);
         if share.is_none_or(|share| share > EVIDENT) {
-            warnings.push(Warning::StraightLines(span, share));
+            warnings.push(Warning::StraightLines {
+                span_k: span,
+                held_out: share,
+            });
             return Ok(line);
         }
     }
     match extrapolation::compare(sessions, options.lag_s).filter(|_| joint.one_way) {
         Some([line, curve]) if curve > line => {
-            warnings.push(Warning::CurvatureRefused(curve / line));
+            warnings.push(Warning::CurvatureRefused {
+                times: curve / line,
+            });
             estimate(sessions, choice(Shape::Line))
         }
         _ => Ok(joint),

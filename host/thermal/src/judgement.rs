@@ -19,7 +19,9 @@ impl ThermalFit {
         let by_input = self.warnings.iter().filter_map(|warning| {
             let kind = match warning {
                 Warning::Recording(warning) => input::of_warning(warning)?,
-                Warning::NotCrossed(_) | Warning::CurvatureRefused(_) => JudgementKind::Untested,
+                Warning::NotCrossed { .. } | Warning::CurvatureRefused { .. } => {
+                    JudgementKind::Untested
+                }
                 _ => return None,
             };
             Some(Judgement::new(kind, warning))

@@ -116,10 +116,16 @@ impl Session {
             _ => Vec::new(),
         };
         if let Some(first_s) = moved_s[1].first() {
-            warnings.push(Warning::Moved(moved_s.each_ref().map(Vec::len), *first_s));
+            warnings.push(Warning::Moved {
+                times: moved_s.each_ref().map(Vec::len),
+                first_s: *first_s,
+            });
         }
         if !bias_jumps.is_empty() {
-            warnings.push(Warning::BiasJumps(bias_jumps.clone(), manifest.raw_unit));
+            warnings.push(Warning::BiasJumps {
+                jumps: bias_jumps.clone(),
+                raw_unit: manifest.raw_unit,
+            });
         }
         Ok(Self {
             place: prepared.place.clone(),

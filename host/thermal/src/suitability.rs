@@ -138,7 +138,11 @@ impl Spans {
         let shows = |[low, high]: [f64; 2]| high - low >= SLOPE_SPAN;
         let needs = format!("a slope needs {SLOPE_SPAN} K, curvature 20 K");
         let (problem, remedy, declare) = if shows(widest) {
-            warnings.extend(self.gaps().into_iter().map(Warning::NotCrossed));
+            warnings.extend(
+                self.gaps()
+                    .into_iter()
+                    .map(|between_c| Warning::NotCrossed { between_c }),
+            );
             return Ok(());
         } else if shows(used) {
             (

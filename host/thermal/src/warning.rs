@@ -3,6 +3,7 @@
 use std::fmt;
 
 use mimu::quantity::{Sensor, plural, significant};
+use mimu::warning::as_data;
 use mimu_recording::RawUnit;
 use serde::{Serialize, Serializer};
 
@@ -12,34 +13,42 @@ use crate::used::Used;
 /// Jumps of a bias that are named at most.
 const NAMED: usize = 3;
 
-/// What a person should know. JSON contains it as a sentence.
-#[derive(Debug, Clone, PartialEq)]
+/// What a person should know. JSON has its kind, the sensor that it is about, and the sentence.
+#[expect(
+    missing_docs,
+    reason = "the comment of a variant says what its fields are"
+)]
+#[derive(Debug, Clone, PartialEq, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Warning {
     /// A warning from reading a recording and choosing its dwells.
     Recording(mimu::warning::Warning),
     /// How often the unit was put into another pose of the gyro, and of the accelerometer; the first time of the latter, s.
-    Moved([usize; 2], f64),
+    Moved { times: [usize; 2], first_s: f64 },
     /// Jumps of the gyro's bias, and the unit of the readings.
-    BiasJumps(Vec<BiasJump>, RawUnit),
+    BiasJumps {
+        jumps: Vec<BiasJump>,
+        raw_unit: RawUnit,
+    },
     /// How much of the recordings a sensor's curves use.
-    Coverage(Sensor, Used),
+    Coverage { sensor: Sensor, used: Used },
     /// Temperatures that no recording crosses, °C.
-    NotCrossed([f64; 2]),
+    NotCrossed { between_c: [f64; 2] },
     /// Span of temperatures, K, over which the data do not show curvature, and the error of held-out dwells by curves over that by straight lines.
-    StraightLines(f64, Option<f64>),
+    StraightLines { span_k: f64, held_out: Option<f64> },
     /// Error of curves in the last third of the recordings, relative to that of straight lines.
-    CurvatureRefused(f64),
+    CurvatureRefused { times: f64 },
     /// The noise of the unit at rest is not known.
     WithoutNoise,
     /// Names of the units of two calibrations that are compared.
-    TwoUnits(String, String),
+    TwoUnits { one: String, other: String },
 }
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Recording(warning) => write!(f, "{warning}"),
-            Self::Moved([turned, moved], first_s) => {
+            Self::Moved { times: [turned, moved], first_s } => {
                 let times = plural(*moved as u64, "time");
                 write!(
                     f,
@@ -55,7 +64,7 @@ impl fmt::Display for Warning {
                 }
                 f.write_str(", because gravity adds to them")
             }
-            Self::BiasJumps(jumps, raw_unit) => {
+            Self::BiasJumps { jumps, raw_unit } => {
                 let size = |jump: &BiasJump| {
                     let size = jump.change.amax();
                     match raw_unit {
@@ -75,16 +84,16 @@ impl fmt::Display for Warning {
                     each.join(", ")
                 )
             }
-            Self::Coverage(sensor, used) => write!(
+            Self::Coverage { sensor, used } => write!(
                 f,
                 "the {sensor} uses {}: the other samples are not found to be at rest, or are clipped",
                 used.words()
             ),
-            Self::NotCrossed([low, high]) => write!(
+            Self::NotCrossed { between_c: [low, high] } => write!(
                 f,
                 "no recording crosses {low:.1} to {high:.1} °C: there the curves connect biases of different power-ons, and the intervals do not include their repeatability"
             ),
-            Self::StraightLines(span, share) => {
+            Self::StraightLines { span_k: span, held_out: share } => {
                 let shows = match share {
                     Some(share) => format!(
                         "the held-out error of curves is {} times that of lines, and over less than 20 K drift looks like curvature",
@@ -98,7 +107,7 @@ impl fmt::Display for Warning {
                     significant(*span)
                 )
             }
-            Self::CurvatureRefused(times) => write!(
+            Self::CurvatureRefused { times } => write!(
                 f,
                 "curvature refused: fitted to the first two thirds, curves miss the last third by {} times as much as straight lines do. If the temperature goes one way only, a drift in time cannot be distinguished from curvature",
                 significant(*times)
@@ -106,13 +115,18 @@ impl fmt::Display for Warning {
             Self::WithoutNoise => f.write_str(
                 "intervals of the biases include only the wander that the recordings show. A noise file shows slower wander: run `mimu allan` on the unit at rest for hours",
             ),
-            Self::TwoUnits(a, b) => write!(f, "they belong to two units, {a:?} and {b:?}"),
+            Self::TwoUnits { one: a, other: b } => write!(f, "they belong to two units, {a:?} and {b:?}"),
         }
     }
 }
 
 impl Serialize for Warning {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
+        let (kind, about) = match self {
+            Self::Recording(warning) => (warning.kind(), warning.about()),
+            Self::Coverage { sensor, .. } => (self.into(), Some(sensor.name())),
+            _ => (self.into(), None),
+        };
+        as_data(kind, about, self, serializer)
     }
 }

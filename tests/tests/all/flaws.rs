@@ -65,7 +65,15 @@ fn a_recording_without_a_flaw_loses_no_dwell_and_no_turn() {
 fn a_violent_shake_is_clipped_and_its_turn_left_out_by_name() {
     let fit = by_hand("[flaws]\nshake_turns = 1\n");
     assert!(scale_error(&fit) < FINE, "{}", scale_error(&fit));
-    let named = |w: &Warning| matches!(w, Warning::TurnNotUsed(.., Some(Fault::Saturated(_))));
+    let named = |w: &Warning| {
+        matches!(
+            w,
+            Warning::TurnNotUsed {
+                fault: Some(Fault::Saturated(_)),
+                ..
+            }
+        )
+    };
     assert_eq!(
         fit.warnings.iter().filter(|w| named(w)).count(),
         1,

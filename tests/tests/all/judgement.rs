@@ -243,7 +243,7 @@ fn another_gravity_than_that_of_the_calibration_is_named_if_the_readings_contrad
     let named = |later: &Prepared| {
         let found = verify(later, &calibration).expect("verified");
         let gravity = found.warnings.iter().find_map(|w| match w {
-            Warning::OtherGravity(_, _, contradicted) => Some(*contradicted),
+            Warning::OtherGravity { contradicted, .. } => Some(*contradicted),
             _ => None,
         });
         (gravity, found.judgement.kind)

@@ -59,7 +59,11 @@ fn recording_text(result: &AllanResult, recording: &RecordingResult, verbose: bo
         let _ = writeln!(out);
         warn(&mut out, recording.warnings.iter());
     } else if !verbose {
-        warn_within(&mut out, recording.warnings.iter().cloned(), 2);
+        warn_within(
+            &mut out,
+            recording.warnings.iter().map(ToString::to_string),
+            2,
+        );
     }
     out
 }

@@ -74,7 +74,7 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
 fn next(fit: &FitResult) -> String {
     let judge = "judge it on another recording (mimu verify OTHER --calibration FILE)";
     let contradict = |w: &Warning| match w {
-        Warning::Of(_, w) => matches!(**w, Warning::RatesContradict(..)),
+        Warning::Of { warning: w, .. } => matches!(**w, Warning::RatesContradict { .. }),
         _ => false,
     };
     if fit.warnings.iter().any(contradict) {

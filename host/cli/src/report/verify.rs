@@ -108,7 +108,15 @@ fn causes_text(out: &mut String, name: Sensor, causes: &Causes) {
 /// Next step after the verification.
 fn next(verification: &Verification) -> String {
     let again = "fit this recording (mimu fit), and compare both calibrations (mimu compare)";
-    let contradicted = |w: &Warning| matches!(w, Warning::OtherGravity(_, _, true));
+    let contradicted = |w: &Warning| {
+        matches!(
+            w,
+            Warning::OtherGravity {
+                contradicted: true,
+                ..
+            }
+        )
+    };
     if verification.warnings.iter().any(contradicted) {
         return "give the recording the gravity of its place (mimu import --gravity), and verify again".into();
     }

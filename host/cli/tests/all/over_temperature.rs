@@ -152,7 +152,7 @@ fn outside(json: &serde_json::Value) -> (f64, f64) {
         .as_array()
         .unwrap()
         .iter()
-        .filter_map(|w| w.as_str())
+        .filter_map(|w| w["text"].as_str())
         .collect();
     let of: Vec<&&str> = all
         .iter()

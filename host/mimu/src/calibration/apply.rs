@@ -153,7 +153,7 @@ impl<'a> Compensated<'a> {
         };
         for (sensor, (recorded, has)) in recorded.zip(has) {
             if recorded && !has {
-                warnings.push(Warning::NotCalibrated(sensor));
+                warnings.push(Warning::NotCalibrated { sensor });
             }
         }
         // First pass: rails and the first temperature are only known at the end.

@@ -71,12 +71,12 @@ pub fn outside(calibration: &Calibration, blocks: &[Block]) -> Option<Warning> {
         return None;
     }
     let beyond = curves.is_some().then_some(BEYOND_C);
-    Some(Warning::OutOfRange(
-        [count, all],
-        [from, to],
-        farthest,
-        beyond,
-    ))
+    Some(Warning::OutOfRange {
+        samples: [count, all],
+        range_c: [from, to],
+        farthest_k: farthest,
+        beyond_k: beyond,
+    })
 }
 
 /// The recording as its sensors would have read at the one temperature for which `[gyro]` and `[accel]` of the calibration hold. A reading u under

@@ -173,12 +173,12 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         }
         let readings_in_si = s.rms_uncalibrated.is_some();
         let warning = match exceeds(s.rms, other, errors(s.figure, s.count)) {
-            true => Warning::Worse(readings_in_si),
-            false => Warning::Undecided(
-                s.count as u64,
-                s.figure == Figure::Direction,
+            true => Warning::Worse { readings_in_si },
+            false => Warning::Undecided {
+                errors: s.count as u64,
+                turns: s.figure == Figure::Direction,
                 readings_in_si,
-            ),
+            },
         };
         warnings.push(warning.of(sensor));
     }

@@ -347,7 +347,7 @@ fn with_temperature(now: &mut Fit, sensors: &[SensorDiagnosis]) {
         return;
     }
     now.warnings.retain_mut(|warning| {
-        if let Warning::WithoutTemperature(.., whose) = warning {
+        if let Warning::WithoutTemperature { sensor: whose, .. } = warning {
             *whose = without.first().map(|s| s.sensor);
             return whose.is_some();
         }

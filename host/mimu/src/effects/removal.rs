@@ -304,7 +304,12 @@ fn leave_out_unknown(sensor: Sensor, effects: &[&FittedEffect], out: &mut Prepar
         if slot.is_none() {
             *slot = Some(fault);
             let id = effect.candidate.id();
-            let warning = Warning::DwellWithEffect(dwell.step, sensor, fault, id);
+            let warning = Warning::DwellWithEffect {
+                dwell: dwell.step,
+                sensor,
+                fault,
+                effect: id,
+            };
             out.dwells.warnings.push(warning);
         }
     }

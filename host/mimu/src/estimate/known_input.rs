@@ -389,7 +389,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
     let residual = &known - &reading * &c_transposed;
     let mut notes = Vec::new();
     if single > 0 {
-        notes.push(Warning::NoOpposite(single));
+        notes.push(Warning::NoOpposite { rates: single });
     }
     let scatter_of = |values: Vec<f64>, variances: &[Matrix3<f64>], axis: usize, dof: f64| {
         let variances: Vec<f64> = variances

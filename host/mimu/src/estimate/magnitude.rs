@@ -383,7 +383,10 @@ pub fn estimate(
             .enumerate()
             .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         if let Some((l, off)) = worst.filter(|w| w.1.abs() > CONTRADICTED * known.level_sigma) {
-            notes.push(Warning::RatesContradict(known.levels[l], off));
+            notes.push(Warning::RatesContradict {
+                rate: known.levels[l],
+                off,
+            });
         }
     }
     let triad = Triad::from_inverse(inverse, parts)

@@ -53,7 +53,7 @@ pub fn fit_biases(
         };
         if observations.is_empty() {
             let unused = prepared.dwells.unused(sensor);
-            warnings.push(Warning::NoDwell(unused).of(sensor));
+            warnings.push(Warning::NoDwell { why: unused }.of(sensor));
             continue;
         }
         refuse_wrong_gravity(&prepared, sensor, &observations)?;
@@ -67,7 +67,9 @@ pub fn fit_biases(
             if let Some(triad) = Triad::from_inverse(estimated.triad.inverse, parts) {
                 estimated.triad = triad;
             }
-            estimated.notes = vec![Warning::MatrixGiven(true)];
+            estimated.notes = vec![Warning::MatrixGiven {
+                with_intervals: true,
+            }];
         }
         let inverse = estimated.triad.inverse;
         let reference = prepared.manifest.reference;

@@ -359,7 +359,8 @@ fn fit_turns(
     );
     fit.uncalibrated_rms = uncalibrated::directions(prepared, &turns);
     if wide > 20f64.to_radians() {
-        fit.warnings.push(Warning::WideTurn(wide).of(Sensor::Gyro));
+        fit.warnings
+            .push(Warning::WideTurn { angle: wide }.of(Sensor::Gyro));
     }
     Ok(Some(fit))
 }

@@ -39,8 +39,12 @@ pub(super) fn fit_rates(
             Ok(accel) => sensors.extend(accel),
             Err(error) if sensors.is_empty() => return Err(error),
             // A turntable is there for the gyro, so the gyro's fit stays.
-            Err(error) => warnings
-                .push(Warning::NoRestsToFit(error.refused().problem.clone()).of(Sensor::Accel)),
+            Err(error) => warnings.push(
+                Warning::NoRestsToFit {
+                    why: error.refused().problem.clone(),
+                }
+                .of(Sensor::Accel),
+            ),
         }
     }
     Ok(sensors)
@@ -152,8 +156,13 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         .turntable
         .as_ref()
         .map_or(0.0, |t| t.rate_error);
-    fit.warnings
-        .push(Warning::RateError(rates_dps, error).of(Sensor::Gyro));
+    fit.warnings.push(
+        Warning::RateError {
+            rates_dps,
+            share: error,
+        }
+        .of(Sensor::Gyro),
+    );
     Ok(fit)
 }
 

@@ -79,5 +79,12 @@ pub(super) fn described(changes: &[Change]) -> Option<Warning> {
     let moved = largest.iter().filter(|c| c.size() > 1.0).count();
     let shown = &largest[..moved.clamp(1, 3)];
     let shown = shown.iter().map(|c| c.text()).collect();
-    Some(Warning::LeftOutChanges(moved, largest.len(), shown).of(sensor))
+    Some(
+        Warning::LeftOutChanges {
+            changed: moved,
+            of: largest.len(),
+            largest: shown,
+        }
+        .of(sensor),
+    )
 }

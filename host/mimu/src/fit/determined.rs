@@ -129,7 +129,14 @@ pub(super) fn unseen_poses(gravity: f64, triad: &Triad, typical: f64) -> Option<
     let open = open_poses(gravity, triad, OPEN * typical);
     let (_, worst) = open.first()?;
     let names = open.iter().map(|(name, _)| name.clone()).collect();
-    Some(Warning::UnseenPoses(names, *worst, typical).of(Sensor::Accel))
+    Some(
+        Warning::UnseenPoses {
+            directions: names,
+            worst: *worst,
+            typical,
+        }
+        .of(Sensor::Accel),
+    )
 }
 
 /// Faces and edges in which the magnitude of specific force has a standard deviation of more than `limit`, m/s², with this deviation; the worst

@@ -27,5 +27,5 @@ pub(super) fn in_intervals(prepared: &Prepared, fit: &SensorFit) -> Option<Warni
     }
     let earth = prepared.earth_on_table.as_ref()?;
     let lost = earth.headings.saturating_sub(1);
-    (lost > 0).then(|| Warning::HeadingLost(lost).of(Sensor::Gyro))
+    (lost > 0).then(|| Warning::HeadingLost { times: lost }.of(Sensor::Gyro))
 }

@@ -78,7 +78,11 @@ fn not_held_out<T>(blocks: bool, refits: &[Result<T, Failure>]) -> Option<Warnin
     let failed = failed.filter_map(|(part, refit)| Some((part + 1, refit.as_ref().err()?)));
     let (parts, failures): (Vec<usize>, Vec<&Failure>) = failed.unzip();
     let problem = failures.first()?.problem();
-    Some(Warning::NotHeldOut(blocks, parts, problem))
+    Some(Warning::NotHeldOut {
+        blocks,
+        parts,
+        why: problem,
+    })
 }
 
 impl<T: Send> Refits<T> {
@@ -103,7 +107,10 @@ impl<T: Send> Refits<T> {
         let failed = |refits: &[Result<T, Failure>]| refits.iter().filter(|r| r.is_err()).count();
         let interleaved = cut(Split::Interleaved);
         if failed(&interleaved) < failed(&blocks) {
-            let mut reasons = vec![Warning::Interleaved(parts, Box::new(why))];
+            let mut reasons = vec![Warning::Interleaved {
+                one_in: parts,
+                why: Box::new(why),
+            }];
             reasons.extend(not_held_out(false, &interleaved));
             return Self {
                 split: Split::Interleaved,

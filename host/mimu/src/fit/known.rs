@@ -27,7 +27,7 @@ pub(super) fn fit_known(
         let observations = prepared.observations(sensor);
         if observations.is_empty() {
             let unused = prepared.dwells.unused(sensor);
-            missing.push(Warning::NoInput(unused).of(sensor));
+            missing.push(Warning::NoInput { why: unused }.of(sensor));
             continue;
         }
         refuse_wrong_gravity(prepared, sensor, &observations)?;
@@ -107,7 +107,10 @@ pub(super) fn fit_known(
         }
         if !within.is_empty() && options.method != Method::LeastSquares {
             let count = count_dwells(&within);
-            let warning = Warning::MeansAlone(count, options.method.name());
+            let warning = Warning::MeansAlone {
+                dwells: count,
+                method: options.method.name(),
+            };
             warnings.push(warning.of(sensor));
         }
         let means = observations.iter().map(|o| (o, 1.0));

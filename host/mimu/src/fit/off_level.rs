@@ -40,7 +40,7 @@ pub fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
         .collect();
     let dwells = dwells?;
     let angle = beside_those_along(&dwells).or_else(|| no_error_along(&dwells))?;
-    (angle > LEVEL).then(|| Warning::OffLevel(angle).of(Sensor::Accel))
+    (angle > LEVEL).then(|| Warning::OffLevel { angle }.of(Sensor::Accel))
 }
 
 /// Root mean square angle, rad, if the errors across the forces are far beyond those along them and the noise.

@@ -90,11 +90,20 @@ pub(super) fn poses(prepared: &Prepared) -> Outlying {
         if !judged.can_be_spared() {
             let (parameter, grows) = judged.grows;
             let parameter = ACCEL_PARAMETERS[parameter];
-            let kept = Warning::DwellKept(step, judged.error, parameter, grows);
+            let kept = Warning::DwellKept {
+                dwell: step,
+                error: judged.error,
+                parameter,
+                wider: grows,
+            };
             out.warnings.push(kept);
             continue;
         }
-        let left_out = Warning::DwellLeftOut(step, judged.error, judged.sigmas);
+        let left_out = Warning::DwellLeftOut {
+            dwell: step,
+            error: judged.error,
+            sigmas: judged.sigmas,
+        };
         out.warnings.push(left_out);
         out.left_out.push(LeftOut {
             sensor: Sensor::Accel,
@@ -223,12 +232,12 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
                 ),
                 _ => format!("the bias of gyro {}", AXES[parameter - 9]),
             };
-            out.warnings.push(Warning::TurnKept(
-                step(turn.from),
-                step(turn.to),
-                name,
-                grows,
-            ));
+            out.warnings.push(Warning::TurnKept {
+                from: step(turn.from),
+                to: step(turn.to),
+                parameter: name,
+                wider: grows,
+            });
             continue;
         }
         out.left_out.push(LeftOut {

@@ -130,7 +130,11 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warni
         Figure::GravityMagnitude | Figure::RateMagnitude | Figure::Direction => None,
     };
     if let Some(with) = with.filter(|w| w.rms / spread <= FOLLOWS_NOTHING) {
-        let warning = Warning::FollowsTemperature(share, with.rms / spread, with.mean_c);
+        let warning = Warning::FollowsTemperature {
+            without: share,
+            with: with.rms / spread,
+            mean_c: with.mean_c,
+        };
         return Ok(Some(warning.of(fit.sensor)));
     }
     let against = match fit.figure {
@@ -193,7 +197,13 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let names = bad.iter().map(|r| name(prepared, r)).collect();
     let (turns, largest) = (fit.figure == Figure::Direction, worst.value.norm());
     let unit = fit.figure.unit(fit.sensor);
-    let warning = Warning::Outliers(turns, names, largest, unit, largest / median);
+    let warning = Warning::Outliers {
+        turns,
+        names,
+        worst: largest,
+        unit,
+        times: largest / median,
+    };
     Some(warning.of(fit.sensor))
 }
 
@@ -240,5 +250,11 @@ fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
         return None;
     }
     let table = prepared.manifest.reference == Reference::Table;
-    Some(Warning::Turned(angle, table).of(fit.sensor))
+    Some(
+        Warning::Turned {
+            angle,
+            to_table: table,
+        }
+        .of(fit.sensor),
+    )
 }

@@ -120,6 +120,8 @@ pub fn estimate(
         condition: 1.0,
         delays: None,
         earth,
-        notes: vec![Warning::MatrixGiven(false)],
+        notes: vec![Warning::MatrixGiven {
+            with_intervals: false,
+        }],
     })
 }

@@ -67,7 +67,12 @@ pub(super) fn compare(fit: &mut SensorFit) {
     let worse = exceeds(calibrated, uncalibrated, errors(fit.figure, count));
     let errors = [uncalibrated, calibrated].map(|error| error * factor);
     let undecided = (!worse).then_some(count);
-    let warning = Warning::NoBetter(errors, unit, held_out.is_some(), undecided);
+    let warning = Warning::NoBetter {
+        errors,
+        unit,
+        held_out: held_out.is_some(),
+        undecided,
+    };
     fit.warnings.push(warning.of(fit.sensor));
 }
 

@@ -11,37 +11,41 @@ use crate::warning::Warning;
 /// `Untested`: the data cannot contradict the result.
 pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
     match warning {
-        Warning::Of(_, warning) | Warning::Channel(_, warning) => of_warning(warning),
-        Warning::NotSi(..)
-        | Warning::NotCounts(..)
-        | Warning::Turning(_)
-        | Warning::CalibrationOfOther(_)
-        | Warning::NoisierThanGyros(_)
-        | Warning::ImplausibleRate(_)
-        | Warning::Restless(_)
-        | Warning::RateOff(..)
-        | Warning::Gravity(..)
-        | Warning::OtherGravity(.., true)
-        | Warning::NoiseOfAnother(..)
+        Warning::Of { warning, .. } | Warning::Channel { warning, .. } => of_warning(warning),
+        Warning::NotSi { .. }
+        | Warning::NotCounts { .. }
+        | Warning::Turning { .. }
+        | Warning::CalibrationOfOther { .. }
+        | Warning::NoisierThanGyros { .. }
+        | Warning::ImplausibleRate { .. }
+        | Warning::Restless { .. }
+        | Warning::RateOff { .. }
+        | Warning::Gravity { .. }
+        | Warning::OtherGravity {
+            contradicted: true, ..
+        }
+        | Warning::NoiseOfAnother { .. }
         | Warning::LeftHanded
-        | Warning::Turned(..)
-        | Warning::WideTurn(_)
-        | Warning::RatesContradict(..)
-        | Warning::OtherUnit(..)
-        | Warning::OtherDevice(..)
-        | Warning::Dead(_)
+        | Warning::Turned { .. }
+        | Warning::WideTurn { .. }
+        | Warning::RatesContradict { .. }
+        | Warning::OtherUnit { .. }
+        | Warning::OtherDevice { .. }
+        | Warning::Dead { .. }
         | Warning::BiasRemoved(_)
-        | Warning::RunAtEnd(..)
-        | Warning::CalmEnd(..) => Some(JudgementKind::Suspect),
+        | Warning::RunAtEnd { .. }
+        | Warning::CalmEnd { .. } => Some(JudgementKind::Suspect),
         Warning::NoResiduals
         | Warning::FewResiduals
-        | Warning::PoorlyDetermined(_)
-        | Warning::UnseenPoses(..)
+        | Warning::PoorlyDetermined { .. }
+        | Warning::UnseenPoses { .. }
         | Warning::SameRecording
         | Warning::NothingToJudge => Some(JudgementKind::Untested),
-        Warning::NoBetter(.., None) | Warning::Worse(_) | Warning::Outliers(..) => {
-            Some(JudgementKind::Unexplained)
+        Warning::NoBetter {
+            undecided: None, ..
         }
+        | Warning::Worse { .. }
+        | Warning::Outliers { .. } => Some(JudgementKind::Unexplained),
         _ => None,
     }
 }

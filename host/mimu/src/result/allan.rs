@@ -43,7 +43,7 @@ pub struct AllanResult {
     /// Their channels, recording by recording.
     pub channels: Vec<ChannelResult>,
     /// Warnings; for several recordings each begins with the name of its recording.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// What was used of a recording.
@@ -58,7 +58,7 @@ pub struct RecordingResult {
     /// Times of the first and the last sample, s.
     pub span_s: [f64; 2],
     /// Warnings.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Noise of one channel. Deviations are in [`Self::unit`].
@@ -189,8 +189,11 @@ impl AllanResult {
         };
         let warnings = surveys.iter().flat_map(|survey| {
             let named = |w: &Warning| match surveys.len() {
-                1 => w.to_string(),
-                _ => format!("{}: {w}", survey.recording),
+                1 => w.clone(),
+                _ => Warning::In {
+                    recording: survey.recording.clone(),
+                    warning: Box::new(w.clone()),
+                },
             };
             survey.warnings.iter().map(named).collect::<Vec<_>>()
         });
@@ -199,7 +202,7 @@ impl AllanResult {
             temp_c: survey.temp_c,
             sample_rate_hz: survey.sample_rate_hz,
             span_s: survey.span_s,
-            warnings: survey.warnings.iter().map(Warning::to_string).collect(),
+            warnings: survey.warnings.clone(),
         });
         let channels = surveys
             .iter()

@@ -144,7 +144,7 @@ impl Condensed {
         condensed.sha256 = summary.sha256;
         // Stamps with jitter have slightly different rates by different means. Only a rate that somebody gave can be contradicted.
         if recording.manifest.has_rate_of_stamps() {
-            let by_stamps = |warning: &Warning| !matches!(warning, Warning::RateOff(..));
+            let by_stamps = |warning: &Warning| !matches!(warning, Warning::RateOff { .. });
             condensed.warnings.retain(by_stamps);
         }
         let read = summary.warnings.into_iter().map(Warning::Reading);
@@ -501,30 +501,45 @@ impl Condenser {
         }
         let out = &mut self.out;
         if off.abs() > 1e-3 {
-            out.warnings
-                .push(Warning::RateOff(1.0 / period, -100.0 * off, rate));
+            out.warnings.push(Warning::RateOff {
+                stamps_hz: 1.0 / period,
+                off_percent: -100.0 * off,
+                manifest_hz: rate,
+            });
         }
         out.period_s = period;
         out.gaps = (intervals.longer, intervals.missing_s);
         if intervals.longer > 0 {
             let (row, _) = intervals.first_odd.unwrap_or((0, 0.0));
-            let gaps = Warning::Gaps(intervals.longer, intervals.missing_s, row + 1);
+            let gaps = Warning::Gaps {
+                count: intervals.longer,
+                missing_s: intervals.missing_s,
+                row: row + 1,
+            };
             out.warnings.push(gaps);
         }
         if out.duplicates > 0 {
-            out.warnings.push(Warning::Repeated(out.duplicates));
+            out.warnings.push(Warning::Repeated {
+                rows: out.duplicates,
+            });
         }
         for (c, &missing) in out.missing.iter().enumerate() {
             if missing > 0 {
-                out.warnings.push(Warning::Empty(missing, RAW_COLUMNS[c]));
+                out.warnings.push(Warning::Empty {
+                    count: missing,
+                    channel: RAW_COLUMNS[c],
+                });
             }
         }
         out.warnings
             .extend(no_temperature::warning(&out.no_temperatures));
         for (sensor, held) in Sensor::BOTH.iter().zip(&self.held) {
             let held = held.found();
-            out.warnings
-                .extend(held.map(|held| Warning::Held(*sensor, held, 1.0 / period)));
+            out.warnings.extend(held.map(|held| Warning::Held {
+                sensor: *sensor,
+                held,
+                rate_hz: 1.0 / period,
+            }));
         }
         if let Some(integrator) = &mut self.integrator {
             out.increments.extend(integrator.take());

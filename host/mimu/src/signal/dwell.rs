@@ -217,7 +217,10 @@ impl Dwells {
                 ends.map_or((0, 0), |ends| rest::walk_in(&mut ranges, condensed, ends));
             if cut > 0 && by_hand {
                 let in_all_s = blocks as f64 * detection.block_s;
-                warnings.push(Warning::DwellsCut(cut, in_all_s));
+                warnings.push(Warning::DwellsCut {
+                    count: cut,
+                    cut_s: in_all_s,
+                });
             }
             (ranges, Some(detection), found.fault)
         };
@@ -434,7 +437,7 @@ fn mark_slow_turns(list: &mut [Dwell]) -> Option<Warning> {
         .filter(|d| d.turns_slowly)
         .map(|d| d.step.to_string())
         .collect();
-    (!steps.is_empty()).then_some(Warning::SlowTurns(steps))
+    (!steps.is_empty()).then_some(Warning::SlowTurns { dwells: steps })
 }
 
 /// Marks the dwells whose known inputs move; returns for which sensors of each dwell the input moves too fast.
@@ -563,13 +566,17 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<Warning>) {
         }
     }
     for (fault, sensor, names) in by_fault {
-        warnings.push(Warning::DwellsNotUsed(names, fault, sensor));
+        warnings.push(Warning::DwellsNotUsed {
+            dwells: names,
+            fault,
+            sensor,
+        });
     }
     let clipped: u64 = list
         .iter()
         .flat_map(|d| d.raw.iter().map(|m| m.clipped))
         .sum();
     if clipped > 0 {
-        warnings.push(Warning::Clipped(clipped));
+        warnings.push(Warning::Clipped { count: clipped });
     }
 }

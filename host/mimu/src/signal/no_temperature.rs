@@ -25,7 +25,9 @@ pub(crate) fn leave_empty(
 
 /// The warning about them, if there are any.
 pub(crate) fn warning(found: &NoTemperatures) -> Option<Warning> {
-    (found.count > 0).then(|| Warning::NoTemperatures(found.clone()))
+    (found.count > 0).then(|| Warning::NoTemperatures {
+        which: found.clone(),
+    })
 }
 
 #[cfg(test)]

@@ -179,15 +179,22 @@ fn converter_rail(
     };
     let full_scale = of_codes.max(of_si);
     if of_codes > RUN_LOG_ODDS {
-        return Some(Warning::EndOfConverter(all, value).of_channel(c));
+        return Some(Warning::EndOfConverter { count: all, value }.of_channel(c));
     }
     if of_si > RUN_LOG_ODDS || of_si > 0.0 && longest > 1.0 {
-        return Some(Warning::FullScale(all, value).of_channel(c));
+        return Some(Warning::FullScale { count: all, value }.of_channel(c));
     }
     // Only runs at the extreme are tested, so the length of the recording does not matter.
     let chance = 1.0 + (RUN_LOG_ODDS - full_scale) / -share_of_repeats(condensed, c)?.ln();
-    (longest > chance)
-        .then(|| Warning::RunAtEnd(high, value, longest, chance.floor()).of_channel(c))
+    (longest > chance).then(|| {
+        Warning::RunAtEnd {
+            high,
+            value,
+            longest,
+            by_chance: chance.floor(),
+        }
+        .of_channel(c)
+    })
 }
 
 /// Rails of the six channels, as declared or as found. The largest or smallest value of a recording is a rail if it repeats in a row more
@@ -227,7 +234,13 @@ pub(crate) fn find(
             } else if let Some(inner) =
                 calm_end(condensed, c, if is_high { 1.0 } else { -1.0 }, [low, high])
             {
-                warnings.push(Warning::CalmEnd(is_high, inner).of_channel(c));
+                warnings.push(
+                    Warning::CalmEnd {
+                        high: is_high,
+                        from: inner,
+                    }
+                    .of_channel(c),
+                );
                 *end = Some(inner);
             }
         }

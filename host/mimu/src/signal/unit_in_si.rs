@@ -62,7 +62,14 @@ fn warning(
         Sensor::Accel if near(gravity_mps2) => "they were multiplied by gravity twice",
         _ => "check the unit, and the range that the part was set to",
     };
-    Some(Warning::NotSi(at_rest, scale, cause).of(sensor))
+    Some(
+        Warning::NotSi {
+            at_rest,
+            times: scale,
+            cause,
+        }
+        .of(sensor),
+    )
 }
 
 /// Sensors have the scale factor of their unit to within this share.
@@ -96,7 +103,14 @@ pub(crate) fn not_counts(sensor: Sensor, scale: f64) -> Option<Warning> {
     let found = units
         .iter()
         .find(|(of, ..)| (scale / of - 1.0).abs() < OF_UNIT);
-    found.map(|(_, unit, remedy)| Warning::NotCounts(scale, unit, remedy).of(sensor))
+    found.map(|(_, unit, remedy)| {
+        Warning::NotCounts {
+            per_si: scale,
+            unit,
+            remedy,
+        }
+        .of(sensor)
+    })
 }
 
 /// Warnings about readings at rest that should be in SI. With known inputs the fit warns instead.
@@ -132,7 +146,7 @@ pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> 
     let rate = rate.filter(|rate| *rate > LARGEST_BIAS);
     force
         .into_iter()
-        .chain(rate.map(|rate| Warning::Turning(rate).of(Sensor::Gyro)))
+        .chain(rate.map(|rate| Warning::Turning { rate }.of(Sensor::Gyro)))
         .collect()
 }
 
@@ -142,5 +156,5 @@ const RESTLESS: f64 = 0.035;
 /// The warning about calibrated rates at rest that scatter by `rms`. A fit by turns knows the scale factor, also of readings in counts. It
 /// cannot judge the size of a bias, because a converter's null may be anywhere, but a bias is nearly the same in all dwells.
 pub(crate) fn restless(rms: f64) -> Option<Warning> {
-    (rms > RESTLESS).then(|| Warning::Restless(rms).of(Sensor::Gyro))
+    (rms > RESTLESS).then(|| Warning::Restless { rms }.of(Sensor::Gyro))
 }

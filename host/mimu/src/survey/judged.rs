@@ -39,8 +39,8 @@ impl Judgement {
 fn of_warning(warning: &Warning) -> Option<Judgement> {
     let kind = match warning {
         // Recordings and calibrations of one unit often have different names; another unit shows in the specific force.
-        Warning::OtherDevice(..) => None,
-        Warning::Moves(..) => Some(JudgementKind::Suspect),
+        Warning::OtherDevice { .. } => None,
+        Warning::Moves { .. } => Some(JudgementKind::Suspect),
         other => input::of_warning(other),
     };
     Some(Judgement::new(kind?, warning))

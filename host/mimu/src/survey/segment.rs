@@ -135,19 +135,23 @@ impl Segment {
             return Err(Error::new(format!("{place}, t_s"), problem, remedy));
         }
         if off.abs() > RATE_OFF[1] && !manifest.has_rate_of_stamps() {
-            warnings.push(Warning::RateOff(1.0 / period_s, 100.0 * off, rate_hz));
+            warnings.push(Warning::RateOff {
+                stamps_hz: 1.0 / period_s,
+                off_percent: 100.0 * off,
+                manifest_hz: rate_hz,
+            });
         }
         let mut rows = 0..t.len();
         if let Some(i) = first_gap {
             let whole = longest(steps, |k| (t[k + 1] - t[k]) * rate_hz <= GAP_PERIODS);
             rows = whole.start..whole.end + 1;
-            warnings.push(Warning::LongestStretch(
-                gaps as u64,
-                t[i] - t[i - 1],
-                first + i + 1,
-                rows.len() as f64 * period_s,
-                t[rows.start],
-            ));
+            warnings.push(Warning::LongestStretch {
+                gaps: gaps as u64,
+                first_s: t[i] - t[i - 1],
+                row: first + i + 1,
+                length_s: rows.len() as f64 * period_s,
+                from_s: t[rows.start],
+            });
             if rows.len() < FEWEST {
                 return Err(Error::new(
                     at(i),

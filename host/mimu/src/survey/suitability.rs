@@ -164,7 +164,12 @@ pub(super) fn refuse_motion(
     let window_s = channels[0].1.window as f64 * segment.period_s;
     let time = |k: usize| segment.span_s[0] + k as f64 * window_s;
     let count = (0..windows).filter(|k| moves(*k)).count();
-    let problem = Warning::Moves([count, windows], window_s, time(first), name);
+    let problem = Warning::Moves {
+        windows: [count, windows],
+        window_s,
+        first_s: time(first),
+        channel: name,
+    };
     if part != Part::Whole {
         warnings.push(problem);
         return Ok(());

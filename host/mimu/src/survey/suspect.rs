@@ -36,7 +36,7 @@ pub(super) fn input(
     let force = mean(Sensor::Accel).zip(calibration.inverse(Sensor::Accel));
     let times = force.map(|(raw, model)| model.apply(&raw).norm() / manifest.gravity_mps2);
     let other = times.filter(|times| !(GAIN.recip()..GAIN).contains(times));
-    all.extend(other.map(|times| Warning::CalibrationOfOther(times).of(Sensor::Accel)));
+    all.extend(other.map(|times| Warning::CalibrationOfOther { times }.of(Sensor::Accel)));
     all
 }
 
@@ -47,6 +47,9 @@ pub(super) fn noise(channels: &[Channel]) -> Vec<Warning> {
         .iter()
         .filter(|c| c.unit.name == Sensor::Gyro.unit());
     let loud = si.filter_map(|c| white(c).filter(|n| *n > LOUDEST_GYRO).map(|n| (c.name, n)));
-    loud.map(|(name, n)| Warning::Channel(name, Box::new(Warning::NoisierThanGyros(n))))
-        .collect()
+    loud.map(|(name, n)| Warning::Channel {
+        channel: name,
+        warning: Box::new(Warning::NoisierThanGyros { white: n }),
+    })
+    .collect()
 }

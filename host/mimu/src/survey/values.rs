@@ -54,7 +54,14 @@ impl Values {
             }
             let length_s = whole.len() as f64 * period_s;
             let used = rows.start + whole.start + 1;
-            warnings.push(Warning::EmptyCells(row, length_s, used).of_channel(i));
+            warnings.push(
+                Warning::EmptyCells {
+                    row,
+                    length_s,
+                    from_row: used,
+                }
+                .of_channel(i),
+            );
             from = whole.start;
             values.truncate(whole.end);
             values.drain(..from);
@@ -72,7 +79,12 @@ impl Values {
         warnings.extend(masked.map(|masked| {
             let first_s = segment.span_s[0] + from as f64 * period_s + masked.first_s;
             let samples = masked.samples as u64;
-            Warning::Disturbed(samples, masked.share, first_s).of_channel(i)
+            Warning::Disturbed {
+                samples,
+                share: masked.share,
+                first_s,
+            }
+            .of_channel(i)
         }));
         if from > 0 {
             suitability.begin_later(from);

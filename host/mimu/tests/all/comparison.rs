@@ -102,7 +102,7 @@ fn a_unit_without_a_name_contradicts_no_name_and_a_note_says_that_nobody_checked
     ] {
         let manifest = recording(with);
         assert_eq!(of.other_unit(&manifest), None, "{with}");
-        let expected = note.map(Warning::UnnamedUnit);
+        let expected = note.map(|unnamed| Warning::UnnamedUnit { unnamed });
         assert_eq!(of.unnamed_unit(&manifest), expected, "{with}");
     }
     assert!(named.other_unit(&recording("two")).is_some());

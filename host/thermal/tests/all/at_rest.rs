@@ -179,7 +179,7 @@ fn a_small_span_has_curves_only_if_the_data_show_that_lines_do_not_do() {
     };
     let lines = |result: &ThermalResult| {
         let mut warnings = result.warnings.iter();
-        warnings.any(|w| matches!(w, Warning::StraightLines(..)))
+        warnings.any(|w| matches!(w, Warning::StraightLines { .. }))
     };
     let (straight, bent) = (of(0.0), of(0.2));
     assert!(lines(&straight) && !lines(&bent), "{:?}", bent.warnings);
@@ -324,7 +324,7 @@ fn a_cubesats_gyro_cooled_one_way_has_straight_lines() {
         result
             .warnings
             .iter()
-            .any(|w| matches!(w, Warning::StraightLines(..)))
+            .any(|w| matches!(w, Warning::StraightLines { .. }))
     );
     for name in ["gyro_bias_x", "gyro_bias_y", "gyro_bias_z"] {
         let curve = result.curve(name).unwrap();

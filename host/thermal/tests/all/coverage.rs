@@ -158,7 +158,7 @@ fn a_turn_that_the_accelerometer_sees_is_still_left_out_while_the_temperature_ra
     let result = ThermalResult::of(&desk.fitted(3, Steps::AsRecorded).unwrap());
     let used = result.sensors.gyro.as_ref().unwrap().used.unwrap();
     assert!((0.5..0.76).contains(&used.samples), "{used:?}");
-    let covers = |w: &Warning| matches!(w, Warning::Coverage(..));
+    let covers = |w: &Warning| matches!(w, Warning::Coverage { .. });
     assert!(result.warnings.iter().any(covers));
     // Sixty rests in two poses, in which gravity contributes to the biases: the curves agree within their intervals. A turn of 2.4 deg/s in
     // one row of a rest would be far outside.

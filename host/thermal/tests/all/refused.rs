@@ -107,7 +107,7 @@ fn temperatures_that_no_recording_crosses_are_said() {
     let gap = joint
         .warnings
         .iter()
-        .find(|w| matches!(w, Warning::NotCrossed(_)));
+        .find(|w| matches!(w, Warning::NotCrossed { .. }));
     let said = gap.expect("the gap is said").to_string();
     assert!(said.contains("to 46.8 °C"), "{said}");
 }

@@ -80,7 +80,10 @@ impl OpenSession<'_> {
         let judged = match both {
             (Ok(before), Ok(after)) => Some([before, after]),
             (Err(refusal), _) | (_, Err(refusal)) => {
-                let warning = Warning::NotJudged(None, refusal);
+                let warning = Warning::NotJudged {
+                    recording: None,
+                    why: refusal,
+                };
                 diagnosis.after.warnings.push(warning);
                 None
             }

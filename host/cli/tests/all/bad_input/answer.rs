@@ -98,7 +98,7 @@ impl Run {
 pub fn warnings(result: &Value) -> Vec<String> {
     let all = result["warnings"].as_array().expect("warnings");
     all.iter()
-        .map(|w| w.as_str().unwrap().to_string())
+        .map(|w| w["text"].as_str().or(w.as_str()).unwrap().to_string())
         .collect()
 }
 

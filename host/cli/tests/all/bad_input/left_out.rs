@@ -232,7 +232,7 @@ fn temperatures_that_are_none_are_counted_in_the_same_words_by_every_command() {
         let said = format!("temp_c: {}: left empty", words(of));
         let warnings = result["warnings"].as_array().unwrap();
         assert!(
-            warnings.iter().any(|w| w.as_str() == Some(&said)),
+            warnings.iter().any(|w| w["text"] == said.as_str()),
             "{arguments:?}: {said} in {warnings:?}"
         );
     };

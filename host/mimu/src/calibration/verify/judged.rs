@@ -79,7 +79,7 @@ pub(super) fn judgement(
 ) -> Judgement {
     let problems = RecordingProblem::without_fit(prepared);
     let gravity = warnings.iter().find_map(|w| match w {
-        Warning::OtherGravity([ours, theirs], _, true) => Some(format!(
+        Warning::OtherGravity { gravity_mps2: [ours, theirs], contradicted: true, .. } => Some(format!(
             "gravity is {ours} m/s² in the calibration and {theirs} in the recording, which the readings contradict"
         )),
         _ => None,
@@ -122,7 +122,11 @@ pub(super) fn other_gravity(calibration: &Calibration, prepared: &Prepared) -> O
     }
     let mean = sizes.iter().sum::<f64>() / sizes.len() as f64;
     let contradicted = (mean - ours).abs() < (mean - theirs).abs();
-    Some(Warning::OtherGravity([ours, theirs], mean, contradicted))
+    Some(Warning::OtherGravity {
+        gravity_mps2: [ours, theirs],
+        force_mps2: mean,
+        contradicted,
+    })
 }
 
 impl Verification {
