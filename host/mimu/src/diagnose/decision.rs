@@ -1,46 +1,46 @@
 //! From the rows of one sensor to a verdict: effects tried, effects accepted, residual errors.
 
 mod acceptance;
+mod accepted;
+mod choice;
 mod hold_out;
 mod in_time;
 mod leftover;
 mod limit;
 mod model;
 mod nonlinear;
+mod not_chosen;
+mod notes;
 mod reading;
 mod second;
 mod together;
 mod tried;
 mod undecided;
 
-use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::note::Note;
-use super::rejected::{ErrorRms, NotChosen, Passed, Reason, Rejected};
+use super::rejected::{Reason, Rejected};
 use super::rows::Rows;
-use super::search::{Chosen, FALSE_LISTED, Found, MOST, Search};
-use super::variance::Fitted;
+use super::search::{Chosen, Search};
 use crate::diagnose::columns::beside;
-use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
-use crate::effects::fitted::FittedEffect;
-use crate::effects::quantity::Quantity;
-use crate::effects::regressor::Product;
-
 use crate::fit::{SensorFit, Split};
 use acceptance::Acceptance;
+pub use accepted::Accepted;
+use accepted::{accepted, coefficients_of};
+use choice::{Choice, choose};
 use in_time::others_in_time;
 use leftover::leftover;
 pub(super) use leftover::noisier;
-use limit::name_limits;
+use not_chosen::not_chosen;
+use notes::notes;
 use reading::of_readings;
 use together::together;
 use tried::candidates;
 use undecided::undecided;
 
-use hold_out::rms_at_rest;
 pub(super) use hold_out::{held_out, part, rms};
 pub use leftover::{CorrelatesWith, FALSE_LEFTOVER, Leftover, WANDERS};
 pub use model::Model;
@@ -53,43 +53,6 @@ pub const LEVERAGE: f64 = 0.7;
 /// Largest probability by chance that an effect may have without the dwell with most evidence for it; above it, one outlier could have caused
 /// the effect.
 const SURVIVES: f64 = 0.01;
-
-/// An accepted effect, and why.
-#[derive(Debug, Clone, Serialize)]
-pub struct Accepted {
-    /// The effect.
-    #[serde(flatten)]
-    pub effect: FittedEffect,
-    /// How it was found.
-    #[serde(flatten)]
-    pub chosen: Chosen,
-    /// Whether it is an error of the unit, so that a calibration stores it. A drift is specific to the session, and so is an effect of the
-    /// time since power-on if that time is unknown. An effect that may be a true input instead is not stored either: of 32 units whose
-    /// sessions on a table were diagnosed together, 6 had Earth rate in their files as g-sensitivity, and 2 of these erred more on another
-    /// session, by up to a fifth.
-    pub of_unit: bool,
-    /// Held-out root mean square without it, beside the others; unit of the sensor's figures.
-    pub held_out_rms_before: f64,
-    /// The same with it.
-    pub held_out_rms_after: f64,
-    /// Held-out root mean square of the rates at rest without it, rad/s, where the figures are of turns.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out_at_rest_before: Option<f64>,
-    /// The same with it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out_at_rest_after: Option<f64>,
-    /// How it was held out.
-    pub held_out: Split,
-    /// Its test on the second recording, if there is one that it can be judged by.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub second: Option<Second>,
-    /// Covariance of its coefficients, which allows for the uncertainty of its nonlinear parameter.
-    #[serde(skip)]
-    pub covariance: DMatrix<f64>,
-    /// The same at the nonlinear parameter found: the uncertainty of a curve that is drawn for this one value.
-    #[serde(skip)]
-    pub conditional: DMatrix<f64>,
-}
 
 /// What was decided on one sensor.
 #[derive(Debug, Clone)]
@@ -203,7 +166,7 @@ pub fn decide(
     without: &[Rejected],
     accept: &[String],
 ) -> Option<Decision> {
-    let (mut all, mut not_excited) = candidates(rows, dwell_ends);
+    let (mut all, not_excited) = candidates(rows, dwell_ends);
     all.retain(|c| !without.iter().any(|w| w.id == c.id()));
     let search = Search::new(rows, all);
     let null = search.fit(&[])?;
@@ -212,82 +175,17 @@ pub fn decide(
         .fit_at(&search.basis, &search.variance.none())?;
     let dof = rows.y.len() as f64 - search.basis.ncols() as f64;
     let omnibus_p = ChiSquared::new(dof).map_or(1.0, |d| d.sf(known.chi2));
-    let Found {
-        chosen,
-        fit: mut with,
-        superfluous,
-    } = search.run()?;
-    let rejection = |candidate: &Candidate, reason| Rejected {
-        id: candidate.id(),
-        sensor: rows.sensor,
-        reason,
-    };
-    let mut rejected = without.to_vec();
-    let mut kept: Vec<Chosen> = Vec::new();
-    let mut jumps = Vec::new();
-    for one in chosen {
-        match one.candidate.kind {
-            CandidateKind::Jump { .. } => jumps.push(one),
-            _ => kept.push(one),
-        }
-    }
-    // Jumps are reported, not fitted.
-    if !jumps.is_empty() {
-        with = search.fit(&kept)?;
-    }
+    let found = search.run()?;
+    let superfluous = found.superfluous.clone();
     let judge = Acceptance::new(&search, unseen, &null);
-    let usual = judge.usual;
-    let mut suggested = Vec::new();
-    // Ids that failed, in order. An effect that failed beside another that failed later is tried once more without the latter.
-    let mut failures: Vec<String> = Vec::new();
-    // Ids that passed. They are not judged again once suggestions are removed: what these explained would then hide an effect from held-out
-    // dwells.
-    let mut passed: Vec<String> = Vec::new();
-    loop {
-        let ids =
-            |all: &[Chosen]| -> Vec<String> { all.iter().map(|c| c.candidate.id()).collect() };
-        let mut failed_any = false;
-        // Effects are judged with the coefficients that would be stored.
-        search.complete(&mut kept, &mut with);
-        name_limits(&search, &mut kept, &mut with, &failures);
-        // Effects that are not accepted are removed, the last in the list first.
-        while let Some(failed) = judge.first_to_fail(&kept, &with, &passed)? {
-            failed_any = true;
-            let candidate = kept.remove(failed.at).candidate;
-            // More dwells may prove it, so the next experiment asks for it.
-            if let CandidateKind::Effect(effect) = &candidate.kind
-                && failed.too_few_dwells
-                && !not_excited.iter().any(|n| n.id == effect.id)
-            {
-                not_excited.push(effect);
-            }
-            failures.push(candidate.id());
-            rejected.retain(|r| r.id != candidate.id());
-            rejected.push(rejection(&candidate, failed.why));
-            with = search.fit(&kept)?;
-        }
-        passed = ids(&kept);
-        let set_aside = judge.suggestions(&mut kept, &with, accept);
-        if set_aside.is_empty() && !failed_any {
-            break;
-        }
-        suggested.extend(set_aside);
-        with = search.fit(&kept)?;
-        // What a suggestion or a rejected effect had explained, a named effect may explain as well. An accelerometer's warm-up of p < 1e-6
-        // was reported as not significant, because the effect that had replaced it in the search was rejected afterwards.
-        let more = search.beside(kept.clone(), |c| {
-            let id = c.id();
-            let times = failures.iter().filter(|f| **f == id).count();
-            let beside_others = times == 1 && failures.last() != Some(&id);
-            let tried = without.iter().any(|w| w.id == id) || times > 0;
-            c.is_listed() && (!tried || beside_others)
-        })?;
-        if ids(&more.chosen) == ids(&kept) {
-            break;
-        }
-        (kept, with) = (more.chosen, more.fit);
-    }
-    rejected.retain(|r| kept.iter().all(|k| k.candidate.id() != r.id));
+    let Choice {
+        mut kept,
+        mut with,
+        mut jumps,
+        suggested,
+        mut rejected,
+        mut not_excited,
+    } = choose(&search, &judge, found, not_excited, without, accept)?;
     nonlinear::refine(&search, &mut kept, &mut with);
     others_in_time(&search, &mut kept, &with);
     let one_at_these_inputs = together(&search, &mut kept, &with);
@@ -296,103 +194,28 @@ pub fn decide(
     let after = Model::of(&search, &kept, &with, split)?;
     let nonlinear = Nonlinear::of(&search, &kept, &after);
     let (model, last) = (&after.columns, &after.fitted);
-    let mut accepted = Vec::new();
-    let values = coefficients_of(&search, &kept, last);
-    let seconds = judge.on_second_recording(&kept, &values);
-    let (first, mut from) = (search.basis.ncols(), 0);
-    let held_with_all = judge.held(&kept, &with, split);
-    for (i, one) in kept.iter().enumerate() {
-        let count = one.columns.ncols();
-        let mut rest = kept.clone();
-        rest.remove(i);
-        let without = search.fit(&rest)?;
-        let held_without = judge.held(&rest, &without, split);
-        let both = [held_without.as_ref(), held_with_all.as_ref()];
-        let held = both.map(|h| h.map(|h| rms(rows, h)));
-        let at_rest = both.map(|h| h.and_then(|h| rms_at_rest(rows, h)));
-        let covariance = nonlinear.covariance.view((from, from), (count, count));
-        let [before, after] = held.map(|h| h.unwrap_or(f64::NAN));
-        let (at_rest_before, at_rest_after) = match at_rest {
-            [Some(without), Some(with)] => (Some(without), Some(with)),
-            _ => (None, None),
-        };
-        accepted.push(Accepted {
-            effect: FittedEffect {
-                interval: nonlinear.intervals[i],
-                sigmas: covariance.diagonal().iter().map(|v| v.sqrt()).collect(),
-                ..FittedEffect::new(
-                    one.candidate.clone(),
-                    one.parameter,
-                    values[i].iter().copied().collect(),
-                )
-            },
-            chosen: one.clone(),
-            held_out: split,
-            second: seconds[i],
-            covariance: covariance.into_owned(),
-            conditional: last
-                .covariance
-                .view((first + from, first + from), (count, count))
-                .into_owned(),
-            held_out_rms_before: before,
-            held_out_rms_after: after,
-            held_out_at_rest_before: at_rest_before,
-            held_out_at_rest_after: at_rest_after,
-            of_unit: one.candidate.is_error()
-                && !one.candidate.is_of_session()
-                && one.or_true_input().is_none(),
-        });
-        from += count;
-    }
+    let accepted = accepted(&search, &judge, (&kept, &with), last, &nonlinear, split)?;
     // A walk at random has steps that look like jumps.
     jumps.retain(|one| {
         let beside_it: Vec<Chosen> = kept.iter().chain([one]).cloned().collect();
         judge.wanders([&kept, &beside_it], one, &with).is_none()
     });
-    // The jumps that were found stay in the model: otherwise every slow effect would seem to explain a part of them.
-    let with_jumps: Vec<Chosen> = kept.iter().chain(&jumps).cloned().collect();
-    let all = match jumps.is_empty() {
-        true => with.clone(),
-        false => search.fit(&with_jumps)?,
-    };
-    rejected.extend(
-        suggested
-            .iter()
-            .map(|one| rejection(&one.candidate, Reason::Suggestion(one.p))),
-    );
-    let now = (
-        rms(rows, &(&rows.y - search.model(&kept) * &with.coefficients)),
-        judge.held_rms(&kept, &with, usual),
-    );
-    for one in search.others(&with_jumps, &all) {
-        let id = one.candidate.id();
-        if rejected.iter().any(|r| r.id == id) || not_excited.iter().any(|n| n.id == id) {
-            continue;
-        }
-        let mut more = kept.clone();
-        more.push(one.clone());
-        let held = search
-            .fit(&more)
-            .and_then(|f| Some((f.clone(), judge.held_rms(&more, &f, usual)?)))
-            .map(|(f, held)| {
-                (
-                    rms(rows, &(&rows.y - search.model(&more) * &f.coefficients)),
-                    held,
-                )
-            });
-        let errors = match (held, now) {
-            (Some((sample, held)), (before, Some(out))) => {
-                Some([[before, sample], [out, held]].map(|of| of.map(|v| ErrorRms::of(rows, v))))
-            }
-            _ => None,
-        };
-        let reason = Reason::NotChosen(NotChosen {
-            p: one.p,
-            why: passed_over(&one, &kept, &superfluous),
-            errors,
-        });
-        rejected.push(rejection(&one.candidate, reason));
-    }
+    rejected.extend(suggested.iter().map(|one| Rejected {
+        id: one.candidate.id(),
+        sensor: rows.sensor,
+        reason: Reason::Suggestion(one.p),
+    }));
+    let listed: Vec<String> = rejected.iter().map(|r| r.id.clone()).collect();
+    let known = listed.iter().map(String::as_str);
+    let known: Vec<&str> = known.chain(not_excited.iter().map(|n| n.id)).collect();
+    rejected.extend(not_chosen(
+        &search,
+        &judge,
+        (&kept, &with),
+        &jumps,
+        &superfluous,
+        &known,
+    )?);
     let of_readings = of_readings(&search, model, last, split);
     // Scatter beside these functions of the readings.
     let whole = of_readings
@@ -413,6 +236,7 @@ pub fn decide(
         let items = rows.judged.0 / rows.judged.1;
         (sum / items as f64).sqrt()
     });
+    not_excited.retain(|n| kept.iter().all(|k| k.candidate.id() != n.id));
     Some(Decision {
         rms: models.each_ref().map(|m| rms(rows, &m.residuals)),
         held_out_rms: models.each_ref().map(|m| {
@@ -426,11 +250,7 @@ pub fn decide(
         noise_floor: floor,
         reference_rms: reference,
         accepted,
-        not_excited: {
-            let accepted = |id: &str| kept.iter().any(|k| k.candidate.id() == id);
-            not_excited.retain(|n| !accepted(n.id));
-            not_excited
-        },
+        not_excited,
         rejected,
         leftover: left,
         undecided: undecided(&search, &kept),
@@ -439,17 +259,6 @@ pub fn decide(
         jumps_sought: [dwell_ends.len(); 2],
         omnibus_p,
     })
-}
-
-/// Why a named effect that is significant is not among the `kept`. `None` if it is not significant.
-fn passed_over(one: &Chosen, kept: &[Chosen], superfluous: &[String]) -> Option<Passed> {
-    let listed = kept.iter().filter(|k| k.candidate.is_listed()).count();
-    match one.p {
-        p if p > FALSE_LISTED => None,
-        _ if superfluous.contains(&one.candidate.id()) => Some(Passed::GivenUp),
-        _ if listed >= MOST => Some(Passed::Enough(listed)),
-        _ => Some(Passed::NotAtFirst),
-    }
 }
 
 /// Known variances of the judged rows, summed: by noise, and by errors of the reference.
@@ -465,103 +274,4 @@ fn known_in(rows: &Rows) -> [f64; 2] {
         sums[1] += by_reference;
     }
     sums
-}
-
-/// Coefficients of each of the chosen.
-fn coefficients_of(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>> {
-    let mut from = search.basis.ncols();
-    let mut all = Vec::new();
-    for one in chosen {
-        let count = one.columns.ncols();
-        all.push(fit.coefficients.rows(from, count).into_owned());
-        from += count;
-    }
-    all
-}
-
-/// Notes on the chosen effects for the user.
-fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
-    let mut notes = Vec::new();
-    let inputs = chosen.iter().filter(|c| !c.candidate.is_error());
-    notes.extend(inputs.map(|c| {
-        let found = format!("{}: it is a true input of the gyro", c.candidate.id());
-        Note::new(
-            found,
-            "the calibration is corrected for it, and it is not removed from readings",
-        )
-    }));
-    notes.extend(chosen.iter().filter_map(|c| {
-        let input = c.or_true_input()?;
-        let id = c.candidate.id();
-        let found = format!(
-            "{id}: {}, a true input of the gyro, explains the recording as well, so a calibration does not store {id}",
-            input.id
-        );
-        Some(Note::new(
-            found,
-            format!("at 1 g it is no larger than {}; a force of several g distinguishes them", input.size),
-        ))
-    }));
-    let sessions = chosen.iter().filter(|c| c.candidate.is_of_session());
-    notes.extend(sessions.map(|c| {
-        let found = format!(
-            "{}: specific to this session, because it is unknown how long it lasts; it is not stored in a calibration, and the biases are those of the middle of the session",
-            c.candidate.id()
-        );
-        Note::new(found, "")
-    }));
-    for candidate in chosen.iter().map(|c| &c.candidate) {
-        if let CandidateKind::Effect(effect) = &candidate.kind
-            && !candidate.inseparable.is_empty()
-        {
-            let names = candidate
-                .inseparable
-                .iter()
-                .map(|k| effect.coefficients[*k].name);
-            let found = format!(
-                "{}: this recording does not distinguish {} from the bias and the other coefficients, so they are 0 in the file",
-                effect.id,
-                names.collect::<Vec<_>>().join(", ")
-            );
-            notes.push(Note::new(found, format!("it needs {}", effect.needs)));
-        }
-    }
-    // The horizontal part of Earth rate depends on the heading. On a table with one heading in each attitude it looks like products of the
-    // force.
-    let only_force = |p: &Product| p.parts().all(|(q, _)| matches!(q, Quantity::Force(_)));
-    let level = chosen
-        .iter()
-        .filter(|c| matches!(&c.candidate.kind, CandidateKind::Term(_, m) if only_force(m)));
-    let level: Vec<String> = level.map(|c| c.candidate.id()).collect();
-    if !level.is_empty() && chosen.iter().any(|c| !c.candidate.is_error()) {
-        let found = format!(
-            "{}: may be the horizontal part of Earth rate, which depends on the heading and the place: record each attitude at several headings",
-            level.join(", ")
-        );
-        notes.push(Note::new(found, ""));
-    }
-    let heated = chosen.iter().filter(|c| c.candidate.without_self_heating);
-    notes.extend(heated.map(|c| {
-        let found = format!(
-            "{}: the thermometer heats itself in the first minute, and the sensor is on another die",
-            c.candidate.id()
-        );
-        let advice = "the device has no other thermometer, so it has this error for that time after power-on";
-        Note::new(found, advice)
-    }));
-    let slow = chosen.iter().filter(|c| c.candidate.is_slow());
-    let ids: Vec<String> = slow.map(|c| c.candidate.id()).collect();
-    let Some(order) = rows.one_way().filter(|_| !ids.is_empty()) else {
-        return notes;
-    };
-    let found = format!(
-        "{}: the temperature only {} during the recording (rank correlation {order:.2}), so effects of temperature and of time look alike, and a lag of the die looks like a bias",
-        ids.join(", "),
-        if order > 0.0 { "rises" } else { "falls" },
-    );
-    notes.push(Note::new(
-        found,
-        "let the temperature return within one recording",
-    ));
-    notes
 }
