@@ -311,6 +311,80 @@ pub(super) fn positive(variances: DVector<f64>) -> DVector<f64> {
     })
 }
 
+/// Dwells of rates in pairs of opposite ones, dwells at rest, and the number of rates without an opposite.
+struct Opposite<'a> {
+    pairs: Vec<(&'a Observation, &'a Observation)>,
+    rest: Vec<&'a Observation>,
+    single: usize,
+}
+
+impl<'a> Opposite<'a> {
+    fn of(observations: &'a [Observation]) -> Result<Self, Failure> {
+        let mut free: Vec<&Observation> = observations.iter().collect();
+        let (mut pairs, mut rest, mut single) = (Vec::new(), Vec::new(), 0);
+        let span = span(observations);
+        while let Some(first) = free.pop() {
+            let size = first.input.norm();
+            if size < REST_SHARE * span {
+                rest.push(first);
+                continue;
+            }
+            let opposite = free
+                .iter()
+                .enumerate()
+                .map(|(i, o)| (i, (o.input + first.input).norm()))
+                .filter(|(_, sum)| *sum <= OPPOSITE_SHARE * size)
+                .min_by(|a, b| a.1.total_cmp(&b.1));
+            match opposite {
+                Some((i, _)) => pairs.push((first, free.swap_remove(i))),
+                None => single += 1,
+            }
+        }
+        if rest.is_empty() {
+            return Err(Failure::Undetermined {
+                parameters: "o (xu (10))".into(),
+                add: "the inverse form needs dwells at rest for the offset: add some, or use least squares".into(),
+            });
+        }
+        Ok(Self {
+            pairs,
+            rest,
+            single,
+        })
+    }
+
+    /// Observability of C from differences of inputs, which are shares of `span`.
+    fn observability(&self, span: f64) -> Result<Observability, Failure> {
+        let differences = self.differences(|o| o.input / (2.0 * span));
+        let observability = Observability::of(&differences);
+        if !observability.is_complete() {
+            let undetermined = observability.undetermined.iter();
+            let axes: Vec<&str> = undetermined.map(|(k, _)| AXES[*k]).collect();
+            return Err(Failure::Undetermined {
+                parameters: format!("C (there are no opposite rates about {})", axes.join(", ")),
+                add: "add the opposite of each rate, or use least squares".into(),
+            });
+        }
+        Ok(observability)
+    }
+
+    fn differences(&self, of: impl Fn(&Observation) -> Vector3<f64>) -> DMatrix<f64> {
+        DMatrix::from_fn(self.pairs.len(), 3, |i, j| {
+            let (a, b) = self.pairs[i];
+            of(a)[j] - of(b)[j]
+        })
+    }
+}
+
+/// Scatter of `values` about zero on `axis`, beyond their known variances.
+fn scatter_on(axis: usize, values: Vec<f64>, variances: &[Matrix3<f64>], dof: f64) -> Scatter {
+    let variances: Vec<f64> = variances
+        .iter()
+        .map(|v| v[(axis, axis)].max(f64::MIN_POSITIVE))
+        .collect();
+    extra_variance(&values, &variances, dof)
+}
+
 /// xu's inverse form for rates: C from the differences of opposite rates, (3)-(8), o from the readings at rest, (9)-(11).
 ///
 /// Unweighted, as published. It regresses the known input on the noisy reading, which shrinks C by the
@@ -319,51 +393,15 @@ pub(super) fn positive(variances: DVector<f64>) -> DVector<f64> {
 /// readings.
 pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure> {
     observability(observations)?;
-    let mut free: Vec<&Observation> = observations.iter().collect();
-    let (mut pairs, mut rest, mut single) = (Vec::new(), Vec::new(), 0);
-    while let Some(first) = free.pop() {
-        let size = first.input.norm();
-        if size < REST_SHARE * span(observations) {
-            rest.push(first);
-            continue;
-        }
-        let opposite = free
-            .iter()
-            .enumerate()
-            .map(|(i, o)| (i, (o.input + first.input).norm()))
-            .filter(|(_, sum)| *sum <= OPPOSITE_SHARE * size)
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        match opposite {
-            Some((i, _)) => pairs.push((first, free.swap_remove(i))),
-            None => single += 1,
-        }
-    }
-    if rest.is_empty() {
-        return Err(Failure::Undetermined {
-            parameters: "o (xu (10))".into(),
-            add: "the inverse form needs dwells at rest for the offset: add some, or use least squares".into(),
-        });
-    }
-    let span = span(observations);
-    let differences = DMatrix::from_fn(pairs.len(), 3, |i, j| {
-        (pairs[i].0.input[j] - pairs[i].1.input[j]) / (2.0 * span)
-    });
-    let observability = Observability::of(&differences);
-    if !observability.is_complete() {
-        let axes: Vec<&str> = observability
-            .undetermined
-            .iter()
-            .map(|(k, _)| AXES[*k])
-            .collect();
-        return Err(Failure::Undetermined {
-            parameters: format!("C (there are no opposite rates about {})", axes.join(", ")),
-            add: "add the opposite of each rate, or use least squares".into(),
-        });
-    }
-    let reading = DMatrix::from_fn(pairs.len(), 3, |i, j| pairs[i].0.raw[j] - pairs[i].1.raw[j]);
-    let known = DMatrix::from_fn(pairs.len(), 3, |i, j| {
-        pairs[i].0.input[j] - pairs[i].1.input[j]
-    });
+    let opposite = Opposite::of(observations)?;
+    let observability = opposite.observability(span(observations))?;
+    let reading = opposite.differences(|o| o.raw);
+    let known = opposite.differences(|o| o.input);
+    let Opposite {
+        pairs,
+        rest,
+        single,
+    } = opposite;
     let pseudo = (reading.transpose() * &reading)
         .try_inverse()
         .ok_or_else(|| Failure::NoSolution("the readings do not change with the rate".into()))?
@@ -375,64 +413,31 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
     // (9) instead of (10): a dwell that counts as rest may turn a little, at a known rate.
     let offsets: Vec<Vector3<f64>> = rest.iter().map(|o| o.input - matrix * o.raw).collect();
     let offset = offsets.iter().sum::<Vector3<f64>>() / count;
-    let inverse = Affine { matrix, offset };
 
     // Errors of a difference in SI: C times the error of the readings.
     let si =
         |variance: Vector3<f64>| matrix * Matrix3::from_diagonal(&variance) * matrix.transpose();
-    let noise: Vec<Matrix3<f64>> = pairs
-        .iter()
-        .map(|(a, b)| si(a.variance + b.variance))
-        .collect();
-    let rest_variance: Vec<Matrix3<f64>> = rest.iter().map(|o| si(o.variance)).collect();
-    let mut rest_noise = rest_variance.iter().sum::<Matrix3<f64>>() / (count * count);
+    let each = pairs.iter().map(|(a, b)| si(a.variance + b.variance));
+    let noise: Vec<Matrix3<f64>> = each.collect();
     let residual = &known - &reading * &c_transposed;
-    let mut notes = Vec::new();
-    if single > 0 {
-        notes.push(Warning::NoOpposite { rates: single });
-    }
-    let scatter_of = |values: Vec<f64>, variances: &[Matrix3<f64>], axis: usize, dof: f64| {
-        let variances: Vec<f64> = variances
-            .iter()
-            .map(|v| v[(axis, axis)].max(f64::MIN_POSITIVE))
-            .collect();
-        extra_variance(&values, &variances, dof)
-    };
-    let mut scatter: Vec<_> = (0..3)
-        .map(|axis| {
-            let values = residual.column(axis).iter().copied().collect();
-            (
-                Observable::Axis(axis),
-                scatter_of(values, &noise, axis, pairs.len() as f64 - 3.0),
-            )
-        })
-        .collect();
-    // Readings at rest have their own scatter, because that of the pairs may be the table's rate.
-    let mut rest_dof = [f64::INFINITY; 3];
-    for axis in 0..3 {
-        let values = offsets.iter().map(|o| o[axis] - offset[axis]).collect();
-        let of_rest = scatter_of(values, &rest_variance, axis, count - 1.0);
-        let of_pairs = scatter[axis].1;
-        // If rest shows no extra variance, there may be too few rests: then that of the pairs counts.
-        let (extra, dof) = if of_rest.extra_variance > 0.0 {
-            (of_rest.extra_variance, of_rest.variance_dof())
-        } else {
-            (0.5 * of_pairs.extra_variance, of_pairs.variance_dof())
-        };
-        rest_dof[axis] = dof;
-        rest_noise[(axis, axis)] += extra / count;
-        if of_rest.extra_variance > 0.0 {
-            scatter.push((Observable::AtRest(axis), of_rest));
-        }
-    }
-    let covariance = rows_covariance(&pseudo, |p, r, s| {
-        noise[p][(r, s)]
-            + if r == s {
-                scatter[r].1.extra_variance
-            } else {
-                0.0
-            }
+    let dof = pairs.len() as f64 - 3.0;
+    let of_pairs = [0, 1, 2].map(|axis| {
+        let values = residual.column(axis).iter().copied().collect();
+        scatter_on(axis, values, &noise, dof)
     });
+    let rest_variance: Vec<Matrix3<f64>> = rest.iter().map(|o| si(o.variance)).collect();
+    let deviations: Vec<Vector3<f64>> = offsets.iter().map(|o| o - offset).collect();
+    let of_rest = RestNoise::of(&deviations, &rest_variance, &of_pairs);
+    let covariance = rows_covariance(&pseudo, |p, r, s| {
+        let extra = match r == s {
+            true => of_pairs[r].extra_variance,
+            false => 0.0,
+        };
+        noise[p][(r, s)] + extra
+    });
+    let observables = [0, 1, 2].map(Observable::Axis);
+    let mut scatter: Vec<_> = observables.into_iter().zip(of_pairs).collect();
+    scatter.extend(of_rest.scatter.iter().copied());
     // o_r = -c_r . G0: its errors come from c_r and from the readings at rest.
     let mut by_c = SMatrix::<f64, 12, 9>::zeros();
     for r in 0..3 {
@@ -445,38 +450,83 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         |a, b| (a / 3 == b / 3).then_some(a / 3),
         &covariance,
         &scatter,
-    )
-    .into_iter()
-    .map(|(covariance, dof)| Part {
+    );
+    let parts = parts.into_iter().map(|(covariance, dof)| Part {
         covariance: by_c * covariance * by_c.transpose(),
         dof,
     });
-    let of_rest = (0..3).map(|r| {
-        let mut covariance = Covariance::zeros();
-        covariance[(9 + r, 9 + r)] = rest_noise[(r, r)];
-        Part {
-            covariance,
-            dof: rest_dof[r],
-        }
-    });
-    let mut rest_between = Covariance::zeros();
-    rest_between
-        .fixed_view_mut::<3, 3>(9, 9)
-        .copy_from(&(rest_noise - Matrix3::from_diagonal(&rest_noise.diagonal())));
-    let known = Part {
-        covariance: rest_between,
-        dof: f64::INFINITY,
-    };
-    let triad = Triad::from_inverse(inverse, parts.chain(of_rest).chain([known]).collect())
+    let inverse = Affine { matrix, offset };
+    let triad = Triad::from_inverse(inverse, parts.chain(of_rest.parts()).collect())
         .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
+    let unpaired = (single > 0).then_some(Warning::NoOpposite { rates: single });
     Ok(Estimated {
         triad,
         scatter,
         condition: observability.condition,
         delays: None,
         earth: Vec::new(),
-        notes,
+        notes: unpaired.into_iter().collect(),
     })
+}
+
+/// Errors of the mean reading at rest, which are those of the offset. Readings at rest have their own scatter, because that of the pairs may be the
+/// table's rate.
+struct RestNoise {
+    covariance: Matrix3<f64>,
+    dof: [f64; 3],
+    /// Scatter beyond the known noise, where there is some.
+    scatter: Vec<(Observable, Scatter)>,
+}
+
+impl RestNoise {
+    /// From the deviations of the dwells at rest from their mean, rad/s, and their known variances. If rest shows no extra variance, there may be too
+    /// few rests: then that of the pairs counts.
+    fn of(
+        deviations: &[Vector3<f64>],
+        variances: &[Matrix3<f64>],
+        of_pairs: &[Scatter; 3],
+    ) -> Self {
+        let count = deviations.len() as f64;
+        let mut covariance = variances.iter().sum::<Matrix3<f64>>() / (count * count);
+        let mut dof = [f64::INFINITY; 3];
+        let mut scatter = Vec::new();
+        for axis in 0..3 {
+            let values = deviations.iter().map(|d| d[axis]).collect();
+            let of_rest = scatter_on(axis, values, variances, count - 1.0);
+            let (extra, of) = match of_rest.extra_variance > 0.0 {
+                true => (of_rest.extra_variance, &of_rest),
+                false => (0.5 * of_pairs[axis].extra_variance, &of_pairs[axis]),
+            };
+            dof[axis] = of.variance_dof();
+            covariance[(axis, axis)] += extra / count;
+            if of_rest.extra_variance > 0.0 {
+                scatter.push((Observable::AtRest(axis), of_rest));
+            }
+        }
+        Self {
+            covariance,
+            dof,
+            scatter,
+        }
+    }
+
+    /// Its parts of the covariance of the triad: of each axis, and between axes.
+    fn parts(&self) -> impl Iterator<Item = Part> {
+        let diagonal = self.covariance.diagonal();
+        let between = self.covariance - Matrix3::from_diagonal(&diagonal);
+        let of_offset = |own: Matrix3<f64>, dof: f64| {
+            let mut covariance = Covariance::zeros();
+            covariance.fixed_view_mut::<3, 3>(9, 9).copy_from(&own);
+            Part { covariance, dof }
+        };
+        let dof = self.dof;
+        let each = (0..3).map(move |r| {
+            let mut own = Vector3::zeros();
+            own[r] = diagonal[r];
+            of_offset(Matrix3::from_diagonal(&own), dof[r])
+        });
+        each.chain([of_offset(between, f64::INFINITY)])
+    }
 }
 
 /// Splits a covariance: one part for each row of the model, whose size the row's scatter determines, and the part that correlates the rows, which is

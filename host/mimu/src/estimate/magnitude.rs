@@ -195,6 +195,196 @@ fn refuse_too_little(observations: &[Observation], known: &KnownMagnitudes) -> R
     })
 }
 
+/// The experiment in units of the largest magnitude, so that parameters and columns are of order one: readings on a sphere of radius one.
+///
+/// Rows are the magnitudes, then the rests by axes, then the errors of the levels; parameters are the nine, then the errors of the levels.
+struct Scaled<'a> {
+    known: &'a KnownMagnitudes<'a>,
+    sphere: Sphere,
+    /// The largest magnitude, SI.
+    unit: f64,
+    /// Magnitude of each observation.
+    shares: Vec<f64>,
+    turned: Vec<Vector3<f64>>,
+    resting: Vec<Vector3<f64>>,
+    /// Number of levels that may err.
+    levels: usize,
+}
+
+impl<'a> Scaled<'a> {
+    fn of(observations: &[Observation], known: &'a KnownMagnitudes<'a>) -> Result<Self, Failure> {
+        let unit = known.levels.iter().copied().fold(0.0, f64::max);
+        let level_of = known.level_of.iter();
+        let shares: Vec<f64> = level_of.map(|l| known.levels[*l] / unit).collect();
+        let sphere = Sphere::through(observations, &shares, known.rests)
+            .ok_or_else(|| Failure::NoSolution("the dwell means do not lie on a sphere".into()))?;
+        let scaled = |raw: &Vector3<f64>| (raw - sphere.centre) / sphere.radius;
+        Ok(Self {
+            turned: observations.iter().map(|o| scaled(&o.raw)).collect(),
+            resting: known.rests.iter().map(|r| scaled(&r.raw)).collect(),
+            levels: match known.level_sigma > 0.0 {
+                true => known.levels.len(),
+                false => 0,
+            },
+            known,
+            sphere,
+            unit,
+            shares,
+        })
+    }
+
+    /// Where the rows of the magnitudes, those of the rests, and all end.
+    fn ends(&self) -> [usize; 3] {
+        let turned = self.turned.len();
+        let resting = turned + 3 * self.resting.len();
+        [turned, resting, resting + self.levels]
+    }
+
+    /// The unit matrix without bias, at the given levels.
+    fn start(&self) -> DVector<f64> {
+        let mut start = DVector::zeros(PARAMETERS + self.levels);
+        for k in [0, 2, 5] {
+            start[k] = 1.0;
+        }
+        start
+    }
+
+    fn linearize(&self, p: &DVector<f64>) -> Linearized {
+        let [turned, resting, rows] = self.ends();
+        let model = lower_triangular(p);
+        let mut out = Linearized::zeros(rows, PARAMETERS + self.levels);
+        let nine = |jacobian: &mut DMatrix<f64>, row: usize, by: &SVector<f64, 12>| {
+            jacobian
+                .view_mut((row, 0), (1, PARAMETERS))
+                .copy_from(&free(by, &LOWER).transpose());
+        };
+        for (i, u) in self.turned.iter().enumerate() {
+            let level = self.known.level_of[i];
+            let off = match self.levels {
+                0 => 0.0,
+                _ => p[PARAMETERS + level],
+            };
+            let found = Magnitude::at(&model, u, self.shares[i] * (1.0 + off));
+            out.residuals[i] = found.residual();
+            nine(&mut out.jacobian, i, &found.block.by(0));
+            if self.levels > 0 {
+                out.jacobian[(i, PARAMETERS + level)] = -self.shares[i];
+            }
+        }
+        for (r, u) in self.resting.iter().enumerate() {
+            let block = vector::at(&model, u, &(self.known.rests[r].rate / self.unit));
+            for axis in 0..3 {
+                let i = turned + 3 * r + axis;
+                out.residuals[i] = block.residual[axis];
+                nine(&mut out.jacobian, i, &block.by(axis));
+            }
+        }
+        for l in 0..self.levels {
+            out.residuals[resting + l] = p[PARAMETERS + l];
+            out.jacobian[(resting + l, PARAMETERS + l)] = 1.0;
+        }
+        out
+    }
+
+    /// Variances of the rows from those of the magnitudes by noise, SI squared. A noiseless recording has none; any positive number then weights all
+    /// poses alike.
+    fn variances(&self, by_noise: &[f64]) -> Vec<f64> {
+        let to_si = self.unit / self.sphere.radius;
+        let at_rest = self.known.rests.iter().flat_map(|r| {
+            let noise = r.variance * (to_si * to_si) + r.rate_variance;
+            <[f64; 3]>::from(noise)
+        });
+        let all: Vec<f64> = by_noise.iter().copied().chain(at_rest).collect();
+        let floor = (1e-12 * all.iter().copied().fold(0.0, f64::max)).max(1e-24);
+        let noise = all.iter().map(|v| (v / (self.unit * self.unit)).max(floor));
+        let by_level = std::iter::repeat_n(self.known.level_sigma.powi(2), self.levels);
+        noise.chain(by_level).collect()
+    }
+
+    /// Observability of the nine at known levels: the levels can worsen it only by their error.
+    fn shape(&self, p: &DVector<f64>) -> Observability {
+        let all = self.linearize(p).jacobian;
+        Observability::of(&all.view((0, 0), (self.ends()[1], PARAMETERS)).into_owned())
+    }
+
+    /// The first solution: all rows weighted alike but the levels.
+    fn solved(&self) -> Result<DVector<f64>, Failure> {
+        let start = self.start();
+        let [_, resting, rows] = self.ends();
+        let mut alike = vec![1.0; resting];
+        alike.resize(rows, self.known.level_sigma.recip());
+        let alike = |p: &DVector<f64>| self.linearize(p).weighted(&alike);
+        let shape = self.shape(&start);
+        if !shape.is_complete() {
+            return Err(undetermined(&shape, self.known.sensor));
+        }
+        let first = minimize(start.clone(), alike);
+        // If the poses do not determine the angles between the sensors, the fit diverges towards C = 0 and |o| = g, which fits every pose.
+        match first.filter(|(p, _)| is_triad(&lower_triangular(p).matrix)) {
+            Some((p, _)) => Ok(p),
+            None => Err(match weak_beside_scatter(&start, alike) {
+                Some(shape) => undetermined(&shape, self.known.sensor),
+                None => self.lost(),
+            }),
+        }
+    }
+
+    fn lost(&self) -> Failure {
+        let magnitude = match self.known.sensor {
+            Sensor::Accel => "magnitude of gravity",
+            Sensor::Gyro => "magnitude of the rate",
+        };
+        Failure::NoSolution(format!("the fit to the {magnitude} does not converge"))
+    }
+
+    /// Back: `x = m (C' (u - centre)/radius + o')`, with the derivatives of the twelve numbers by the nine parameters.
+    fn to_si(&self, p: &DVector<f64>) -> (Affine<f64>, SMatrix<f64, 12, 9>) {
+        let Affine {
+            matrix: mut c,
+            offset: mut o,
+        } = lower_triangular(p);
+        let scale = self.unit / self.sphere.radius;
+        let mut change = SMatrix::<f64, 12, 9>::zeros();
+        let about_zero = from_centre(&self.sphere.centre);
+        for (k, parameter) in LOWER.into_iter().enumerate() {
+            let per_unit = place(parameter).1.map_or(self.unit, |_| scale);
+            change.set_column(k, &(about_zero.column(parameter) * per_unit));
+        }
+        // Magnitudes do not show the sign of a row, and flipping rows keeps them: the raw reading decides. The diagonal has to be positive; the start
+        // (the unit matrix) makes a negative one all but impossible.
+        let mut flips = SVector::<f64, 12>::repeat(1.0);
+        for row in 0..3 {
+            if c[(row, row)] < 0.0 {
+                c.row_mut(row).neg_mut();
+                o[row] = -o[row];
+                for k in 0..3 {
+                    flips[3 * row + k] = -1.0;
+                }
+                flips[9 + row] = -1.0;
+            }
+        }
+        let matrix = c * scale;
+        let inverse = Affine {
+            matrix,
+            offset: o * self.unit - matrix * self.sphere.centre,
+        };
+        (inverse, SMatrix::from_diagonal(&flips) * change)
+    }
+
+    /// A level that the others contradict.
+    fn contradicted(&self, p: &DVector<f64>) -> Option<Warning> {
+        let off = (0..self.levels).map(|l| p[PARAMETERS + l]);
+        let worst = off
+            .enumerate()
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        let (l, off) = worst.filter(|w| w.1.abs() > CONTRADICTED * self.known.level_sigma)?;
+        Some(Warning::RatesContradict {
+            rate: self.known.levels[l],
+            off,
+        })
+    }
+}
+
 /// Fits C and o to `|C u + o| = m` over all observations and `C u + o = x` over the rests, and the levels m to within their error.
 ///
 /// `variances` are those of the magnitudes by noise, SI squared, one for each observation. The errors of the levels are further parameters, each with
@@ -205,110 +395,17 @@ pub fn estimate(
     known: &KnownMagnitudes,
 ) -> Result<Estimated, Failure> {
     refuse_too_little(observations, known)?;
-    let (n, rests) = (observations.len(), known.rests);
-    let unit = known.levels.iter().copied().fold(0.0, f64::max);
-    let shares: Vec<f64> = known
-        .level_of
-        .iter()
-        .map(|l| known.levels[*l] / unit)
-        .collect();
-    let sphere = Sphere::through(observations, &shares, rests)
-        .ok_or_else(|| Failure::NoSolution("the dwell means do not lie on a sphere".into()))?;
-    let scaled = |raw: &Vector3<f64>| (raw - sphere.centre) / sphere.radius;
-    let v: Vec<Vector3<f64>> = observations.iter().map(|o| scaled(&o.raw)).collect();
-    let resting: Vec<Vector3<f64>> = rests.iter().map(|r| scaled(&r.raw)).collect();
-    let levels = if known.level_sigma > 0.0 {
-        known.levels.len()
-    } else {
-        0
-    };
-    let parameters = PARAMETERS + levels;
-    // Magnitudes, rests by axes, levels.
-    let ends = [n, n + 3 * rests.len()];
-    let rows = ends[1] + levels;
-    // All in units of the largest magnitude, so that parameters and columns are of order one.
-    let linearize = |p: &DVector<f64>| {
-        let model = lower_triangular(p);
-        let mut out = Linearized::zeros(rows, parameters);
-        for i in 0..n {
-            let level = known.level_of[i];
-            let off = if levels > 0 {
-                p[PARAMETERS + level]
-            } else {
-                0.0
-            };
-            let found = Magnitude::at(&model, &v[i], shares[i] * (1.0 + off));
-            out.residuals[i] = found.residual();
-            let by = free(&found.block.by(0), &LOWER).transpose();
-            out.jacobian
-                .view_mut((i, 0), (1, PARAMETERS))
-                .copy_from(&by);
-            if levels > 0 {
-                out.jacobian[(i, PARAMETERS + level)] = -shares[i];
-            }
-        }
-        for (r, u) in resting.iter().enumerate() {
-            let block = vector::at(&model, u, &(rests[r].rate / unit));
-            for axis in 0..3 {
-                let i = ends[0] + 3 * r + axis;
-                out.residuals[i] = block.residual[axis];
-                let by = free(&block.by(axis), &LOWER).transpose();
-                out.jacobian
-                    .view_mut((i, 0), (1, PARAMETERS))
-                    .copy_from(&by);
-            }
-        }
-        for l in 0..levels {
-            let i = ends[1] + l;
-            out.residuals[i] = p[PARAMETERS + l];
-            out.jacobian[(i, PARAMETERS + l)] = 1.0;
-        }
-        out
-    };
-    // A noiseless recording has no variances; any positive number then weights all poses alike.
-    let to_si = unit / sphere.radius;
-    let at_rest = rests.iter().flat_map(|r| {
-        let noise = r.variance * (to_si * to_si) + r.rate_variance;
-        <[f64; 3]>::from(noise)
-    });
-    let variances: Vec<f64> = variances.iter().copied().chain(at_rest).collect();
-    let floor = (1e-12 * variances.iter().copied().fold(0.0, f64::max)).max(1e-24);
-    let noise = variances.iter().map(|v| (v / (unit * unit)).max(floor));
-    let by_level = std::iter::repeat_n(known.level_sigma.powi(2), levels);
-    let variances: Vec<f64> = noise.chain(by_level).collect();
-    let lost = || {
-        let magnitude = match known.sensor {
-            Sensor::Accel => "magnitude of gravity",
-            Sensor::Gyro => "magnitude of the rate",
-        };
-        Failure::NoSolution(format!("the fit to the {magnitude} does not converge"))
-    };
-    let mut start = DVector::zeros(parameters);
-    for k in [0, 2, 5] {
-        start[k] = 1.0;
-    }
-    let mut alike = vec![1.0; ends[1]];
-    alike.resize(rows, known.level_sigma.recip());
-    let alike = |p: &DVector<f64>| linearize(p).weighted(&alike);
-    // Observability of the nine at known levels: the levels can worsen it only by their error.
-    let shape_of = |p: &DVector<f64>| {
-        let all = linearize(p).jacobian;
-        Observability::of(&all.view((0, 0), (ends[1], PARAMETERS)).into_owned())
-    };
-    let shape = shape_of(&start);
-    if !shape.is_complete() {
-        return Err(undetermined(&shape, known.sensor));
-    }
-    let first = minimize(start.clone(), alike);
-    // If the poses do not determine the angles between the sensors, the fit diverges towards C = 0 and |o| = g, which fits every pose.
-    let Some((mut p, _)) = first.filter(|(p, _)| is_triad(&lower_triangular(p).matrix)) else {
-        let weak = weak_beside_scatter(&start, alike);
-        return Err(weak.map_or_else(lost, |shape| undetermined(&shape, known.sensor)));
-    };
-    let mut groups = Reweighted::new([0..ends[0], ends[0]..ends[1]], [0.0; 2]);
+    let scaled = Scaled::of(observations, known)?;
+    let [turned, resting, rows] = scaled.ends();
+    let variances = scaled.variances(variances);
+    let linearize = |p: &DVector<f64>| scaled.linearize(p);
+    let mut p = scaled.solved()?;
+    let mut groups = Reweighted::new([0..turned, turned..resting], [0.0; 2]);
     let mut chi2: Option<[f64; 2]> = None;
     for _ in 0..30 {
-        let found = groups.minimize(p, &variances, linearize).ok_or_else(lost)?;
+        let found = groups
+            .minimize(p, &variances, linearize)
+            .ok_or_else(|| scaled.lost())?;
         let covariance = found.at.covariance()?;
         let converged = groups.update(&found, &covariance, &variances, 1e-6);
         p = found.parameters;
@@ -318,46 +415,15 @@ pub fn estimate(
         }
     }
     let last = linearize(&p).weighted(&groups.weights(&variances));
-    let shape = shape_of(&p);
+    let shape = scaled.shape(&p);
     if !shape.is_complete() {
         return Err(undetermined(&shape, known.sensor));
     }
     let covariance = last.covariance()?;
-    // Back: x = m (C' (u - centre)/radius + o').
-    let Affine {
-        matrix: mut c,
-        offset: mut o,
-    } = lower_triangular(&p);
-    let scale = unit / sphere.radius;
-    let mut change = SMatrix::<f64, 12, 9>::zeros();
-    let about_zero = from_centre(&sphere.centre);
-    for (k, parameter) in LOWER.into_iter().enumerate() {
-        let per_unit = place(parameter).1.map_or(unit, |_| scale);
-        change.set_column(k, &(about_zero.column(parameter) * per_unit));
-    }
-    // Magnitudes do not show the sign of a row, and flipping rows keeps them: the raw reading decides. The diagonal has to be positive; the start
-    // (the unit matrix) makes a negative one all but impossible.
-    let mut flips = SVector::<f64, 12>::repeat(1.0);
-    for row in 0..3 {
-        if c[(row, row)] < 0.0 {
-            c.row_mut(row).neg_mut();
-            o[row] = -o[row];
-            for k in 0..3 {
-                flips[3 * row + k] = -1.0;
-            }
-            flips[9 + row] = -1.0;
-        }
-    }
-    let change = SMatrix::from_diagonal(&flips) * change;
-    let matrix = c * scale;
-    let inverse = Affine {
-        matrix,
-        offset: o * unit - matrix * sphere.centre,
-    };
-    // From units of the largest magnitude to SI.
+    let (inverse, change) = scaled.to_si(&p);
     let mut scatter = groups.scatter;
     for (g, scatter) in scatter.iter_mut().enumerate() {
-        scatter.extra_variance *= unit * unit;
+        scatter.extra_variance *= scaled.unit * scaled.unit;
         scatter.chi2 = chi2.map_or(scatter.chi2, |first| first[g]);
     }
     let part = |rows: std::ops::Range<usize>, dof: f64| {
@@ -368,26 +434,15 @@ pub fn estimate(
             dof,
         }
     };
-    let mut parts = vec![part(0..ends[0], scatter[0].variance_dof())];
+    let mut parts = vec![part(0..turned, scatter[0].variance_dof())];
     let mut found = vec![(Observable::Magnitude, scatter[0])];
-    if !rests.is_empty() {
-        parts.push(part(ends[0]..ends[1], scatter[1].variance_dof()));
+    if !known.rests.is_empty() {
+        parts.push(part(turned..resting, scatter[1].variance_dof()));
         found.push((Observable::Rest, scatter[1]));
     }
-    let mut notes = Vec::new();
-    if levels > 0 {
+    if scaled.levels > 0 {
         // The error of a turntable's rate is given; the dwells do not determine it.
-        parts.push(part(ends[1]..rows, f64::INFINITY));
-        let off = (0..levels).map(|l| p[PARAMETERS + l]);
-        let worst = off
-            .enumerate()
-            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        if let Some((l, off)) = worst.filter(|w| w.1.abs() > CONTRADICTED * known.level_sigma) {
-            notes.push(Warning::RatesContradict {
-                rate: known.levels[l],
-                off,
-            });
-        }
+        parts.push(part(resting..rows, f64::INFINITY));
     }
     let triad = Triad::from_inverse(inverse, parts)
         .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
@@ -397,7 +452,7 @@ pub fn estimate(
         condition: shape.condition,
         delays: None,
         earth: Vec::new(),
-        notes,
+        notes: scaled.contradicted(&p).into_iter().collect(),
     })
 }
 

@@ -50,107 +50,168 @@ struct Models {
     gyro: Affine<f64>,
 }
 
-impl JointFit<'_> {
-    /// Fits both and returns the accelerometer.
-    pub fn estimate(&self) -> Result<Estimated, Failure> {
-        let g = self.gravity;
-        let at_rest =
-            self.rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / self.rest.len().max(1) as f64;
-        let unit = self.gyro.matrix.norm() / 3f64.sqrt();
-        let rotations = Rotations::new(self.turns, &at_rest);
-        let unpack = |p: &DVector<f64>| Models {
-            accel: lower_triangular(p),
-            gyro: Affine {
-                matrix: Matrix3::from_fn(|i, j| unit * p[ACCEL + 3 * i + j]),
-                offset: Vector3::new(p[18], p[19], p[20]),
-            },
-        };
-        let order_one = |raw: &Vector3<f64>| self.accel.apply(raw) / g;
-        let rows = [self.poses.len(), 2 * self.turns.len(), 3 * self.rest.len()];
-        let from = [0, rows[0], rows[0] + rows[1]];
-        let scale = ByTriad::from_fn(|k, _| if k < 9 { unit } else { 1.0 });
-        // Residuals without weights: share of gravity, rad, rad/s.
-        let linearize = |p: &DVector<f64>| {
-            let Models { accel, gyro } = unpack(p);
-            let mut out = Linearized::zeros(rows.iter().sum(), ALL);
-            let (r, j) = (&mut out.residuals, &mut out.jacobian);
-            let mut by_accel = |row: usize, by: &ByTriad| {
-                let by = free(by, &LOWER).transpose();
-                j.view_mut((row, 0), (1, ACCEL)).copy_from(&by);
-            };
-            let mut own = Vec::with_capacity(rows[1] + rows[2]);
-            for (row, o) in self.poses.iter().enumerate() {
-                let found = Magnitude::at(&accel, &order_one(&o.raw), 1.0);
-                r[row] = found.residual();
-                by_accel(row, &found.block.by(0));
-            }
-            let turned = rotations.at(&gyro.matrix, &gyro.offset);
-            for (t, (turn, turned)) in self.turns.iter().zip(&turned).enumerate() {
-                let raw = turn.raw.map(|raw| order_one(&raw));
-                let [before, after] = raw.map(|raw| accel.apply(&raw));
-                let turn = Turn {
-                    before,
-                    after,
-                    ..*turn
-                };
-                let error = TurnError::of(&turn, turned);
-                for (k, by) in error.by_accel(&raw).iter().enumerate() {
-                    let row = from[1] + 2 * t + k;
-                    r[row] = error.block.residual[k];
-                    by_accel(row, by);
-                    own.push((row, error.block.by(k)));
-                }
-            }
-            for (s, o) in self.rest.iter().enumerate() {
-                let block = vector::at(&gyro, &(o.raw - at_rest), &o.rate);
-                for axis in 0..3 {
-                    let row = from[2] + 3 * s + axis;
-                    r[row] = block.residual[axis];
-                    own.push((row, block.by(axis)));
-                }
-            }
-            for (row, by) in own {
-                let by = by.component_mul(&scale).transpose();
-                j.view_mut((row, ACCEL), (1, 12)).copy_from(&by);
-            }
-            out
-        };
-        let known = |p: &DVector<f64>| -> Vec<f64> {
-            let c = unpack(p).gyro.matrix;
-            let squared = c.component_mul(&c);
-            let mean = squared.sum() / 3.0;
-            let poses = self.variances.iter().map(|v| v / (g * g));
-            let turns = self
-                .turns
-                .iter()
-                .flat_map(|t| [t.variance(mean) + t.earth_variance; 2]);
-            let rest = self.rest.iter().flat_map(|o| {
-                let v = squared * o.variance + o.rate_variance;
-                [v.x, v.y, v.z]
-            });
-            poses
-                .chain(turns)
-                .chain(rest)
-                .map(|v| v.max(1e-20))
-                .collect()
-        };
+/// The fit in units in which its parameters are of order one. Rows are the magnitudes, then two for each turn, then three for each rest.
+struct Scaled<'a> {
+    data: &'a JointFit<'a>,
+    /// Mean reading of the gyro at rest.
+    at_rest: Vector3<f64>,
+    /// Scale of the gyro's matrix.
+    unit: f64,
+    rotations: Rotations,
+    /// Number of rows of each group, and where each begins.
+    rows: [usize; 3],
+    from: [usize; 3],
+}
+
+impl<'a> Scaled<'a> {
+    fn of(data: &'a JointFit<'a>) -> Self {
+        let rest = data.rest.iter().map(|o| o.raw).sum::<Vector3<f64>>();
+        let at_rest = rest / data.rest.len().max(1) as f64;
+        let rows = [data.poses.len(), 2 * data.turns.len(), 3 * data.rest.len()];
+        Self {
+            at_rest,
+            unit: data.gyro.matrix.norm() / 3f64.sqrt(),
+            rotations: Rotations::new(data.turns, &at_rest),
+            rows,
+            from: [0, rows[0], rows[0] + rows[1]],
+            data,
+        }
+    }
+
+    fn start(&self) -> DVector<f64> {
         let mut p = DVector::zeros(ALL);
         for k in [0, 2, 5] {
             p[k] = 1.0;
         }
+        let bias = self.data.gyro.apply(&self.at_rest);
         for i in 0..3 {
             for k in 0..3 {
-                p[ACCEL + 3 * i + k] = self.gyro.matrix[(i, k)] / unit;
+                p[ACCEL + 3 * i + k] = self.data.gyro.matrix[(i, k)] / self.unit;
+            }
+            p[18 + i] = bias[i];
+        }
+        p
+    }
+
+    fn models(&self, p: &DVector<f64>) -> Models {
+        Models {
+            accel: lower_triangular(p),
+            gyro: Affine {
+                matrix: Matrix3::from_fn(|i, j| self.unit * p[ACCEL + 3 * i + j]),
+                offset: Vector3::new(p[18], p[19], p[20]),
+            },
+        }
+    }
+
+    /// Residuals without weights: share of gravity, rad, rad/s.
+    fn linearize(&self, p: &DVector<f64>) -> Linearized {
+        let JointFit {
+            poses,
+            turns,
+            rest,
+            gravity,
+            ..
+        } = self.data;
+        let order_one = |raw: &Vector3<f64>| self.data.accel.apply(raw) / *gravity;
+        let Models { accel, gyro } = self.models(p);
+        let mut out = Linearized::zeros(self.rows.iter().sum(), ALL);
+        let (r, j) = (&mut out.residuals, &mut out.jacobian);
+        let mut by_accel = |row: usize, by: &ByTriad| {
+            let by = free(by, &LOWER).transpose();
+            j.view_mut((row, 0), (1, ACCEL)).copy_from(&by);
+        };
+        let mut own = Vec::with_capacity(self.rows[1] + self.rows[2]);
+        for (row, o) in poses.iter().enumerate() {
+            let found = Magnitude::at(&accel, &order_one(&o.raw), 1.0);
+            r[row] = found.residual();
+            by_accel(row, &found.block.by(0));
+        }
+        let turned = self.rotations.at(&gyro.matrix, &gyro.offset);
+        for (t, (turn, turned)) in turns.iter().zip(&turned).enumerate() {
+            let raw = turn.raw.map(|raw| order_one(&raw));
+            let [before, after] = raw.map(|raw| accel.apply(&raw));
+            let turn = Turn {
+                before,
+                after,
+                ..*turn
+            };
+            let error = TurnError::of(&turn, turned);
+            for (k, by) in error.by_accel(&raw).iter().enumerate() {
+                let row = self.from[1] + 2 * t + k;
+                r[row] = error.block.residual[k];
+                by_accel(row, by);
+                own.push((row, error.block.by(k)));
             }
         }
-        let start = self.gyro.apply(&at_rest);
-        for i in 0..3 {
-            p[18 + i] = start[i];
+        for (s, o) in rest.iter().enumerate() {
+            let block = vector::at(&gyro, &(o.raw - self.at_rest), &o.rate);
+            for axis in 0..3 {
+                let row = self.from[2] + 3 * s + axis;
+                r[row] = block.residual[axis];
+                own.push((row, block.by(axis)));
+            }
         }
+        let scale = ByTriad::from_fn(|k, _| if k < 9 { self.unit } else { 1.0 });
+        for (row, by) in own {
+            let by = by.component_mul(&scale).transpose();
+            j.view_mut((row, ACCEL), (1, 12)).copy_from(&by);
+        }
+        out
+    }
+
+    /// Known variances of the rows, in the units of the residuals.
+    fn variances(&self, p: &DVector<f64>) -> Vec<f64> {
+        let c = self.models(p).gyro.matrix;
+        let squared = c.component_mul(&c);
+        let mean = squared.sum() / 3.0;
+        let g = self.data.gravity;
+        let poses = self.data.variances.iter().map(|v| v / (g * g));
+        let turns = self.data.turns.iter();
+        let turns = turns.flat_map(|t| [t.variance(mean) + t.earth_variance; 2]);
+        let rest = self.data.rest.iter().flat_map(|o| {
+            let v = squared * o.variance + o.rate_variance;
+            [v.x, v.y, v.z]
+        });
+        let all = poses.chain(turns).chain(rest);
+        all.map(|v| v.max(1e-20)).collect()
+    }
+
+    /// The accelerometer in SI, and the derivatives of its twelve numbers by the nine parameters.
+    fn to_si(&self, p: &DVector<f64>) -> (Affine<f64>, SMatrix<f64, 12, 9>) {
+        let g = self.data.gravity;
+        let Affine { matrix, offset } = self.data.accel;
+        let mut by = SMatrix::<f64, 12, 9>::zeros();
+        for (k, parameter) in LOWER.into_iter().enumerate() {
+            match place(parameter) {
+                (row, Some(column)) => {
+                    for m in 0..3 {
+                        by[(3 * row + m, k)] += matrix[(column, m)];
+                    }
+                    by[(9 + row, k)] += offset[column];
+                }
+                (row, None) => by[(9 + row, k)] = g,
+            }
+        }
+        let change = self.models(p).accel;
+        let inverse = Affine {
+            matrix: change.matrix * matrix,
+            offset: change.matrix * offset + change.offset * g,
+        };
+        (inverse, by)
+    }
+}
+
+impl JointFit<'_> {
+    /// Fits both and returns the accelerometer.
+    pub fn estimate(&self) -> Result<Estimated, Failure> {
+        let scaled = Scaled::of(self);
+        let linearize = |p: &DVector<f64>| scaled.linearize(p);
         let lost = || {
             Failure::NoSolution("the fit to the magnitudes and the turns does not converge".into())
         };
+        let mut p = scaled.start();
         // The first weights: 5 milli-g, half a degree, and the scatter of the dwells.
+        let Scaled { rows, from, .. } = scaled;
         let r = linearize(&p).residuals;
         let of_rest = r.rows(from[2], rows[2]).norm_squared() / rows[2].max(1) as f64;
         let groups = [0, 1, 2].map(|g| from[g]..from[g] + rows[g]);
@@ -158,7 +219,7 @@ impl JointFit<'_> {
         let mut first_chi2 = None;
         let mut round = 0;
         let (found, covariance) = loop {
-            let variances = known(&p);
+            let variances = scaled.variances(&p);
             let found = groups.minimize(p, &variances, linearize).ok_or_else(lost)?;
             let covariance = found.at.covariance()?;
             let converged = groups.update(&found, &covariance, &variances, 1e-3);
@@ -170,7 +231,7 @@ impl JointFit<'_> {
             p = found.parameters;
         };
         let p = &found.parameters;
-        let c = unpack(p).accel.matrix;
+        let c = scaled.models(p).accel.matrix;
         if (0..3).any(|k| !(c[(k, k)] > 0.0)) {
             return Err(lost());
         }
@@ -178,37 +239,20 @@ impl JointFit<'_> {
         let own = covariance.view((0, 0), (ACCEL, ACCEL)).into_owned();
         let eigen = own.symmetric_eigenvalues();
         let condition = (eigen.max() / eigen.min()).sqrt();
-        let mut change = SMatrix::<f64, 12, 9>::zeros();
-        let Affine { matrix, offset } = self.accel;
-        for (k, parameter) in LOWER.into_iter().enumerate() {
-            match place(parameter) {
-                (row, Some(column)) => {
-                    for m in 0..3 {
-                        change[(3 * row + m, k)] += matrix[(column, m)];
-                    }
-                    change[(9 + row, k)] += offset[column];
-                }
-                (row, None) => change[(9 + row, k)] = g,
-            }
-        }
+        let (inverse, by) = scaled.to_si(p);
         let parts = (0..3).map(|g| {
             let own = found.at.part(&covariance, &groups.rows[g]);
             let nine = SMatrix::<f64, 9, 9>::from_fn(|i, j| own[(i, j)]);
-            let covariance: Covariance = change * nine * change.transpose();
+            let covariance: Covariance = by * nine * by.transpose();
             Part {
                 covariance,
                 dof: groups.scatter[g].variance_dof(),
             }
         });
-        let change = unpack(p).accel;
-        let inverse = Affine {
-            matrix: change.matrix * matrix,
-            offset: change.matrix * offset + change.offset * g,
-        };
         let triad = Triad::from_inverse(inverse, parts.collect())
             .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
         let mut magnitude = groups.scatter[0];
-        magnitude.extra_variance *= g * g;
+        magnitude.extra_variance *= self.gravity * self.gravity;
         magnitude.chi2 = first_chi2.unwrap_or(magnitude.chi2);
         Ok(Estimated {
             triad,
