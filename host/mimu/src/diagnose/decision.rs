@@ -24,7 +24,7 @@ use super::note::Note;
 use super::rejected::{Reason, Rejected};
 use super::rows::Rows;
 use super::search::{Chosen, Search};
-use crate::diagnose::columns::beside;
+use crate::diagnose::columns;
 use crate::effects::effect::Effect;
 use crate::fit::{SensorFit, Split};
 use acceptance::Acceptance;
@@ -200,27 +200,22 @@ pub fn decide(
         let beside_it: Vec<Chosen> = kept.iter().chain([one]).cloned().collect();
         judge.wanders([&kept, &beside_it], one, &with).is_none()
     });
-    rejected.extend(suggested.iter().map(|one| Rejected {
+    let suggestion = |one: &Chosen| Rejected {
         id: one.candidate.id(),
         sensor: rows.sensor,
         reason: Reason::Suggestion(one.p),
-    }));
-    let listed: Vec<String> = rejected.iter().map(|r| r.id.clone()).collect();
-    let known = listed.iter().map(String::as_str);
+    };
+    rejected.extend(suggested.iter().map(suggestion));
+    let known = rejected.iter().map(|r| r.id.as_str());
     let known: Vec<&str> = known.chain(not_excited.iter().map(|n| n.id)).collect();
-    rejected.extend(not_chosen(
-        &search,
-        &judge,
-        (&kept, &with),
-        &jumps,
-        &superfluous,
-        &known,
-    )?);
+    let beside = (&kept[..], &with);
+    let others = not_chosen(&search, &judge, beside, &jumps, &superfluous, &known)?;
+    rejected.extend(others);
     let of_readings = of_readings(&search, model, last, split);
     // Scatter beside these functions of the readings.
     let whole = of_readings
         .iter()
-        .fold(model.clone(), |m, r| beside(&m, &r.columns));
+        .fold(model.clone(), |m, r| columns::beside(&m, &r.columns));
     let mut left = leftover(&search, &whole, last, &jumps);
     left.extend(of_readings.into_iter().map(|r| r.left));
     for one in suggested {

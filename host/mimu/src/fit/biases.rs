@@ -4,8 +4,9 @@ use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 
 use super::hold_out::HoldOut;
-use super::sensor::Residual;
+use super::sensor::{Residual, SensorFit};
 use super::{Fit, Options, earth, finish, plausible, refuse_wrong_gravity, session_bias};
+use crate::estimate::{Estimated, Observation};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::Sensor;
@@ -71,47 +72,7 @@ pub fn fit_biases(
                 with_intervals: true,
             }];
         }
-        let inverse = estimated.triad.inverse;
-        let reference = prepared.manifest.reference;
-        let by_size = reference == Reference::Gravity && sensor == Sensor::Accel;
-        let floors: Vec<f64> = match by_size {
-            true => prepared.magnitude_variances(&inverse, &observations),
-            false => observations
-                .iter()
-                .map(|o| si_covariance(&inverse.matrix, &o.variance).trace() / 3.0)
-                .collect(),
-        };
-        let residuals = observations.iter().zip(floors).map(|(o, floor)| {
-            let is = inverse.apply(&o.raw);
-            let value = match (reference, sensor) {
-                (Reference::Table, _) | (_, Sensor::Gyro) => estimated.error(o, 1.0),
-                (_, Sensor::Accel) => {
-                    Vector3::new(is.norm() - prepared.manifest.gravity_mps2, 0.0, 0.0)
-                }
-            };
-            Residual {
-                dwell: o.dwell,
-                within: false,
-                value,
-                held_out: None,
-                floor: prepared.if_noise_known(&[sensor], floor.sqrt()),
-            }
-        });
-        let figure = match by_size {
-            true => Figure::GravityMagnitude,
-            false => Figure::Input,
-        };
-        let residuals = residuals.collect();
-        let n = observations.len();
-        sensors.push(finish(
-            sensor,
-            estimated,
-            figure,
-            residuals,
-            n,
-            None,
-            HoldOut::none(),
-        ));
+        sensors.push(judged(&prepared, sensor, estimated, &observations));
     }
     let without_inputs = prepared.manifest.reference == Reference::Table
         && prepared.condensed.has_reference == [false; 6];
@@ -142,6 +103,56 @@ pub fn fit_biases(
         changes: Vec::new(),
         warnings,
     })
+}
+
+/// The fit with the error of each dwell, in sample: with the matrix given nothing is held out.
+fn judged(
+    prepared: &Prepared,
+    sensor: Sensor,
+    estimated: Estimated,
+    observations: &[Observation],
+) -> SensorFit {
+    let inverse = estimated.triad.inverse;
+    let reference = prepared.manifest.reference;
+    let by_size = reference == Reference::Gravity && sensor == Sensor::Accel;
+    let floors: Vec<f64> = match by_size {
+        true => prepared.magnitude_variances(&inverse, observations),
+        false => observations
+            .iter()
+            .map(|o| si_covariance(&inverse.matrix, &o.variance).trace() / 3.0)
+            .collect(),
+    };
+    let residuals = observations.iter().zip(floors).map(|(o, floor)| {
+        let is = inverse.apply(&o.raw);
+        let value = match (reference, sensor) {
+            (Reference::Table, _) | (_, Sensor::Gyro) => estimated.error(o, 1.0),
+            (_, Sensor::Accel) => {
+                Vector3::new(is.norm() - prepared.manifest.gravity_mps2, 0.0, 0.0)
+            }
+        };
+        Residual {
+            dwell: o.dwell,
+            within: false,
+            value,
+            held_out: None,
+            floor: prepared.if_noise_known(&[sensor], floor.sqrt()),
+        }
+    });
+    let residuals = residuals.collect();
+    let figure = match by_size {
+        true => Figure::GravityMagnitude,
+        false => Figure::Input,
+    };
+    let n = observations.len();
+    finish(
+        sensor,
+        estimated,
+        figure,
+        residuals,
+        n,
+        None,
+        HoldOut::none(),
+    )
 }
 
 #[cfg(test)]

@@ -25,26 +25,7 @@ pub(super) fn fit_gravity(
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<SensorFit>> {
     let g = prepared.manifest.gravity_mps2;
-    if !prepared.has(Sensor::Accel) {
-        return Err(Error::new(
-            &prepared.place,
-            "the recording has no accelerometer, and gravity is the only reference",
-            "add the columns accel_x, accel_y, accel_z, or give the rates in ref_rate_ columns (reference = \"table\")",
-        ));
-    }
-    let poses = prepared.observations(Sensor::Accel);
-    if poses.is_empty() {
-        let error = Error::new(
-            &prepared.place,
-            format!(
-                "no dwell can be used for the accelerometer{}",
-                prepared.dwells.unused(Sensor::Accel)
-            ),
-            "hold the unit still for some seconds in every pose, within the sensor's range",
-        );
-        return Err(prepared.with_steps_as_given(error, Sensor::Accel));
-    }
-    refuse_wrong_gravity(prepared, Sensor::Accel, &poses)?;
+    let poses = poses(prepared)?;
     let variances = |accel: &Affine<f64>| prepared.magnitude_variances(accel, &poses);
     let by_sphere =
         magnitude::first_guess(&poses, g).map_or_else(|| vec![0.0; poses.len()], |a| variances(&a));
@@ -126,6 +107,34 @@ pub(super) fn fit_gravity(
     fit.warnings.extend(unseen);
     sensors.push(fit);
     Ok(sensors)
+}
+
+/// The poses of the accelerometer.
+///
+/// # Errors
+/// No accelerometer, no pose, or another size of gravity than given.
+fn poses(prepared: &Prepared) -> Result<Vec<Observation>> {
+    if !prepared.has(Sensor::Accel) {
+        return Err(Error::new(
+            &prepared.place,
+            "the recording has no accelerometer, and gravity is the only reference",
+            "add the columns accel_x, accel_y, accel_z, or give the rates in ref_rate_ columns (reference = \"table\")",
+        ));
+    }
+    let poses = prepared.observations(Sensor::Accel);
+    if poses.is_empty() {
+        let error = Error::new(
+            &prepared.place,
+            format!(
+                "no dwell can be used for the accelerometer{}",
+                prepared.dwells.unused(Sensor::Accel)
+            ),
+            "hold the unit still for some seconds in every pose, within the sensor's range",
+        );
+        return Err(prepared.with_steps_as_given(error, Sensor::Accel));
+    }
+    refuse_wrong_gravity(prepared, Sensor::Accel, &poses)?;
+    Ok(poses)
 }
 
 /// Condition of the poses from which on the turns between them help to determine the accelerometer. Twenty poses all around have 2 to 5. Ten poses of

@@ -60,31 +60,7 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         );
         return Err(prepared.with_steps_as_given(error, Sensor::Gyro));
     }
-    let estimate = |kept: &dyn Fn(usize) -> bool| -> std::result::Result<Estimated, Failure> {
-        let both = dwells.turning.iter().zip(&dwells.rate_of);
-        let (turning, rate_of): (Vec<Observation>, Vec<usize>) = both
-            .filter(|(o, _)| kept(o.dwell))
-            .map(|(o, r)| (*o, *r))
-            .unzip();
-        let rests: Vec<Rest> = dwells
-            .rests
-            .iter()
-            .filter(|r| kept(r.dwell))
-            .copied()
-            .collect();
-        let known = KnownMagnitudes {
-            sensor: Sensor::Gyro,
-            levels: &dwells.rates,
-            level_sigma: dwells.rate_sigma,
-            level_of: &rate_of,
-            rests: &rests,
-        };
-        // Noise is in raw units; a sphere through the readings converts it to SI well enough.
-        let sphere = magnitude::first_guess(&turning, dwells.rates[0]);
-        let rough = sphere.map_or_else(|| vec![0.0; turning.len()], |s| variances(&s, &turning));
-        let first = magnitude::estimate(&turning, &rough, &known)?;
-        magnitude::estimate(&turning, &variances(&first.triad.inverse, &turning), &known)
-    };
+    let estimate = |kept: &dyn Fn(usize) -> bool| estimate(dwells, kept);
     let gyro = estimate(&|_| true).map_err(|f| prepared.refused(f, Sensor::Gyro))?;
     let inverse = gyro.triad.inverse;
     let fitted: Vec<f64> = dwells
@@ -164,6 +140,32 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         .of(Sensor::Gyro),
     );
     Ok(fit)
+}
+
+/// The gyro by the `kept` dwells.
+fn estimate(
+    dwells: &RatedDwells,
+    kept: &dyn Fn(usize) -> bool,
+) -> std::result::Result<Estimated, Failure> {
+    let both = dwells.turning.iter().zip(&dwells.rate_of);
+    let (turning, rate_of): (Vec<Observation>, Vec<usize>) = both
+        .filter(|(o, _)| kept(o.dwell))
+        .map(|(o, r)| (*o, *r))
+        .unzip();
+    let rests = dwells.rests.iter().filter(|r| kept(r.dwell));
+    let rests: Vec<Rest> = rests.copied().collect();
+    let known = KnownMagnitudes {
+        sensor: Sensor::Gyro,
+        levels: &dwells.rates,
+        level_sigma: dwells.rate_sigma,
+        level_of: &rate_of,
+        rests: &rests,
+    };
+    // Noise is in raw units; a sphere through the readings converts it to SI well enough.
+    let sphere = magnitude::first_guess(&turning, dwells.rates[0]);
+    let rough = sphere.map_or_else(|| vec![0.0; turning.len()], |s| variances(&s, &turning));
+    let first = magnitude::estimate(&turning, &rough, &known)?;
+    magnitude::estimate(&turning, &variances(&first.triad.inverse, &turning), &known)
 }
 
 /// Variances of the compensated magnitudes by noise, (rad/s)²; zero if the noise is unknown.

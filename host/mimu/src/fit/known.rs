@@ -5,7 +5,9 @@ use nalgebra::{DMatrix, Vector3};
 use super::hold_out::{Refits, Split, determined};
 use super::sensor::{Residual, SensorFit, typical};
 use super::{Method, Options, finish, lever_arm, refuse_wrong_gravity, uncalibrated};
-use crate::estimate::{Observation, earth_shared, known_input, moving_input, six_positions};
+use crate::estimate::{
+    Estimated, Failure, Observation, earth_shared, known_input, moving_input, six_positions,
+};
 use crate::observation::slope;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
@@ -31,56 +33,11 @@ pub(super) fn fit_known(
             continue;
         }
         refuse_wrong_gravity(prepared, sensor, &observations)?;
-        let wander = prepared.noise.wander(sensor, &prepared.dwells.list);
-        let within = prepared.within_dwells(sensor);
-        let by =
-            |o: &[Observation], within: &[Observation], wander: Option<&[DMatrix<f64>; 3]>| match (
-                options.method,
-                sensor,
-            ) {
-                (Method::LeastSquares, _) if !within.is_empty() => {
-                    moving_input::least_squares(o, within, wander)
-                }
-                (Method::LeastSquares, _) => known_input::least_squares(o, wander),
-                (Method::Kalman, _) => known_input::kalman(o, wander),
-                (Method::InverseForm, Sensor::Gyro) => {
-                    earth_shared::apart(o, known_input::opposite_rates)
-                }
-                (Method::InverseForm, Sensor::Accel) => known_input::inverse_form(o),
-                (Method::SixPositions, _) => earth_shared::apart(o, six_positions::six_positions),
-            };
-        let dwells = &prepared.dwells.list;
-        let off_axis = sensor == Sensor::Accel && prepared.lever_arm_m > 0.0;
-        let lever = match by(&observations, &within, wander.as_ref()) {
-            Ok(first) if off_axis => {
-                let forward = first.triad.forward.matrix;
-                Some(lever_arm::covariance(
-                    dwells,
-                    &forward,
-                    prepared.lever_arm_m,
-                ))
-            }
-            _ => None,
-        };
-        let weighed = match &lever {
-            Some(lever) => lever_arm::widened(&observations, lever),
-            None => observations.clone(),
-        };
-        let shared = match (wander, lever) {
-            (Some(wander), Some(lever)) => Some([0, 1, 2].map(|k| &wander[k] + &lever[k])),
-            (wander, lever) => wander.or(lever),
-        };
-        let estimate = |o: &[Observation], within: &[Observation]| by(o, within, shared.as_ref());
-        let estimated = match estimate(&weighed, &within) {
+        let known = Known::of(prepared, options, sensor, observations);
+        let estimated = match known.estimate(&known.weighed, &known.within) {
             Ok(estimated) => estimated,
             // A level cube does not determine the gyro, and a rate table hardly the accelerometer.
-            Err(_)
-                if within.is_empty()
-                    && observations.iter().all(|o| {
-                        let [a, b] = [o, &observations[0]].map(|o| o.without_earth().input);
-                        (a - b).norm() < SAME_RATE
-                    }) =>
-            {
+            Err(_) if known.has_one_input() => {
                 missing.push(Warning::OneInput.of(sensor));
                 continue;
             }
@@ -98,29 +55,131 @@ pub(super) fn fit_known(
                 });
             }
         };
-        if observations
-            .iter()
-            .any(|o| prepared.dwells.list[o.dwell].turn)
-            && sensor == Sensor::Gyro
+        warnings.extend(known.warnings().into_iter().map(|w| w.of(sensor)));
+        sensors.push(known.judged(estimated)?);
+    }
+    if sensors.is_empty() {
+        let why: Vec<String> = missing.iter().map(Warning::to_string).collect();
+        let error = Error::new(
+            &prepared.place,
+            why.join(", "),
+            "give the inputs of dwells of a second or more in the ref_ columns, or set reference = \"gravity\" if there was no table",
+        );
+        let judged = Sensor::BOTH.into_iter().filter(wanted);
+        let mut judged = judged.filter(|s| prepared.dwells.are_judged_not_still(*s));
+        return Err(match judged.next() {
+            Some(sensor) => prepared.with_steps_as_given(error, sensor),
+            None => error,
+        });
+    }
+    warnings.extend(missing);
+    Ok(sensors)
+}
+
+/// The dwells of one sensor with known inputs, and what errs in them.
+struct Known<'a> {
+    prepared: &'a Prepared,
+    options: Options,
+    sensor: Sensor,
+    observations: Vec<Observation>,
+    /// Sums within dwells whose input moves.
+    within: Vec<Observation>,
+    /// The observations with the variance that the force of a lever arm adds.
+    weighed: Vec<Observation>,
+    /// Covariances of the means of each axis by causes that dwells share: wander of the bias, and the lever arm.
+    shared: Option<[DMatrix<f64>; 3]>,
+    /// Whether the accelerometer is beside the axis.
+    off_axis: bool,
+}
+
+impl<'a> Known<'a> {
+    fn of(
+        prepared: &'a Prepared,
+        options: Options,
+        sensor: Sensor,
+        observations: Vec<Observation>,
+    ) -> Self {
+        let dwells = &prepared.dwells.list;
+        let mut known = Self {
+            within: prepared.within_dwells(sensor),
+            weighed: observations.clone(),
+            shared: prepared.noise.wander(sensor, dwells),
+            off_axis: sensor == Sensor::Accel && prepared.lever_arm_m > 0.0,
+            prepared,
+            options,
+            sensor,
+            observations,
+        };
+        if known.off_axis
+            && let Ok(first) = known.estimate(&known.observations, &known.within)
         {
-            warnings.push(Warning::ExactTurns.of(sensor));
+            let forward = first.triad.forward.matrix;
+            let lever = lever_arm::covariance(dwells, &forward, prepared.lever_arm_m);
+            known.weighed = lever_arm::widened(&known.observations, &lever);
+            known.shared = Some(match known.shared {
+                Some(wander) => [0, 1, 2].map(|k| &wander[k] + &lever[k]),
+                None => lever,
+            });
         }
-        if !within.is_empty() && options.method != Method::LeastSquares {
-            let count = count_dwells(&within);
-            let warning = Warning::MeansAlone {
-                dwells: count,
-                method: options.method.name(),
-            };
-            warnings.push(warning.of(sensor));
+        known
+    }
+
+    fn estimate(
+        &self,
+        o: &[Observation],
+        within: &[Observation],
+    ) -> std::result::Result<Estimated, Failure> {
+        let shared = self.shared.as_ref();
+        match (self.options.method, self.sensor) {
+            (Method::LeastSquares, _) if !within.is_empty() => {
+                moving_input::least_squares(o, within, shared)
+            }
+            (Method::LeastSquares, _) => known_input::least_squares(o, shared),
+            (Method::Kalman, _) => known_input::kalman(o, shared),
+            (Method::InverseForm, Sensor::Gyro) => {
+                earth_shared::apart(o, known_input::opposite_rates)
+            }
+            (Method::InverseForm, Sensor::Accel) => known_input::inverse_form(o),
+            (Method::SixPositions, _) => earth_shared::apart(o, six_positions::six_positions),
         }
-        let means = observations.iter().map(|o| (o, 1.0));
-        let within_used = match options.method {
-            Method::LeastSquares => &within[..],
+    }
+
+    fn has_one_input(&self) -> bool {
+        let first = &self.observations[0];
+        self.within.is_empty()
+            && self.observations.iter().all(|o| {
+                let [a, b] = [o, first].map(|o| o.without_earth().input);
+                (a - b).norm() < SAME_RATE
+            })
+    }
+
+    fn warnings(&self) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        let turn = |o: &Observation| self.prepared.dwells.list[o.dwell].turn;
+        if self.sensor == Sensor::Gyro && self.observations.iter().any(turn) {
+            warnings.push(Warning::ExactTurns);
+        }
+        if !self.within.is_empty() && self.options.method != Method::LeastSquares {
+            warnings.push(Warning::MeansAlone {
+                dwells: count_dwells(&self.within),
+                method: self.options.method.name(),
+            });
+        }
+        warnings
+    }
+
+    /// The fit with its errors, in sample and held out.
+    fn judged(&self, estimated: Estimated) -> Result<SensorFit> {
+        let (prepared, sensor) = (self.prepared, self.sensor);
+        let means = self.observations.iter().map(|o| (o, 1.0));
+        let within_used = match self.options.method {
+            Method::LeastSquares => &self.within[..],
             _ => &[],
         };
         let all: Vec<(&Observation, f64)> =
             means.chain(within_used.iter().map(|o| (o, 0.0))).collect();
         let matrix = estimated.triad.inverse.matrix;
+        let floor = |o: &Observation| (si_covariance(&matrix, &o.variance).trace() / 3.0).sqrt();
         let mut residuals: Vec<Residual> = all
             .iter()
             .map(|(o, bias)| Residual {
@@ -128,17 +187,14 @@ pub(super) fn fit_known(
                 within: *bias == 0.0,
                 value: estimated.error(o, *bias),
                 held_out: None,
-                floor: prepared.if_noise_known(
-                    &[sensor],
-                    (si_covariance(&matrix, &o.variance).trace() / 3.0).sqrt(),
-                ),
+                floor: prepared.if_noise_known(&[sensor], floor(o)),
             })
             .collect();
-        let n = observations.len();
-        let parts = options.holdout_blocks.min(n);
+        let n = self.observations.len();
+        let parts = self.options.holdout_blocks.min(n);
         // The sums within a dwell are held out with its mean.
         let part_of = |split: Split, dwell: usize| {
-            let at = observations.partition_point(|o| o.dwell < dwell);
+            let at = self.observations.partition_point(|o| o.dwell < dwell);
             split.part(at.min(n - 1), n, parts)
         };
         let typical = typical(Figure::Input, &residuals);
@@ -147,7 +203,7 @@ pub(super) fn fit_known(
             let kept = |all: &[Observation]| -> Vec<Observation> {
                 all.iter().filter(|o| !of_part(o)).copied().collect()
             };
-            let refit = estimate(&kept(&weighed), &kept(&within))?;
+            let refit = self.estimate(&kept(&self.weighed), &kept(&self.within))?;
             let open = all.iter().filter(|(o, _)| of_part(o)).map(|(o, bias)| {
                 let axis = |k: usize| {
                     let mut by = slope(&Vector3::ith(k, 1.0), &o.raw);
@@ -164,8 +220,8 @@ pub(super) fn fit_known(
             residual.held_out = refit.map(|refit| refit.error(o, *bias));
         }
         // In dwells that spin, the force of the arm is not an error of the sensor.
-        let at_rest = |r: &Residual| !dwells[r.dwell].spins();
-        if off_axis && residuals.iter().any(at_rest) {
+        let at_rest = |r: &Residual| !prepared.dwells.list[r.dwell].spins();
+        if self.off_axis && residuals.iter().any(at_rest) {
             residuals.retain(at_rest);
         }
         let mut fit = finish(
@@ -178,27 +234,8 @@ pub(super) fn fit_known(
             held_out.into(),
         );
         fit.uncalibrated_rms = uncalibrated::inputs(prepared, all.iter().map(|(o, _)| *o));
-        sensors.push(fit);
+        Ok(fit)
     }
-    if sensors.is_empty() {
-        let error = Error::new(
-            &prepared.place,
-            missing
-                .iter()
-                .map(Warning::to_string)
-                .collect::<Vec<_>>()
-                .join(", "),
-            "give the inputs of dwells of a second or more in the ref_ columns, or set reference = \"gravity\" if there was no table",
-        );
-        let judged = Sensor::BOTH.into_iter().filter(wanted);
-        let mut judged = judged.filter(|s| prepared.dwells.are_judged_not_still(*s));
-        return Err(match judged.next() {
-            Some(sensor) => prepared.with_steps_as_given(error, sensor),
-            None => error,
-        });
-    }
-    warnings.extend(missing);
-    Ok(sensors)
 }
 
 /// Dwells of `observations`, in order.

@@ -5,7 +5,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::estimate::least_squares::{Errors, Group, Scatter, Solution, solve_groups};
-use crate::estimate::{Estimated, Failure, earth_shared};
+use crate::estimate::{Estimated, Failure, Observation, earth_shared};
 use crate::observable::Observable;
 use crate::observation::magnitude::Magnitude;
 use crate::prepared::{Prepared, si_covariance};
@@ -39,73 +39,17 @@ pub fn estimate(
     if observations.is_empty() {
         return Err(none());
     }
-    let matrix = known.matrix;
     let by_size = prepared.manifest.reference == Reference::Gravity && sensor == Sensor::Accel;
-    let mut offset = known.offset;
-    let mut covariance = Covariance::zeros();
-    let mut scatter: Vec<(Observable, Scatter)> = Vec::new();
-    if by_size {
-        let g = prepared.manifest.gravity_mps2;
-        let mut last: Option<(Solution, Scatter)> = None;
-        let mut kept = DMatrix::zeros(3, 0);
-        for _ in 0..STEPS {
-            let model = Affine { matrix, offset };
-            let each = observations
-                .iter()
-                .map(|o| Magnitude::at(&model, &o.raw, g));
-            let errors: Vec<Magnitude> = each.collect();
-            let n = errors.len();
-            let design = DMatrix::from_fn(n, 3, |i, k| errors[i].block.by[(0, 9 + k)]);
-            let y = DVector::from_fn(n, |i, _| -errors[i].residual());
-            // Directions of the bias that the poses show.
-            let svd = design.clone().svd(false, true);
-            let shown = svd.v_t.ok_or_else(none)?;
-            let strong: Vec<usize> = (0..svd.singular_values.len())
-                .filter(|k| svd.singular_values[*k] > 0.05 * svd.singular_values.max())
-                .collect();
-            kept = shown.select_rows(&strong).transpose();
-            let variances = prepared.magnitude_variances(&model, &observations);
-            let (solution, [found]) = solve_groups(&[Group {
-                design: &design * &kept,
-                observations: y,
-                errors: Errors::Independent(DVector::from_vec(variances)),
-            }])
-            .ok_or_else(none)?;
-            let step = &kept * &solution.parameters;
-            offset += Vector3::new(step[0], step[1], step[2]);
-            last = Some((solution, found));
-        }
-        let (solution, found) = last.ok_or_else(none)?;
-        let full = &kept * solution.covariance * kept.transpose();
-        covariance
-            .fixed_view_mut::<3, 3>(9, 9)
-            .copy_from(&Matrix3::from_fn(|i, j| full[(i, j)]));
-        scatter.push((Observable::Magnitude, found));
-    } else {
-        for axis in 0..3 {
-            let n = observations.len();
-            let y = DVector::from_fn(n, |i, _| {
-                observations[i].input[axis] - (matrix.row(axis) * observations[i].raw)[(0, 0)]
-            });
-            let mut variances = DVector::from_fn(n, |i, _| {
-                si_covariance(&matrix, &observations[i].variance)[(axis, axis)]
-            });
-            let in_si = Matrix3::identity();
-            let factor = earth_shared::factor(&observations, axis, &in_si, &mut variances);
-            let (solution, [found]) = solve_groups(&[Group {
-                design: DMatrix::from_element(n, 1, 1.0),
-                observations: y,
-                errors: match factor.ncols() {
-                    0 => Errors::Independent(variances),
-                    _ => Errors::Shared(variances, factor),
-                },
-            }])
-            .ok_or_else(none)?;
-            offset[axis] = solution.parameters[0];
-            covariance[(9 + axis, 9 + axis)] = solution.covariance[(0, 0)];
-            scatter.push((Observable::Axis(axis), found));
-        }
-    }
+    let found = match by_size {
+        true => by_magnitudes(prepared, &observations, known),
+        false => by_inputs(&observations, known),
+    };
+    let Biases {
+        offset,
+        covariance,
+        scatter,
+    } = found.ok_or_else(none)?;
+    let matrix = known.matrix;
     let dof = scatter.iter().map(|s| s.1.variance_dof());
     let part = Part {
         covariance,
@@ -124,4 +68,93 @@ pub fn estimate(
             with_intervals: false,
         }],
     })
+}
+
+/// Biases with their scatter.
+struct Biases {
+    offset: Vector3<f64>,
+    /// Of the twelve numbers of the inverse model.
+    covariance: Covariance,
+    scatter: Vec<(Observable, Scatter)>,
+}
+
+/// Biases of an accelerometer by the magnitude of gravity.
+fn by_magnitudes(
+    prepared: &Prepared,
+    observations: &[Observation],
+    known: &Affine<f64>,
+) -> Option<Biases> {
+    let g = prepared.manifest.gravity_mps2;
+    let mut model = *known;
+    let mut last: Option<(Solution, Scatter)> = None;
+    let mut kept = DMatrix::zeros(3, 0);
+    for _ in 0..STEPS {
+        let each = observations
+            .iter()
+            .map(|o| Magnitude::at(&model, &o.raw, g));
+        let errors: Vec<Magnitude> = each.collect();
+        let n = errors.len();
+        let design = DMatrix::from_fn(n, 3, |i, k| errors[i].block.by[(0, 9 + k)]);
+        let y = DVector::from_fn(n, |i, _| -errors[i].residual());
+        // Directions of the bias that the poses show.
+        let svd = design.clone().svd(false, true);
+        let shown = svd.v_t?;
+        let strong: Vec<usize> = (0..svd.singular_values.len())
+            .filter(|k| svd.singular_values[*k] > 0.05 * svd.singular_values.max())
+            .collect();
+        kept = shown.select_rows(&strong).transpose();
+        let variances = prepared.magnitude_variances(&model, observations);
+        let (solution, [found]) = solve_groups(&[Group {
+            design: &design * &kept,
+            observations: y,
+            errors: Errors::Independent(DVector::from_vec(variances)),
+        }])?;
+        let step = &kept * &solution.parameters;
+        model.offset += Vector3::new(step[0], step[1], step[2]);
+        last = Some((solution, found));
+    }
+    let (solution, found) = last?;
+    let full = &kept * solution.covariance * kept.transpose();
+    let mut covariance = Covariance::zeros();
+    covariance
+        .fixed_view_mut::<3, 3>(9, 9)
+        .copy_from(&Matrix3::from_fn(|i, j| full[(i, j)]));
+    Some(Biases {
+        offset: model.offset,
+        covariance,
+        scatter: vec![(Observable::Magnitude, found)],
+    })
+}
+
+/// Biases by the mean error of each axis against known inputs.
+fn by_inputs(observations: &[Observation], known: &Affine<f64>) -> Option<Biases> {
+    let matrix = known.matrix;
+    let mut found = Biases {
+        offset: known.offset,
+        covariance: Covariance::zeros(),
+        scatter: Vec::new(),
+    };
+    for axis in 0..3 {
+        let n = observations.len();
+        let y = DVector::from_fn(n, |i, _| {
+            observations[i].input[axis] - (matrix.row(axis) * observations[i].raw)[(0, 0)]
+        });
+        let mut variances = DVector::from_fn(n, |i, _| {
+            si_covariance(&matrix, &observations[i].variance)[(axis, axis)]
+        });
+        let in_si = Matrix3::identity();
+        let factor = earth_shared::factor(observations, axis, &in_si, &mut variances);
+        let (solution, [scatter]) = solve_groups(&[Group {
+            design: DMatrix::from_element(n, 1, 1.0),
+            observations: y,
+            errors: match factor.ncols() {
+                0 => Errors::Independent(variances),
+                _ => Errors::Shared(variances, factor),
+            },
+        }])?;
+        found.offset[axis] = solution.parameters[0];
+        found.covariance[(9 + axis, 9 + axis)] = solution.covariance[(0, 0)];
+        found.scatter.push((Observable::Axis(axis), scatter));
+    }
+    Some(found)
 }
