@@ -1,22 +1,22 @@
-//! Calibration of inertial units made of analog MEMS sensors.
+//! Calibration of inertial units, digital or analog: biases, scale factors, angles, noise, and the effect behind what then still errs.
 //!
-//! | in order of use | what |
+//! | to | use |
 //! |---|---|
-//! | [`quantity`], [`readable`] | sensors, axes, SI units, and how numbers are written for people |
-//! | [`signal`] | from samples to dwells and turns: blocks, rails, stillness, dwells; [`prepared`] is all of it for one recording |
-//! | [`noise`] | how well a dwell mean is known; [`survey`] finds it from a recording at rest, by the Allan deviation of [`mimu_allan`] |
-//! | [`estimate`], [`triad`] | the estimators, and what they estimate: both directions, covariances, physical quantities |
-//! | [`mod@fit`] | both triads, judged on held-out data; impossible results are refused |
-//! | [`judgement`], [`judge`] | the one judgement of every result, with its reason; the rules |
-//! | [`calibration`] | the file; [`calibration::verify`] judges it by another recording, [`calibration::apply`] compensates one |
-//! | [`effects`], [`diagnose`], [`mod@diagnosed`] | the effect behind a residual: found, added, proved on other data |
-//! | [`plan`] | experiments: [`plan::design`] chooses attitudes, rates and times, [`plan::next_experiment`] what to record next |
-//! | [`result`], [`warning`] | what the commands print and write as JSON |
+//! | read a recording, or make one from arrays | [`Recording`]; [`Manifest`] and [`Samples`]; [`Prepared`] finds the dwells |
+//! | calibrate | [`fit`]: a [`Fit`] with a [`SensorFit`] for gyro and accelerometer, held-out errors, and its [`Judgement`] |
+//! | keep a calibration, and use it | [`Calibration`], [`apply`] |
+//! | judge a calibration by another recording | [`verify`]: a [`Verification`] |
+//! | find the physical effect behind a residual | [`diagnose`]: a [`Diagnosis`] of [`Recordings`], with the effects as [`FittedEffect`] |
+//! | know the noise of a unit at rest | [`allan`]: a [`Survey`], kept as a [`NoiseFile`] |
+//! | design an experiment | [`DesignProblem`] |
+//!
+//! Rates are in rad/s, specific forces in m/s² (at rest they point up), temperatures in °C, times in s. *Inverse* is raw to SI, *forward* SI to raw.
+//! An [`Error`] names the thing, what is wrong and what to do. The modules below these items are hidden here; they may change at any time.
 //!
 //! Calibrate a recording from arrays, and apply the calibration to a reading:
 //!
 //! ```
-//! use mimu::{Manifest, Options, Prepared, RawUnit, Reference, Samples, Sensor, fit};
+//! use mimu::{Angles, Finding, Manifest, Options, Prepared, RawUnit, Reference, Samples, Sensor, fit};
 //!
 //! // An accelerometer of 300 mV/g with a bias of 1.65 V, held for two seconds in each of twelve poses, 100 samples a second.
 //! let g = 9.80665;
@@ -38,11 +38,11 @@
 //! let manifest = Manifest::new("my unit", 100.0, g, RawUnit::Volt, Reference::Gravity);
 //! let options = Options::default();
 //!
-//! let prepared = Prepared::of(manifest, &samples, mimu::signal::stillness::STILL_FACTOR)?; // its dwells are found
+//! let prepared = Prepared::of(manifest, &samples, Finding::default())?; // its dwells are found
 //! assert_eq!(prepared.dwells.list.len(), 12);
 //! let fitted = fit(prepared, options)?;
 //! let accel = fitted.sensor(Sensor::Accel).unwrap();
-//! let scale = accel.estimated.triad.physical(mimu::triad::Angles::Exact).scale[0];
+//! let scale = accel.estimated.triad.physical(Angles::Exact).scale[0];
 //! assert!((scale.value - 0.3 / g).abs() < scale.interval); // V/(m/s²), with its 95 % interval
 //! let force = accel.estimated.triad.inverse.apply(&mimu::nalgebra::Vector3::new(1.65, 1.65, 1.95));
 //! assert!((force.z - g).abs() < 0.01);
@@ -54,40 +54,86 @@
 //!
 //! `Cargo.toml` needs this crate alone: `mimu = { path = "mimu/host/mimu" }`. Vectors and matrices are those of [`nalgebra`].
 
+#[doc(hidden)]
 pub mod bias_removal;
+#[doc(hidden)]
 pub mod calibration;
+#[doc(hidden)]
 pub mod diagnose;
+#[doc(hidden)]
 pub mod diagnosed;
+#[doc(hidden)]
 pub mod effects;
+#[doc(hidden)]
 pub mod estimate;
 mod fault;
+#[doc(hidden)]
 pub mod fit;
+#[doc(hidden)]
 pub mod judge;
+#[doc(hidden)]
 pub mod judgement;
+#[doc(hidden)]
 pub mod log_fault;
+#[doc(hidden)]
 pub mod noise;
+#[doc(hidden)]
 pub mod observable;
+#[doc(hidden)]
 pub mod observation;
+#[doc(hidden)]
 pub mod parameter;
+#[doc(hidden)]
 pub mod plan;
+#[doc(hidden)]
 pub mod pose_means;
+#[doc(hidden)]
 pub mod prepared;
+#[doc(hidden)]
 pub mod quantity;
+#[doc(hidden)]
 pub mod readable;
+#[doc(hidden)]
 pub mod recording_problem;
+#[doc(hidden)]
 pub mod result;
+#[doc(hidden)]
 pub mod signal;
+#[doc(hidden)]
 pub mod survey;
 mod toml_layout;
+#[doc(hidden)]
 pub mod triad;
+#[doc(hidden)]
 pub mod turntable;
+#[doc(hidden)]
 pub mod warning;
 
 pub use calibration::Calibration;
-pub use fit::{Fit, Options, fit};
+pub use calibration::apply::{Applied, apply};
+pub use calibration::verify::{SensorVerification, Verification, verify};
+pub use diagnose::decision::Accepted;
+pub use diagnose::{Diagnosis, Recordings, SensorDiagnosis, Verdict, diagnose};
+pub use effects::effect::Effect;
+pub use effects::fitted::FittedEffect;
+pub use fit::{Fit, Method, Options, Residual, SensorFit, Split, fit, fit_biases};
 pub use judgement::{Judgement, JudgementKind};
+pub use mimu_core::PerSensor;
+pub use mimu_core::compensation::Affine;
 pub use mimu_recording::error::Error;
-pub use mimu_recording::{Batch as Samples, Manifest, RawUnit, Recording, Reference};
+pub use mimu_recording::{
+    Batch as Samples, Manifest, RawUnit, Recording, Reference, SampleFormat, Turntable,
+};
 pub use nalgebra;
+pub use noise::noise_file::NoiseFile;
+pub use plan::Plan;
+pub use plan::design::Problem as DesignProblem;
+pub use plan::design::model::{Model as DesignModel, Terms};
+pub use plan::design::reach::Fixture;
+pub use plan::design::schemes::Scheme;
 pub use prepared::Prepared;
 pub use quantity::Sensor;
+pub use signal::stillness::Finding;
+pub use survey::{Options as AllanOptions, Part, Survey, survey as allan};
+pub use triad::{Angles, Estimate, Forward, Physical, Triad};
+pub use warning::Warning;

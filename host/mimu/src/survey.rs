@@ -48,6 +48,18 @@ pub struct Options {
     pub confidence: f64,
 }
 
+impl Default for Options {
+    /// The whole recording, by the overlapping Allan deviation at ten averaging times a decade, with 95 % intervals.
+    fn default() -> Self {
+        Self {
+            part: Part::Whole,
+            kind: Deviation::Allan,
+            per_decade: 10,
+            confidence: 0.95,
+        }
+    }
+}
+
 /// Noise of one channel.
 #[derive(Debug, Clone)]
 pub struct Channel {

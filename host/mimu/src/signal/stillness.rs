@@ -57,6 +57,13 @@ pub struct Finding {
     pub steps: Steps,
 }
 
+impl Default for Finding {
+    /// By [`STILL_FACTOR`].
+    fn default() -> Self {
+        STILL_FACTOR.into()
+    }
+}
+
 impl From<f64> for Finding {
     fn from(still_factor: f64) -> Self {
         Self {
