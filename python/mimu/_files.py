@@ -81,7 +81,7 @@ def verify(
 
 Format = Literal[
     "c", "rust", "json", "kalibr", "openvins", "vins", "orbslam3", "liosam", "fastlio", "imu-calib", "imu-tk", "fusion", "realsense",
-    "px4", "ardupilot", "mcap", "core",
+    "px4", "ardupilot", "core",
 ]
 
 

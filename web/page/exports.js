@@ -14,7 +14,6 @@ export const FORMATS = [
   { name: "Fusion (x-io)", file: "fusion.h", args: ["fusion"], of: "calibration" },
   { name: "RealSense, EEPROM", file: "realsense.bin", args: ["realsense"], of: "calibration" },
   { name: "RealSense, calibration.json", file: "realsense.json", args: ["realsense", "--layout", "json"], of: "calibration" },
-  { name: "MCAP for Foxglove", file: "unit.mcap", args: ["mcap", "--recording", "rec"], of: "calibration" },
   { name: "Kalibr", file: "imu.yaml", args: ["kalibr"], of: "noise" },
   { name: "OpenVINS", file: "kalibr_imu_chain.yaml", args: ["openvins"], of: "noise" },
   { name: "VINS-Fusion", file: "vins.yaml", args: ["vins"], of: "noise" },

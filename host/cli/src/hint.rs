@@ -162,7 +162,6 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::GyroZero => "--gyro-zero",
         Argument::AccelZero => "--accel-zero",
         Argument::Prefix => "--prefix",
-        Argument::Every => "--every",
         Argument::CalibrationOfNoise => "mimu allan --calibration",
         // The command has no flag for this argument.
         _ => return None,

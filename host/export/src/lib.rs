@@ -28,7 +28,6 @@ pub mod json;
 pub mod judged;
 pub mod kalibr;
 pub mod liosam;
-pub mod mcap;
 pub mod misalignment;
 mod one_temperature;
 pub mod openvins;
@@ -43,8 +42,6 @@ pub mod rust;
 pub mod vins;
 pub mod worst_axis;
 pub mod yaml;
-
-use std::path::PathBuf;
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
@@ -99,8 +96,6 @@ pub enum Format {
     /// Parameters of ArduPilot: INS_TCAL* over temperature, INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS at one
     #[cfg_attr(feature = "clap", command(name = "ardupilot"))]
     ArduPilot(ardupilot::Options),
-    /// MCAP for Foxglove: raw and compensated samples, and poses on the sphere of gravity
-    Mcap(mcap::Options),
     /// The bytes that a device stores, for programs with mimu-core
     Core,
 }
@@ -263,16 +258,6 @@ impl Format {
         matches!(self, Self::Px4(_) | Self::ArduPilot(_))
     }
 
-    /// Files that it reads in addition to its [`Sources`]; output must not overwrite them.
-    pub fn inputs(&self) -> Vec<PathBuf> {
-        match self {
-            Self::Mcap(options) => ["recording.toml", "samples.csv", "samples.parquet"]
-                .map(|name| options.recording.join(name))
-                .into(),
-            _ => Vec::new(),
-        }
-    }
-
     /// The file of this format.
     ///
     /// # Errors
@@ -295,7 +280,6 @@ impl Format {
             Self::ArduPilot(options) => ardupilot::export(from, options),
             Self::Core => core::export(from),
             Self::Json => json::export(from),
-            Self::Mcap(options) => mcap::export(from, options),
             Self::Rust => rust::export(from),
         }
     }

@@ -164,8 +164,6 @@ pub enum Argument {
     AccelZero,
     /// Beginning of the names in a source file.
     Prefix,
-    /// One sample out of this many is written.
-    Every,
 }
 
 /// Result with [`Error`].

@@ -53,9 +53,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         return Err(Error::new("export", problem, "leave it out").about(Argument::Noise));
     }
     let sources = [args.calibration.as_deref(), args.noise.as_deref()];
-    let own = args.format.inputs();
-    let own = own.iter().map(PathBuf::as_path);
-    let inputs: Vec<_> = sources.into_iter().flatten().chain(own).collect();
+    let inputs: Vec<_> = sources.into_iter().flatten().collect();
     check_outputs(&[Some(path), args.json.file()], &inputs)?;
     let named = args.calibration.as_deref().map(|p| p.display().to_string());
     let (mut calibration, mut biases) = (None, None);

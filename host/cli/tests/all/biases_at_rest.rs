@@ -201,7 +201,6 @@ fn everything_that_needs_a_calibration_refuses_the_file_by_its_name_and_says_wha
         "fusion",
         "realsense",
         "core",
-        "mcap --recording rec",
     ]
     .map(|format| format!("export {format} --calibration biases.toml -o out"));
     let commands = [
