@@ -15,6 +15,10 @@ MDBOOK := 0.5.4
 LOWEST := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device mimu-equipment mimu-export mimu-wizard mimu-cli
 
+# Written when all tests have been built. Their build has the programs of the demo too, with other features of the dependencies than a build of these
+# programs alone, which would compile everything again.
+BUILT := $(or $(CARGO_TARGET_DIR),target)/debug/.tests-built
+
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python
 
@@ -72,6 +76,7 @@ no-panic:
 # With the libraries, so that the extension module for Python is built with the features that the tests need: no crate is compiled twice.
 build-tests:
 	$(CARGO) build --locked $(ON_PC) --lib --tests
+	@touch $(BUILT)
 
 run-tests:
 	$(CARGO) test --locked $(ON_PC)
@@ -123,7 +128,9 @@ SEED ?= 1
 demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is another unit with another effect
 	@echo "The firmware, the emulated board and the command are compiled first: some minutes the first time (five on two idle cores)."
 	@$(FIRMWARE)
-	@$(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bin mimu --bin demo
+	@if [ -e $(BUILT) ] && [ -z "$$(find core host rig tests -name '*.rs' -newer $(BUILT) -print -quit)" ]; \
+	then $(CARGO) build --locked $(ON_PC) --lib --tests; \
+	else $(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bin mimu --bin demo; fi
 	@rm -rf $(DEMO)
 	@target/debug/demo $(SEED) $(DEMO)
 
