@@ -18,8 +18,9 @@ use self::ahead::ahead;
 use self::columns::Columns;
 pub use self::masking::Masked;
 pub use self::segment::Part;
-use self::segment::{Segment, temperature};
+use self::segment::{Segment, Temperature, temperature};
 pub use self::several::survey_all;
+use self::suitability::Suitability;
 use self::unit::Unit;
 use self::values::{Read, Values};
 use crate::calibration::Calibration;
@@ -135,111 +136,177 @@ pub fn survey(
     let read = recording.warnings.iter().cloned();
     let mut warnings: Vec<Warning> = read.map(Warning::Reading).collect();
     let segment = Segment::find(&mut columns, recording, options.part, &place, &mut warnings)?;
-    let temp_c = match recording.columns.temp_c {
-        true => {
-            let mut temp_c = columns.take(Column::Temperature)?;
-            let mut none = NoTemperatures::default();
-            let times = (0..).map(|k| segment.span_s[0] + f64::from(k) * segment.period_s);
-            no_temperature::leave_empty(&mut temp_c[segment.rows.clone()], times, &mut none);
-            warnings.extend(no_temperature::warning(&none));
-            temperature(&temp_c, &segment.rows)
-        }
-        false => None,
+    let temperature = read_temperature(&mut columns, recording, &segment, &mut warnings)?;
+    let mut found = Found {
+        segment: &segment,
+        temperature: temperature.as_ref(),
+        options,
+        estimators: Estimators::default(),
+        channels: Vec::new(),
+        judged: Vec::new(),
+        warnings,
     };
-    let mut channels = Vec::new();
-    let mut judged = Vec::new();
-    let mut estimators: Vec<(usize, Estimator)> = Vec::new();
     let read = |done: usize| {
         let (i, unit) = (indices[done], units[done]);
         let values = columns.take(Column::Raw(i))?;
         Values::of(values, &segment, options.part, i, unit, &place)
     };
     ahead(&place, indices.len(), read, |done, read, next| {
-        let i = indices[done];
-        let values = match read? {
-            Read::Values(values) => values,
+        let (i, unit) = (indices[done], units[done]);
+        match read? {
+            Read::Values(values) => {
+                found.add(i, unit, values, next)?;
+                progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
+            }
             Read::Dead(why) => {
                 next();
-                warnings.push(Warning::Dead { why: why.clone() }.of_channel(i));
-                channels.push(Channel::dead(i, units[done], why));
-                return Ok(());
+                found.add_dead(i, unit, why);
             }
-        };
-        warnings.extend(values.warnings);
-        let samples = values.rates.len();
-        if !estimators.iter().any(|(n, _)| *n == samples) {
-            let new = Estimator::new(samples, segment.period_s, options.confidence);
-            estimators.push((samples, new));
         }
-        let estimator = estimators.iter().find(|(n, _)| *n == samples);
-        let heat = temp_c
-            .as_ref()
+        Ok(())
+    })?;
+    found.refuse_all_dead(&place)?;
+    found.warn_if_suspect(recording, calibration);
+    found.refuse_motion(&place)?;
+    Ok(Survey {
+        recording: recording.directory.display().to_string(),
+        device: recording.manifest.device.clone(),
+        temp_c: temperature.as_ref().map(|t| t.mean_c),
+        sample_rate_hz: 1.0 / segment.period_s,
+        span_s: segment.span_s,
+        options,
+        channels: found.channels,
+        warnings: found.warnings,
+    })
+}
+
+/// Temperature over `segment`; `None` where it was not recorded.
+fn read_temperature(
+    columns: &mut Columns,
+    recording: &Recording,
+    segment: &Segment,
+    warnings: &mut Vec<Warning>,
+) -> Result<Option<Temperature>> {
+    if !recording.columns.temp_c {
+        return Ok(None);
+    }
+    let mut temp_c = columns.take(Column::Temperature)?;
+    let mut none = NoTemperatures::default();
+    let times = (0..).map(|k| segment.span_s[0] + f64::from(k) * segment.period_s);
+    no_temperature::leave_empty(&mut temp_c[segment.rows.clone()], times, &mut none);
+    warnings.extend(no_temperature::warning(&none));
+    Ok(temperature(&temp_c, &segment.rows))
+}
+
+/// What the channels of a recording have shown so far, and what the next one is computed with.
+struct Found<'a> {
+    segment: &'a Segment,
+    temperature: Option<&'a Temperature>,
+    options: Options,
+    estimators: Estimators,
+    channels: Vec<Channel>,
+    /// Those that are alive, by index.
+    judged: Vec<(usize, Suitability)>,
+    warnings: Vec<Warning>,
+}
+
+impl Found<'_> {
+    /// Computes the noise of the raw channel `i`; calls `next` as soon as there is memory for the next one.
+    fn add(&mut self, i: usize, unit: Unit, values: Values, next: &dyn Fn()) -> Result<()> {
+        let (dt_s, options) = (self.segment.period_s, &self.options);
+        self.warnings.extend(values.warnings);
+        let samples = values.rates.len();
+        let estimator = self.estimators.of(samples, dt_s, options.confidence);
+        let heat = self
+            .temperature
             .and_then(|t| t.against(&values.suitability.levels));
-        judged.push((i, values.suitability));
+        self.judged.push((i, values.suitability));
         let mut rates = values.rates;
-        let dt_s = segment.period_s;
         // Only its curves are kept: the integral is as long as the series.
         let mut as_it_is = None;
         let spectrum = remove_lines_after(&mut rates, dt_s, options.confidence, |rates| {
-            as_it_is = Some(AsItIs::of(rates, dt_s, &options));
+            as_it_is = Some(AsItIs::of(rates, dt_s, options));
         });
         let without_lines = Integrated::new(rates, dt_s).map_err(not_finite)?;
         next();
-        let mut channel = Channel::of(i, units[done], samples);
+        let mut channel = Channel::of(i, unit, samples);
         channel.masked = values.masked;
         channel.spectrum = spectrum;
         let as_it_is = as_it_is.transpose()?;
-        channel.analyse(
-            as_it_is.as_ref(),
-            &without_lines,
-            estimator.map(|(_, e)| e),
-            &options,
-        );
+        channel.analyse(as_it_is.as_ref(), &without_lines, estimator, options);
         let hadamard = || match as_it_is {
             Some(curves) => curves.hadamard,
-            None => hadamard(&without_lines, &options),
+            None => hadamard(&without_lines, options),
         };
-        channel.judge_drift(hadamard, heat, &options, &mut warnings);
+        channel.judge_drift(hadamard, heat, options, &mut self.warnings);
         if channel.spectrum.remains {
-            warnings.push(Warning::UnsteadyLines.of_channel(i));
+            self.warnings.push(Warning::UnsteadyLines.of_channel(i));
         }
         channel.spectrum = channel.spectrum.without_spectrum();
-        channels.push(channel);
-        progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
+        self.channels.push(channel);
         Ok(())
-    })?;
-    if let Some(why) = channels.first().and_then(|c| c.dead.as_ref())
-        && judged.is_empty()
-    {
-        let names: Vec<&str> = channels.iter().map(|c| c.name).collect();
-        return Err(Error::new(
+    }
+
+    fn add_dead(&mut self, i: usize, unit: Unit, why: String) {
+        let warning = Warning::Dead { why: why.clone() };
+        self.warnings.push(warning.of_channel(i));
+        self.channels.push(Channel::dead(i, unit, why));
+    }
+
+    fn refuse_all_dead(&self, place: &str) -> Result<()> {
+        let first = self.channels.first().and_then(|c| c.dead.as_ref());
+        let Some(why) = first.filter(|_| self.judged.is_empty()) else {
+            return Ok(());
+        };
+        let names: Vec<&str> = self.channels.iter().map(|c| c.name).collect();
+        Err(Error::new(
             format!("{place}, columns {}", names.join(", ")),
-            match channels.len() {
+            match self.channels.len() {
                 1 => why.clone(),
                 n => format!("all {n} channels are constant: of the first {why}"),
             },
             CHECK_WIRING,
-        ));
+        ))
     }
-    let levels = judged.iter().map(|(i, seen)| (*i, seen.level())).collect();
-    warnings.extend(suspect::input(
-        &recording.manifest,
-        calibration,
-        segment.period_s,
-        levels,
-    ));
-    warnings.extend(suspect::noise(&channels));
-    suitability::refuse_motion(&judged, &segment, options.part, &place, &mut warnings)?;
-    Ok(Survey {
-        recording: recording.directory.display().to_string(),
-        device: recording.manifest.device.clone(),
-        temp_c: temp_c.map(|t| t.mean_c),
-        sample_rate_hz: 1.0 / segment.period_s,
-        span_s: segment.span_s,
-        options,
-        channels,
-        warnings,
-    })
+
+    fn warn_if_suspect(&mut self, recording: &Recording, calibration: Option<&Calibration>) {
+        let levels = self.judged.iter().map(|(i, seen)| (*i, seen.level()));
+        self.warnings.extend(suspect::input(
+            &recording.manifest,
+            calibration,
+            self.segment.period_s,
+            levels.collect(),
+        ));
+        self.warnings.extend(suspect::noise(&self.channels));
+    }
+
+    fn refuse_motion(&mut self, place: &str) -> Result<()> {
+        suitability::refuse_motion(
+            &self.judged,
+            self.segment,
+            self.options.part,
+            place,
+            &mut self.warnings,
+        )
+    }
+}
+
+/// Estimators, each with the number of samples that it is for.
+#[derive(Default)]
+struct Estimators(Vec<(usize, Estimator)>);
+
+impl Estimators {
+    fn of(&mut self, samples: usize, period_s: f64, confidence: f64) -> &Estimator {
+        let at = match self.0.iter().position(|(n, _)| *n == samples) {
+            Some(at) => at,
+            None => {
+                let new = Estimator::new(samples, period_s, confidence);
+                self.0.push((samples, new));
+                self.0.len() - 1
+            }
+        };
+        &self.0[at].1
+    }
 }
 
 /// Unit of each channel, with the factor from raw to it.
@@ -356,7 +423,7 @@ impl Channel {
         &mut self,
         as_it_is: Option<&AsItIs>,
         without_lines: &Integrated,
-        estimator: Option<&Estimator>,
+        estimator: &Estimator,
         options: &Options,
     ) {
         let curve = |of: &Integrated, kind, times: &[usize]| {
@@ -380,7 +447,7 @@ impl Channel {
             Deviation::Hadamard,
             &hadamard_factors(self.samples),
         );
-        self.model = estimator.and_then(|e| e.fit(&allan, &hadamard));
+        self.model = estimator.fit(&allan, &hadamard);
         self.read_white_band(without_lines.dt_s(), options.confidence);
     }
 

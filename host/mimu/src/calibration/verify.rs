@@ -5,6 +5,8 @@ mod judged;
 
 pub use causes::{Causes, Share};
 
+use std::borrow::Cow;
+
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
@@ -79,53 +81,114 @@ pub struct Verification {
 
 /// Judges `calibration` by a recording.
 pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verification> {
-    let manifest = &prepared.manifest;
+    let same_recording = calibration.recording.sha256.as_ref() == Some(&prepared.condensed.sha256);
+    let mut warnings = warnings_before(prepared, calibration, same_recording)?;
+    refuse_effects_of_means(prepared, calibration)?;
+    let readings = Readings::of(prepared, calibration, &mut warnings)?;
+    let mut sensors = PerSensor::<Option<SensorVerification>>::default();
+    for sensor in Sensor::BOTH {
+        if calibration.inverse(sensor).is_some() && readings.as_read.has(sensor) {
+            sensors[sensor] = readings.verify(calibration, sensor, &mut warnings)?;
+        }
+    }
+    if sensors.present().next().is_none() {
+        return Err(nothing_to_judge(&readings.as_read));
+    }
+    let at_rest = sensors.present().filter_map(|(_, s)| s.static_rms);
+    warnings.extend(at_rest.filter_map(restless));
+    let worse = sensors.present();
+    warnings.extend(worse.filter_map(|(sensor, s)| Some(worse_than_without(s)?.of(sensor))));
+    let all: Vec<(Sensor, &SensorVerification)> = sensors.present().collect();
+    Ok(Verification {
+        format: "mimu-verify/1",
+        judgement: judged::judgement(&readings.as_read, &all, &warnings),
+        same_recording,
+        sensors,
+        warnings,
+    })
+}
+
+/// Warnings about the recording, and about how the calibration fits it.
+fn warnings_before(
+    prepared: &Prepared,
+    calibration: &Calibration,
+    same_recording: bool,
+) -> Result<Vec<Warning>> {
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warnings.extend(prepared.implausible_rate());
-    warnings.extend(check_unit(calibration, manifest, &prepared.place)?);
-    let same_recording = calibration.recording.sha256.as_ref() == Some(&prepared.condensed.sha256);
+    let unit = check_unit(calibration, &prepared.manifest, &prepared.place)?;
+    warnings.extend(unit);
     if same_recording {
         warnings.push(Warning::SameRecording);
     }
     warnings.extend(outside(calibration, &prepared.condensed.blocks));
     warnings.extend(judged::other_gravity(calibration, prepared));
-    if manifest.means && !calibration.effects().is_empty() {
+    Ok(warnings)
+}
+
+fn refuse_effects_of_means(prepared: &Prepared, calibration: &Calibration) -> Result<()> {
+    if prepared.manifest.means && !calibration.effects().is_empty() {
         return Err(Error::new(
             &prepared.place,
             "the calibration has effects, and means of poses do not show how these change the samples",
             "verify it with a recording of samples",
         ));
     }
-    let cleaned = without_effects(prepared, calibration)?;
-    let curves = calibration.curves();
-    let at_one = |p: &Prepared| at_one_temperature(p, calibration, curves.as_ref()?);
-    let cleaned = cleaned.map(|cleaned| at_one(&cleaned).unwrap_or(cleaned));
-    let moved = at_one(prepared);
-    if curves.is_some() && moved.is_none() {
-        warnings.push(Warning::NoTemperature);
+    Ok(())
+}
+
+/// The readings that a calibration is judged by. If it has curves over temperature, they are those at one temperature, as far as the recording has
+/// temperatures.
+struct Readings<'a> {
+    /// With the effects of the calibration. Of a turntable, the dwells that it turns in are excluded for the accelerometer.
+    as_read: Cow<'a, Prepared>,
+    /// Without the effects, if it has any.
+    without_effects: Option<Prepared>,
+}
+
+impl<'a> Readings<'a> {
+    fn of(
+        prepared: &'a Prepared,
+        calibration: &Calibration,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Self> {
+        let cleaned = without_effects(prepared, calibration)?;
+        let curves = calibration.curves();
+        let at_one = |p: &Prepared| at_one_temperature(p, calibration, curves.as_ref()?);
+        let cleaned = cleaned.map(|cleaned| at_one(&cleaned).unwrap_or(cleaned));
+        let moved = at_one(prepared);
+        if curves.is_some() && moved.is_none() {
+            warnings.push(Warning::NoTemperature);
+        }
+        let mut as_read = moved.map_or(Cow::Borrowed(prepared), Cow::Owned);
+        match prepared.manifest.reference {
+            Reference::TurntableRate => {
+                let dwells = RatedDwells::of(&as_read)?;
+                warnings.extend(dwells.exclude_dwells(as_read.to_mut()));
+            }
+            Reference::Table | Reference::Gravity => {}
+        }
+        Ok(Self {
+            as_read,
+            without_effects: cleaned,
+        })
     }
-    let prepared = moved.as_ref().unwrap_or(prepared);
-    let at_rest = match manifest.reference {
-        Reference::TurntableRate => {
-            let mut at_rest = prepared.clone();
-            warnings.extend(RatedDwells::of(prepared)?.exclude_dwells(&mut at_rest));
-            Some(at_rest)
-        }
-        Reference::Table | Reference::Gravity => None,
-    };
-    let prepared = at_rest.as_ref().unwrap_or(prepared);
-    let mut sensors = PerSensor::<Option<SensorVerification>>::default();
-    for sensor in Sensor::BOTH {
-        if calibration.inverse(sensor).is_none() || !prepared.has(sensor) {
-            continue;
-        }
-        let observations = prepared.observations(sensor);
+
+    /// The figures of `sensor`; `None`, with a warning, if nothing judges it.
+    fn verify(
+        &self,
+        calibration: &Calibration,
+        sensor: Sensor,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Option<SensorVerification>> {
+        let observations = self.as_read.observations(sensor);
         if !observations.is_empty() {
-            refuse_wrong_gravity(prepared, sensor, &observations)?;
+            refuse_wrong_gravity(&self.as_read, sensor, &observations)?;
         }
-        let affine = judge(prepared, calibration, sensor);
-        let with_effects = cleaned.as_ref().and_then(|c| judge(c, calibration, sensor));
+        let affine = judge(&self.as_read, calibration, sensor);
+        let cleaned = self.without_effects.as_ref();
+        let with_effects = cleaned.and_then(|c| judge(c, calibration, sensor));
         let (judged, refused) = match (affine, with_effects) {
             // Without a calibration, the readings count as the unit gave them.
             (Some((affine, _)), Some((clean, refused))) => {
@@ -140,55 +203,47 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             (Some(affine), None) if cleaned.is_none() => affine,
             _ => {
                 warnings.push(Warning::NothingToJudge.of(sensor));
-                continue;
+                return Ok(None);
             }
         };
         warnings.extend(refused);
-        sensors[sensor] = Some(judged);
+        Ok(Some(judged))
     }
-    if sensors.present().next().is_none() {
-        let unused = Sensor::BOTH.map(|s| prepared.dwells.unused(s));
-        let reason = unused.iter().find(|u| !u.is_empty());
-        let error = Error::new(
-            &prepared.place,
-            format!(
-                "the recording has no data that this calibration could be judged by{}",
-                reason.map_or("", String::as_str)
-            ),
-            "record dwells with a known input, or poses and turns by hand",
-        );
-        let mut judged = Sensor::BOTH.into_iter();
-        let judged = judged.find(|s| prepared.dwells.are_judged_not_still(*s));
-        return Err(match judged {
-            Some(sensor) => prepared.with_steps_as_given(error, sensor),
-            None => error,
-        });
+}
+
+fn nothing_to_judge(prepared: &Prepared) -> Error {
+    let unused = Sensor::BOTH.map(|s| prepared.dwells.unused(s));
+    let reason = unused.iter().find(|u| !u.is_empty());
+    let error = Error::new(
+        &prepared.place,
+        format!(
+            "the recording has no data that this calibration could be judged by{}",
+            reason.map_or("", String::as_str)
+        ),
+        "record dwells with a known input, or poses and turns by hand",
+    );
+    let mut judged = Sensor::BOTH.into_iter();
+    let judged = judged.find(|s| prepared.dwells.are_judged_not_still(*s));
+    match judged {
+        Some(sensor) => prepared.with_steps_as_given(error, sensor),
+        None => error,
     }
-    let at_rest = sensors.present().filter_map(|(_, s)| s.static_rms);
-    warnings.extend(at_rest.filter_map(restless));
-    for (sensor, s) in sensors.present() {
-        let other = s.rms_uncalibrated.unwrap_or(s.rms_raw);
-        if !(s.rms > other) {
-            continue;
-        }
-        let readings_in_si = s.rms_uncalibrated.is_some();
-        let warning = match exceeds(s.rms, other, errors(s.figure, s.count)) {
-            true => Warning::Worse { readings_in_si },
-            false => Warning::Undecided {
-                errors: s.count as u64,
-                turns: s.figure == Figure::Direction,
-                readings_in_si,
-            },
-        };
-        warnings.push(warning.of(sensor));
+}
+
+/// The warning if the errors are not smaller than without a calibration.
+fn worse_than_without(s: &SensorVerification) -> Option<Warning> {
+    let other = s.rms_uncalibrated.unwrap_or(s.rms_raw);
+    if !(s.rms > other) {
+        return None;
     }
-    let all: Vec<(Sensor, &SensorVerification)> = sensors.present().collect();
-    Ok(Verification {
-        format: "mimu-verify/1",
-        judgement: judged::judgement(prepared, &all, &warnings),
-        same_recording,
-        sensors,
-        warnings,
+    let readings_in_si = s.rms_uncalibrated.is_some();
+    Some(match exceeds(s.rms, other, errors(s.figure, s.count)) {
+        true => Warning::Worse { readings_in_si },
+        false => Warning::Undecided {
+            errors: s.count as u64,
+            turns: s.figure == Figure::Direction,
+            readings_in_si,
+        },
     })
 }
 

@@ -44,7 +44,7 @@ use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::prepared::Prepared;
 use crate::quantity::{Sensor, significant};
 use crate::recording_problem::OfRecording;
-use crate::triad::{Part, Triad};
+use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference, two_units};
@@ -360,138 +360,224 @@ fn singular(place: &str) -> Error {
     Error::new(place, "the calibration is singular", remedy)
 }
 
-/// Diagnoses a unit.
-///
-/// The accelerometer comes first: without a table, its directions of gravity judge the gyro.
-pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
-    recordings.check()?;
-    let place = recordings.first.place.clone();
-    let singular = || singular(&place);
-    let held = matrices(&recordings);
-    // For readings in SI of a unit that is never turned, the uncertainty of the matrix is unknown.
-    let covariances = Sensor::BOTH.map(|s| recordings.given.and_then(|c| c.covariance(s)));
-    let free = |sensor: Sensor| match (held, &covariances) {
-        (Some(_), [gyro, accel]) => FreeParameters::Bias(match sensor {
-            Sensor::Gyro => gyro.as_ref(),
-            Sensor::Accel => accel.as_ref(),
-        }),
-        (None, _) => FreeParameters::Affine,
-    };
-    let calibrate = |prepared: Prepared| match held {
-        Some(matrices) => fit_biases(prepared, options, matrices, &covariances),
-        None => fit(prepared, options),
-    };
-    let without = |prepared: &Prepared| match (recordings.given, held) {
-        (Some(given), Some([gyro, accel])) => {
-            let (gyro, accel) = (gyro.as_ref(), accel.as_ref());
-            remove_within(prepared, gyro, accel, given.effects(), given.limits())
+/// How the recordings of a diagnosis are calibrated.
+struct Calibrator<'a> {
+    recordings: &'a Recordings<'a>,
+    options: Options,
+    /// See [`matrices`].
+    held: Option<[Option<Affine<f64>>; 2]>,
+    /// Those of the given calibration. For readings in SI of a unit that is never turned, the uncertainty of the matrix is unknown.
+    covariances: [Option<Covariance>; 2],
+}
+
+impl<'a> Calibrator<'a> {
+    fn of(recordings: &'a Recordings<'a>, options: Options) -> Self {
+        Self {
+            recordings,
+            options,
+            held: matrices(recordings),
+            covariances: Sensor::BOTH.map(|s| recordings.given.and_then(|c| c.covariance(s))),
         }
-        _ => Some(prepared.clone()),
-    };
-    let judged = |prepared: Prepared| match held {
-        // A given matrix is judged by the rows alone: its biases are all that a part could be held out of.
-        Some(_) => calibrate(prepared),
-        None => fit(prepared, HELD_OUT),
-    };
-    let before = judged(without(&recordings.first).ok_or_else(singular)?)?;
-    let of_later = recordings.later().flat_map(OfRecording::prepared);
-    let problems = OfRecording::fitted(&before).into_iter().chain(of_later);
-    let problems = problems.collect();
-    let mut later: Vec<Prepared> = Vec::new();
-    for prepared in recordings.later() {
-        later.push(without(prepared).ok_or_else(singular)?);
     }
-    let found_in = 1 + recordings.more.len();
-    let sources = std::iter::once(&recordings.first).chain(&recordings.more);
-    let sources = sources.map(Source::from).collect();
-    let mut now = before.clone();
-    let mut effects: Vec<FittedEffect> = Vec::new();
-    let mut sensors = Vec::new();
-    let mut forces: Option<ForceErrors> = None;
-    // Uncertainty that the coefficients of effects add to the calibration.
-    let mut open: Vec<(Sensor, Part)> = Vec::new();
-    let by_gravity = recordings.first.manifest.reference == Reference::Gravity;
-    for sensor in [Sensor::Accel, Sensor::Gyro] {
-        if now.sensor(sensor).is_none() {
-            continue;
+
+    fn singular(&self) -> Error {
+        singular(&self.recordings.first.place)
+    }
+
+    fn free(&self, sensor: Sensor) -> FreeParameters<'_> {
+        match self.held {
+            Some(_) => FreeParameters::Bias(self.covariances[sensor as usize].as_ref()),
+            None => FreeParameters::Affine,
         }
-        let passes = Passes {
-            sensor,
-            now: &now,
-            later: &later,
-            found_in,
-            forces: forces.as_ref(),
-            free: free(sensor),
-            accept: &recordings.accept,
-            calibrate: &calibrate,
-            place: &place,
+    }
+
+    fn calibrate(&self, prepared: Prepared) -> Result<Fit> {
+        match self.held {
+            Some(matrices) => fit_biases(prepared, self.options, matrices, &self.covariances),
+            None => fit(prepared, self.options),
+        }
+    }
+
+    /// The fit that judges the model without effects.
+    fn judged(&self, prepared: Prepared) -> Result<Fit> {
+        match self.held {
+            // A given matrix is judged by the rows alone: its biases are all that a part could be held out of.
+            Some(_) => self.calibrate(prepared),
+            None => fit(prepared, HELD_OUT),
+        }
+    }
+
+    fn without_given_effects(&self, prepared: &Prepared) -> Result<Prepared> {
+        let (Some(given), Some([gyro, accel])) = (self.recordings.given, &self.held) else {
+            return Ok(prepared.clone());
         };
+        let (gyro, accel) = (gyro.as_ref(), accel.as_ref());
+        remove_within(prepared, gyro, accel, given.effects(), given.limits())
+            .ok_or_else(|| self.singular())
+    }
+}
+
+/// What was found on the sensors so far.
+struct Found<'a> {
+    calibrator: &'a Calibrator<'a>,
+    /// The affine fit before effects were sought.
+    before: &'a Fit,
+    /// The affine fit without the effects found, and the later recordings without them.
+    now: Fit,
+    later: Vec<Prepared>,
+    sensors: Vec<SensorDiagnosis>,
+    effects: Vec<FittedEffect>,
+    /// Errors of the forces that judge the gyro.
+    forces: Option<ForceErrors>,
+    /// Uncertainty that the coefficients of effects add to the calibration.
+    open: Vec<(Sensor, Part)>,
+}
+
+impl Found<'_> {
+    /// Seeks the effects of `sensor`, and removes them.
+    fn seek(&mut self, sensor: Sensor) -> Result<()> {
         let Pass {
             rows,
             mut decision,
             found,
             after,
-        } = passes.best()?;
-        let affine = match effects.is_empty() {
-            true => before.clone(),
-            false => judged(now.prepared.clone())?,
+        } = self.best_pass(sensor)?;
+        let affine = match self.effects.is_empty() {
+            true => self.before.clone(),
+            false => self.calibrator.judged(self.now.prepared.clone())?,
         };
         let with_effects = after.is_some();
         if let Some(after) = after {
-            effects.extend(found);
-            (now, later) = after?;
+            self.effects.extend(found);
+            (self.now, self.later) = after?;
         }
-        if held.is_none()
-            && found_in == 1
+        if self.calibrator.held.is_none()
+            && self.calibrator.recordings.more.is_empty()
             && let Some(affine) = affine.sensor(sensor)
         {
-            let with_effects = now.sensor(sensor).filter(|_| with_effects);
+            let with_effects = self.now.sensor(sensor).filter(|_| with_effects);
             decision.take_figures(affine, with_effects);
         }
-        open.extend(uncertainty::of_affine(&rows, &decision).map(|part| (sensor, part)));
-        if sensor == Sensor::Accel && by_gravity {
-            let models = Sensor::BOTH.map(|s| now.sensor(s).map(|f| f.estimated.triad.inverse));
-            let head = session(&now.prepared, models);
-            forces = match held {
-                None if !by_turns(&now) => uncertainty::of_forces(&head, &rows, &decision),
-                // With the turns the fit knows the directions better than the poses alone do.
-                _ => now.sensor(sensor).map(|f| {
-                    let covariance = &f.estimated.triad.inverse_covariance;
-                    uncertainty::of_given_forces(&now.prepared, covariance)
-                }),
-            };
+        let part = uncertainty::of_affine(&rows, &decision);
+        self.open.extend(part.map(|part| (sensor, part)));
+        let reference = self.calibrator.recordings.first.manifest.reference;
+        if sensor == Sensor::Accel && reference == Reference::Gravity {
+            self.forces = self.forces_by(&rows, &decision);
         }
         let picture = Picture::of(sensor, &rows, &decision);
-        sensors.push(SensorDiagnosis {
+        self.sensors.push(SensorDiagnosis {
             sensor,
             rows,
             decision,
             picture,
         });
+        Ok(())
     }
-    for (sensor, part) in open {
-        let fit = now.sensors.iter_mut().find(|f| f.sensor == sensor);
-        if let Some(triad) = fit.map(|f| &mut f.estimated.triad) {
-            let mut parts = triad.inverse_parts();
-            parts.push(part);
-            *triad = Triad::from_inverse(triad.inverse, parts).ok_or_else(singular)?;
+
+    fn best_pass(&self, sensor: Sensor) -> Result<Pass> {
+        let recordings = self.calibrator.recordings;
+        let passes = Passes {
+            sensor,
+            now: &self.now,
+            later: &self.later,
+            found_in: 1 + recordings.more.len(),
+            forces: self.forces.as_ref(),
+            free: self.calibrator.free(sensor),
+            accept: &recordings.accept,
+            calibrate: &|prepared| self.calibrator.calibrate(prepared),
+            place: &recordings.first.place,
+        };
+        passes.best()
+    }
+
+    /// Errors of the forces that the accelerometer measures; `rows` are those of its magnitudes.
+    fn forces_by(&self, rows: &Rows, decision: &Decision) -> Option<ForceErrors> {
+        let models = Sensor::BOTH.map(|s| self.now.sensor(s).map(|f| f.estimated.triad.inverse));
+        let head = session(&self.now.prepared, models);
+        match self.calibrator.held {
+            None if !by_turns(&self.now) => uncertainty::of_forces(&head, rows, decision),
+            // With the turns the fit knows the directions better than the poses alone do.
+            _ => self.now.sensor(Sensor::Accel).map(|f| {
+                let covariance = &f.estimated.triad.inverse_covariance;
+                uncertainty::of_given_forces(&self.now.prepared, covariance)
+            }),
         }
     }
-    if recordings.given.is_some_and(|given| !given.is_uncertain()) {
-        now.warnings.push(Warning::Uncertain);
+
+    fn add_uncertainty(&mut self) -> Result<()> {
+        for (sensor, part) in std::mem::take(&mut self.open) {
+            let fit = self.now.sensors.iter_mut().find(|f| f.sensor == sensor);
+            if let Some(triad) = fit.map(|f| &mut f.estimated.triad) {
+                let mut parts = triad.inverse_parts();
+                parts.push(part);
+                *triad = Triad::from_inverse(triad.inverse, parts)
+                    .ok_or_else(|| self.calibrator.singular())?;
+            }
+        }
+        let given = self.calibrator.recordings.given;
+        if given.is_some_and(|given| !given.is_uncertain()) {
+            self.now.warnings.push(Warning::Uncertain);
+        }
+        Ok(())
     }
-    sensors.reverse();
-    with_temperature(&mut now, &sensors);
-    let open = |d: &Decision| d.unexplained().next().is_some() || !d.undecided.is_empty();
-    let left = sensors.iter().any(|s| open(&s.decision));
-    let of = |s: &SensorDiagnosis| Some((s.sensor, s.untestable(&before, held.is_some())?));
-    let untestable: Vec<(Sensor, Untestable)> = sensors.iter().filter_map(of).collect();
-    let verdict = match (left, effects.is_empty()) {
-        (true, _) => Verdict::Unexplained,
-        (false, true) if !untestable.is_empty() => Verdict::Untestable,
-        (false, true) => Verdict::Clean,
-        (false, false) => Verdict::Explained,
+
+    fn untestable(&self) -> Vec<(Sensor, Untestable)> {
+        let matrix_given = self.calibrator.held.is_some();
+        let why = |s: &SensorDiagnosis| Some((s.sensor, s.untestable(self.before, matrix_given)?));
+        self.sensors.iter().filter_map(why).collect()
+    }
+
+    fn verdict(&self, all_testable: bool) -> Verdict {
+        let open = |d: &Decision| d.unexplained().next().is_some() || !d.undecided.is_empty();
+        let left = self.sensors.iter().any(|s| open(&s.decision));
+        match (left, self.effects.is_empty()) {
+            (true, _) => Verdict::Unexplained,
+            (false, true) if !all_testable => Verdict::Untestable,
+            (false, true) => Verdict::Clean,
+            (false, false) => Verdict::Explained,
+        }
+    }
+}
+
+/// Diagnoses a unit.
+///
+/// The accelerometer comes first: without a table, its directions of gravity judge the gyro.
+pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
+    recordings.check()?;
+    let calibrator = Calibrator::of(&recordings, options);
+    let before = calibrator.judged(calibrator.without_given_effects(&recordings.first)?)?;
+    let of_later = recordings.later().flat_map(OfRecording::prepared);
+    let problems = OfRecording::fitted(&before).into_iter().chain(of_later);
+    let problems = problems.collect();
+    let later = recordings.later();
+    let later = later.map(|prepared| calibrator.without_given_effects(prepared));
+    let sources = std::iter::once(&recordings.first).chain(&recordings.more);
+    let mut found = Found {
+        calibrator: &calibrator,
+        before: &before,
+        now: before.clone(),
+        later: later.collect::<Result<_>>()?,
+        sensors: Vec::new(),
+        effects: Vec::new(),
+        forces: None,
+        open: Vec::new(),
     };
+    for sensor in [Sensor::Accel, Sensor::Gyro] {
+        if found.now.sensor(sensor).is_some() {
+            found.seek(sensor)?;
+        }
+    }
+    found.add_uncertainty()?;
+    found.sensors.reverse();
+    with_temperature(&mut found.now, &found.sensors);
+    let untestable = found.untestable();
+    let verdict = found.verdict(untestable.is_empty());
+    let Found {
+        now,
+        sensors,
+        effects,
+        ..
+    } = found;
     Ok(Diagnosis {
         before,
         after: now,
@@ -499,7 +585,7 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         effects,
         verdict,
         untestable,
-        sources,
+        sources: sources.map(Source::from).collect(),
         problems,
     })
 }

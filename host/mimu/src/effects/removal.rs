@@ -12,7 +12,8 @@ use super::temperature::{Followed, lagged, offsets, without_self_heating};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::signal::blocks::Block;
-use crate::signal::dwell::Fault;
+use crate::signal::dwell::{Dwell, Fault};
+use crate::signal::increment::Increment;
 use crate::triad::directions;
 use crate::warning::Warning;
 use mimu_recording::Reference;
@@ -185,91 +186,179 @@ fn of_sensor(
     effects: &[&FittedEffect],
     out: &mut Prepared,
 ) -> Option<()> {
-    let model = models[sensor as usize]?;
-    let (direction, scale, _) = directions(model)?;
-    let blocks = &prepared.condensed.blocks;
-    let t0_s = blocks.first()?.start_s;
-    let middle_s = prepared.middle_s();
-    // As on the device: before the first temperature that one is used, and without any the reference.
-    let recorded = offsets(blocks);
-    let first = recorded.iter().map(|w| w.1).find(|w| w.is_finite());
-    let known = |w: f64| if w.is_nan() { first.unwrap_or(0.0) } else { w };
-    let recorded: Vec<(f64, f64)> = recorded.into_iter().map(|(t, w)| (t, known(w))).collect();
-    let all = SensorEffects {
-        sensor,
-        direction,
-        to_body: direction.try_inverse()?,
-        effects,
-        followed_temperatures: effects
-            .iter()
-            .map(|e| {
-                let followed: Followed = e.candidate.followed(e.parameter)?;
-                let other = match followed.without_self_heating {
-                    true => without_self_heating(&recorded),
-                    false => None,
-                };
-                let recorded = other.as_ref().unwrap_or(&recorded);
-                let now = recorded.iter().map(|w| w.1);
-                Some(match followed.lag_s {
-                    Some(lag_s) => now.zip(lagged(recorded, lag_s)).collect(),
-                    None => now.map(|w| (w, w)).collect(),
-                })
-            })
-            .collect(),
-    };
-    let from = sensor.channels().start;
-    let held: [Vec<f64>; 6] = std::array::from_fn(|channel| held(blocks, channel));
-    let raw = |at: usize, from: usize| Vector3::from_fn(|i, _| held[from + i][at]);
-    let apply = |model: Option<&Affine<f64>>, u: Vector3<f64>| {
-        model.map_or(Vector3::repeat(f64::NAN), |m| m.apply(&u))
-    };
-    let reading = |at: usize| Reading {
-        mean: raw(at, from),
-        ..Reading::of(&blocks[at].raw[from..from + 3], &scale)
-    };
-    let conditions = |at: usize, t_s: f64, rate: Vector3<f64>, force: Vector3<f64>| Conditions {
-        session: 0,
-        t_s: t_s - t0_s,
-        on_s: t_s - prepared.power_on_s(),
-        from_middle_s: t_s - middle_s,
-        duration_s: f64::from(blocks[at].rows) * prepared.condensed.period_s,
-        rate,
-        force,
-        angular_acceleration: Vector3::zeros(),
-        sensed: direction * if sensor == Sensor::Gyro { rate } else { force },
-        temperature_offset: recorded[at].1,
-        lagged_temperature: recorded[at].1,
-        reading: reading(at),
-    };
-    let mut of_block = Vec::with_capacity(blocks.len());
-    for (at, (t_s, _)) in recorded.iter().enumerate() {
-        let [rate, force] = [0, 1].map(|s| apply(models[s], raw(at, 3 * s)));
-        of_block.push(all.error(&conditions(at, *t_s, rate, force), at));
-    }
+    let removal = Removal::of(prepared, sensor, models, effects)?;
+    let of_block = removal.errors_of_blocks();
     let corrected = Arc::make_mut(&mut out.condensed);
     if sensor == Sensor::Gyro {
         for piece in &mut corrected.increments {
-            let t_s = piece.end_s - 0.5 * piece.duration_s;
-            let at = blocks
-                .partition_point(|b| b.last_s < t_s)
-                .min(blocks.len() - 1);
-            let mean = Vector3::from(piece.integral) / piece.duration_s;
-            let force = apply(models[1], raw(at, 3));
-            let mut conditions = conditions(at, t_s, model.apply(&mean), force);
-            conditions.reading.mean = mean;
-            conditions.duration_s = piece.duration_s;
-            let error = all.error(&conditions, at);
+            removal.correct_increment(piece);
+        }
+    }
+    removal.correct_blocks(&mut corrected.blocks, &of_block);
+    for dwell in &mut out.dwells.list {
+        removal.correct_dwell(dwell, &of_block);
+    }
+    leave_out_unknown(sensor, effects, out);
+    Some(())
+}
+
+/// Middle of each block, s, and its temperature. As on the device: before the first temperature that one is used, and without any the reference.
+fn temperatures(blocks: &[Block]) -> Vec<(f64, f64)> {
+    let recorded = offsets(blocks);
+    let first = recorded.iter().map(|w| w.1).find(|w| w.is_finite());
+    let known = |w: f64| if w.is_nan() { first.unwrap_or(0.0) } else { w };
+    recorded.into_iter().map(|(t, w)| (t, known(w))).collect()
+}
+
+/// The temperature that `effect` follows in each block, and the lagged one; `None` if it follows the recorded one.
+fn followed_temperature(effect: &FittedEffect, recorded: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
+    let followed: Followed = effect.candidate.followed(effect.parameter)?;
+    let other = match followed.without_self_heating {
+        true => without_self_heating(recorded),
+        false => None,
+    };
+    let recorded = other.as_deref().unwrap_or(recorded);
+    let now = recorded.iter().map(|w| w.1);
+    Some(match followed.lag_s {
+        Some(lag_s) => now.zip(lagged(recorded, lag_s)).collect(),
+        None => now.map(|w| (w, w)).collect(),
+    })
+}
+
+/// The removal of the effects of one sensor from a recording.
+struct Removal<'a> {
+    prepared: &'a Prepared,
+    effects: SensorEffects<'a>,
+    /// Inverse model of the sensor, and those of gyro and accelerometer.
+    model: &'a Affine<f64>,
+    models: [Option<&'a Affine<f64>>; 2],
+    /// Scale factors of the sensor, raw/SI.
+    scale: Vector3<f64>,
+    /// See [`temperatures`].
+    recorded: Vec<(f64, f64)>,
+    /// Of each channel, see [`held`].
+    held: [Vec<f64>; 6],
+    t0_s: f64,
+    middle_s: f64,
+}
+
+fn apply(model: Option<&Affine<f64>>, raw: Vector3<f64>) -> Vector3<f64> {
+    model.map_or(Vector3::repeat(f64::NAN), |m| m.apply(&raw))
+}
+
+impl<'a> Removal<'a> {
+    fn of(
+        prepared: &'a Prepared,
+        sensor: Sensor,
+        models: [Option<&'a Affine<f64>>; 2],
+        effects: &'a [&'a FittedEffect],
+    ) -> Option<Self> {
+        let model = models[sensor as usize]?;
+        let (direction, scale, _) = directions(model)?;
+        let blocks = &prepared.condensed.blocks;
+        let t0_s = blocks.first()?.start_s;
+        let recorded = temperatures(blocks);
+        let followed = effects.iter().map(|e| followed_temperature(e, &recorded));
+        Some(Self {
+            prepared,
+            effects: SensorEffects {
+                sensor,
+                direction,
+                to_body: direction.try_inverse()?,
+                effects,
+                followed_temperatures: followed.collect(),
+            },
+            model,
+            models,
+            scale,
+            recorded,
+            held: std::array::from_fn(|channel| held(blocks, channel)),
+            t0_s,
+            middle_s: prepared.middle_s(),
+        })
+    }
+
+    fn blocks(&self) -> &'a [Block] {
+        &self.prepared.condensed.blocks
+    }
+
+    fn first_channel(&self) -> usize {
+        self.effects.sensor.channels().start
+    }
+
+    /// Mean readings in block `at` of three channels.
+    fn raw(&self, at: usize, from: usize) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| self.held[from + i][at])
+    }
+
+    fn conditions(
+        &self,
+        at: usize,
+        t_s: f64,
+        rate: Vector3<f64>,
+        force: Vector3<f64>,
+    ) -> Conditions {
+        let (block, from) = (&self.blocks()[at], self.first_channel());
+        let input = match self.effects.sensor {
+            Sensor::Gyro => rate,
+            Sensor::Accel => force,
+        };
+        Conditions {
+            session: 0,
+            t_s: t_s - self.t0_s,
+            on_s: t_s - self.prepared.power_on_s(),
+            from_middle_s: t_s - self.middle_s,
+            duration_s: f64::from(block.rows) * self.prepared.condensed.period_s,
+            rate,
+            force,
+            angular_acceleration: Vector3::zeros(),
+            sensed: self.effects.direction * input,
+            temperature_offset: self.recorded[at].1,
+            lagged_temperature: self.recorded[at].1,
+            reading: Reading {
+                mean: self.raw(at, from),
+                ..Reading::of(&block.raw[from..from + 3], &self.scale)
+            },
+        }
+    }
+
+    fn errors_of_blocks(&self) -> Vec<Vector3<f64>> {
+        let each = self.recorded.iter().enumerate().map(|(at, (t_s, _))| {
+            let [rate, force] = [0, 1].map(|s| apply(self.models[s], self.raw(at, 3 * s)));
+            let conditions = self.conditions(at, *t_s, rate, force);
+            self.effects.error(&conditions, at)
+        });
+        each.collect()
+    }
+
+    /// Corrects an increment of the gyro.
+    fn correct_increment(&self, piece: &mut Increment) {
+        let blocks = self.blocks();
+        let t_s = piece.end_s - 0.5 * piece.duration_s;
+        let at = blocks
+            .partition_point(|b| b.last_s < t_s)
+            .min(blocks.len() - 1);
+        let mean = Vector3::from(piece.integral) / piece.duration_s;
+        let force = apply(self.models[1], self.raw(at, 3));
+        let mut conditions = self.conditions(at, t_s, self.model.apply(&mean), force);
+        conditions.reading.mean = mean;
+        conditions.duration_s = piece.duration_s;
+        let error = self.effects.error(&conditions, at);
+        for i in 0..3 {
+            piece.integral[i] -= self.scale[i] * error[i] * piece.duration_s;
+        }
+    }
+
+    fn correct_blocks(&self, blocks: &mut [Block], of_block: &[Vector3<f64>]) {
+        for (block, error) in blocks.iter_mut().zip(of_block) {
             for i in 0..3 {
-                piece.integral[i] -= scale[i] * error[i] * piece.duration_s;
+                block.raw[self.first_channel() + i].mean -= self.scale[i] * error[i];
             }
         }
     }
-    for (block, error) in corrected.blocks.iter_mut().zip(&of_block) {
-        for i in 0..3 {
-            block.raw[from + i].mean -= scale[i] * error[i];
-        }
-    }
-    for dwell in &mut out.dwells.list {
+
+    fn correct_dwell(&self, dwell: &mut Dwell, of_block: &[Vector3<f64>]) {
+        let (blocks, from) = (self.blocks(), self.first_channel());
         let range = dwell.blocks.clone();
         for i in 0..3 {
             // Weighted by the samples present, as in the mean of the dwell.
@@ -278,12 +367,10 @@ fn of_sensor(
             let pairs = blocks[range.clone()].iter().zip(&of_block[range.clone()]);
             let mean: f64 = pairs.map(|(b, e)| e[i] * (samples(b) / total)).sum();
             if total > 0.0 {
-                dwell.raw[from + i].mean -= scale[i] * mean;
+                dwell.raw[from + i].mean -= self.scale[i] * mean;
             }
         }
     }
-    leave_out_unknown(sensor, effects, out);
-    Some(())
 }
 
 /// If an effect depends on the other triad, a dwell without readings of that triad cannot be used for this one.

@@ -190,72 +190,19 @@ impl Dwells {
         let mut longest_run = [0, 1, 2, 3, 4, 5]
             .map(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
         let rails = rails::find(condensed, manifest, &mut warnings);
-        let given = match finding.steps {
-            Steps::Given if !condensed.has_steps => {
-                let problem = "the dwells were requested from the column step, and the recording has no such column";
-                return Err(Error::new("dwells", problem, "let mimu find the dwells")
-                    .about(Argument::StepsFound));
-            }
-            Steps::Given | Steps::AsRecorded => condensed.has_steps,
-            Steps::Found | Steps::AtRest => false,
-        };
+        let given = are_given(condensed, finding)?;
         let at_rest = finding.steps == Steps::AtRest;
         let by_hand = manifest.reference == Reference::Gravity;
-        let (ranges, detection, fault) = if given {
-            (by_step(condensed), None, None)
+        let segments = if given {
+            Segments::from(by_step(condensed))
         } else if at_rest {
-            (vec![(None, 0..condensed.blocks.len())], None, None)
+            Segments::from(vec![(None, 0..condensed.blocks.len())])
         } else {
-            let found = stillness::find(condensed, manifest, finding.still_factor)?;
-            let (mut ranges, detection) = (found.ranges, found.detection);
-            let ends = match manifest.reference {
-                Reference::Gravity => Some(rest::AT_ENDS),
-                Reference::TurntableRate => Some(rest::AT_ENDS_OF_TURNS),
-                Reference::Table => None,
-            };
-            let (cut, blocks) =
-                ends.map_or((0, 0), |ends| rest::walk_in(&mut ranges, condensed, ends));
-            if cut > 0 && by_hand {
-                let in_all_s = blocks as f64 * detection.block_s;
-                warnings.push(Warning::DwellsCut {
-                    count: cut,
-                    cut_s: in_all_s,
-                });
-            }
-            (ranges, Some(detection), found.fault)
+            Segments::still(condensed, manifest, finding, &mut warnings)?
         };
-        let mut list: Vec<Dwell> = ranges
-            .into_iter()
-            .enumerate()
-            .map(|(i, (step, blocks))| {
-                let step = step.unwrap_or(i as i32);
-                let turn = manifest.turn_steps.contains(&step);
-                Dwell {
-                    turn,
-                    ..dwell(condensed, step, blocks, &rails)
-                }
-            })
-            .collect();
+        let mut list = segments.dwells(condensed, manifest, &rails);
         if list.is_empty() {
-            let (problem, remedy) = match given {
-                true => (
-                    "every row is in transit: its number in the column step is empty or -1",
-                    "number the dwells in the column step, or leave the column out to let mimu find the dwells",
-                ),
-                false => (
-                    "the recording is nowhere still",
-                    "hold the unit still for some seconds in every pose, or allow a larger variance",
-                ),
-            };
-            let error = Error::undetermined("dwells", problem, remedy);
-            return Err(match given {
-                true => error.about(Argument::StepsFound),
-                false if condensed.has_steps => error
-                    .map(|e| e.remedy += ", or take the dwells of the step column as given")
-                    .about(Argument::StillFactor)
-                    .about(Argument::StepsGiven),
-                false => error.about(Argument::StillFactor),
-            });
+            return Err(no_dwells(given, condensed.has_steps));
         }
         for (c, longest) in longest_run.iter_mut().enumerate() {
             if is_coarse(&list, condensed.quantisation_step[c], c) {
@@ -268,23 +215,17 @@ impl Dwells {
             Reference::Gravity | Reference::TurntableRate => vec![[false; 2]; list.len()],
         };
         judge(&mut list, condensed, (&longest_run, &rails), judged);
-        for (dwell, too_fast) in list.iter_mut().zip(too_fast) {
-            for (sensor, too_fast) in PerSensor::from(too_fast) {
-                if too_fast && dwell.faults[sensor] == Some(Fault::NotStill) {
-                    dwell.faults[sensor] = Some(Fault::TooFast);
-                }
-            }
-        }
+        name_too_fast(&mut list, &too_fast);
         if !given && by_hand && !at_rest {
             leave_out_turning(&mut list, condensed);
             warnings.extend(mark_slow_turns(&mut list));
         }
-        warnings.extend(fault.map(Warning::LogFault));
+        warnings.extend(segments.fault.map(Warning::LogFault));
         warn(&list, manifest, &mut warnings);
         Ok(Self {
             list,
-            detection,
-            fault,
+            detection: segments.detection,
+            fault: segments.fault,
             rails,
             longest_run,
             left_out: Vec::new(),
@@ -314,6 +255,101 @@ impl Dwells {
     pub fn are_judged_not_still(&self, sensor: Sensor) -> bool {
         let not_still = |d: &Dwell| d.faults[sensor] == Some(Fault::NotStill);
         self.detection.is_none() && self.list.iter().any(not_still)
+    }
+}
+
+/// Whether the `step` column gives the dwells.
+fn are_given(condensed: &Condensed, finding: Finding) -> Result<bool> {
+    match finding.steps {
+        Steps::Given if !condensed.has_steps => {
+            let problem = "the dwells were requested from the column step, and the recording has no such column";
+            let error = Error::new("dwells", problem, "let mimu find the dwells");
+            Err(error.about(Argument::StepsFound))
+        }
+        Steps::Given | Steps::AsRecorded => Ok(condensed.has_steps),
+        Steps::Found | Steps::AtRest => Ok(false),
+    }
+}
+
+/// The blocks of the dwells, and how they were found.
+struct Segments {
+    ranges: Vec<StepBlocks>,
+    detection: Option<Detection>,
+    fault: Option<LogFault>,
+}
+
+impl From<Vec<StepBlocks>> for Segments {
+    fn from(ranges: Vec<StepBlocks>) -> Self {
+        Self {
+            ranges,
+            detection: None,
+            fault: None,
+        }
+    }
+}
+
+impl Segments {
+    /// Those in which all channels are still.
+    fn still(
+        condensed: &Condensed,
+        manifest: &Manifest,
+        finding: Finding,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Self> {
+        let found = stillness::find(condensed, manifest, finding.still_factor)?;
+        let (mut ranges, detection) = (found.ranges, found.detection);
+        let ends = match manifest.reference {
+            Reference::Gravity => Some(rest::AT_ENDS),
+            Reference::TurntableRate => Some(rest::AT_ENDS_OF_TURNS),
+            Reference::Table => None,
+        };
+        let (cut, blocks) = ends.map_or((0, 0), |ends| rest::walk_in(&mut ranges, condensed, ends));
+        if cut > 0 && manifest.reference == Reference::Gravity {
+            warnings.push(Warning::DwellsCut {
+                count: cut,
+                cut_s: blocks as f64 * detection.block_s,
+            });
+        }
+        Ok(Self {
+            ranges,
+            detection: Some(detection),
+            fault: found.fault,
+        })
+    }
+
+    fn dwells(&self, condensed: &Condensed, manifest: &Manifest, rails: &[Rails; 6]) -> Vec<Dwell> {
+        let each = self.ranges.iter().enumerate().map(|(i, (step, blocks))| {
+            let step = step.unwrap_or(i as i32);
+            let turn = manifest.turn_steps.contains(&step);
+            Dwell {
+                turn,
+                ..dwell(condensed, step, blocks.clone(), rails)
+            }
+        });
+        each.collect()
+    }
+}
+
+/// `given` says whether the `step` column was to give the dwells.
+fn no_dwells(given: bool, has_steps: bool) -> Error {
+    let (problem, remedy) = match given {
+        true => (
+            "every row is in transit: its number in the column step is empty or -1",
+            "number the dwells in the column step, or leave the column out to let mimu find the dwells",
+        ),
+        false => (
+            "the recording is nowhere still",
+            "hold the unit still for some seconds in every pose, or allow a larger variance",
+        ),
+    };
+    let error = Error::undetermined("dwells", problem, remedy);
+    match given {
+        true => error.about(Argument::StepsFound),
+        false if has_steps => error
+            .map(|e| e.remedy += ", or take the dwells of the step column as given")
+            .about(Argument::StillFactor)
+            .about(Argument::StepsGiven),
+        false => error.about(Argument::StillFactor),
     }
 }
 
@@ -454,6 +490,17 @@ fn find_moving(list: &mut [Dwell], condensed: &Condensed) -> Vec<[bool; 2]> {
         found.map(|m| m == Motion::TooFast)
     });
     each.collect()
+}
+
+/// Where the input of a dwell moves too fast, that is why it is not still.
+fn name_too_fast(list: &mut [Dwell], too_fast: &[[bool; 2]]) {
+    for (dwell, too_fast) in list.iter_mut().zip(too_fast) {
+        for (sensor, too_fast) in PerSensor::from(*too_fast) {
+            if too_fast && dwell.faults[sensor] == Some(Fault::NotStill) {
+                dwell.faults[sensor] = Some(Fault::TooFast);
+            }
+        }
+    }
 }
 
 /// Variance of the block means of each channel of `sensor` over `dwell`, raw units squared, and the part that the known input leaves

@@ -8,11 +8,11 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::build::{Builder, Part};
 use super::{ForceErrors, Row, RowFigure, Stratum, row_variances, shared_by_several};
 use crate::effects::quantity::Conditions;
-use crate::estimate::chains::Chains;
+use crate::estimate::chains::{Chains, GyroRow};
 use crate::estimate::earth::poses;
 use crate::observable::{Observable, StratumName};
 use crate::observation::magnitude::Magnitude;
-use crate::observation::turn::TurnError;
+use crate::observation::turn::{Rest, Turn, TurnError};
 use crate::observation::{ByTriad, LOWER, about, from_centre, vector};
 use crate::prepared::si_covariance;
 use crate::quantity::Sensor;
@@ -146,75 +146,173 @@ impl Builder<'_> {
         let prepared = self.prepared;
         let body = self.to_body()?;
         let turns = accel.map_or(Vec::new(), |a| prepared.turns(a).0);
+        let turned = |t| self.turn(t, inverse, accel, &body);
+        let errors: Vec<TurnError> = turns.iter().map(turned).collect();
+        let by_hand = ByHand::of(&self, *inverse, accel, turns, errors);
+        let (m, n) = (by_hand.turn_rows(), by_hand.rest.len());
+        let dwells: Vec<usize> = by_hand.rest.iter().map(|o| o.dwell).collect();
+        let conditions: Vec<Range<usize>> = dwells
+            .iter()
+            .map(|d| self.dwell(*d, self.force(*d, accel)))
+            .collect();
+        let found = by_hand.rows();
+        let nuisance = by_hand.nuisance(&found);
+        let mut y: Vec<f64> = found[..m].iter().map(|row| row.residual).collect();
+        let mut strata = Vec::new();
+        if m > 0 {
+            strata.push(by_hand.turn_stratum(forces));
+        }
+        let random_walk = (n > 0).then(|| self.random_walk(&dwells));
+        let wander = prepared.noise.wander(Sensor::Gyro, &prepared.dwells.list);
+        for axis in 0..3 {
+            for (i, dwell) in dwells.iter().enumerate() {
+                self.mean_row(*dwell, &conditions[i], body.row(axis).transpose());
+                y.push(found[m + 3 * i + axis].residual);
+            }
+            strata.push(by_hand.rest_stratum(axis, wander.as_ref(), random_walk.as_ref()));
+        }
+        let figure = match m {
+            0 => (RowFigure::Rest, 3 * n, 1),
+            m => (RowFigure::Direction, m, 2),
+        };
+        // A bias absorbs the constant part of an error of C.
+        let whole = nuisance.columns(0, 12);
+        let change = from_centre(&by_hand.at_rest);
+        let by_matrix = whole * DMatrix::from_fn(12, 9, |i, k| change[(i, k)]);
+        // The direction of Earth rate belongs to the recording, as the biases do.
+        let own = 9..nuisance.ncols();
+        let nuisance = (nuisance, DMatrix::identity(12, own.end), by_matrix);
+        self.finish(y, nuisance, own.collect(), strata, figure)
+    }
+
+    /// Adds the two rows of a turn; returns its error.
+    fn turn(
+        &mut self,
+        turn: &Turn,
+        inverse: &Affine<f64>,
+        accel: Option<&Affine<f64>>,
+        body: &Matrix3<f64>,
+    ) -> TurnError {
+        let conditions = self.increments(turn, inverse, accel);
+        let (error, by) = TurnError::with_increments(turn, inverse);
+        for side in 0..2 {
+            let pieces = by.iter().zip(turn.increments);
+            let weights = pieces
+                .map(|(by, piece)| body.tr_mul(&by[side]) * piece.duration_s)
+                .collect();
+            self.rows.push(Row {
+                conditions: conditions.clone(),
+                weights,
+                dwells: [turn.from, turn.to],
+                moving: false,
+            });
+        }
+        error
+    }
+
+    /// The conditions of a turn, increment by increment.
+    fn increments(
+        &mut self,
+        turn: &Turn,
+        inverse: &Affine<f64>,
+        accel: Option<&Affine<f64>>,
+    ) -> Range<usize> {
+        let blocks = &self.prepared.condensed.blocks;
+        let first = self.conditions.len();
+        for (k, piece) in turn.increments.iter().enumerate() {
+            let t_s = piece.end_s - 0.5 * piece.duration_s;
+            let at = blocks
+                .partition_point(|b| b.last_s < t_s)
+                .min(blocks.len() - 1);
+            let raw = Vector3::from(piece.integral) / piece.duration_s;
+            let rate = inverse.apply(&raw);
+            let reading = Vector3::from_fn(|i, _| blocks[at].raw[3 + i].mean);
+            let force = accel.map_or(Vector3::repeat(f64::NAN), |a| a.apply(&reading));
+            let mut conditions = self.conditions(at, t_s, piece.duration_s, rate, force);
+            conditions.reading.mean = raw;
+            if k > 0 {
+                let before: &Conditions = &self.conditions[first + k - 1];
+                conditions.angular_acceleration =
+                    (rate - before.rate) / (conditions.t_s - before.t_s);
+            }
+            self.conditions.push(conditions);
+            self.block.push(at);
+        }
+        first..self.conditions.len()
+    }
+}
+
+/// What a gyro by hand is judged by: turns, and dwells at rest.
+struct ByHand<'a> {
+    inverse: Affine<f64>,
+    turns: Vec<Turn<'a>>,
+    errors: Vec<TurnError>,
+    rest: Vec<Rest>,
+    /// Mean reading of all dwells at rest, raw.
+    at_rest: Vector3<f64>,
+    chains: Chains,
+    /// The pose of each dwell at rest whose heading is unknown. In one pose a bias absorbs the Earth's rate.
+    poses: Vec<Option<usize>>,
+}
+
+impl<'a> ByHand<'a> {
+    fn of(
+        builder: &Builder<'a>,
+        inverse: Affine<f64>,
+        accel: Option<&Affine<f64>>,
+        turns: Vec<Turn<'a>>,
+        errors: Vec<TurnError>,
+    ) -> Self {
         // Without an accelerometer, as in one pose, the Earth's rate is a part of the bias.
         let nowhere = Affine {
             matrix: Matrix3::zeros(),
             offset: Vector3::zeros(),
         };
-        let rest = prepared.rest(accel.unwrap_or(&nowhere));
-        let ups: Vec<Vector3<f64>> = rest.iter().map(|o| self.force(o.dwell, accel)).collect();
+        let rest = builder.prepared.rest(accel.unwrap_or(&nowhere));
+        let up = |o: &Rest| builder.force(o.dwell, accel);
         let poses = match accel {
-            Some(_) => poses(&ups),
+            Some(_) => poses(&rest.iter().map(up).collect::<Vec<_>>()),
             None => vec![0; rest.len()],
         };
-        let mean_square = inverse.matrix.norm_squared() / 3.0;
-        let mut y = Vec::new();
-        let (mut by_force, mut errors) = (Vec::new(), Vec::new());
-        let blocks = &prepared.condensed.blocks;
-        for turn in &turns {
-            let first = self.conditions.len();
-            for (k, piece) in turn.increments.iter().enumerate() {
-                let t_s = piece.end_s - 0.5 * piece.duration_s;
-                let at = blocks
-                    .partition_point(|b| b.last_s < t_s)
-                    .min(blocks.len() - 1);
-                let raw = Vector3::from(piece.integral) / piece.duration_s;
-                let rate = inverse.apply(&raw);
-                let reading = Vector3::from_fn(|i, _| blocks[at].raw[3 + i].mean);
-                let force = accel.map_or(Vector3::repeat(f64::NAN), |a| a.apply(&reading));
-                let mut conditions = self.conditions(at, t_s, piece.duration_s, rate, force);
-                conditions.reading.mean = raw;
-                if k > 0 {
-                    let before: &Conditions = &self.conditions[first + k - 1];
-                    conditions.angular_acceleration =
-                        (rate - before.rate) / (conditions.t_s - before.t_s);
-                }
-                self.conditions.push(conditions);
-                self.block.push(at);
-            }
-            let conditions = first..self.conditions.len();
-            let (error, by) = TurnError::with_increments(turn, inverse);
-            for side in 0..2 {
-                let pieces = by.iter().zip(turn.increments);
-                let weights = pieces
-                    .map(|(by, piece)| body.tr_mul(&by[side]) * piece.duration_s)
-                    .collect();
-                y.push(error.block.residual[side]);
-                by_force.push((turn, error.by_force[side]));
-                self.rows.push(Row {
-                    conditions: conditions.clone(),
-                    weights,
-                    dwells: [turn.from, turn.to],
-                    moving: false,
-                });
-            }
-            errors.push(error);
-        }
-        let (m, n) = (y.len(), rest.len());
-        let dwells: Vec<usize> = rest.iter().map(|o| o.dwell).collect();
-        let conditions: Vec<Range<usize>> = dwells
-            .iter()
-            .map(|d| self.dwell(*d, self.force(*d, accel)))
-            .collect();
         let chains = Chains::of(&turns, &rest);
-        let found = chains.rows(&turns, &errors, &rest, inverse, &Vector3::zeros());
+        let in_one_pose = poses.iter().all(|p| *p == 0);
+        let of_chains = poses.iter().zip(&chains.of_rest);
+        let poses = of_chains
+            .map(|(pose, chain)| (!in_one_pose && chain.is_none()).then_some(*pose))
+            .collect();
+        Self {
+            inverse,
+            turns,
+            errors,
+            at_rest: mean(rest.iter().map(|o| &o.raw)),
+            rest,
+            chains,
+            poses,
+        }
+    }
+
+    fn turn_rows(&self) -> usize {
+        2 * self.turns.len()
+    }
+
+    fn rows(&self) -> Vec<GyroRow> {
+        self.chains.rows(
+            &self.turns,
+            &self.errors,
+            &self.rest,
+            &self.inverse,
+            &Vector3::zeros(),
+        )
+    }
+
+    /// Derivatives of the rows `found` by the gyro and the level rates of the chains. Here the rests are by axes.
+    fn nuisance(&self, found: &[GyroRow]) -> DMatrix<f64> {
         // The mean reading of all dwells at rest instead of each dwell's own, whose noise is in the row too. With the latter, a matrix
         // of zeros would explain that noise wholly, and `rate_x` with coefficient -1 would correct the turns for it.
-        let at_rest = mean(rest.iter().map(|o| &o.raw));
-        let by_rest = vector::at(inverse, &at_rest, &Vector3::zeros());
-        let mut nuisance = DMatrix::zeros(m + 3 * n, 12 + 2 * chains.count);
+        let by_rest = vector::at(&self.inverse, &self.at_rest, &Vector3::zeros());
+        let (m, n) = (self.turn_rows(), self.rest.len());
+        let mut nuisance = DMatrix::zeros(m + 3 * n, 12 + 2 * self.chains.count);
         for (k, row) in found.iter().enumerate() {
-            // Rests by axes.
             let (to, by) = match k.checked_sub(m) {
                 None => (k, row.by),
                 Some(k) => (m + k % 3 * n + k / 3, by_rest.by(k % 3)),
@@ -226,86 +324,86 @@ impl Builder<'_> {
                 nuisance[(to, 12 + place)] = by;
             }
         }
-        let random_walk = (n > 0).then(|| self.random_walk(&dwells));
-        let wander = prepared.noise.wander(Sensor::Gyro, &prepared.dwells.list);
-        let turn_variances: Vec<f64> = turns
-            .iter()
-            .zip(&chains.of_turn)
-            .flat_map(|(t, chain)| {
-                let earth = if chain.is_some() {
-                    0.0
-                } else {
-                    t.earth_variance
-                };
-                [t.variance(mean_square) + earth; 2]
-            })
+        nuisance
+    }
+
+    /// `forces` are the errors of those that judge the turns.
+    fn turn_stratum(&self, forces: Option<&ForceErrors>) -> Stratum {
+        let pairs = self.turns.iter().zip(&self.errors);
+        let by_force: Vec<_> = pairs
+            .flat_map(|(turn, error)| error.by_force.map(|by| (turn, by)))
             .collect();
-        // The pose of a dwell whose heading is unknown. In one pose a bias absorbs the Earth's rate.
-        let in_one_pose = poses.iter().all(|p| *p == 0);
-        let of_pose = |i: usize| (!in_one_pose && chains.of_rest[i].is_none()).then_some(poses[i]);
-        let mut strata = Vec::new();
-        if m > 0 {
-            let by_reference = forces.map(|f| f.of_turns(&by_force));
-            strata.push(Stratum {
-                name: StratumName(Observable::Turns, None),
-                axis: None,
-                session: 0,
-                rows: 0..m,
-                known: DMatrix::from_diagonal(&DVector::from_vec(turn_variances)),
-                by_reference: by_reference.as_ref().map(row_variances),
-                by_earth: None,
-                open: by_reference,
-                random_walk: None,
-                wander_known: true,
-                within: false,
-            });
+        let by_reference = forces.map(|f| f.of_turns(&by_force));
+        Stratum {
+            name: StratumName(Observable::Turns, None),
+            axis: None,
+            session: 0,
+            rows: 0..self.turn_rows(),
+            known: DMatrix::from_diagonal(&DVector::from_vec(self.turn_variances())),
+            by_reference: by_reference.as_ref().map(row_variances),
+            by_earth: None,
+            open: by_reference,
+            random_walk: None,
+            wander_known: true,
+            within: false,
         }
-        for axis in 0..3 {
-            for (i, o) in rest.iter().enumerate() {
-                self.mean_row(o.dwell, &conditions[i], body.row(axis).transpose());
-                y.push(found[m + 3 * i + axis].residual);
-            }
-            let c = inverse.matrix.row(axis);
-            let noise = |i: usize, j: usize| match (i == j, &wander) {
-                (true, _) => si_covariance(&inverse.matrix, &rest[i].variance)[(axis, axis)],
-                (_, Some(w)) => (0..3)
-                    .map(|k| c[k] * c[k] * w[k][(dwells[i], dwells[j])])
-                    .sum(),
-                _ => 0.0,
+    }
+
+    fn turn_variances(&self) -> Vec<f64> {
+        let mean_square = self.inverse.matrix.norm_squared() / 3.0;
+        let chains = self.turns.iter().zip(&self.chains.of_turn);
+        let each = chains.flat_map(|(t, chain)| {
+            let earth = if chain.is_some() {
+                0.0
+            } else {
+                t.earth_variance
             };
-            let mut known = DMatrix::from_fn(n, n, noise);
-            // Dwells in one pose share the Earth's level rate if their heading is the same.
-            let of_earth = DMatrix::from_fn(n, n, |i, pose| match of_pose(i) == Some(pose) {
-                true => rest[pose].rate_variance[axis].sqrt(),
-                false => 0.0,
-            });
-            let mut alone = DVector::zeros(n);
-            let open = shared_by_several(&of_earth, &mut alone);
-            known += DMatrix::from_diagonal(&alone);
-            strata.push(Stratum {
-                name: StratumName(Observable::AtRest(axis), None),
-                axis: Some(axis),
-                session: 0,
-                rows: m + axis * n..m + (axis + 1) * n,
-                known,
-                by_reference: None,
-                by_earth: None,
-                open,
-                random_walk: random_walk.clone(),
-                wander_known: wander.is_some(),
-                within: false,
-            });
+            [t.variance(mean_square) + earth; 2]
+        });
+        each.collect()
+    }
+
+    /// With the wander of the biases, if that is known.
+    fn rest_stratum(
+        &self,
+        axis: usize,
+        wander: Option<&[DMatrix<f64>; 3]>,
+        random_walk: Option<&DMatrix<f64>>,
+    ) -> Stratum {
+        let (m, n) = (self.turn_rows(), self.rest.len());
+        let mut known = self.noise_at_rest(axis, wander);
+        // Dwells in one pose share the Earth's level rate if their heading is the same.
+        let of_earth = DMatrix::from_fn(n, n, |i, pose| match self.poses[i] == Some(pose) {
+            true => self.rest[pose].rate_variance[axis].sqrt(),
+            false => 0.0,
+        });
+        let mut alone = DVector::zeros(n);
+        let open = shared_by_several(&of_earth, &mut alone);
+        known += DMatrix::from_diagonal(&alone);
+        Stratum {
+            name: StratumName(Observable::AtRest(axis), None),
+            axis: Some(axis),
+            session: 0,
+            rows: m + axis * n..m + (axis + 1) * n,
+            known,
+            by_reference: None,
+            by_earth: None,
+            open,
+            random_walk: random_walk.cloned(),
+            wander_known: wander.is_some(),
+            within: false,
         }
-        let figure = match m {
-            0 => (RowFigure::Rest, 3 * n, 1),
-            m => (RowFigure::Direction, m, 2),
+    }
+
+    fn noise_at_rest(&self, axis: usize, wander: Option<&[DMatrix<f64>; 3]>) -> DMatrix<f64> {
+        let (c, rest) = (self.inverse.matrix.row(axis), &self.rest);
+        let noise = |i: usize, j: usize| match (i == j, wander) {
+            (true, _) => si_covariance(&self.inverse.matrix, &rest[i].variance)[(axis, axis)],
+            (_, Some(w)) => (0..3)
+                .map(|k| c[k] * c[k] * w[k][(rest[i].dwell, rest[j].dwell)])
+                .sum(),
+            _ => 0.0,
         };
-        // A bias absorbs the constant part of an error of C.
-        let whole = nuisance.columns(0, 12);
-        let by_matrix = whole * DMatrix::from_fn(12, 9, |i, k| from_centre(&at_rest)[(i, k)]);
-        // The direction of Earth rate belongs to the recording, as the biases do.
-        let own = 9..nuisance.ncols();
-        let nuisance = (nuisance, DMatrix::identity(12, own.end), by_matrix);
-        self.finish(y, nuisance, own.collect(), strata, figure)
+        DMatrix::from_fn(rest.len(), rest.len(), noise)
     }
 }

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::build::{Part, common_step};
 use super::{Row, Rows};
 use crate::diagnose::columns::unit_columns;
+use crate::effects::quantity::Conditions;
 use crate::effects::temperature::without_self_heating;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
@@ -41,6 +42,110 @@ fn places(parts: &[(usize, Part)]) -> (Vec<Vec<usize>>, usize) {
     (all, count)
 }
 
+/// Part and stratum, in the order in which the strata are joined: those among the `judged` rows of their parts come first. A stratum is judged as a
+/// whole or not at all.
+fn order(parts: &[(usize, Part)], judged: &[usize]) -> Vec<(usize, usize)> {
+    let mut order: Vec<(usize, usize)> = Vec::new();
+    for first in [true, false] {
+        for (p, (_, part)) in parts.iter().enumerate() {
+            let ours = |s: &usize| (part.strata[*s].rows.end <= judged[p]) == first;
+            order.extend((0..part.strata.len()).filter(ours).map(|s| (p, s)));
+        }
+    }
+    order
+}
+
+/// Conditions, dwells and temperatures of all recordings, one after another, as in [`Rows`].
+struct Joined {
+    conditions: Vec<Conditions>,
+    block: Vec<(usize, usize)>,
+    temperature: Vec<Vec<(f64, f64)>>,
+    first: Vec<usize>,
+    /// Index of the first condition of each part.
+    first_condition: Vec<usize>,
+}
+
+impl Joined {
+    fn of(parts: &[(usize, Part)], sessions: usize) -> Self {
+        let mut all = Self {
+            conditions: Vec::new(),
+            block: Vec::new(),
+            temperature: vec![Vec::new(); sessions],
+            first: vec![0],
+            first_condition: Vec::new(),
+        };
+        for session in 0..sessions {
+            let dwells = match parts.iter().find(|p| p.0 == session) {
+                Some((_, part)) => {
+                    all.add(session, part);
+                    let last = part.rows.iter().flat_map(|r| r.dwells).max();
+                    1 + last.unwrap_or(0)
+                }
+                None => 0,
+            };
+            all.first.push(all.first[session] + dwells);
+        }
+        all
+    }
+
+    fn add(&mut self, session: usize, part: &Part) {
+        self.first_condition.push(self.conditions.len());
+        let conditions = part.conditions.iter();
+        self.conditions
+            .extend(conditions.map(|m| Conditions { session, ..*m }));
+        self.block.extend(part.block.iter().map(|b| (session, *b)));
+        self.temperature[session].clone_from(&part.temperature_offset);
+    }
+
+    /// A row of part `p`, which is of recording `session`.
+    fn row(&self, row: &Row, p: usize, session: usize) -> Row {
+        let offset = self.first_condition[p];
+        Row {
+            conditions: row.conditions.start + offset..row.conditions.end + offset,
+            weights: row.weights.clone(),
+            dwells: row.dwells.map(|d| d + self.first[session]),
+            moving: row.moving,
+        }
+    }
+}
+
+/// Residuals and derivatives of all rows.
+struct Linear {
+    y: DVector<f64>,
+    nuisance: DMatrix<f64>,
+    by_matrix: DMatrix<f64>,
+}
+
+impl Linear {
+    fn zeros(rows: usize, columns: usize) -> Self {
+        Self {
+            y: DVector::zeros(rows),
+            nuisance: DMatrix::zeros(rows, columns),
+            by_matrix: DMatrix::zeros(rows, 9),
+        }
+    }
+
+    /// Sets row `to` to row `from` of `part`, whose nuisance columns have these `places`.
+    fn set(&mut self, to: usize, part: &Part, from: usize, places: &[usize]) {
+        self.y[to] = part.y[from];
+        for (k, place) in places.iter().enumerate() {
+            self.nuisance[(to, *place)] = part.nuisance[(from, k)];
+        }
+        self.by_matrix.set_row(to, &part.by_matrix.row(from));
+    }
+
+    /// The parameters of the part whose nuisance columns have these `places`, for columns of length 1.
+    fn parameters_of_unit_columns(&self, part: &Part, places: &[usize]) -> DMatrix<f64> {
+        let mut parameters = part.parameters.clone();
+        for (column, place) in part.parameters.column_iter().zip(places) {
+            let size = self.nuisance.column(*place).norm();
+            let size = if size > 0.0 { size } else { 1.0 };
+            parameters.set_column(*place, &(column / size));
+        }
+        parameters
+    }
+}
+
 /// One problem of `parts`, each with the index of its recording, out of `sessions` recordings. `None` if the first recording
 /// is missing.
 pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -> Option<Rows> {
@@ -48,71 +153,25 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         return None;
     };
     let (figure, together) = (head.figure, head.judged.1);
-    let (places, columns) = places(&parts);
-    // The judged rows come first. A stratum is judged as a whole or not at all.
-    let judged_rows = |part: &Part| match part.figure == figure {
+    let judged_rows = |(_, part): &(usize, Part)| match part.figure == figure {
         true => part.judged.0,
         false => 0,
     };
-    let mut order: Vec<(usize, usize)> = Vec::new();
-    for judged in [true, false] {
-        for (p, (_, part)) in parts.iter().enumerate() {
-            let ours = |s: &usize| (part.strata[*s].rows.end <= judged_rows(part)) == judged;
-            order.extend((0..part.strata.len()).filter(ours).map(|s| (p, s)));
-        }
-    }
-    let total: usize = parts.iter().map(|p| p.1.y.len()).sum();
-    let judged = parts.iter().map(|p| judged_rows(&p.1)).sum();
-
+    let judged: Vec<usize> = parts.iter().map(judged_rows).collect();
     let steps: Vec<Option<f64>> = parts.iter().map(|p| p.1.step).collect();
-    let step = common_step(&steps);
-    let mut first = vec![0];
-    let mut conditions = Vec::new();
-    let mut block = Vec::new();
-    let mut temperature = vec![Vec::new(); sessions];
-    let mut first_condition = Vec::new();
-    for session in 0..sessions {
-        let dwells = match parts.iter().find(|p| p.0 == session) {
-            Some((_, part)) => {
-                first_condition.push(conditions.len());
-                conditions.extend(part.conditions.iter().map(|m| {
-                    let mut conditions = *m;
-                    conditions.session = session;
-                    conditions
-                }));
-                block.extend(part.block.iter().map(|b| (session, *b)));
-                temperature[session].clone_from(&part.temperature_offset);
-                let last = part.rows.iter().flat_map(|r| r.dwells).max();
-                1 + last.unwrap_or(0)
-            }
-            None => 0,
-        };
-        first.push(first[session] + dwells);
-    }
-
-    let mut y = DVector::zeros(total);
-    let mut nuisance = DMatrix::zeros(total, columns);
-    let mut by_matrix = DMatrix::zeros(total, 9);
+    let joined = Joined::of(&parts, sessions);
+    let (places, columns) = places(&parts);
+    let total: usize = parts.iter().map(|p| p.1.y.len()).sum();
+    let mut linear = Linear::zeros(total, columns);
     let mut strata = Vec::new();
     let mut rows = Vec::with_capacity(total);
-    for (p, s) in order {
+    for (p, s) in order(&parts, &judged) {
         let (session, part) = &parts[p];
         let from = rows.len();
         let mut stratum = part.strata[s].clone();
         for r in stratum.rows.clone() {
-            y[rows.len()] = part.y[r];
-            for (k, place) in places[p].iter().enumerate() {
-                nuisance[(rows.len(), *place)] = part.nuisance[(r, k)];
-            }
-            by_matrix.set_row(rows.len(), &part.by_matrix.row(r));
-            let row = &part.rows[r];
-            let offset = first_condition[p];
-            rows.push(Row {
-                conditions: row.conditions.start + offset..row.conditions.end + offset,
-                weights: row.weights.clone(),
-                dwells: row.dwells.map(|d| d + first[*session]),
-                moving: row.moving,
-            });
+            linear.set(rows.len(), part, r, &places[p]);
+            rows.push(joined.row(&part.rows[r], p, *session));
         }
         stratum.rows = from..rows.len();
         stratum.session = *session;
@@ -121,33 +180,28 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         }
         strata.push(stratum);
     }
-    // The columns of the first recording come first.
-    let mut parameters = head.parameters.clone();
-    for (column, place) in head.parameters.column_iter().zip(&places[0]) {
-        let size = nuisance.column(*place).norm();
-        let size = if size > 0.0 { size } else { 1.0 };
-        parameters.set_column(*place, &(column / size));
-    }
+    let temperature = joined.temperature;
     Some(Rows {
         sensor,
-        y,
-        parameters,
-        by_matrix,
-        nuisance: unit_columns(&nuisance),
+        // The columns of the first recording come first.
+        parameters: linear.parameters_of_unit_columns(head, &places[0]),
+        nuisance: unit_columns(&linear.nuisance),
+        y: linear.y,
+        by_matrix: linear.by_matrix,
         strata,
         earth_unknown: parts.iter().all(|p| p.1.earth_unknown),
         figure,
-        judged: (judged, together),
-        step,
+        judged: (judged.iter().sum(), together),
+        step: common_step(&steps),
         rows,
-        conditions,
-        block,
+        conditions: joined.conditions,
+        block: joined.block,
         without_self_heating: temperature
             .iter()
             .map(|w| without_self_heating(w))
             .collect(),
         temperature,
-        first,
+        first: joined.first,
         quantities: std::sync::OnceLock::new(),
     })
 }
