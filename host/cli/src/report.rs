@@ -17,6 +17,7 @@ mod import;
 mod page;
 mod refusal;
 mod svg;
+mod table;
 pub(crate) mod text;
 mod thermal;
 mod thermal_page;

@@ -14,6 +14,7 @@ use mimu::warning::Warning;
 use mimu_recording::Reference;
 
 use crate::hint;
+use crate::report::table::{Cell, Table};
 use crate::report::text::{counted, kinds, problems, warn, warn_within};
 
 /// Result of `mimu fit`: a summary, or with `verbose` everything.
@@ -39,7 +40,7 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
         }
     } else {
         let _ = writeln!(out, "judgement: {}\n", fit.judgement);
-        errors_text(&mut out, fit);
+        out += &errors(fit).text("");
         for (name, sensor) in fit.sensors.present() {
             let _ = writeln!(out);
             let head = format!("{name}, ± of 95 %");
@@ -96,51 +97,36 @@ fn next(fit: &FitResult) -> String {
     }
 }
 
-/// Errors of both sensors in one table.
-fn errors_text(out: &mut String, fit: &FitResult) {
-    let came = fit
-        .sensors
-        .present()
-        .any(|(_, s)| s.uncalibrated_rms.is_some());
-    let last = if came { "  uncalibrated" } else { "" };
-    let _ = writeln!(
-        out,
-        "{:<18}{:>11}{:>11}{:>11}{last}",
-        "rms error", "held out", "in sample", "noise"
-    );
-    for (name, s) in fit.sensors.present() {
+/// Errors of both sensors.
+pub(super) fn errors(fit: &FitResult) -> Table {
+    let all = || fit.sensors.present();
+    let came = all().any(|(_, s)| s.uncalibrated_rms.is_some());
+    let mut table = Table::new(
+        "Root mean square error; held out: on dwells that the fit has not used; noise: what noise alone would cause",
+        "rms error",
+    )
+    .numbers(["held out", "in sample", "noise"])
+    .numbers(came.then_some("uncalibrated"))
+    .words("")
+    .on_page("error of");
+    for (name, s) in all() {
         let unit = readable::error(s.unit);
-        let shown = |value: Option<f64>| match value.filter(|v| v.is_finite()) {
-            Some(value) => significant(value * unit.factor),
-            None => "-".into(),
-        };
-        let last = match (came, s.uncalibrated_rms) {
-            (true, came) => shown(came),
-            (false, _) => String::new(),
-        };
-        let width = if came { 14 } else { 0 };
-        let _ = writeln!(
-            out,
-            "{:<18}{:>11}{:>11}{:>11}{last:>width$}  {}",
-            format!("{name}, {}", unit.unit),
-            shown(s.held_out_rms),
-            shown(Some(s.rms)),
-            shown(Some(s.noise_floor)),
-            used(s)
-        );
+        let known = |value: Option<f64>| Cell::known(value, unit.factor);
+        let uncalibrated = came.then(|| known(s.uncalibrated_rms));
+        let figures = [s.held_out_rms, Some(s.rms), Some(s.noise_floor)].map(known);
+        let row = std::iter::once(format!("{name}, {}", unit.unit).into());
+        let words = [used(s).into(), s.figure.description().into()];
+        table.row(row.chain(figures).chain(uncalibrated).chain(words));
         if let Some(rms) = s.static_rms {
             let unit = readable::error("rad/s");
-            let held = s.static_held_out_rms.flatten();
-            let shown = |v: Option<f64>| v.map_or("-".into(), |v| significant(v * unit.factor));
-            let _ = writeln!(
-                out,
-                "{:<18}{:>11}{:>11}",
-                format!("  at rest, {}", unit.unit),
-                shown(held),
-                shown(Some(rms))
-            );
+            table.row([
+                format!("  at rest, {}", unit.unit).into(),
+                Cell::known(s.static_held_out_rms.flatten(), unit.factor),
+                Cell::number(rms, unit.factor),
+            ]);
         }
     }
+    table
 }
 
 /// Kind and number of the errors.

@@ -6,15 +6,14 @@ use maud::{Markup, PreEscaped, html};
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::Verification;
 use mimu::fit::Fit;
-use mimu::readable;
 use mimu::result::allan::AllanResult;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::result::fit::FitResult;
 use mimu_recording::error::Result;
 use mimu_thermal::result::ThermalResult;
 
-use super::page::{Made, STYLE, number, spoken};
-use super::{allan_plot, diagnosis, thermal_page, unit};
+use super::page::{Made, STYLE};
+use super::{allan_plot, diagnosis, fit, thermal_page, unit, verify};
 use crate::hint;
 use crate::output::now;
 
@@ -23,24 +22,7 @@ pub fn of_fit(fit: &Fit, result: &FitResult, calibration: &Calibration) -> Strin
     let prepared = &fit.prepared;
     fragment(&html! {
         h1 { "Calibration of " (result.device) }
-        div class="scroll" { table {
-            caption { "Root mean square error; held out: on dwells that the fit has not used" }
-            thead { tr {
-                th { "sensor" } th class="n" { "held out" } th class="n" { "in sample" } th class="n" { "noise alone" }
-                th class="n" { "dwells" } th { "error of" }
-            } }
-            tbody {
-                @for (sensor, s) in result.sensors.present() {
-                    @let unit = readable::error(s.unit);
-                    @let cell = |v: f64| html! { td class="n" { (number(v, unit.factor, &unit.unit)) } };
-                    tr {
-                        td { (spoken(sensor)) }
-                        (cell(s.held_out_rms.unwrap_or(f64::NAN))) (cell(s.rms)) (cell(s.noise_floor))
-                        td class="n" { (s.dwells) } td { (s.figure.description()) }
-                    }
-                }
-            }
-        } }
+        (fit::errors(result).html())
         (unit::model::section(calibration))
         (unit::poses::figure(prepared, calibration, None))
         (unit::trace::figure(prepared))
@@ -86,7 +68,7 @@ pub fn of_text(text: &str) -> String {
 pub fn of_verification(name: &str, verification: &Verification) -> String {
     let one = [(name.to_owned(), verification.clone())];
     fragment(&html! {
-        (unit::model::verified(&one))
+        (verify::errors(&one, true).html())
         @if !verification.warnings.is_empty() {
             ul { @for warning in &verification.warnings { li { (warning.to_string()) } } }
         }

@@ -10,6 +10,7 @@ use mimu_thermal::fit::FitVerdict;
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
 use crate::hint;
+use crate::report::table::{Cell, Table};
 use crate::report::text::{warn, warn_within, wrap};
 
 /// Number of temperatures at which curves are shown.
@@ -54,7 +55,10 @@ fn summary(result: &ThermalResult) -> String {
         let _ = writeln!(out, "verdict: {}: {meaning}", result.verdict.name());
     }
     let _ = writeln!(out, "judgement: {}\n", result.judgement);
-    errors_text(&mut out, result);
+    out += &errors(result).text("");
+    for why in without_lag(result) {
+        wrap(&mut out, "lag: ", why);
+    }
     for (name, sensor) in result.sensors.present() {
         if let Some(what) = sensor.inseparable {
             wrap(&mut out, &format!("{name}, inseparable: "), what);
@@ -70,26 +74,25 @@ fn summary(result: &ThermalResult) -> String {
     out
 }
 
-/// Errors and lags of both sensors in one table.
-fn errors_text(out: &mut String, result: &ThermalResult) {
+/// Errors and lags of both sensors.
+pub(super) fn errors(result: &ThermalResult) -> Table {
     // Held out of a verification recording, because the biases change with every power-on.
+    let without_bias = |s: &SensorResult| s.held_out_rms_without_session_bias;
     let verified = result
         .sensors
         .present()
-        .any(|(_, s)| s.held_out_rms_without_session_bias.is_some());
-    let (head, width) = match verified {
-        true => ("minus its bias", 15),
-        false => ("", 0),
-    };
-    let _ = writeln!(
-        out,
-        "{:<18}{:>11}{head:>width$}{:>11}{:>11}   lag of the dies, s",
-        "rms error", "held out", "in sample", "noise"
-    );
-    let mut reasons: Vec<&str> = Vec::new();
+        .any(|(_, s)| without_bias(s).is_some());
+    let mut table = Table::new(
+        "Root mean square error of the dwells (of segments of 30 s if only biases are estimated), and the lag of the dies behind the thermometer with its 95 % interval",
+        "rms error",
+    )
+    .numbers(["held out"])
+    .numbers(verified.then_some("minus its bias"))
+    .numbers(["in sample", "noise"])
+    .words("lag of the dies, s");
     for (name, s) in result.sensors.present() {
         let unit = readable::error(&s.unit);
-        let shown = |v: Option<f64>| v.map_or("-".into(), |v| significant(v * unit.factor));
+        let known = |v: Option<f64>| Cell::known(v, unit.factor);
         let lag = match &s.lag_s {
             Some(lag) => {
                 let [value, lower, upper] = [lag.value, lag.lower, lag.upper].map(significant);
@@ -97,24 +100,25 @@ fn errors_text(out: &mut String, result: &ThermalResult) {
             }
             None => "-".into(),
         };
-        let without = match verified {
-            true => shown(s.held_out_rms_without_session_bias),
-            false => String::new(),
-        };
-        let _ = writeln!(
-            out,
-            "{:<18}{:>11}{without:>width$}{:>11}{:>11}   {lag}",
-            format!("{name}, {}", unit.unit),
-            shown(s.held_out_rms),
-            shown(s.rms),
-            shown(s.noise_floor),
-        );
+        let first = [
+            format!("{name}, {}", unit.unit).into(),
+            known(s.held_out_rms),
+        ];
+        let without = verified.then(|| known(without_bias(s)));
+        let last = [known(s.rms), known(s.noise_floor), lag.into()];
+        table.row(first.into_iter().chain(without).chain(last));
+    }
+    table
+}
+
+/// Why lags are not known, each reason once.
+pub(super) fn without_lag(result: &ThermalResult) -> Vec<&str> {
+    let mut reasons: Vec<&str> = Vec::new();
+    for (_, s) in result.sensors.present() {
         let why = s.lag_reason.as_deref().filter(|_| s.lag_s.is_none());
         reasons.extend(why.filter(|why| !reasons.contains(why)));
     }
-    for why in reasons {
-        wrap(out, "lag: ", why);
-    }
+    reasons
 }
 
 fn everything(result: &ThermalResult) -> String {
@@ -169,7 +173,9 @@ fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult) {
         }
         let _ = writeln!(out, ", noise alone {}", unit.write(floor));
     }
-    bins_text(out, sensor);
+    if !sensor.bins.is_empty() {
+        *out += &bins(sensor).text("  ");
+    }
     for h in sensor.hysteresis.iter().flatten() {
         let [mean, largest] = [(h.value, h.half_width), (h.largest, h.largest_half_width)]
             .map(|(value, half)| plus_minus(value * unit.factor, half * unit.factor));
@@ -190,30 +196,25 @@ fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult) {
     }
 }
 
-fn bins_text(out: &mut String, sensor: &SensorResult) {
-    let bins = &sensor.bins;
-    if bins.is_empty() {
-        return;
-    }
+/// Errors by temperature of the die.
+pub(super) fn bins(sensor: &SensorResult) -> Table {
     let unit = readable::error(&sensor.unit);
-    let head = format!("error, {}", unit.unit);
-    let _ = writeln!(
-        out,
-        "  {head:<16}{:>10}{:>10}{:>10}{:>8}",
-        "heating", "cooling", "noise", sensor.judged_by
-    );
-    let shown = |v: Option<f64>| v.map_or("-".into(), |v| significant(v * unit.factor));
-    for b in bins {
-        let range = format!("{:.0} to {:.0} °C", b.from_c, b.to_c);
-        let _ = writeln!(
-            out,
-            "  {range:<16}{:>10}{:>10}{:>10}{:>8}",
-            shown(b.heating),
-            shown(b.cooling),
-            shown(Some(b.noise_floor)),
-            b.dwells
-        );
+    let mut table = Table::new(
+        "Error by temperature of the die, rms; noise: what noise alone would cause",
+        format!("error, {}", unit.unit),
+    )
+    .numbers(["heating", "cooling", "noise", sensor.judged_by]);
+    for b in &sensor.bins {
+        let known = |v: Option<f64>| Cell::known(v, unit.factor);
+        table.row([
+            format!("{:.0} to {:.0} °C", b.from_c, b.to_c).into(),
+            known(b.heating),
+            known(b.cooling),
+            known(Some(b.noise_floor)),
+            Cell::Count(b.dwells as u64),
+        ]);
     }
+    table
 }
 
 /// Whether a curve is a physical parameter of `sensor`; elements of C and o are not.
@@ -221,49 +222,55 @@ pub(super) fn physical(curve: &CurveResult, sensor: Sensor) -> bool {
     curve.sensor == sensor && curve.of.0 != ParameterKind::Inverse
 }
 
-/// Physical parameters at some temperatures. Unless `verbose`, only scale factors and biases at three. JSON contains more temperatures and the
-/// inverse model.
+/// Physical parameters of a sensor at some temperatures. Unless `verbose`, only scale factors and biases at three. JSON contains more temperatures
+/// and the inverse model.
 fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult, verbose: bool) {
-    let main = |c: &&CurveResult| {
-        verbose
-            || matches!(
-                c.of.0,
-                ParameterKind::Scale | ParameterKind::Bias | ParameterKind::BiasAndGravity
-            )
-    };
-    let all = result.curves.iter().filter(|c| physical(c, name));
-    let curves: Vec<&CurveResult> = all.filter(main).collect();
-    let Some(first) = curves.first() else {
-        return;
-    };
-    let last = first.temp_c.len() - 1;
     let count = if verbose { SHOWN } else { ACROSS };
-    let shown: Vec<usize> = (0..count).map(|k| k * last / (count - 1)).collect();
-    for shown in shown.chunks(ACROSS) {
-        let head = match verbose {
-            true => "  95 % intervals at".into(),
-            false => format!("{name}, ± of 95 %"),
-        };
-        let _ = write!(out, "{head:<34}");
-        for &k in shown {
-            let _ = write!(out, "{:>22}", format!("{:.1} °C", first.temp_c[k]));
-        }
-        let _ = writeln!(out);
-        for curve in &curves {
-            let unit = readable::parameter(&curve.unit);
-            let label = curve.of;
-            let _ = write!(out, "  {:<32}", format!("{label}, {}", unit.unit));
-            for &k in shown {
-                let half = 0.5 * (curve.upper[k] - curve.lower[k]) * unit.factor;
-                let _ = write!(
-                    out,
-                    "{:>22}",
-                    plus_minus(curve.value[k] * unit.factor, half)
-                );
-            }
-            let _ = writeln!(out);
+    for from in (0..count).step_by(ACROSS) {
+        let shown = from..count.min(from + ACROSS);
+        if let Some(table) = curves(name, result, (shown, count), verbose) {
+            *out += &table.text(if verbose { "  " } else { "" });
         }
     }
+}
+
+/// Parameters of a sensor with their intervals, at those of `count` temperatures that are `shown`. `all`: not only scale factors and biases.
+pub(super) fn curves(
+    name: Sensor,
+    result: &ThermalResult,
+    (shown, count): (std::ops::Range<usize>, usize),
+    all: bool,
+) -> Option<Table> {
+    let main = |c: &&CurveResult| {
+        let kind = c.of.0;
+        let of_axis = [
+            ParameterKind::Scale,
+            ParameterKind::Bias,
+            ParameterKind::BiasAndGravity,
+        ];
+        all || of_axis.contains(&kind)
+    };
+    let own = result.curves.iter().filter(|c| physical(c, name));
+    let curves: Vec<&CurveResult> = own.filter(main).collect();
+    let temp_c = &curves.first()?.temp_c;
+    let at = shown.map(|k| k * (temp_c.len() - 1) / (count - 1));
+    let at: Vec<usize> = at.collect();
+    let mut table = Table::new(
+        "Parameters with 95 % intervals, by temperature of the die",
+        format!("{name}, ± of 95 %"),
+    )
+    .numbers(at.iter().map(|k| format!("{:.1} °C", temp_c[*k])));
+    for curve in curves {
+        let unit = readable::parameter(&curve.unit);
+        let first = Cell::from(format!("  {}, {}", curve.of, unit.unit));
+        let cells = at.iter().map(|&k| Cell::Interval {
+            si: curve.value[k],
+            half: 0.5 * (curve.upper[k] - curve.lower[k]),
+            factor: unit.factor,
+        });
+        table.row(std::iter::once(first).chain(cells));
+    }
+    Some(table)
 }
 
 /// Rows of a comparison. A summary contains scale factors, biases, and the elements of C and o that differ most in sigmas.

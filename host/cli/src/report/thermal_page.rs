@@ -1,16 +1,16 @@
 //! A fit over temperature as a page.
 
 use maud::{Markup, html};
-use mimu::quantity::{Sensor, plus_minus};
+use mimu::quantity::plus_minus;
 use mimu::readable;
 use mimu_thermal::fit::FitVerdict;
-use mimu_thermal::judge::{Bin, Hysteresis};
-use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
+use mimu_thermal::judge::Hysteresis;
+use mimu_thermal::result::{SensorResult, ThermalResult};
 
 use crate::hint;
 
 use super::page::{Made, number, page, spoken, written};
-use super::thermal::{SHOWN, VERDICT_MISFIT, VERDICT_ONE_WAY, physical};
+use super::thermal::{SHOWN, VERDICT_MISFIT, VERDICT_ONE_WAY, bins, curves, errors, without_lag};
 use super::thermal_plot;
 
 /// The page of a fit.
@@ -25,7 +25,8 @@ pub(super) fn body(result: &ThermalResult, made: &Made) -> Markup {
     html! {
         (head(result, made))
         h2 { "Errors and lag" }
-        (errors(result))
+        (errors(result).html())
+        @for why in without_lag(result) { p { "Lag: " (why) "." } }
         @for (name, sensor) in result.sensors.present() {
             @if let Some(used) = &sensor.used { p { (spoken(name)) " uses " (used.words()) "." } }
             @if let Some(what) = sensor.inseparable { p { (spoken(name)) ", inseparable: " (what) "." } }
@@ -39,9 +40,9 @@ pub(super) fn body(result: &ThermalResult, made: &Made) -> Markup {
         }
         @for (name, sensor) in result.sensors.present() {
             h2 class="sensor" { (spoken(name)) }
-            @if !sensor.bins.is_empty() { (bins(sensor)) }
+            @if !sensor.bins.is_empty() { (bins(sensor).html()) }
             @if let Some(all) = &sensor.hysteresis { (hysteresis(sensor, all)) }
-            (curves(result, name))
+            @if let Some(table) = curves(name, result, (0..SHOWN, SHOWN), true) { (table.html()) }
         }
         @if !result.warnings.is_empty() {
             h2 { "To know" }
@@ -74,51 +75,6 @@ fn head(result: &ThermalResult, made: &Made) -> Markup {
     }
 }
 
-fn errors(result: &ThermalResult) -> Markup {
-    html! {
-        div class="scroll" { table {
-            caption { "Root mean square error of the dwells (of segments of 30 s if only biases are estimated), and the lag of the dies behind the thermometer with its 95 % interval." }
-            thead { tr {
-                th { "sensor" } th class="n" { "in sample" } th class="n" { "held out" } th class="n" { "noise alone" } th { "lag" }
-            } }
-            tbody {
-                @for (name, sensor) in result.sensors.present() {
-                    @let unit = readable::error(&sensor.unit);
-                    @let cell = |v: Option<f64>| html! { td class="n" { (number(v.unwrap_or(f64::NAN), unit.factor, &unit.unit)) } };
-                    tr {
-                        td { (spoken(name)) }
-                        (cell(sensor.rms)) (cell(sensor.held_out_rms)) (cell(sensor.noise_floor))
-                        td {
-                            @if let Some(lag) = sensor.lag_s { span class="whole" {
-                                (number(lag.value, 1.0, "s")) ", from " (number(lag.lower, 1.0, "")) " to " (number(lag.upper, 1.0, "s"))
-                            } } @else { (sensor.lag_reason.as_deref().unwrap_or("none")) }
-                        }
-                    }
-                }
-            }
-        } }
-    }
-}
-
-fn bins(sensor: &SensorResult) -> Markup {
-    let unit = readable::error(&sensor.unit);
-    let cell = |v: Option<f64>| html! { td class="n" { (number(v.unwrap_or(f64::NAN), unit.factor, "")) } };
-    let range = |b: &Bin| written(&format!("{:.0} to {:.0} °C", b.from_c, b.to_c));
-    html! {
-        div class="scroll" { table {
-            caption { "Error by temperature of the die, rms, " (unit.unit) }
-            thead { tr {
-                th { "die" } th class="n" { "heating" } th class="n" { "cooling" } th class="n" { "noise alone" } th class="n" { (sensor.judged_by) }
-            } }
-            tbody {
-                @for b in &sensor.bins {
-                    tr { td { (range(b)) } (cell(b.heating)) (cell(b.cooling)) (cell(Some(b.noise_floor))) td class="n" { (b.dwells) } }
-                }
-            }
-        } }
-    }
-}
-
 fn hysteresis(sensor: &SensorResult, all: &[Hysteresis]) -> Markup {
     let unit = readable::error(&sensor.unit);
     html! {
@@ -134,37 +90,6 @@ fn hysteresis(sensor: &SensorResult, all: &[Hysteresis]) -> Markup {
                         td class="n" { data value=(h.largest) { (written(&plus_minus(h.largest * unit.factor, h.largest_half_width * unit.factor))) } }
                         td class="n" { (written(&format!("{:.0}", h.largest_at_c))) }
                         td class="n" { data value=(h.value) { (written(&plus_minus(h.value * unit.factor, h.half_width * unit.factor))) } }
-                    }
-                }
-            }
-        } }
-    }
-}
-
-fn curves(result: &ThermalResult, name: Sensor) -> Markup {
-    let found: Vec<&CurveResult> = result.curves.iter().filter(|c| physical(c, name)).collect();
-    let Some(first) = found.first() else {
-        return html! {};
-    };
-    let last = first.temp_c.len() - 1;
-    let shown: Vec<usize> = (0..SHOWN).map(|k| k * last / (SHOWN - 1)).collect();
-    html! {
-        div class="scroll" { table {
-            caption { "Parameters with 95 % intervals, by temperature of the die" }
-            thead { tr {
-                th { "parameter" }
-                @for k in &shown { th class="n" { (written(&format!("{:.1} °C", first.temp_c[*k]))) } }
-            } }
-            tbody {
-                @for curve in found {
-                    @let unit = readable::parameter(&curve.unit);
-                    @let label = curve.of.to_string();
-                    tr {
-                        td { (label) ", " (unit.unit) }
-                        @for k in &shown {
-                            @let half = 0.5 * (curve.upper[*k] - curve.lower[*k]) * unit.factor;
-                            td class="n" { data value=(curve.value[*k]) { (written(&plus_minus(curve.value[*k] * unit.factor, half))) } }
-                        }
                     }
                 }
             }

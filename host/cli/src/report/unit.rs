@@ -16,6 +16,7 @@ use mimu_recording::error::Result;
 
 use super::diagnosis::Sections;
 use super::page::{Made, judged, page};
+use super::verify;
 
 /// Contents of the page.
 pub struct UnitReport<'a> {
@@ -59,7 +60,7 @@ pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
         @if found.is_some() || !unit.verified.is_empty() || !unit.not_judged.is_empty() {
             h2 id="errors" { "Error before and after" }
             @if let Some(found) = found { (found.errors()) }
-            @if !unit.verified.is_empty() { (model::verified(unit.verified)) }
+            @if !unit.verified.is_empty() { (verify::errors(unit.verified, true).html()) }
             @for why in unit.not_judged { p { "Not judged: " (why) "." } }
             @if let Some(found) = found { (found.leftover()) }
         }

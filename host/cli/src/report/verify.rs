@@ -5,10 +5,11 @@ use std::fmt::Write as _;
 use mimu::calibration::verify::{Causes, SensorVerification, Verification};
 use mimu::judge::errors::BEYOND_NOISE;
 use mimu::judgement::JudgementKind;
-use mimu::quantity::{AXES, Figure, Sensor, plus_minus, significant};
+use mimu::quantity::{AXES, Figure, Sensor, plural, plus_minus, significant};
 use mimu::readable;
 use mimu::warning::Warning;
 
+use crate::report::table::{Cell, Table};
 use crate::report::text::{counted, kinds, warn, warn_within, wrap};
 
 /// Result of `mimu verify`: a summary, or with `verbose` all warnings.
@@ -18,41 +19,8 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
         wrap(&mut out, &format!("{name}: "), &verdict(s));
     }
     let _ = writeln!(out);
-    let _ = writeln!(
-        out,
-        "{:<7}{:>14}{:>14}{:>14}{:>14}{:>12}",
-        "", "one scale", "calibrated", "largest", "noise floor", "over"
-    );
-    for (name, s) in verification.sensors.present() {
-        let figure = readable::error(s.unit);
-        let [raw, rms, max, floor] =
-            [s.rms_raw, s.rms, s.max, s.noise_floor].map(|v| match v.is_finite() {
-                true => figure.write(v),
-                false => "unknown".into(),
-            });
-        let noun = match s.figure {
-            Figure::Direction => "turns",
-            Figure::Input | Figure::GravityMagnitude | Figure::RateMagnitude => "dwells",
-        };
-        let over = format!("{} {noun}", s.count);
-        let _ = writeln!(
-            out,
-            "{name:<7}{raw:>14}{rms:>14}{max:>14}{floor:>14}{over:>12}"
-        );
-        let below = [
-            ("uncalibrated", s.rms_uncalibrated.map(|v| figure.write(v))),
-            ("effects left in", s.rms_affine.map(|v| figure.write(v))),
-            (
-                "at rest",
-                s.static_rms.map(|v| readable::error("rad/s").write(v)),
-            ),
-        ];
-        for (label, value) in below {
-            if let Some(value) = value {
-                let _ = writeln!(out, "{:<7}{label:>14}{value:>14}", "");
-            }
-        }
-    }
+    let one = [(String::new(), verification.clone())];
+    out += &errors(&one, false).text("");
     for (name, s) in verification.sensors.present() {
         let _ = writeln!(out, "{name}: {}, rms", s.figure.description());
     }
@@ -81,6 +49,52 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
     }
     let _ = writeln!(out, "next: {}", next(verification));
     out
+}
+
+/// Errors on recordings that the calibration was not made from, by recording and sensor; `named`: with the names of the recordings.
+pub(super) fn errors(all: &[(String, Verification)], named: bool) -> Table {
+    type Of = dyn Fn(&SensorVerification) -> Option<f64>;
+    let each = || all.iter().flat_map(|(_, v)| v.sensors.present());
+    let has =
+        |of: &dyn Fn(&SensorVerification) -> Option<f64>| each().any(|(_, s)| of(s).is_some());
+    let optional: [(&str, &Of); 2] = [
+        ("uncalibrated", &|s| s.rms_uncalibrated),
+        ("effects left in", &|s| s.rms_affine),
+    ];
+    let optional: Vec<_> = optional.into_iter().filter(|(_, of)| has(of)).collect();
+    let rest = readable::error("rad/s");
+    let at_rest = has(&|s| s.static_rms);
+    let mut table = Table::new(
+        "Error of the calibration on other recordings, rms; noise: what noise alone would cause",
+        "rms error",
+    )
+    .numbers(["calibrated", "noise", "largest", "one scale"])
+    .numbers(optional.iter().map(|(head, _)| *head))
+    .numbers(at_rest.then(|| format!("at rest, {}", rest.unit)))
+    .words("over");
+    if named {
+        table = table.on_page("recording");
+    }
+    for (recording, v) in all {
+        for (name, s) in v.sensors.present() {
+            let unit = readable::error(s.unit);
+            let noun = match s.figure {
+                Figure::Direction => "turn",
+                Figure::Input | Figure::GravityMagnitude | Figure::RateMagnitude => "dwell",
+            };
+            let figures = [s.rms, s.noise_floor, s.max, s.rms_raw].map(Some);
+            let more = optional.iter().map(|(_, of)| of(s));
+            let figures = figures.into_iter().chain(more);
+            let figures = figures.map(|v| Cell::known(v, unit.factor));
+            let still = at_rest.then(|| Cell::known(s.static_rms, rest.factor));
+            let first = Cell::from(format!("{name}, {}", unit.unit));
+            let over = Cell::from(plural(s.count as u64, noun));
+            let name = named.then(|| Cell::Code(recording.clone()));
+            let row = std::iter::once(first).chain(figures).chain(still);
+            table.row(row.chain([over]).chain(name));
+        }
+    }
+    table
 }
 
 fn beyond_noise(s: &SensorVerification) -> bool {

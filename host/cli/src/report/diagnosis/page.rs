@@ -6,7 +6,7 @@ mod tables;
 use maud::{Markup, html};
 
 use super::meaning;
-use super::text::{USUAL, by};
+use super::text::{USUAL, by, second_errors};
 use mimu::diagnose::decision::Accepted;
 use mimu::diagnose::decision::{FALSE_LEFTOVER, LEVERAGE};
 use mimu::diagnose::picture::{Against, Omnibus, Panel, Picture};
@@ -82,7 +82,7 @@ impl<'a> Sections<'a> {
                 } @else {
                     "Of " code { (second.recording) } " was not used to find or fit the effects."
                 } }
-                (tables::second(second))
+                (second_errors(second).html())
             }
         }
     }

@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 
 use super::{meaning, remarks};
 use crate::hint;
+use crate::report::table::{Cell, Table};
 use crate::report::text::{counted, kinds, problems, wrap};
 use effect::effect;
 pub(super) use experiments::by_experiment;
@@ -157,24 +158,38 @@ fn errors(out: &mut String, d: &DiagnosisResult) {
 fn on_second(out: &mut String, second: &SecondResult) {
     let _ = writeln!(
         out,
-        "on {}{}\n  {:<8}{:>16}{:>16}{:>16}",
+        "on {}{}",
         second.recording,
         match second.fitted_to {
             true => ", the fitted recording itself",
             false => ", which was not used for the fit",
-        },
-        "",
-        "before",
-        "after",
-        "noise floor"
+        }
     );
-    let both = second.before.sensors.present();
-    for ((name, before), (_, after)) in both.zip(second.after.sensors.present()) {
-        let figure = readable::error(before.unit);
-        let [x, y, z] = [before.rms, after.rms, after.noise_floor].map(|v| figure.write(v));
-        let _ = writeln!(out, "  {name:<8}{x:>16}{y:>16}{z:>16}");
-    }
+    *out += &second_errors(second).text("  ");
     let _ = writeln!(out);
+}
+
+/// Errors before and after, on a recording that was not fitted.
+pub(super) fn second_errors(both: &SecondResult) -> Table {
+    let mut table = Table::new(
+        "Root mean square error with the calibration of the first recording",
+        "rms error",
+    )
+    .numbers(["before", "after", "noise", "dwells or turns"])
+    .on_page("error of");
+    let sensors = both.before.sensors.present();
+    for ((name, before), (_, after)) in sensors.zip(both.after.sensors.present()) {
+        let unit = readable::error(before.unit);
+        let figures = [before.rms, after.rms, after.noise_floor];
+        let first = Cell::from(format!("{name}, {}", unit.unit));
+        let figures = figures.map(|v| Cell::number(v, unit.factor));
+        let last = [
+            Cell::Count(after.count as u64),
+            before.figure.description().into(),
+        ];
+        table.row(std::iter::once(first).chain(figures).chain(last));
+    }
+    table
 }
 
 fn sensor(

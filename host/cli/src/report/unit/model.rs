@@ -1,7 +1,6 @@
 //! Tables of a calibration: scale factors, biases, alignment, and the inverse model.
 
 use maud::{Markup, html};
-use mimu::calibration::verify::Verification;
 use mimu::calibration::{Calibration, TriadTable};
 use mimu::quantity::{AXES, Sensor, plus_minus};
 use mimu::readable;
@@ -110,28 +109,6 @@ fn matrix(sensor: Sensor, table: &TriadTable, effects: &[String]) -> Markup {
                         td { (axis) }
                         @for j in 0..3 { td class="n" { data value=(table.C[i][j]) { (digits(table.C[i][j])) } } }
                         td class="n" { data value=(table.o[i]) { (digits(table.o[i])) } }
-                    }
-                }
-            }
-        } }
-    }
-}
-
-/// Errors on recordings that the calibration was not made from.
-pub fn verified(all: &[(String, Verification)]) -> Markup {
-    html! {
-        div class="scroll" { table {
-            caption { "Error of the calibration on other recordings, rms" }
-            thead { tr { th { "recording" } th { "sensor" } th class="n" { "error" } th class="n" { "noise alone" } } }
-            tbody {
-                @for (name, result) in all {
-                    @for (sensor, s) in result.sensors.present() {
-                        @let unit = readable::error(s.unit);
-                        tr {
-                            td { code { (name) } } td { (spoken(sensor)) }
-                            td class="n" { (number(s.rms, unit.factor, &unit.unit)) }
-                            td class="n" { (number(s.noise_floor, unit.factor, &unit.unit)) }
-                        }
                     }
                 }
             }

@@ -10,7 +10,7 @@ use crate::report::page::{number, spoken, written};
 use mimu::diagnose::decision::{Accepted, Leftover};
 use mimu::quantity::{Figure, Sensor, p_value, significant};
 use mimu::readable;
-use mimu::result::diagnosis::{DiagnosisResult, SecondResult, SensorDiagnosisResult};
+use mimu::result::diagnosis::{DiagnosisResult, SensorDiagnosisResult};
 
 /// A line break that is HTML and XML.
 const BR: PreEscaped<&str> = PreEscaped("<br/>");
@@ -164,28 +164,6 @@ pub fn leftover_words(d: &DiagnosisResult, sensor: Sensor) -> Markup {
             (spoken(sensor)) " " (names.join(", ")) @if part.len() > 1 { " by up to " } @else { " by " }
             (strength(largest)) " rms"
         }
-    }
-}
-
-/// Errors before and after, on a recording that was not fitted.
-pub fn second(both: &SecondResult) -> Markup {
-    html! {
-        div class="scroll" { table {
-            caption { "Root mean square error with the calibration of the first recording." }
-            thead { tr {
-                th { "sensor" } th class="n" { "before" } th class="n" { "after" } th class="n" { "noise floor" } th class="n" { "dwells or turns" }
-            } }
-            tbody { @for ((name, b), (_, a)) in both.before.sensors.present().zip(both.after.sensors.present()) {
-                @let readable::Readable { factor, unit } = readable::error(b.unit);
-                tr {
-                    td { (spoken(name)) (BR) span class="dim" { (b.figure.description()) } }
-                    td class="n" { (number(b.rms, factor, &unit)) }
-                    td class="n" { (number(a.rms, factor, &unit)) }
-                    td class="n" { (number(a.noise_floor, factor, &unit)) }
-                    td class="n" { (a.count) }
-                }
-            } }
-        } }
     }
 }
 
