@@ -119,14 +119,6 @@ fn largest(distances: &[[f64; STATES]; 3]) -> f64 {
     sizes.fold(0.0, f64::max)
 }
 
-/// Everything received during a run.
-struct Log {
-    samples: BTreeMap<u32, Sample<f32>>,
-    reports: Vec<KalmanState>,
-    /// When the last samples came.
-    last: Instant,
-}
-
 /// Runs a bank on the device. `apply` is called before each input and returns once it is applied; `progress` gets the fraction done.
 pub fn kalman(
     session: &mut Session,
@@ -142,114 +134,137 @@ pub fn kalman(
             "flash newer firmware",
         ));
     }
-    let (sensor, each) = (plan.sensor, plan.each.max(SHORTEST));
-    let mut log = Log {
-        samples: BTreeMap::new(),
-        reports: Vec::new(),
-        last: Instant::now(),
-    };
-    session.forget_events();
-    let raw = Request::Stream {
-        raw: true,
-        compensated: false,
-    };
-    let rate_hz = f64::from(session.who().sample_rate_hz);
-    let mut noise = plan.noise;
+    let mut run = BankRun::new(session, plan);
     let mut ends: Vec<u32> = Vec::new();
     for (at, input) in plan.inputs.iter().enumerate() {
         apply(input)?;
-        log.last = Instant::now();
-        session.begin_stream(raw)?;
-        // The input is set only after the first batch: the samples before it are missing here, and the bank must not use them.
-        let before = log.samples.len();
-        while log.samples.len() == before {
-            log.listen(session, sensor)?;
-        }
+        run.begin_stream()?;
         if at == 0 {
-            if noise.is_none() {
-                while log.samples.len() < NOISE_SAMPLES {
-                    log.listen(session, sensor)?;
-                }
-            }
-            let noise = *noise.get_or_insert_with(|| variances(&log.samples, sensor));
-            let prior = Prior::Diffuse { span: plan.span() };
-            let start = Request::KalmanStart {
-                sensor,
-                noise,
-                prior,
-            };
-            session.done(start, "to start a Kalman bank")?;
+            run.start_bank()?;
         }
-        let set = |input| Request::KalmanInput { sensor, input };
-        session.done(set(Some(*input)), "to take an input")?;
-        // Counts samples, that is the device's time.
-        let (from, wanted) = (log.samples.len(), (each.as_secs_f64() * rate_hz) as usize);
-        while log.samples.len() < from + wanted {
-            log.listen(session, sensor)?;
-            let share = (log.samples.len() - from) as f64 / wanted as f64;
-            progress((at as f64 + share.min(1.0)) / plan.inputs.len() as f64);
-        }
-        session.done(set(None), "to take no input")?;
-        ends.push(log.settled(session, sensor)?);
-        session.done(Request::Stop, "to stop streaming")?;
+        let end = run.take_input(*input, |share| {
+            progress((at as f64 + share) / plan.inputs.len() as f64);
+        })?;
+        ends.push(end);
+        run.session.done(Request::Stop, "to stop streaming")?;
     }
-    let purpose = "to end a Kalman bank";
-    let end = session.call(Request::KalmanEnd { sensor }, purpose, PATIENCE)?;
-    let Answer::Kalman(last) = end else {
-        return Err(session.unexpected(purpose));
-    };
-    let noise = noise.unwrap_or_default();
-    let inputs = taken_in(session.port(), plan, &ends, &log.reports)?;
-    let host = replay(session.port(), plan, &noise, &inputs, &log.samples)?;
-    let device = estimates(&last);
-    let distance_sigma = distances(&device, &host);
-    let (scale, input_unit) = match sensor {
-        Sensor::Gyro => ("V/(rad/s)", "rad/s"),
-        Sensor::Accel => ("V/(m/s²)", "m/s²"),
-    };
-    Ok(KalmanRun {
-        triad: sensor,
-        parameters: ["b", "P1", "P2", "P3"],
-        direction: "SI to raw",
-        units: ["V", scale, scale, scale],
-        input_unit,
-        noise_v2: noise,
-        inputs,
-        rejected: last.rejected,
-        device,
-        host,
-        largest_distance_sigma: largest(&distance_sigma),
-        distance_sigma,
-        history: log
-            .reports
-            .iter()
-            .map(|r| Converging {
-                updates: r.updates,
-                axes: estimates(r),
-            })
-            .collect(),
-    })
+    let last = run.end_bank()?;
+    run.result(&ends, &last)
 }
 
-impl Log {
-    fn listen(&mut self, session: &mut Session, sensor: Sensor) -> Result<()> {
-        match session.stream_event(self.last, "raw stream")? {
+/// A run of a bank on the device, and everything received during it.
+struct BankRun<'a> {
+    session: &'a mut Session,
+    plan: &'a KalmanPlan,
+    /// Samples under each input.
+    wanted: usize,
+    /// Variances of single readings, once they are known, V².
+    noise: Option<[f32; 3]>,
+    samples: BTreeMap<u32, Sample<f32>>,
+    reports: Vec<KalmanState>,
+    /// When the last samples came.
+    last: Instant,
+}
+
+impl<'a> BankRun<'a> {
+    fn new(session: &'a mut Session, plan: &'a KalmanPlan) -> Self {
+        session.forget_events();
+        let rate_hz = f64::from(session.who().sample_rate_hz);
+        // Counts samples, that is the device's time.
+        let wanted = (plan.each.max(SHORTEST).as_secs_f64() * rate_hz) as usize;
+        Self {
+            session,
+            plan,
+            wanted,
+            noise: plan.noise,
+            samples: BTreeMap::new(),
+            reports: Vec::new(),
+            last: Instant::now(),
+        }
+    }
+
+    /// Begins the stream, and waits for its first batch.
+    fn begin_stream(&mut self) -> Result<()> {
+        self.last = Instant::now();
+        self.session.begin_stream(Request::Stream {
+            raw: true,
+            compensated: false,
+        })?;
+        // The input is set only after the first batch: the samples before it are missing here, and the bank must not use them.
+        self.listen_until(self.samples.len() + 1)
+    }
+
+    /// Starts the bank, after a second of readings if they are to give the noise.
+    fn start_bank(&mut self) -> Result<()> {
+        let sensor = self.plan.sensor;
+        if self.noise.is_none() {
+            self.listen_until(NOISE_SAMPLES)?;
+        }
+        let samples = &self.samples;
+        let noise = *self.noise.get_or_insert_with(|| variances(samples, sensor));
+        let span = self.plan.span();
+        let start = Request::KalmanStart {
+            sensor,
+            noise,
+            prior: Prior::Diffuse { span },
+        };
+        self.session.done(start, "to start a Kalman bank")
+    }
+
+    /// Lets the bank use samples under `input`. Returns how many it has used since its start.
+    fn take_input(&mut self, input: [f32; 3], mut progress: impl FnMut(f64)) -> Result<u32> {
+        let sensor = self.plan.sensor;
+        let set = |input| Request::KalmanInput { sensor, input };
+        self.session.done(set(Some(input)), "to take an input")?;
+        let (from, wanted) = (self.samples.len(), self.wanted);
+        while self.samples.len() < from + wanted {
+            self.listen()?;
+            let share = (self.samples.len() - from) as f64 / wanted as f64;
+            progress(share.min(1.0));
+        }
+        self.session.done(set(None), "to take no input")?;
+        self.settled()
+    }
+
+    /// Ends the bank, and returns its last state.
+    fn end_bank(&mut self) -> Result<Box<KalmanState>> {
+        let purpose = "to end a Kalman bank";
+        let end = Request::KalmanEnd {
+            sensor: self.plan.sensor,
+        };
+        match self.session.call(end, purpose, PATIENCE)? {
+            Answer::Kalman(last) => Ok(last),
+            _ => Err(self.session.unexpected(purpose)),
+        }
+    }
+
+    fn listen_until(&mut self, samples: usize) -> Result<()> {
+        while self.samples.len() < samples {
+            self.listen()?;
+        }
+        Ok(())
+    }
+
+    fn listen(&mut self) -> Result<()> {
+        match self.session.stream_event(self.last, "raw stream")? {
             Some(Event::Raw(batch)) => {
                 let numbers = (0..).map(|k| batch.head.first.wrapping_add(k));
                 self.samples.extend(numbers.zip(batch.values));
                 self.last = Instant::now();
             }
-            Some(Event::Kalman(state)) if state.sensor == sensor => self.reports.push(*state),
+            Some(Event::Kalman(state)) if state.sensor == self.plan.sensor => {
+                self.reports.push(*state);
+            }
             _ => {}
         }
         Ok(())
     }
 
     /// Waits until two successive reports have used the same number of samples, and returns that number.
-    fn settled(&mut self, session: &mut Session, sensor: Sensor) -> Result<u32> {
+    fn settled(&mut self) -> Result<u32> {
         let (from, since) = (self.reports.len(), Instant::now());
         loop {
-            self.listen(session, sensor)?;
+            self.listen()?;
             if let [.., a, b] = &self.reports[from..]
                 && a.updates == b.updates
             {
@@ -257,9 +272,42 @@ impl Log {
             }
             if since.elapsed() > SILENCE {
                 let problem = "the Kalman bank does not report";
-                return Err(Error::device(session.port(), problem, "run it again"));
+                return Err(Error::device(self.session.port(), problem, "run it again"));
             }
         }
+    }
+
+    /// Compares the bank, which ended as `last`, with the same bank here. `ends` are the numbers of samples that it had used after each input.
+    fn result(self, ends: &[u32], last: &KalmanState) -> Result<KalmanRun> {
+        let (port, plan) = (self.session.port(), self.plan);
+        let noise = self.noise.unwrap_or_default();
+        let inputs = taken_in(port, plan, ends, &self.reports)?;
+        let host = replay(port, plan, &noise, &inputs, &self.samples)?;
+        let device = estimates(last);
+        let distance_sigma = distances(&device, &host);
+        let (scale, input_unit) = match plan.sensor {
+            Sensor::Gyro => ("V/(rad/s)", "rad/s"),
+            Sensor::Accel => ("V/(m/s²)", "m/s²"),
+        };
+        let converging = |report: &KalmanState| Converging {
+            updates: report.updates,
+            axes: estimates(report),
+        };
+        Ok(KalmanRun {
+            triad: plan.sensor,
+            parameters: ["b", "P1", "P2", "P3"],
+            direction: "SI to raw",
+            units: ["V", scale, scale, scale],
+            input_unit,
+            noise_v2: noise,
+            inputs,
+            rejected: last.rejected,
+            device,
+            host,
+            largest_distance_sigma: largest(&distance_sigma),
+            distance_sigma,
+            history: self.reports.iter().map(converging).collect(),
+        })
     }
 }
 

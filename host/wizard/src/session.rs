@@ -191,6 +191,8 @@ struct AffineCalibration {
     fitted: Fit,
     /// The verification recording.
     other: Prepared,
+    /// Whether it may be stored, by the verification.
+    passed: bool,
     /// Why the user has to agree before it is stored.
     rough: Option<String>,
 }
@@ -219,6 +221,48 @@ mod effects;
 
 impl OpenSession<'_> {
     async fn carry_out(&mut self) -> Result<Ended> {
+        or_cancelled!(self.warm_up().await);
+        let wizard = &mut self.wizard;
+        let steps = wizard.config.steps.clone();
+        let words = format!("{} dwells are planned", steps.len());
+        wizard.begin_phase(Phase::Calibration, words);
+        or_cancelled!(wizard.dwells(Part::Calibration, &steps).await);
+        self.finish()?;
+        let fits = self.fits()?;
+        let wizard = &mut self.wizard;
+        let steps = wizard.config.verification.clone();
+        let words = format!("{} poses that the fit has not used", steps.len());
+        wizard.begin_phase(Phase::Verification, words);
+        or_cancelled!(wizard.dwells(Part::Verification, &steps).await);
+        self.finish()?;
+        self.wizard
+            .begin_phase(Phase::Store, "storing the verified calibration".into());
+        let mut plain = Vec::new();
+        for (k, fitted) in fits.into_iter().enumerate() {
+            let affine = self.affine_calibration(k, fitted)?;
+            if affine.passed && affine.rough.is_none() {
+                or_cancelled!(self.store(k, PLAIN, &affine.calibration).await);
+            }
+            plain.push(affine);
+        }
+        self.wizard.begin_phase(
+            Phase::Diagnosis,
+            "looking for the cause of the remaining error".into(),
+        );
+        let mut found = Vec::new();
+        for (k, plain) in plain.iter().enumerate() {
+            found.push(self.diagnose(k, plain)?);
+        }
+        if found.iter().any(Option::is_some) {
+            or_cancelled!(self.with_effects(&plain, found).await);
+        }
+        or_cancelled!(self.store_rough(&plain).await);
+        self.wizard.journal(&Entry::Done)?;
+        Ok(Ended::Done)
+    }
+
+    /// Waits until the units can be used, and shows what they are.
+    async fn warm_up(&mut self) -> Result<Ended> {
         let wizard = &mut self.wizard;
         let words = wizard.config.gravity_words();
         wizard.tell(Event::Note { words });
@@ -233,15 +277,11 @@ impl OpenSession<'_> {
         };
         wizard.begin_phase(Phase::WarmUp, words);
         or_cancelled!(wizard.warm_up().await);
-        or_cancelled!(wizard.look_at_devices().await);
-        let steps = wizard.config.steps.clone();
-        wizard.begin_phase(
-            Phase::Calibration,
-            format!("{} dwells are planned", steps.len()),
-        );
-        or_cancelled!(wizard.dwells(Part::Calibration, &steps).await);
-        self.finish()?;
-        let by_table = self.wizard.config.fixture == Fixture::Table;
+        wizard.look_at_devices().await
+    }
+
+    /// The fit of each unit to its calibration dwells, or the estimate of its filters.
+    fn fits(&mut self) -> Result<Vec<Fit>> {
         let mut fits = Vec::new();
         for unit in &self.wizard.units {
             let first = prepared(&unit.folder.file(Part::Calibration.name()))?;
@@ -256,55 +296,40 @@ impl OpenSession<'_> {
                 self.take_from_device(k, fitted)?;
             }
         }
-        if by_table {
+        if self.wizard.config.fixture == Fixture::Table {
             for fitted in &mut fits {
                 add_mounting_uncertainty(fitted, self.wizard.config.mounting_deg);
             }
         }
-        let wizard = &mut self.wizard;
-        let steps = wizard.config.verification.clone();
-        let words = format!("{} poses that the fit has not used", steps.len());
-        wizard.begin_phase(Phase::Verification, words);
-        or_cancelled!(wizard.dwells(Part::Verification, &steps).await);
-        self.finish()?;
-        self.wizard
-            .begin_phase(Phase::Store, "storing the verified calibration".into());
-        let mut plain = Vec::new();
-        for (k, fitted) in fits.into_iter().enumerate() {
-            let created = self.wizard.units[k]
-                .folder
-                .created(Part::Verification, now)?;
-            let mut calibration = Calibration::of(&fitted, &[], &created)?;
-            let other = prepared(&self.file(k, Part::Verification.name()))?;
-            let judged = self.judged(k, &other, &calibration, &fitted, Part::Verification)?;
-            calibration.judgement = Some(judged.judgement.clone());
-            let rough = judged.rough().filter(|_| judged.passed());
-            match &rough {
-                Some(why) => {
-                    let words = format!("{why}: the error is diagnosed before anything is stored");
-                    self.wizard.tell(Event::Note { words });
-                }
-                None if judged.passed() => or_cancelled!(self.store(k, PLAIN, &calibration).await),
-                None => {}
-            }
-            plain.push(AffineCalibration {
-                calibration,
-                fitted,
-                other,
-                rough,
-            });
+        Ok(fits)
+    }
+
+    /// The affine calibration of unit `k`, judged by its verification.
+    fn affine_calibration(&mut self, k: usize, fitted: Fit) -> Result<AffineCalibration> {
+        let created = self.wizard.units[k]
+            .folder
+            .created(Part::Verification, now)?;
+        let mut calibration = Calibration::of(&fitted, &[], &created)?;
+        let other = prepared(&self.file(k, Part::Verification.name()))?;
+        let judged = self.judged(k, &other, &calibration, &fitted, Part::Verification)?;
+        calibration.judgement = Some(judged.judgement.clone());
+        let passed = judged.passed();
+        let rough = judged.rough().filter(|_| passed);
+        if let Some(why) = &rough {
+            let words = format!("{why}: the error is diagnosed before anything is stored");
+            self.wizard.tell(Event::Note { words });
         }
-        self.wizard.begin_phase(
-            Phase::Diagnosis,
-            "looking for the cause of the remaining error".into(),
-        );
-        let mut found = Vec::new();
-        for (k, plain) in plain.iter().enumerate() {
-            found.push(self.diagnose(k, plain)?);
-        }
-        if found.iter().any(Option::is_some) {
-            or_cancelled!(self.with_effects(&plain, found).await);
-        }
+        Ok(AffineCalibration {
+            calibration,
+            fitted,
+            other,
+            passed,
+            rough,
+        })
+    }
+
+    /// Stores rough calibrations where nothing else was stored, if the user agrees.
+    async fn store_rough(&mut self, plain: &[AffineCalibration]) -> Result<Ended> {
         for (k, plain) in plain.iter().enumerate() {
             let Some(why) = plain
                 .rough
@@ -319,7 +344,6 @@ impl OpenSession<'_> {
                 Some(false) => self.outcomes[k].notes.push(format!("not stored: {why}")),
             }
         }
-        self.wizard.journal(&Entry::Done)?;
         Ok(Ended::Done)
     }
 

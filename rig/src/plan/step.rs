@@ -1,13 +1,12 @@
 //! Reading one `[[step]]` of a plan.
 
-use std::fmt::Display;
 use std::ops::Range;
 
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::reader::{FASTEST_DPS, Reader};
-use super::{CarriedBy, Places, Pose, Step, TableAxis};
+use super::{CarriedBy, Places, Pose, Step, TableAxis, Turn};
 use crate::located::written;
 use crate::rotation::{Vector, direction};
 
@@ -37,77 +36,10 @@ impl Reader<'_> {
         let (at, raw) = (raw.span(), raw.get_ref());
         self.on_table(raw, carrier)?;
         let turn = self.turn(raw)?;
-        let place = |value: Option<Range<usize>>| value.unwrap_or(at.clone());
-        let refuse = |at: &Range<usize>, problem: &dyn Display, remedy: &str| {
-            Err(self.source.error(at, problem, remedy))
-        };
-        if let (Some(stay), true) = (&raw.stay, raw.up.is_some() || raw.poses.is_some()) {
-            return refuse(
-                &stay.span(),
-                &"`stay` contradicts the pose of the same entry",
-                "keep one of them",
-            );
-        }
-        let (pose, pose_at) = match (&raw.up, &raw.poses) {
-            (None, None) if self.stays(raw, turn.is_some())? => (Pose::Here, at.clone()),
-            (Some(up), None) => {
-                let v = *up.get_ref();
-                if !v.iter().all(|x| x.is_finite()) {
-                    return refuse(&up.span(), &"`up` is not finite", "give three numbers");
-                }
-                let Some(v) = direction(v) else {
-                    let remedy = "give the body direction that points up, as [0.0, 0.0, 1.0]";
-                    return refuse(&up.span(), &"`up` has no length", remedy);
-                };
-                (Pose::Up(v), up.span())
-            }
-            (None, Some(poses)) => {
-                if *poses.get_ref() == 0 {
-                    return refuse(&poses.span(), &"`poses` is 0", "give one or more");
-                }
-                (Pose::Many(*poses.get_ref()), poses.span())
-            }
-            (Some(_), Some(poses)) => {
-                return refuse(
-                    &poses.span(),
-                    &"`up` and `poses` in one entry",
-                    "keep one of them",
-                );
-            }
-            (None, None) => {
-                let remedy = "add the body direction that points up, or `poses = ...`";
-                return refuse(&at, &"`up` is missing", remedy);
-            }
-        };
-        let dwell_s = match (&turn, &raw.dwell_s) {
-            (Some(turn), _) => turn.angle.abs() / turn.rate,
-            (None, Some(dwell_s)) => *dwell_s.get_ref(),
-            (None, None) => {
-                let remedy = "add `dwell_s = ...`, in seconds";
-                return refuse(&at, &"`dwell_s` is missing", remedy);
-            }
-        };
-        if !(dwell_s.is_finite() && dwell_s * sample_rate_hz >= 1.0) {
-            let problem = match turn {
-                Some(_) => format!("the turn takes {} s", written(dwell_s)),
-                None => format!("`dwell_s` is {}", written(dwell_s)),
-            };
-            return refuse(
-                &place(raw.dwell_s.as_ref().map(Spanned::span)),
-                &problem,
-                "give the dwell in seconds, a sample or longer",
-            );
-        }
-        let repeat = raw.repeat.as_ref().map_or(1, |r| *r.get_ref());
-        if let Some(r) = &raw.repeat
-            && repeat == 0
-        {
-            return refuse(
-                &r.span(),
-                &"`repeat` is 0",
-                "give one or more, or remove the entry",
-            );
-        }
+        let (pose, pose_at) = self.pose(raw, &at, turn.is_some())?;
+        let dwell_s = self.dwell_s(raw, &at, turn.as_ref(), sample_rate_hz)?;
+        let repeat = self.repeat(raw)?;
+        let place = |value: Option<&Spanned<f64>>| value.map_or(at.clone(), Spanned::span);
         Ok(Step {
             pose,
             heading: match &raw.heading_deg {
@@ -120,17 +52,96 @@ impl Reader<'_> {
             dwell_s,
             repeat,
             at: Places {
-                heading: place(raw.heading_deg.as_ref().map(Spanned::span)),
-                rate: place(raw.rate_dps.as_ref().map(Spanned::span)),
-                spin: place(
-                    raw.spin_dps
-                        .as_ref()
-                        .or(raw.rate_dps.as_ref())
-                        .map(Spanned::span),
-                ),
+                heading: place(raw.heading_deg.as_ref()),
+                rate: place(raw.rate_dps.as_ref()),
+                spin: place(raw.spin_dps.as_ref().or(raw.rate_dps.as_ref())),
                 pose: pose_at,
             },
         })
+    }
+
+    /// The pose of the step at `at`, and where it is written.
+    fn pose(
+        &self,
+        raw: &RawStep,
+        at: &Range<usize>,
+        turns: bool,
+    ) -> Result<(Pose, Range<usize>), String> {
+        let remedy = "keep one of them";
+        if let (Some(stay), true) = (&raw.stay, raw.up.is_some() || raw.poses.is_some()) {
+            let problem = "`stay` contradicts the pose of the same entry";
+            return Err(self.source.error(&stay.span(), problem, remedy));
+        }
+        match (&raw.up, &raw.poses) {
+            (None, None) if self.stays(raw, turns)? => Ok((Pose::Here, at.clone())),
+            (Some(up), None) => Ok((Pose::Up(self.up(up)?), up.span())),
+            (None, Some(poses)) => match *poses.get_ref() {
+                0 => {
+                    let remedy = "give one or more";
+                    Err(self.source.error(&poses.span(), "`poses` is 0", remedy))
+                }
+                count => Ok((Pose::Many(count), poses.span())),
+            },
+            (Some(_), Some(poses)) => {
+                let problem = "`up` and `poses` in one entry";
+                Err(self.source.error(&poses.span(), problem, remedy))
+            }
+            (None, None) => {
+                let remedy = "add the body direction that points up, or `poses = ...`";
+                Err(self.source.error(at, "`up` is missing", remedy))
+            }
+        }
+    }
+
+    fn up(&self, up: &Spanned<Vector>) -> Result<Vector, String> {
+        let refuse = |problem, remedy| self.source.error(&up.span(), problem, remedy);
+        let v = *up.get_ref();
+        if !v.iter().all(|x| x.is_finite()) {
+            return Err(refuse("`up` is not finite", "give three numbers"));
+        }
+        direction(v).ok_or_else(|| {
+            let remedy = "give the body direction that points up, as [0.0, 0.0, 1.0]";
+            refuse("`up` has no length", remedy)
+        })
+    }
+
+    /// How long the step at `at` takes: a turn as long as its angle needs.
+    fn dwell_s(
+        &self,
+        raw: &RawStep,
+        at: &Range<usize>,
+        turn: Option<&Turn>,
+        sample_rate_hz: f64,
+    ) -> Result<f64, String> {
+        let dwell_s = match (turn, &raw.dwell_s) {
+            (Some(turn), _) => turn.angle.abs() / turn.rate,
+            (None, Some(dwell_s)) => *dwell_s.get_ref(),
+            (None, None) => {
+                let remedy = "add `dwell_s = ...`, in seconds";
+                return Err(self.source.error(at, "`dwell_s` is missing", remedy));
+            }
+        };
+        if dwell_s.is_finite() && dwell_s * sample_rate_hz >= 1.0 {
+            return Ok(dwell_s);
+        }
+        let problem = match turn {
+            Some(_) => format!("the turn takes {} s", written(dwell_s)),
+            None => format!("`dwell_s` is {}", written(dwell_s)),
+        };
+        let place = raw.dwell_s.as_ref().map_or(at.clone(), Spanned::span);
+        let remedy = "give the dwell in seconds, a sample or longer";
+        Err(self.source.error(&place, problem, remedy))
+    }
+
+    fn repeat(&self, raw: &RawStep) -> Result<u32, String> {
+        match &raw.repeat {
+            None => Ok(1),
+            Some(repeat) if *repeat.get_ref() == 0 => {
+                let remedy = "give one or more, or remove the entry";
+                Err(self.source.error(&repeat.span(), "`repeat` is 0", remedy))
+            }
+            Some(repeat) => Ok(*repeat.get_ref()),
+        }
     }
 
     /// Refuses a step by hand that only a table can carry out.

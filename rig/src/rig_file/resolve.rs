@@ -2,7 +2,7 @@
 
 use std::array::from_fn;
 
-use super::{AxesFile, EffectFile, RigFile};
+use super::{AffineFile, AxesFile, ConverterFile, EffectFile, RigFile, UnitFile};
 use crate::catalog::{MeasuredQuantity, Sensor};
 use crate::converter::{ConverterTruth, RawUnit};
 use crate::effects::{EffectTruth, draw_ids};
@@ -43,95 +43,27 @@ impl RigTruth {
     pub fn resolve(file: &RigFile, seed: u64) -> Result<Self, String> {
         file.check()?;
         let mut file = file.clone();
-        let random = |cause: &str| Random::new(seed, cause);
         let gyro = file.sensors(MeasuredQuantity::Gyro)?;
         let accel = file.sensors(MeasuredQuantity::Accel)?;
 
         let effects = effects(&mut file, seed)?;
         let earth_rate = *file.earth_rate.get_or_insert(true);
         let unit = &mut file.unit;
-        let affine = unit.gyro_affine.as_ref().map(|a| (a.matrix, a.bias));
-        let mut gyro_truth = triad(&mut unit.gyro_axes, gyro, affine.is_some(), "gyro", seed);
-        if let Some((matrix, bias)) = affine {
-            gyro_truth.set_affine(&matrix, &bias);
-        }
-        let affine = unit.accel_affine.as_ref().map(|a| (a.matrix, a.bias));
-        let mut accel_truth = triad(&mut unit.accel_axes, accel, affine.is_some(), "accel", seed);
-        if let Some((matrix, bias)) = affine {
-            accel_truth.set_affine(&matrix, &bias);
-        }
+        let affine = unit.gyro_affine.as_ref();
+        let mut gyro_truth = triad(&mut unit.gyro_axes, affine, gyro, "gyro", seed);
+        let affine = unit.accel_affine.as_ref();
+        let mut accel_truth = triad(&mut unit.accel_axes, affine, accel, "accel", seed);
+        let gyro_reference_v = gyro_reference_pins(unit, gyro, seed);
+        let temperature = temperature(unit, gyro[0], seed);
+        let supply = supply(unit, accel[0], seed);
 
-        let gyro_reference_nominal_v = gyro[0].reference_v.unwrap_or(0.0);
-        // In the catalog, parts with a reference pin also have a TEMP pin.
-        let dies = gyro[0].reference_v.is_some();
-        if dies {
-            unit.gyro_reference_v.get_or_insert_with(|| {
-                let mut r = random("gyro reference pins");
-                gyro.map(|s| {
-                    gyro_reference_nominal_v + r.within(s.reference_tolerance_v.unwrap_or(0.0))
-                })
-            });
-        }
-        let gyro_reference_v = unit.gyro_reference_v.unwrap_or_default();
-        let usual = if dies {
-            TemperatureSensor::Dies
-        } else {
-            TemperatureSensor::Board
-        };
-        let temperature = TemperatureTruth {
-            at: *unit.temperature.get_or_insert(usual),
-            lag_s: *unit.temperature_lag_s.get_or_insert(0.0),
-            offset_c: *unit
-                .temperature_offset_c
-                .get_or_insert_with(|| random("temperature offset").within(2.0)),
-            noise_c: *unit.temperature_noise_c.get_or_insert(0.02),
-        };
-        let supply = VoltageTruth {
-            nominal_v: accel[0].supply_v,
-            error: 1e-6
-                * *unit
-                    .supply_error_ppm
-                    .get_or_insert_with(|| random("supply error").within(5000.0)),
-            per_c: 1e-6 * *unit.supply_ppm_per_c.get_or_insert(0.0),
-            noise: 1e-6 * *unit.supply_noise_ppm.get_or_insert(0.0),
-        };
-
-        let c = &mut file.converter;
-        let nominal_v = *c.reference_v.get_or_insert(3.3);
-        let error = || random("converter reference error").within(5000.0);
-        let converter_reference = VoltageTruth {
-            nominal_v,
-            error: 1e-6 * *c.reference_error_ppm.get_or_insert_with(error),
-            per_c: 1e-6 * *c.reference_ppm_per_c.get_or_insert(0.0),
-            noise: 1e-6 * *c.reference_noise_ppm.get_or_insert(0.0),
-        };
-        // By the part, even if its output range is given, because boards are designed from data sheets.
-        let divider = |part: &Sensor| match part.output {
-            RawUnit::V => (20.0 * (nominal_v / part.high).min(1.0)).floor() / 20.0,
-            RawUnit::Count => 1.0,
-        };
+        let converter_reference = converter_reference(&mut file.converter, seed);
+        let nominal_v = converter_reference.nominal_v;
         let analog = gyro_truth.analog && accel_truth.analog;
-        let converter = ConverterTruth {
-            bits: *c.bits.get_or_insert(16),
-            gyro_divider: *c.gyro_divider.get_or_insert(divider(gyro[0])),
-            accel_divider: *c.accel_divider.get_or_insert(divider(accel[0])),
-            conversions: *c.conversions.get_or_insert(4),
-            noise_codes: *c.noise_codes.get_or_insert(1.5),
-            take_out_reference: *c.take_out_reference.get_or_insert(false),
-            raw_unit: *c
-                .raw_unit
-                .get_or_insert(if analog { RawUnit::V } else { RawUnit::Count }),
-        };
-        for (triad, divider) in [
-            (&mut gyro_truth, converter.gyro_divider),
-            (&mut accel_truth, converter.accel_divider),
-        ] {
-            (triad.code_low, triad.code_span) = if triad.analog {
-                (0.0, nominal_v / divider)
-            } else {
-                (-32768.0, 65536.0)
-            };
-        }
+        let parts = [gyro[0], accel[0]];
+        let converter = converter(&mut file.converter, nominal_v, parts, analog);
+        set_codes(&mut gyro_truth, nominal_v / converter.gyro_divider);
+        set_codes(&mut accel_truth, nominal_v / converter.accel_divider);
 
         let curves = file.curves.resolve(seed);
         let thermal = thermal(&mut file, [gyro[0], gyro[1], gyro[2], accel[0]], seed);
@@ -146,7 +78,7 @@ impl RigTruth {
                 temperature,
                 supply,
                 converter_reference,
-                gyro_reference_nominal_v,
+                gyro_reference_nominal_v: gyro[0].reference_v.unwrap_or(0.0),
                 gyro_reference_v,
                 effects,
                 curves,
@@ -157,6 +89,89 @@ impl RigTruth {
             flaws,
         })
     }
+}
+
+/// True voltages of the gyros' reference pins; 0 without pins.
+fn gyro_reference_pins(file: &mut UnitFile, gyro: [&Sensor; 3], seed: u64) -> [f64; 3] {
+    if let Some(nominal_v) = gyro[0].reference_v {
+        file.gyro_reference_v.get_or_insert_with(|| {
+            let mut r = Random::new(seed, "gyro reference pins");
+            gyro.map(|s| nominal_v + r.within(s.reference_tolerance_v.unwrap_or(0.0)))
+        });
+    }
+    file.gyro_reference_v.unwrap_or_default()
+}
+
+fn temperature(file: &mut UnitFile, gyro: &Sensor, seed: u64) -> TemperatureTruth {
+    // In the catalog, parts with a reference pin also have a TEMP pin.
+    let usual = if gyro.reference_v.is_some() {
+        TemperatureSensor::Dies
+    } else {
+        TemperatureSensor::Board
+    };
+    TemperatureTruth {
+        at: *file.temperature.get_or_insert(usual),
+        lag_s: *file.temperature_lag_s.get_or_insert(0.0),
+        offset_c: *file
+            .temperature_offset_c
+            .get_or_insert_with(|| Random::new(seed, "temperature offset").within(2.0)),
+        noise_c: *file.temperature_noise_c.get_or_insert(0.02),
+    }
+}
+
+/// The accelerometer's supply.
+fn supply(file: &mut UnitFile, accel: &Sensor, seed: u64) -> VoltageTruth {
+    let error = || Random::new(seed, "supply error").within(5000.0);
+    VoltageTruth {
+        nominal_v: accel.supply_v,
+        error: 1e-6 * *file.supply_error_ppm.get_or_insert_with(error),
+        per_c: 1e-6 * *file.supply_ppm_per_c.get_or_insert(0.0),
+        noise: 1e-6 * *file.supply_noise_ppm.get_or_insert(0.0),
+    }
+}
+
+fn converter_reference(file: &mut ConverterFile, seed: u64) -> VoltageTruth {
+    let error = || Random::new(seed, "converter reference error").within(5000.0);
+    VoltageTruth {
+        nominal_v: *file.reference_v.get_or_insert(3.3),
+        error: 1e-6 * *file.reference_error_ppm.get_or_insert_with(error),
+        per_c: 1e-6 * *file.reference_ppm_per_c.get_or_insert(0.0),
+        noise: 1e-6 * *file.reference_noise_ppm.get_or_insert(0.0),
+    }
+}
+
+/// The converter for a gyro and an accelerometer; `analog` if the outputs of both are voltages.
+fn converter(
+    file: &mut ConverterFile,
+    nominal_v: f64,
+    [gyro, accel]: [&Sensor; 2],
+    analog: bool,
+) -> ConverterTruth {
+    // By the part, even if its output range is given, because boards are designed from data sheets.
+    let divider = |part: &Sensor| match part.output {
+        RawUnit::V => (20.0 * (nominal_v / part.high).min(1.0)).floor() / 20.0,
+        RawUnit::Count => 1.0,
+    };
+    ConverterTruth {
+        bits: *file.bits.get_or_insert(16),
+        gyro_divider: *file.gyro_divider.get_or_insert(divider(gyro)),
+        accel_divider: *file.accel_divider.get_or_insert(divider(accel)),
+        conversions: *file.conversions.get_or_insert(4),
+        noise_codes: *file.noise_codes.get_or_insert(1.5),
+        take_out_reference: *file.take_out_reference.get_or_insert(false),
+        raw_unit: *file
+            .raw_unit
+            .get_or_insert(if analog { RawUnit::V } else { RawUnit::Count }),
+    }
+}
+
+/// Sets the readings that the converter's codes cover: up to `full_scale_v` at an analog part's output.
+fn set_codes(triad: &mut TriadTruth, full_scale_v: f64) {
+    (triad.code_low, triad.code_span) = if triad.analog {
+        (0.0, full_scale_v)
+    } else {
+        (-32768.0, 65536.0)
+    };
 }
 
 /// Draws the effects and adds them to the file.
@@ -204,11 +219,11 @@ fn thermal(file: &mut RigFile, parts: [&Sensor; 4], seed: u64) -> ThermalTruth {
     }
 }
 
-/// Axes from the catalog, except for given values. With a forward model, directions, sensitivities and nulls stay undetermined here.
+/// Axes from the catalog, except for given values. Directions, sensitivities and nulls are those of the forward model, if there is one.
 fn triad(
     file: &mut AxesFile,
+    affine: Option<&AffineFile>,
     parts: [&Sensor; 3],
-    open: bool,
     name: &str,
     seed: u64,
 ) -> TriadTruth {
@@ -241,7 +256,7 @@ fn triad(
     let high = *file.high_raw.get_or_insert(parts[0].high);
 
     let (mut directions, mut sensitivity, mut null) = ([[0.0; 3]; 3], [0.0; 3], [0.0; 3]);
-    if !open {
+    if affine.is_none() {
         directions = *file
             .directions
             .get_or_insert_with(|| draw_directions(parts, &mut random("directions")));
@@ -254,7 +269,7 @@ fn triad(
             parts.map(|s| s.null + r.within(s.null_tolerance))
         });
     }
-    TriadTruth {
+    let mut triad = TriadTruth {
         axes: from_fn(|i| AxisTruth {
             direction: unit(directions[i]),
             sensitivity: sensitivity[i],
@@ -274,7 +289,11 @@ fn triad(
         analog: parts[0].output == RawUnit::V,
         code_low: 0.0,
         code_span: 0.0,
+    };
+    if let Some(affine) = affine {
+        triad.set_affine(&affine.matrix, &affine.bias);
     }
+    triad
 }
 
 /// A length of exactly 1 is left unchanged, bit by bit.

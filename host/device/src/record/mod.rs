@@ -12,7 +12,7 @@ mod run;
 mod steps;
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use mimu_core::wire::Request;
 
@@ -24,15 +24,12 @@ pub use reading::shortest;
 pub use steps::Steps;
 
 use crate::flagged::Flagged;
-use crate::identity::{Started, unit_name};
+use crate::identity::{Identity, Started, unit_name};
 use crate::received::LineCount;
 use crate::result::TOOL;
 use crate::session::Session;
-use clock::Clock;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{
-    Batch, Columns, Growing, Manifest, RawUnit, Recorded, Reference, Restart, SampleFormat,
-};
+use mimu_recording::{Manifest, RawUnit, Recorded, Reference, Restart, SampleFormat};
 use run::Run;
 
 /// What to record.
@@ -163,84 +160,19 @@ pub fn record(
             "update mimu on this computer",
         ));
     }
-    let device = options.device.clone();
-    let mut manifest = Manifest::new(
-        device.unwrap_or_else(|| unit_name(&who.unit_id)),
-        f64::from(who.sample_rate_hz),
-        options.gravity_mps2,
-        RawUnit::Volt,
-        match options.table {
-            true => Reference::Table,
-            false => Reference::Gravity,
-        },
-    );
-    manifest.latitude_deg = options.latitude_deg;
-    if let Some(known) = &known {
-        manifest.step_labels = known.labels().to_vec();
-    }
-    // The clock restarts after every reset, but the die stays warm: counted from a reset, each warm-up would look different. The device knows how
-    // long it has had power, unless it lost that in the reset.
-    let by_power = who.start == Started::PowerOn;
-    manifest.power_on_s = who.powered_for_ms.map(|ms| -f64::from(ms) / 1000.0);
-    manifest.recorded = Some(Recorded {
-        tool: TOOL.into(),
-        firmware: who.firmware.clone(),
-        board: who.board.clone(),
-        unit_id: who.unit_id.clone(),
-        start: (!by_power).then(|| who.start.to_string()),
-        ..Recorded::default()
-    });
-    let columns = Columns {
-        step: options.steps != Steps::Detected,
-        temp_c: true,
-        gyro: true,
-        accel: true,
-        reference: known.as_ref().map_or([false; 6], Known::columns),
-    };
-    let growing = Growing::create(&options.directory, columns, &manifest)?;
-    let mut run = Run {
-        growing,
-        clock: Clock::new(who.sample_rate_hz),
-        steps: options.steps.clone(),
-        known,
-        state: RecordingState::default(),
-        begun: None,
-        heard: Instant::now(),
-        unit_id: who.unit_id,
-        starts: who.starts,
-        one_power_on: options.one_power_on,
-        // A program that was killed may have left half a frame.
-        line: line::LineTotals::from(session.count()),
-    };
+    let mut manifest = manifest(&who, options, known.as_ref());
+    let mut run = Run::begin(session, options, known, &manifest)?;
     let ended = run.receive(session, options, &mut look);
     run.state.ended = true;
     run.asks_to_end(&mut look);
     run.drop_open_turn();
-    let mut state = run.state;
-    state.line = run.line.total(session.count());
-    state.waiting = false;
-    if let Some(recorded) = &mut manifest.recorded {
-        recorded.missing = state.missing;
-        recorded.restarts = state.restarts.clone();
-    }
-    let rate_hz = manifest.sample_rate_hz;
-    manifest.dropped_steps = state.dropped.clone();
-    let mut known = run.known;
-    if let Some(known) = &known {
-        manifest.turn_steps = known.turns();
-        state.warnings.extend(known.unused());
-    }
-    let mut complete = known
-        .as_mut()
-        .filter(|known| known.has_turns())
-        .map(|known| |batch: &mut Batch| known.complete(batch, rate_hz));
-    let complete = complete.as_mut().map(|c| c as &mut dyn FnMut(&mut Batch));
+    run.state.line = run.line.total(session.count());
+    run.state.waiting = false;
     // A device that is gone cannot be stopped.
     let _ = ended
         .is_ok()
         .then(|| session.done(Request::Stop, "to stop streaming"));
-    run.growing
-        .finish(&manifest, options.format, complete, finishing)?;
+    let state = run.finish(&mut manifest, options.format, finishing)?;
     match ended {
         Ok(()) if state.samples == 0 => Err(Error::new(
             session.port(),
@@ -259,6 +191,38 @@ pub fn record(
             state,
         }),
     }
+}
+
+/// The manifest, as far as it is known before the first sample.
+fn manifest(who: &Identity, options: &RecordOptions, known: Option<&Known>) -> Manifest {
+    let device = options.device.clone();
+    let mut manifest = Manifest::new(
+        device.unwrap_or_else(|| unit_name(&who.unit_id)),
+        f64::from(who.sample_rate_hz),
+        options.gravity_mps2,
+        RawUnit::Volt,
+        match options.table {
+            true => Reference::Table,
+            false => Reference::Gravity,
+        },
+    );
+    manifest.latitude_deg = options.latitude_deg;
+    if let Some(known) = known {
+        manifest.step_labels = known.labels().to_vec();
+    }
+    // The clock restarts after every reset, but the die stays warm: counted from a reset, each warm-up would look different. The device knows how
+    // long it has had power, unless it lost that in the reset.
+    let by_power = who.start == Started::PowerOn;
+    manifest.power_on_s = who.powered_for_ms.map(|ms| -f64::from(ms) / 1000.0);
+    manifest.recorded = Some(Recorded {
+        tool: TOOL.into(),
+        firmware: who.firmware.clone(),
+        board: who.board.clone(),
+        unit_id: who.unit_id.clone(),
+        start: (!by_power).then(|| who.start.to_string()),
+        ..Recorded::default()
+    });
+    manifest
 }
 
 /// `error`, with the place of the samples received so far.

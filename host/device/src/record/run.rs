@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use mimu_core::wire::Request;
 
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Batch, Growing, Restart};
+use mimu_recording::{Batch, Columns, Growing, Manifest, Restart, SampleFormat};
 
 use super::clock::Clock;
 use super::known::Known;
@@ -44,6 +44,37 @@ const RAW: Request<'_> = Request::Stream {
 };
 
 impl Run {
+    /// Creates the recording, to which `manifest` belongs until its end.
+    pub fn begin(
+        session: &Session,
+        options: &RecordOptions,
+        known: Option<Known>,
+        manifest: &Manifest,
+    ) -> Result<Self> {
+        let who = session.who();
+        let columns = Columns {
+            step: options.steps != Steps::Detected,
+            temp_c: true,
+            gyro: true,
+            accel: true,
+            reference: known.as_ref().map_or([false; 6], Known::columns),
+        };
+        Ok(Self {
+            growing: Growing::create(&options.directory, columns, manifest)?,
+            clock: Clock::new(who.sample_rate_hz),
+            steps: options.steps.clone(),
+            known,
+            state: RecordingState::default(),
+            begun: None,
+            heard: Instant::now(),
+            unit_id: who.unit_id.clone(),
+            starts: who.starts,
+            one_power_on: options.one_power_on,
+            // A program that was killed may have left half a frame.
+            line: line::LineTotals::from(session.count()),
+        })
+    }
+
     pub fn receive(
         &mut self,
         session: &mut Session,
@@ -157,6 +188,31 @@ impl Run {
         }
         session.begin_stream(RAW)?;
         Ok(true)
+    }
+
+    /// Writes the recording, with what `manifest` lacks until its end.
+    pub fn finish(
+        mut self,
+        manifest: &mut Manifest,
+        format: SampleFormat,
+        finishing: impl Fn(f64),
+    ) -> Result<RecordingState> {
+        if let Some(recorded) = &mut manifest.recorded {
+            recorded.missing = self.state.missing;
+            recorded.restarts = self.state.restarts.clone();
+        }
+        manifest.dropped_steps = self.state.dropped.clone();
+        if let Some(known) = &self.known {
+            manifest.turn_steps = known.turns();
+            self.state.warnings.extend(known.unused());
+        }
+        let rate_hz = manifest.sample_rate_hz;
+        let turning = self.known.as_mut().filter(|known| known.has_turns());
+        let mut complete =
+            turning.map(|known| move |batch: &mut Batch| known.complete(batch, rate_hz));
+        let complete = complete.as_mut().map(|c| c as &mut dyn FnMut(&mut Batch));
+        self.growing.finish(manifest, format, complete, finishing)?;
+        Ok(self.state)
     }
 
     fn is_done(&self, wanted: Option<u64>) -> bool {

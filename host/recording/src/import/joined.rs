@@ -1,7 +1,5 @@
 //! Several files as one recording: each row of the first with what the others have at that time.
 
-use std::collections::VecDeque;
-
 use super::first_pass;
 use super::foreign::{ForeignFile, HowToRead};
 use super::join::{Follower, Joined, check_order};
@@ -38,6 +36,156 @@ fn other_rate(times: &Times, given: f64) -> Option<String> {
     })
 }
 
+/// Files that are being opened, and what the first passes over them have found.
+struct Opening<'a> {
+    options: &'a ImportOptions,
+    left_out: LeftOut,
+    first: ForeignFile,
+    /// Times of the first file, if it has stamps.
+    first_times: Option<Times>,
+    rate_hz: f64,
+    followers: Vec<Follower>,
+    time: Vec<TimeSummary>,
+    warnings: Vec<String>,
+}
+
+impl<'a> Opening<'a> {
+    /// Opens the first file and finds its times, which are those of the recording.
+    fn first(options: &'a ImportOptions, left_out: LeftOut) -> Result<Self> {
+        let how = how(options, left_out, 0);
+        let first = ForeignFile::open(options.file(0), &how)?;
+        let mut opening = Self {
+            options,
+            left_out,
+            first,
+            first_times: None,
+            rate_hz: f64::NAN,
+            followers: Vec::new(),
+            time: Vec::new(),
+            warnings: options.preset_warnings.clone(),
+        };
+        if !opening.first.has_time() {
+            // Opening has refused this already: without a time column the rate is needed.
+            opening.rate_hz = options.rate_hz.ok_or_else(|| {
+                Error::new("import", "the rate is unknown", "give it").about(Argument::SampleRate)
+            })?;
+            return Ok(opening);
+        }
+        let times = first_pass::times(options.file(0), &how, options.rate_hz, None)?;
+        let warning = options.rate_hz.and_then(|given| other_rate(&times, given));
+        opening.rate_hz = times.summary.rate_hz;
+        opening.warnings.extend(warning);
+        opening.time.push(times.summary.clone());
+        opening.first = opening.first.with_times(times.clone());
+        opening.first_times = Some(times);
+        Ok(opening)
+    }
+
+    /// Opens the further parts of the first file, and all parts of the others.
+    fn open_followers(&mut self) -> Result<()> {
+        for part in 1..self.first.parts {
+            self.follow(0, part)?;
+        }
+        for source in 1..self.options.sources() {
+            for part in 1..self.follow(source, 0)? {
+                self.follow(source, part)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Opens a part of a source, to be read beside the first file. Returns how many parts the source has.
+    fn follow(&mut self, source: usize, part: usize) -> Result<usize> {
+        let path = self.options.file(source);
+        let how = HowToRead {
+            rate_hz: self.options.rate_hz.or(Some(self.rate_hz)),
+            part,
+            ..how(self.options, self.left_out, source)
+        };
+        let mut file = ForeignFile::open(path, &how)?;
+        if file.has_step() {
+            let problem = "the first file lacks the column step";
+            let remedy = "name the file with the column step first";
+            return Err(Error::new(path.display(), problem, remedy));
+        }
+        let first_period_s = 1.0 / self.rate_hz;
+        let mut period_s = first_period_s;
+        if file.has_time() {
+            // Another sensor has its own rate and delays, but the times of both come from one clock.
+            let first = self.first_times.as_ref();
+            let times = first_pass::times(path, &how, self.options.rate_hz, first)?;
+            period_s = times.period_s();
+            self.time.push(times.summary.clone());
+            file = file.with_times(times);
+        }
+        let parts = file.parts;
+        self.followers
+            .push(Follower::new(file, period_s, first_period_s));
+        Ok(parts)
+    }
+
+    /// Columns of the values, in the order in which the files give them.
+    fn columns(&self) -> impl Iterator<Item = Column> + '_ {
+        let followers = self.followers.iter();
+        self.first
+            .columns()
+            .chain(followers.flat_map(|follower| follower.file.columns()))
+    }
+
+    /// Whether the rows of the recording belong to numbered steps.
+    fn has_steps(&self) -> bool {
+        self.first.has_step() || self.options.is_sequence() || self.options.step_gap_s.is_some()
+    }
+
+    /// Columns of the recording: those of the files that are not left out, the step, and those of `inputs`.
+    fn columns_with(&self, inputs: Option<&StepInputs>) -> Result<Columns> {
+        let kept = |column: &Column| match column {
+            Column::Raw(c) => !self.left_out.sensors[c / 3],
+            Column::Temperature => !self.left_out.thermometer,
+            _ => true,
+        };
+        let mut names: Vec<&str> = vec![Column::Time.name()];
+        names.extend(self.columns().filter(kept).map(|column| column.name()));
+        if self.options.step_gap_s.is_some() && self.first.has_step() {
+            let problem = "it has a column step, but the dwells are to be separated by pauses";
+            let remedy = "skip the column, or leave out the pause";
+            let place = self.first.path().display();
+            return Err(Error::new(place, problem, remedy).about(Argument::Columns));
+        }
+        if self.has_steps() {
+            names.push(Column::Step.name());
+        }
+        let given = inputs.map_or([false; 6], StepInputs::columns);
+        let given = (0..6)
+            .filter(|&i| given[i])
+            .map(|i| Column::Reference(i).name());
+        names.extend(given);
+        // The same rules as for a recording's header: nothing twice, all axes of a sensor.
+        Ok(Layout::from_names(&names, "import, all columns together")?.columns)
+    }
+
+    /// Refuses a table of inputs whose steps the files do not number.
+    fn check_inputs(&self, inputs: Option<&StepInputs>) -> Result<()> {
+        let problem = match inputs {
+            Some(inputs) if self.options.step_gap_s.is_some() && inputs.has_turns() => {
+                "the table of inputs has angles of turns, but pauses do not separate turns"
+            }
+            Some(_) if !self.has_steps() => "a table of inputs is given, but no column is step",
+            _ => return Ok(()),
+        };
+        let remedy = "name the column with the numbers of the dwells (step)";
+        Err(Error::new("import", problem, remedy))
+    }
+}
+
+/// How to read a source without `left_out`.
+fn how(options: &ImportOptions, left_out: LeftOut, source: usize) -> HowToRead<'_> {
+    HowToRead {
+        empty_zero_temperatures: left_out.zero_temperatures,
+        ..options.how(source)
+    }
+}
+
 /// Files that are read side by side, on the times of the first.
 pub(super) struct JoinedFiles {
     pub first: ForeignFile,
@@ -61,116 +209,15 @@ pub(super) struct JoinedFiles {
 impl JoinedFiles {
     /// Opens the files of `options` and finds their times and columns, without `left_out`.
     pub fn open(options: &ImportOptions, left_out: LeftOut) -> Result<Self> {
-        let mut warnings = options.preset_warnings.clone();
-        let how = |source: usize| HowToRead {
-            empty_zero_temperatures: left_out.zero_temperatures,
-            ..options.how(source)
-        };
-        let mut first = ForeignFile::open(options.file(0), &how(0))?;
-        let mut time = Vec::new();
-        let mut first_times: Option<Times> = None;
-        let rate_hz = match first.has_time() {
-            true => {
-                let times = first_pass::times(options.file(0), &how(0), options.rate_hz, None)?;
-                let rate_hz = times.summary.rate_hz;
-                warnings.extend(options.rate_hz.and_then(|given| other_rate(&times, given)));
-                time.push(times.summary.clone());
-                first_times = Some(times.clone());
-                first = first.with_times(times);
-                rate_hz
-            }
-            // Opening has refused this already: without a time column the rate is needed.
-            false => options.rate_hz.ok_or_else(|| {
-                Error::new("import", "the rate is unknown", "give it").about(Argument::SampleRate)
-            })?,
-        };
-        let polled = first_times.as_ref().filter(|t| t.summary.polled.is_some());
+        let mut files = Opening::first(options, left_out)?;
+        files.open_followers()?;
+        let polled = files.first_times.as_ref();
+        let polled = polled.filter(|times| times.summary.polled.is_some());
         let resampler = polled.map(|times| Resampler::new(times.period_s()));
-        let mut followers = Vec::new();
-        let others = (1..options.sources()).map(|index| (index, 0));
-        let mut waiting: VecDeque<(usize, usize)> = (1..first.parts)
-            .map(|part| (0, part))
-            .chain(others)
-            .collect();
-        while let Some((index, part)) = waiting.pop_front() {
-            let path = options.file(index);
-            let how = HowToRead {
-                rate_hz: options.rate_hz.or(Some(rate_hz)),
-                part,
-                ..how(index)
-            };
-            let mut file = ForeignFile::open(path, &how)?;
-            if part == 0 {
-                (1..file.parts)
-                    .rev()
-                    .for_each(|part| waiting.push_front((index, part)));
-            }
-            if file.has_step() {
-                let problem = "the first file lacks the column step";
-                let remedy = "name the file with the column step first";
-                return Err(Error::new(path.display(), problem, remedy));
-            }
-            let mut period_s = 1.0 / rate_hz;
-            if file.has_time() {
-                // Another sensor has its own rate and delays, but the times of both come from one clock.
-                let times = first_pass::times(path, &how, options.rate_hz, first_times.as_ref())?;
-                period_s = times.period_s();
-                time.push(times.summary.clone());
-                file = file.with_times(times);
-            }
-            followers.push(Follower::new(file, period_s, 1.0 / rate_hz));
-        }
-        let order: Vec<Column> = first
-            .columns()
-            .chain(
-                followers
-                    .iter()
-                    .flat_map(|follower| follower.file.columns()),
-            )
-            .collect();
+        let order: Vec<Column> = files.columns().collect();
         let mut inputs = StepInputs::of(options)?;
-        let mut names: Vec<&str> = vec![Column::Time.name()];
-        let kept = |column: &&Column| match column {
-            Column::Raw(c) => !left_out.sensors[c / 3],
-            Column::Temperature => !left_out.thermometer,
-            _ => true,
-        };
-        names.extend(order.iter().filter(kept).map(|column| column.name()));
-        let by_pauses = options.step_gap_s.is_some();
-        if by_pauses && first.has_step() {
-            let problem = "it has a column step, but the dwells are to be separated by pauses";
-            let remedy = "skip the column, or leave out the pause";
-            return Err(
-                Error::new(first.path().display(), problem, remedy).about(Argument::Columns)
-            );
-        }
-        if first.has_step() || options.is_sequence() || by_pauses {
-            names.push(Column::Step.name());
-        }
-        let given = inputs.as_ref().map_or([false; 6], StepInputs::columns);
-        let given = (0..6)
-            .filter(|&i| given[i])
-            .map(|i| Column::Reference(i).name());
-        names.extend(given);
-        // The same rules as for a recording's header: nothing twice, all axes of a sensor.
-        let columns = Layout::from_names(&names, "import, all columns together")?.columns;
-        if by_pauses && inputs.as_ref().is_some_and(StepInputs::has_turns) {
-            let problem =
-                "the table of inputs has angles of turns, but pauses do not separate turns";
-            return Err(Error::new(
-                "import",
-                problem,
-                "name the column with the numbers of the dwells (step)",
-            ));
-        }
-        if inputs.is_some() && !first.has_step() && !options.is_sequence() && !by_pauses {
-            let problem = "a table of inputs is given, but no column is step";
-            return Err(Error::new(
-                "import",
-                problem,
-                "name the column with the numbers of the dwells (step)",
-            ));
-        }
+        let columns = files.columns_with(inputs.as_ref())?;
+        files.check_inputs(inputs.as_ref())?;
         if options.reference == Reference::Table && columns.reference == [false; 6] {
             return Err(Error::new(
                 "import, reference",
@@ -179,35 +226,33 @@ impl JoinedFiles {
             )
             .about(Argument::Reference));
         }
-        for file in followers
-            .iter()
-            .map(|follower| &follower.file)
-            .chain([&first])
-        {
+        let mut warnings = files.warnings;
+        let followers = files.followers.iter().map(|follower| &follower.file);
+        for file in followers.chain([&files.first]) {
             warnings.extend_from_slice(file.warnings());
         }
         if let Some(inputs) = &mut inputs {
-            let irregular = first_times.filter(|_| resampler.is_some());
+            let irregular = files.first_times.filter(|_| resampler.is_some());
             inputs.count_rows(options.file(0), &options.how(0), irregular)?;
         }
         Ok(Self {
             summary: ImportSummary {
                 format: "mimu-import/1",
                 preset: options.preset.clone(),
-                sample_rate_hz: rate_hz,
-                time,
+                sample_rate_hz: files.rate_hz,
+                time: files.time,
                 warnings,
                 ..ImportSummary::default()
             },
-            rate_hz,
+            rate_hz: files.rate_hz,
             columns,
             order,
             inputs,
-            first,
+            first: files.first,
             resampler,
             place: None,
             step_gap_s: options.step_gap_s,
-            followers,
+            followers: files.followers,
             one_file: options.has_one_file_for_all(),
         })
     }

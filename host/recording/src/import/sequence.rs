@@ -29,121 +29,196 @@ pub(super) fn import_sequence(
     progress: &impl Fn(f64),
     left_out: LeftOut,
 ) -> Result<std::result::Result<ImportSummary, LeftOut>> {
-    let labels = labels(options)?;
-    let mut inputs: Option<StepInputs> = None;
-    let mut open: Option<(Writer, Manifest, ImportSummary, Columns)> = None;
-    let mut without = LeftOut {
-        thermometer: true,
-        ..LeftOut::default()
-    };
-    let (mut origin_s, mut after_s) = (0, f64::NEG_INFINITY);
+    let mut sequence = Sequence::of(options, left_out)?;
+    let mut recording: Option<SequenceRecording> = None;
     let count = options.files.len() as f64;
     for (step, path) in options.files.iter().enumerate() {
-        let list = options.columns.get(step).or(options.columns.first());
-        let one = ImportOptions {
-            files: vec![path.clone()],
-            columns: list.cloned().into_iter().collect(),
-            preset_warnings: Vec::new(),
-            ..options.clone()
+        let mut import = sequence.open(step, path)?;
+        let recording = match &mut recording {
+            Some(recording) => recording,
+            None => recording.insert(SequenceRecording::begin(&sequence, &import, out)?),
         };
-        let mut import = JoinedFiles::open(&one, left_out)?;
-        if import.first.has_step() {
-            let problem = "it has a column step, but in a sequence each file is a dwell";
-            let remedy = "skip the column, or import this file alone";
-            return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
-        }
-        // Which rows of the table are unused is known only after all files.
-        let own = import.inputs.take();
-        import.inputs = own.map(|own| own.of_step(step as i32, inputs.take()));
-        import.first.labels = StepLabels::of(labels.clone());
-        let begun_s = import.summary.time.first().map_or(0, |time| time.origin_s);
-        if step == 0 {
-            origin_s = begun_s;
-        }
-        let behind_s = (begun_s - origin_s) as f64;
-        import.place = Some(SequencePosition::new(step as i32, behind_s, after_s));
-        let (writer, manifest, summary, columns) = match &mut open {
-            Some(open) => open,
-            None => {
-                let mut manifest = import.manifest(options);
-                manifest.check("import")?;
-                manifest.step_labels = labels.clone();
-                let writer = Writer::create(out, import.columns, options.format, options.replace)?;
-                let mut summary = import.summary.clone();
-                (summary.time, summary.warnings) = (Vec::new(), options.preset_warnings.clone());
-                if !options.faces.is_empty() {
-                    let gyro = import.columns.gyro;
-                    summary.warnings.extend(of_faces(options, gyro));
-                }
-                open.insert((writer, manifest, summary, import.columns))
-            }
-        };
-        if import.columns != *columns {
-            let problem = format!(
-                "its columns differ from those of {}",
-                file_name(&options.files[0])
-            );
-            return Err(Error::new(
-                path.display(),
-                problem,
-                "give a list of columns for each file",
-            )
-            .about(Argument::Columns));
-        }
-        if (import.rate_hz / manifest.sample_rate_hz - 1.0).abs() > ALIKE {
-            let problem = format!(
-                "its rate is {} Hz, but that of {} is {} Hz",
-                import.rate_hz,
-                file_name(&options.files[0]),
-                manifest.sample_rate_hz
-            );
-            let remedy = "import only files with the same rate as a sequence";
-            return Err(Error::new(path.display(), problem, remedy));
-        }
-        import.run(writer, &|share: f64| {
+        recording.check_alike(&import, path, &options.files[0])?;
+        recording.take(&mut import, &|share| {
             progress((step as f64 + share) / count)
         })?;
-        import.finish_summary(writer.rows(), manifest)?;
-        let dead = import.to_leave_out();
-        if let Some(sensor) = dead.sensors.iter().position(|dead| *dead) {
-            let sensor = ["gyro", "accel"][sensor];
-            let problem = format!("{sensor} is exactly 0 throughout: it was not connected");
-            return Err(Error::new(
-                path.display(),
-                problem,
-                "leave the file out, or skip the columns",
-            ));
-        }
-        // A thermometer that answers in none of the files is none; in some, its zeros are missing answers.
-        without.thermometer &= dead.thermometer;
-        without.zero_temperatures |= dead.thermometer || dead.zero_temperatures;
-        after_s = import.place.map_or(after_s, |place| place.last_s());
-        manifest.sources.push(source(path)?);
-        add(summary, import.summary);
-        inputs = import.inputs;
-        if let Some(inputs) = &inputs {
-            manifest.turn_steps = inputs.turns().collect();
+        sequence.close(&import, path)?;
+        recording.manifest.sources.push(source(path)?);
+        add(&mut recording.summary, import.summary);
+        sequence.inputs = import.inputs;
+        if let Some(inputs) = &sequence.inputs {
+            recording.manifest.turn_steps = inputs.turns().collect();
         }
     }
-    let Some((writer, mut manifest, mut summary, _)) = open else {
+    let Some(recording) = recording else {
         return Err(Error::new(
             "import",
             "no file is given",
             "name the files to import",
         ));
     };
-    without.zero_temperatures &= !without.thermometer;
+    let without = sequence.to_leave_out();
     if without != LeftOut::default() && left_out == LeftOut::default() {
         return Ok(Err(without));
     }
-    if let Some(file) = &options.inputs {
-        manifest.sources.push(source(file)?);
+    recording.finish(options, sequence.inputs.as_ref()).map(Ok)
+}
+
+/// What the files of a sequence so far mean for the next one.
+struct Sequence<'a> {
+    options: &'a ImportOptions,
+    left_out: LeftOut,
+    labels: Vec<String>,
+    /// The table of inputs. Which of its rows are unused is known only after all files.
+    inputs: Option<StepInputs>,
+    /// When the first file began, by its stamps.
+    origin_s: i64,
+    /// Time of the last row, s.
+    after_s: f64,
+    /// What is no reading: a thermometer in all files, zeros of it in any.
+    without: LeftOut,
+}
+
+impl<'a> Sequence<'a> {
+    fn of(options: &'a ImportOptions, left_out: LeftOut) -> Result<Self> {
+        Ok(Self {
+            options,
+            left_out,
+            labels: labels(options)?,
+            inputs: None,
+            origin_s: 0,
+            after_s: f64::NEG_INFINITY,
+            without: LeftOut {
+                thermometer: true,
+                ..LeftOut::default()
+            },
+        })
     }
-    let unused = inputs.as_ref().and_then(StepInputs::unused);
-    summary.warnings.extend(unused);
-    summary.rows = writer.rows();
-    summary.recording = writer.finish(&manifest)?.display().to_string();
-    Ok(Ok(summary))
+
+    /// Opens the file of `step`, at its position after the others.
+    fn open(&mut self, step: usize, path: &Path) -> Result<JoinedFiles> {
+        let options = self.options;
+        let list = options.columns.get(step).or(options.columns.first());
+        let one = ImportOptions {
+            files: vec![path.to_owned()],
+            columns: list.cloned().into_iter().collect(),
+            preset_warnings: Vec::new(),
+            ..options.clone()
+        };
+        let mut import = JoinedFiles::open(&one, self.left_out)?;
+        if import.first.has_step() {
+            let problem = "it has a column step, but in a sequence each file is a dwell";
+            let remedy = "skip the column, or import this file alone";
+            return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
+        }
+        let own = import.inputs.take();
+        import.inputs = own.map(|own| own.of_step(step as i32, self.inputs.take()));
+        import.first.labels = StepLabels::of(self.labels.clone());
+        let begun_s = import.summary.time.first().map_or(0, |time| time.origin_s);
+        if step == 0 {
+            self.origin_s = begun_s;
+        }
+        let behind_s = (begun_s - self.origin_s) as f64;
+        let place = SequencePosition::new(step as i32, behind_s, self.after_s);
+        import.place = Some(place);
+        Ok(import)
+    }
+
+    /// Notes the end of a file that has been read, and what of it is no reading. Refuses a sensor that was not connected.
+    fn close(&mut self, import: &JoinedFiles, path: &Path) -> Result<()> {
+        let dead = import.to_leave_out();
+        if let Some(sensor) = dead.sensors.iter().position(|dead| *dead) {
+            let sensor = ["gyro", "accel"][sensor];
+            let problem = format!("{sensor} is exactly 0 throughout: it was not connected");
+            let remedy = "leave the file out, or skip the columns";
+            return Err(Error::new(path.display(), problem, remedy));
+        }
+        // A thermometer that answers in none of the files is none; in some, its zeros are missing answers.
+        self.without.thermometer &= dead.thermometer;
+        self.without.zero_temperatures |= dead.thermometer || dead.zero_temperatures;
+        self.after_s = import.place.map_or(self.after_s, |place| place.last_s());
+        Ok(())
+    }
+
+    /// What is to be left out, once all files have been read.
+    fn to_leave_out(&self) -> LeftOut {
+        LeftOut {
+            zero_temperatures: self.without.zero_temperatures && !self.without.thermometer,
+            ..self.without
+        }
+    }
+}
+
+/// The recording of a sequence, to which each file is added.
+struct SequenceRecording {
+    writer: Writer,
+    manifest: Manifest,
+    summary: ImportSummary,
+    columns: Columns,
+}
+
+impl SequenceRecording {
+    /// Begins the recording with what the first file determines.
+    fn begin(sequence: &Sequence<'_>, import: &JoinedFiles, out: &Path) -> Result<Self> {
+        let options = sequence.options;
+        let mut manifest = import.manifest(options);
+        manifest.check("import")?;
+        manifest.step_labels = sequence.labels.clone();
+        let columns = import.columns;
+        let writer = Writer::create(out, columns, options.format, options.replace)?;
+        let mut summary = import.summary.clone();
+        (summary.time, summary.warnings) = (Vec::new(), options.preset_warnings.clone());
+        if !options.faces.is_empty() {
+            summary.warnings.extend(of_faces(options, columns.gyro));
+        }
+        Ok(Self {
+            writer,
+            manifest,
+            summary,
+            columns,
+        })
+    }
+
+    /// Refuses a file with other columns or another rate than the `first`.
+    fn check_alike(&self, import: &JoinedFiles, path: &Path, first: &Path) -> Result<()> {
+        let first = file_name(first);
+        if import.columns != self.columns {
+            let problem = format!("its columns differ from those of {first}");
+            let remedy = "give a list of columns for each file";
+            return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
+        }
+        let rate_hz = self.manifest.sample_rate_hz;
+        if (import.rate_hz / rate_hz - 1.0).abs() > ALIKE {
+            let problem = format!(
+                "its rate is {} Hz, but that of {first} is {rate_hz} Hz",
+                import.rate_hz
+            );
+            let remedy = "import only files with the same rate as a sequence";
+            return Err(Error::new(path.display(), problem, remedy));
+        }
+        Ok(())
+    }
+
+    /// Reads all rows of a file.
+    fn take(&mut self, import: &mut JoinedFiles, progress: &impl Fn(f64)) -> Result<()> {
+        import.run(&mut self.writer, progress)?;
+        import.finish_summary(self.writer.rows(), &self.manifest)
+    }
+
+    fn finish(
+        mut self,
+        options: &ImportOptions,
+        inputs: Option<&StepInputs>,
+    ) -> Result<ImportSummary> {
+        if let Some(file) = &options.inputs {
+            self.manifest.sources.push(source(file)?);
+        }
+        let mut summary = self.summary;
+        summary.warnings.extend(inputs.and_then(StepInputs::unused));
+        summary.rows = self.writer.rows();
+        summary.recording = self.writer.finish(&self.manifest)?.display().to_string();
+        Ok(summary)
+    }
 }
 
 /// Warnings about what six faces do not determine.

@@ -72,6 +72,32 @@ struct Misfit {
     data: bool,
 }
 
+/// What the lines before the first row have shown.
+#[derive(Default)]
+struct Search {
+    /// The names in the line that is nearest to the wanted header.
+    names: Vec<String>,
+    misfit: Option<Misfit>,
+    /// Line of the first row that the filters leave out. Such rows may come first, and have another width.
+    left_out: Option<u64>,
+}
+
+impl Search {
+    /// Keeps the names of a line if they are nearer to the wanted header.
+    fn compare(&mut self, here: Vec<String>, list: Option<&ColumnList>) {
+        if self.names.is_empty() || matches(list, &here) > matches(list, &self.names) {
+            self.names = here;
+        }
+    }
+
+    fn report(&mut self, misfit: Misfit) {
+        let data = misfit.data;
+        if self.misfit.as_ref().is_none_or(|first| data && !first.data) {
+            self.misfit = Some(misfit);
+        }
+    }
+}
+
 /// Kind of a line, as far as it shows without the list of columns.
 enum Kind {
     Blank,
@@ -350,111 +376,108 @@ impl TextTable {
 
     /// Finds the first row among `lines` and, if columns are chosen by name, the header above it.
     fn find_rows(&mut self, lines: &[&[u8]], list: Option<&ColumnList>) -> Result<()> {
-        // The names in the line that is nearest to the wanted header.
-        let mut names: Vec<String> = Vec::new();
         if let Some(ColumnList::ByPosition(items)) = list {
             let place = |(position, role): (usize, &Option<Role>)| Some((position, (*role)?));
             self.wanted = items.iter().enumerate().filter_map(place).collect();
             self.width = items.len();
         }
+        let mut search = Search::default();
         let mut record = csv::ByteRecord::new();
-        let mut misfit: Option<Misfit> = None;
-        // Rows that the filters leave out may come first, and have another width.
-        let mut left_out: Option<u64> = None;
         for (index, line) in lines.iter().enumerate() {
             let number = index as u64 + 1;
             match kind(line, self.comments) {
                 // Counted when the rows are read.
-                Kind::Blank | Kind::Comment if left_out.is_some() => continue,
-                Kind::Blank => {
-                    // The text after the last line break is not a line.
-                    self.skipped.blank += u64::from(index + 1 < lines.len());
-                    continue;
-                }
+                Kind::Blank | Kind::Comment if search.left_out.is_some() => {}
+                // The text after the last line break is not a line.
+                Kind::Blank => self.skipped.blank += u64::from(index + 1 < lines.len()),
                 Kind::Comment => {
                     // Many programs write the names of the columns after a #.
                     self.separator
                         .split(self.comments.skipped(line), &mut record);
-                    let open = self.wanted.is_empty();
-                    if open {
-                        self.take_header(&texts(&record), list, number)?;
-                    } else if record.len() == self.width {
-                        self.names = texts(&record);
-                    }
-                    match open && !self.wanted.is_empty() {
-                        true => self.skipped.header += 1,
-                        false => self.skipped.comment += 1,
-                    }
-                    continue;
+                    self.take_comment(&record, list, number)?;
                 }
-                Kind::Other => split(self.separator, line, &mut record),
-            }
-            if self.wanted.is_empty() {
-                let here = texts(&record);
-                self.take_header(&here, list, number)?;
-                if names.is_empty() || matches(list, &here) > matches(list, &names) {
-                    names = here;
-                }
-            } else if self.mostly_numbers(record.iter())
-                && !self.filters.hold(&self.filtered, &record)
-            {
-                left_out.get_or_insert(number);
-                continue;
-            } else {
-                let problem = match self.misfit(&record, true) {
-                    Some(refusal) => refusal.problem,
-                    None if self.is_row(&record) => {
-                        self.first_row = left_out.unwrap_or(number);
+                Kind::Other => {
+                    split(self.separator, line, &mut record);
+                    if self.take_line(&record, list, number, &mut search)? {
+                        self.first_row = search.left_out.unwrap_or(number);
                         return Ok(());
                     }
-                    None => {
-                        self.names = texts(&record);
-                        "it contains words".to_owned()
-                    }
-                };
-                let data = self.mostly_numbers(record.iter());
-                if misfit.as_ref().is_none_or(|first| data && !first.data) {
-                    misfit = Some(Misfit {
-                        number,
-                        problem,
-                        data,
-                    });
                 }
             }
-            self.skipped.header += u64::from(left_out.is_none());
         }
-        if let (Some(number), None) = (left_out, &misfit) {
-            self.first_row = number;
-            return Ok(());
+        match (search.left_out, &search.misfit) {
+            (Some(number), None) => {
+                self.first_row = number;
+                Ok(())
+            }
+            _ => Err(self.no_row(lines, list, search)),
         }
-        let path = self.path.display();
+    }
+
+    /// Takes the names in a comment above the first row, and counts its line.
+    fn take_comment(
+        &mut self,
+        record: &csv::ByteRecord,
+        list: Option<&ColumnList>,
+        number: u64,
+    ) -> Result<()> {
+        let open = self.wanted.is_empty();
+        if open {
+            self.take_header(&texts(record), list, number)?;
+        } else if record.len() == self.width {
+            self.names = texts(record);
+        }
+        match open && !self.wanted.is_empty() {
+            true => self.skipped.header += 1,
+            false => self.skipped.comment += 1,
+        }
+        Ok(())
+    }
+
+    /// Takes a line as the header or as a row, or notes in `search` what else it is. Returns whether it is the first row that the filters keep.
+    fn take_line(
+        &mut self,
+        record: &csv::ByteRecord,
+        list: Option<&ColumnList>,
+        number: u64,
+        search: &mut Search,
+    ) -> Result<bool> {
         if self.wanted.is_empty() {
-            let (problem, remedy) = match list {
-                None => (
-                    "no header has the names of a recording's columns".to_owned(),
-                    "name the columns",
-                ),
-                Some(ColumnList::ByName(wanted)) => {
-                    let missing = |(_, name): &&(Role, String)| !names.contains(name);
-                    let name = wanted.iter().find(missing).map_or("", |(_, name)| name);
-                    let name = shorten(name.as_bytes());
-                    (
-                        format!("no header has the column {name}"),
-                        "check the name; it must be spelt as in the file",
-                    )
+            let here = texts(record);
+            self.take_header(&here, list, number)?;
+            search.compare(here, list);
+        } else if self.mostly_numbers(record.iter()) && !self.filters.hold(&self.filtered, record) {
+            search.left_out.get_or_insert(number);
+            return Ok(false);
+        } else {
+            let problem = match self.misfit(record, true) {
+                Some(refusal) => refusal.problem,
+                None if self.is_row(record) => return Ok(true),
+                None => {
+                    self.names = texts(record);
+                    "it contains words".to_owned()
                 }
-                Some(ColumnList::ByPosition(_)) => (
-                    "all columns are skipped".to_owned(),
-                    "name the columns to be imported",
-                ),
             };
-            let error = Error::new(path, problem, remedy).about(Argument::Columns);
-            return Err(self.all_comments(lines).unwrap_or(error));
+            search.report(Misfit {
+                number,
+                problem,
+                data: self.mostly_numbers(record.iter()),
+            });
         }
-        match misfit {
+        self.skipped.header += u64::from(search.left_out.is_none());
+        Ok(false)
+    }
+
+    /// Why none of `lines` is a row.
+    fn no_row(&self, lines: &[&[u8]], list: Option<&ColumnList>, search: Search) -> Error {
+        if self.wanted.is_empty() {
+            let error = self.no_header(list, &search.names);
+            return self.all_comments(lines).unwrap_or(error);
+        }
+        match search.misfit {
             Some(Misfit {
                 number, problem, ..
-            }) => Err(Error::new(
+            }) => Error::new(
                 self.place(number),
                 format!(
                     "no row fits the list of {} columns ({problem}; separator: {})",
@@ -463,12 +486,36 @@ impl TextTable {
                 "name every column, - for one to skip",
             )
             .about(Argument::Columns)
-            .about(Argument::Separator)),
-            None => Err(self.all_comments(lines).unwrap_or_else(|| {
+            .about(Argument::Separator),
+            None => self.all_comments(lines).unwrap_or_else(|| {
                 let problem = "the file has no row of data";
-                Error::new(path, problem, "record it again")
-            })),
+                Error::new(self.path.display(), problem, "record it again")
+            }),
         }
+    }
+
+    /// The refusal of a file without a header with the wanted columns; `names` are in the line that is nearest to it.
+    fn no_header(&self, list: Option<&ColumnList>, names: &[String]) -> Error {
+        let (problem, remedy) = match list {
+            None => (
+                "no header has the names of a recording's columns".to_owned(),
+                "name the columns",
+            ),
+            Some(ColumnList::ByName(wanted)) => {
+                let missing = |(_, name): &&(Role, String)| !names.contains(name);
+                let name = wanted.iter().find(missing).map_or("", |(_, name)| name);
+                let name = shorten(name.as_bytes());
+                (
+                    format!("no header has the column {name}"),
+                    "check the name; it must be spelt as in the file",
+                )
+            }
+            Some(ColumnList::ByPosition(_)) => (
+                "all columns are skipped".to_owned(),
+                "name the columns to be imported",
+            ),
+        };
+        Error::new(self.path.display(), problem, remedy).about(Argument::Columns)
     }
 
     /// The refusal of a file whose lines are all comments, of which most contain numbers.
