@@ -404,7 +404,83 @@ pub struct Minimum {
     pub weights: Vec<f64>,
 }
 
+/// A nonlinear fit whose rows fall in `N` groups: what differs between fits of turns, magnitudes and both.
+pub trait Grouped<const N: usize> {
+    /// The extra variances have converged when none changes by this share any more.
+    const SHARE: f64;
+    /// Fewest rounds.
+    const ROUNDS: usize = 1;
+
+    /// Unweighted residuals and derivatives.
+    fn linearize(&self, p: &DVector<f64>) -> Linearized;
+
+    /// Known variances of the rows, which are their weights beside the extra ones.
+    fn variances(&self, p: &DVector<f64>) -> Vec<f64>;
+
+    /// Variances that the residuals may have without an extra one. Errors that rows share are among these, but not among the weights.
+    fn allowed(&self, _found: &Minimum, variances: Vec<f64>) -> Vec<f64> {
+        variances
+    }
+
+    /// Refuses a minimum that the rows do not determine.
+    ///
+    /// # Errors
+    /// See [`Failure::Undetermined`].
+    fn check(&self, _found: &Minimum) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// Why there is no result if a round does not converge.
+    fn lost(&self) -> Failure;
+}
+
+/// Most rounds of a fit.
+const MOST_ROUNDS: usize = 30;
+
+/// The last round of a fit.
+pub struct Solved<const N: usize> {
+    /// The minimum, under the weights of the round before.
+    pub found: Minimum,
+    /// Covariance of its parameters.
+    pub covariance: DMatrix<f64>,
+    /// Chi-square of each group in the first round, under the first weights.
+    pub first_chi2: [f64; N],
+}
+
 impl<const N: usize> Reweighted<N> {
+    /// Minimizes `fit` from `start` on and estimates the extra variances from its residuals, in turn.
+    ///
+    /// # Errors
+    /// Those of `fit`; a singular covariance.
+    pub fn solve<F: Grouped<N>>(
+        &mut self,
+        fit: &F,
+        mut start: DVector<f64>,
+    ) -> Result<Solved<N>, Failure> {
+        let mut first_chi2 = None;
+        let mut round = 0;
+        loop {
+            let variances = fit.variances(&start);
+            let found = self
+                .minimize(start, &variances, |p| fit.linearize(p))
+                .ok_or_else(|| fit.lost())?;
+            fit.check(&found)?;
+            let covariance = found.at.covariance()?;
+            let allowed = fit.allowed(&found, variances);
+            let converged = self.update(&found, &covariance, &allowed, F::SHARE);
+            let first_chi2 = *first_chi2.get_or_insert(self.scatter.map(|s| s.chi2));
+            round += 1;
+            if converged && round >= F::ROUNDS || round == MOST_ROUNDS {
+                return Ok(Solved {
+                    found,
+                    covariance,
+                    first_chi2,
+                });
+            }
+            start = found.parameters;
+        }
+    }
+
     /// Begins with these extra variances.
     pub fn new(rows: [Range<usize>; N], extra: [f64; N]) -> Self {
         let scatter = extra.map(|extra_variance| Scatter {

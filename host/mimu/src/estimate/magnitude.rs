@@ -9,7 +9,7 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
-use super::least_squares::{Linearized, Observability, Reweighted, minimize};
+use super::least_squares::{Grouped, Linearized, Observability, Reweighted, minimize};
 use super::{Estimated, Failure, Observation, lower_triangular};
 use crate::observable::Observable;
 use crate::observation::magnitude::Magnitude;
@@ -209,17 +209,24 @@ struct Scaled<'a> {
     resting: Vec<Vector3<f64>>,
     /// Number of levels that may err.
     levels: usize,
+    /// Known variances of the rows.
+    variances: Vec<f64>,
 }
 
 impl<'a> Scaled<'a> {
-    fn of(observations: &[Observation], known: &'a KnownMagnitudes<'a>) -> Result<Self, Failure> {
+    /// `variances` are those of the magnitudes by noise, SI squared.
+    fn of(
+        observations: &[Observation],
+        variances: &[f64],
+        known: &'a KnownMagnitudes<'a>,
+    ) -> Result<Self, Failure> {
         let unit = known.levels.iter().copied().fold(0.0, f64::max);
         let level_of = known.level_of.iter();
         let shares: Vec<f64> = level_of.map(|l| known.levels[*l] / unit).collect();
         let sphere = Sphere::through(observations, &shares, known.rests)
             .ok_or_else(|| Failure::NoSolution("the dwell means do not lie on a sphere".into()))?;
         let scaled = |raw: &Vector3<f64>| (raw - sphere.centre) / sphere.radius;
-        Ok(Self {
+        let mut scaled = Self {
             turned: observations.iter().map(|o| scaled(&o.raw)).collect(),
             resting: known.rests.iter().map(|r| scaled(&r.raw)).collect(),
             levels: match known.level_sigma > 0.0 {
@@ -230,7 +237,10 @@ impl<'a> Scaled<'a> {
             sphere,
             unit,
             shares,
-        })
+            variances: Vec::new(),
+        };
+        scaled.variances = scaled.with_noise(variances);
+        Ok(scaled)
     }
 
     /// Where the rows of the magnitudes, those of the rests, and all end.
@@ -249,46 +259,9 @@ impl<'a> Scaled<'a> {
         start
     }
 
-    fn linearize(&self, p: &DVector<f64>) -> Linearized {
-        let [turned, resting, rows] = self.ends();
-        let model = lower_triangular(p);
-        let mut out = Linearized::zeros(rows, PARAMETERS + self.levels);
-        let nine = |jacobian: &mut DMatrix<f64>, row: usize, by: &SVector<f64, 12>| {
-            jacobian
-                .view_mut((row, 0), (1, PARAMETERS))
-                .copy_from(&free(by, &LOWER).transpose());
-        };
-        for (i, u) in self.turned.iter().enumerate() {
-            let level = self.known.level_of[i];
-            let off = match self.levels {
-                0 => 0.0,
-                _ => p[PARAMETERS + level],
-            };
-            let found = Magnitude::at(&model, u, self.shares[i] * (1.0 + off));
-            out.residuals[i] = found.residual();
-            nine(&mut out.jacobian, i, &found.block.by(0));
-            if self.levels > 0 {
-                out.jacobian[(i, PARAMETERS + level)] = -self.shares[i];
-            }
-        }
-        for (r, u) in self.resting.iter().enumerate() {
-            let block = vector::at(&model, u, &(self.known.rests[r].rate / self.unit));
-            for axis in 0..3 {
-                let i = turned + 3 * r + axis;
-                out.residuals[i] = block.residual[axis];
-                nine(&mut out.jacobian, i, &block.by(axis));
-            }
-        }
-        for l in 0..self.levels {
-            out.residuals[resting + l] = p[PARAMETERS + l];
-            out.jacobian[(resting + l, PARAMETERS + l)] = 1.0;
-        }
-        out
-    }
-
     /// Variances of the rows from those of the magnitudes by noise, SI squared. A noiseless recording has none; any positive number then weights all
     /// poses alike.
-    fn variances(&self, by_noise: &[f64]) -> Vec<f64> {
+    fn with_noise(&self, by_noise: &[f64]) -> Vec<f64> {
         let to_si = self.unit / self.sphere.radius;
         let at_rest = self.known.rests.iter().flat_map(|r| {
             let noise = r.variance * (to_si * to_si) + r.rate_variance;
@@ -327,14 +300,6 @@ impl<'a> Scaled<'a> {
                 None => self.lost(),
             }),
         }
-    }
-
-    fn lost(&self) -> Failure {
-        let magnitude = match self.known.sensor {
-            Sensor::Accel => "magnitude of gravity",
-            Sensor::Gyro => "magnitude of the rate",
-        };
-        Failure::NoSolution(format!("the fit to the {magnitude} does not converge"))
     }
 
     /// Back: `x = m (C' (u - centre)/radius + o')`, with the derivatives of the twelve numbers by the nine parameters.
@@ -385,6 +350,59 @@ impl<'a> Scaled<'a> {
     }
 }
 
+impl Grouped<2> for Scaled<'_> {
+    const SHARE: f64 = 1e-6;
+
+    fn linearize(&self, p: &DVector<f64>) -> Linearized {
+        let [turned, resting, rows] = self.ends();
+        let model = lower_triangular(p);
+        let mut out = Linearized::zeros(rows, PARAMETERS + self.levels);
+        let nine = |jacobian: &mut DMatrix<f64>, row: usize, by: &SVector<f64, 12>| {
+            jacobian
+                .view_mut((row, 0), (1, PARAMETERS))
+                .copy_from(&free(by, &LOWER).transpose());
+        };
+        for (i, u) in self.turned.iter().enumerate() {
+            let level = self.known.level_of[i];
+            let off = match self.levels {
+                0 => 0.0,
+                _ => p[PARAMETERS + level],
+            };
+            let found = Magnitude::at(&model, u, self.shares[i] * (1.0 + off));
+            out.residuals[i] = found.residual();
+            nine(&mut out.jacobian, i, &found.block.by(0));
+            if self.levels > 0 {
+                out.jacobian[(i, PARAMETERS + level)] = -self.shares[i];
+            }
+        }
+        for (r, u) in self.resting.iter().enumerate() {
+            let block = vector::at(&model, u, &(self.known.rests[r].rate / self.unit));
+            for axis in 0..3 {
+                let i = turned + 3 * r + axis;
+                out.residuals[i] = block.residual[axis];
+                nine(&mut out.jacobian, i, &block.by(axis));
+            }
+        }
+        for l in 0..self.levels {
+            out.residuals[resting + l] = p[PARAMETERS + l];
+            out.jacobian[(resting + l, PARAMETERS + l)] = 1.0;
+        }
+        out
+    }
+
+    fn variances(&self, _: &DVector<f64>) -> Vec<f64> {
+        self.variances.clone()
+    }
+
+    fn lost(&self) -> Failure {
+        let magnitude = match self.known.sensor {
+            Sensor::Accel => "magnitude of gravity",
+            Sensor::Gyro => "magnitude of the rate",
+        };
+        Failure::NoSolution(format!("the fit to the {magnitude} does not converge"))
+    }
+}
+
 /// Fits C and o to `|C u + o| = m` over all observations and `C u + o = x` over the rests, and the levels m to within their error.
 ///
 /// `variances` are those of the magnitudes by noise, SI squared, one for each observation. The errors of the levels are further parameters, each with
@@ -395,26 +413,15 @@ pub fn estimate(
     known: &KnownMagnitudes,
 ) -> Result<Estimated, Failure> {
     refuse_too_little(observations, known)?;
-    let scaled = Scaled::of(observations, known)?;
+    let scaled = Scaled::of(observations, variances, known)?;
     let [turned, resting, rows] = scaled.ends();
-    let variances = scaled.variances(variances);
-    let linearize = |p: &DVector<f64>| scaled.linearize(p);
-    let mut p = scaled.solved()?;
     let mut groups = Reweighted::new([0..turned, turned..resting], [0.0; 2]);
-    let mut chi2: Option<[f64; 2]> = None;
-    for _ in 0..30 {
-        let found = groups
-            .minimize(p, &variances, linearize)
-            .ok_or_else(|| scaled.lost())?;
-        let covariance = found.at.covariance()?;
-        let converged = groups.update(&found, &covariance, &variances, 1e-6);
-        p = found.parameters;
-        chi2.get_or_insert(groups.scatter.map(|s| s.chi2));
-        if converged {
-            break;
-        }
-    }
-    let last = linearize(&p).weighted(&groups.weights(&variances));
+    let solved = groups.solve(&scaled, scaled.solved()?)?;
+    let p = solved.found.parameters;
+    // Under the last extra variances.
+    let last = scaled
+        .linearize(&p)
+        .weighted(&groups.weights(&scaled.variances));
     let shape = scaled.shape(&p);
     if !shape.is_complete() {
         return Err(undetermined(&shape, known.sensor));
@@ -424,7 +431,7 @@ pub fn estimate(
     let mut scatter = groups.scatter;
     for (g, scatter) in scatter.iter_mut().enumerate() {
         scatter.extra_variance *= scaled.unit * scaled.unit;
-        scatter.chi2 = chi2.map_or(scatter.chi2, |first| first[g]);
+        scatter.chi2 = solved.first_chi2[g];
     }
     let part = |rows: std::ops::Range<usize>, dof: f64| {
         let own = last.part(&covariance, &rows);

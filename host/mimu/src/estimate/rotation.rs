@@ -9,7 +9,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::chains::Chains;
-use super::least_squares::{Linearized, Observability, Reweighted};
+use super::least_squares::{Grouped, Linearized, Minimum, Observability, Reweighted, Solved};
 use super::{Estimated, Failure};
 use crate::observable::Observable;
 use crate::observation::turn::{Motion, Rest, Rotations, Turn, TurnError};
@@ -64,12 +64,21 @@ struct ByTurns<'a> {
     scale: ByTriad,
     rotations: Rotations,
     chains: Chains,
+    /// Covariance of C and o of the accelerometer.
+    of_accel: Covariance,
 }
 
 impl<'a> ByTurns<'a> {
     /// `size` is that of a row of C.
-    fn of(turns: &'a [Turn<'a>], rest: &'a [Rest], at_rest: Vector3<f64>, size: f64) -> Self {
+    fn of(
+        turns: &'a [Turn<'a>],
+        rest: &'a [Rest],
+        at_rest: Vector3<f64>,
+        size: f64,
+        of_accel: Covariance,
+    ) -> Self {
         Self {
+            of_accel,
             turns,
             rest,
             at_rest,
@@ -109,41 +118,20 @@ impl<'a> ByTurns<'a> {
             .collect()
     }
 
-    /// Unweighted residuals and derivatives: rad, then rad/s.
-    fn linearize(&self, p: &DVector<f64>) -> Linearized {
-        let model = self.model(p);
-        let errors = self.errors(&model);
-        let rows = (self.chains).rows(self.turns, &errors, self.rest, &model, &self.at_rest);
-        let mut out = Linearized::zeros(rows.len(), self.parameters());
-        for (row, found) in rows.iter().enumerate() {
-            out.residuals[row] = found.residual;
-            let own = found.by.component_mul(&self.scale).transpose();
-            out.jacobian.view_mut((row, 0), (1, 12)).copy_from(&own);
-            for (place, by) in found.by_level() {
-                let column = PARAMETERS + place;
-                out.jacobian[(row, column)] = by;
-                out.residuals[row] += by * p[column];
-            }
-        }
-        out
+    /// How well the turns determine C.
+    fn shape(&self, found: &Minimum) -> Observability {
+        let turns = self.rows()[0];
+        Observability::of(&found.at.jacobian.rows(0, turns).columns(0, 9).into_owned())
     }
 
-    /// Known variances of the rows.
-    fn variances(&self, p: &DVector<f64>) -> Vec<f64> {
-        let c = self.model(p).matrix;
-        let squared = c.component_mul(&c);
-        let mean = squared.sum() / 3.0;
-        // In a chain the Earth's level rate is among the parameters.
-        let unknown = |chain: &Option<usize>| f64::from(u8::from(chain.is_none()));
-        let turns = self.turns.iter().zip(&self.chains.of_turn);
-        let turns =
-            turns.flat_map(|(t, chain)| [t.variance(mean) + unknown(chain) * t.earth_variance; 2]);
-        let rest = self.rest.iter().zip(&self.chains.of_rest);
-        let rest = rest.flat_map(|(o, chain)| {
-            let v = squared * o.variance + o.rate_variance * unknown(chain) + o.vertical_variance;
-            <[f64; 3]>::from(v)
-        });
-        turns.chain(rest).map(|v| v.max(1e-20)).collect()
+    /// What a unit of each of the accelerometer's parameters adds to those of `found`.
+    fn gain(&self, found: &Minimum, covariance: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut weighted = self.by_accelerometer(&found.parameters);
+        for (mut row, weight) in weighted.row_iter_mut().zip(&found.weights) {
+            row *= *weight;
+        }
+        let by_turns = found.at.jacobian.rows(0, self.rows()[0]);
+        covariance * by_turns.transpose() * weighted
     }
 
     /// Derivatives of the turns' residuals by C and o of the accelerometer.
@@ -170,58 +158,71 @@ impl<'a> ByTurns<'a> {
     }
 }
 
-/// A fit so far.
-struct Round {
-    parameters: DVector<f64>,
-    condition: f64,
-    /// Covariance of all parameters by the scatter of each group.
-    of_groups: [DMatrix<f64>; 2],
-    /// What a unit of each of the accelerometer's parameters adds to the gyro's.
-    gain: DMatrix<f64>,
-}
+impl Grouped<2> for ByTurns<'_> {
+    const SHARE: f64 = 1e-3;
+    /// The first weights are a guess.
+    const ROUNDS: usize = 2;
 
-/// One minimum with the weights of `groups`, which are then estimated again; and whether they have converged.
-fn round(
-    by: &ByTurns,
-    start: DVector<f64>,
-    accel: &Triad,
-    groups: &mut Reweighted<2>,
-) -> Result<(Round, bool), Failure> {
-    let lost = || Failure::NoSolution("the fit of the gyro to the turns does not converge".into());
-    let variances = by.variances(&start);
-    let found = groups
-        .minimize(start, &variances, |p| by.linearize(p))
-        .ok_or_else(lost)?;
-    let (last, turns) = (&found.at, by.rows()[0]);
-    let shape = Observability::of(&last.jacobian.rows(0, turns).columns(0, 9).into_owned());
-    if !shape.is_complete() {
-        return Err(undetermined(&shape));
+    /// Rad, then rad/s.
+    fn linearize(&self, p: &DVector<f64>) -> Linearized {
+        let model = self.model(p);
+        let errors = self.errors(&model);
+        let rows = (self.chains).rows(self.turns, &errors, self.rest, &model, &self.at_rest);
+        let mut out = Linearized::zeros(rows.len(), self.parameters());
+        for (row, found) in rows.iter().enumerate() {
+            out.residuals[row] = found.residual;
+            let own = found.by.component_mul(&self.scale).transpose();
+            out.jacobian.view_mut((row, 0), (1, 12)).copy_from(&own);
+            for (place, by) in found.by_level() {
+                let column = PARAMETERS + place;
+                out.jacobian[(row, column)] = by;
+                out.residuals[row] += by * p[column];
+            }
+        }
+        out
     }
-    let covariance = last.covariance()?;
-    // Errors of the accelerometer's calibration are common to all turns. They go into the parameters in full, and into the size that residuals
-    // may have, but not into the weights.
-    let by_accel = by.by_accelerometer(&found.parameters);
-    let mut weighted = by_accel.clone();
-    for (mut row, weight) in weighted.row_iter_mut().zip(&found.weights) {
-        row *= *weight;
+
+    fn variances(&self, p: &DVector<f64>) -> Vec<f64> {
+        let c = self.model(p).matrix;
+        let squared = c.component_mul(&c);
+        let mean = squared.sum() / 3.0;
+        // In a chain the Earth's level rate is among the parameters.
+        let unknown = |chain: &Option<usize>| f64::from(u8::from(chain.is_none()));
+        let turns = self.turns.iter().zip(&self.chains.of_turn);
+        let turns =
+            turns.flat_map(|(t, chain)| [t.variance(mean) + unknown(chain) * t.earth_variance; 2]);
+        let rest = self.rest.iter().zip(&self.chains.of_rest);
+        let rest = rest.flat_map(|(o, chain)| {
+            let v = squared * o.variance + o.rate_variance * unknown(chain) + o.vertical_variance;
+            <[f64; 3]>::from(v)
+        });
+        turns.chain(rest).map(|v| v.max(1e-20)).collect()
     }
-    let gain = &covariance * last.jacobian.rows(0, turns).transpose() * weighted;
-    let rows = groups.rows.each_ref();
-    let of_groups = rows.map(|rows| last.part(&covariance, rows));
-    let of_accel = DMatrix::from_fn(12, 12, |i, j| accel.inverse_covariance[(i, j)]);
-    let common = (&by_accel * of_accel).component_mul(&by_accel).column_sum();
-    let mut allowed = variances;
-    for (allowed, common) in allowed.iter_mut().zip(&common) {
-        *allowed += common;
+
+    /// Errors of the accelerometer's calibration are common to all turns. They go into the parameters in full, and into the size that residuals
+    /// may have, but not into the weights.
+    fn allowed(&self, found: &Minimum, mut variances: Vec<f64>) -> Vec<f64> {
+        let by_accel = self.by_accelerometer(&found.parameters);
+        let common = (&by_accel * self.of_accel)
+            .component_mul(&by_accel)
+            .column_sum();
+        for (allowed, common) in variances.iter_mut().zip(&common) {
+            *allowed += common;
+        }
+        variances
     }
-    let converged = groups.update(&found, &covariance, &allowed, 1e-3);
-    let round = Round {
-        parameters: found.parameters,
-        condition: shape.condition,
-        of_groups,
-        gain,
-    };
-    Ok((round, converged))
+
+    fn check(&self, found: &Minimum) -> Result<(), Failure> {
+        let shape = self.shape(found);
+        match shape.is_complete() {
+            true => Ok(()),
+            false => Err(undetermined(&shape)),
+        }
+    }
+
+    fn lost(&self) -> Failure {
+        Failure::NoSolution("the fit of the gyro to the turns does not converge".into())
+    }
 }
 
 fn undetermined(shape: &Observability) -> Failure {
@@ -235,9 +236,6 @@ fn undetermined(shape: &Observability) -> Failure {
         add: "add turns about every axis, with that axis level and slanted: gravity does not show a turn about the vertical".into(),
     }
 }
-
-/// Most rounds.
-const ROUNDS: usize = 30;
 
 /// Fits `ω = C u + o` to the turns and to the dwells (`rest`) together.
 ///
@@ -271,9 +269,11 @@ pub fn estimate(
             )
         })?,
     };
-    let by = ByTurns::of(turns, rest, at_rest, first.norm() / 3f64.sqrt());
+    let of_accel = Covariance::from_fn(|i, j| accel.inverse_covariance[(i, j)]);
+    let size = first.norm() / 3f64.sqrt();
+    let by = ByTurns::of(turns, rest, at_rest, size, of_accel);
     let [n_turns, n_rest] = by.rows();
-    let mut p = by.start(&first);
+    let p = by.start(&first);
     // The first weights: half a degree, and the scatter of the dwells.
     let residuals = by.linearize(&p).residuals;
     let of_rest = residuals.rows(n_turns, n_rest).norm_squared() / n_rest as f64;
@@ -281,22 +281,20 @@ pub fn estimate(
         [0..n_turns, n_turns..n_turns + n_rest],
         [0.5f64.to_radians().powi(2), of_rest],
     );
-    let mut count = 0;
-    let last = loop {
-        let (found, converged) = round(&by, p, accel, &mut groups)?;
-        count += 1;
-        if converged && count > 1 || count == ROUNDS {
-            break found;
+    let Solved {
+        found, covariance, ..
+    } = groups.solve(&by, p)?;
+    let (inverse, change) = by.about_zero(&found.parameters);
+    let own = groups.rows.iter().zip(&groups.scatter);
+    let own = own.map(|(rows, group)| {
+        let own = found.at.part(&covariance, rows);
+        Part {
+            covariance: Covariance::from_fn(|i, j| own[(i, j)]),
+            dof: group.variance_dof(),
         }
-        p = found.parameters;
-    };
-    let (inverse, change) = by.about_zero(&last.parameters);
-    let own = last.of_groups.iter().zip(&groups.scatter);
-    let own = own.map(|(c, group)| Part {
-        covariance: Covariance::from_fn(|i, j| c[(i, j)]),
-        dof: group.variance_dof(),
     });
-    let gain = Covariance::from_fn(|i, j| last.gain[(i, j)]);
+    let gain = by.gain(&found, &covariance);
+    let gain = Covariance::from_fn(|i, j| gain[(i, j)]);
     let of_accelerometer = accel.inverse_parts();
     let shared = of_accelerometer.iter().map(|part| part.seen_by(&gain));
     let parts = own.chain(shared).map(|part| part.seen_by(&change));
@@ -311,7 +309,7 @@ pub fn estimate(
             .into_iter()
             .zip(groups.scatter)
             .collect(),
-        condition: last.condition,
+        condition: by.shape(&found).condition,
         delays: None,
         earth: Vec::new(),
         notes: Vec::new(),

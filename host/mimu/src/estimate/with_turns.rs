@@ -12,7 +12,7 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{DVector, Matrix3, SMatrix, Vector3};
 
-use super::least_squares::{Linearized, Reweighted};
+use super::least_squares::{Grouped, Linearized, Reweighted, Solved};
 use super::{Estimated, Failure, Observation, lower_triangular};
 use crate::observable::Observable;
 use crate::observation::magnitude::Magnitude;
@@ -103,7 +103,35 @@ impl<'a> Scaled<'a> {
         }
     }
 
-    /// Residuals without weights: share of gravity, rad, rad/s.
+    /// The accelerometer in SI, and the derivatives of its twelve numbers by the nine parameters.
+    fn to_si(&self, p: &DVector<f64>) -> (Affine<f64>, SMatrix<f64, 12, 9>) {
+        let g = self.data.gravity;
+        let Affine { matrix, offset } = self.data.accel;
+        let mut by = SMatrix::<f64, 12, 9>::zeros();
+        for (k, parameter) in LOWER.into_iter().enumerate() {
+            match place(parameter) {
+                (row, Some(column)) => {
+                    for m in 0..3 {
+                        by[(3 * row + m, k)] += matrix[(column, m)];
+                    }
+                    by[(9 + row, k)] += offset[column];
+                }
+                (row, None) => by[(9 + row, k)] = g,
+            }
+        }
+        let change = self.models(p).accel;
+        let inverse = Affine {
+            matrix: change.matrix * matrix,
+            offset: change.matrix * offset + change.offset * g,
+        };
+        (inverse, by)
+    }
+}
+
+impl Grouped<3> for Scaled<'_> {
+    const SHARE: f64 = 1e-3;
+
+    /// Share of gravity, rad, rad/s.
     fn linearize(&self, p: &DVector<f64>) -> Linearized {
         let JointFit {
             poses,
@@ -159,7 +187,6 @@ impl<'a> Scaled<'a> {
         out
     }
 
-    /// Known variances of the rows, in the units of the residuals.
     fn variances(&self, p: &DVector<f64>) -> Vec<f64> {
         let c = self.models(p).gyro.matrix;
         let squared = c.component_mul(&c);
@@ -176,28 +203,8 @@ impl<'a> Scaled<'a> {
         all.map(|v| v.max(1e-20)).collect()
     }
 
-    /// The accelerometer in SI, and the derivatives of its twelve numbers by the nine parameters.
-    fn to_si(&self, p: &DVector<f64>) -> (Affine<f64>, SMatrix<f64, 12, 9>) {
-        let g = self.data.gravity;
-        let Affine { matrix, offset } = self.data.accel;
-        let mut by = SMatrix::<f64, 12, 9>::zeros();
-        for (k, parameter) in LOWER.into_iter().enumerate() {
-            match place(parameter) {
-                (row, Some(column)) => {
-                    for m in 0..3 {
-                        by[(3 * row + m, k)] += matrix[(column, m)];
-                    }
-                    by[(9 + row, k)] += offset[column];
-                }
-                (row, None) => by[(9 + row, k)] = g,
-            }
-        }
-        let change = self.models(p).accel;
-        let inverse = Affine {
-            matrix: change.matrix * matrix,
-            offset: change.matrix * offset + change.offset * g,
-        };
-        (inverse, by)
+    fn lost(&self) -> Failure {
+        Failure::NoSolution("the fit to the magnitudes and the turns does not converge".into())
     }
 }
 
@@ -205,35 +212,22 @@ impl JointFit<'_> {
     /// Fits both and returns the accelerometer.
     pub fn estimate(&self) -> Result<Estimated, Failure> {
         let scaled = Scaled::of(self);
-        let linearize = |p: &DVector<f64>| scaled.linearize(p);
-        let lost = || {
-            Failure::NoSolution("the fit to the magnitudes and the turns does not converge".into())
-        };
-        let mut p = scaled.start();
+        let start = scaled.start();
         // The first weights: 5 milli-g, half a degree, and the scatter of the dwells.
         let Scaled { rows, from, .. } = scaled;
-        let r = linearize(&p).residuals;
+        let r = scaled.linearize(&start).residuals;
         let of_rest = r.rows(from[2], rows[2]).norm_squared() / rows[2].max(1) as f64;
         let groups = [0, 1, 2].map(|g| from[g]..from[g] + rows[g]);
         let mut groups = Reweighted::new(groups, [2.5e-5, 7.6e-5, of_rest]);
-        let mut first_chi2 = None;
-        let mut round = 0;
-        let (found, covariance) = loop {
-            let variances = scaled.variances(&p);
-            let found = groups.minimize(p, &variances, linearize).ok_or_else(lost)?;
-            let covariance = found.at.covariance()?;
-            let converged = groups.update(&found, &covariance, &variances, 1e-3);
-            first_chi2.get_or_insert(groups.scatter[0].chi2);
-            round += 1;
-            if converged || round == 30 {
-                break (found, covariance);
-            }
-            p = found.parameters;
-        };
+        let Solved {
+            found,
+            covariance,
+            first_chi2,
+        } = groups.solve(&scaled, start)?;
         let p = &found.parameters;
         let c = scaled.models(p).accel.matrix;
         if (0..3).any(|k| !(c[(k, k)] > 0.0)) {
-            return Err(lost());
+            return Err(scaled.lost());
         }
         // Of the accelerometer's parameters alone, whose columns share one unit. Those of the gyro have others.
         let own = covariance.view((0, 0), (ACCEL, ACCEL)).into_owned();
@@ -253,7 +247,7 @@ impl JointFit<'_> {
             .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
         let mut magnitude = groups.scatter[0];
         magnitude.extra_variance *= self.gravity * self.gravity;
-        magnitude.chi2 = first_chi2.unwrap_or(magnitude.chi2);
+        magnitude.chi2 = first_chi2[0];
         Ok(Estimated {
             triad,
             scatter: vec![(Observable::Magnitude, magnitude)],
