@@ -21,10 +21,11 @@ def several(recordings: Recording | Sequence[Recording]) -> list[Recording]:
 def read(
     *files: Path,
     output: Path | None = None,
-    reference: str = "gravity",
+    reference: str | None = None,
     gravity: float | None = None,
     latitude: float | None = None,
     raw_unit: str | None = None,
+    units: str | None = None,
     columns: str | Sequence[str] | None = None,
     preset: str | None = None,
     rate_hz: float | None = None,
@@ -57,6 +58,10 @@ def read(
     ``files``: a folder with ``recording.toml``, which takes no other argument; or text, Parquet, bags of ROS, logs of PX4 and
     ArduPilot. The later files are joined onto the times of the first.
 
+    Columns and units that are not given are found in the file: by the names of its columns, by gravity at rest, and by how the gyro's turns move
+    gravity. What the file does not show is asked: the :class:`mimu.Error` says what to add. ``units="g,deg/s"`` says the units of both sensors.
+    ``reference`` is ``"gravity"`` unless there are known inputs.
+
     ``columns`` is one list for each file, ``"t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,-"`` from the left or
     ``"gyro_x=wx,t_s=time"`` by the names of the header. ``raw_unit`` is ``"V"``, ``"count"`` or ``"SI"``; ``gravity`` is in m/s²,
     ``latitude`` in degrees, ``rate_hz`` in samples a second, ``step_gap`` in seconds. ``scale``, ``offset``, ``zero`` and
@@ -71,7 +76,7 @@ def read(
     if len(files) == 1 and os.path.isdir(files[0]) and os.path.exists(os.path.join(files[0], "recording.toml")):
         return _mimu.open(files[0])
     options: dict[str, Any] = dict(
-        reference=reference, gravity=gravity, latitude=latitude, raw_unit=raw_unit, columns=columns, preset=preset, rate_hz=rate_hz,
+        reference=reference, gravity=gravity, latitude=latitude, raw_unit=raw_unit, units=units, columns=columns, preset=preset, rate_hz=rate_hz,
         time_unit=time_unit, scale=scale, offset=offset, zero=zero, twos_complement=twos_complement, signed_low_byte=signed_low_byte,
         where=where, rows=rows, topic=topic, instance=instance, means=means, sequence=sequence, faces=bool(faces), step_gap=step_gap, inputs=inputs,
         rate_dps=rate_dps, rate_error=rate_error, separator=separator, comment=comment, skip_broken=skip_broken, device=device, format=format, replace=replace,

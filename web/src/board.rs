@@ -6,7 +6,8 @@ use mimu_recording::error::{Error, Result};
 use mimu_wizard::text_line::numbers;
 use serde::Serialize;
 
-use crate::columns::{Guess, Units, guess};
+use mimu_recording::Decimal;
+use mimu_recording::look::{Guess, Units, guess};
 
 /// Last lines that are examined; earlier ones may be a greeting.
 const LOOKED_AT: usize = 200;
@@ -103,7 +104,7 @@ fn look(text: &str, seconds: f64) -> Lines {
             ],
             ..Guess::default()
         },
-        false => guess("board", &found.names, &rows),
+        false => guess("board", &found.names, &[], &rows),
     };
     let column = |(at, role): (usize, &&'static str)| match *role {
         "accel_x" => "ax",
@@ -114,9 +115,9 @@ fn look(text: &str, seconds: f64) -> Lines {
         "gyro_z" => "gz",
         "temp_c" => "temp_c",
         "t_s" => match guessed.time_unit {
-            Some("us") => "t_us",
-            Some("ms") => "t_ms",
-            Some("s") => "t_s",
+            Some(Decimal::Microsecond) => "t_us",
+            Some(Decimal::Millisecond) => "t_ms",
+            Some(Decimal::Second) => "t_s",
             _ => clock((rows[rows.len() - 1][at] - rows[0][at]) / seconds),
         },
         _ => "-",

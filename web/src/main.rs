@@ -9,7 +9,6 @@
 //! | any other | what `mimu` prints |
 
 mod board;
-mod columns;
 mod poses;
 mod session;
 
@@ -20,6 +19,7 @@ use mimu::calibration::Calibration;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
 use mimu_recording::error::{Error, Result};
+use mimu_recording::look::{Guess, Units, guess};
 use mimu_recording::{ColumnList, Preset, Preview, Recording, preview};
 use serde::Serialize;
 
@@ -77,7 +77,7 @@ struct Dropped {
     preset: Option<Recognised>,
     files: Vec<DroppedFile>,
     /// Units of the readings.
-    units: columns::Units,
+    units: Units,
 }
 
 #[derive(Serialize)]
@@ -96,7 +96,7 @@ struct DroppedFile {
     #[serde(flatten)]
     preview: Preview,
     #[serde(flatten)]
-    guess: columns::Guess,
+    guess: Guess,
 }
 
 fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
@@ -113,8 +113,13 @@ fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
         preview.rows.truncate(SHOWN);
         let file = path.file_name().unwrap_or_default().to_string_lossy();
         let mut guess = match preview.log {
-            true => columns::Guess::default(),
-            false => columns::guess(&file, &preview.names, &rows[..rows.len().min(NAMED)]),
+            true => Guess::default(),
+            false => guess(
+                &file,
+                &preview.names,
+                &preview.units,
+                &rows[..rows.len().min(NAMED)],
+            ),
         };
         if let Some(list) = chosen.as_ref().and_then(|chosen| chosen.columns.get(k)) {
             guess.roles = roles(list, &preview.names);
@@ -136,8 +141,8 @@ fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
             .map(|scale| scale.to_string())
             .collect(),
     });
-    let guesses: Vec<&columns::Guess> = files.iter().map(|file| &file.guess).collect();
-    let units = columns::Units::of(&guesses, &numbers);
+    let guesses: Vec<&Guess> = files.iter().map(|file| &file.guess).collect();
+    let units = Units::of(&guesses, &numbers);
     Ok(Dropped {
         preset,
         files,

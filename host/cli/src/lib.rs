@@ -122,6 +122,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Completions(args) => cmd::completions::run(&args).map(done),
         Command::Man(args) => cmd::man::run(&args).map(done),
     };
+    reading::remove_logs();
     match ended {
         Ok(status) => status.code(),
         Err(error) => {

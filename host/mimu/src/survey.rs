@@ -114,7 +114,18 @@ pub struct Survey {
 /// If a ramp makes more than this share of the Allan variance at the longest time, the curve shows a drift there.
 const RAMP_SHARE: f64 = 0.5;
 
-/// Computes the noise of `recording`, in SI if its raw unit is SI or `calibration` gives the scale factors.
+/// Computes the noise of `recording`, a unit at rest, in SI if its raw unit is SI or `calibration` gives the scale factors.
+///
+/// ```no_run
+/// use mimu::{AllanOptions, Recording, allan};
+///
+/// let night = Recording::open("night".as_ref())?;
+/// let survey = allan(&night, None, AllanOptions::default(), |_| ())?;
+/// for channel in &survey.channels {
+///     println!("{}: {:?}", channel.name, channel.unit); // N, B and K of each, with intervals
+/// }
+/// # Ok::<(), mimu::Error>(())
+/// ```
 ///
 /// A channel in volts or counts is divided by the scale factor of its axis, without the rotation to body axes: the noise belongs to the
 /// sensor, and a misalignment of 1 % is 1e-4 of its variance.

@@ -59,7 +59,7 @@ pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, Decimal, Face,
     ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse,
     Preview, Role, Rounds, RowFilter, RowRange, Scale, SkippedLines, TimeSummary, TwosComplement,
-    Zero, import, is_log, preview,
+    Zero, import, is_log, look, preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};

@@ -43,17 +43,24 @@ pub struct Series {
 }
 
 /// The unit of the readings of a sensor.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct UnitFound {
     /// `m/s²`, `g`, `mg`, `rad/s`, `deg/s`, `mdeg/s` or `count`; `None` if the readings allow several, so that a person has to say.
     pub unit: Option<&'static str>,
     /// The evidence in a sentence, without a full stop.
     pub reason: String,
+    /// Usual magnitude of an accelerometer's readings.
+    #[serde(skip)]
+    pub size: Option<f64>,
 }
 
 impl UnitFound {
     fn new(unit: Option<&'static str>, reason: String) -> Self {
-        Self { unit, reason }
+        Self {
+            unit,
+            reason,
+            size: None,
+        }
     }
 }
 
@@ -82,7 +89,15 @@ fn shown(x: f64) -> String {
 ///
 /// The median magnitude of its readings is gravity, because a unit rests most of the time, and a hand accelerates it in all directions.
 pub fn accel_unit(accel: &Series, named: Option<&'static str>) -> UnitFound {
-    let Some(size) = median(accel.readings.iter().map(norm).collect()) else {
+    let size = median(accel.readings.iter().map(norm).collect());
+    UnitFound {
+        size,
+        ..of_size(accel, size, named)
+    }
+}
+
+fn of_size(accel: &Series, size: Option<f64>, named: Option<&'static str>) -> UnitFound {
+    let Some(size) = size else {
         return UnitFound::new(named, "there are no readings".into());
     };
     let near = |gravity: f64| (size / gravity - 1.0).abs() < OFF_GRAVITY;

@@ -15,6 +15,7 @@ use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs};
 use crate::output::{check_outputs, now, print, progress};
+use crate::reading::folder;
 use crate::status::Status;
 
 #[derive(Args)]
@@ -106,7 +107,7 @@ pub fn run(args: &AllanArgs) -> Result<Status> {
     let recordings: Vec<Recording> = args
         .recordings
         .iter()
-        .map(|r| Recording::open(r))
+        .map(|r| Recording::open(&folder(r)?))
         .collect::<Result<_>>()?;
     let manifests: Vec<PathBuf> = args
         .recordings
@@ -115,6 +116,7 @@ pub fn run(args: &AllanArgs) -> Result<Status> {
         .collect();
     let mut inputs: Vec<&Path> = manifests.iter().map(PathBuf::as_path).collect();
     inputs.extend(recordings.iter().map(|r| r.samples.as_path()));
+    inputs.extend(args.recordings.iter().map(PathBuf::as_path));
     inputs.extend(args.calibration.as_deref());
     let outputs = [
         args.plot.as_deref(),

@@ -10,6 +10,7 @@ use mimu_recording::{MANIFEST_FILE, Recording, SampleFormat};
 
 use crate::arguments::JsonArgs;
 use crate::output::{check_outputs, print, progress};
+use crate::reading::folder;
 use crate::report;
 
 #[derive(Args)]
@@ -34,9 +35,14 @@ pub(crate) struct ApplyArgs {
 
 pub(crate) fn run(args: &ApplyArgs) -> Result<()> {
     let calibration = Calibration::read(&args.calibration)?;
-    let recording = Recording::open(&args.recording)?;
+    let recording = Recording::open(&folder(&args.recording)?)?;
     let manifest = args.recording.join(MANIFEST_FILE);
-    let inputs = [manifest.as_path(), &recording.samples, &args.calibration];
+    let inputs = [
+        manifest.as_path(),
+        &recording.samples,
+        &args.calibration,
+        &args.recording,
+    ];
     check_outputs(&[args.json.file()], &inputs)?;
     let bar = progress("compensating");
     let done = apply(

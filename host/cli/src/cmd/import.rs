@@ -1,5 +1,6 @@
 //! `mimu import`.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -7,6 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mimu::quantity::normal_gravity;
 use mimu::warning::Warning;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::look::{Given, Look};
 use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
     BrokenLimit, ColumnList, CommentSigns, Decimal, Face, ImportOptions, ImportSummary, Offset,
@@ -77,6 +79,10 @@ pub(crate) struct ImportArgs {
     /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²) [default of bags, logs and most presets: SI]
     #[arg(long, value_name = "UNIT")]
     raw_unit: Option<RawUnit>,
+    /// Units of the readings in the file, which are converted to SI: one of g, mg, m/s2 and one of deg/s, mdeg/s, rad/s; or count, or V
+    /// [default: by the names, by gravity at rest and by its turns]
+    #[arg(long, value_name = "G,DEG/S", conflicts_with_all = ["raw_unit", "means"])]
+    units: Option<String>,
     /// Topic of a bag (sensor_msgs/Imu; give two if gyro and accelerometer have one each) or of a PX4 log (sensor_gyro, sensor_combined,
     /// vehicle_imu), or message of an ArduPilot log (IMU, GYR, IMT) [default: the only or the best one]
     #[arg(long)]
@@ -85,9 +91,10 @@ pub(crate) struct ImportArgs {
     #[arg(long, value_name = "N")]
     instance: Option<u32>,
     /// What is known of the input: table (ref_ columns or --inputs), gravity (its magnitude at rest), or turntable-rate (the magnitude of
-    /// the rate, as on a record player; needs --rate-dps and --rate-error)
+    /// the rate, as on a record player; needs --rate-dps and --rate-error) [default: gravity, unless there are ref_ columns, --inputs or
+    /// --rate-dps]
     #[arg(long)]
-    reference: Reference,
+    reference: Option<Reference>,
     /// Magnitudes of the turntable's rates, deg/s: 200 for 33 1/3 rpm, 270 for 45 rpm. The readings show which dwell has which rate, unless
     /// it is given by number, label or file name (`edge=270`, `rest=0`)
     #[arg(
@@ -201,6 +208,70 @@ fn faces(args: &ImportArgs) -> Result<(Vec<PathBuf>, Vec<Face>)> {
     Ok(both.into_iter().map(|(face, path)| (path, face)).unzip())
 }
 
+/// Looks at files whose columns nobody has named, and asks on a terminal about what they do not show.
+///
+/// # Errors
+/// What is still open, all at once, with the command to complete.
+fn look_at(args: &ImportArgs, files: &[PathBuf]) -> Result<Look> {
+    let converted = !args.twos_complement.is_empty()
+        || !args.zero.is_empty()
+        || !args.signed_low_byte.is_empty();
+    let scaled = args.scale.iter().any(Scale::is_of_readings);
+    let mut given = Given {
+        raw_unit: args.raw_unit.is_some() || converted || scaled,
+        rate: args.rate_hz.is_some(),
+        time_unit: args.time_unit,
+        ..Given::default()
+    };
+    if let Some(units) = &args.units {
+        given = given.with_units(units)?;
+    }
+    // Files of a sequence are alike; joined ones are looked at together.
+    let together = match args.sequence || args.faces {
+        true => &files[..files.len().min(1)],
+        false => files,
+    };
+    let look = Look::at(together, args.separator, &given)?;
+    let typed: Vec<String> = std::env::args().skip(1).map(quoted).collect();
+    let import = typed.first().is_some_and(|first| first == "import");
+    let command = match import {
+        true => format!("mimu {}", typed.join(" ")),
+        false => format!(
+            "mimu import {} -o DIR",
+            quoted(files[0].display().to_string())
+        ),
+    };
+    match look.refusal(&files[0], &command) {
+        Some(error) => Err(error),
+        None => Ok(look),
+    }
+}
+
+/// An argument as a shell takes it.
+fn quoted(argument: String) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_=+./,:@%".contains(c);
+    match !argument.is_empty() && argument.chars().all(plain) {
+        true => argument,
+        false => format!("'{}'", argument.replace('\'', r"'\''")),
+    }
+}
+
+/// Imports a log that was given in place of a recording, with nothing said about it.
+pub(crate) fn imported_log(file: &Path, out: &Path) -> Result<ImportSummary> {
+    #[derive(clap::Parser)]
+    struct Alone {
+        #[command(flatten)]
+        import: ImportArgs,
+    }
+    let words = [
+        OsString::from("import"),
+        file.into(),
+        "-o".into(),
+        out.into(),
+    ];
+    imported(<Alone as clap::Parser>::parse_from(words).import)
+}
+
 pub(crate) fn run(args: ImportArgs) -> Result<()> {
     let json = JsonArgs {
         path: args.json.path.clone(),
@@ -212,6 +283,24 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
 /// Makes the recording, and prints nothing.
 pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
     let (files, faces) = faces(&args)?;
+    let chosen = match (&args.preset, args.columns.is_empty()) {
+        (None, false) => None,
+        (named, _) => Preset::choose(*named, &files, args.separator)?,
+    };
+    let logs = files.iter().all(|file| is_log(file));
+    let looked = match (
+        chosen.is_some() || logs || args.means,
+        args.columns.is_empty(),
+    ) {
+        (false, true) => Some(look_at(&args, &files)?),
+        _ => None,
+    };
+    let known = args.inputs.is_some() || looked.as_ref().is_some_and(Look::has_reference);
+    let reference = args.reference.unwrap_or(match (args.rate_error, known) {
+        (Some(_), _) => Reference::TurntableRate,
+        (None, true) => Reference::Table,
+        (None, false) => Reference::Gravity,
+    });
     let (gravity, assumed) = match (args.gravity, args.latitude) {
         (Some(gravity), latitude) => (
             gravity,
@@ -220,22 +309,34 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
                 .map(|w| w.to_string()),
         ),
         (None, Some(latitude)) => (normal_gravity(latitude), None),
-        (None, None) if args.reference == Reference::Table => (9.80665, None),
+        (None, None) if reference == Reference::Table => (9.80665, None),
         (None, None) => (9.80665, Some("gravity is assumed to be 9.80665 m/s². It ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude".to_string())),
     };
-    let chosen = match (&args.preset, args.columns.is_empty()) {
-        (None, false) => None,
-        (named, _) => Preset::choose(*named, &files, args.separator)?,
-    };
-    let logs = files.iter().all(|file| is_log(file));
     let raw_unit = args
         .raw_unit
         .or(chosen.as_ref().and_then(|chosen| chosen.raw_unit))
         .or(logs.then_some(RawUnit::Si))
+        .or(looked.as_ref().and_then(|look| look.raw_unit))
         .ok_or_else(|| {
             let remedy = "give --raw-unit: V, count or SI (rad/s and m/s²)";
             Error::new("import", "the unit of the readings is unknown", remedy)
         })?;
+    let by_look = |args: &mut ImportArgs, look: &Look| {
+        // One list holds for all files that follow one another.
+        args.columns = look.columns();
+        if args.sequence || !faces.is_empty() {
+            args.columns.truncate(1);
+        }
+        args.scale.extend(look.scales.iter().cloned());
+        args.time_unit = args.time_unit.or(look.time_unit());
+        args.separator = args
+            .separator
+            .or(look.files.iter().find_map(|f| f.separator));
+    };
+    let mut args = args;
+    if let Some(look) = &looked {
+        by_look(&mut args, look);
+    }
     let options = ImportOptions {
         topics: args.topic,
         instance: args.instance,
@@ -264,7 +365,7 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         skip_broken: args.skip_broken.unwrap_or_default(),
         format: args.format,
         replace: args.replace,
-        ..ImportOptions::new(files, gravity, raw_unit, args.reference)
+        ..ImportOptions::new(files, gravity, raw_unit, reference)
     };
     let options = match chosen {
         Some(chosen) => options.with_preset(chosen),
@@ -277,11 +378,14 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         .map(|p| p.as_path())
         .collect();
     check_outputs(&[args.json.file()], &inputs)?;
+    let arguments = options.arguments();
     let bar = progress("importing");
     let mut summary = import(&options, &args.output, |share| {
         bar.set_position((share * 1000.0) as u64)
     })?;
     bar.finish_and_clear();
+    summary.taken = looked.map_or(Vec::new(), |look| look.words());
+    summary.arguments = arguments;
     summary.warnings.extend(assumed);
     let recognised = summary.time.first().filter(|time| time.recognised);
     if let Some(unit) = recognised.and_then(|time| time.unit)

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use mimu::quantity::{plural, significant};
 use mimu_recording::{ImportSummary, TimeSummary};
 
-use crate::report::text::warn;
+use crate::report::text::{warn, wrap};
 
 /// Result of `mimu import`.
 pub fn import_text(summary: &ImportSummary) -> String {
@@ -34,6 +34,18 @@ pub fn import_text(summary: &ImportSummary) -> String {
             out,
             "  read with the preset {}, {whence}: {}",
             preset.name, preset.title
+        );
+    }
+    if !summary.taken.is_empty() {
+        for line in &summary.taken {
+            wrap(&mut out, "  ", line);
+        }
+        let said = summary.arguments.iter().map(|a| shell(a));
+        let said: Vec<String> = said.collect();
+        wrap(
+            &mut out,
+            "  the same, said: ",
+            &format!("mimu import {}", said.join(" ")),
         );
     }
     for time in &summary.time {
@@ -83,6 +95,14 @@ pub fn import_text(summary: &ImportSummary) -> String {
     }
     warn(&mut out, summary.warnings.iter());
     out
+}
+
+/// An argument as a shell takes it.
+fn shell(argument: &str) -> String {
+    match argument.contains([' ', '(', ')', '[', ']', ';', '|', '\'', '*', '&', '#', '$']) {
+        true => format!("'{}'", argument.replace('\'', r"'\''")),
+        false => argument.to_owned(),
+    }
 }
 
 /// Findings about the time stamps of a file.

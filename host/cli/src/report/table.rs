@@ -22,6 +22,8 @@ pub(super) enum Cell {
     Number { si: f64, factor: f64 },
     /// A number with the half-width of its interval.
     Interval { si: f64, half: f64, factor: f64 },
+    /// A number with the ends of its interval.
+    Between { si: f64, ends: [f64; 2] },
     /// A count.
     Count(u64),
     /// Nothing.
@@ -44,6 +46,10 @@ impl Cell {
             Self::Number { si, .. } if !si.is_finite() => "-".into(),
             Self::Number { si, factor } => significant(si * factor),
             Self::Interval { si, half, factor } => plus_minus(si * factor, half * factor),
+            Self::Between { si, ends } => {
+                let [value, low, high] = [*si, ends[0], ends[1]].map(significant);
+                format!("{value} ({low} to {high})")
+            }
             Self::Count(count) => count.to_string(),
             Self::Empty => String::new(),
         }
@@ -55,7 +61,7 @@ impl Cell {
             Self::Words(_) => html! { (written(&text)) },
             Self::Code(_) => html! { code { (text) } },
             Self::Number { si, .. } if !si.is_finite() => html! { "–" },
-            Self::Number { si, .. } | Self::Interval { si, .. } => {
+            Self::Number { si, .. } | Self::Interval { si, .. } | Self::Between { si, .. } => {
                 html! { data value=(si) { (written(&text)) } }
             }
             Self::Count(_) | Self::Empty => html! { (text) },

@@ -94,10 +94,10 @@ pub(super) fn errors(result: &ThermalResult) -> Table {
         let unit = readable::error(&s.unit);
         let known = |v: Option<f64>| Cell::known(v, unit.factor);
         let lag = match &s.lag_s {
-            Some(lag) => {
-                let [value, lower, upper] = [lag.value, lag.lower, lag.upper].map(significant);
-                format!("{value} ({lower} to {upper})")
-            }
+            Some(lag) => Cell::Between {
+                si: lag.value,
+                ends: [lag.lower, lag.upper],
+            },
             None => "-".into(),
         };
         let first = [
@@ -105,7 +105,7 @@ pub(super) fn errors(result: &ThermalResult) -> Table {
             known(s.held_out_rms),
         ];
         let without = verified.then(|| known(without_bias(s)));
-        let last = [known(s.rms), known(s.noise_floor), lag.into()];
+        let last = [known(s.rms), known(s.noise_floor), lag];
         table.row(first.into_iter().chain(without).chain(last));
     }
     table

@@ -170,10 +170,21 @@ fn text(node: roxmltree::Node) -> String {
 }
 
 /// All numbers below `node`: the value, and the text for people.
+/// Values and texts of the numbers. Where the first cell of a row gives the unit of all of them, it is added to the text.
 fn numbers(node: roxmltree::Node) -> Vec<(f64, String)> {
+    let unit_of_row = |n: roxmltree::Node| {
+        let row = n.ancestors().find(|n| n.tag_name().name() == "tr")?;
+        let first = text(row.children().find(|n| n.is_element())?);
+        first.split_once(", ").map(|(_, unit)| unit.to_owned())
+    };
     node.descendants()
         .filter(|n| n.tag_name().name() == "data")
-        .map(|n| (n.attribute("value").unwrap().parse().unwrap(), text(n)))
+        .map(|n| {
+            let own = text(n);
+            let unit = unit_of_row(n).filter(|_| own.parse::<f64>().is_ok());
+            let shown = unit.map_or(own.clone(), |unit| format!("{own} {unit}"));
+            (n.attribute("value").unwrap().parse().unwrap(), shown)
+        })
         .collect()
 }
 

@@ -18,7 +18,7 @@ const EFFECTS: [(&str, &str, &str); 5] = [
     ),
     (
         "gyro_thermal_lag",
-        r#"form = { name = "lag_s", value = 90.0 }"#,
+        r#"nonlinear_parameter = { name = "lag_s", value = 90.0 }"#,
         r#"{ name = "z", value = 2e-3, unit = "rad/s/K" }"#,
     ),
     (

@@ -62,6 +62,16 @@ pub struct AppliedSensor {
 
 /// Writes `recording`, compensated by `calibration`, to `out`: rad/s and m/s². Known inputs are kept.
 ///
+/// ```no_run
+/// use mimu::{Calibration, Recording, SampleFormat, apply};
+///
+/// let calibration = Calibration::read("cal.toml".as_ref())?;
+/// let recording = Recording::open("flight".as_ref())?;
+/// let done = apply(&recording, &calibration, "flight-si".as_ref(), SampleFormat::Parquet, false, |_| ())?;
+/// println!("{} rows, {} gaps", done.rows, done.gaps);
+/// # Ok::<(), mimu::Error>(())
+/// ```
+///
 /// If one axis has no reading in a sample, or is at its rail, the input of no axis is known: the three cells are empty. A calibration for another raw
 /// unit is refused, and so is one with effects for which the recording lacks a channel or a temperature.
 pub fn apply(

@@ -79,7 +79,23 @@ pub struct Verification {
     pub warnings: Vec<Warning>,
 }
 
-/// Judges `calibration` by a recording.
+/// Judges `calibration`, raw to SI, by a recording that it was not made from: rms errors in SI and what explains them.
+///
+/// ```no_run
+/// use mimu::{Calibration, Finding, JudgementKind, Prepared, Recording, Sensor, verify};
+///
+/// let recording = Recording::open("another-day".as_ref())?;
+/// let prepared = Prepared::read(&recording, Finding::default(), |_| ())?;
+/// let found = verify(&prepared, &Calibration::read("cal.toml".as_ref())?)?;
+/// if let Some(accel) = &found.sensors[Sensor::Accel] {
+///     println!("{} m/s² where noise explains {}", accel.rms, accel.noise_floor);
+/// }
+/// assert_eq!(found.judgement.kind, JudgementKind::Good, "{}", found.judgement);
+/// # Ok::<(), mimu::Error>(())
+/// ```
+///
+/// # Errors
+/// A recording of another unit, or in another unit of readings; means of poses with a calibration that has effects; no usable dwell.
 pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verification> {
     let same_recording = calibration.recording.sha256.as_ref() == Some(&prepared.condensed.sha256);
     let mut warnings = warnings_before(prepared, calibration, same_recording)?;

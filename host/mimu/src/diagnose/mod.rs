@@ -539,7 +539,21 @@ impl Found<'_> {
     }
 }
 
-/// Diagnoses a unit.
+/// Finds the physical effects behind what a calibration leaves, with their coefficients in SI.
+///
+/// ```no_run
+/// use mimu::{Finding, Options, Prepared, Recording, Recordings, Verdict, diagnose};
+///
+/// let recording = Recording::open("by-hand".as_ref())?;
+/// let prepared = Prepared::read(&recording, Finding::default(), |_| ())?;
+/// let found = diagnose(Recordings::from(prepared), Options::default())?;
+/// if found.verdict == Verdict::Explained {
+///     for effect in &found.effects {
+///         println!("{}: {:?} ± {:?} in SI (one sigma)", effect.id(), effect.values, effect.sigmas);
+///     }
+/// }
+/// # Ok::<(), mimu::Error>(())
+/// ```
 ///
 /// The accelerometer comes first: without a table, its directions of gravity judge the gyro.
 pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {

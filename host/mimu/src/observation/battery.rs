@@ -50,8 +50,27 @@ impl Unit {
 /// Residuals, and for each the derivatives by the triads that it depends on.
 type Found = Vec<(f64, Vec<(Sensor, ByTriad)>)>;
 
-/// One observation of each kind. What is known of it is given in the body frame turned by the rotation.
-type Kind = (&'static str, Box<dyn Fn(&Unit, &Rotation3<f64>) -> Found>);
+type Residuals = dyn Fn(&Unit, &Rotation3<f64>) -> Found;
+
+/// One observation of a kind.
+struct Kind {
+    name: &'static str,
+    /// Its residuals, none of them zero, and their derivatives, none of them zero, by the triads of a unit. What is known of it is given in the body frame
+    /// turned by the rotation.
+    at: Box<Residuals>,
+    /// The unit at which its derivatives are compared: [`unit`], or one with small residuals if they are those of a small error.
+    unit: fn() -> Unit,
+}
+
+impl Kind {
+    fn new(name: &'static str, at: impl Fn(&Unit, &Rotation3<f64>) -> Found + 'static) -> Self {
+        Self {
+            name,
+            at: Box::new(at),
+            unit,
+        }
+    }
+}
 
 /// A unit with errors of some per cent, in volts.
 fn unit() -> Unit {
@@ -100,77 +119,78 @@ fn kinds() -> Vec<Kind> {
         let found = Magnitude::at(&unit.gyro, &raw, 2.0);
         vec![(found.residual(), vec![(Sensor::Gyro, found.block.by(0))])]
     };
-    let of_turn = move |unit: &Unit, _: &Rotation3<f64>| -> Found {
-        let pieces = increments();
-        let raw = [Vector3::new(1.7, 1.1, 2.2), Vector3::new(2.0, 2.3, 1.5)];
-        let [before, after] = raw.map(|raw| unit.accel.apply(&raw));
-        let turn = Turn {
-            from: 0,
-            to: 1,
-            increments: &pieces,
-            before,
-            after,
-            raw,
-            direction_variance: 0.0,
-            earth_variance: 0.0,
-            integral_variance: 0.0,
-            duration_s: 2.0,
-        };
-        let error = TurnError::at(&turn, &unit.gyro);
-        let by_accel = error.by_accel(&raw);
-        let each = (0..2).map(|k| {
-            let by = vec![
-                (Sensor::Gyro, error.block.by(k)),
-                (Sensor::Accel, by_accel[k]),
-            ];
-            (error.block.residual[k], by)
-        });
-        each.collect()
+    let turn = Kind {
+        // The derivatives of its direction error hold for a small one.
+        unit: agreeing,
+        ..Kind::new("turn", |unit, _| of_turn(unit))
     };
     vec![
-        ("vector", Box::new(of_vector)),
-        ("magnitude of force", Box::new(of_magnitude)),
-        ("magnitude of rate", Box::new(of_rate)),
-        ("turn", Box::new(of_turn)),
+        Kind::new("vector", of_vector),
+        Kind::new("magnitude of force", of_magnitude),
+        Kind::new("magnitude of rate", of_rate),
+        turn,
     ]
 }
 
-/// A unit at which the residual of the turn is small, as the derivatives of its direction error require: the accelerometer agrees with the gyro's turn.
-fn consistent(kind: &str) -> Unit {
-    let unit = unit();
-    match kind {
-        "turn" => Unit {
-            // The reading after the turn is where the turn takes the one before.
-            accel: agreeing(&unit),
-            ..unit
-        },
-        _ => unit,
-    }
+/// A turn, judged by the accelerometer's readings before and after it.
+fn of_turn(unit: &Unit) -> Found {
+    let pieces = increments();
+    let raw = [Vector3::new(1.7, 1.1, 2.2), Vector3::new(2.0, 2.3, 1.5)];
+    let [before, after] = raw.map(|raw| unit.accel.apply(&raw));
+    let turn = Turn {
+        from: 0,
+        to: 1,
+        increments: &pieces,
+        before,
+        after,
+        raw,
+        direction_variance: 0.0,
+        earth_variance: 0.0,
+        integral_variance: 0.0,
+        duration_s: 2.0,
+    };
+    let error = TurnError::at(&turn, &unit.gyro);
+    let by_accel = error.by_accel(&raw);
+    let each = (0..2).map(|k| {
+        let by = vec![
+            (Sensor::Gyro, error.block.by(k)),
+            (Sensor::Accel, by_accel[k]),
+        ];
+        (error.block.residual[k], by)
+    });
+    each.collect()
 }
 
-/// The accelerometer, turned a little so that one turn fits exactly.
-fn agreeing(unit: &Unit) -> Affine<f64> {
+/// A unit whose accelerometer is turned a little so that the turn fits: its reading after the turn is where the turn takes the one before.
+fn agreeing() -> Unit {
+    let unit = unit();
     let mut accel = unit.accel;
     for _ in 0..50 {
-        let kind = &kinds()[3];
-        let now = Unit { accel, ..*unit };
-        let found = (kind.1)(&now, &Rotation3::identity());
+        let found = of_turn(&Unit { accel, ..unit });
         // A step along the derivatives.
         let [a, b] = [&found[0], &found[1]];
-        let of = |f: &(f64, Vec<(Sensor, ByTriad)>)| f.1[1].1;
+        let of = |f: &(f64, Vec<(Sensor, ByTriad)>)| {
+            let own = f.1.iter().find(|(sensor, _)| *sensor == Sensor::Accel);
+            own.expect("a turn depends on the accelerometer").1
+        };
         let (ja, jb) = (of(a), of(b));
         let normal = nalgebra::Matrix2::new(ja.dot(&ja), ja.dot(&jb), ja.dot(&jb), jb.dot(&jb));
         let step = normal.try_inverse().unwrap() * nalgebra::Vector2::new(a.0, b.0);
         let change: ByTriad = ja * step.x + jb * step.y;
         accel = affine(&(parameters(&accel.matrix, &accel.offset) - change));
     }
-    accel
+    Unit { accel, ..unit }
 }
 
 #[test]
 fn derivatives_are_those_of_finite_differences() {
-    for (name, kind) in kinds() {
-        let unit = consistent(name);
+    for Kind {
+        name,
+        at: kind,
+        unit,
+    } in kinds()
+    {
+        let unit = unit();
         let here = Rotation3::identity();
         let found = kind(&unit, &here);
         for (row, (_, by)) in found.iter().enumerate() {
@@ -199,7 +219,7 @@ fn derivatives_are_those_of_finite_differences() {
 #[test]
 fn the_size_of_an_error_does_not_depend_on_the_frame() {
     let frame = Rotation3::from_euler_angles(0.4, -0.9, 2.1);
-    for (name, kind) in kinds() {
+    for Kind { name, at: kind, .. } in kinds() {
         let size = |unit: &Unit, frame: &Rotation3<f64>| -> f64 {
             kind(unit, frame).iter().map(|r| r.0 * r.0).sum()
         };
@@ -217,8 +237,13 @@ fn the_size_of_an_error_does_not_depend_on_the_frame() {
 #[test]
 fn the_covariance_by_the_derivatives_is_that_of_a_simulation() {
     const RUNS: u32 = 4000;
-    for (name, kind) in kinds() {
-        let unit = consistent(name);
+    for Kind {
+        name,
+        at: kind,
+        unit,
+    } in kinds()
+    {
+        let unit = unit();
         let here = Rotation3::identity();
         let found = kind(&unit, &here);
         let mut state = 1u64;

@@ -242,14 +242,15 @@ impl Rotations {
     }
 }
 
-/// The error of the direction of gravity after a turn: the rotation from the direction that a calibration predicts to the measured one.
+/// The error of the direction of gravity after a turn: the rotation from the direction that a calibration predicts to the measured one. About an axis
+/// across gravity it is positive if the gyro turns too far: the turn by the gyro minus the true one.
 #[derive(Debug, Clone, Copy)]
 pub struct TurnError {
     /// Transforms a direction from the body frame before the turn into that after it.
     pub rotation: Matrix3<f64>,
     /// Directions of the two components of the error, across the measured direction, body frame after the turn.
     pub sides: [Vector3<f64>; 2],
-    /// The two components, rad, and their derivatives by the gyro.
+    /// The two components, rad, and their derivatives by the gyro; those by the accelerometer are [`Self::by_accel`].
     pub block: Block<2>,
     /// Derivatives of each component by the force before and after the turn, rad/(m/s²).
     pub by_force: [[Vector3<f64>; 2]; 2],

@@ -14,6 +14,8 @@ pub enum Role {
     Column(Column),
     /// A running number, from which the time follows with the sample rate.
     Sample,
+    /// Nanoseconds beside the whole seconds of the time, as ROS writes them.
+    Nanoseconds,
     /// In a table of means: standard deviation of one sample of a raw column, index into [`RAW_COLUMNS`](crate::RAW_COLUMNS).
     Deviation(usize),
     /// In a table of means: how many samples were averaged, of one raw column or of all.
@@ -43,7 +45,7 @@ impl Role {
     pub fn all() -> impl Iterator<Item = Role> {
         Column::all()
             .map(Role::Column)
-            .chain([Role::Sample, Role::Averaged(None)])
+            .chain([Role::Sample, Role::Nanoseconds, Role::Averaged(None)])
             .chain((0..6).map(Role::Deviation))
             .chain((0..6).map(|c| Role::Averaged(Some(c))))
     }
@@ -53,13 +55,15 @@ impl Role {
         match self {
             Role::Column(column) => column.name(),
             Role::Sample => "sample",
+            Role::Nanoseconds => "t_ns",
             Role::Deviation(c) => DEVIATION_COLUMNS[c],
             Role::Averaged(None) => "averaged",
             Role::Averaged(Some(c)) => AVERAGED_COLUMNS[c],
         }
     }
 
-    fn from_name(name: &str) -> Option<Role> {
+    /// The role with this name.
+    pub fn from_name(name: &str) -> Option<Role> {
         Role::all().find(|role| role.name() == name)
     }
 }
@@ -170,6 +174,11 @@ impl Scale {
             }
             target => name == target,
         }
+    }
+
+    /// Whether it holds for readings of a sensor, not only for the time or the temperature.
+    pub fn is_of_readings(&self) -> bool {
+        Column::all().any(|column| matches!(column, Column::Raw(_)) && self.applies_to(column))
     }
 
     /// The scales of those columns for which `by_hand` has none. If it has some axes of a sensor, the scale is kept for the others.

@@ -171,6 +171,11 @@ impl ForeignFile {
             )
             .about(Argument::Means));
         }
+        if parquet && roles.contains(&Role::Nanoseconds) {
+            let problem = "nanoseconds beside seconds are read from text only";
+            let remedy = "give a column with the whole time, or convert the file to text";
+            return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
+        }
         let at = |role| roles.iter().position(|&other| other == role);
         let needs_rate = || {
             how.rate_hz.ok_or_else(|| {
@@ -191,7 +196,7 @@ impl ForeignFile {
             .iter()
             .enumerate()
             .filter_map(|(cell, role)| match role {
-                Role::Sample | Role::Deviation(_) | Role::Averaged(_) => None,
+                Role::Sample | Role::Nanoseconds | Role::Deviation(_) | Role::Averaged(_) => None,
                 Role::Column(Column::Time | Column::Step) => None,
                 Role::Column(column) => Some(Cell {
                     at: cell,

@@ -14,6 +14,7 @@ mod inputs;
 mod join;
 mod joined;
 mod log;
+pub mod look;
 mod options;
 #[cfg(feature = "parquet")]
 mod parquet_table;

@@ -255,7 +255,7 @@ impl ImportOptions {
 
     /// The options as arguments of `mimu import`, for the manifest. File names come without folders, which are useless on another machine and may be
     /// private.
-    pub(super) fn arguments(&self) -> Vec<String> {
+    pub fn arguments(&self) -> Vec<String> {
         let mut arguments: Vec<String> = self.files.iter().map(|file| file_name(file)).collect();
         if !self.faces.is_empty() {
             for (argument, face) in arguments.iter_mut().zip(&self.faces) {

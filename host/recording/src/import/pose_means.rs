@@ -216,7 +216,7 @@ fn pose(
                     }
                 }
             }
-            Role::Column(Column::Time | Column::Step) | Role::Sample => {}
+            Role::Column(Column::Time | Column::Step) | Role::Sample | Role::Nanoseconds => {}
         }
     }
     let numbers = pose

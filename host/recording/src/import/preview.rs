@@ -9,6 +9,7 @@ use super::binary::{refuse_binary, without_zeros};
 use super::comment_signs::CommentSigns;
 use super::log::is_log;
 use super::parquet_table;
+use super::text_table::split;
 use crate::cell;
 use crate::csv_file::BOM;
 use crate::error::{Error, Result};
@@ -24,6 +25,11 @@ pub struct Preview {
     pub log: bool,
     /// Names of the columns; empty if no line has them.
     pub names: Vec<String>,
+    /// Units in a line of their own below the names; empty if there is none.
+    pub units: Vec<String>,
+    /// The separator, if it is not one that an import recognises: that of lines with a label before each number.
+    #[serde(skip)]
+    pub separator: Option<Separator>,
     /// The first rows, cell by cell, as they are written.
     pub rows: Vec<Vec<String>>,
 }
@@ -43,9 +49,9 @@ pub fn preview(path: &Path, separator: Option<Separator>, most: usize) -> Result
     if ending.eq_ignore_ascii_case("parquet") {
         let (names, rows) = parquet_table::first_rows(path, most)?;
         return Ok(Preview {
-            log: false,
             names,
             rows,
+            ..Preview::default()
         });
     }
     let io = |error: std::io::Error| Error::io(path, &error);
@@ -60,7 +66,12 @@ pub fn preview(path: &Path, separator: Option<Separator>, most: usize) -> Result
     if head.len() as u64 >= enough - BOM.len() as u64 {
         lines.pop();
     }
-    of_lines(&lines, separator, most).ok_or_else(|| {
+    let found = of_lines(&lines, separator, most);
+    let found = found.or_else(|| match separator {
+        None => labelled(&lines, most),
+        Some(_) => None,
+    });
+    found.ok_or_else(|| {
         let problem = "no line is a row of numbers";
         let remedy =
             "give a text file with one sample a line, Parquet, or a log with its usual ending";
@@ -79,7 +90,7 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Optio
     let separator = separator.unwrap_or_else(|| Separator::detect(&shown));
     let cells = |line: &[u8]| {
         let mut record = csv::ByteRecord::new();
-        separator.split(line, &mut record);
+        split(separator, line, &mut record);
         let text = |cell: &[u8]| String::from_utf8_lossy(cell).into_owned();
         record.iter().map(text).collect::<Vec<String>>()
     };
@@ -102,11 +113,85 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Optio
         .rev()
         .map(|line| cells(signs.skipped(line)));
     let mut headers = above.filter(|row| row.len() == width && numbers(row) == 0);
+    let nearest = headers.next().unwrap_or_default();
+    let (names, units) = match headers.next() {
+        Some(names) if is_units(&nearest) => (names, nearest),
+        _ => (nearest, Vec::new()),
+    };
     let rows = lines[first..].iter().filter(|line| is_row(line));
     Some(Preview {
-        log: false,
-        names: headers.next().unwrap_or_default(),
+        names,
+        units,
         rows: rows.take(most).map(|line| cells(line)).collect(),
+        ..Preview::default()
+    })
+}
+
+/// Whether a line of words is one of units, below the names: short words, or brackets.
+fn is_units(row: &[String]) -> bool {
+    let unit = |cell: &&String| {
+        let cell = cell.trim();
+        let bracketed = cell.starts_with(['(', '[']) && cell.ends_with([')', ']']);
+        let known = [
+            "s", "ms", "us", "µs", "ns", "g", "mg", "m/s^2", "m/s2", "m/s²", "mps2", "deg/s",
+            "dps", "°/s", "mdps", "rad/s", "deg", "°C", "C", "degC", "uT", "µT", "Gauss", "gauss",
+            "V", "counts", "count", "LSB", "raw", "Pa", "hPa", "-", "",
+        ];
+        bracketed || known.contains(&cell)
+    };
+    let filled = row.iter().filter(|cell| !cell.trim().is_empty());
+    filled.clone().count() > 0
+        && row.iter().all(|cell| unit(&cell))
+        && filled.count() * 2 >= row.len()
+}
+
+/// Separators of lines with a label before each number: `ax:1,ay:2`, `AcX = 1 | AcY = 2`, `gx: 1 gy: 2`.
+const OF_LABELS: [&str; 8] = [":,", ":;", "=,", "=;", "=|", ":|", ": ", "= "];
+
+/// Lines whose cells alternate between a label, the same in all lines, and a number.
+fn labelled(lines: &[&[u8]], most: usize) -> Option<Preview> {
+    OF_LABELS.iter().find_map(|text| {
+        let separator: Separator = text.parse().ok()?;
+        let mut record = csv::ByteRecord::new();
+        let mut cells = |line: &[u8]| -> Vec<String> {
+            separator.split(line.trim_ascii(), &mut record);
+            let text = |cell: &[u8]| String::from_utf8_lossy(cell).into_owned();
+            record.iter().map(text).collect()
+        };
+        let number = |cell: &String| cell::number(cell.as_bytes()).is_ok_and(f64::is_finite);
+        let is_row = |row: &[String]| {
+            let (pairs, rest) = row.as_chunks::<2>();
+            !pairs.is_empty()
+                && rest.is_empty()
+                && pairs
+                    .iter()
+                    .all(|[label, value]| !number(label) && number(value))
+        };
+        let rows: Vec<Vec<String>> = lines
+            .iter()
+            .map(|line| cells(line))
+            .filter(|row| is_row(row))
+            .take(most)
+            .collect();
+        let first = rows.first()?;
+        let labels = |row: &[String]| row.iter().step_by(2).cloned().collect::<Vec<String>>();
+        let alike = rows
+            .iter()
+            .filter(|row| labels(row) == labels(first))
+            .count();
+        // A line of a title, or a cut one, has other labels.
+        if rows.len() < 2 || first.len() < 4 || 10 * alike < 9 * rows.len() {
+            return None;
+        }
+        let names = first
+            .chunks(2)
+            .flat_map(|pair| [String::new(), pair[0].clone()]);
+        Some(Preview {
+            names: names.collect(),
+            separator: Some(separator),
+            rows,
+            ..Preview::default()
+        })
     })
 }
 

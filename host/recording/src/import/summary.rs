@@ -26,6 +26,11 @@ pub struct ImportSummary {
     pub format: &'static str,
     /// Directory of the recording.
     pub recording: String,
+    /// Where nobody named the columns: what they were taken for, their units and why, in a line each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub taken: Vec<String>,
+    /// The arguments of `mimu import` that say the same without a look at the files.
+    pub arguments: Vec<String>,
     /// Rows written.
     pub rows: u64,
     /// Whether each row is the mean over a pose instead of a sample.

@@ -54,6 +54,8 @@ pub(super) struct TextTable {
     line_number: u64,
     /// Line of the first row.
     first_row: u64,
+    /// The line of words above it. A logger that starts again writes it once more.
+    header: Vec<u8>,
     bytes: u64,
     length: u64,
     record: csv::ByteRecord,
@@ -114,7 +116,7 @@ fn kind(line: &[u8], comments: CommentSigns) -> Kind {
 }
 
 /// Splits a line into cells. What a serial monitor puts before it (`15:04:23.125 -> 1,2,3`) is its first cell.
-fn split(separator: Separator, line: &[u8], cells: &mut csv::ByteRecord) {
+pub(super) fn split(separator: Separator, line: &[u8], cells: &mut csv::ByteRecord) {
     const ARROW: &[u8] = b" -> ";
     let arrow = line.windows(ARROW.len()).position(|part| part == ARROW);
     let Some(at) = arrow.filter(|at| calendar_time(&line[..*at]).is_some()) else {
@@ -176,6 +178,7 @@ impl TextTable {
             line: Vec::new(),
             line_number: 0,
             first_row: 0,
+            header: Vec::new(),
             bytes: 0,
             length,
             record: csv::ByteRecord::new(),
@@ -249,6 +252,9 @@ impl TextTable {
             match kind(&self.line, self.comments) {
                 Kind::Blank => self.skipped.blank += 1,
                 Kind::Comment => self.skipped.comment += 1,
+                Kind::Other if !self.header.is_empty() && self.line == self.header => {
+                    self.skipped.header += 1;
+                }
                 Kind::Other => {
                     split(self.separator, &self.line, &mut self.record);
                     // Spreadsheets end with rows of nothing but separators.
@@ -323,6 +329,7 @@ impl TextTable {
     fn parse(&self, line: u64, cells: &mut Cells) -> std::result::Result<(), Unreadable> {
         cells.numbers.clear();
         cells.step.clear();
+        let mut nanoseconds = None;
         for &(position, role) in &self.wanted {
             let cell = &self.record[position];
             if role == Role::Column(Column::Step) {
@@ -343,7 +350,13 @@ impl TextTable {
             if time {
                 cells.stamp = Stamp::in_cell(cell, number);
             }
+            if role == Role::Nanoseconds {
+                nanoseconds = Some(number);
+            }
             cells.numbers.push(number);
+        }
+        if let Some(nanoseconds) = nanoseconds {
+            cells.stamp = cells.stamp.with_nanoseconds(nanoseconds);
         }
         Ok(())
     }
@@ -400,6 +413,11 @@ impl TextTable {
                     split(self.separator, line, &mut record);
                     if self.take_line(&record, list, number, &mut search)? {
                         self.first_row = search.left_out.unwrap_or(number);
+                        let above = lines[..self.first_row as usize - 1].iter().rev();
+                        let mut words =
+                            above.filter(|l| matches!(kind(l, self.comments), Kind::Other));
+                        let words = words.next().map_or(&b""[..], |l| l);
+                        self.header = words.strip_suffix(b"\r").unwrap_or(words).to_vec();
                         return Ok(());
                     }
                 }

@@ -289,7 +289,7 @@ sensor = "gyro"
 about = ""
 formula = "x = C (u - S e) + o, e_i = sum of coefficient * regressor"
 direction = "raw to SI"
-form = { name = "time_constant_s", value = 200.0 }
+nonlinear_parameter = { name = "time_constant_s", value = 200.0 }
 coefficients = [{ name = "x", value = 0.1, sigma = 1e-6, unit = "rad/s" }]
 "#;
 

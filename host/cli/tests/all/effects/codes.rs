@@ -148,7 +148,7 @@ fn converters_that_make_no_sense_are_refused() {
         ),
         (
             "formula = \"x = C (u - S e)",
-            "form = { name = \"time_constant_s\", value = 3.0 }\nformula = \"x = C (u - S e)",
+            "nonlinear_parameter = { name = \"time_constant_s\", value = 3.0 }\nformula = \"x = C (u - S e)",
             "has no nonlinear parameter",
         ),
     ] {

@@ -79,7 +79,12 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
             "gyro_warm_up",
             "time_constant_s",
         ),
-        ("form = {", "# form = {", "gyro_warm_up", "time_constant_s"),
+        (
+            "nonlinear_parameter = {",
+            "# nonlinear_parameter = {",
+            "gyro_warm_up",
+            "time_constant_s",
+        ),
         (
             "x = C (u - S e) + o",
             "x = C (u + S e) + o",

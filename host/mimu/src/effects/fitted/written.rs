@@ -32,7 +32,7 @@ pub(super) struct WrittenEffect {
     direction: String,
     /// Its nonlinear parameter, if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    form: Option<WrittenParameter>,
+    nonlinear_parameter: Option<WrittenParameter>,
     /// For errors that depend on the code: one converter for all axes, or one for each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     converters: Vec<WrittenConverter>,
@@ -105,7 +105,7 @@ impl From<FittedEffect> for WrittenEffect {
             about: effect.candidate.about().into(),
             formula: FORMULA.into(),
             direction: DIRECTION.into(),
-            form: effect.nonlinear_parameter(),
+            nonlinear_parameter: effect.nonlinear_parameter(),
             converters: effect.converters(),
             coefficients: effect.coefficients(),
         }
@@ -225,15 +225,22 @@ impl WrittenEffect {
                 self.sensor, candidate.sensor
             ));
         }
-        let parameter = match (candidate.parameter().map(|p| p.name), &self.form) {
+        let parameter = match (
+            candidate.parameter().map(|p| p.name),
+            &self.nonlinear_parameter,
+        ) {
             (None, None) => 0.0,
             (Some(name), Some(f)) if f.name == name && f.value > 0.0 && f.value.is_finite() => {
                 f.value
             }
-            (Some(name), _) => return Err(format!("form has to be {name}, a positive number")),
+            (Some(name), _) => {
+                return Err(format!(
+                    "nonlinear_parameter has to be {name}, a positive number"
+                ));
+            }
             (None, Some(f)) => {
                 return Err(format!(
-                    "form is {:?}, but this effect has no nonlinear parameter",
+                    "nonlinear_parameter is {:?}, but this effect has no nonlinear parameter",
                     f.name
                 ));
             }
@@ -294,7 +301,9 @@ impl WrittenEffect {
         }
         let (values, sigmas): (Vec<f64>, Vec<Option<f64>>) = numbers.into_iter().flatten().unzip();
         let sigmas: Option<Vec<f64>> = sigmas.into_iter().collect();
-        let interval = self.form.filter(|f| f.lower.is_some() || f.upper.is_some());
+        let interval = self
+            .nonlinear_parameter
+            .filter(|f| f.lower.is_some() || f.upper.is_some());
         Ok(FittedEffect {
             candidate,
             parameter,

@@ -78,6 +78,15 @@ impl Stamp {
         }
     }
 
+    /// The stamp in s with these nanoseconds.
+    pub fn with_nanoseconds(self, nanoseconds: f64) -> Self {
+        Self {
+            value: self.value + 1e-9 * nanoseconds,
+            fraction: self.fraction + 1e-9 * nanoseconds,
+            ..self
+        }
+    }
+
     /// Time since `origin`, in the unit of the stamp; the stamp itself if `origin` is 0.
     pub fn since(&self, origin: i64) -> f64 {
         match origin {
@@ -140,6 +149,11 @@ impl Decimal {
         Decimal::Microsecond,
         Decimal::Nanosecond,
     ];
+
+    /// Its size, s.
+    pub fn seconds(self) -> f64 {
+        1.0 / self.per_second() as f64
+    }
 
     /// The unit that the name of a column ends with, as `timestamp_us` and `time [ms]` do.
     pub(super) fn in_name(name: &str) -> Option<Decimal> {

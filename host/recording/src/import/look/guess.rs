@@ -1,35 +1,14 @@
-//! Guesses the roles of the columns of a dropped file. The user corrects them in the page.
+//! The roles of the columns of a file, by their names; without names by the readings.
 //!
-//! Names decide, by the words that loggers use. Without names, the first column that only grows is the time. Of two triads, the one with larger
-//! readings is the accelerometer, because gravity is large compared with the rate of a unit at rest. This may be wrong for readings with a large
-//! bias, so the page asks to check it.
+//! Without names, the first column that only grows is the time. Of two triads, the one with larger readings is the accelerometer, because gravity is
+//! large compared with the rate of a unit at rest. This may be wrong for readings with a large bias, so a person has to check it.
 
-use mimu_recording::units::{Series, UnitFound, accel_unit, gyro_unit};
 use serde::Serialize;
 
-/// Units in which a triad or the time may be written, with the spellings in the names of columns.
-const GYRO_UNITS: [(&str, &[&str]); 3] = [
-    (
-        "deg/s",
-        &["deg/s", "dps", "°/s", "deg_s", "degps", "degpersec"],
-    ),
-    ("mdeg/s", &["mdps", "mdeg/s"]),
-    ("rad/s", &["rad/s", "radps", "rads", "rad_s"]),
-];
-const ACCEL_UNITS: [(&str, &[&str]); 3] = [
-    ("mg", &["(mg)", "[mg]", "_mg"]),
-    (
-        "m/s²",
-        &["m/s2", "m/s^2", "m/s²", "mps2", "ms2", "m_s2", "m.s-2"],
-    ),
-    ("g", &["(g)", "[g]", "_g"]),
-];
-const TIME_UNITS: [(&str, &[&str]); 4] = [
-    ("ms", &["ms", "milli"]),
-    ("us", &["us", "µs", "micro"]),
-    ("ns", &["ns", "nano"]),
-    ("s", &["(s)", "[s]", "_s", "sec"]),
-];
+use super::names::{Meaning, clock_unit, force_unit, meaning, rate_unit};
+use crate::RAW_COLUMNS;
+use crate::import::time::Decimal;
+use crate::units::{Series, UnitFound, accel_unit, gyro_unit};
 
 /// A guess for one file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -41,100 +20,23 @@ pub struct Guess {
     /// Unit of the accelerometer, if the names of its columns contain it.
     pub accel_unit: Option<&'static str>,
     /// Unit of the time stamps, if the name of their column contains it.
-    pub time_unit: Option<&'static str>,
+    pub time_unit: Option<Decimal>,
     /// Whether the roles follow from the readings alone.
     pub by_readings: bool,
+    /// Whether the times are dates or times of day.
+    #[serde(skip)]
+    pub calendar: bool,
 }
 
 const GYRO: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 const ACCEL: [&str; 3] = ["accel_x", "accel_y", "accel_z"];
 
-/// Meaning of a column's name.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Meaning {
-    Time,
-    Gyro(usize),
-    Accel(usize),
-    Temperature,
-    Step,
-    Other,
-}
-
-/// A name without its unit, in lower case, cut into words.
-fn words(name: &str) -> Vec<String> {
-    let bare = name.split(['(', '[']).next().unwrap_or_default();
-    let mut words = Vec::new();
-    let mut word = String::new();
-    let mut before = ' ';
-    for c in bare.chars() {
-        let cut = c.is_uppercase() && before.is_lowercase();
-        if !c.is_alphanumeric() || cut {
-            words.push(std::mem::take(&mut word));
-        }
-        if c.is_alphanumeric() {
-            word.extend(c.to_lowercase());
-        }
-        before = c;
-    }
-    words.push(word);
-    words.retain(|word| !word.is_empty());
-    words
-}
-
-fn meaning(name: &str) -> Meaning {
-    let words = words(name);
-    let all = words.concat();
-    let has = |parts: &[&str]| parts.iter().any(|part| all.contains(part));
-    // `gx`, `accelX`, `Gyr_Y`, `angular_velocity.z`, `gyrox rad/s`: a separate word, or the end of the sensor's.
-    let axis = || {
-        let of_word = |word: &String| {
-            let bare = word.trim_end_matches(|c: char| c.is_ascii_digit());
-            let (at, last) = bare.char_indices().next_back()?;
-            let stem = &bare[..at];
-            let sensor = ["gyr", "acc", "vel", "rot", "omega"]
-                .iter()
-                .any(|name| stem.contains(name));
-            "xyz".find(last).filter(|_| stem.len() < 2 || sensor)
-        };
-        words.iter().rev().find_map(of_word)
-    };
-    if has(&["mag", "lin", "quat", "orient", "euler", "grav"]) && !has(&["linear_acc", "linearacc"])
-    {
-        return Meaning::Other;
-    }
-    match axis() {
-        Some(axis) if has(&["gyr", "angularvel", "angvel", "rot", "omega"]) => Meaning::Gyro(axis),
-        Some(axis) if has(&["acc", "specificforce"]) => Meaning::Accel(axis),
-        Some(axis) if matches!(all.as_str(), "gx" | "gy" | "gz" | "wx" | "wy" | "wz") => {
-            Meaning::Gyro(axis)
-        }
-        Some(axis) if matches!(all.as_str(), "ax" | "ay" | "az" | "fx" | "fy" | "fz") => {
-            Meaning::Accel(axis)
-        }
-        _ if has(&["temp"]) => Meaning::Temperature,
-        _ if has(&["time", "stamp", "sec"]) || all == "t" || all == "ts" => Meaning::Time,
-        _ if all == "step" || all == "pose" => Meaning::Step,
-        _ => Meaning::Other,
-    }
-}
-
-fn unit(names: &[&String], units: &[(&'static str, &[&str])]) -> Option<&'static str> {
-    let says = |spellings: &[&str]| {
-        let any = |name: &&String| spellings.iter().any(|s| name.to_lowercase().contains(s));
-        !names.is_empty() && names.iter().all(any)
-    };
-    units
-        .iter()
-        .find(|(_, spellings)| says(spellings))
-        .map(|(unit, _)| *unit)
-}
-
-/// Guesses the columns of the file called `file` from these names and first rows.
-pub fn guess(file: &str, names: &[String], rows: &[Vec<f64>]) -> Guess {
+/// Guesses the columns of the file called `file` from these names, the units in a row of their own, and the first rows.
+pub fn guess(file: &str, names: &[String], units: &[String], rows: &[Vec<f64>]) -> Guess {
     let width = rows.first().map_or(names.len(), Vec::len);
     let mut guess = match names.is_empty() {
         true => by_readings(file, width, rows),
-        false => by_names(names),
+        false => by_names(file, names),
     };
     // Codes of a thermometer are not in °C, and are worse than no temperature.
     let implausible = |at: usize| {
@@ -150,38 +52,68 @@ pub fn guess(file: &str, names: &[String], rows: &[Vec<f64>]) -> Guess {
             guess.roles[other] = "temp_c";
         }
     }
-    let named = |wanted: &[&str]| -> Vec<&String> {
-        let all = names.iter().zip(&guess.roles);
-        all.filter(|(_, role)| wanted.contains(*role))
-            .map(|(name, _)| name)
-            .collect()
+    // The unit beside a name, in a row of units, or in the name itself.
+    let said = |wanted: &[&str]| -> Vec<String> {
+        let all = names.iter().enumerate().zip(&guess.roles);
+        let own = all.filter(|(_, role)| wanted.contains(*role));
+        own.map(|((k, name), _)| match units.get(k) {
+            Some(unit) if !unit.is_empty() => format!("{name} [{unit}]"),
+            _ => name.clone(),
+        })
+        .collect()
     };
-    let found = [
-        unit(&named(&GYRO), &GYRO_UNITS),
-        unit(&named(&ACCEL), &ACCEL_UNITS),
-        unit(&named(&["t_s"]), &TIME_UNITS),
-    ];
-    [guess.gyro_unit, guess.accel_unit, guess.time_unit] = found;
+    guess.gyro_unit = alike(&said(&GYRO), rate_unit);
+    guess.accel_unit = alike(&said(&ACCEL), force_unit);
+    guess.time_unit = alike(&said(&["t_s"]), clock_unit);
     guess
 }
 
-fn by_names(names: &[String]) -> Guess {
+/// The unit that all of `names` have.
+fn alike<T: Copy + PartialEq>(names: &[String], unit: impl Fn(&str) -> Option<T>) -> Option<T> {
+    let mut units = names.iter().map(|name| unit(name));
+    let first = units.next()??;
+    units.all(|unit| unit == Some(first)).then_some(first)
+}
+
+fn by_names(file: &str, names: &[String]) -> Guess {
+    let file = file.to_lowercase();
+    // The files of phones have columns x, y and z.
+    let of_file = match (
+        file.contains("gyr") || file.contains("rot"),
+        file.contains("acc"),
+    ) {
+        (true, false) => Some(&GYRO),
+        (false, true) => Some(&ACCEL),
+        _ => None,
+    };
+    let named = |role: &str| names.iter().any(|name| name == role);
+    let has_time = named("t_s") || names.iter().any(|name| meaning(name) == Meaning::Time);
     let mut roles: Vec<&'static str> = Vec::new();
     for name in names {
-        let exact = mimu_recording::RAW_COLUMNS
+        let exact = RAW_COLUMNS
             .iter()
-            .chain(&["t_s", "temp_c", "step", "sample"]);
+            .chain(&["t_s", "temp_c", "step", "sample", "t_ns"]);
         let role = match (exact.into_iter().find(|role| *role == name), meaning(name)) {
             (Some(role), _) => *role,
             (None, Meaning::Time) => "t_s",
+            (None, Meaning::Nanoseconds) => "t_ns",
             (None, Meaning::Gyro(axis)) => GYRO[axis],
             (None, Meaning::Accel(axis)) => ACCEL[axis],
+            (None, Meaning::Axis(axis)) => of_file.map_or("-", |triad| triad[axis]),
             (None, Meaning::Temperature) => "temp_c",
             (None, Meaning::Step) => "step",
-            (None, Meaning::Other) => "-",
+            (None, Meaning::Reference(role)) => role,
+            (None, Meaning::Counter) if !has_time => "sample",
+            (None, Meaning::Counter | Meaning::Other) => "-",
         };
         // Of two sensors or two clocks, the first is used.
         roles.push(if roles.contains(&role) { "-" } else { role });
+    }
+    // Nanoseconds of their own, without seconds, are the whole time.
+    if let Some(at) = roles.iter().position(|role| *role == "t_ns")
+        && !roles.contains(&"t_s")
+    {
+        roles[at] = "t_s";
     }
     Guess {
         roles,
@@ -240,8 +172,10 @@ fn by_readings(file: &str, width: usize, rows: &[Vec<f64>]) -> Guess {
 /// Units of both sensors of the files: by the readings, and by the names where the readings leave it open.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Units {
-    gyro: Option<UnitFound>,
-    accel: Option<UnitFound>,
+    /// Of the gyro, if it has columns.
+    pub gyro: Option<UnitFound>,
+    /// Of the accelerometer, if it has columns.
+    pub accel: Option<UnitFound>,
 }
 
 impl Units {
@@ -277,10 +211,7 @@ fn series(guess: &Guess, rows: &[Vec<f64>], sensor: &[&'static str; 3]) -> Optio
         rows.iter().map(|row| cell(row, t)).collect()
     });
     let unit_s = match guess.time_unit {
-        Some("ms") => Some(1e-3),
-        Some("us") => Some(1e-6),
-        Some("ns") => Some(1e-9),
-        Some(_) => Some(1.0),
+        Some(unit) => Some(unit.seconds()),
         None => clock_unit_s(&times),
     };
     Some(Series {
@@ -296,7 +227,7 @@ fn series(guess: &Guess, rows: &[Vec<f64>], sensor: &[&'static str; 3]) -> Optio
 
 /// Unit of time stamps, s, of the four that make the sample rate that of an inertial unit: 3 to 3000 Hz.
 fn clock_unit_s(times: &[f64]) -> Option<f64> {
-    let rate = mimu_recording::usual_rate_hz(times).ok()?;
+    let rate = crate::usual_rate_hz(times).ok()?;
     let units = [1.0, 1e-3, 1e-6, 1e-9];
     units
         .into_iter()
@@ -309,7 +240,7 @@ mod tests {
 
     fn roles(names: &[&str]) -> Vec<&'static str> {
         let names: Vec<String> = names.iter().map(|n| n.to_string()).collect();
-        guess("log.csv", &names, &[]).roles
+        guess("log.csv", &names, &[], &[]).roles
     }
 
     const ALL: [&str; 7] = [
@@ -372,7 +303,7 @@ mod tests {
     #[test]
     fn the_codes_of_a_thermometer_are_not_taken_for_degrees() {
         let names = ["time", "dTemp", "Temp", "gyrox rad/s"].map(String::from);
-        let found = guess("log.csv", &names, &[vec![0.0, -8884.0, 31.2, 0.0]]);
+        let found = guess("log.csv", &names, &[], &[vec![0.0, -8884.0, 31.2, 0.0]]);
         assert_eq!(found.roles, ["t_s", "-", "temp_c", "gyro_x"]);
     }
 
@@ -391,8 +322,8 @@ mod tests {
         let units = |gyro: f64, z: f64| {
             let row = |k: usize| vec![10.0 * k as f64, gyro, 0.0, -gyro, 0.0, 0.0, z];
             let rows: Vec<Vec<f64>> = (0..50).map(row).collect();
-            let found = guess("log.csv", &names, &rows);
-            assert_eq!(found.time_unit, Some("ms"));
+            let found = guess("log.csv", &names, &[], &rows);
+            assert_eq!(found.time_unit, Some(Decimal::Millisecond));
             Units::of(&[&found], &[rows]).known()
         };
         assert_eq!(units(0.5, 9.7), [Some("deg/s"), Some("m/s²")]);
@@ -414,8 +345,8 @@ mod tests {
         });
         let rows: Vec<Vec<Vec<f64>>> = vec![gyro.collect(), accel.collect()];
         let guesses = [
-            guess("gyro.txt", &[], &rows[0]),
-            guess("acc.txt", &[], &rows[1]),
+            guess("gyro.txt", &[], &[], &rows[0]),
+            guess("acc.txt", &[], &[], &rows[1]),
         ];
         let units = Units::of(&[&guesses[0], &guesses[1]], &rows);
         assert_eq!(units.known(), [Some("deg/s"), Some("m/s²")]);
@@ -426,7 +357,7 @@ mod tests {
         let rows: Vec<Vec<f64>> = (0..20)
             .map(|k| vec![0.01 * f64::from(k), 0.1, 0.2, 9.8, 0.01, -0.02, 0.01])
             .collect();
-        let found = guess("log.csv", &[], &rows);
+        let found = guess("log.csv", &[], &[], &rows);
         assert_eq!(
             found.roles,
             [
@@ -436,7 +367,7 @@ mod tests {
         assert!(found.by_readings);
         let alone: Vec<Vec<f64>> = rows.iter().map(|row| row[..4].to_vec()).collect();
         assert_eq!(
-            guess("my_Gyro.txt", &[], &alone).roles,
+            guess("my_Gyro.txt", &[], &[], &alone).roles,
             ["t_s", "gyro_x", "gyro_y", "gyro_z"]
         );
     }

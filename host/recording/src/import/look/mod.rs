@@ -1,0 +1,497 @@
+//! A look at files before anything is asked: which columns they have, in which units, and what only a person can say.
+//!
+//! Names decide about columns, physics about units: gravity is 9.8 m/s², 1 g or 1000 mg, and a turn moves it by the angle that the gyro has to read.
+//! Where both are silent, or contradict each other in a way that would pass unseen, the look asks: a wrong unit that passes is the worst that can
+//! happen, because every number of the calibration is then wrong by its factor.
+
+mod guess;
+mod names;
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+pub use guess::{Guess, Units, guess};
+
+use super::assignment::{ColumnList, Role, Scale};
+use super::preview::preview;
+use super::time::{Decimal, calendar_time};
+use crate::RawUnit;
+use crate::error::{Error, Result};
+use crate::separator::Separator;
+use crate::units::UnitFound;
+
+/// Rows that are looked at: at 100 Hz ten minutes, in which a unit that is turned by hand turns.
+const ROWS: usize = 60_000;
+/// Rows by which columns without names are judged.
+const JUDGED: usize = 2_000;
+/// Nominal counts for 1 g of 16-bit accelerometers, by the ranges of ±2 to ±32 g, and of those with 12 and 14 bits.
+const PER_G: [f64; 8] = [
+    16_384.0, 8_192.0, 4_096.0, 2_048.0, 1_024.0, 256.0, 32_768.0, 1_000.0,
+];
+/// Largest share by which gravity in counts may differ from a nominal one.
+const OFF_NOMINAL: f64 = 0.08;
+const STANDARD_GRAVITY: f64 = 9.80665;
+
+/// One file as it was looked at.
+#[derive(Debug, Clone)]
+pub struct FileLook {
+    /// Its path.
+    pub path: PathBuf,
+    /// Names of its columns; empty if it has none.
+    pub names: Vec<String>,
+    /// What the columns are.
+    pub guess: Guess,
+    /// The separator, if an import would not recognise it.
+    pub separator: Option<Separator>,
+}
+
+/// What a person has to say, with the options that say it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Question {
+    /// What is not known, and why, as a sentence without a full stop.
+    pub about: String,
+    /// What to add to the command, as `--units g,deg/s`, with a choice where several are possible.
+    pub answer: String,
+}
+
+/// What was found in files that belong together.
+#[derive(Debug, Clone)]
+pub struct Look {
+    /// The files.
+    pub files: Vec<FileLook>,
+    /// Unit of the gyro, if there is one.
+    pub gyro: Option<UnitFound>,
+    /// Unit of the accelerometer, if there is one.
+    pub accel: Option<UnitFound>,
+    /// Unit of the readings after [`Self::scales`].
+    pub raw_unit: Option<RawUnit>,
+    /// Factors to that unit.
+    pub scales: Vec<Scale>,
+    /// What is still open.
+    pub questions: Vec<Question>,
+}
+
+/// Units that a person gives, and settings that answer questions.
+#[derive(Debug, Clone, Default)]
+pub struct Given {
+    /// Unit of the accelerometer, as in [`UnitFound::unit`].
+    pub accel: Option<&'static str>,
+    /// Unit of the gyro.
+    pub gyro: Option<&'static str>,
+    /// Whether the unit of the readings is given in another way.
+    pub raw_unit: bool,
+    /// Whether the sample rate is given.
+    pub rate: bool,
+    /// Unit of the time stamps.
+    pub time_unit: Option<Decimal>,
+}
+
+/// The units that `--units` takes, with what they are in SI; `count` and `V` have no size.
+const UNITS: [(&str, &str, Option<f64>); 10] = [
+    ("g", "accel", Some(STANDARD_GRAVITY)),
+    ("mg", "accel", Some(1e-3 * STANDARD_GRAVITY)),
+    ("m/s²", "accel", Some(1.0)),
+    ("rad/s", "gyro", Some(1.0)),
+    ("deg/s", "gyro", Some(std::f64::consts::PI / 180.0)),
+    ("mdeg/s", "gyro", Some(std::f64::consts::PI / 180_000.0)),
+    ("count", "", None),
+    ("V", "", None),
+    ("m/s2", "accel", Some(1.0)),
+    ("dps", "gyro", Some(std::f64::consts::PI / 180.0)),
+];
+
+impl Given {
+    /// Units as `g,deg/s`, in any order; `count` and `V` hold for both sensors.
+    ///
+    /// # Errors
+    /// An unknown unit, or two for one sensor.
+    pub fn with_units(mut self, text: &str) -> Result<Self> {
+        let refuse = |problem: String| {
+            Error::new(
+                "units",
+                problem,
+                "give one of g, mg, m/s2 and one of deg/s, mdeg/s, rad/s, as g,deg/s; or count, or V",
+            )
+        };
+        for word in text.split(',').map(str::trim) {
+            let known = UNITS.iter().find(|(name, ..)| *name == word);
+            let Some((name, sensor, _)) = known else {
+                return Err(refuse(format!("{word:?} is no unit of readings")));
+            };
+            let name = match *name {
+                "m/s2" => "m/s²",
+                "dps" => "deg/s",
+                other => other,
+            };
+            for (which, unit) in [("gyro", &mut self.gyro), ("accel", &mut self.accel)] {
+                if sensor.is_empty() || *sensor == which {
+                    if unit.is_some_and(|before| before != name) && !sensor.is_empty() {
+                        return Err(refuse(format!("the {which} has two units")));
+                    }
+                    *unit = Some(name);
+                }
+            }
+        }
+        Ok(self)
+    }
+}
+
+fn si(unit: &str) -> Option<f64> {
+    UNITS.iter().find(|(name, ..)| *name == unit)?.2
+}
+
+impl Look {
+    /// Looks at `files`, which are joined or follow one another. `given` is what a person has said.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or has no line of numbers.
+    pub fn at(files: &[PathBuf], separator: Option<Separator>, given: &Given) -> Result<Self> {
+        let (mut looks, mut numbers) = (Vec::new(), Vec::new());
+        for path in files {
+            let seen = preview(path, separator, ROWS)?;
+            let mut rows: Vec<Vec<f64>> = seen
+                .rows
+                .iter()
+                .map(|row| row.iter().map(|cell| number(cell)).collect())
+                .collect();
+            let file = path.file_name().unwrap_or_default().to_string_lossy();
+            let judged = &rows[..rows.len().min(JUDGED)];
+            let mut guess = guess(&file, &seen.names, &seen.units, judged);
+            guess.time_unit = given.time_unit.or(guess.time_unit);
+            // A date or a time of day is in s, whatever its name says.
+            let time = guess.roles.iter().position(|role| *role == "t_s");
+            let first = time.and_then(|at| seen.rows.first()?.get(at));
+            if first.is_some_and(|cell| calendar_time(cell.as_bytes()).is_some()) {
+                guess.time_unit = None;
+                guess.calendar = true;
+            }
+            join_times(&guess, &mut rows);
+            looks.push(FileLook {
+                path: path.clone(),
+                names: seen.names,
+                guess,
+                separator: seen.separator,
+            });
+            numbers.push(rows);
+        }
+        let guesses: Vec<&Guess> = looks.iter().map(|look| &look.guess).collect();
+        let units = Units::of(&guesses, &numbers);
+        let mut look = Self {
+            files: looks,
+            gyro: units.gyro,
+            accel: units.accel,
+            raw_unit: None,
+            scales: Vec::new(),
+            questions: Vec::new(),
+        };
+        look.take_columns(&numbers, given);
+        look.take_units(given);
+        Ok(look)
+    }
+
+    /// One list of columns for each file.
+    pub fn columns(&self) -> Vec<ColumnList> {
+        let list = |look: &FileLook| {
+            let roles = look.guess.roles.iter();
+            ColumnList::ByPosition(roles.map(|role| Role::from_name(role)).collect())
+        };
+        self.files.iter().map(list).collect()
+    }
+
+    /// Unit of the time stamps, if the names say it.
+    pub fn time_unit(&self) -> Option<Decimal> {
+        self.files.iter().find_map(|look| look.guess.time_unit)
+    }
+
+    /// Whether a column has known inputs of a table.
+    pub fn has_reference(&self) -> bool {
+        let mut roles = self.files.iter().flat_map(|look| &look.guess.roles);
+        roles.any(|role| role.starts_with("ref_"))
+    }
+
+    fn ask(&mut self, about: String, answer: &str) {
+        self.questions.push(Question {
+            about,
+            answer: answer.into(),
+        });
+    }
+
+    /// Asks about columns that are missing or that only the readings suggest.
+    fn take_columns(&mut self, numbers: &[Vec<Vec<f64>>], given: &Given) {
+        let roles: Vec<&str> = self
+            .files
+            .iter()
+            .flat_map(|look| look.guess.roles.iter().copied())
+            .collect();
+        let has = |role: &str| roles.contains(&role);
+        let axes = |sensor: &str| {
+            let found = ["x", "y", "z"].map(|axis| has(&format!("{sensor}_{axis}")));
+            found.iter().filter(|f| **f).count()
+        };
+        let [gyro, accel] = ["gyro", "accel"].map(axes);
+        let names: Vec<String> = self
+            .files
+            .iter()
+            .flat_map(|look| look.names.clone())
+            .filter(|name| !name.is_empty())
+            .collect();
+        let list = "--columns t_s=NAME,gyro_x=NAME,gyro_y=NAME,gyro_z=NAME,accel_x=NAME,accel_y=NAME,accel_z=NAME";
+        if gyro + accel == 0 {
+            let about = match names.is_empty() {
+                true => "no columns are known to be a gyro or an accelerometer".into(),
+                false => format!(
+                    "no name is known to be a gyro's or an accelerometer's: {}",
+                    few(&names)
+                ),
+            };
+            self.ask(about, list);
+            return;
+        }
+        for (sensor, count) in [("gyro", gyro), ("accelerometer", accel)] {
+            if (1..3).contains(&count) {
+                let about = format!(
+                    "{count} of the three axes of the {sensor} are known among {}",
+                    few(&names)
+                );
+                self.ask(about, list);
+            }
+        }
+        let unnamed = self.files.iter().any(|look| look.guess.by_readings);
+        if unnamed && gyro == 3 && accel == 3 {
+            // Gravity is seen, so the accelerometer is the one with gravity in it; else only a person knows.
+            let known = self
+                .accel
+                .as_ref()
+                .is_some_and(|found| matches!(found.unit, Some("m/s²" | "g" | "mg")));
+            let counts = self
+                .accel
+                .as_ref()
+                .is_some_and(|found| found.unit == Some("count") && nominal(found).is_some());
+            if !known && !counts {
+                let about =
+                    "the file has no names, and the readings do not show which triad feels gravity"
+                        .into();
+                self.ask(
+                    about,
+                    "--columns t_s,accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z",
+                );
+            }
+        }
+        let timed = has("t_s");
+        if !timed && !given.rate {
+            self.ask("no column is a time".into(), "--rate-hz RATE");
+        } else if timed && !given.rate && given.time_unit.is_none() && self.time_unit().is_none() {
+            self.check_clock(numbers);
+        }
+    }
+
+    /// Asks about time stamps without a unit in which their rate is that of no inertial unit, or of two.
+    fn check_clock(&mut self, numbers: &[Vec<Vec<f64>>]) {
+        let Some((look, rows)) = self
+            .files
+            .iter()
+            .zip(numbers)
+            .find(|(look, _)| look.guess.roles.contains(&"t_s"))
+        else {
+            return;
+        };
+        if look.guess.calendar {
+            return;
+        }
+        let at = look
+            .guess
+            .roles
+            .iter()
+            .position(|role| *role == "t_s")
+            .unwrap_or(0);
+        let times: Vec<f64> = rows.iter().filter_map(|row| row.get(at).copied()).collect();
+        // One by one: a counter, whose rate nobody knows.
+        let counts = times.len() > 2 && times.windows(2).all(|w| w[1] - w[0] == 1.0);
+        if counts {
+            let name = look.names.get(at).cloned().unwrap_or_default();
+            let about = format!("the column {name:?} counts the rows one by one, which is no time");
+            let roles = &mut self.files[0].guess.roles;
+            if let Some(role) = roles.iter_mut().find(|role| **role == "t_s") {
+                *role = "sample";
+            }
+            self.ask(about, "--rate-hz RATE");
+        }
+    }
+
+    /// Decides the unit of the readings, or asks.
+    fn take_units(&mut self, given: &Given) {
+        for (found, said) in [(&mut self.gyro, given.gyro), (&mut self.accel, given.accel)] {
+            if let (Some(found), Some(unit)) = (found.as_mut(), said) {
+                found.unit = Some(unit);
+                found.reason = "as given".into();
+            }
+        }
+        if given.raw_unit {
+            return;
+        }
+        for (sensor, found, choices) in [
+            ("gyro", self.gyro.clone(), "deg/s|rad/s|mdeg/s|count"),
+            ("accelerometer", self.accel.clone(), "g|m/s2|mg|count"),
+        ] {
+            if let Some(UnitFound {
+                unit: None, reason, ..
+            }) = found
+            {
+                let about = format!("the unit of the {sensor} is open: {reason}");
+                self.ask(about, &format!("--units {choices}"));
+            }
+        }
+        let [gyro, accel] = [&self.gyro, &self.accel].map(|f| f.as_ref().and_then(|f| f.unit));
+        let missing = [(&self.gyro, gyro), (&self.accel, accel)];
+        if missing
+            .iter()
+            .any(|(found, unit)| found.is_some() && unit.is_none())
+        {
+            return;
+        }
+        let sizes = [gyro.map(si), accel.map(si)];
+        match sizes {
+            // Both in SI units, or the only one.
+            _ if sizes.iter().flatten().all(Option::is_some) => self.convert(gyro, accel),
+            _ if sizes.iter().flatten().all(Option::is_none) => {
+                let volts = [gyro, accel].contains(&Some("V"));
+                self.raw_unit = Some(if volts { RawUnit::Volt } else { RawUnit::Count });
+            }
+            _ => self.mixed(gyro, accel),
+        }
+    }
+
+    fn convert(&mut self, gyro: Option<&str>, accel: Option<&str>) {
+        self.raw_unit = Some(RawUnit::Si);
+        for (sensor, unit) in [("gyro", gyro), ("accel", accel)] {
+            let factor = unit.and_then(si).unwrap_or(1.0);
+            if factor != 1.0
+                && let Ok(scale) = format!("{sensor}={factor}").parse()
+            {
+                self.scales.push(scale);
+            }
+        }
+    }
+
+    /// One sensor in a unit, the other in counts: a recording has one unit, so the counts are converted by their nominal size.
+    fn mixed(&mut self, gyro: Option<&'static str>, accel: Option<&'static str>) {
+        let per_g = self.accel.as_ref().and_then(nominal);
+        match (accel, per_g) {
+            (Some("count"), Some(per_g)) => {
+                self.convert(gyro, None);
+                if let Ok(scale) = format!("accel={}", STANDARD_GRAVITY / per_g).parse() {
+                    self.scales.push(scale);
+                }
+            }
+            _ => {
+                let about = "one sensor is in a unit and the other in counts, and a recording has one unit for both".into();
+                self.ask(
+                    about,
+                    "--raw-unit SI --scale gyro=RAD/S_PER_COUNT (or accel=M/S²_PER_COUNT)",
+                );
+            }
+        }
+    }
+
+    /// What was taken, in a few lines: columns with their meanings, units and why.
+    pub fn words(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        for look in &self.files {
+            let of = |k: usize| match look.names.get(k) {
+                Some(name) if !name.is_empty() => name.clone(),
+                _ => format!("column {}", k + 1),
+            };
+            let used = look
+                .guess
+                .roles
+                .iter()
+                .enumerate()
+                .filter(|(_, role)| **role != "-");
+            let used: Vec<String> = used
+                .map(|(k, role)| format!("{role} = {}", of(k)))
+                .collect();
+            let left: Vec<String> = (0..look.guess.roles.len())
+                .filter(|k| look.guess.roles[*k] == "-")
+                .map(of)
+                .filter(|n| !n.is_empty())
+                .collect();
+            let place = match self.files.len() {
+                1 => String::new(),
+                _ => format!(
+                    "{}: ",
+                    look.path.file_name().unwrap_or_default().to_string_lossy()
+                ),
+            };
+            lines.push(format!("{place}{}", used.join(", ")));
+            if !left.is_empty() && look.separator.is_none() {
+                lines.push(format!("{place}left out: {}", few(&left)));
+            }
+        }
+        for (sensor, found) in [("gyro", &self.gyro), ("accelerometer", &self.accel)] {
+            if let Some(found) = found {
+                let unit = found.unit.unwrap_or("unknown unit");
+                lines.push(format!("{sensor} in {unit}: {}", found.reason));
+            }
+        }
+        lines
+    }
+
+    /// The refusal of what is open, all at once; `command` is the one to complete.
+    pub fn refusal(&self, place: &Path, command: &str) -> Option<Error> {
+        self.questions.first()?;
+        let about: Vec<&str> = self.questions.iter().map(|q| q.about.as_str()).collect();
+        let answers: Vec<&str> = self.questions.iter().map(|q| q.answer.as_str()).collect();
+        Some(Error::new(
+            place.display(),
+            about.join("; "),
+            format!("say it: {command} {}", answers.join(" ")),
+        ))
+    }
+}
+
+/// Makes the times of the rows go on: nanoseconds are added to seconds, and a time of day goes on over midnight.
+fn join_times(guess: &Guess, rows: &mut [Vec<f64>]) {
+    const DAY_S: f64 = 86_400.0;
+    let at = |role: &str| guess.roles.iter().position(|r| *r == role);
+    let Some(time) = at("t_s") else { return };
+    let nanoseconds = at("t_ns");
+    let (mut before, mut days) = (f64::NEG_INFINITY, 0.0);
+    for row in rows {
+        let added = nanoseconds.and_then(|at| row.get(at).copied());
+        let Some(cell) = row.get_mut(time) else {
+            continue;
+        };
+        *cell += 1e-9 * added.unwrap_or(0.0);
+        if guess.calendar {
+            if *cell < before - 0.5 * DAY_S {
+                days += DAY_S;
+            }
+            before = *cell;
+            *cell += days;
+        }
+    }
+}
+
+/// Nominal counts for 1 g near the usual magnitude that the evidence gives.
+fn nominal(found: &UnitFound) -> Option<f64> {
+    let size = found.size?;
+    PER_G
+        .into_iter()
+        .find(|per_g| (size / per_g - 1.0).abs() < OFF_NOMINAL)
+}
+
+/// The first names.
+fn few(names: &[String]) -> String {
+    const MOST: usize = 12;
+    let more = if names.len() > MOST { ", ..." } else { "" };
+    names[..names.len().min(MOST)].join(", ") + more
+}
+
+fn number(cell: &str) -> f64 {
+    let cell = cell.trim();
+    match calendar_time(cell.as_bytes()) {
+        Some(stamp) => stamp.value,
+        None => cell.replacen(',', ".", 1).parse().unwrap_or(f64::NAN),
+    }
+}
