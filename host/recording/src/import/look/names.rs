@@ -257,7 +257,17 @@ fn without_unit(name: &str) -> String {
         rest = inner.get(close + 1..).unwrap_or_default();
     }
     bare.push_str(rest);
-    bare
+    // `gyrox rad/s`
+    let is_unit = |word: &&str| {
+        let own = |spellings: &[&str]| spellings.contains(&word.to_lowercase().as_str());
+        let named = |units: &[(&str, &[&str])]| units.iter().any(|(_, s)| own(s));
+        word.contains(['/', '²', '^']) && (named(&RATES) || named(&FORCES))
+    };
+    let kept: Vec<&str> = bare
+        .split_whitespace()
+        .filter(|word| !is_unit(word))
+        .collect();
+    kept.join(" ")
 }
 
 /// The axis that a word is, or that it ends or begins with behind or before a sensor's word: `x`, `gx`, `xgyro`, `0`.
@@ -423,6 +433,7 @@ const RATES: [(&str, &[&str]); 3] = [
             "º/s",
             "deg s-1",
             "degrees_per_second",
+            "deg_per_s",
             "deg.s-1",
         ],
     ),
@@ -440,6 +451,7 @@ const RATES: [(&str, &[&str]); 3] = [
             "rad s^-1",
             "rad.s-1",
             "radians_per_second",
+            "rad_per_s",
             "1/s",
             "rad*s^-1",
         ],
@@ -562,6 +574,7 @@ mod tests {
             ("rotationRate.x", Meaning::Gyro(0)),
             ("x-axis angular velocity", Meaning::Gyro(0)),
             ("gx1", Meaning::Gyro(0)),
+            ("gyrox rad/s", Meaning::Gyro(0)),
             ("gy1", Meaning::Gyro(1)),
             ("az2", Meaning::Accel(2)),
             ("x", Meaning::Axis(0)),
