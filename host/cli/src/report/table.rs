@@ -58,7 +58,7 @@ impl Cell {
     fn html(&self) -> Markup {
         let text = self.text();
         match self {
-            Self::Words(_) => html! { (written(&text)) },
+            Self::Words(_) => html! { (words(&text)) },
             Self::Code(_) => html! { code { (text) } },
             Self::Number { si, .. } if !si.is_finite() => html! { "–" },
             Self::Number { si, .. } | Self::Interval { si, .. } | Self::Between { si, .. } => {
@@ -79,6 +79,22 @@ impl From<String> for Cell {
     fn from(words: String) -> Self {
         Self::Words(words)
     }
+}
+
+/// Words with a minus sign before their numbers. An `e` in them is no exponent.
+fn words(text: &str) -> String {
+    let mut out = String::new();
+    let mut before = ' ';
+    let mut letters = text.chars().peekable();
+    while let Some(c) = letters.next() {
+        let number = letters.peek().is_some_and(char::is_ascii_digit);
+        out.push(match c == '-' && before == ' ' && number {
+            true => '−',
+            false => c,
+        });
+        before = c;
+    }
+    out
 }
 
 /// How a column is aligned, and where it is shown.
@@ -178,7 +194,7 @@ impl Table {
         html! {
             div class="scroll" { table {
                 caption { (self.caption) }
-                thead { tr { @for (c, (head, _)) in self.columns.iter().enumerate() { th class=[class(c)] { (written(head)) } } } }
+                thead { tr { @for (c, (head, _)) in self.columns.iter().enumerate() { th class=[class(c)] { (words(head)) } } } }
                 tbody { @for row in &self.rows { tr {
                     @for (c, cell) in row.iter().enumerate() { td class=[class(c)] { (cell.html()) } }
                 } } }
@@ -224,6 +240,10 @@ mod tests {
             "{html}"
         );
         assert!(html.contains("−0.50000 ± 0.00012"), "{html}");
+        assert!(
+            html.contains(">held out<") && html.contains(">gyro, deg<"),
+            "{html}"
+        );
     }
 
     #[test]

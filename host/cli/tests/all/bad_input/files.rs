@@ -124,8 +124,9 @@ fn a_damaged_parquet_file_is_refused() {
 fn a_place_without_a_recording_is_named() {
     let place = Place::with(&by_hand());
     place.fit(&[]).json();
+    // A file of a recording stands for its folder.
     let file = place.recording().join("samples.csv").display().to_string();
-    mimu(["fit", &file]).refused(&["samples.csv", "a recording is a directory", "mimu import"]);
+    mimu(["fit", &file, "--json", "-"]).json();
     mimu(["fit", &place.text("nowhere")]).refused(&["nowhere", "the directory does not exist"]);
     fs::create_dir(place.path("bare")).unwrap();
     mimu(["fit", &place.text("bare")]).refused(&["bare", "no recording.toml", "mimu import"]);

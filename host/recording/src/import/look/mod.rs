@@ -257,8 +257,17 @@ impl Look {
                 self.ask(about, list);
             }
         }
-        let unnamed = self.files.iter().any(|look| look.guess.by_readings);
-        if unnamed && gyro == 3 && accel == 3 {
+        // A file may be named after its sensor.
+        let unnamed = self.files.iter().any(|look| {
+            let file = look
+                .path
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .to_lowercase();
+            look.guess.by_readings && !file.contains("acc") && !file.contains("gyr")
+        });
+        if unnamed && accel == 3 {
             // Gravity is seen, so the accelerometer is the one with gravity in it; else only a person knows.
             let known = self
                 .accel
