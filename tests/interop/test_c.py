@@ -139,8 +139,8 @@ EFFECTS = [
     effect("term:gyro_y~rate_x*force_z", [("y", 1e-3, "rad/s/((rad/s)*(m/s^2))")]),
     effect("gyro_thermal_bias", [("x", 1e-3, "rad/s/K"), ("x squared", 2e-5, "rad/s/K^2")]),
     effect("accel_thermal_scale", [("y", 3e-4, "1/K")]),
-    effect("gyro_thermal_lag", [("z", 2e-3, "rad/s/K")], form='{ name = "lag_s", value = 90.0 }'),
-    effect("accel_warm_up", [("x", 0.05, "m/s^2")], form='{ name = "time_constant_s", value = 200.0 }'),
+    effect("gyro_thermal_lag", [("z", 2e-3, "rad/s/K")], nonlinear_parameter='{ name = "lag_s", value = 90.0 }'),
+    effect("accel_warm_up", [("x", 0.05, "m/s^2")], nonlinear_parameter='{ name = "time_constant_s", value = 200.0 }'),
     effect("term:accel_z~temp_rate", [("z", 0.5, "m/s^2/(K/s)")]),
 ]
 
