@@ -25,6 +25,8 @@ use crate::units::UnitFound;
 const ROWS: usize = 60_000;
 /// Rows by which columns without names are judged.
 const JUDGED: usize = 2_000;
+/// Fewest rows whose magnitude shows what columns without names are.
+const FEWEST_ROWS: usize = 50;
 /// Nominal counts for 1 g of 16-bit accelerometers, by the ranges of ±2 to ±32 g, and of those with 12 and 14 bits.
 const PER_G: [f64; 8] = [
     16_384.0, 8_192.0, 4_096.0, 2_048.0, 1_024.0, 256.0, 32_768.0, 1_000.0,
@@ -277,7 +279,9 @@ impl Look {
                 .accel
                 .as_ref()
                 .is_some_and(|found| found.unit == Some("count") && nominal(found).is_some());
-            if !known && !counts {
+            // Two rows may have any magnitude.
+            let enough = numbers.iter().all(|rows| rows.len() >= FEWEST_ROWS);
+            if !enough || !known && !counts {
                 let about =
                     "the file has no names, and the readings do not show which triad feels gravity"
                         .into();
