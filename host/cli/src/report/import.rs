@@ -44,7 +44,7 @@ pub fn import_text(summary: &ImportSummary) -> String {
         let said: Vec<String> = said.collect();
         wrap(
             &mut out,
-            "  the same, said: ",
+            "  the same in full: ",
             &format!("mimu import {}", said.join(" ")),
         );
     }
