@@ -54,7 +54,7 @@ pub(super) struct TextTable {
     line_number: u64,
     /// Line of the first row.
     first_row: u64,
-    /// The line of words above it. A logger that starts again writes it once more.
+    /// The line of words above it, if rows have a time: a logger that starts again writes it once more, and the times show how long it stood still.
     header: Vec<u8>,
     bytes: u64,
     length: u64,
@@ -416,7 +416,8 @@ impl TextTable {
                         let above = lines[..self.first_row as usize - 1].iter().rev();
                         let mut words =
                             above.filter(|l| matches!(kind(l, self.comments), Kind::Other));
-                        let words = words.next().map_or(&b""[..], |l| l);
+                        let timed = self.roles().contains(&Role::Column(Column::Time));
+                        let words = words.next().filter(|_| timed).map_or(&b""[..], |l| l);
                         self.header = words.strip_suffix(b"\r").unwrap_or(words).to_vec();
                         return Ok(());
                     }
