@@ -15,9 +15,9 @@ use mimu_wizard::session::Outcome;
 use crate::Cli;
 use crate::cmd::design::DesignArgs;
 pub use crate::cmd::design::Designed;
-use crate::cmd::import::{ImportArgs, imported};
 use crate::cmd::wizard::{WizardArgs, session};
 use crate::hint;
+use crate::importing::{ImportArgs, imported};
 
 /// Why a call was refused.
 #[derive(Debug)]

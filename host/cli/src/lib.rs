@@ -17,6 +17,7 @@ pub mod called;
 mod cmd;
 mod examples;
 mod hint;
+mod importing;
 mod output;
 mod reading;
 pub mod report;

@@ -9,7 +9,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{MANIFEST_FILE, PoseMeans, Recording};
 use tempfile::TempDir;
 
-use crate::cmd::import::imported_log;
+use crate::importing::imported_log;
 use crate::output::{check_outputs, progress};
 use crate::report;
 
