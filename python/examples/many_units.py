@@ -2,7 +2,11 @@
 
     python many_units.py fit recordings results.parquet                                    # a process for each core
     python many_units.py fit recordings results.parquet --scheduler tcp://head:8786        # the workers of a cluster
+    python many_units.py fit recordings results.parquet --calibrations cal --limits limits.toml
     python many_units.py ask results.parquet
+
+With ``--calibrations``, each unit gets its calibration file, in folders like those of the recordings. With ``--limits``, a row has ``passed`` and what
+``failed``: limits.toml has the largest value of columns, as in ``gyro_held_out_rad = 0.01``.
 
 A recording is a folder with recording.toml and samples.parquet. Folders above it with names like ``line=B`` become columns. A recording
 that is refused keeps its row, with the reason and the place. A second run fits only what is new or has changed, so it also continues
@@ -17,7 +21,9 @@ import resource
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +39,7 @@ Row = dict[str, Any]
 TYPES = {
     "recording": pa.string(), "device": pa.string(), "sha256": pa.string(), "mimu": pa.string(), "warnings": pa.list_(pa.string()),
     "rows": pa.int64(), "gyro_dwells": pa.int64(), "accel_dwells": pa.int64(), "problems": pa.list_(pa.string()), "modified_ns": pa.int64(), "error": pa.string(), "error_kind": pa.string(), "error_file": pa.string(),
+    "judgement": pa.string(), "reason": pa.string(), "calibration": pa.string(), "passed": pa.bool_(), "failed": pa.list_(pa.string()),
     "error_row": pa.int64(), "error_column": pa.string(), "error_problem": pa.string(), "error_remedy": pa.string(),
 }
 #: How often the table is written while there is work left.
@@ -46,8 +53,8 @@ def column(name: str, unit: str) -> str:
     return f"{name}_{unit.lower()}"
 
 
-def calibrated(folder: str) -> Row:
-    """The row of one recording; this runs on a worker."""
+def calibrated(folder: str, to: Mapping[str, str] | None = None, limits: Mapping[str, float] | None = None) -> Row:
+    """The row of one recording; this runs on a worker. ``to`` has the calibration file of each folder, ``limits`` the largest value of columns."""
     # A worker has one core to itself, and a fit would start a thread for each core of the machine. The first fit reads this.
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
     import mimu
@@ -62,9 +69,10 @@ def calibrated(folder: str) -> Row:
     except mimu.Error as error:
         row |= {"error": str(error), "error_kind": error.kind, "error_file": error.file, "error_row": error.row}
         row |= {"error_column": error.column, "error_problem": error.problem, "error_remedy": error.remedy}
-        return row
+        return row | ({"passed": False, "failed": [str(error)]} if limits is not None else {})
     found = fit.to_dict()
     row |= {"sha256": found["sha256"], "rows": found["rows"], "gravity_mps2": found["gravity_mps2"], "warnings": fit.warnings}
+    row |= {"judgement": fit.judgement.kind, "reason": fit.judgement.reason}
     row["problems"] = [problem["id"] for problem in found["recording_problems"]]
     for name, sensor in (("gyro", fit.gyro), ("accel", fit.accel)):
         if sensor is None:
@@ -78,8 +86,28 @@ def calibrated(folder: str) -> Row:
             if parameter.name[:2] not in ("C_", "o_"):
                 row[column(f"{name}_{parameter.name}", parameter.unit)] = parameter.value
                 row[column(f"{name}_{parameter.name}_sigma", parameter.unit)] = parameter.sigma
+    if limits is not None:
+        row["failed"] = failures(row, limits)
+        row["passed"] = not row["failed"]
+    # What does not describe its readings is no calibration.
+    if to is not None and fit.judgement.kind != "misfit":
+        Path(to[folder]).parent.mkdir(parents=True, exist_ok=True)
+        fit.save(to[folder])
+        row["calibration"] = to[folder]
     row["seconds"] = time.monotonic() - begun
     return row
+
+
+def failures(row: Row, limits: Mapping[str, float]) -> list[str]:
+    """The limits that a row exceeds; a value that it lacks exceeds every limit. Signs do not count."""
+    failed = []
+    for name, most in limits.items():
+        value = row.get(name)
+        if value is None or not abs(value) <= most:
+            failed.append(f"{name} {'is missing' if value is None else f'{value:.6g}'}, at most {most:g}")
+    if row["judgement"] in ("suspect", "misfit"):
+        failed.append(f"{row['judgement']}: {row['reason']}")
+    return failed
 
 
 def rows(client: Client, folders: list[str], calibrate: Callable[[str], Row] = calibrated) -> Iterator[tuple[str, Row]]:
@@ -168,6 +196,9 @@ def calibrate_all(client: Client, root: Path, path: Path, calibrate: Callable[[s
             save(list(done.values()), path)
         took = time.monotonic() - begun
         refused = sum(row.get("error") is not None for row in done.values())
+        failed = sum(row.get("passed") is False for row in done.values())
+        if failed:
+            print(f"{failed} failed a limit, as the column failed says", flush=True)
         print(f"{path}: {len(done)} of {len(known)} recordings, {refused} refused; {len(known) - len(todo)} of them from before", flush=True)
     if todo:
         after = client.run(used)
@@ -229,6 +260,8 @@ def main(arguments: list[str] | None = None) -> None:
     fit = commands.add_parser("fit", help="fit the recordings that are new")
     fit.add_argument("recordings", type=Path)
     fit.add_argument("results", type=Path)
+    fit.add_argument("--calibrations", type=Path, help="folder for a calibration file of each unit")
+    fit.add_argument("--limits", type=Path, help="TOML file with the largest value of columns")
     fit.add_argument("--scheduler", help="address of a cluster's scheduler; without it, workers on this machine")
     fit.add_argument("--workers", type=int, default=os.cpu_count(), help="processes on this machine")
     fit.add_argument("--threads", type=int, default=1, help="threads of each process")
@@ -240,15 +273,21 @@ def main(arguments: list[str] | None = None) -> None:
             print(question)
             answer.show(max_width=160)
         return
+    limits = tomllib.loads(given.limits.read_text()) if given.limits else None
+    to = None
+    if given.calibrations:
+        at = {folder: given.calibrations.resolve() / f"{row['recording']}.toml" for folder, row in recordings(given.recordings).items()}
+        to = {folder: str(file) for folder, file in at.items()}
+    calibrate = partial(calibrated, to=to, limits=limits)
     if given.scheduler:
         with Client(given.scheduler) as client:
-            calibrate_all(client, given.recordings, given.results)
+            calibrate_all(client, given.recordings, given.results, calibrate)
         return
     # A terminal sends Ctrl-C to the workers too. They inherit that it is ignored, so that this process ends them in good order.
     on_ctrl_c = signal.signal(signal.SIGINT, signal.SIG_IGN)
     with LocalCluster(n_workers=given.workers, threads_per_worker=given.threads, dashboard_address=":0") as cluster, Client(cluster) as client:
         signal.signal(signal.SIGINT, on_ctrl_c)
-        calibrate_all(client, given.recordings, given.results)
+        calibrate_all(client, given.recordings, given.results, calibrate)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -106,6 +107,7 @@ def record(unit: Unit, root: Path, bench: Path, poses: int) -> None:
     """Records a unit, and breaks the recording where it is to be broken."""
     folder = root / unit.folder
     folder.parent.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
     plan, rig, truth = (root / f"{unit.number}.{kind}.toml" for kind in ("plan", "rig", "truth"))
     # A unit that never moved lies on the table for as long as the others are turned.
     poses, dwell_s = (1, 60.0) if unit.broken == "never moved" else (poses, 3.0)
@@ -147,8 +149,8 @@ BREAK = {"cut short": cut_short, "without accel z": without_a_column, "clock set
 
 
 def produce(root: Path, count: int, bench: Path = BENCH, poses: int = 24) -> list[Unit]:
-    """Records ``count`` units under ``root``, a new folder, as many at once as there are cores."""
-    root.mkdir(parents=True)
+    """Records ``count`` units under ``root``, as many at once as there are cores. Units that are there from an earlier run are recorded anew."""
+    root.mkdir(parents=True, exist_ok=True)
     made = units(count)
     with ThreadPoolExecutor() as pool:
         list(pool.map(lambda unit: record(unit, root, bench, poses), made))

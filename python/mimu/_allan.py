@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from mimu import _mimu
+from mimu import _frame, _mimu, _plot
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
 
@@ -52,6 +53,7 @@ class Allan(Result):
     """Allan deviation and noise model of a unit at rest."""
 
     _native: _mimu.Allan
+    _questions = ("json", "text", "html", "svg", "noise")
 
     channels: list[Channel]
     #: Whether it may be used.
@@ -83,6 +85,21 @@ class Allan(Result):
     def to_toml(self) -> str:
         """The noise file that ``mimu allan -o`` writes."""
         return self.noise.to_toml()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the noise file, as ``mimu allan -o`` does: whole or not at all."""
+        self.noise.save(path)
+
+    def to_dataframe(self) -> Any:
+        """The curves as a table of pandas: a row for each channel and averaging time."""
+        return _frame.of_curves(
+            [{"channel": c.name, "recording": c.recording, "tau_s": c.tau_s, "adev": c.adev, "lower": c.lower, "upper": c.upper, "unit": c.unit}
+             for c in self.channels]
+        )
+
+    def plot(self, sensor: Literal["gyro", "accel"] = "gyro", ax: Any = None) -> Any:
+        """The deviations of a sensor with their intervals, on axes of matplotlib: on ``ax``, or on axes of its own, which it returns."""
+        return _plot.deviations(self, sensor, ax)
 
     def svg(self) -> str:
         """The plot that ``mimu allan --plot`` writes."""

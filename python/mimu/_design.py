@@ -34,6 +34,7 @@ class Design(Result):
     """The attitudes, and how well they determine the parameters."""
 
     _native: _mimu.Design
+    _questions = ("json", "text", "html", "plan")
 
     title: str
     #: Direction in the body frame that points up, a row for each dwell, in order.
@@ -98,6 +99,7 @@ class NextExperiment(Result):
     """The smallest experiment that shows given effects."""
 
     _native: _mimu.Design
+    _questions = ("json", "text", "html", "plan")
 
     title: str
     #: What to do, in order.
@@ -146,6 +148,7 @@ class SchemeComparison(Result):
     """Published schemes, compared with the best designs of as many dwells."""
 
     _native: _mimu.Design
+    _questions = ("json", "text", "html", "plan")
 
     #: Schemes, each followed by the best design.
     designs: list[dict[str, Any]]

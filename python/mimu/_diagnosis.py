@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from mimu import _mimu
+from mimu import _frame, _mimu
 from mimu._fit import Keep, Steps, _keep
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._recording import several
@@ -77,6 +79,8 @@ class Diagnosis(Result):
     """The effects behind the residual of a unit."""
 
     _native: _mimu.Diagnosis
+    _questions = ("json", "text", "html", "calibration")
+    _texts = True
 
     #: ``"clean"``, ``"explained"``, ``"unexplained"`` or ``"untestable"``.
     verdict: str
@@ -113,6 +117,14 @@ class Diagnosis(Result):
         """The calibration file that ``mimu diagnose -o`` writes."""
         return self.calibration.to_toml()
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the calibration file, as ``mimu diagnose -o`` does: whole or not at all."""
+        self.calibration.save(path)
+
+    def to_dataframe(self) -> Any:
+        """The coefficients as a table of pandas: a row for each, with ``effect``, ``sensor``, ``coefficient``, ``value``, ``sigma`` and ``unit``."""
+        return _frame.of_effects(self.effects)
+
     def text(self, *, everything: bool = False) -> str:
         """What ``mimu diagnose`` prints; ``everything`` as with ``--all --next``."""
         return self._native.text(everything)
@@ -145,7 +157,7 @@ def diagnose(
     """
     others = [] if verify is None else several(verify)
     if len(others) > 1:
-        raise TypeError("verify: a diagnosis is judged by one other recording; judge its calibration by more with mimu.verify")
+        raise ValueError("verify: a diagnosis is judged by one other recording; judge its calibration by more with mimu.verify")
     return Diagnosis(
         _mimu.diagnose(
             several(recordings), verify=others[0] if others else None, calibration=calibration, accept=list(accept), still=still, steps=steps,

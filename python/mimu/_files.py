@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from mimu import _mimu
+from mimu._allan import Allan
 from mimu._arguments import arguments
-from mimu._fit import Steps
+from mimu._diagnosis import Diagnosis
+from mimu._fit import Fit, Steps
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._recording import Path
-from mimu._result import Judgement, Message, Result, judged, messages, typed
+from mimu._result import Judgement, Message, Result, _Kept, judged, messages, typed
+from mimu.thermal import ThermalFit
 
 
 def load(path: Path) -> Calibration:
@@ -67,16 +70,41 @@ class Verification(Result):
         return "<mimu.Verification: " + ", ".join(f"{name} {s.rms:.4g} {s.unit}" for name, s in self.sensors.items()) + ">"
 
 
+def calibration_of(given: Calibration | Fit | Diagnosis | ThermalFit) -> Calibration:
+    """The calibration, or that of a result."""
+    return given if isinstance(given, Calibration) else given.calibration
+
+
+def noise_of(given: Noise | Allan | None) -> Noise | None:
+    """The noise, or that of a result."""
+    return given if given is None or isinstance(given, Noise) else given.noise
+
+
 def verify(
     recording: Recording,
-    calibration: Calibration,
+    calibration: Calibration | Fit | Diagnosis | ThermalFit,
     *,
     still: float | None = None,
     steps: Steps | None = None,
-    noise: Noise | None = None,
+    noise: Noise | Allan | None = None,
 ) -> Verification:
-    """Judges a calibration by another recording, as ``mimu verify`` does."""
-    return Verification(_mimu.verify(recording, calibration, still=still, steps=steps, noise=noise))
+    """Judges a calibration by another recording, as ``mimu verify`` does.
+
+    Parameters
+    ----------
+    recording : Recording
+        Another recording of the same unit.
+    calibration : Calibration, Fit, Diagnosis or thermal.ThermalFit
+        What is judged.
+    still, steps, noise
+        As for :func:`mimu.fit`.
+
+    Returns
+    -------
+    Verification
+        With a ``judgement``, and by sensor the errors before and after.
+    """
+    return Verification(_mimu.verify(recording, calibration_of(calibration), still=still, steps=steps, noise=noise_of(noise)))
 
 
 Format = Literal[
@@ -106,6 +134,9 @@ class Export:
         """Formulas, notes and the errors that remain because the format has no place for a part of the calibration."""
         return cast(dict[str, Any], json.loads(self._native.json()))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpickled_export, (self.content, self._native.json())
+
     def save(self, path: Path) -> None:
         """Writes the file."""
         with open(path, "wb") as file:
@@ -118,10 +149,21 @@ class Export:
         return f"<mimu.Export to {self.to_dict()['to']}: {len(self.content)} bytes>"
 
 
-def export(format: Format, *, calibration: Calibration | None = None, noise: Noise | None = None, **options: Any) -> Export:
+def _unpickled_export(content: bytes, text: str) -> Export:
+    return Export(cast(Any, _Kept({"content": (content,), "json": (text,)})))
+
+
+def export(
+    format: Format,
+    *,
+    calibration: Calibration | Fit | Diagnosis | ThermalFit | None = None,
+    noise: Noise | Allan | None = None,
+    **options: Any,
+) -> Export:
     """A calibration, or noise, in the format of another program: every one of ``mimu export``, with its options as keywords.
 
-    ``mimu.export("px4", calibration=fit.calibration, qgc=True).save("unit.params")``. What is not in the file is in ``notes`` and in
+    ``mimu.export("px4", calibration=fit, qgc=True).save("unit.params")``. What is not in the file is in ``notes`` and in
     ``to_dict()["remaining"]``. ``mimu export FORMAT --help`` lists the options.
     """
-    return Export(_mimu.export([format, *arguments(options)], calibration=calibration, noise=noise))
+    of = calibration_of(calibration) if calibration is not None else None
+    return Export(_mimu.export([format, *arguments(options)], calibration=of, noise=noise_of(noise)))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mimu import _mimu
+from mimu import _frame, _mimu, _plot
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._result import Array, Judgement, Message, Result, judged, messages, typed
 
@@ -66,6 +68,30 @@ class Figures:
 
 
 @dataclass(frozen=True)
+class Residual:
+    """What the calibration leaves of one dwell or turn, SI."""
+
+    #: Dwell, or that in which the turn ends.
+    step: int
+    #: Of x, y, z; that of a magnitude is the first.
+    value: Array
+    #: The same by a fit without it; None if nothing was held out.
+    held_out: Array | None
+    #: Standard deviation by noise alone.
+    floor: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is wrong with a recording."""
+
+    #: As in ``"gaps"`` or ``"clipping"``.
+    kind: str
+    #: The sentence.
+    text: str
+
+
+@dataclass(frozen=True)
 class SensorFit:
     """The calibration of one triad: ``x = C @ u + o``, raw to SI."""
 
@@ -78,6 +104,10 @@ class SensorFit:
     sigma_o: Array
     #: By name: ``C_xx`` to ``o_z``, and ``scale_x``, ``bias_x``, ``misalignment_x``, ``non_orthogonality_yz`` and so on.
     parameters: dict[str, Parameter]
+    #: Of the nine elements of ``C`` by rows, then the three of ``o``: shape (12, 12), SI.
+    covariance: Array
+    #: One for every dwell or turn that was used.
+    residuals: list[Residual]
     estimator: str
     held_out_rms: float | None
     rms: float
@@ -95,11 +125,12 @@ class SensorFit:
     static_held_out_rms: float | None
 
     @staticmethod
-    def _of(data: dict[str, Any]) -> SensorFit:
+    def _of(data: dict[str, Any], covariance: list[float]) -> SensorFit:
         # The first twelve parameters are C, by rows, and o.
         value, sigma = (np.array([p[key] for p in data["parameters"][:12]], dtype=float) for key in ("value", "sigma"))
         own = {
             "C": value[:9].reshape(3, 3), "o": value[9:], "sigma": sigma[:9].reshape(3, 3), "sigma_o": sigma[9:],
+            "covariance": np.array(covariance, dtype=float).reshape(12, 12),
             "parameters": {p["name"]: p for p in data["parameters"]},
         }
         return typed(SensorFit, {**data, **own})
@@ -109,6 +140,7 @@ class Fit(Result):
     """A calibration of a recording, judged on data held out of the fit."""
 
     _native: _mimu.Fit
+    _questions = ("json", "text", "html", "calibration", "covariance")
 
     #: The triads; None if the recording has no such sensor.
     gyro: SensorFit | None
@@ -121,17 +153,20 @@ class Fit(Result):
     judgement: Judgement
     #: Warnings, one sentence each, with its ``kind``.
     warnings: list[Message]
+    #: What is wrong with the recording, one for each kind.
+    problems: list[Problem]
     device: str
 
     def __init__(self, native: _mimu.Fit) -> None:
         super().__init__(native)
         data = self.to_dict()
-        sensors = data["sensors"]
-        self.gyro, self.accel = (SensorFit._of(sensors[s]) if s in sensors else None for s in ("gyro", "accel"))
+        sensors, covariance = data["sensors"], dict(native.covariance())
+        self.gyro, self.accel = (SensorFit._of(sensors[s], covariance[s]) if s in sensors else None for s in ("gyro", "accel"))
         self.held_out = {name: typed(Figures, sensor) for name, sensor in sensors.items()}
         self.dwells = [typed(Dwell, dwell) for dwell in data["dwells"]]
         self.judgement = judged(data)
         self.warnings = messages(data)
+        self.problems = [typed(Problem, {"kind": p["id"], "text": p["text"]}) for p in data["recording_problems"]]
         self.device = data["device"]
 
     @property
@@ -139,13 +174,54 @@ class Fit(Result):
         """The calibration, to apply, save or export."""
         return self._native.calibration()
 
-    def apply(self, gyro: Any = None, accel: Any = None) -> tuple[Array | None, Array | None]:
-        """Compensated readings in rad/s and m/s², a row for each sample. A :class:`mimu.Recording` may replace both arguments."""
+    @overload
+    def apply(self, gyro: ArrayLike, accel: ArrayLike) -> tuple[Array, Array]: ...
+    @overload
+    def apply(self, gyro: ArrayLike, accel: None = None) -> tuple[Array, None]: ...
+    @overload
+    def apply(self, gyro: None = None, *, accel: ArrayLike) -> tuple[None, Array]: ...
+    @overload
+    def apply(self, gyro: Recording) -> tuple[Array | None, Array | None]: ...
+
+    def apply(self, gyro: Any = None, accel: Any = None) -> Any:
+        """Compensated readings in rad/s and m/s², a row for each sample.
+
+        Parameters
+        ----------
+        gyro : array_like of shape (n, 3), DataFrame or Recording, optional
+            Readings in the unit of the recording. A :class:`mimu.Recording` stands for both sensors.
+        accel : array_like of shape (n, 3) or DataFrame, optional
+            Readings in the unit of the recording.
+
+        Returns
+        -------
+        tuple of two arrays of shape (n, 3)
+            Rates in rad/s and specific forces in m/s², with None for a sensor that was not given. A DataFrame stays one, with its index and columns.
+
+        Examples
+        --------
+        >>> rate, force = fit.apply(gyro, accel)
+        """
         return self.calibration.apply(gyro, accel)
 
     def to_toml(self) -> str:
         """The calibration file that ``mimu fit -o`` writes."""
         return self.calibration.to_toml()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the calibration file, as ``mimu fit -o`` does: whole or not at all."""
+        self.calibration.save(path)
+
+    def to_dataframe(self) -> Any:
+        """The parameters as a table of pandas: a row for each, with ``sensor``, ``parameter``, ``value``, ``sigma``, ``lower``, ``upper`` and ``unit``."""
+        return _frame.of_parameters({"gyro": self.gyro, "accel": self.accel})
+
+    def plot(self, sensor: Sensor = "accel", ax: Any = None) -> Any:
+        """The residual of each dwell or turn with the noise that is due, on axes of matplotlib.
+
+        ``sensor`` is ``"gyro"`` or ``"accel"``. Draws on ``ax``, or on axes of its own, and returns them.
+        """
+        return _plot.residuals(self, sensor, ax)
 
     def __str__(self) -> str:
         return self._native.text()
@@ -169,11 +245,39 @@ def fit(
 ) -> Fit:
     """Calibrates the gyro and the accelerometer of a recording, as ``mimu fit`` does.
 
-    ``holdout`` blocks of time are left out in turn, and the error on them is reported; 0 for none. ``method`` chooses the estimator
-    if the input is known. ``only`` calibrates one sensor. ``still`` is the largest variance of a dwell, as a multiple of that of the quietest
-    times; ``steps="given"`` takes the dwells of the step column as they are, ``"found"`` searches for them. ``keep`` uses dwells that the
-    others contradict: ``"all"``, or their numbers. ``noise`` is that of the unit at rest: ``mimu.allan(...).noise``, or from
-    :func:`mimu.load_noise`.
+    Parameters
+    ----------
+    recording : Recording
+        Dwells at rest in several poses, with turns between them for the gyro; or dwells with known inputs.
+    holdout : int
+        Blocks of time that are left out in turn, so that the error on them can be reported; 0 for none.
+    method : str, optional
+        Estimator, if the input is known.
+    only : {"gyro", "accel"}, optional
+        Calibrates one sensor.
+    still : float, optional
+        Largest variance of a dwell, as a multiple of that of the quietest times.
+    steps : {"given", "found"}, optional
+        Takes the dwells of the step column as they are, or searches for them.
+    keep : "all" or list of int, optional
+        Dwells to use although the others contradict them.
+    noise : Noise, optional
+        Noise of the unit at rest: ``mimu.allan(...).noise``, or from :func:`mimu.load_noise`.
+
+    Returns
+    -------
+    Fit
+        Quote ``fit.held_out["gyro"].held_out_rms``, and look at ``fit.judgement`` first.
+
+    Raises
+    ------
+    mimu.Error
+        The recording does not determine the calibration; the message says what is missing.
+
+    Examples
+    --------
+    >>> fit = mimu.fit(mimu.Recording(t, gyro, accel, units="deg/s,g"))
+    >>> fit.judgement.kind, fit.gyro.parameters["scale_x"].value
     """
     return Fit(
         _mimu.fit(recording, holdout=holdout, method=method, only=only, still=still, steps=steps, keep=_keep(keep), noise=noise)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import types
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, Protocol, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Protocol, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,27 @@ class Native(Protocol):
     def html(self) -> str: ...
 
 
+class _Kept:
+    """What the compiled part of a result answered: what a pickle keeps of it."""
+
+    def __init__(self, answers: dict[str, Any]) -> None:
+        self._answers = answers
+
+    def __getattr__(self, question: str) -> Callable[..., Any]:
+        answers = self.__dict__.get("_answers", {})
+        if question not in answers:
+            raise AttributeError(question)
+        # The only argument that a question has is `everything`, of a diagnosis.
+        return lambda *arguments: answers[question][bool(arguments and arguments[0])]
+
+
+def _unpickled(cls: type[Result], answers: dict[str, Any]) -> Result:
+    with warnings.catch_warnings():
+        # Its maker was warned.
+        warnings.simplefilter("ignore")
+        return cls(cast(Any, _Kept(answers)))
+
+
 class Result:
     """A result of mimu. Attributes have their units in their names, or in ``unit`` beside them."""
 
@@ -64,9 +86,22 @@ class Result:
         self._native = native
         self._json = native.json()
 
+    #: Questions to the compiled part, without arguments; a pickle keeps their answers.
+    _questions: ClassVar[tuple[str, ...]] = ("json", "text", "html")
+
     def to_dict(self) -> dict[str, Any]:
         """The whole result: the JSON that the command writes. NaN becomes None."""
         return cast(dict[str, Any], json.loads(self._json))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        answers = {}
+        for question in self._questions:
+            ask = getattr(self._native, question)
+            answers[question] = (ask(False), ask(True)) if question == "text" and self._texts else (ask(), None)
+        return _unpickled, (type(self), answers)
+
+    #: Whether the text is asked for with ``everything`` or without.
+    _texts: ClassVar[bool] = False
 
     def _repr_html_(self) -> str:
         """Tables and plots for a notebook, as self-contained HTML."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from mimu import _mimu
+from mimu import _frame, _mimu, _plot
 from mimu._fit import Steps
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._recording import several
@@ -54,6 +55,7 @@ class ThermalFit(Result):
     """All parameters over temperature, and the lag of the dies behind the thermometer."""
 
     _native: _mimu.ThermalFit
+    _questions = ("json", "text", "html", "calibration")
 
     #: ``"fitted"``, ``"one-way"`` or ``"misfit"``.
     verdict: str
@@ -87,6 +89,21 @@ class ThermalFit(Result):
     def to_toml(self) -> str:
         """The calibration file that ``mimu thermal fit -o`` writes."""
         return self.calibration.to_toml()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the calibration file, as ``mimu thermal fit -o`` does: whole or not at all."""
+        self.calibration.save(path)
+
+    def to_dataframe(self) -> Any:
+        """The curves as a table of pandas: a row for each parameter and temperature."""
+        return _frame.of_curves(
+            [{"parameter": c.name, "sensor": c.sensor, "temp_c": c.temp_c, "value": c.value, "lower": c.lower, "upper": c.upper, "unit": c.unit}
+             for c in self.curves.values()]
+        )
+
+    def plot(self, parameter: str = "gyro_bias_x", ax: Any = None) -> Any:
+        """A curve with its 95 % band, by its name in ``curves``, on axes of matplotlib: on ``ax``, or on axes of its own, which it returns."""
+        return _plot.curve(self.curves[parameter], ax)
 
     def __str__(self) -> str:
         return self._native.text()

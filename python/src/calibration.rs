@@ -13,8 +13,9 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use numpy::ndarray::{Array2, ArrayView2, Zip};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::error::raised;
 use crate::recording::{Recording, triad};
@@ -25,6 +26,9 @@ type Both<'py> = (
     Option<Bound<'py, PyArray2<f64>>>,
     Option<Bound<'py, PyArray2<f64>>>,
 );
+
+/// The same as what they were given as: arrays, or tables of pandas.
+type Applied<'py> = (Option<Bound<'py, PyAny>>, Option<Bound<'py, PyAny>>);
 
 /// C and o of one triad.
 type MatrixAndOffset<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
@@ -95,22 +99,65 @@ impl Calibration {
 
     /// Compensated readings of gyro and accelerometer in rad/s and m/s², a row for each sample.
     ///
-    /// For arrays this is C u + o of each row. For a recording it is what `mimu apply` writes: with effects and curves over temperature, and NaN
-    /// where a sensor has no reading or is at its rail.
-    #[pyo3(signature = (gyro=None, accel=None))]
+    /// For arrays, or tables of pandas with three columns, this is C u + o of each row. A calibration with curves over temperature or with effects
+    /// needs `temp`, the temperature of each row in degrees Celsius, and `t`, its time in s. For a recording it is what `mimu apply` writes: with
+    /// effects and curves over temperature, and NaN where a sensor has no reading or is at its rail.
+    ///
+    /// Parameters
+    /// ----------
+    /// gyro : array_like of shape (n, 3), DataFrame or Recording, optional
+    ///     Readings in `unit`.
+    /// accel : array_like of shape (n, 3) or DataFrame, optional
+    ///     Readings in `unit`.
+    /// temp : array_like of shape (n,), optional
+    ///     Temperatures, degrees Celsius.
+    /// t : array_like of shape (n,), optional
+    ///     Times, s, ascending.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of two arrays of shape (n, 3), or DataFrames like those given
+    ///     Rates in rad/s and specific forces in m/s²; None for a sensor that was not given.
+    #[pyo3(signature = (gyro=None, accel=None, *, temp=None, t=None))]
     fn apply<'py>(
         &self,
         py: Python<'py>,
         gyro: Option<&Bound<'py, PyAny>>,
         accel: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Both<'py>> {
+        temp: Option<&Bound<'py, PyAny>>,
+        t: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Applied<'py>> {
+        let shaped_like = |(rate, force): Both<'py>| -> PyResult<Applied<'py>> {
+            Ok((like(gyro, rate)?, like(accel, force)?))
+        };
         match gyro.and_then(|gyro| gyro.cast::<Recording>().ok()) {
-            Some(recording) if accel.is_none() => self.apply_to_recording(py, recording.get()),
-            Some(_) => Err(PyTypeError::new_err(
+            Some(recording) if accel.is_none() => {
+                let (rate, force) = self.apply_to_recording(py, recording.get())?;
+                Ok((rate.map(Bound::into_any), force.map(Bound::into_any)))
+            }
+            Some(_) => Err(PyValueError::new_err(
                 "a recording contains both sensors: leave accel out",
             )),
-            None => self.apply_to_arrays(py, gyro, accel),
+            None if temp.is_some() || t.is_some() => {
+                let given = PyDict::new(py);
+                given.set_item("unit", self.unit())?;
+                given.set_item("gravity", self.model.recording.gravity_mps2)?;
+                given.set_item("device", self.device())?;
+                let columns = [("t", t), ("gyro", gyro), ("accel", accel), ("temp", temp)];
+                for (name, value) in columns {
+                    given.set_item(name, value)?;
+                }
+                let recording = py.get_type::<Recording>().call((), Some(&given))?;
+                shaped_like(self.apply_to_recording(py, recording.cast::<Recording>()?.get())?)
+            }
+            None => shaped_like(self.apply_to_arrays(py, gyro, accel)?),
         }
+    }
+
+    /// For pickle and for other processes.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String, String))> {
+        let made = py.import("mimu._mimu")?.getattr("parse_calibration")?;
+        Ok((made, (self.to_toml(), self.name.clone())))
     }
 
     /// The whole calibration, as `mimu export json` writes it.
@@ -173,7 +220,7 @@ impl Calibration {
             _ => None,
         };
         if let Some(problem) = more {
-            let remedy = "give a mimu.Recording instead of arrays";
+            let remedy = "give temp and t, of each row, or a mimu.Recording instead of arrays";
             return Err(raised(py, &Error::new(&self.name, problem, remedy)));
         }
         let one = |sensor: Sensor, readings: Option<&Bound<'py, PyAny>>| -> PyResult<_> {
@@ -224,6 +271,24 @@ impl Calibration {
     }
 }
 
+/// `values` in the form of `given`: a table of pandas keeps its index and the names of its columns.
+fn like<'py>(
+    given: Option<&Bound<'py, PyAny>>,
+    values: Option<Bound<'py, PyArray2<f64>>>,
+) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let (Some(given), Some(values)) = (given, values) else {
+        return Ok(None);
+    };
+    if !(given.hasattr("index")? && given.hasattr("columns")?) {
+        return Ok(Some(values.into_any()));
+    }
+    let kept = PyDict::new(given.py());
+    for name in ["index", "columns"] {
+        kept.set_item(name, given.getattr(name)?)?;
+    }
+    given.get_type().call((values,), Some(&kept)).map(Some)
+}
+
 /// The sensor of a name.
 pub(crate) fn named(sensor: &str) -> PyResult<Sensor> {
     match sensor {
@@ -257,6 +322,21 @@ fn shaped(clean: PerSensor<Vec<f64>>) -> Result<[Option<Array2<f64>>; 2]> {
         (rows > 0).then_some(shaped).transpose().map_err(broken)
     };
     Ok([one(gyro)?, one(accel)?])
+}
+
+/// A calibration from the text of its file.
+#[pyfunction]
+pub(crate) fn parse_calibration(
+    py: Python<'_>,
+    text: String,
+    name: String,
+) -> PyResult<Calibration> {
+    let place = name.clone();
+    let model = computed(py, move || Model::parse(&text, &place))?;
+    Ok(Calibration {
+        model: Arc::new(model),
+        name,
+    })
 }
 
 /// Reads a calibration file.

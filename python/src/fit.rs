@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use mimu::fit::{Method, Options};
+use mimu::quantity::Sensor;
 use mimu::result::fit::FitResult;
 use mimu_cli::report::{self, fragment};
 use mimu_recording::Reference;
@@ -39,6 +40,18 @@ impl Fit {
     /// Tables and plots.
     fn html(&self) -> String {
         fragment::of_fit(&self.fit, &self.result, &self.model)
+    }
+
+    /// Covariance of C, by rows, and o of each triad, by rows.
+    fn covariance(&self) -> Vec<(String, Vec<f64>)> {
+        let of = |sensor: Sensor| {
+            let covariance = self.fit.sensor(sensor)?.estimated.triad.inverse_covariance;
+            Some((
+                sensor.to_string(),
+                covariance.transpose().as_slice().to_vec(),
+            ))
+        };
+        Sensor::BOTH.into_iter().filter_map(of).collect()
     }
 
     /// The calibration that it gives.

@@ -36,7 +36,7 @@ mod _mimu {
     #[pymodule_export]
     use super::allan::{Allan, allan};
     #[pymodule_export]
-    use super::calibration::{Calibration, load_calibration};
+    use super::calibration::{Calibration, load_calibration, parse_calibration};
     #[pymodule_export]
     use super::command::{options, run};
     #[pymodule_export]
@@ -48,9 +48,9 @@ mod _mimu {
     #[pymodule_export]
     use super::fit::{Fit, fit};
     #[pymodule_export]
-    use super::noise::{Noise, load_noise};
+    use super::noise::{Noise, load_noise, parse_noise};
     #[pymodule_export]
-    use super::recording::{Recording, open, read};
+    use super::recording::{Recording, open, read, unpickled_arrays, unpickled_files};
     #[pymodule_export]
     use super::thermal::{ThermalFit, thermal_fit};
     #[pymodule_export]

@@ -39,6 +39,12 @@ impl Noise {
         self.file.to_toml()
     }
 
+    /// For pickle and for other processes.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let made = py.import("mimu._mimu")?.getattr("parse_noise")?;
+        Ok((made, (self.to_toml(),)))
+    }
+
     fn __repr__(&self) -> String {
         let NoiseFile {
             device,
@@ -48,6 +54,15 @@ impl Noise {
         } = self.file.as_ref();
         format!("<mimu.Noise {device:?}: {duration_s:.1} s at rest, {sample_rate_hz:.6} Hz>")
     }
+}
+
+/// Noise from the text of its file.
+#[pyfunction]
+pub(crate) fn parse_noise(py: Python<'_>, text: String) -> PyResult<Noise> {
+    let file = computed(py, move || NoiseFile::parse(&text, "pickle"))?;
+    Ok(Noise {
+        file: Arc::new(file),
+    })
 }
 
 /// Reads a noise file.

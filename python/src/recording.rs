@@ -1,5 +1,6 @@
 //! A recording: arrays that Python holds, or a folder on disk.
 
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -11,18 +12,19 @@ use mimu::warning::Warning;
 use mimu_cli::called;
 use mimu_cli::report::fragment;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::look::Given;
 use mimu_recording::{
     Column, Columns, InMemory, Manifest, PoseMeans, RawUnit, Reference, SampleFormat, Writer,
     usual_rate_hz,
 };
 use numpy::ndarray::{Array2, ArrayView1, s};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::IntoPyDict;
+use pyo3::types::{IntoPyDict, PyBytes, PyDict, PySlice};
 use tempfile::TempDir;
 
-use crate::error::{raised, refused};
+use crate::error::{keywords, raised, refused};
 use crate::preparation::Preparation;
 use crate::work::{computed, done, json, loaded};
 
@@ -37,7 +39,9 @@ pub(crate) struct Recording {
     /// Result of the import, as JSON.
     imported: Option<String>,
     warnings: Vec<String>,
-    /// Kept as long as the recording is used.
+    /// Its folder, unless it is of arrays.
+    directory: Option<PathBuf>,
+    /// Kept as long as the recording is used, if the folder is a temporary one.
     folder: Option<Arc<TempDir>>,
 }
 
@@ -168,11 +172,32 @@ impl InMemory for Arrays {
 }
 
 /// `value` as an array of doubles; the same array if it is one already.
-fn doubles<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+///
+/// # Errors
+/// Arrays whose meaning numpy would drop without a word: masked ones, and quantities with a unit of their own.
+fn doubles<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     let py = value.py();
+    let numpy = py.import("numpy")?;
+    let refused = |problem: &str, remedy: &str| {
+        let error = Error::new(name, problem, remedy);
+        Err(raised(py, &error))
+    };
+    if value.is_instance(&numpy.getattr("ma")?.getattr("MaskedArray")?)? {
+        return refused(
+            "it is a masked array, and a sample without a value is NaN here",
+            "give array.filled(numpy.nan)",
+        );
+    }
+    // pint's quantities, and astropy's.
+    for (number, unit) in [("magnitude", "units"), ("value", "unit")] {
+        if value.hasattr(number)? && value.hasattr(unit)? {
+            let problem = format!("it carries the unit {}", value.getattr(unit)?.str()?);
+            let remedy = format!("give its numbers (.{number}), and their units as units=");
+            return refused(&problem, &remedy);
+        }
+    }
     let kwargs = [("dtype", "float64")].into_py_dict(py)?;
-    py.import("numpy")?
-        .call_method("asarray", (value,), Some(&kwargs))
+    numpy.call_method("asarray", (value,), Some(&kwargs))
 }
 
 fn shape(array: &Bound<'_, PyAny>) -> String {
@@ -187,7 +212,7 @@ fn column<'py>(
     name: &str,
     rows: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let array = doubles(value)?;
+    let array = doubles(value, name)?;
     let fits = |a: &Bound<'py, PyArray1<f64>>| rows.is_none_or(|rows| a.len() == rows);
     match array.cast::<PyArray1<f64>>() {
         Ok(column) if fits(column) => Ok(column.clone()),
@@ -206,7 +231,7 @@ pub(crate) fn triad<'py>(
     name: &str,
     rows: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let array = doubles(value)?;
+    let array = doubles(value, name)?;
     let fits = |a: &Bound<'py, PyArray2<f64>>| {
         a.shape()[1] == 3 && rows.is_none_or(|rows| a.shape()[0] == rows)
     };
@@ -226,10 +251,39 @@ fn parsed<T: std::str::FromStr<Err = Error>>(py: Python<'_>, name: &str) -> PyRe
     name.parse().map_err(|error| raised(py, &error))
 }
 
+/// Unit of the readings, and the factors of gyro and accelerometer to it.
+fn units_of(
+    py: Python<'_>,
+    unit: Option<&str>,
+    units: Option<&str>,
+) -> PyResult<(RawUnit, [Option<f64>; 2])> {
+    match (unit, units) {
+        (Some(unit), None) => Ok((parsed(py, unit)?, [Some(1.0); 2])),
+        (None, Some(units)) => {
+            let given = Given::default().with_units(units);
+            let conversion = given.and_then(|given| given.conversion());
+            conversion.map_err(|error| raised(py, &error))
+        }
+        (None, None) => {
+            let problem = "the unit of the readings is not given";
+            let remedy =
+                "give units=\"deg/s,g\" or what they are in, or unit=\"count\", \"V\" or \"SI\"";
+            Err(raised(py, &Error::new("units", problem, remedy)))
+        }
+        (Some(_), Some(_)) => {
+            let problem = "unit and units say the same";
+            Err(raised(
+                py,
+                &Error::new("units", problem, "give one of them"),
+            ))
+        }
+    }
+}
+
 #[pymethods]
 impl Recording {
     #[new]
-    #[pyo3(signature = (t, gyro=None, accel=None, temp=None, *, unit, gravity=None, reference="gravity", rate_hz=None,
+    #[pyo3(signature = (t, gyro=None, accel=None, temp=None, *, unit=None, units=None, gravity=None, reference="gravity", rate_hz=None,
         step=None, ref_rate_dps=None, ref_force_mps2=None, device="unit", latitude_deg=None, power_on_s=None))]
     #[expect(clippy::too_many_arguments)]
     fn new(
@@ -238,7 +292,8 @@ impl Recording {
         gyro: Option<&Bound<'_, PyAny>>,
         accel: Option<&Bound<'_, PyAny>>,
         temp: Option<&Bound<'_, PyAny>>,
-        unit: &str,
+        unit: Option<&str>,
+        units: Option<&str>,
         gravity: Option<f64>,
         reference: &str,
         rate_hz: Option<f64>,
@@ -249,7 +304,8 @@ impl Recording {
         latitude_deg: Option<f64>,
         power_on_s: Option<f64>,
     ) -> PyResult<Self> {
-        let (unit, reference): (RawUnit, Reference) = (parsed(py, unit)?, parsed(py, reference)?);
+        let reference: Reference = parsed(py, reference)?;
+        let (unit, factors) = units_of(py, unit, units)?;
         let first = |value: Option<&Bound<'_, PyAny>>| value.and_then(|v| v.len().ok());
         let t = match (t, rate_hz, first(gyro).or(first(accel))) {
             (Some(t), ..) => column(t, "t", None)?,
@@ -265,10 +321,23 @@ impl Recording {
             }
         };
         let rows = t.len();
-        let of_triad = |value: Option<&Bound<'_, PyAny>>, name| {
-            value
-                .map(|v| Ok::<_, PyErr>(triad(v, name, Some(rows))?.unbind()))
-                .transpose()
+        let of_triad = |value: Option<&Bound<'_, PyAny>>, name: &str, factor: Option<f64>| {
+            let scaled = |v: &Bound<'_, PyAny>| {
+                let given = triad(v, name, Some(rows))?;
+                match factor {
+                    Some(1.0) => Ok(given.unbind()),
+                    Some(factor) => {
+                        let scaled = given.readonly().as_array().map(|x| x * factor);
+                        Ok(scaled.into_pyarray(py).unbind())
+                    }
+                    None => {
+                        let problem = format!("the unit of the {name} is not given");
+                        let remedy = "give both units, as in units=\"deg/s,g\"";
+                        Err(raised(py, &Error::new("units", problem, remedy)))
+                    }
+                }
+            };
+            value.map(scaled).transpose()
         };
         let of_column = |value: Option<&Bound<'_, PyAny>>, name| {
             value
@@ -277,32 +346,131 @@ impl Recording {
         };
         let rate_hz = match rate_hz {
             Some(rate) => rate,
-            None => usual_rate_hz(&t.to_vec()?).map_err(|error| raised(py, &error))?,
+            None => usual_rate_hz(&t.readonly().as_array().to_vec())
+                .map_err(|error| raised(py, &error))?,
         };
         let (gravity_mps2, warning) = gravity_at(gravity, latitude_deg, reference);
         let of_rate = Warning::of_rate(rate_hz).map(|warning| warning.to_string());
         let mut manifest = Manifest::new(device, rate_hz, gravity_mps2, unit, reference);
         manifest.latitude_deg = latitude_deg;
         manifest.power_on_s = power_on_s;
-        let arrays = Arc::new(Arrays {
+        let arrays = Arrays {
             step: of_column(step, "step")?,
             temp: of_column(temp, "temp")?,
-            gyro: of_triad(gyro, "gyro")?,
-            accel: of_triad(accel, "accel")?,
-            rate_dps: of_triad(ref_rate_dps, "ref_rate_dps")?,
-            force_mps2: of_triad(ref_force_mps2, "ref_force_mps2")?,
+            gyro: of_triad(gyro, "gyro", factors[0])?,
+            accel: of_triad(accel, "accel", factors[1])?,
+            rate_dps: of_triad(ref_rate_dps, "ref_rate_dps", Some(1.0))?,
+            force_mps2: of_triad(ref_force_mps2, "ref_force_mps2", Some(1.0))?,
             rows,
             t: t.unbind(),
-        });
-        let made = mimu_recording::Recording::in_memory(manifest, arrays.clone());
-        let made = made.map_err(|error| raised(py, &error))?;
-        Ok(Self {
-            source: Source::Samples(Arc::new(made)),
-            arrays: Some(arrays),
-            imported: None,
-            warnings: warning.into_iter().chain(of_rate).collect(),
-            folder: None,
-        })
+        };
+        let warnings = warning.into_iter().chain(of_rate).collect();
+        Self::of_arrays(py, manifest, arrays, warnings)
+    }
+
+    /// Rows of it, as a recording of arrays: `rec[1000:]`, `rec[:-500]`.
+    fn __getitem__(&self, py: Python<'_>, rows: &Bound<'_, PySlice>) -> PyResult<Self> {
+        let samples = self.source.samples().map_err(|error| raised(py, &error))?;
+        let length = isize::try_from(self.__len__(py)?).unwrap_or(isize::MAX);
+        if rows.indices(length)?.step != 1 {
+            let problem = "a step in a slice changes the sample rate";
+            let error = Error::new(
+                "slice",
+                problem,
+                "slice without a step, as in rec[1000:2000]",
+            );
+            return Err(raised(py, &error));
+        }
+        let column = |array: Option<Bound<'_, PyArray1<f64>>>| -> PyResult<_> {
+            let part = array.map(|array| array.get_item(rows)).transpose()?;
+            let typed = |part: Bound<'_, PyAny>| {
+                Ok::<_, PyErr>(part.cast_into::<PyArray1<f64>>()?.unbind())
+            };
+            part.map(typed).transpose()
+        };
+        let triad = |array: Option<Bound<'_, PyArray2<f64>>>| -> PyResult<_> {
+            let part = array.map(|array| array.get_item(rows)).transpose()?;
+            let typed = |part: Bound<'_, PyAny>| {
+                Ok::<_, PyErr>(part.cast_into::<PyArray2<f64>>()?.unbind())
+            };
+            part.map(typed).transpose()
+        };
+        let t = self.t(py)?.get_item(rows)?.cast_into::<PyArray1<f64>>()?;
+        let arrays = Arrays {
+            step: column(self.step(py)?)?,
+            temp: column(self.temp_c(py)?)?,
+            gyro: triad(self.gyro(py)?)?,
+            accel: triad(self.accel(py)?)?,
+            rate_dps: triad(self.ref_rate_dps(py)?)?,
+            force_mps2: triad(self.ref_force_mps2(py)?)?,
+            rows: t.len(),
+            t: t.unbind(),
+        };
+        Self::of_arrays(py, samples.manifest.clone(), arrays, self.warnings.clone())
+    }
+
+    /// For pickle and for other processes: the path of a folder, the files of a temporary one, or the arrays.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let module = py.import("mimu._mimu")?;
+        let said = PyDict::new(py);
+        said.set_item("imported", &self.imported)?;
+        said.set_item("warnings", &self.warnings)?;
+        let Some(directory) = &self.directory else {
+            let samples = self.source.samples().map_err(|error| raised(py, &error))?;
+            let manifest = samples.manifest.to_toml();
+            said.set_item("manifest", manifest.map_err(|error| raised(py, &error))?)?;
+            let columns = [
+                ("t", self.t(py)?.into_any()),
+                ("step", self.step(py)?.into_pyobject(py)?.into_any()),
+                ("temp", self.temp_c(py)?.into_pyobject(py)?.into_any()),
+                ("gyro", self.gyro(py)?.into_pyobject(py)?.into_any()),
+                ("accel", self.accel(py)?.into_pyobject(py)?.into_any()),
+                (
+                    "rate_dps",
+                    self.ref_rate_dps(py)?.into_pyobject(py)?.into_any(),
+                ),
+                (
+                    "force_mps2",
+                    self.ref_force_mps2(py)?.into_pyobject(py)?.into_any(),
+                ),
+            ];
+            for (name, array) in columns {
+                said.set_item(name, array)?;
+            }
+            return Ok((
+                module.getattr("unpickled_arrays")?,
+                (said,).into_pyobject(py)?.into_any(),
+            ));
+        };
+        if self.folder.is_none() {
+            return Ok((
+                module.getattr("open")?,
+                (directory,).into_pyobject(py)?.into_any(),
+            ));
+        }
+        let files = PyDict::new(py);
+        for entry in std::fs::read_dir(directory)? {
+            let entry = entry?;
+            let content = PyBytes::new(py, &std::fs::read(entry.path())?);
+            files.set_item(entry.file_name(), content)?;
+        }
+        Ok((
+            module.getattr("unpickled_files")?,
+            (files, said).into_pyobject(py)?.into_any(),
+        ))
+    }
+
+    /// All samples as a table of pandas, in the columns of the files: `t_s`, `step`, `temp_c`, `gyro_x` to `accel_z` in `unit`, and the known
+    /// inputs.
+    fn to_dataframe<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let frame = slf.py().import("mimu._frame")?;
+        frame.call_method1("of_recording", (slf,))
+    }
+
+    /// Latitude, degrees; None if it is unknown.
+    #[getter]
+    fn latitude_deg(&self) -> Option<f64> {
+        self.source.manifest().latitude_deg
     }
 
     /// Times of the samples, s.
@@ -389,12 +557,7 @@ impl Recording {
     /// Folder of a recording on disk; None for arrays, and for a file that was read without an output.
     #[getter]
     fn directory(&self) -> Option<PathBuf> {
-        match &self.source {
-            Source::Samples(samples) if self.arrays.is_none() && self.folder.is_none() => {
-                Some(samples.directory.clone())
-            }
-            _ => None,
-        }
+        self.directory.clone().filter(|_| self.folder.is_none())
     }
 
     /// Warnings about how it was made.
@@ -470,6 +633,25 @@ impl Recording {
 }
 
 impl Recording {
+    fn of_arrays(
+        py: Python<'_>,
+        manifest: Manifest,
+        arrays: Arrays,
+        warnings: Vec<String>,
+    ) -> PyResult<Self> {
+        let arrays = Arc::new(arrays);
+        let made = mimu_recording::Recording::in_memory(manifest, arrays.clone());
+        let made = made.map_err(|error| raised(py, &error))?;
+        Ok(Self {
+            source: Source::Samples(Arc::new(made)),
+            arrays: Some(arrays),
+            imported: None,
+            warnings,
+            directory: None,
+            folder: None,
+        })
+    }
+
     fn sensors(&self) -> String {
         let columns = match &self.source {
             Source::Means(_) => return "means of poses".into(),
@@ -563,13 +745,77 @@ fn gravity_at(
 /// Opens a recording on disk.
 #[pyfunction]
 pub(crate) fn open(py: Python<'_>, directory: PathBuf) -> PyResult<Recording> {
-    let source = computed(py, move || Source::open(&directory))?;
+    let opened = directory.clone();
+    let source = computed(py, move || Source::open(&opened))?;
     Ok(Recording {
         source,
         arrays: None,
         imported: None,
         warnings: Vec::new(),
+        directory: Some(directory),
         folder: None,
+    })
+}
+
+/// What a pickle says of a recording, by `name`.
+fn pickled<'py, T>(said: &Bound<'py, PyDict>, name: &str) -> PyResult<T>
+where
+    T: for<'a> FromPyObject<'a, 'py>,
+{
+    let value = said.get_item(name)?;
+    let value = value.unwrap_or_else(|| said.py().None().into_bound(said.py()));
+    value.extract::<T>().map_err(Into::into)
+}
+
+/// A recording of arrays out of a pickle.
+#[pyfunction]
+pub(crate) fn unpickled_arrays(py: Python<'_>, said: &Bound<'_, PyDict>) -> PyResult<Recording> {
+    let text: String = pickled(said, "manifest")?;
+    let manifest = Manifest::parse(&text, "pickle").map_err(|error| raised(py, &error))?;
+    let column = |name| {
+        pickled::<Option<Bound<'_, PyArray1<f64>>>>(said, name).map(|a| a.map(Bound::unbind))
+    };
+    let triad = |name| {
+        pickled::<Option<Bound<'_, PyArray2<f64>>>>(said, name).map(|a| a.map(Bound::unbind))
+    };
+    let t: Bound<'_, PyArray1<f64>> = pickled(said, "t")?;
+    let arrays = Arrays {
+        step: column("step")?,
+        temp: column("temp")?,
+        gyro: triad("gyro")?,
+        accel: triad("accel")?,
+        rate_dps: triad("rate_dps")?,
+        force_mps2: triad("force_mps2")?,
+        rows: t.len(),
+        t: t.unbind(),
+    };
+    Recording::of_arrays(py, manifest, arrays, pickled(said, "warnings")?)
+}
+
+/// A recording in a temporary folder out of a pickle.
+#[pyfunction]
+pub(crate) fn unpickled_files(
+    py: Python<'_>,
+    files: BTreeMap<OsString, Vec<u8>>,
+    said: &Bound<'_, PyDict>,
+) -> PyResult<Recording> {
+    let work = move || {
+        let made = TempDir::with_prefix("mimu-");
+        let folder = made.map_err(|e| Error::io(&std::env::temp_dir(), &e))?;
+        for (name, content) in files {
+            let path = folder.path().join(name);
+            std::fs::write(&path, content).map_err(|e| Error::io(&path, &e))?;
+        }
+        Ok((Source::open(folder.path())?, folder))
+    };
+    let (source, folder) = computed(py, work)?;
+    Ok(Recording {
+        source,
+        arrays: None,
+        imported: pickled(said, "imported")?,
+        warnings: pickled(said, "warnings")?,
+        directory: Some(folder.path().to_owned()),
+        folder: Some(Arc::new(folder)),
     })
 }
 
@@ -593,14 +839,15 @@ pub(crate) fn read(
         let to = ["-o".into(), directory.clone().into_os_string()];
         // Placed before the files, because everything after `--` is a file.
         let summary = called::import(to.into_iter().chain(arguments).collect())?;
-        Ok((Source::open(&directory)?, summary, folder))
+        Ok((Source::open(&directory)?, summary, directory, folder))
     };
-    let (source, summary, folder) = done(py, work, refused)?;
+    let (source, summary, directory, folder) = done(py, work, refused)?;
     Ok(Recording {
         source,
         arrays: None,
         imported: Some(json(&summary)?),
-        warnings: summary.warnings,
+        warnings: summary.warnings.iter().map(|w| keywords(w)).collect(),
+        directory: Some(directory),
         folder,
     })
 }
@@ -608,7 +855,7 @@ pub(crate) fn read(
 /// Sources of `recordings`. Refuses an empty list, by the name of the argument.
 pub(crate) fn sources(recordings: &[PyRef<'_, Recording>], name: &str) -> PyResult<Vec<Source>> {
     if recordings.is_empty() {
-        return Err(PyTypeError::new_err(format!(
+        return Err(PyValueError::new_err(format!(
             "{name}: give one recording at least"
         )));
     }

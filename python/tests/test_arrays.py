@@ -79,7 +79,7 @@ def test_a_calibration_over_temperature_refuses_bare_arrays(chamber: ModuleType)
     session = chamber.session()
     calibration = mimu.thermal.fit(mimu.Recording(**session.keywords())).calibration
     assert calibration.over_temperature and calibration.range_c[0] < -15 and calibration.range_c[1] > 55
-    with pytest.raises(mimu.Error, match="curves over temperature; give a mimu.Recording"):
+    with pytest.raises(mimu.Error, match="curves over temperature; give temp and t, of each row, or a mimu.Recording"):
         calibration.apply(session.gyro, session.accel)
     warm, cold = (calibration.inverse("gyro", at)[1] for at in (50.0, -10.0))
     assert not np.array_equal(warm, cold)

@@ -69,13 +69,13 @@ def test_options_that_there_are_not_are_errors_of_type_or_value(arrays: mimu.Rec
     calibration = mimu.fit(arrays).calibration
     with pytest.raises(TypeError, match="qgroundcontrol"):
         mimu.export("px4", calibration=calibration, qgroundcontrol=True)
-    with pytest.raises(TypeError, match="cannot be used with"):
+    with pytest.raises(ValueError, match="cannot be used with"):
         mimu.design(n=3, scheme="six-face")
     with pytest.raises(ValueError, match='method="best": write least-squares'):
         mimu.fit(arrays, method="best")
     with pytest.raises(mimu.Error, match="reference is"):
         mimu.fit(arrays, method="kalman")
-    with pytest.raises(TypeError, match="one other recording"):
+    with pytest.raises(ValueError, match="one other recording"):
         mimu.diagnose(arrays, verify=[arrays, arrays])
 
 

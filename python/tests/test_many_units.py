@@ -117,6 +117,24 @@ def test_the_questions_find_what_is_wrong_with_the_lines(many: ModuleType, line:
     assert all(abs(row[2] - 100.0 * row[1] / UNITS) <= 0.05 for row in reasons)
 
 
+def test_each_unit_has_its_calibration_file_and_passes_or_fails(
+    many: ModuleType, line: ModuleType, recordings: Path, tmp_path: Path
+) -> None:
+    limits = tmp_path / "limits.toml"
+    limits.write_text("gyro_held_out_rad = 0.002\ngyro_bias_x_count = 1000\n")
+    many.main(["fit", str(recordings), str(tmp_path / "table.parquet"), "--workers", "2", "--calibrations", str(tmp_path / "cal"), "--limits", str(limits)])
+    found, units = rows(tmp_path / "table.parquet"), line.units(UNITS)
+    for unit in units:
+        row = found[unit.folder]
+        if unit.broken:
+            assert row["passed"] is False and row["calibration"] is None
+            continue
+        assert mimu.load(row["calibration"]).device == row["device"]
+        assert row["passed"] == (not row["failed"])
+        assert unit.badly_glued == any("gyro_held_out_rad" in failed for failed in row["failed"]), row["failed"]
+    assert any(row["passed"] for row in found.values())
+
+
 def test_only_what_is_new_is_fitted_again(
     many: ModuleType, recordings: Path, results: Path, client: Client, capsys: pytest.CaptureFixture[str]
 ) -> None:

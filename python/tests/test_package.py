@@ -20,7 +20,7 @@ def test_the_command_is_there_with_its_help_and_status() -> None:
     assert helped.returncode == 0 and "wizard" in helped.stdout
     assert run("--version").stdout.split() == ["mimu", mimu.__version__]
     refused = run("fit", "nowhere")
-    assert refused.returncode == 1 and refused.stderr == "mimu: nowhere: the directory does not exist; check the path\n"
+    assert refused.returncode == 1 and refused.stderr == "mimu: nowhere: there is no such file or directory; check the path\n"
     assert run("fit").returncode == 2
     module = subprocess.run([sys.executable, "-m", "mimu._command", "--version"], capture_output=True, text=True, check=True)
     assert module.stdout.split() == ["mimu", mimu.__version__]
