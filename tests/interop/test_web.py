@@ -269,6 +269,60 @@ def test_noise_and_calibration_of_different_units_are_kept_apart(page, tmp_path)
     assert "count" in page.inner_text("#warnings") and "kept apart" in page.inner_text("#made-from")
 
 
+def test_a_calibration_of_ones_own_is_verified_by_a_log_and_applied_to_it(page, tmp_path):
+    page.click("#example")
+    page.wait_for_selector("#away:not([hidden])", timeout=PATIENCE)
+    cal = tmp_path / "cal.toml"
+    cal.write_bytes(taken_away(page, "calibration.toml"))
+    web_logs.write_csv(tmp_path / "log.csv", web_logs.by_hand())
+    page.reload()
+    page.set_input_files("#file", cal)
+    page.wait_for_selector("#given:not([hidden])")
+    assert "cal.toml" in page.inner_text("#given") and page.is_hidden("#columns")
+    page.set_input_files("#file", [EXAMPLE / "accel.txt", EXAMPLE / "gyro.txt"])
+    page.wait_for_selector("#columns:not([hidden])")
+    page.fill("#gravity", "9.80665")
+    page.fill("#unit-name", "accel")
+    for sensor in ("accel", "gyro"):
+        page.select_option(f"#{sensor}-unit", "count")
+    for button, file in (("#verify-given", "verify.json"), ("#apply-given", "calibrated/samples.csv")):
+        page.click(button)
+        page.wait_for_selector("#work:not([hidden]) #progress[hidden]", state="attached", timeout=PATIENCE)
+        assert page.inner_text("#error") == ""
+        assert taken_away(page, file)
+    lists = ["t_s,accel_x,accel_y,accel_z", "t_s,gyro_x,gyro_y,gyro_z"]
+    run("import", EXAMPLE / "accel.txt", EXAMPLE / "gyro.txt", "--columns", lists[0], "--columns", lists[1], "--gravity", 9.80665,
+        "--raw-unit", "count", "--device", "accel", "-o", "rec", cwd=tmp_path)
+    run("apply", "rec", "--calibration", "cal.toml", "--format", "csv", "-o", "clean", cwd=tmp_path)
+    ours, theirs = (numpy.loadtxt(text, delimiter=",", skiprows=1) for text in (
+        taken_away(page, "calibrated/samples.csv").decode().splitlines(), (tmp_path / "clean" / "samples.csv").read_text().splitlines()))
+    numpy.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+
+
+def test_a_name_and_a_rate_hold_for_one_log_only(page, tmp_path):
+    rows = web_logs.by_hand()
+    web_logs.write_csv(tmp_path / "first.csv", rows)
+    web_logs.write_csv(tmp_path / "second.csv", rows)
+    page.set_input_files("#file", tmp_path / "first.csv")
+    page.wait_for_selector("#columns:not([hidden])")
+    assert page.get_attribute("#unit-name", "placeholder") == "first"
+    page.fill("#rate", "123")
+    page.fill("#unit-name", "B-17")
+    page.set_input_files("#file", tmp_path / "second.csv")
+    page.wait_for_selector("#columns:not([hidden])")
+    assert page.input_value("#rate") == "" and page.input_value("#unit-name") == ""
+    page.fill("#unit-name", "B-17")
+    calibrate(page)
+    page.wait_for_selector("#away:not([hidden])", timeout=PATIENCE)
+    assert "B-17" in page.inner_text("#made-from")
+    # The verdict, scale factors and biases are on the first screen of the result; the report is folded.
+    page.evaluate("document.getElementById('result').scrollIntoView()")
+    for words in ("scale factor", "bias"):
+        where = page.locator("#parameters").get_by_text(words).first.bounding_box()
+        assert where["y"] < 900, (words, where)
+    assert page.evaluate("document.documentElement.scrollHeight") < 5000
+
+
 def test_work_can_be_cancelled_and_begun_again(page, tmp_path):
     web_logs.write_csv(tmp_path / "log.csv", web_logs.by_hand(dwell_s=40.0, rate_hz=500.0))
     page.set_input_files("#file", tmp_path / "log.csv")

@@ -22,7 +22,7 @@ const TO_SI = {
 /** Field that sets an argument of the command. */
 export const FIELD_OF = {
   "--columns": "files", "--rate-hz": "rate", "--time-unit": "time-unit", "--gravity": "gravity", "--latitude": "latitude", "--topic": "topic",
-  "--raw-unit": "accel-unit", "--reference": "reference", "--skip-broken": "broken", "--instance": "more-import", "--where": "more-import",
+  "--raw-unit": "accel-unit", "--reference": "reference", "--skip-broken": "broken", "--instance": "instance", "--device": "unit-name", "--where": "more-import",
   "--scale": "more-import", "--offset": "more-import", "--signed-low-byte": "more-import", "--preset": "more-import", "--still": "more-fit",
   "--steps": "more-fit", "--only": "more-fit", "--keep": "more-fit",
 };
@@ -82,7 +82,7 @@ export function show(looked, units) {
     const timeless = !log && !has("t_s");
     $("rate").required = timeless;
     $("rate").placeholder = timeless ? "needed: no column is the time" : "from the time stamps";
-    $("topic-field").hidden = !log;
+    $("topic-field").hidden = $("instance-field").hidden = !log;
     $("several-field").hidden = files.length < 2;
     if (has("ref_")) say("reference", "table");
   }
@@ -141,7 +141,10 @@ function importArguments(looked, names, roles, device, alone = false) {
     } else args.push("--raw-unit", units.every((unit) => unit === "V") ? "V" : "count");
     add("--time-unit", $("time-unit").value);
     add("--rate-hz", $("rate").value.trim().replace(",", "."));
-  } else $("topic").value.split(/[\s,]+/).forEach((topic) => add("--topic", topic));
+  } else {
+    $("topic").value.split(/[\s,]+/).forEach((topic) => add("--topic", topic));
+    add("--instance", $("instance").value);
+  }
   add("--gravity", $("gravity").value.trim().replace(",", "."));
   add("--latitude", $("latitude").value.trim().replace(",", "."));
   args.push("--reference", $("reference").value);

@@ -8,10 +8,10 @@ import { Cancelled, Program, Refused, load } from "./program.js";
 import { sphere } from "./sphere.js";
 
 /**
- * The files that were dropped last and what was found in them, or a later session with a board; the units with results, those of them that were
+ * A calibration of the person, `given`; the files that were dropped last and what was found in them, or a later session with a board; the units with results, those of them that were
  * `offered` for these files beside a new one, `dropped`; and the `unit` at work.
  */
-const state = { files: [], looked: null, session: null, recordings: ["rec"], program: null, units: [], offered: [], dropped: null, unit: null, example: false };
+const state = { given: null, files: [], looked: null, session: null, recordings: ["rec"], program: null, units: [], offered: [], dropped: null, unit: null, example: false };
 
 /** A unit without results. `calibration` and `noise` become { text, rawUnit, from }: a file, the unit of the readings that it is for, and the name of their log. */
 const newUnit = (name) => ({ name, calibration: null, noise: null });
@@ -83,10 +83,13 @@ async function guarded(work, place, fields) {
 async function open(files) {
   if (files.length === 0) return;
   if (files.length === 1 && /\.zip$/i.test(files[0].name)) return loadJournal(files[0]);
+  files = await withoutCalibration([...files]);
+  if (files.length === 0) return;
   cancel();
   Object.assign(state, { files: named(files), session: null, recordings: ["rec"] });
-  // The gravity of the example does not apply to other files.
+  // The gravity of the example does not apply to other files, nor the rate and the sensor of one log to another.
   if (state.example) $("gravity").value = "";
+  for (const id of ["rate", "topic", "instance"]) $(id).value = "";
   state.example = false;
   $("result").hidden = $("work").hidden = true;
   await guarded(async () => {
@@ -95,11 +98,30 @@ async function open(files) {
     const done = await mimu.run("columns", ...state.files.map(({ name }) => name));
     state.looked = JSON.parse(done.stdout);
     Object.assign(state, { dropped: newUnit(state.files[0].name.replace(/\.[^.]*$/, "")), offered: [...state.units] });
+    $("unit-name").value = "";
+    $("unit-name").placeholder = state.dropped.name;
+    $("verify-given").hidden = $("apply-given").hidden = !state.given;
     const known = state.offered.map((unit) => ({ name: unit.name, from: resultsOf(unit).at(-1)[1].from }));
     show(state.looked, [state.dropped, ...known]);
     $("columns").hidden = false;
     $("columns-title").focus();
   });
+}
+
+/** Keeps a calibration that is among the dropped `files`, and returns the others. */
+async function withoutCalibration(files) {
+  for (const file of files.filter(({ name }) => /\.toml$/i.test(name))) {
+    const text = await file.text();
+    if (!/^format = "mimu-calibration\//m.test(text)) {
+      refuse(`${file.name}: this is no calibration; drop a file of mimu fit, or a log`);
+      return [];
+    }
+    state.given = { name: file.name, text };
+    $("given").textContent = `${file.name}: drop a log to verify it by, or to apply it to.`;
+    $("given").hidden = false;
+    $("verify-given").hidden = $("apply-given").hidden = $("columns").hidden;
+  }
+  return files.filter(({ name }) => !/\.toml$/i.test(name));
 }
 
 /** Ends what is being computed. */
@@ -131,7 +153,8 @@ async function compute(steps) {
   $("result").hidden = true;
   $("work").hidden = $("progress").hidden = false;
   $("work-title").focus();
-  for (const id of ["steps", "errors", "warnings", "allan", "trace", "sphere", "kept", "next", "exported", "verdict", "judgement"]) $(id).replaceChildren();
+  for (const id of ["steps", "errors", "warnings", "allan", "trace", "sphere", "kept", "next", "exported", "verdict", "judgement", "parameters"]) $(id).replaceChildren();
+  $("report-part").open = false;
   for (const id of ["report-part", "away", "pictures", "verdict", "judgement"]) $(id).hidden = true;
   await guarded(async () => {
     try {
@@ -148,6 +171,7 @@ async function imported(mimu) {
   const names = state.files.map(({ name }) => name);
   const again = Number($("unit").value);
   state.unit = again ? state.offered[again - 1] : state.dropped;
+  if (!again && $("unit-name").value.trim()) state.unit.name = $("unit-name").value.trim();
   const all = imports(state.looked, names, state.unit.name);
   state.recordings = all.map((_, k) => (k ? `rec-${k + 1}` : "rec"));
   for (const [k, args] of all.entries()) {
@@ -171,7 +195,7 @@ async function calibrate(mimu) {
 async function fitted(mimu, name, more, verify = [], others = []) {
   const [rec] = state.recordings;
   // The readings are shown even if they cannot be fitted, because they show why.
-  const fit = await step("Calibration", () => mimu.run("fit", rec, "-o", "cal.toml", "--json", "fit.json", ...more)).catch(refusal);
+  const fit = await step("Calibration", () => mimu.run("fit", rec, "-o", "cal.toml", "--replace", "--json", "fit.json", ...more)).catch(refusal);
   const shown = fit instanceof Refused ? [] : ["cal.toml"];
   const view = await step("Readings and poses", () => mimu.run("view", rec, ...shown)).catch((why) => {
     throw fit instanceof Refused ? fit : why;
@@ -185,7 +209,7 @@ async function fitted(mimu, name, more, verify = [], others = []) {
   warn(fitted.warnings);
   $("errors").replaceChildren(printed("mimu fit", fit));
   const shared = more.filter((_, k) => more[k] !== "--only" && more[k - 1] !== "--only");
-  const page = ["-o", "calibration.toml", "--json", "diagnosis.json", "--page", "diagnosis.html"];
+  const page = ["-o", "calibration.toml", "--replace", "--json", "diagnosis.json", "--page", "diagnosis.html"];
   const found = await step("Diagnosis", () => mimu.run("diagnose", rec, ...others, ...page, ...shared, ...verify.slice(0, 2))).catch(refusal);
   if (!(found instanceof Refused)) {
     state.unit.calibration.text = await mimu.text("calibration.toml");
@@ -208,6 +232,30 @@ async function finished(files, name) {
   $("columns").hidden = true;
   const verify = files.has("verification/samples.csv") ? ["--verify", "session/verification"] : [];
   await compute((mimu) => fitted(mimu, `the session with ${name}`, [], verify));
+}
+
+/** Judges the calibration of the person by the dropped log. */
+async function verifyGiven(mimu) {
+  await imported(mimu);
+  await mimu.write("given.toml", state.given.text);
+  const done = await step("Verification", () => mimu.run("verify", state.recordings[0], "--calibration", "given.toml", "--json", "verify.json", ...cut($("more-fit").value)));
+  const found = await mimu.json("verify.json");
+  judge(found);
+  warn(found.warnings);
+  $("errors").replaceChildren(made("pre", { textContent: done.stdout }));
+  $("result").hidden = false;
+  await keep(mimu, ["verify.json"]);
+}
+
+/** Applies the calibration of the person to the dropped log. */
+async function applyGiven(mimu) {
+  await imported(mimu);
+  await mimu.write("given.toml", state.given.text);
+  const args = [state.recordings[0], "--calibration", "given.toml", "--format", "csv", "--replace", "-o", "calibrated"];
+  const done = await step("Application", () => mimu.run("apply", ...args));
+  $("errors").replaceChildren(made("pre", { textContent: done.stdout }));
+  $("result").hidden = false;
+  await keep(mimu, ["calibrated/samples.csv"]);
 }
 
 async function noise(mimu) {
@@ -291,8 +339,13 @@ function verdict(html) {
   if (errors) $("errors").prepend(document.importNode(errors, true));
 }
 
-/** Shows the report of the unit. */
+/** Shows the report of the unit, folded, and its table of the calibration on the page itself. */
 async function report(html) {
+  const parsed = new DOMParser().parseFromString(html, "text/html");
+  const tables = [];
+  for (let at = parsed.getElementById("calibration")?.nextElementSibling; at && at.tagName !== "H2"; at = at.nextElementSibling)
+    tables.push(...(at.matches("div.scroll") ? [at] : at.querySelectorAll("div.scroll")));
+  $("parameters").replaceChildren(...tables.slice(0, 1).map((table) => document.importNode(table, true)));
   $("report-part").hidden = false;
   await new Promise((loaded) => {
     $("report").onload = () => {
@@ -399,6 +452,9 @@ $("columns").addEventListener("submit", (event) => {
   event.preventDefault();
   compute(calibrate);
 });
+for (const [id, work] of [["verify-given", verifyGiven], ["apply-given", applyGiven]])
+  $(id).addEventListener("click", () => $("columns").reportValidity() && compute(work));
+$("trace").addEventListener("click", () => $("trace").classList.toggle("zoomed"));
 $("noise").addEventListener("click", () => $("columns").reportValidity() && compute(noise));
 addEventListener("dragover", (event) => {
   event.preventDefault();

@@ -15,7 +15,7 @@ let shown = {};
 /** Begins to show a session whose journal is read by `journal`. */
 export function begin(journal) {
   shown = { journal, part: "calibration", step: null, told: [], rate: 0, counted: null };
-  for (const id of ["log", "heard", "aims", "not-yet", "session-sphere", "pose", "phase", "count"]) $(id).replaceChildren();
+  for (const id of ["log", "heard", "aims", "not-yet", "session-sphere", "pose", "held", "phase", "count"]) $(id).replaceChildren();
   $("session-bar").value = $("dwell-bar").value = 0;
   $("prompt").textContent = WAITING["warm-up"];
   $("state").textContent = "Its rate is being found …";
@@ -59,15 +59,40 @@ const events = {
   step({ step, words, done, planned }) {
     shown.step = { ...step, words };
     $("prompt").textContent = capital(words);
-    $("pose").replaceChildren(pose(step.up, words));
+    $("pose").replaceChildren(made("p", { className: "dim", textContent: "wanted" }), pose(step.up, words));
+    say(words);
     $("session-bar").value = done / planned;
     $("count").textContent = `pose ${done + 1} of ${planned}`;
     poses();
   },
-  dwell: () => poses(),
+  dwell() {
+    beep();
+    poses();
+  },
   redo: () => poses(),
   progress: ({ progress }) => aims(progress),
 };
+
+/** Says `words`, if the person wants it: hands and eyes are at the unit. */
+function say(words) {
+  if (!$("aloud").checked || !("speechSynthesis" in window)) return;
+  speechSynthesis.cancel();
+  speechSynthesis.speak(new SpeechSynthesisUtterance(words.replaceAll("+", "plus ").replaceAll("-", "minus ")));
+}
+
+let sound;
+/** A short tone, if the person wants it. */
+function beep() {
+  if (!$("aloud").checked) return;
+  sound ??= new AudioContext();
+  const tone = sound.createOscillator(), level = sound.createGain();
+  tone.connect(level).connect(sound.destination);
+  tone.frequency.value = 880;
+  level.gain.setValueAtTime(0.2, sound.currentTime);
+  level.gain.exponentialRampToValueAtTime(0.001, sound.currentTime + 0.25);
+  tone.start();
+  tone.stop(sound.currentTime + 0.25);
+}
 
 /** Shows the poses of this part from the journal, and the next one. */
 async function poses() {
@@ -101,6 +126,13 @@ function aims({ sensors, not_yet: why }) {
 /** Shows the state of the unit: what it waits for, and what was received from it. */
 export function stand({ units: [unit], phase, step }) {
   if (!unit) return;
+  // The pose in which the unit is, beside the one that is wanted, until it is taken.
+  const off = step && unit.up && unit.tilt_deg !== null && unit.tilt_deg > unit.tilt_limit_deg;
+  const words = off ? `${Math.round(unit.tilt_deg)}° off` : "";
+  if (shown.off !== words || off) {
+    shown.off = words;
+    $("held").replaceChildren(...(off ? [made("p", { className: "dim", textContent: `now, ${words}` }), pose(unit.up, "the present pose")] : []));
+  }
   const running = unit.left_s !== null && step;
   $("dwell-bar").value = running ? Math.min(1, Math.max(0, 1 - unit.left_s / step.dwell_s)) : 0;
   if (running) $("state").textContent = `Keep it still: ${unit.left_s.toFixed(1)} s`;

@@ -1,8 +1,8 @@
 //! The poses of a recording, and how much each further pose would improve the accelerometer's parameters.
 
 use mimu::calibration::Calibration;
-use mimu::plan::design::information::{Inverse, Rows};
 use mimu::plan::design::model::{Model, Setting, Terms};
+use mimu::plan::design::next_pose::Had;
 use mimu::plan::design::reach::{Fixture, Rates, Reach};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -53,9 +53,10 @@ pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
         fixture: Fixture::Hand,
         rates: Rates::Any,
     };
-    let gains = gains(&reach, &ups);
+    let dwells: Vec<Setting> = ups.iter().copied().map(Setting::at_rest).collect();
+    let had = Had::new(&reach, &dwells);
     let plain = reach.plain();
-    let gain = |up: Vector3<f64>| gains.as_ref().map_or(0.0, |gain| gain(up));
+    let gain = |up: Vector3<f64>| had.gain(&Setting::at_rest(up)).unwrap_or(0.0);
     let best = plain.iter().map(|s| (s.up, gain(s.up)));
     // Of equal ones the first is used: faces come before edges and corners.
     let best = best.reduce(|a, b| if b.1 > a.1 * 1.001 { b } else { a });
@@ -83,53 +84,9 @@ fn cells() -> impl Iterator<Item = Vector3<f64>> {
     })
 }
 
-/// The gain of a direction after dwells with `ups` up; `None` if those do not determine all parameters.
-fn gains(reach: &Reach, ups: &[Vector3<f64>]) -> Option<impl Fn(Vector3<f64>) -> f64> {
-    let regressions = reach.model.distinct_regressions();
-    let row = move |up: Vector3<f64>| {
-        let mut row = Vec::new();
-        for regression in 0..regressions {
-            reach
-                .model
-                .regressors(regression, &Setting::at_rest(up), &mut row);
-        }
-        row
-    };
-    let widths: Vec<usize> = (0..regressions)
-        .map(|r| reach.model.parameters(r).len())
-        .collect();
-    let mut rows = Rows::new(&widths);
-    for up in ups {
-        rows.push(&row(*up));
-    }
-    let inverse = Inverse::of(&rows, (0..rows.len()).map(|i| (i, 1.0)))?;
-    // Each dwell multiplies the determinant of the information by 1 + f' M⁻¹ f; a sigma is a 2p-th root of its inverse.
-    let parameters = rows.parameters() as f64;
-    Some(move |up| 1.0 - (1.0 + inverse.variance(&row(up))).powf(-0.5 / parameters))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mimu_recording::Reference;
-
-    fn reach() -> Reach {
-        Reach {
-            model: Model::accel(Reference::Gravity, &Terms::default()),
-            fixture: Fixture::Hand,
-            rates: Rates::Any,
-        }
-    }
-
-    #[test]
-    fn a_direction_that_no_pose_has_shown_adds_more_than_one_that_several_have() {
-        let reach = reach();
-        let mut ups: Vec<Vector3<f64>> = reach.plain().iter().map(|s| s.up).collect();
-        ups.retain(|up| up.z < 0.9);
-        ups.extend([-Vector3::z(); 4]);
-        let gain = gains(&reach, &ups).unwrap();
-        assert!(gain(Vector3::z()) > 2.0 * gain(-Vector3::z()));
-    }
 
     #[test]
     fn cells_are_directions_and_cover_both_hemispheres() {
@@ -138,12 +95,5 @@ mod tests {
         let expected = std::f64::consts::FRAC_PI_4 * f64::from(CELLS * CELLS);
         assert!((count(true) / expected - 1.0).abs() < 0.05);
         assert_eq!(count(true), count(false));
-    }
-
-    #[test]
-    fn six_faces_do_not_determine_nine_parameters_by_the_size_of_gravity() {
-        let faces = [Vector3::x(), Vector3::y(), Vector3::z()];
-        let ups: Vec<Vector3<f64>> = faces.iter().flat_map(|up| [*up, -up]).collect();
-        assert!(gains(&reach(), &ups).is_none());
     }
 }

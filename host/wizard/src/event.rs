@@ -228,6 +228,8 @@ pub struct UnitState {
     pub motion: Option<[f64; 2]>,
     /// Largest accepted motion: 1, and more for the gyro while the unit turns.
     pub motion_limits: [f64; 2],
+    /// Unit vector upwards in the body frame.
+    pub up: Option<[f64; 3]>,
     /// Angle between up and the requested direction, degrees.
     pub tilt_deg: Option<f64>,
     /// Largest accepted angle, degrees.

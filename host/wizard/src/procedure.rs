@@ -1,9 +1,8 @@
 //! Settings of a session, and its dwells: the first ones, the next one by the information that it adds, and those for the verification.
 
-use mimu::plan::design::information::Inverse;
 use mimu::plan::design::model::{Model, Setting, Terms};
+use mimu::plan::design::next_pose::Had;
 use mimu::plan::design::reach::{Fixture as Reached, Rates, Reach};
-use mimu::plan::design::refinement::Region as _;
 use mimu::plan::design::tour::randomised;
 use mimu::quantity::normal_gravity;
 use mimu_recording::Reference;
@@ -287,28 +286,37 @@ pub fn next_step(config: &SessionConfig, done: &[Step], missed: Missed) -> Step 
         (of_accel, reach)
     });
     let reaches: Vec<(bool, Reach)> = reaches.collect();
+    // While a table turns, an accelerometer off its axis measures centripetal acceleration too.
+    let shows = |of_accel: bool, s: &Setting| !of_accel || s.rate.abs() < AT_REST;
     let setting = |s: &Step| Setting {
         up: s.up(),
         rate: s.rate_dps.to_radians(),
     };
     let had: Vec<Setting> = done.iter().map(setting).collect();
+    let known: Vec<(bool, Had)> = reaches
+        .iter()
+        .map(|(of_accel, reach)| {
+            let shown: Vec<Setting> = had
+                .iter()
+                .filter(|s| shows(*of_accel, s))
+                .copied()
+                .collect();
+            (*of_accel, Had::new(reach, &shown))
+        })
+        .collect();
     let mut turned = TurnInformation::default();
     for pair in had.windows(2) {
         turned.take(&pair[0].up, &pair[1].up);
     }
     let last = had.last().map(|s| s.up);
     let gain = |candidate: &Step| {
-        let with = [had.as_slice(), &[setting(candidate)]].concat();
-        let of = |(of_accel, reach): &(bool, Reach)| {
-            // While a table turns, an accelerometer off its axis measures centripetal acceleration too.
-            let tells = |s: &&Setting| !*of_accel || s.rate.abs() < AT_REST;
-            let with: Vec<Setting> = with.iter().filter(tells).copied().collect();
-            let rows = reach.rows(&with);
-            // A little information about every parameter, so that determinants can be compared before all parameters are determined.
-            let all = (0..rows.len()).map(|i| (i, 1.0));
-            Inverse::of(&rows, all).map_or(-1e3, |i| i.log_det())
+        let candidate_setting = setting(candidate);
+        // Candidates after which a parameter is still undetermined are equal.
+        let of = |(of_accel, known): &(bool, Had)| match shows(*of_accel, &candidate_setting) {
+            true => known.log_det_with(&candidate_setting).unwrap_or(-1e3),
+            false => known.log_det().unwrap_or(-1e3),
         };
-        let mut gain: f64 = reaches.iter().map(of).sum();
+        let mut gain: f64 = known.iter().map(of).sum();
         if let Some(last) = last.filter(|_| reference == Reference::Gravity) {
             gain += turned.gain(&last, &candidate.up()) * if missed[0] { 3.0 } else { 1.0 };
             // The same pose again is neither a turn nor a new pose.

@@ -324,6 +324,7 @@ impl UnitSession {
         state.trend_limit_c_per_min = config.warm_c_per_min;
         state.temp_c = seen.temp_c.is_finite().then_some(seen.temp_c);
         state.trend_c_per_min = seen.trend;
+        state.up = Some(up.normalize().into()).filter(|up: &[f64; 3]| up[0].is_finite());
         state.tilt_deg = step.map(|s| up.angle(&s.up()).to_degrees());
         let rate = self.watch.rate(seen, &nominal[0]);
         // An estimated gyro model has no scale.

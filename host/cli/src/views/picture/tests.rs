@@ -80,6 +80,7 @@ fn unit(name: &str) -> UnitState {
         motion: Some([0.31, 0.44]),
         motion_limits: [1.0, 1.0],
         tilt_deg: Some(3.12),
+        up: Some([0.0, 0.0, 1.0]),
         tilt_limit_deg: 17.0,
         rate_dps: Some(0.04),
         rate_limit_dps: 2.0,

@@ -7,6 +7,7 @@
 //! | [`exchange`], [`refinement`]  | exact designs of n dwells: on candidates, then between them              |
 //! | [`continuous`]                | the optimum that no n dwells can beat, with a proof of how near it is    |
 //! | [`judgement`], [`lack_of_fit`] | what a set of settings determines, how well, and what it would notice   |
+//! | [`next_pose`]                 | what one more dwell adds to those that a unit has had                    |
 //! | [`tour`], [`budget`]          | order and time of a sequence; best use of a limited time                 |
 //! | [`schemes`]                   | published schemes                                                        |
 //! | [`problem`]                   | a model, what it can be measured with, and the best designs of it        |
@@ -35,6 +36,7 @@ pub mod information;
 pub mod judgement;
 pub mod lack_of_fit;
 pub mod model;
+pub mod next_pose;
 pub mod problem;
 pub mod reach;
 pub mod refinement;
