@@ -163,6 +163,16 @@ def shapes():
     yield "at rest, the gyro's unit unnamed", rest, "ask"
     yield "at rest, units in the names", simple("t", A, names("g{0}_dps"), t=T[:240], w=dps, a=1.0), "si"
     yield "words of another language", simple("時刻", names("加速度{1}"), names("角速度{1}")), "ask"
+    # From files of strangers, at their first try.
+    yield "a tenth of a unit in the name", simple("time (ms)", names("accelerometer {0} (mg)"), names("gyroscope {0} (0.1 deg/s)"), t=T * 1000, a=1000 / G, w=10 * dps, whole=True, decimals=0), "ask"
+    yield "axes with a unit only", table(names("{0}(m/s^2)") + ["timestamp_ns"], xyz(F) + [T * 1e9]), "si"
+    yield "giro_x", simple("tempo_ms", names("acel_{0}"), names("giro_{0}"), t=T * 1000, a=1 / G, w=dps), "si"
+    yield "a triad of an unknown word, and no gyro", simple("t", A, names("foo_{0}")), "ask"
+    two = [w for pair in zip(xyz(F), xyz(F), strict=True) for w in pair] + [w for pair in zip(xyz(W), xyz(W), strict=True) for w in pair]
+    both = [n for n in names("acc_{0}") + names("gyr_{0}") for _ in range(2)]
+    yield "two sensors with the same names", table(["t"] + both, [T] + two), "ask"
+    yield "counts without names in a file called gyro", {"gyroData.csv": table(None, xyz(W, 131 * dps, True) + [40000 + c for c in xyz(F, 800, True)], decimals=0)}, "ask"
+    yield "a row is a whole gesture", table(None, [numpy.roll(F[:, k % 3], k) for k in range(300)]), "ask"
     yield "a counter, and no time", table(["sample"] + A + GY, [[str(k) for k in range(len(T))]] + xyz(F) + xyz(W)), "ask"
     yield "a counter called t", table(["t"] + A + GY, [[str(k) for k in range(len(T))]] + xyz(F) + xyz(W)), "ask"
     lines = simple("t", A, GY).splitlines()

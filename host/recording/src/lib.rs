@@ -68,7 +68,7 @@ pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};
 pub use separator::Separator;
-pub use toml_file::{parse_toml, read_text};
+pub use toml_file::{check_kind, parse_toml, read_text};
 pub use turntable::{Turntable, TurntableRate, rate_error};
 pub use unit_name::{UNNAMED, are_two_units, two_units};
 pub use warning::Warning;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::recorded::Recorded;
 use super::turntable::Turntable;
 use crate::error::{Argument, Error, Result};
-use crate::toml_file::{parse_toml, read_text};
+use crate::toml_file::{check_kind, parse_toml, read_text};
 
 /// Name of the manifest in a recording's directory.
 pub const MANIFEST_FILE: &str = "recording.toml";
@@ -267,6 +267,7 @@ impl Manifest {
 
     /// Parses and checks the text of a manifest; `place` is its file.
     pub fn parse(text: &str, place: &str) -> Result<Manifest> {
+        check_kind(text, place, "mimu-recording")?;
         let manifest: Manifest = parse_toml(text, place, None)?;
         manifest.check(place)?;
         Ok(manifest)

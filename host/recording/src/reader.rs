@@ -54,7 +54,7 @@ impl Recording {
         let manifest = directory.join(MANIFEST_FILE);
         if !manifest.is_file() {
             let (problem, remedy) = if !directory.exists() {
-                ("the directory does not exist", "check the path")
+                ("there is no such file or directory", "check the path")
             } else if !directory.is_dir() {
                 (
                     "this is a file, but a recording is a directory",

@@ -255,7 +255,7 @@ fn a_directory_that_is_no_recording_says_why() {
         .unwrap_err()
         .to_string();
     assert!(
-        nowhere.contains("the directory does not exist"),
+        nowhere.contains("there is no such file or directory"),
         "{nowhere}"
     );
     let file = Recording::open(&folder.path().join(MANIFEST_FILE))

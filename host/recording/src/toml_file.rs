@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
@@ -17,6 +18,49 @@ pub fn read_text(path: &Path) -> Result<String> {
             "save the file as UTF-8",
         )
     })
+}
+
+/// Files of this program, by the name in their key `format`, with what makes them.
+const FILES: [(&str, &str); 6] = [
+    ("mimu-calibration", "a calibration (`mimu fit -o`)"),
+    ("mimu-noise", "a noise file (`mimu allan -o`)"),
+    ("mimu-plan", "a plan (`mimu design -o`)"),
+    (
+        "mimu-recording",
+        "the manifest of a recording (`mimu import`)",
+    ),
+    ("mimu-driver", "a description of a turntable"),
+    (
+        "mimu-thermal-biases",
+        "biases over temperature (`mimu thermal fit --at-rest -o`)",
+    ),
+];
+
+/// Refuses `text` if it is another file of this program than the one of this `name`, before its keys are compared with those of that one.
+///
+/// # Errors
+/// What the file is, and what is wanted.
+pub fn check_kind(text: &str, place: &str, name: &str) -> Result<()> {
+    #[derive(Deserialize)]
+    struct Format {
+        format: String,
+    }
+    let found = toml::from_str::<Format>(text).ok();
+    let found = found.as_ref().and_then(|f| f.format.split('/').next());
+    let of = |name: &str| {
+        FILES
+            .iter()
+            .find(|(n, _)| *n == name)
+            .map(|(_, what)| *what)
+    };
+    match (found.filter(|f| *f != name).and_then(of), of(name)) {
+        (Some(is), Some(wanted)) => Err(Error::new(
+            place,
+            format!("this is {is}"),
+            format!("give {wanted}"),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// Parses the text of the file `place`. What is wrong is in the words of serde and of the parser, which name the keys and values that

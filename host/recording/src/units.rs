@@ -160,11 +160,25 @@ pub fn gyro_unit(gyro: &Series, accel: &Series, named: Option<&'static str>) -> 
             UnitFound::new(Some(unit), reason)
         }
         (None, Some(ratio)) => {
-            let name = named.map_or("rad/s, deg/s or mdeg/s", |name| name);
-            let reason = format!(
-                "gravity turns by {} rad/s for each unit of the gyro, which is none of {name}",
-                shown(ratio)
-            );
+            if whole && named.is_none() {
+                let per_dps = 1f64.to_radians() / ratio;
+                let reason = format!(
+                    "whole numbers, about {} for 1 deg/s by its turns",
+                    shown(per_dps)
+                );
+                return UnitFound::new(Some(COUNTS), reason);
+            }
+            let of = |unit: &str| RATES.iter().find(|(name, _)| *name == unit);
+            let reason = match named.and_then(of) {
+                Some((name, per)) => format!(
+                    "gravity turns {} times as fast as the gyro reads in {name}, the unit in the names: its range, or the time stamps, are wrong by this factor",
+                    shown(ratio / per)
+                ),
+                None => format!(
+                    "a unit of its readings is {} deg/s by how gravity turns, which is none of rad/s, deg/s and mdeg/s",
+                    shown(ratio.to_degrees())
+                ),
+            };
             UnitFound::new(whole.then_some(COUNTS), reason)
         }
         (None, None) => at_rest(whole, usual, named),

@@ -99,7 +99,15 @@ fn by_names(file: &str, names: &[String]) -> Guess {
             (None, Meaning::Nanoseconds) => "t_ns",
             (None, Meaning::Gyro(axis)) => GYRO[axis],
             (None, Meaning::Accel(axis)) => ACCEL[axis],
-            (None, Meaning::Axis(axis)) => of_file.map_or("-", |triad| triad[axis]),
+            (None, Meaning::Axis(axis)) => {
+                // `x (m/s^2)` says it by its unit.
+                let by_unit = match (rate_unit(name), force_unit(name)) {
+                    (Some(_), None) => Some(&GYRO),
+                    (None, Some(_)) => Some(&ACCEL),
+                    _ => None,
+                };
+                of_file.or(by_unit).map_or("-", |triad| triad[axis])
+            }
             (None, Meaning::Temperature) => "temp_c",
             (None, Meaning::Step) => "step",
             (None, Meaning::Reference(role)) => role,
@@ -121,6 +129,9 @@ fn by_names(file: &str, names: &[String]) -> Guess {
     }
 }
 
+/// Columns beyond which a file without names is no log of samples: a row is then a whole recording, or many sensors.
+const MOST_COLUMNS: usize = 24;
+
 /// Without names: the time, and the first two triads.
 fn by_readings(file: &str, width: usize, rows: &[Vec<f64>]) -> Guess {
     let column = |at: usize| {
@@ -132,6 +143,13 @@ fn by_readings(file: &str, width: usize, rows: &[Vec<f64>]) -> Guess {
         values.len() > 2 && values.is_sorted() && values[0] < values[values.len() - 1]
     };
     let mut roles = vec!["-"; width];
+    if width > MOST_COLUMNS {
+        return Guess {
+            roles,
+            by_readings: true,
+            ..Guess::default()
+        };
+    }
     let time = (0..width).find(|&at| grows(at));
     let first = time.map_or(0, |at| at + 1);
     if let Some(at) = time {

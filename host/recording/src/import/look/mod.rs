@@ -13,13 +13,14 @@ use serde::Serialize;
 
 pub use guess::{Guess, Units, guess};
 
+use self::names::{Meaning, meaning, unknown_axis};
 use super::assignment::{ColumnList, Role, Scale};
 use super::preview::preview;
 use super::time::{Decimal, calendar_time};
-use crate::RawUnit;
 use crate::error::{Error, Result};
 use crate::separator::Separator;
 use crate::units::UnitFound;
+use crate::{Column, RAW_COLUMNS, RawUnit};
 
 /// Rows that are looked at: at 100 Hz ten minutes, in which a unit that is turned by hand turns.
 const ROWS: usize = 60_000;
@@ -116,7 +117,14 @@ impl Given {
                 "give one of g, mg, m/s2 and one of deg/s, mdeg/s, rad/s, as g,deg/s; or count, or V",
             )
         };
-        for word in text.split(',').map(str::trim) {
+        let mut words: Vec<&str> = text.split(',').map(str::trim).collect();
+        let of_both = |word: &&str| {
+            UNITS
+                .iter()
+                .any(|(n, sensor, _)| n == word && sensor.is_empty())
+        };
+        words.sort_by_key(of_both);
+        for word in words {
             let known = UNITS.iter().find(|(name, ..)| *name == word);
             let Some((name, sensor, _)) = known else {
                 return Err(refuse(format!("{word:?} is no unit of readings")));
@@ -127,7 +135,8 @@ impl Given {
                 other => other,
             };
             for (which, unit) in [("gyro", &mut self.gyro), ("accel", &mut self.accel)] {
-                if sensor.is_empty() || *sensor == which {
+                // `g,count` are the two sensors' units.
+                if sensor.is_empty() && unit.is_none() || *sensor == which {
                     if unit.is_some_and(|before| before != name) && !sensor.is_empty() {
                         return Err(refuse(format!("the {which} has two units")));
                     }
@@ -136,6 +145,27 @@ impl Given {
             }
         }
         Ok(self)
+    }
+
+    /// Unit of readings after a conversion, and the factors to it of gyro and accelerometer, if their units are given.
+    ///
+    /// # Errors
+    /// One sensor in a unit and the other in counts or V: a recording has one unit for both.
+    pub fn conversion(&self) -> Result<(RawUnit, [Option<f64>; 2])> {
+        let given = [self.gyro, self.accel];
+        let factors = given.map(|unit| unit.map(si));
+        if factors.into_iter().flatten().all(|factor| factor.is_some()) {
+            return Ok((RawUnit::Si, factors.map(Option::flatten)));
+        }
+        match given {
+            [Some("count"), Some("count")] => Ok((RawUnit::Count, [Some(1.0); 2])),
+            [Some("V"), Some("V")] => Ok((RawUnit::Volt, [Some(1.0); 2])),
+            _ => Err(Error::new(
+                "units",
+                "one sensor is in a unit and the other in counts or V, and a recording has one unit for both",
+                "convert the readings of one of them",
+            )),
+        }
     }
 }
 
@@ -259,7 +289,8 @@ impl Look {
                 self.ask(about, list);
             }
         }
-        // A file may be named after its sensor.
+        self.ask_about_names([gyro, accel], list);
+        // A file with one triad may be named after its sensor.
         let unnamed = self.files.iter().any(|look| {
             let file = look
                 .path
@@ -267,7 +298,8 @@ impl Look {
                 .unwrap_or_default()
                 .to_string_lossy()
                 .to_lowercase();
-            look.guess.by_readings && !file.contains("acc") && !file.contains("gyr")
+            let by_file = gyro + accel == 3 && (file.contains("acc") || file.contains("gyr"));
+            look.guess.by_readings && !by_file
         });
         if unnamed && accel == 3 {
             // Gravity is seen, so the accelerometer is the one with gravity in it; else only a person knows.
@@ -296,6 +328,45 @@ impl Look {
             self.ask("no column is a time".into(), "--rate-hz RATE");
         } else if timed && !given.rate && given.time_unit.is_none() && self.time_unit().is_none() {
             self.check_clock(numbers);
+        }
+    }
+
+    /// Asks about names that stand for two sensors, and about a triad of an unknown name where one sensor is missing: left out without a word, the fit
+    /// would be of the other sensor alone.
+    fn ask_about_names(&mut self, [gyro, accel]: [usize; 2], list: &str) {
+        let mut asked = Vec::new();
+        for look in &self.files {
+            let used = |k: &usize| RAW_COLUMNS.contains(&look.guess.roles[*k]);
+            let names = &look.names;
+            let twice = (0..names.len().min(look.guess.roles.len()))
+                .filter(used)
+                .find(|k| (0..names.len()).any(|j| j != *k && names[j] == names[*k]));
+            if let Some(k) = twice {
+                asked.push(format!(
+                    "the name {:?} occurs twice, and only a person knows which of the sensors is meant",
+                    names[k]
+                ));
+            }
+            let mut unknown: Vec<(usize, String)> =
+                names.iter().filter_map(|n| unknown_axis(n)).collect();
+            unknown.sort_by(|a, b| a.1.cmp(&b.1));
+            let triad = unknown
+                .chunk_by(|a, b| a.1 == b.1)
+                .find(|all| (0..3).all(|axis| all.iter().any(|(a, _)| *a == axis)));
+            let missing = match [gyro, accel] {
+                [0, 3] => Some("the gyro"),
+                [3, 0] => Some("the accelerometer"),
+                _ => None,
+            };
+            if let (Some(triad), Some(missing)) = (triad, missing) {
+                asked.push(format!(
+                    "the columns of {:?} may be {missing}, which is not among the others",
+                    triad[0].1
+                ));
+            }
+        }
+        for about in asked {
+            self.ask(about, list);
         }
     }
 
@@ -343,16 +414,26 @@ impl Look {
         if given.raw_unit {
             return;
         }
-        for (sensor, found, choices) in [
-            ("gyro", self.gyro.clone(), "deg/s|rad/s|mdeg/s|count"),
-            ("accelerometer", self.accel.clone(), "g|m/s2|mg|count"),
+        for (sensor, found, unit, choices) in [
+            (
+                "accelerometer",
+                self.accel.clone(),
+                "ACCEL_UNIT",
+                "g, m/s2, mg or count",
+            ),
+            (
+                "gyro",
+                self.gyro.clone(),
+                "GYRO_UNIT",
+                "deg/s, rad/s, mdeg/s or count",
+            ),
         ] {
             if let Some(UnitFound {
                 unit: None, reason, ..
             }) = found
             {
-                let about = format!("the unit of the {sensor} is open: {reason}");
-                self.ask(about, &format!("--units {choices}"));
+                let about = format!("the unit of the {sensor} is open ({choices}): {reason}");
+                self.ask(about, &format!("--units {unit}"));
             }
         }
         let [gyro, accel] = [&self.gyro, &self.accel].map(|f| f.as_ref().and_then(|f| f.unit));
@@ -454,12 +535,31 @@ impl Look {
     pub fn refusal(&self, place: &Path, command: &str) -> Option<Error> {
         self.questions.first()?;
         let about: Vec<&str> = self.questions.iter().map(|q| q.about.as_str()).collect();
-        let answers: Vec<&str> = self.questions.iter().map(|q| q.answer.as_str()).collect();
+        // Both units are one option.
+        let mut answers: Vec<String> = Vec::new();
+        for question in &self.questions {
+            let unit = question.answer.strip_prefix("--units ");
+            let before = answers.iter_mut().find(|a| a.starts_with("--units "));
+            match (unit, before) {
+                (Some(unit), Some(units)) => *units += &format!(",{unit}"),
+                _ => answers.push(question.answer.clone()),
+            }
+        }
         Some(Error::new(
             place.display(),
             about.join("; "),
             format!("say it: {command} {}", answers.join(" ")),
         ))
+    }
+}
+
+/// The column that a name means by itself, if it is one of readings or of a thermometer: `AccX`, `wz`, `gyro_y`.
+pub fn column_named(name: &str) -> Option<Column> {
+    match meaning(name) {
+        Meaning::Gyro(axis) => Some(Column::Raw(axis)),
+        Meaning::Accel(axis) => Some(Column::Raw(3 + axis)),
+        Meaning::Temperature => Some(Column::Temperature),
+        _ => None,
     }
 }
 

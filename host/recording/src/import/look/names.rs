@@ -29,7 +29,7 @@ pub(super) enum Meaning {
 
 /// Words of a gyro. A name is cut into words at capitals, digits and signs, and joined again without its axis: `GyroX(dps)`, `Gyr_X`,
 /// `angular_velocity.x` are `gyro`, `gyr` and `angularvelocity`.
-const GYRO: [&str; 30] = [
+const GYRO: [&str; 35] = [
     "gyro",      // most
     "gyr",       // Xsens, Movella
     "gyroscope", // phyphox, Sensor Logger
@@ -60,9 +60,14 @@ const GYRO: [&str; 30] = [
     "g",  // gx: InvenSense's examples
     "gr",
     "wrss", // EuRoC: w_RS_S_x
+    "giro", // Portuguese, Spanish, Italian
+    "giros",
+    "giroscopio",
+    "drehrate", // German
+    "gyroskop",
 ];
 /// Words of an accelerometer.
-const ACCEL: [&str; 30] = [
+const ACCEL: [&str; 37] = [
     "accel",
     "acc",                // Xsens, Movella
     "accelerometer",      // phyphox, Sensor Logger
@@ -93,6 +98,13 @@ const ACCEL: [&str; 30] = [
     "deltavelocity",
     "accelrate",
     "arss", // EuRoC: a_RS_S_x
+    "acel", // Portuguese, Spanish
+    "aceleracao",
+    "aceleração",
+    "aceleracion",
+    "aceleración",
+    "acelerometro",
+    "beschleunigung", // German
 ];
 /// What is neither, though it may contain a word of one: magnetometers, attitudes, forces without gravity, satellites, motors.
 const OTHER: [&str; 40] = [
@@ -408,6 +420,15 @@ pub(super) fn meaning(name: &str) -> Meaning {
     }
 }
 
+/// The axis that `name` seems to be of a sensor that is not known, and the sensor's word: `foo_x`.
+pub(super) fn unknown_axis(name: &str) -> Option<(usize, String)> {
+    let essential = essential(words(&without_unit(name.trim())));
+    let (axis, stem) = axis_of(&essential)?;
+    // A letter is a part of a quaternion, or of anything.
+    let known = stem.len() < 2 || OTHER.iter().any(|word| stem.contains(word));
+    (!known && meaning(name) == Meaning::Other).then_some((axis, stem))
+}
+
 /// `t_ms`, `ts [us]`: a letter or two with a unit of time.
 fn is_short_time(words: &[String]) -> bool {
     let units = ["s", "ms", "us", "ns", "sec"];
@@ -498,6 +519,9 @@ const CLOCKS: [(Decimal, &[&str]); 4] = [
     (Decimal::Second, &["s", "sec", "secs", "second", "seconds"]),
 ];
 
+/// Fields of `sensor_msgs/Imu` of ROS, which are in rad/s and m/s² by definition.
+const ROS: [&str; 2] = ["angular_velocity", "linear_acceleration"];
+
 /// Whether `text` has one of the spellings as a word of its own.
 fn spelled(text: &str, spellings: &[&str]) -> bool {
     let text = text.to_lowercase();
@@ -508,7 +532,11 @@ fn spelled(text: &str, spellings: &[&str]) -> bool {
         text.match_indices(spelling).any(|(at, found)| {
             let before = text[..at].chars().next_back();
             let after = text[at + found.len()..].chars().next();
-            !part(before) && !part(after)
+            // `(0.1 deg/s)` is a tenth of this unit.
+            let number = text[..at]
+                .trim_end()
+                .ends_with(|c: char| c.is_ascii_digit());
+            !part(before) && !part(after) && !number
         })
     })
 }
@@ -522,12 +550,12 @@ fn of<T: Copy>(text: &str, units: &[(T, &[&str])]) -> Option<T> {
 
 /// The unit of a gyro in the names of its columns, or beside them.
 pub(super) fn rate_unit(text: &str) -> Option<&'static str> {
-    of(text, &RATES)
+    of(text, &RATES).or_else(|| text.contains(ROS[0]).then_some("rad/s"))
 }
 
 /// The unit of an accelerometer. A `g` of its own is a unit only in brackets or at the end: `acc_g_x` may be an accelerometer of the group g.
 pub(super) fn force_unit(text: &str) -> Option<&'static str> {
-    of(text, &FORCES)
+    of(text, &FORCES).or_else(|| text.contains(ROS[1]).then_some("m/s²"))
 }
 
 /// The unit of time stamps.
@@ -563,6 +591,8 @@ mod tests {
             ("Gx [°/s]", Meaning::Gyro(0)),
             ("AcX", Meaning::Accel(0)),
             ("GyZ", Meaning::Gyro(2)),
+            ("giro_x", Meaning::Gyro(0)),
+            ("aceleración_z", Meaning::Accel(2)),
             ("Gyroscope x (rad/s)", Meaning::Gyro(0)),
             ("Acceleration z (m/s^2)", Meaning::Accel(2)),
             ("Gyr_X", Meaning::Gyro(0)),
@@ -647,6 +677,14 @@ mod tests {
     }
 
     #[test]
+    fn a_triad_of_an_unknown_word_is_noticed() {
+        assert_eq!(unknown_axis("foo_x"), Some((0, "foo".into())));
+        for name in ["x", "gyro_x", "mag_y", "Mx", "q_z", "orientation.x", "temp"] {
+            assert_eq!(unknown_axis(name), None, "{name}");
+        }
+    }
+
+    #[test]
     fn units_are_read_as_words_of_their_own() {
         for (text, unit) in [
             ("Gx [°/s]", Some("deg/s")),
@@ -656,6 +694,8 @@ mod tests {
             ("gyro", None),
             ("w_x [rad/s]", Some("rad/s")),
             ("AngularRate(degrees/s)", Some("deg/s")),
+            // A tenth of a unit is another one.
+            ("gyroscope x (0.1 deg/s)", None),
         ] {
             assert_eq!(rate_unit(text), unit, "{text}");
         }
