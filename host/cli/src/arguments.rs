@@ -126,13 +126,36 @@ impl StrictArgs {
 }
 
 #[derive(Args)]
-pub(crate) struct ForceArgs {
+pub(crate) struct WritingArgs {
+    /// Replace an existing calibration file
+    #[arg(long)]
+    replace: bool,
     /// Write the calibration although it is judged a misfit; the file contains the judgement
     #[arg(long)]
     force: bool,
 }
 
-impl ForceArgs {
+impl WritingArgs {
+    /// Refuses to replace the file `output`, before the work, but after a test whether it is an input: it may be the only calibration of a unit that took a day in a chamber.
+    ///
+    /// # Errors
+    /// The file exists and has contents, and `--replace` is not given.
+    pub(crate) fn check(&self, output: Option<&Path>) -> Result<()> {
+        let full = |path: &&Path| {
+            let there = std::fs::metadata(path);
+            there.is_ok_and(|there| there.is_file() && there.len() > 0)
+        };
+        match output.filter(full) {
+            Some(path) if !self.replace => Err(Error::new(
+                path.display(),
+                "the file exists",
+                "choose another name, or replace it",
+            )
+            .about(Argument::Replace)),
+            _ => Ok(()),
+        }
+    }
+
     /// The error about a result of `place` that is judged a misfit and would therefore not be written; `remedy` says what to do.
     pub(crate) fn refusal(
         &self,
@@ -166,8 +189,7 @@ impl JsonArgs {
         self.path.is_some()
     }
 
-    /// Whether JSON replaces the text on standard output. Only the wizard asks.
-    #[cfg(not(target_family = "wasm"))]
+    /// Whether JSON replaces the text on standard output.
     pub(crate) fn is_standard_output(&self) -> bool {
         self.path.is_some() && self.file().is_none()
     }

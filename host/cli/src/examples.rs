@@ -9,6 +9,7 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
     (
         "wizard",
         &[
+            "mimu wizard --text t_ms,ax,ay,az,gx,gy,gz -o session --port /dev/ttyUSB0 --latitude 48.1",
             "mimu wizard -o session --port /dev/ttyACM0",
             "mimu wizard -o session --fixture table --driver turntable.toml --rate 250 --latitude 48.1",
         ],
@@ -16,6 +17,8 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
     (
         "import",
         &[
+            "mimu import log.csv -o rec",
+            "mimu import log.csv --units g,deg/s --latitude 48.1 -o rec",
             "mimu import log.csv --columns t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,- --raw-unit count --gravity 9.81 --reference gravity -o rec",
             "mimu import player.csv --columns t_s,gyro_x,gyro_y,gyro_z --raw-unit count --reference turntable-rate --rate-dps 200,270 --rate-error 0.3% -o player",
             "mimu import MT_00B4D6D1.txt --preset xsens --reference gravity --gravity 9.81 -o rec",
@@ -24,6 +27,7 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
     (
         "fit",
         &[
+            "mimu fit log.csv -o cal.toml",
             "mimu fit rec -o cal.toml",
             "mimu fit rec --noise noise.toml --verbose",
             "mimu fit rec --json -",
@@ -69,6 +73,7 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
     (
         "export",
         &[
+            "mimu export c cal.toml -o cal.h",
             "mimu export kalibr --noise noise.toml -o imu.yaml",
             "mimu export px4 --calibration cal.toml --qgc -o unit.params",
         ],

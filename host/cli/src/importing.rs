@@ -1,6 +1,7 @@
 //! Imports: of `mimu import`, and of logs that other commands take in place of a recording.
 
 use std::ffi::OsString;
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -11,13 +12,13 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::look::{Given, Look};
 use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
-    BrokenLimit, ColumnList, CommentSigns, Decimal, Face, ImportOptions, ImportSummary, Offset,
-    Preset, RawUnit, Reference, RowFilter, RowRange, SampleFormat, Scale, Separator, Turntable,
-    TurntableRate, TwosComplement, Zero, import, is_log, rate_error,
+    BrokenLimit, Chosen, ColumnList, CommentSigns, Decimal, Face, ImportOptions, ImportSummary,
+    Offset, Preset, RawUnit, Reference, RowFilter, RowRange, SampleFormat, Scale, Separator,
+    Turntable, TurntableRate, TwosComplement, Zero, import, is_log, rate_error,
 };
 
 use crate::arguments::JsonArgs;
-use crate::output::{check_outputs, progress};
+use crate::output::{check_outputs, progress, quoted};
 
 #[derive(Args)]
 pub(crate) struct ImportArgs {
@@ -211,13 +212,77 @@ fn faces(args: &ImportArgs) -> Result<(Vec<PathBuf>, Vec<Face>)> {
 ///
 /// # Errors
 /// What is still open, all at once, with the command to complete.
-fn look_at(args: &ImportArgs, files: &[PathBuf]) -> Result<Look> {
+fn look_at(args: &mut ImportArgs, files: &[PathBuf]) -> Result<Option<Look>> {
+    loop {
+        let look = look(args, files)?;
+        let Some(refusal) = look.refusal(&files[0], &typed(files)) else {
+            return Ok(Some(look));
+        };
+        let person = std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
+        if !person || !ask(args, &look)? {
+            return Err(refusal);
+        }
+        // The person has named the columns, so there is nothing to look for.
+        if !args.columns.is_empty() {
+            return Ok(None);
+        }
+    }
+}
+
+/// Asks about everything that `look` leaves open, and puts the answers into `args`. False if the person gives none.
+fn ask(args: &mut ImportArgs, look: &Look) -> Result<bool> {
+    let io = |error: std::io::Error| Error::io(Path::new("terminal"), &error);
+    for question in &look.questions {
+        let (option, choice) = question
+            .answer
+            .split_once(' ')
+            .unwrap_or((&question.answer, ""));
+        eprintln!("{}", question.about);
+        eprint!("{option} ({choice}): ");
+        let mut answer = String::new();
+        std::io::stdin().read_line(&mut answer).map_err(io)?;
+        let answer = answer.trim();
+        if answer.is_empty() {
+            return Ok(false);
+        }
+        match option {
+            "--units" => {
+                let before = args.units.take().map_or(String::new(), |units| units + ",");
+                args.units = Some(before + answer);
+            }
+            "--rate-hz" => {
+                let number = answer.trim_end_matches("Hz").trim().parse();
+                let problem = format!("{answer:?} is no number");
+                let refused = |_| Error::new("--rate-hz", problem, "write samples a second");
+                args.rate_hz = Some(number.map_err(refused)?);
+            }
+            "--columns" => args.columns.push(answer.parse()?),
+            _ => return Ok(false),
+        }
+    }
+    Ok(true)
+}
+
+/// The command to complete.
+fn typed(files: &[PathBuf]) -> String {
+    let typed: Vec<String> = std::env::args().skip(1).map(|a| quoted(&a)).collect();
+    match typed.first().is_some_and(|first| first == "import") {
+        true => format!("mimu {}", typed.join(" ")),
+        false => format!(
+            "mimu import {} -o DIR",
+            quoted(&files[0].display().to_string())
+        ),
+    }
+}
+
+fn look(args: &ImportArgs, files: &[PathBuf]) -> Result<Look> {
     let converted = !args.twos_complement.is_empty()
         || !args.zero.is_empty()
         || !args.signed_low_byte.is_empty();
     let scaled = args.scale.iter().any(Scale::is_of_readings);
     let mut given = Given {
-        raw_unit: args.raw_unit.is_some() || converted || scaled,
+        // A factor may also come before the unit: twice the readings in deg/s.
+        raw_unit: args.raw_unit.is_some() || converted || scaled && args.units.is_none(),
         rate: args.rate_hz.is_some(),
         time_unit: args.time_unit,
         ..Given::default()
@@ -230,33 +295,37 @@ fn look_at(args: &ImportArgs, files: &[PathBuf]) -> Result<Look> {
         true => &files[..files.len().min(1)],
         false => files,
     };
-    let look = Look::at(together, args.separator, &given)?;
-    let typed: Vec<String> = std::env::args().skip(1).map(quoted).collect();
-    let import = typed.first().is_some_and(|first| first == "import");
-    let command = match import {
-        true => format!("mimu {}", typed.join(" ")),
-        false => format!(
-            "mimu import {} -o DIR",
-            quoted(files[0].display().to_string())
-        ),
+    Look::at(together, args.separator, &given)
+}
+
+/// Unit of readings whose columns are given, by `--units`; their conversion is added to the factors.
+fn by_units(args: &mut ImportArgs, preset: Option<&Chosen>) -> Result<Option<RawUnit>> {
+    let Some(units) = &args.units else {
+        return Ok(None);
     };
-    match look.refusal(&files[0], &command) {
-        Some(error) => Err(error),
-        None => Ok(look),
+    if let Some(preset) = preset.filter(|preset| preset.raw_unit.is_some()) {
+        let problem = format!(
+            "the readings of the preset {} have a unit",
+            preset.used.name
+        );
+        let remedy = "leave it out, or name the columns: --columns";
+        return Err(Error::new("--units", problem, remedy));
     }
+    let (unit, factors) = Given::default().with_units(units)?.conversion()?;
+    for (sensor, factor) in ["gyro", "accel"].into_iter().zip(factors) {
+        if let Some(factor) = factor.filter(|factor| *factor != 1.0) {
+            args.scale.push(format!("{sensor}={factor}").parse()?);
+        }
+    }
+    Ok(Some(unit))
 }
 
-/// An argument as a shell takes it.
-fn quoted(argument: String) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_=+./,:@%".contains(c);
-    match !argument.is_empty() && argument.chars().all(plain) {
-        true => argument,
-        false => format!("'{}'", argument.replace('\'', r"'\''")),
-    }
-}
-
-/// Imports a log that was given in place of a recording, with nothing said about it.
-pub(crate) fn imported_log(file: &Path, out: &Path) -> Result<ImportSummary> {
+/// Imports a log that was given in place of a recording, with these `options` of the import.
+pub(crate) fn imported_log(
+    file: &Path,
+    out: &Path,
+    options: Vec<OsString>,
+) -> Result<ImportSummary> {
     #[derive(clap::Parser)]
     struct Alone {
         #[command(flatten)]
@@ -268,11 +337,12 @@ pub(crate) fn imported_log(file: &Path, out: &Path) -> Result<ImportSummary> {
         "-o".into(),
         out.into(),
     ];
+    let words = words.into_iter().chain(options);
     imported(<Alone as clap::Parser>::parse_from(words).import)
 }
 
 /// Makes the recording, and prints nothing.
-pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
+pub(crate) fn imported(mut args: ImportArgs) -> Result<ImportSummary> {
     let (files, faces) = faces(&args)?;
     let chosen = match (&args.preset, args.columns.is_empty()) {
         (None, false) => None,
@@ -283,8 +353,12 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
         chosen.is_some() || logs || args.means,
         args.columns.is_empty(),
     ) {
-        (false, true) => Some(look_at(&args, &files)?),
+        (false, true) => look_at(&mut args, &files)?,
         _ => None,
+    };
+    let by_units = match &looked {
+        Some(_) => None,
+        None => by_units(&mut args, chosen.as_ref())?,
     };
     let known = args.inputs.is_some() || looked.as_ref().is_some_and(Look::has_reference);
     let reference = args.reference.unwrap_or(match (args.rate_error, known) {
@@ -305,12 +379,20 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
     };
     let raw_unit = args
         .raw_unit
+        .or(by_units)
         .or(chosen.as_ref().and_then(|chosen| chosen.raw_unit))
         .or(logs.then_some(RawUnit::Si))
         .or(looked.as_ref().and_then(|look| look.raw_unit))
         .ok_or_else(|| {
-            let remedy = "give --raw-unit: V, count or SI (rad/s and m/s²)";
-            Error::new("import", "the unit of the readings is unknown", remedy)
+            let remedy = format!(
+                "say it: {} --units UNITS, which is count, V, or as g,deg/s",
+                typed(&files)
+            );
+            Error::new(
+                files[0].display(),
+                "the unit of the readings is unknown",
+                remedy,
+            )
         })?;
     let by_look = |args: &mut ImportArgs, look: &Look| {
         // One list holds for all files that follow one another.
@@ -324,7 +406,6 @@ pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
             .separator
             .or(look.files.iter().find_map(|f| f.separator));
     };
-    let mut args = args;
     if let Some(look) = &looked {
         by_look(&mut args, look);
     }

@@ -36,7 +36,10 @@ use cmd::{allan, apply, design, diagnose, fit, import, thermal, verify};
 #[cfg(not(target_family = "wasm"))]
 use cmd::{device, record, wizard};
 
-/// Calibration of inertial units made of analog MEMS sensors.
+/// Calibration of inertial units: any gyro and accelerometer of three axes, digital or analog.
+///
+/// A log at hand: mimu fit log.csv -o cal.toml, then mimu export c cal.toml -o cal.h. By hand, with any board that prints lines of readings: mimu wizard
+/// --text ax,ay,az,gx,gy,gz --latitude 48.1 -o session --port /dev/ttyUSB0. Every command prints the next one.
 ///
 /// Exit status 0: done; 1: the data were refused, and one line gives the fault, its place and the remedy; 2: wrong usage; 3: done, but --strict was
 /// given and the result is not judged good.
@@ -128,6 +131,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(status) => status.code(),
         Err(error) => {
             eprintln!("mimu: {}", hint::line(&error, &innermost(&matches)));
+            if json_is_printed(&matches) && !output::json_printed() {
+                report::print_refusal(&error);
+            }
             1
         }
     }
@@ -141,6 +147,16 @@ fn command_line(arguments: &[OsString]) -> String {
     });
     let all: Vec<String> = std::iter::once("mimu".to_string()).chain(shown).collect();
     all.join(" ")
+}
+
+/// Whether `--json -` is among the arguments of any subcommand.
+fn json_is_printed(matches: &clap::ArgMatches) -> bool {
+    // The id is that of the field of `JsonArgs`.
+    let to: Option<&std::path::PathBuf> = matches.try_get_one("path").ok().flatten();
+    let within = matches
+        .subcommand()
+        .is_some_and(|(_, of)| json_is_printed(of));
+    within || to.is_some_and(|path| path.as_os_str() == "-")
 }
 
 /// The innermost subcommand of `matches`, with its flags.

@@ -2,6 +2,7 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anstream::AutoStream;
 use anstyle::AnsiColor;
@@ -11,6 +12,14 @@ use mimu_recording::result_file::{Staged, stage};
 use serde::Serialize;
 
 use crate::arguments::JsonArgs;
+
+/// Whether a result was printed as JSON, so that no refusal follows it.
+static JSON_PRINTED: AtomicBool = AtomicBool::new(false);
+
+/// Whether this command has printed a result as JSON.
+pub(crate) fn json_printed() -> bool {
+    JSON_PRINTED.load(Ordering::Relaxed)
+}
 
 /// Before the work, refuses outputs that cannot be written, and those that would overwrite an input or each other.
 pub(crate) fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<()> {
@@ -32,6 +41,15 @@ pub(crate) fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Resu
         }
     }
     Ok(())
+}
+
+/// An argument as a shell takes it.
+pub(crate) fn quoted(argument: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_=+./,:@%".contains(c);
+    match !argument.is_empty() && argument.chars().all(plain) {
+        true => argument.to_owned(),
+        false => format!("'{}'", argument.replace('\'', r"'\''")),
+    }
 }
 
 /// The present time, RFC 3339, in whole seconds.
@@ -69,10 +87,11 @@ pub(crate) fn print(
     for staged in files.into_iter().chain(file.transpose()?) {
         staged.publish()?;
     }
-    let shown = match (&json.path, json.file()) {
-        (Some(_), None) => &pretty,
-        _ => text,
+    let shown = match json.is_standard_output() {
+        true => &pretty,
+        false => text,
     };
+    JSON_PRINTED.store(json.is_standard_output(), Ordering::Relaxed);
     show(shown)
 }
 

@@ -1,8 +1,10 @@
 //! Reads the recording of a subcommand.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use clap::Args;
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::Finding;
 use mimu_recording::error::{Error, Result};
@@ -13,15 +15,53 @@ use crate::importing::imported_log;
 use crate::output::{check_outputs, progress};
 use crate::report;
 
+/// What a log that is given in place of a recording does not say, and where its recording is kept.
+#[derive(Args, Default, Clone)]
+pub(crate) struct LogArgs {
+    /// If a log is given in place of the recording: directory in which to keep the recording that is made of it
+    #[arg(long = "save", value_name = "DIR")]
+    folder: Option<PathBuf>,
+    /// Local gravity of a log, m/s² [default: normal gravity at --latitude, or 9.80665 with a warning]
+    #[arg(long, value_name = "MPS2", allow_negative_numbers = true)]
+    gravity: Option<f64>,
+    /// Latitude of a log, degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    latitude: Option<f64>,
+    /// Units of a log, as of `mimu import`: `g,deg/s`
+    #[arg(long, value_name = "G,DEG/S")]
+    units: Option<String>,
+}
+
+impl LogArgs {
+    /// With the gravity of a calibration that judges the log, unless the person knows a better one.
+    pub(crate) fn or_gravity(&self, known: Option<f64>) -> Self {
+        let given = self.gravity.is_some() || self.latitude.is_some();
+        Self {
+            gravity: self.gravity.or(known.filter(|_| !given)),
+            ..self.clone()
+        }
+    }
+
+    /// The options of `mimu import`.
+    fn options(&self) -> Vec<OsString> {
+        let numbers = [("--gravity", self.gravity), ("--latitude", self.latitude)];
+        let numbers = numbers
+            .into_iter()
+            .filter_map(|(option, value)| Some(format!("{option}={}", value?)));
+        let units = self.units.iter().map(|units| format!("--units={units}"));
+        numbers.chain(units).map(OsString::from).collect()
+    }
+}
+
 /// Folders of logs that were given in place of recordings; see [`remove_logs`].
 static LOGS: Mutex<Vec<TempDir>> = Mutex::new(Vec::new());
 
-/// The recording at `path`: its folder. A file is a log: it is imported to a folder that lasts as long as the command, and what it was taken for is
-/// printed to standard error, where it does not disturb a result.
+/// The recording at `path`: its folder. A file is a log: it is imported to the folder of `log`, or to one that lasts as long as the command, and what
+/// it was taken for is printed to standard error, where it does not disturb a result.
 ///
 /// # Errors
 /// A log that does not show its columns or units; the error has the import to complete.
-pub(crate) fn folder(path: &Path) -> Result<PathBuf> {
+pub(crate) fn folder(path: &Path, log: &LogArgs) -> Result<PathBuf> {
     let own = path.file_name().is_some_and(|name| name == MANIFEST_FILE);
     let within = path
         .parent()
@@ -32,18 +72,27 @@ pub(crate) fn folder(path: &Path) -> Result<PathBuf> {
     if !path.is_file() {
         return Ok(path.to_owned());
     }
-    let io = |error: std::io::Error| Error::io(&std::env::temp_dir(), &error);
-    let scratch = tempfile::Builder::new()
-        .prefix("mimu-")
-        .tempdir()
-        .map_err(io)?;
-    let out = scratch.path().join(path.file_name().unwrap_or_default());
-    LOGS.lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .push(scratch);
-    let summary = imported_log(path, &out)?;
+    let out = match &log.folder {
+        Some(folder) => folder.clone(),
+        None => scratch()?.join(path.file_name().unwrap_or_default()),
+    };
+    let mut summary = imported_log(path, &out, log.options())?;
+    // Its folder is of no interest.
+    if log.folder.is_none() {
+        summary.recording = path.display().to_string();
+    }
     eprint!("{}", report::import_text(&summary));
     Ok(out)
+}
+
+/// A folder that [`remove_logs`] removes.
+fn scratch() -> Result<PathBuf> {
+    let made = tempfile::Builder::new().prefix("mimu-").tempdir();
+    let made = made.map_err(|error| Error::io(&std::env::temp_dir(), &error))?;
+    let path = made.path().to_owned();
+    let mut logs = LOGS.lock().unwrap_or_else(PoisonError::into_inner);
+    logs.push(made);
+    Ok(path)
 }
 
 /// Removes the folders of logs, at the end of a command.
@@ -54,15 +103,16 @@ pub(crate) fn remove_logs() {
 /// Reads a recording of samples or of means like [`read`].
 pub(crate) fn read_samples_or_means(
     directory: &Path,
+    log: &LogArgs,
     finding: Finding,
     outputs: &[Option<&Path>],
     others: &[Option<&Path>],
 ) -> Result<Prepared> {
     let given = directory;
-    let directory = &folder(given)?;
+    let directory = &folder(given, log)?;
     let Some(means) = PoseMeans::file(directory) else {
         let others: Vec<Option<&Path>> = others.iter().copied().chain([Some(given)]).collect();
-        return read(directory, finding, outputs, &others);
+        return read(directory, log, finding, outputs, &others);
     };
     let manifest = directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &means];
@@ -74,12 +124,13 @@ pub(crate) fn read_samples_or_means(
 /// Reads a recording, after checking that the results can be written and overwrite no input.
 pub(crate) fn read(
     directory: &Path,
+    log: &LogArgs,
     finding: Finding,
     outputs: &[Option<&Path>],
     others: &[Option<&Path>],
 ) -> Result<Prepared> {
     let given = directory;
-    let directory = &folder(given)?;
+    let directory = &folder(given, log)?;
     let recording = Recording::open(directory)?;
     let manifest = directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples, given];

@@ -42,7 +42,7 @@ pub use diagnosis::{Detail, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
 pub use import::import_text;
 pub use page::Made;
-pub(crate) use refusal::refused;
+pub(crate) use refusal::{print_refusal, refused};
 pub use thermal::{thermal_comparison_text, thermal_text};
 pub use thermal_page::thermal_page;
 pub use thermal_plan::thermal_plan_text;

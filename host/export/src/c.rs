@@ -143,6 +143,23 @@ impl Header<'_> {
         };
         let all = format!("{state}{follow}with every sample {each}{remove}");
         lines.push(format!("Use: {}.", all.trim_end_matches("; ")));
+        let array = |sensor: Sensor| {
+            let (raw, [x, y, z], out, unit) = match sensor {
+                Sensor::Gyro => ("g", ["gx", "gy", "gz"], "rate", "rad/s"),
+                Sensor::Accel => (
+                    "a",
+                    ["ax", "ay", "az"],
+                    "force",
+                    "m/s^2, at rest it points up",
+                ),
+            };
+            let state = if self.has_curves(sensor) { "&s, " } else { "" };
+            format!(
+                "  float {raw}[3] = {{(float){x}, (float){y}, (float){z}}}, {out}[3]; {prefix}_{sensor}({state}{raw}, {out});  // {unit}"
+            )
+        };
+        lines.push("Readings are floats in the order x, y, z, raw as they are read, at the range that was calibrated:".into());
+        lines.extend(self.sensors().map(array));
         if self.follows() {
             lines.push(format!(
                 "{prefix}_follow takes the time in s since its last call (first call: since power-on) and the thermometer in degrees Celsius, NAN if it has no reading."

@@ -46,10 +46,10 @@ pub mod yaml;
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::calibration::thermal_biases::ThermalBiases;
-use mimu::noise::noise_file::NoiseFile;
+use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
 use mimu::quantity::{Sensor, significant};
-use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{RAW_COLUMNS, RawUnit};
 use serde::Serialize;
 
 use crate::judged::JudgedSource;
@@ -100,6 +100,8 @@ pub enum Format {
     Core,
 }
 
+/// Largest share by which a scale factor may differ from 1 without a consequence: that of N is rarely known better.
+const SAME_SCALE: f64 = 0.03;
 /// Largest share by which two scale factors of one unit differ: temperature and age change it by less.
 const OTHER_SCALE: f64 = 0.1;
 
@@ -186,13 +188,15 @@ impl Sources<'_> {
         for channel in &noise.channel {
             let at = RAW_COLUMNS.iter().position(|name| *name == channel.name);
             let scaled = channel.raw_unit.as_ref().zip(channel.scale_factor);
-            let (Some(at), Some((unit, scale))) = (at, scaled) else {
-                continue;
-            };
+            let Some(at) = at else { continue };
             let Some(table) = calibration.table(Sensor::BOTH[at / 3]) else {
                 continue;
             };
             let ours = table.physical.scale_factor[at % 3];
+            let Some((unit, scale)) = scaled else {
+                self.check_alike(channel, ours, table.raw_unit)?;
+                continue;
+            };
             let raw = table.raw_unit.to_string();
             if *unit == raw && ((scale / ours).abs() - 1.0).abs() < OTHER_SCALE {
                 continue;
@@ -210,6 +214,22 @@ impl Sources<'_> {
             .about(Argument::Noise));
         }
         Ok(())
+    }
+
+    /// Refuses noise of which nobody says whether it is that of readings in SI before the calibration or after it, if the two differ: the densities of a
+    /// gyro whose driver reports half of the rate came out too small by half.
+    fn check_alike(&self, channel: &NoiseChannel, scale: f64, raw: RawUnit) -> Result<()> {
+        if raw != RawUnit::Si || (scale.abs() - 1.0).abs() < SAME_SCALE {
+            return Ok(());
+        }
+        let place = self.noise.map_or("", |noise| noise.place.as_str());
+        let problem = format!(
+            "the calibration changes these readings by a factor of {}, and the file does not say whether its noise is that before or after",
+            significant(1.0 / scale)
+        );
+        let remedy = "make it of the same readings with the calibration: mimu allan REC --calibration FILE -o noise.toml";
+        let place = format!("{place}, channel {}", channel.name);
+        Err(Error::new(place, problem, remedy).about(Argument::Noise))
     }
 
     /// A note if calibration and noise have the names of different units.
@@ -232,7 +252,7 @@ impl Sources<'_> {
             Error::new(
                 "export",
                 "this format needs the noise of the unit",
-                "name a file of `mimu allan -o`",
+                "record the unit at rest, and add its file: mimu allan REST --calibration cal.toml -o noise.toml, then --noise noise.toml",
             )
             .about(Argument::Noise)
         })

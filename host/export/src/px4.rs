@@ -154,7 +154,7 @@ fn add(cubics: BiasCubics, export: &mut Export) {
     let list = |values: [f64; 3]| values.map(|v| format!("{v:.6}")).join(", ");
     let [from, to] = cubics.range_c;
     export.formulas.push(format!(
-        "{}: reading = [{}] (raw - [{}]) {}, raw to SI; minus the cubic of {from:.1} to {to:.1} °C about {:.1} °C",
+        "{}: reading = [{}] (raw - [{}]) {}, raw to SI; the firmware then subtracts the bias, a cubic in (T - {:.1} °C) for T from {from:.1} to {to:.1} °C",
         cubics.sensor,
         list(cubics.conversion.si_per_raw),
         list(cubics.conversion.zero_raw),

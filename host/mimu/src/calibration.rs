@@ -34,7 +34,9 @@ use crate::quantity::Sensor;
 use crate::triad::Covariance;
 use crate::warning::Warning;
 use mimu_recording::error::Result;
-use mimu_recording::{Manifest, RawUnit, Reference, UNNAMED, are_two_units, parse_toml, read_text};
+use mimu_recording::{
+    Manifest, RawUnit, Reference, UNNAMED, are_two_units, check_kind, parse_toml, read_text,
+};
 
 /// Version of the layout of a calibration at one temperature.
 const FORMAT: &str = "mimu-calibration/1";
@@ -278,6 +280,7 @@ impl Calibration {
         if thermal_biases::is_one(text) {
             return Err(thermal_biases::refusal(place));
         }
+        check_kind(text, place, "mimu-calibration")?;
         let calibration: Self = parse_toml(text, place, Some("fit the recording again"))?;
         calibration.checked(place)
     }

@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{parse_toml, read_text};
+use mimu_recording::{check_kind, parse_toml, read_text};
 
 use crate::plan::design::model::Setting;
 use crate::plan::design::reach::Fixture;
@@ -235,6 +235,7 @@ impl Plan {
         let place = path.display().to_string();
         let text = read_text(path)?;
         let again = "write the plan with `mimu design` or `mimu thermal plan`";
+        check_kind(&text, &place, "mimu-plan")?;
         let plan: Self = parse_toml(&text, &place, Some(again))?;
         if !(1..=MOST_DWELLS).contains(&(plan.rounds as usize)) {
             let problem = format!("rounds is {}", plan.rounds);

@@ -5,6 +5,7 @@
 //! integers and `Uni:` with the same nine in SI.
 
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::look::column_named;
 use mimu_recording::{Column, Decimal};
 
 /// Longest line, bytes. No board writes a line as long as this with ten numbers.
@@ -45,7 +46,7 @@ fn wraps_s(unit: Decimal) -> f64 {
 }
 
 impl Columns {
-    /// Parses names separated by commas: `ax`, `ay`, `az`, `gx`, `gy`, `gz` (or `accel_x` to `gyro_z` as in a recording), at most one of `t_us`,
+    /// Parses names separated by commas: `ax`, `ay`, `az`, `gx`, `gy`, `gz` or what loggers call them (`AccX`, `gyro_y`), at most one of `t_us`,
     /// `t_ms` and `t_s`, `temp_c`, and `-` for a column to ignore.
     ///
     /// Errors: an unknown or repeated name, or a missing axis.
@@ -56,7 +57,12 @@ impl Columns {
         };
         let (mut columns, mut clock) = (Vec::new(), None);
         for name in names.split(',').map(str::trim) {
-            let of_clock = |unit: &Decimal| name.strip_prefix("t_") == Some(unit.symbol());
+            // `millis` and `micros` are what a sketch calls.
+            let of_clock = |unit: &Decimal| match name {
+                "millis" => *unit == Decimal::Millisecond,
+                "micros" => *unit == Decimal::Microsecond,
+                _ => name.strip_prefix("t_") == Some(unit.symbol()),
+            };
             let channel = CHANNELS.iter().position(|c| *c == name);
             let column = match (name, CLOCKS.into_iter().find(of_clock)) {
                 ("-", _) => None,
@@ -66,6 +72,7 @@ impl Columns {
                 }
                 _ => {
                     let known = channel.map(Column::Raw).or(Column::from_name(name));
+                    let known = known.or_else(|| column_named(name));
                     let known = known.filter(|c| matches!(c, Column::Raw(_) | Column::Temperature));
                     let none = || refused(format!("{name:?} is not a column"));
                     Some(known.ok_or_else(none)?)
@@ -342,6 +349,18 @@ mod tests {
         let mut lines = Lines::new(Columns::parse(columns).unwrap());
         let readings = lines.take(format!("cut,1\n{text}").as_bytes());
         (readings, lines)
+    }
+
+    #[test]
+    fn columns_have_the_names_that_loggers_write() {
+        for names in [
+            "AccX,AccY,AccZ,GyroX,GyroY,GyroZ",
+            "accel.x,accel.y,accel.z,wx,wy,wz",
+        ] {
+            let (readings, _) = read(names, "1,2,3,4,5,6\n");
+            assert_eq!(readings[0].raw, [4.0, 5.0, 6.0, 1.0, 2.0, 3.0], "{names}");
+        }
+        assert!(Columns::parse("AccX,AccY,AccZ,GyroX,GyroY,heading").is_err());
     }
 
     #[test]

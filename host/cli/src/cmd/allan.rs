@@ -15,7 +15,7 @@ use mimu_recording::{MANIFEST_FILE, Recording};
 
 use crate::arguments::{JsonArgs, StrictArgs, VerboseArgs};
 use crate::output::{check_outputs, now, print, progress};
-use crate::reading::folder;
+use crate::reading::{LogArgs, folder};
 use crate::status::Status;
 
 #[derive(Args)]
@@ -53,6 +53,8 @@ pub struct AllanArgs {
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
+    log: LogArgs,
+    #[command(flatten)]
     strict: StrictArgs,
     #[command(flatten)]
     verbose: VerboseArgs,
@@ -84,6 +86,21 @@ fn confidence(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
+/// The next step: the file, or what it is for.
+fn next(args: &AllanArgs) -> String {
+    let step = match (&args.output, &args.calibration) {
+        (None, None) => "mimu allan ... --calibration cal.toml -o noise.toml writes the file for fit, design and export".into(),
+        (None, Some(_)) => "-o noise.toml writes the file for fit, design and export".into(),
+        (Some(file), None) => format!("mimu fit REC --noise {}", file.display()),
+        (Some(file), Some(calibration)) => format!(
+            "mimu export kalibr {} --noise {} -o imu.yaml",
+            calibration.display(),
+            file.display()
+        ),
+    };
+    format!("next: {step}; --verbose prints curve and reasons\n")
+}
+
 pub fn run(args: &AllanArgs) -> Result<Status> {
     if args.plot.is_some() && args.recordings.len() > 1 {
         return Err(Error::new(
@@ -107,7 +124,7 @@ pub fn run(args: &AllanArgs) -> Result<Status> {
     let recordings: Vec<Recording> = args
         .recordings
         .iter()
-        .map(|r| Recording::open(&folder(r)?))
+        .map(|r| Recording::open(&folder(r, &args.log)?))
         .collect::<Result<_>>()?;
     let manifests: Vec<PathBuf> = args
         .recordings
@@ -151,6 +168,9 @@ pub fn run(args: &AllanArgs) -> Result<Status> {
     let surveys = surveys?;
     let result = AllanResult::of(&surveys);
     let mut text = report::allan_text(&result, args.verbose.verbose);
+    if !args.verbose.verbose {
+        text.push_str(&next(args));
+    }
     let mut staged = Vec::new();
     if let (Some(path), Some(noise)) = (&args.output, result.noise_file(&now())) {
         staged.push(stage(path, noise.to_toml())?);

@@ -10,7 +10,7 @@ use mimu_recording::{MANIFEST_FILE, Recording, SampleFormat};
 
 use crate::arguments::JsonArgs;
 use crate::output::{check_outputs, print, progress};
-use crate::reading::folder;
+use crate::reading::{LogArgs, folder};
 use crate::report;
 
 #[derive(Args)]
@@ -30,12 +30,14 @@ pub(crate) struct ApplyArgs {
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
     #[command(flatten)]
+    log: LogArgs,
+    #[command(flatten)]
     json: JsonArgs,
 }
 
 pub(crate) fn run(args: &ApplyArgs) -> Result<()> {
     let calibration = Calibration::read(&args.calibration)?;
-    let recording = Recording::open(&folder(&args.recording)?)?;
+    let recording = Recording::open(&folder(&args.recording, &args.log)?)?;
     let manifest = args.recording.join(MANIFEST_FILE);
     let inputs = [
         manifest.as_path(),

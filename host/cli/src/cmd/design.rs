@@ -32,9 +32,9 @@ pub struct DesignArgs {
     /// Sensor to calibrate
     #[arg(long, value_enum, default_value = "accel")]
     sensor: SensorArg,
-    /// What is known of the input: table (all of it) or gravity (its magnitude at rest)
-    #[arg(long, default_value = "table")]
-    reference: Reference,
+    /// What is known of the input: table (all of it) or gravity (its magnitude at rest) [default: table, or gravity with --table hand]
+    #[arg(long)]
+    reference: Option<Reference>,
     /// Terms to be determined: affine, and any of quadratic, cubic, cross, g-sensitivity
     #[arg(long, value_name = "LIST", default_value = "affine")]
     model: Terms,
@@ -65,7 +65,7 @@ pub struct DesignArgs {
     table: Option<TableArg>,
     /// Length of a dwell, s
     ///
-    /// By default 20 s; with a noise file, the length beyond which longer dwells reduce sigma by at most 5 %.
+    /// By default 20 s, by hand 4 s; with a noise file, the length beyond which longer dwells reduce sigma by at most 5 %.
     #[arg(long, value_name = "S", conflicts_with = "budget",
           value_parser = |t: &str| number(t, 0.1, 86400.0))]
     dwell: Option<f64>,
@@ -181,6 +181,8 @@ impl FromStr for NoiseArg {
 
 /// Default length of a dwell for an unknown unit: fang's, s.
 const DWELL_S: f64 = 20.0;
+/// The same by hand, s: a person does not hold still for longer.
+const BY_HAND_S: f64 = 4.0;
 
 impl DesignArgs {
     fn sensor(&self) -> Sensor {
@@ -190,8 +192,15 @@ impl DesignArgs {
         }
     }
 
+    fn reference(&self) -> Reference {
+        self.reference.unwrap_or(match self.table {
+            Some(TableArg::Hand) => Reference::Gravity,
+            _ => Reference::Table,
+        })
+    }
+
     fn fixture(&self) -> Fixture {
-        match (self.table, self.reference) {
+        match (self.table, self.reference()) {
             (Some(TableArg::ThreeAxis), _) | (None, Reference::Table) => Fixture::ThreeAxis,
             (Some(TableArg::TwoAxis), _) => Fixture::TwoAxis,
             (Some(TableArg::Faces), _) => Fixture::Faces,
@@ -233,6 +242,15 @@ impl DesignArgs {
         })
     }
 
+    /// Whose noise is assumed, if none is given.
+    fn assumed_noise(&self) -> Option<&'static str> {
+        let given = self.sigma.is_some() || self.noise.is_some();
+        (!given).then_some(match self.sensor() {
+            Sensor::Gyro => "an ADXRS300",
+            Sensor::Accel => "an MMA7260QT",
+        })
+    }
+
     /// Length of a dwell, s.
     fn dwell_s(&self, noise: &DwellNoise) -> f64 {
         let useful = match &self.noise {
@@ -242,7 +260,10 @@ impl DesignArgs {
         // Tables are set to tenths of a second.
         self.dwell
             .or(useful.map(|s| ((10.0 * s).ceil() / 10.0).max(1.0)))
-            .unwrap_or(DWELL_S)
+            .unwrap_or(match self.fixture() {
+                Fixture::Hand => BY_HAND_S,
+                _ => DWELL_S,
+            })
     }
 
     /// Requested order of a design; `None`: the default, which for a published scheme is the published order.
@@ -255,7 +276,7 @@ impl DesignArgs {
 
     /// The problem; `span` are the full rates of a gyro.
     fn problem(&self, span: Vector3<f64>, rates: Rates) -> Result<Problem> {
-        match (self.sensor(), self.reference) {
+        match (self.sensor(), self.reference()) {
             (Sensor::Accel, reference) => {
                 Problem::accel(Model::accel(reference, &self.model), self.fixture())
             }
@@ -314,6 +335,7 @@ impl DesignArgs {
             title,
             dwell_s,
             noise: self.sigma.is_none().then_some(noise),
+            assumed_noise: self.assumed_noise(),
             motion,
             order,
             shortest_moves_s,
@@ -359,6 +381,7 @@ impl DesignArgs {
             title: format!("best within {minutes} min (seed {})", self.seed),
             dwell_s: best.dwell_s,
             noise: Some(session.noise),
+            assumed_noise: self.assumed_noise(),
             motion: session.motion,
             order: Some(order),
             shortest_moves_s: best.shortest_moves_s,

@@ -14,10 +14,10 @@ use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{
-    ForceArgs, JsonArgs, KeepArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs,
+    JsonArgs, KeepArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WritingArgs,
 };
 use crate::output::{now, print};
-use crate::reading::read;
+use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::status::Status;
 
@@ -51,13 +51,15 @@ pub struct DiagnoseArgs {
     #[arg(long)]
     next: bool,
     #[command(flatten)]
+    log: LogArgs,
+    #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
     keep: KeepArgs,
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
-    force: ForceArgs,
+    writing: WritingArgs,
     #[command(flatten)]
     strict: StrictArgs,
     #[command(flatten)]
@@ -79,13 +81,14 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     ];
     let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
     let open = |path: &PathBuf| {
-        let prepared = read(path, args.still.finding(), &outputs, &inputs)?;
+        let prepared = read(path, &args.log, args.still.finding(), &outputs, &inputs)?;
         Ok(args.keep.apply(args.noise.apply(prepared)?))
     };
     let given = args.calibration.as_deref().map(Calibration::read);
     let given = given.transpose()?;
     let all: Result<Vec<Prepared>> = args.recordings.iter().map(open).collect();
     let mut all = all?;
+    args.writing.check(args.output.as_deref())?;
     let recordings = Recordings {
         first: all.remove(0),
         more: all,
@@ -101,8 +104,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let all = all.chain(&recordings.second);
     let problems: Vec<_> = all.flat_map(OfRecording::prepared).collect();
     let several = args.recordings.len() > 1 || args.verify.is_some();
-    let done = diagnosed(recordings, by, &now)
-        .inspect_err(|error| refused(error, &problems, several, Some(&args.json)))?;
+    let done = diagnosed(recordings, by, &now).inspect_err(|_| refused(&problems, several))?;
     let Diagnosed {
         diagnosis,
         next,
@@ -111,7 +113,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     } = &done;
     let mut files = Vec::new();
     let place = diagnosis.before.prepared.place.clone();
-    let refusal = args.force.refusal(&found.judgement, &place, MISFIT);
+    let refusal = args.writing.refusal(&found.judgement, &place, MISFIT);
     let output = args.output.as_ref().filter(|_| refusal.is_none());
     if let Some(path) = output {
         files.push(stage(path, done.calibration(&now)?.to_toml())?);

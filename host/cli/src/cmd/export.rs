@@ -1,8 +1,8 @@
 //! `mimu export`: one subcommand for each format of [`mimu_export`].
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches, Subcommand};
 use mimu::calibration::Calibration;
 use mimu::calibration::thermal_biases::{self, ThermalBiases};
 use mimu::noise::noise_file::NoiseFile;
@@ -19,8 +19,9 @@ use crate::output::{check_outputs, print};
 #[command(subcommand_value_name = "FORMAT", subcommand_help_heading = "Formats")]
 pub struct ExportArgs {
     #[command(subcommand)]
-    format: Format,
-    /// Calibration file of `mimu fit -o`, `mimu diagnose -o` or `mimu thermal fit -o`; px4 and ardupilot also take the biases of a unit at rest
+    to: FormatOf,
+    /// Calibration file of `mimu fit -o`, `mimu diagnose -o` or `mimu thermal fit -o`, which may also follow the format's name; px4 and ardupilot
+    /// also take the biases of a unit at rest
     #[arg(long, value_name = "FILE", global = true)]
     calibration: Option<PathBuf>,
     /// Noise file of the unit (`mimu allan -o`)
@@ -32,6 +33,63 @@ pub struct ExportArgs {
     out: Option<PathBuf>,
     #[command(flatten)]
     json: JsonArgs,
+}
+
+/// A format, and the calibration that may follow its name.
+struct FormatOf {
+    format: Format,
+    calibration: Option<PathBuf>,
+}
+
+/// Id of the argument that follows the name of a format.
+const FILE: &str = "file";
+
+impl FormatOf {
+    /// Adds the file to every format, so that a new one has it too.
+    fn with_file(mut command: Command) -> Command {
+        let formats = command.get_subcommands().map(|c| c.get_name().to_owned());
+        for name in formats.collect::<Vec<_>>() {
+            let file = Arg::new(FILE)
+                .value_name("CALIBRATION")
+                .value_parser(clap::value_parser!(PathBuf))
+                .help("Calibration file, as with --calibration")
+                .conflicts_with("calibration");
+            command = command.mut_subcommand(name, |c| c.arg(file));
+        }
+        command
+    }
+}
+
+impl FromArgMatches for FormatOf {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        let file = matches.subcommand().map(|(_, of)| of.get_one(FILE));
+        Ok(Self {
+            format: Format::from_arg_matches(matches)?,
+            calibration: file.flatten().cloned(),
+        })
+    }
+
+    fn update_from_arg_matches(
+        &mut self,
+        matches: &ArgMatches,
+    ) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Subcommand for FormatOf {
+    fn augment_subcommands(command: Command) -> Command {
+        Self::with_file(Format::augment_subcommands(command))
+    }
+
+    fn augment_subcommands_for_update(command: Command) -> Command {
+        Self::with_file(Format::augment_subcommands_for_update(command))
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        Format::has_subcommand(name)
+    }
 }
 
 /// The written file and its contents.
@@ -48,18 +106,23 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         .out
         .as_deref()
         .ok_or_else(|| Error::new("-o", "it is missing", "name the file to write: -o FILE"))?;
-    if args.noise.is_some() && !args.format.has_noise() {
+    let format = &args.to.format;
+    let file = args.calibration.as_ref().or(args.to.calibration.as_ref());
+    if args.noise.is_some() && !format.has_noise() {
         let problem = "this format cannot contain the noise of a unit";
         return Err(Error::new("export", problem, "leave it out").about(Argument::Noise));
     }
-    let sources = [args.calibration.as_deref(), args.noise.as_deref()];
-    let inputs: Vec<_> = sources.into_iter().flatten().collect();
+    let inputs: Vec<&Path> = file
+        .into_iter()
+        .chain(&args.noise)
+        .map(PathBuf::as_path)
+        .collect();
     check_outputs(&[Some(path), args.json.file()], &inputs)?;
-    let named = args.calibration.as_deref().map(|p| p.display().to_string());
+    let named = file.map(|p| p.display().to_string());
     let (mut calibration, mut biases) = (None, None);
-    if let (Some(path), Some(place)) = (&args.calibration, &named) {
+    if let (Some(path), Some(place)) = (file, &named) {
         let text = read_text(path)?;
-        match args.format.takes_biases() && thermal_biases::is_one(&text) {
+        match format.takes_biases() && thermal_biases::is_one(&text) {
             true => biases = Some(ThermalBiases::parse(&text, place)?),
             false => calibration = Some(Calibration::parse(&text, place)?),
         }
@@ -70,7 +133,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         biases: biases.as_ref(),
         noise: noise.as_ref(),
     };
-    let export = args.format.export(&from)?;
+    let export = format.export(&from)?;
     let content = export.content.clone();
     let result = ExportResult {
         file: path.display().to_string(),

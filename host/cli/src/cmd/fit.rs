@@ -12,17 +12,17 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{
-    ForceArgs, JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs,
+    JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs, WritingArgs,
 };
 use crate::output::{now, print};
-use crate::reading::read_samples_or_means;
+use crate::reading::{LogArgs, read_samples_or_means};
 use crate::report;
 use crate::report::refused;
 use crate::status::Status;
 
 #[derive(Args)]
 pub(crate) struct FitArgs {
-    /// Directory of the recording, of samples or of means
+    /// Recording, of samples or of means, or a log that `mimu import` reads
     recording: PathBuf,
     /// Hold out N contiguous blocks in turn, refit without each, and report the error on it
     #[arg(long, value_name = "blocks=N", default_value = "blocks=4", value_parser = holdout)]
@@ -33,6 +33,8 @@ pub(crate) struct FitArgs {
     /// Calibrate one sensor only, if the experiment does not determine the other
     #[arg(long, value_enum, value_name = "SENSOR")]
     only: Option<SensorArg>,
+    #[command(flatten)]
+    log: LogArgs,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -46,7 +48,7 @@ pub(crate) struct FitArgs {
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
-    force: ForceArgs,
+    writing: WritingArgs,
     #[command(flatten)]
     strict: StrictArgs,
     #[command(flatten)]
@@ -96,7 +98,14 @@ pub(crate) fn run(args: &FitArgs) -> Result<Status> {
     };
     let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref()];
-    let prepared = read_samples_or_means(&args.recording, args.still.finding(), &outputs, &inputs)?;
+    let prepared = read_samples_or_means(
+        &args.recording,
+        &args.log,
+        args.still.finding(),
+        &outputs,
+        &inputs,
+    )?;
+    args.writing.check(args.output.as_deref())?;
     let prepared = args.keep.apply(args.noise.apply(prepared)?);
     if args.method.is_some() && prepared.manifest.reference != Reference::Table {
         return Err(Error::new(
@@ -111,8 +120,8 @@ pub(crate) fn run(args: &FitArgs) -> Result<Status> {
     let (found, place) = (DwellResult::list(&prepared), prepared.place.clone());
     // After a refusal the user first needs the list of dwells. The error line comes last.
     let problems = OfRecording::prepared(&prepared);
-    let fitted = fit(prepared, options).inspect_err(|error| {
-        refused(error, &problems, false, Some(&args.json));
+    let fitted = fit(prepared, options).inspect_err(|_| {
+        refused(&problems, false);
         eprint!("{}", report::dwell_table(&found));
     })?;
     let result = FitResult::of(&fitted);
@@ -121,7 +130,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Status> {
         text.push('\n');
         text.push_str(&report::dwell_table(&result.dwells));
     }
-    let refusal = args.force.refusal(&result.judgement, &place, CHECK);
+    let refusal = args.writing.refusal(&result.judgement, &place, CHECK);
     let mut calibration = None;
     if let Some(path) = args.output.as_ref().filter(|_| refusal.is_none()) {
         let made = Calibration::of(&fitted, &[], &now())?;

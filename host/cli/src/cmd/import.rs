@@ -5,7 +5,7 @@ use mimu_recording::error::Result;
 use crate::arguments::JsonArgs;
 pub(crate) use crate::importing::ImportArgs;
 use crate::importing::imported;
-use crate::output::print;
+use crate::output::{print, quoted};
 use crate::report;
 
 pub(crate) fn run(args: ImportArgs) -> Result<()> {
@@ -13,5 +13,10 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         path: args.json.path.clone(),
     };
     let summary = imported(args)?;
-    print(&json, &report::import_text(&summary), &summary, None)
+    let mut text = report::import_text(&summary);
+    text += &format!(
+        "next: mimu fit {0} -o cal.toml; if the unit lay still: mimu allan {0} -o noise.toml\n",
+        quoted(&summary.recording)
+    );
+    print(&json, &text, &summary, None)
 }

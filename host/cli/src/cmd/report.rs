@@ -15,7 +15,7 @@ use mimu_recording::result_file::stage;
 
 use crate::arguments::{KeepArgs, NoiseArgs, StillArgs};
 use crate::output::{now, show};
-use crate::reading::read;
+use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::report::text::problems;
 use crate::report::{Made, UnitReport, unit_page};
@@ -34,6 +34,8 @@ pub struct ReportArgs {
     /// Page to write
     #[arg(short = 'o', long = "out", value_name = "FILE")]
     out: PathBuf,
+    #[command(flatten)]
+    log: LogArgs,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -85,7 +87,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let outputs = [Some(args.out.as_path())];
     let others = [args.noise.file.as_deref(), inputs.calibration.as_deref()];
     let open = |path: &PathBuf| -> Result<(String, Prepared)> {
-        let prepared = read(path, args.still.finding(), &outputs, &others)?;
+        let prepared = read(path, &args.log, args.still.finding(), &outputs, &others)?;
         let prepared = args.keep.apply(args.noise.apply(prepared)?);
         Ok((path.display().to_string(), prepared))
     };
@@ -103,9 +105,9 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         false => {
             let all = || recordings.iter().chain(&others);
             let done = found(&recordings, &others, &now);
-            let refused = |error: &Error| {
+            let refused = |_: &Error| {
                 let problems: Vec<_> = all().flat_map(|r| OfRecording::prepared(&r.1)).collect();
-                refused(error, &problems, all().count() > 1, None);
+                refused(&problems, all().count() > 1);
             };
             Some(done.inspect_err(refused)?)
         }

@@ -18,9 +18,9 @@ use mimu_thermal::fit::{Estimator, Options, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 
-use crate::arguments::{ForceArgs, JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs};
+use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WritingArgs};
 use crate::output::{check_outputs, now, print};
-use crate::reading::read;
+use crate::reading::{LogArgs, read};
 use crate::report::{self, Made, thermal_plot};
 use crate::status::Status;
 
@@ -65,6 +65,8 @@ struct FitArgs {
     #[arg(long, value_name = "FILE")]
     base: Option<PathBuf>,
     #[command(flatten)]
+    log: LogArgs,
+    #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
     still: StillArgs,
@@ -81,7 +83,7 @@ struct FitArgs {
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
     #[command(flatten)]
-    force: ForceArgs,
+    writing: WritingArgs,
     #[command(flatten)]
     strict: StrictArgs,
     #[command(flatten)]
@@ -179,7 +181,7 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {
     let beside = [args.base.as_deref(), args.noise.file.as_deref()];
     let base = args.base.as_deref().map(Calibration::read).transpose()?;
     let session = |directory: &PathBuf, finding: Finding| {
-        let prepared = read(directory, finding, &outputs, &beside)?;
+        let prepared = read(directory, &args.log, finding, &outputs, &beside)?;
         Session::of(&args.noise.apply(prepared)?)
     };
     let all = |list: &[PathBuf]| -> Result<Vec<Session>> {
@@ -191,6 +193,7 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {
         each.map(|d| session(d, finding)).collect()
     };
     let (sessions, verify) = (all(&args.recordings)?, all(&args.verify)?);
+    args.writing.check(args.output.as_deref())?;
     let options = Options {
         estimator: args.estimator.estimator(),
         lag_s: args.lag,
@@ -202,7 +205,7 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {
     let mut staged = Vec::new();
     let now = now();
     let place = fitted.sessions[0].place.clone();
-    let refusal = args.force.refusal(&result.judgement, &place, MISFIT);
+    let refusal = args.writing.refusal(&result.judgement, &place, MISFIT);
     if let Some(path) = args.output.as_ref().filter(|_| refusal.is_none()) {
         let (what, made) = match &base {
             None if fitted.is_biases_only() => (BIASES, fitted.biases(&now)?.to_toml()),

@@ -9,17 +9,19 @@ use mimu_recording::error::Result;
 
 use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs};
 use crate::output::print;
-use crate::reading::read_samples_or_means;
+use crate::reading::{LogArgs, read_samples_or_means};
 use crate::report;
 use crate::status::Status;
 
 #[derive(Args)]
 pub(crate) struct VerifyArgs {
-    /// Directory of the recording, of samples or of means
+    /// Recording, of samples or of means, or a log that `mimu import` reads
     recording: PathBuf,
     /// Calibration file
     #[arg(long, value_name = "FILE")]
     calibration: PathBuf,
+    #[command(flatten)]
+    log: LogArgs,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -35,8 +37,10 @@ pub(crate) struct VerifyArgs {
 pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
     let calibration = Calibration::read(&args.calibration)?;
     let outputs = [args.json.file()];
+    let log = args.log.or_gravity(calibration.recording.gravity_mps2);
     let prepared = read_samples_or_means(
         &args.recording,
+        &log,
         args.still.finding(),
         &outputs,
         &[Some(&args.calibration), args.noise.file.as_deref()],

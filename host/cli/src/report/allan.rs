@@ -5,9 +5,12 @@ use std::fmt::Write as _;
 use mimu::quantity::{Sensor, duration, plural, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::allan::{AllanResult, ChannelResult, RecordingResult};
+use mimu::survey::unit::Unit;
 use mimu_allan::model::Term;
+use mimu_recording::RawUnit;
 
-use crate::report::text::{warn, warn_within};
+use crate::report::table::{Cell, Table};
+use crate::report::text::{warn, warn_within, wrap};
 
 /// Result of `mimu allan`: the coefficients of the first recording, or with `verbose` a block with everything for each.
 pub fn allan_text(result: &AllanResult, verbose: bool) -> String {
@@ -29,7 +32,6 @@ pub fn allan_text(result: &AllanResult, verbose: bool) -> String {
         let others = plural(others as u64, "more recording");
         let _ = writeln!(out, "and {others}: --verbose");
     }
-    out += "next: -o noise.toml writes the file for mimu fit --noise and mimu export; --verbose prints curve and reasons\n";
     out
 }
 
@@ -68,19 +70,15 @@ fn recording_text(result: &AllanResult, recording: &RecordingResult, verbose: bo
     out
 }
 
-/// Rows of a label and a cell for each channel.
-type Rows = Vec<(String, Vec<String>)>;
+/// A table of channels: a row for each label.
+fn by_channel(channels: &[&ChannelResult]) -> Table {
+    let axis = |c: &&ChannelResult| c.name.rsplit('_').next().unwrap_or_default().to_owned();
+    Table::new("", "").numbers(channels.iter().map(axis))
+}
 
-fn write_rows(out: &mut String, rows: &Rows) {
-    let cells = rows.iter().flat_map(|(_, cells)| cells);
-    let width = 2 + cells.map(|c| c.chars().count()).max().unwrap_or(0);
-    for (label, cells) in rows {
-        let _ = write!(out, "  {label:<17}");
-        for cell in cells {
-            let _ = write!(out, "{cell:>width$}");
-        }
-        let _ = writeln!(out);
-    }
+/// A row of `table`.
+fn add_row(table: &mut Table, label: impl Into<Cell>, cells: impl IntoIterator<Item = String>) {
+    table.row(std::iter::once(label.into()).chain(cells.into_iter().map(Cell::Words)));
 }
 
 fn interval(value: f64, lower: f64, upper: f64, unit: &Readable) -> String {
@@ -101,7 +99,7 @@ fn sensor_text(
         "{sensor}: coefficient ({} % interval)",
         significant(percent).trim_end_matches(".0")
     );
-    let mut rows: Rows = vec![(String::new(), ["x", "y", "z"].map(String::from).into())];
+    let mut rows = by_channel(channels);
     for term in Term::ALL {
         let Some(any) = channels.iter().find_map(|c| c.get(term).ok()) else {
             continue;
@@ -121,7 +119,11 @@ fn sensor_text(
                 }
                 Err(_) => "-".into(),
             });
-            rows.push((format!("{}, {}", term.letter(), unit.unit), cells.collect()));
+            add_row(
+                &mut rows,
+                format!("{}, {}", term.letter(), unit.unit),
+                cells,
+            );
         }
     }
     let scaled = channels.iter().filter(|c| c.raw_unit == Some("SI"));
@@ -131,15 +133,13 @@ fn sensor_text(
         .collect();
     let dwell = |c: &&ChannelResult| match (c.useful_average_s, &c.model) {
         (Some(s), _) => duration(s),
-        (None, Some(model)) => format!("over {}", duration(model.range_s[1])),
+        (None, Some(model)) => format!("{} or more", duration(model.range_s[1])),
         (None, None) => "-".into(),
     };
-    rows.push((
-        "useful average".into(),
-        channels.iter().map(dwell).collect(),
-    ));
-    write_rows(out, &rows);
+    add_row(&mut rows, "useful dwell up to", channels.iter().map(dwell));
+    *out += &rows.text("  ");
     if !verbose {
+        unseen(out, channels);
         return;
     }
     if !factors.is_empty() {
@@ -152,6 +152,58 @@ fn sensor_text(
     curve_text(out, channels);
     lines_text(out, channels);
     reasons(out, channels);
+}
+
+/// What the recording was too short or too noisy to show of the three coefficients that a filter needs, and how long to record.
+fn unseen(out: &mut String, channels: &[&ChannelResult]) {
+    if let Some(why) = channels
+        .iter()
+        .find(|c| c.model.is_none())
+        .and_then(|c| c.get(Term::N).err())
+    {
+        let _ = writeln!(out, "  no coefficients: {why}");
+        return;
+    }
+    for term in [Term::N, Term::B, Term::K] {
+        let missing = channels.iter().filter(|c| c.get(term).is_err());
+        let missing: Vec<&&ChannelResult> = missing.collect();
+        let Some(any) = missing.first() else { continue };
+        let key = term.letter().to_lowercase();
+        let names: Vec<&str> = missing.iter().map(|c| c.name).collect();
+        let largest = |values: Vec<f64>| values.into_iter().reduce(f64::max);
+        let bound = largest(
+            missing
+                .iter()
+                .filter_map(|c| *c.at_most.get(&key)?)
+                .collect(),
+        );
+        let longer = largest(
+            missing
+                .iter()
+                .filter_map(|c| c.longer_s.get(&key).copied())
+                .collect(),
+        );
+        let mut text = format!(
+            "{}, {}, is not seen in {}",
+            term.letter(),
+            term.name(),
+            names.join(", ")
+        );
+        if let Some(bound) = bound {
+            let unit = Unit {
+                name: any.unit,
+                ..Unit::raw(RawUnit::Si)
+            };
+            text += &format!(
+                ": at most {}",
+                readable::noise(&unit.coefficient(term))[0].write(bound)
+            );
+        }
+        if let Some(longer) = longer {
+            text += &format!("; to see half of that, record {} longer", duration(longer));
+        }
+        wrap(out, "  ", &text);
+    }
 }
 
 /// Lines of the spectrum that were set aside, and the origin of N.
@@ -218,7 +270,7 @@ fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
         "  deviation, {}; 95 % bounds in %; in brackets the textbook one-sigma value",
         unit.unit
     );
-    let mut rows = Rows::new();
+    let mut rows = by_channel(channels);
     let mut decade = 1e-6;
     while decade < 1e9 {
         let cell = |p: Option<Point>| match p {
@@ -240,7 +292,7 @@ fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
         let points: Vec<Option<Point>> = points.collect();
         if let Some(time_s) = points.iter().flatten().next().map(|p| p[0]) {
             let label = format!("  {} s", significant(time_s));
-            rows.push((label, points.into_iter().map(cell).collect()));
+            add_row(&mut rows, label, points.into_iter().map(cell));
             // Shown only if it differs.
             let without = channels.iter().map(|c| {
                 let quiet = c.adev_without_lines.as_ref()?;
@@ -251,7 +303,7 @@ fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
             let without: Vec<Option<String>> = without.collect();
             if without.iter().any(Option::is_some) {
                 let cells = without.into_iter().map(|c| c.unwrap_or_else(|| "-".into()));
-                rows.push(("    without lines".into(), cells.collect()));
+                add_row(&mut rows, "    without lines", cells);
             }
             let beside = channels.iter().map(|c| {
                 let h = c.hadamard.as_ref()?;
@@ -260,13 +312,12 @@ fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
             });
             let beside: Vec<Option<Point>> = beside.collect();
             if beside.iter().any(Option::is_some) {
-                let cells = beside.into_iter().map(cell);
-                rows.push(("    Hadamard".into(), cells.collect()));
+                add_row(&mut rows, "    Hadamard", beside.into_iter().map(cell));
             }
         }
         decade *= 10.0;
     }
-    write_rows(out, &rows);
+    *out += &rows.text("  ");
 }
 
 /// Why coefficients are missing, and where the model is invalid; each sentence once.

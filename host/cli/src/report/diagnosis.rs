@@ -59,7 +59,7 @@ fn remarks(s: &SensorDiagnosisResult, with_share: bool) -> Vec<String> {
     }
     if s.reference_rms > s.noise_floor {
         all.push(format!(
-            "errors of the accelerometer's directions may add {} rms to the noise floor",
+            "the directions of gravity come from the accelerometer, and its errors add at most {} rms to the noise floor",
             readable::error(s.unit).write(s.reference_rms)
         ));
     }

@@ -23,7 +23,7 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
     if fit.means {
         let _ = writeln!(
             out,
-            "{}: means of {}, gravity {} m/s²",
+            "{}: means of {}, gravity {:.5} m/s²",
             fit.device,
             plural(fit.rows, "pose"),
             fit.gravity_mps2
@@ -142,7 +142,7 @@ fn used(sensor: &SensorFitResult) -> String {
 fn recorded(out: &mut String, fit: &FitResult, verbose: bool) {
     let _ = writeln!(
         out,
-        "{}: {} samples, {:.1} s at {:.2} Hz, gravity {} m/s²",
+        "{}: {} samples, {:.1} s at {:.2} Hz, gravity {:.5} m/s²",
         fit.device,
         fit.rows,
         fit.rows as f64 * fit.period_s,

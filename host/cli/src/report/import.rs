@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use mimu::quantity::{plural, significant};
 use mimu_recording::{ImportSummary, TimeSummary};
 
+use crate::output::quoted;
 use crate::report::text::{warn, wrap};
 
 /// Result of `mimu import`.
@@ -40,12 +41,12 @@ pub fn import_text(summary: &ImportSummary) -> String {
         for line in &summary.taken {
             wrap(&mut out, "  ", line);
         }
-        let said = summary.arguments.iter().map(|a| shell(a));
+        let said = summary.arguments.iter().map(|a| quoted(a));
         let said: Vec<String> = said.collect();
         wrap(
             &mut out,
             "  the same in full: ",
-            &format!("mimu import {}", said.join(" ")),
+            &format!("mimu import {} -o DIR", said.join(" ")),
         );
     }
     for time in &summary.time {
@@ -95,14 +96,6 @@ pub fn import_text(summary: &ImportSummary) -> String {
     }
     warn(&mut out, summary.warnings.iter());
     out
-}
-
-/// An argument as a shell takes it.
-fn shell(argument: &str) -> String {
-    match argument.contains([' ', '(', ')', '[', ']', ';', '|', '\'', '*', '&', '#', '$']) {
-        true => format!("'{}'", argument.replace('\'', r"'\''")),
-        false => argument.to_owned(),
-    }
 }
 
 /// Findings about the time stamps of a file.

@@ -6,6 +6,7 @@ use maud::{Markup, html};
 use mimu::quantity::{plus_minus, significant};
 
 use super::page::written;
+use super::text::columns;
 
 /// Narrowest first column and narrowest column of numbers in text, characters.
 const LABEL: usize = 18;
@@ -172,9 +173,13 @@ impl Table {
         };
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
         let mut out = String::new();
-        for line in &lines {
+        for (block, line) in self
+            .blocks(&shown, &widths, indent.chars().count())
+            .iter()
+            .flat_map(|b| lines.iter().map(move |l| (b, l)))
+        {
             let mut text = indent.to_string();
-            for &c in &shown {
+            for &c in block {
                 let width = widths[c];
                 text += &match (c, self.columns[c].1) {
                     (0, _) => format!("{:<width$}", line[c]),
@@ -186,6 +191,26 @@ impl Table {
             out.push('\n');
         }
         out
+    }
+
+    /// The columns `shown`, in blocks that fit into the width of the text; each begins with the first column.
+    fn blocks(&self, shown: &[usize], widths: &[usize], indent: usize) -> Vec<Vec<usize>> {
+        let [first, others @ ..] = shown else {
+            return Vec::new();
+        };
+        let begin = indent + widths[*first];
+        let (mut blocks, mut width) = (vec![vec![*first]], begin);
+        for &c in others {
+            let last = blocks.len() - 1;
+            if blocks[last].len() > 1 && width + widths[c] > columns() {
+                blocks.push(vec![*first, c]);
+                width = begin + widths[c];
+            } else {
+                blocks[last].push(c);
+                width += widths[c];
+            }
+        }
+        blocks
     }
 
     /// As HTML.
@@ -244,6 +269,24 @@ mod tests {
             html.contains(">held out<") && html.contains(">gyro, deg<"),
             "{html}"
         );
+    }
+
+    #[test]
+    fn a_table_that_is_too_wide_goes_on_below_with_its_first_column() {
+        let mut table = Table::new("", "axis").numbers((0..12).map(|k| format!("column {k}")));
+        table.row(std::iter::once("x".into()).chain((0..12).map(Cell::Count)));
+        let text = table.text("  ");
+        assert!(
+            text.lines().all(|line| line.chars().count() <= columns()),
+            "{text}"
+        );
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 4, "{text}");
+        assert!(
+            lines[2].starts_with("  axis") && lines[3].starts_with("  x"),
+            "{text}"
+        );
+        assert!(text.contains("column 11"), "{text}");
     }
 
     #[test]

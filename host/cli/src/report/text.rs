@@ -1,26 +1,38 @@
 //! Lines and warnings of all text results.
 
 use std::fmt::{Display, Write as _};
+use std::sync::OnceLock;
 
 use mimu::quantity::plural;
 use mimu::recording_problem::OfRecording;
 
-/// Width of text, characters.
-pub(crate) const COLUMNS: usize = 98;
+/// Width of text that does not go to a terminal, characters.
+const COLUMNS: usize = 98;
+/// Narrowest and widest text: narrower, tables no longer fold; wider, lines are hard to follow.
+const WIDTHS: std::ops::RangeInclusive<usize> = 60..=120;
+
+/// Width of text, characters: that of the terminal, if the text goes to one.
+pub(crate) fn columns() -> usize {
+    static FOUND: OnceLock<usize> = OnceLock::new();
+    *FOUND.get_or_init(|| {
+        let found = terminal_size::terminal_size_of(std::io::stdout());
+        let fitted = |(terminal_size::Width(width), _): (_, terminal_size::Height)| {
+            usize::from(width).clamp(*WIDTHS.start(), *WIDTHS.end())
+        };
+        found.map_or(COLUMNS, fitted)
+    })
+}
 
 /// Wraps `head` and `text`. Further lines are indented to the beginning of the text, or only a little if the head is long.
 pub(super) fn wrap(out: &mut String, head: &str, text: &str) {
     let first = head.chars().count();
     let spaces = head.chars().take_while(|c| *c == ' ').count();
-    let indent = if first > COLUMNS / 3 {
-        spaces + 2
-    } else {
-        first
-    };
+    let width = columns();
+    let indent = if first > width / 3 { spaces + 2 } else { first };
     let (mut line, mut begun) = (head.to_string(), false);
     for word in text.split(' ') {
         let longer = line.chars().count() + usize::from(begun) + word.chars().count();
-        if begun && longer > COLUMNS {
+        if begun && longer > width {
             let _ = writeln!(out, "{line}");
             (line, begun) = (" ".repeat(indent), false);
         }

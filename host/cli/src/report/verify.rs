@@ -26,8 +26,8 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
     }
     wrap(
         &mut out,
-        "one scale: ",
-        "on all three axes the mean of the calibration's scale factors and that of its biases, without misalignment",
+        "one for all: ",
+        "the error with one scale factor and one bias for all three axes, the means of the calibration's",
     );
     for (name, s) in verification.sensors.present() {
         if let Some(causes) = s.causes.as_ref().filter(|_| verbose || beyond_noise(s)) {
@@ -68,7 +68,7 @@ pub(super) fn errors(all: &[(String, Verification)], named: bool) -> Table {
         "Error of the calibration on other recordings, rms; noise: what noise alone would cause",
         "rms error",
     )
-    .numbers(["calibrated", "noise", "largest", "one scale"])
+    .numbers(["calibrated", "noise", "largest", "one for all"])
     .numbers(optional.iter().map(|(head, _)| *head))
     .numbers(at_rest.then(|| format!("at rest, {}", rest.unit)))
     .words("over");
@@ -135,7 +135,10 @@ fn next(verification: &Verification) -> String {
         return "give the recording the gravity of its place (mimu import --gravity), and verify again".into();
     }
     match verification.judgement.kind {
-        JudgementKind::Good => return "use the calibration".into(),
+        JudgementKind::Good => {
+            return "use the calibration: mimu export c FILE -o calibration.h, or kalibr, px4 ..."
+                .into();
+        }
         JudgementKind::Untested => {
             return "record more dwells or turns on another day, and verify with that recording"
                 .into();
@@ -162,7 +165,7 @@ fn verdict(s: &SensorVerification) -> String {
     let figure = readable::error(s.unit);
     let (other, what) = match s.rms_uncalibrated {
         Some(came) => (came, "uncalibrated"),
-        None => (s.rms_raw, "with one scale"),
+        None => (s.rms_raw, "with one scale factor and bias for all axes"),
     };
     let [rms, before] = [s.rms, other].map(|v| figure.write(v));
     let how = match s.rms < other {

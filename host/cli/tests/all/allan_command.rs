@@ -587,7 +587,9 @@ fn at_a_rate_that_has_no_power_of_ten_the_nearest_averaging_times_are_printed() 
         let rows = text
             .lines()
             .filter(|l| l.trim_start().starts_with(time.trim()));
-        assert_eq!(rows.count(), 2, "{time}: {text}");
+        // Of gyro and accelerometer; a table that is too wide goes on below.
+        let count = rows.count();
+        assert!(count == 2 || count == 4, "{time}: {text}");
     }
 }
 
@@ -624,7 +626,7 @@ fn readings_in_volts_become_si_by_the_calibration_of_the_unit() {
     assert!(outside <= 1, "{outside} of six");
     one_noise_file_serves_all(folder.path());
     let error = refused(folder.path(), "export kalibr -o imu.yaml --noise cal.toml");
-    assert!(error.contains("cal.toml, line"), "{error}");
+    assert!(error.contains("cal.toml: this is a calibration"), "{error}");
 }
 
 /// A driver's SI may be inaccurate. The scale factors of the calibration then differ from 1, and the noise of the readings is not that of the unit.

@@ -56,7 +56,7 @@ fn a_diagnosis_of_an_effect_takes_at_most_25_lines_without_all() {
         // `--next` prints the plans that the short form only counts.
         let next = run(&["diagnose", name, "--next"]);
         let not_seen = ids("not_excited");
-        let counted = format!("not seen at data-sheet size: {} effect", not_seen.len());
+        let counted = format!("too small to be seen here: {} effect", not_seen.len());
         assert_eq!(short.contains(&counted), !not_seen.is_empty(), "{short}");
         for id in not_seen {
             assert!(next.contains(&id), "{name}: {id} is in no experiment");

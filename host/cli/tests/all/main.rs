@@ -10,6 +10,7 @@ mod diagnosis_text;
 mod doubtful_input;
 mod effects;
 mod export_over_temperature;
+mod first_minutes;
 mod fuzz;
 mod import_command;
 mod manual;

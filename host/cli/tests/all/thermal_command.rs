@@ -137,7 +137,7 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
     assert!(page.contains("has no intervals at its nodes"));
 
     // Summaries fit a terminal, except for sentences.
-    let fit = "thermal fit niu --verify again -o again.toml";
+    let fit = "thermal fit niu --verify again --replace -o again.toml";
     for (short, verbose) in [
         (fit, "thermal fit niu --verify again --verbose"),
         (

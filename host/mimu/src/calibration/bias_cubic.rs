@@ -148,7 +148,11 @@ impl BiasCubics {
     fn misses(&self, biases: &[Vector3<f64>]) -> Remainder {
         let misses = temperatures(self.range_c).zip(biases);
         let misses: Vec<_> = misses.map(|(t, b)| b - self.at(t)).collect();
-        Remainder::of("bias minus the cubic", "without input", &misses)
+        Remainder::of(
+            "bias that the cubic does not describe",
+            "without input",
+            &misses,
+        )
     }
 
     /// The change of the biases if the dies follow the thermometer by `lag_s`; `bias` gives the bias at a temperature of the dies.

@@ -11,7 +11,7 @@ use crate::toml_layout::to_toml;
 use mimu_allan::model::{FLOOR, Term};
 use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{RAW_COLUMNS, parse_toml, read_text};
+use mimu_recording::{RAW_COLUMNS, check_kind, parse_toml, read_text};
 
 /// Version of the noise file.
 pub const NOISE_FORMAT: &str = "mimu-noise/1";
@@ -210,6 +210,7 @@ impl NoiseFile {
 
     /// Parses and checks the text of a noise file; `place` is its path.
     pub fn parse(text: &str, place: &str) -> Result<Self> {
+        check_kind(text, place, "mimu-noise")?;
         let mut file: Self = parse_toml(text, place, Some("run `mimu allan` again"))?;
         if file.format != NOISE_FORMAT {
             return Err(Error::new(

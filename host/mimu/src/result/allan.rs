@@ -11,7 +11,7 @@ use crate::quantity::Sensor;
 use crate::survey::{Channel, Survey};
 use crate::warning::Warning;
 use mimu_allan::Point;
-use mimu_allan::model::{NoiseModel, Term};
+use mimu_allan::model::{NoiseModel, Reason, Term, Unseen};
 use mimu_allan::spectrum::Line;
 
 /// Why a channel has no coefficients at all.
@@ -117,6 +117,9 @@ pub struct ChannelResult {
     pub reasons: BTreeMap<String, String>,
     /// Upper end of the interval of an absent coefficient, by its letter; null if it is unknown.
     pub at_most: BTreeMap<String, Option<f64>>,
+    /// Additional length of the recording that would show half of [`Self::at_most`], s, by the letter of the coefficient; absent if a longer one does not
+    /// help.
+    pub longer_s: BTreeMap<String, f64>,
     /// Lowest and highest frequency that was searched for lines, Hz; null for a record too short for a spectrum.
     pub searched_hz: Option<[f64; 2]>,
     /// Lines and bumps of the spectrum, by frequency. The coefficients describe the noise without them.
@@ -253,6 +256,7 @@ impl ChannelResult {
         let model = channel.model.as_ref();
         let without_lines = channel.without_lines.as_deref();
         let (mut reasons, mut at_most) = (BTreeMap::new(), BTreeMap::new());
+        let mut longer_s = BTreeMap::new();
         let [q, n, b, k, r] = Term::ALL.map(|term| {
             let why = match model.map(|m| m.get(term)) {
                 Some(Ok(c)) => {
@@ -268,6 +272,15 @@ impl ChannelResult {
                 None => channel.dead.as_deref().unwrap_or(TOO_SHORT).to_owned(),
             };
             let key = term.letter().to_lowercase();
+            if let Some(Err(Unseen {
+                why: Reason::Small {
+                    longer_s: Some(s), ..
+                },
+                ..
+            })) = model.map(|m| m.get(term))
+            {
+                longer_s.insert(key.clone(), *s);
+            }
             reasons.insert(key.clone(), why);
             at_most.insert(key, model.and_then(|m| m.at_most(term)));
             None
@@ -298,6 +311,7 @@ impl ChannelResult {
             r,
             reasons,
             at_most,
+            longer_s,
             searched_hz: channel.spectrum.searched_hz,
             lines: channel.spectrum.lines.iter().map(LineResult::of).collect(),
             adev_without_lines: without_lines.map(|curve| self::column(curve, |p| p.deviation)),

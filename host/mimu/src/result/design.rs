@@ -28,6 +28,8 @@ pub struct Conditions {
     pub dwell_s: f64,
     /// Noise that the sigma of a dwell mean follows from; `None` if that was given.
     pub noise: Option<DwellNoise>,
+    /// Whose noise that is; `None` if it was given.
+    pub assumed_noise: Option<&'static str>,
     /// Moves between the dwells.
     pub motion: Motion,
     /// Order of the dwells; `None` as published.
@@ -87,6 +89,9 @@ pub struct Design {
     pub dwell_sigma: Quantity,
     /// Noise that this follows from; `None` if it was given.
     pub noise: Option<DwellNoise>,
+    /// Whose noise was assumed, because none was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assumed_noise: Option<&'static str>,
     /// `published`, `shortest` or `randomised`.
     pub order: &'static str,
     /// Whether the unit had to be turned over for the table to reach the scheme's poses: see [`Fixture::holding`].
@@ -244,6 +249,11 @@ impl From<&Spending> for Way {
 }
 
 impl Design {
+    /// Whether a person holds the unit.
+    pub fn is_by_hand(&self) -> bool {
+        self.fixture == Fixture::Hand
+    }
+
     /// The result of `judgement`.
     pub fn new(problem: &Problem, judgement: Judgement, conditions: Conditions) -> Self {
         let model = &problem.reach.model;
@@ -309,6 +319,7 @@ impl Design {
                 unit: model.sensor.unit(),
             },
             noise: conditions.noise,
+            assumed_noise: conditions.assumed_noise,
             order: conditions.order.map_or("published", Order::name),
             turned_over: false,
             moves_s,

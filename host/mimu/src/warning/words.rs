@@ -107,7 +107,7 @@ pub(super) fn other_gravity(
     let ppm = 1e6 * (theirs / ours - 1.0).abs();
     write!(
         f,
-        "gravity is {ours} m/s² in the calibration and {theirs} m/s² in the recording, a difference of {ppm:.0} ppm, and the calibrated force at rest has a magnitude of {force_mps2:.5} m/s²: "
+        "gravity is {ours:.5} m/s² in the calibration and {theirs:.5} m/s² in the recording, a difference of {ppm:.0} ppm, and the calibrated force at rest has a magnitude of {force_mps2:.5} m/s²: "
     )?;
     let who = match contradicted {
         true => {

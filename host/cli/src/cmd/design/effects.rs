@@ -17,7 +17,7 @@ use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
 use super::{DesignArgs, NoiseArg};
-use crate::reading::read;
+use crate::reading::{LogArgs, read};
 
 /// Default sample rate without a recording, Hz.
 const SAMPLE_RATE_HZ: f64 = 1000.0;
@@ -77,7 +77,7 @@ impl DesignArgs {
         Setup {
             reference: match fixture {
                 Fixture::Hand => Reference::Gravity,
-                _ => self.reference,
+                _ => self.reference(),
             },
             fixture,
             sensors: Sensor::BOTH.to_vec(),
@@ -130,7 +130,13 @@ impl DesignArgs {
 /// Fit of a recording of the unit.
 fn after(path: &Path, args: &DesignArgs) -> Result<Fit> {
     let outputs = [args.output.as_deref(), args.json.file()];
-    let prepared = read(path, STILL_FACTOR.into(), &outputs, &[])?;
+    let prepared = read(
+        path,
+        &LogArgs::default(),
+        STILL_FACTOR.into(),
+        &outputs,
+        &[],
+    )?;
     let prepared = match &args.noise {
         Some(NoiseArg::File(file)) => prepared.with_noise(&NoiseFile::read(file)?)?,
         _ => prepared,

@@ -2,12 +2,13 @@
 
 use std::fmt::Write as _;
 
-use crate::report::text::{COLUMNS, wrap};
+use crate::report::text::{columns, wrap};
 use mimu::plan::design::judgement::WEAK;
 use mimu::plan::round;
 use mimu::quantity::{minutes, plural, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::design::{Comparison, Design, Noticed, Spent, Way};
+use mimu_equipment::step::words;
 
 /// Largest number of dwells listed: that of the longest design.
 pub(super) const LISTED: usize = 200;
@@ -64,14 +65,17 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
     );
     line("order", order(report));
     line("sigma of a dwell mean", sigma(report));
+    if let Some(part) = report.assumed_noise {
+        line(
+            "noise",
+            format!("that of {part} is assumed: --noise takes yours"),
+        );
+    }
     line(
-        "residual",
+        "spare",
         format!(
-            "{} of freedom to reveal a wrong model, {} from repetitions",
-            match report.dof.lack_of_fit {
-                1 => "1 degree".into(),
-                dof => format!("{dof} degrees"),
-            },
+            "{}, which alone reveal a wrong model, and {} from repetitions",
+            spare(report),
             report.dof.repetition
         ),
     );
@@ -126,10 +130,15 @@ fn summary(out: &mut String, report: &Design) {
         format!("{time}: {dwells} of {} s", significant(report.dwell_s)),
     );
     line("sigma of a dwell mean", sigma(report));
-    let left = plural(report.dof.lack_of_fit as u64, "degree");
+    if let Some(part) = report.assumed_noise {
+        line(
+            "noise",
+            format!("that of {part} is assumed: --noise takes yours"),
+        );
+    }
     line(
-        "residual",
-        format!("{left} of freedom to reveal a wrong model"),
+        "spare",
+        format!("{}, which alone reveal a wrong model", spare(report)),
     );
     if report.turned_over {
         line(
@@ -142,8 +151,22 @@ fn summary(out: &mut String, report: &Design) {
     } else {
         ""
     };
-    let _ = writeln!(out, "\n  dwell: direction that is up, x y z{rate}");
+    out.push('\n');
+    match report.is_by_hand() {
+        true => wrap(
+            out,
+            "  dwells: ",
+            "hold each still; up to 25 degrees off a pose does not matter, because only the size of gravity is used. +x is up where the accelerometer's x reads most; on an edge two axes read alike, on a corner three. The turns between the poses calibrate the gyro: turn by a quarter or more, about each axis both ways",
+        ),
+        false => {
+            let _ = writeln!(out, "  dwell: direction that is up, x y z{rate}");
+        }
+    }
     let cell = |k: usize| {
+        if report.is_by_hand() {
+            let up = words(&report.positions[k].into());
+            return format!("{:>3}: {up:<28}", k + 1);
+        }
         let [x, y, z] = report.positions[k].map(|c| round(c, 1e3));
         let rate = report.rates_dps.as_ref().and_then(|rates| rates.get(k));
         // Three cells with a rate and their gaps fill exactly a hundred columns.
@@ -154,7 +177,7 @@ fn summary(out: &mut String, report: &Design) {
     for row in 0..rows.min(ROWS) {
         let cells = (0..ACROSS).map(|c| c * rows + row).filter(|k| *k < n);
         let cells: Vec<String> = cells.map(cell).collect();
-        let _ = writeln!(out, "{}", cells.join("  "));
+        let _ = writeln!(out, "{}", cells.join("  ").trim_end());
     }
     if rows > ROWS {
         let _ = writeln!(out, "  the other dwells: --verbose, -o, --json");
@@ -163,6 +186,12 @@ fn summary(out: &mut String, report: &Design) {
     out.push_str(
         "next: -o plan.toml writes it for mimu wizard and mimu record; --verbose prints more\n",
     );
+}
+
+/// Equations beyond the unknown parameters, of each sensor.
+fn spare(report: &Design) -> String {
+    let left = report.dof.lack_of_fit as u64;
+    format!("{} beyond the parameters", plural(left, "dwell"))
 }
 
 /// Wrapped text next to a name.
@@ -278,11 +307,7 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
         .collect();
     let width = 2 + cells.iter().map(|c| c.chars().count()).max().unwrap_or(0);
     // One column for each sensor if they fit.
-    let across = if 3 * width <= COLUMNS {
-        3
-    } else {
-        COLUMNS / width
-    };
+    let across = (columns() / width).clamp(1, 3);
     let rows = cells.len().div_ceil(across);
     let _ = writeln!(
         out,

@@ -111,8 +111,8 @@ impl<'a> Sections<'a> {
         html! {
             h2 { "Tried and rejected" }
             (tables::rejected(self.d))
-            h2 { "Not seen at data-sheet size" }
-            p { "These effects were tried too. At their data-sheet size this recording would not show them, so their absence proves nothing." }
+            h2 { "Too small to be seen here" }
+            p { "These effects were tried too. At the sizes of data sheets this recording would not show them, so their absence proves nothing." }
             (tables::not_excited(self.d))
             (confused(self.d))
         }

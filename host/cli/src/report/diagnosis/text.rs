@@ -286,7 +286,7 @@ fn open(out: &mut String, d: &DiagnosisResult) {
     let unseen = d.not_excited.len();
     let pairs = d.confused.len() + d.undecided.len();
     let unseen_words = format!(
-        "not seen at data-sheet size: {}",
+        "too small to be seen here: {}",
         plural(unseen as u64, "effect")
     );
     let pairs_words = format!("not distinguished: {}", plural(pairs as u64, "pair"));

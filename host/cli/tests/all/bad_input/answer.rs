@@ -74,7 +74,7 @@ impl Run {
             let keys = told.as_object().unwrap().keys();
             assert_eq!(
                 keys.collect::<Vec<_>>(),
-                ["error", "format", "recording_problems"]
+                ["error", "format", "judgement", "recording_problems"]
             );
         }
         line

@@ -127,7 +127,8 @@ fn a_place_without_a_recording_is_named() {
     // A file of a recording stands for its folder.
     let file = place.recording().join("samples.csv").display().to_string();
     mimu(["fit", &file, "--json", "-"]).json();
-    mimu(["fit", &place.text("nowhere")]).refused(&["nowhere", "the directory does not exist"]);
+    mimu(["fit", &place.text("nowhere")])
+        .refused(&["nowhere", "there is no such file or directory"]);
     fs::create_dir(place.path("bare")).unwrap();
     mimu(["fit", &place.text("bare")]).refused(&["bare", "no recording.toml", "mimu import"]);
     fs::write(place.recording().join("samples.parquet"), "").unwrap();

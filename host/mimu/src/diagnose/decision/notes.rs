@@ -15,7 +15,7 @@ pub(super) fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
         let found = format!("{}: it is a true input of the gyro", c.candidate.id());
         Note::new(
             found,
-            "the calibration is corrected for it, and it is not removed from readings",
+            "it is no error of the unit: the calibration is corrected for it, and nothing is removed from readings",
         )
     }));
     notes.extend(chosen.iter().filter_map(|c| {

@@ -95,7 +95,8 @@ impl Problem {
 
     /// Best design found of `n` dwells, in no particular order; determinate for a `seed`.
     ///
-    /// Of equally good designs, one on different faces is taken, which people and fixtures can hold; else the
+    /// By hand only faces, edges and corners are used: nobody holds (-0.859, 0.346, 0.377), and twelve of these 26 directions have a D-efficiency of
+    /// 0.97. Of equally good designs, one on different faces is taken, which people and fixtures can hold; else the
     /// one that would notice most of the terms that the model lacks ([`lack_of_fit::potential`]).
     pub fn best(&self, n: usize, seed: u64) -> Result<Vec<Setting>> {
         let plain = self.reach.plain();
@@ -113,14 +114,21 @@ impl Problem {
         };
         let on_faces = search(&faces, &self.reach.rows(&faces));
         let on_plain = search(&plain, &self.reach.rows(&plain));
-        let on_grid = search(&self.candidates, &self.rows);
+        let by_hand = self.reach.fixture == Fixture::Hand;
+        let on_grid = match by_hand {
+            true => Vec::new(),
+            false => search(&self.candidates, &self.rows),
+        };
         let refined = |designs: &[Vec<Setting>]| -> Vec<Vec<Setting>> {
             let each = designs.par_iter().take(REFINED);
             each.filter_map(|d| refine(&self.reach, d.clone()))
                 .map(|(points, _)| points)
                 .collect()
         };
-        let (refined_plain, refined_grid) = (refined(&on_plain), refined(&on_grid));
+        let (refined_plain, refined_grid) = match by_hand {
+            true => (Vec::new(), Vec::new()),
+            false => (refined(&on_plain), refined(&on_grid)),
+        };
         let all = [on_faces, on_plain, refined_plain, refined_grid].concat();
         let values: Vec<f64> = all.iter().map(|d| self.log_det(d)).collect();
         let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -188,7 +188,7 @@ pub fn not_excited(d: &DiagnosisResult) -> Markup {
     let by_experiment = by_experiment(d);
     html! {
         @if by_experiment.is_empty() {
-            p { "This recording would show every effect of the library at its data-sheet size." }
+            p { "This recording would show every effect of the library at the size of data sheets." }
         } @else {
             div class="scroll" { table class="told" {
                 thead { tr { th { "effect" } th { "what would show it" } } }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{by, converter, shown};
-use crate::report::text::{COLUMNS, wrap};
+use crate::report::text::{columns, wrap};
 use mimu::diagnose::decision::Accepted;
 use mimu::effects::fitted::WrittenCoefficient;
 use mimu::quantity::{p_value, plus_minus, significant};
@@ -102,7 +102,7 @@ fn compact(out: &mut String, coefficients: &[WrittenCoefficient]) {
         let width = rows.iter().flatten().map(|c| c.chars().count()).max();
         let width = width.unwrap_or(0) + 3;
         let (_, unit) = coefficient(&of_unit[0]);
-        let fit = (COLUMNS.saturating_sub(4 + unit.chars().count()) / width).max(1);
+        let fit = (columns().saturating_sub(4 + unit.chars().count()) / width).max(1);
         for line in rows.iter().flat_map(|row| row.chunks(fit)) {
             let line: String = line.iter().map(|c| format!("{c:<width$}")).collect();
             let _ = writeln!(out, "    {} {unit}", line.trim_end());

@@ -10,7 +10,11 @@ use mimu::result::diagnosis::DiagnosisResult;
 /// All experiments.
 pub(super) fn experiments(out: &mut String, d: &DiagnosisResult) {
     for (shown_by, ids) in by_recipe(d) {
-        wrap(out, "not seen at data-sheet size: ", &ids.join(", "));
+        wrap(
+            out,
+            "too small to be seen here at the sizes of data sheets: ",
+            &ids.join(", "),
+        );
         wrap(out, "  ", &shown_by.experiment);
     }
     for c in &d.confused {

@@ -1,0 +1,229 @@
+//! The first minutes of a user: a log in, a file out, and what the command says when something is given in the wrong place.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn mimu(folder: &Path, arguments: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
+    command.current_dir(folder);
+    command.args(arguments.split_whitespace()).output().unwrap()
+}
+
+fn right(folder: &Path, arguments: &str) -> String {
+    let out = mimu(folder, arguments);
+    let error = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(out.status.success(), "mimu {arguments}: {error}");
+    String::from_utf8(out.stdout).unwrap()
+}
+
+fn refused(folder: &Path, arguments: &str) -> String {
+    let out = mimu(folder, arguments);
+    let error = String::from_utf8(out.stderr).unwrap();
+    assert_eq!(out.status.code(), Some(1), "mimu {arguments}: {error}");
+    error.lines().last().unwrap_or_default().to_owned()
+}
+
+fn json(text: &str) -> serde_json::Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+/// A folder with the example as a log in m/s² and rad/s, without units in its names.
+fn log() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let example = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/example");
+    for name in ["accel.txt", "gyro.txt"] {
+        std::fs::copy(example.join(name), at.join(name)).unwrap();
+    }
+    right(
+        at,
+        "import accel.txt gyro.txt --columns t_s,accel_x,accel_y,accel_z --columns t_s,gyro_x,gyro_y,gyro_z --raw-unit count \
+         --gravity 9.80665 -o counts",
+    );
+    right(at, "fit counts -o counts.toml");
+    right(
+        at,
+        "apply counts --calibration counts.toml --format csv -o clean",
+    );
+    let text = std::fs::read_to_string(at.join("clean/samples.csv")).unwrap();
+    let (head, rows) = text.split_once('\n').unwrap();
+    let names = head.replace("gyro_", "g").replace("accel_", "a");
+    std::fs::write(at.join("log.csv"), format!("{names}\n{rows}")).unwrap();
+    folder
+}
+
+#[test]
+fn a_log_becomes_a_header_in_two_commands_and_nothing_is_replaced_by_mistake() {
+    let folder = log();
+    let at = folder.path();
+    let said = right(at, "fit log.csv -o cal.toml --save rec");
+    assert!(said.contains("calibration: cal.toml"), "{said}");
+    right(at, "export c cal.toml -o cal.h");
+    right(at, "export c --calibration cal.toml -o again.h");
+    let [one, other] = ["cal.h", "again.h"].map(|name| std::fs::read(at.join(name)).unwrap());
+    assert_eq!(one, other);
+    let out = mimu(at, "export c cal.toml --calibration cal.toml -o third.h");
+    assert_eq!(out.status.code(), Some(2));
+
+    // The recording was kept.
+    let before = std::fs::read(at.join("cal.toml")).unwrap();
+    let error = refused(at, "fit rec -o cal.toml");
+    let said = "mimu: cal.toml: the file exists; choose another name, or replace it (--replace)";
+    assert_eq!(error, said);
+    assert_eq!(refused(at, "diagnose rec -o cal.toml"), said);
+    assert_eq!(std::fs::read(at.join("cal.toml")).unwrap(), before);
+    right(at, "fit rec -o cal.toml --replace");
+    right(at, "verify log.csv --calibration cal.toml");
+}
+
+#[test]
+fn a_file_in_the_wrong_place_is_called_what_it_is() {
+    let folder = log();
+    let at = folder.path();
+    std::fs::write(at.join("noise.toml"), "format = \"mimu-noise/1\"\n").unwrap();
+    right(at, "design -n 12 --reference gravity -o plan.toml");
+    let error = refused(at, "verify counts --calibration noise.toml");
+    let said = "mimu: noise.toml: this is a noise file (`mimu allan -o`); give a calibration (`mimu fit -o`)";
+    assert_eq!(error, said);
+    assert_eq!(refused(at, "export c noise.toml -o x.h"), said);
+    let error = refused(at, "fit counts --noise counts.toml");
+    assert!(
+        error.contains("this is a calibration (`mimu fit -o`); give a noise file"),
+        "{error}"
+    );
+    let error = refused(at, "export c plan.toml -o x.h");
+    assert!(error.contains("this is a plan"), "{error}");
+}
+
+#[test]
+fn every_refusal_on_standard_output_is_json_with_its_judgement() {
+    let folder = log();
+    let at = folder.path();
+    let of = |arguments: &str| {
+        let out = mimu(at, arguments);
+        assert_eq!(out.status.code(), Some(1), "{arguments}");
+        let refusal = json(&String::from_utf8(out.stdout).unwrap());
+        assert_eq!(refusal["format"], "mimu-refusal/1", "{arguments}");
+        let line = String::from_utf8(out.stderr).unwrap();
+        let problem = refusal["error"]["problem"].as_str().unwrap();
+        assert!(line.contains(problem), "{arguments}: {line}");
+        refusal
+    };
+    let missing = of("import nowhere.csv -o x --json -");
+    assert!(missing["judgement"].is_null(), "{missing}");
+    of("verify counts --calibration nowhere.toml --json -");
+    of("export kalibr --calibration counts.toml -o x.yaml --json -");
+    // A unit that lies still shows no scale factor.
+    let text = std::fs::read_to_string(at.join("log.csv")).unwrap();
+    let still: Vec<&str> = text.lines().take(100).collect();
+    std::fs::write(at.join("still.csv"), still.join("\n")).unwrap();
+    right(at, "import still.csv --units m/s2,rad/s -o still");
+    let refusal = of("fit still --json -");
+    let kind = refusal["judgement"]["kind"].as_str().unwrap();
+    assert!(["untested", "suspect"].contains(&kind), "{refusal}");
+    // A result that is refused afterwards is printed once, as a result.
+    let out = right(at, "fit counts --json -");
+    assert_eq!(json(&out)["format"], "mimu-fit/1");
+}
+
+#[test]
+fn units_that_are_given_hold_for_named_columns_too() {
+    let folder = log();
+    let at = folder.path();
+    let text = std::fs::read_to_string(at.join("log.csv")).unwrap();
+    let head = text.lines().next().unwrap();
+    let place = |name: &str| head.split(',').position(|n| n == name).unwrap();
+    let axes = ["gx", "gy", "gz", "ax", "ay", "az"].map(place);
+    let t = place("t_s");
+    let row = |line: &str| {
+        let cells: Vec<f64> = line
+            .split(',')
+            .map(|c| c.parse().unwrap_or(f64::NAN))
+            .collect();
+        let [g, a] = [axes[..3].to_vec(), axes[3..].to_vec()];
+        let g = g.iter().map(|k| cells[*k].to_degrees());
+        let all: Vec<String> = std::iter::once(cells[t])
+            .chain(g)
+            .chain(a.iter().map(|k| cells[*k] / 9.80665))
+            .map(|v| v.to_string())
+            .collect();
+        all.join(",")
+    };
+    let rows: Vec<String> = text.lines().skip(1).map(row).collect();
+    std::fs::write(at.join("bare.csv"), rows.join("\n")).unwrap();
+    let list = "--columns t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
+    right(
+        at,
+        &format!("import bare.csv {list} --units g,deg/s -o bare"),
+    );
+    let manifest = std::fs::read_to_string(at.join("bare/recording.toml")).unwrap();
+    assert!(manifest.contains("raw_unit = \"SI\""), "{manifest}");
+    let fit = json(&right(at, "fit bare --json -"));
+    let scale = &fit["sensors"]["accel"]["parameters"];
+    let scale = scale
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|p| p["name"] == "scale_x")
+        .unwrap();
+    assert!(
+        (scale["value"].as_f64().unwrap() - 1.0).abs() < 1e-2,
+        "{scale}"
+    );
+    let error = refused(at, &format!("import bare.csv {list} -o again"));
+    assert!(
+        error.contains("--units UNITS, which is count, V, or as g,deg/s"),
+        "{error}"
+    );
+    let error = refused(
+        at,
+        &format!("import bare.csv {list} --units g,count -o again"),
+    );
+    assert!(
+        error.contains("a recording has one unit for both"),
+        "{error}"
+    );
+}
+
+#[test]
+fn poses_for_hands_are_in_words_and_say_whose_noise_is_assumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = right(
+        folder.path(),
+        "design -n 12 --reference gravity --table hand",
+    );
+    assert!(
+        text.contains("face up") || text.contains("edge between"),
+        "{text}"
+    );
+    assert!(text.contains("up to 25 degrees off"), "{text}");
+    assert!(
+        text.contains("MMA7260QT is assumed: --noise takes yours"),
+        "{text}"
+    );
+    assert!(
+        text.lines().all(|line| line.chars().count() <= 100),
+        "{text}"
+    );
+    let design = json(&right(
+        folder.path(),
+        "design -n 12 --reference gravity --json -",
+    ));
+    assert!(
+        design["d_efficiency"].as_f64().unwrap() > 0.96,
+        "{}",
+        design["d_efficiency"]
+    );
+    for up in design["positions"].as_array().unwrap() {
+        let parts = up
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|c| c.as_f64().unwrap().abs());
+        let parts: Vec<f64> = parts.filter(|c| *c > 1e-9).collect();
+        assert!(
+            parts.iter().all(|c| (c - parts[0]).abs() < 1e-9),
+            "{up}: no face, edge or corner"
+        );
+    }
+}
