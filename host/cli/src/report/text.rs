@@ -15,12 +15,21 @@ const WIDTHS: std::ops::RangeInclusive<usize> = 60..=120;
 pub(crate) fn columns() -> usize {
     static FOUND: OnceLock<usize> = OnceLock::new();
     *FOUND.get_or_init(|| {
-        let found = terminal_size::terminal_size_of(std::io::stdout());
-        let fitted = |(terminal_size::Width(width), _): (_, terminal_size::Height)| {
-            usize::from(width).clamp(*WIDTHS.start(), *WIDTHS.end())
-        };
-        found.map_or(COLUMNS, fitted)
+        let width = terminal().map(|width| width.clamp(*WIDTHS.start(), *WIDTHS.end()));
+        width.unwrap_or(COLUMNS)
     })
+}
+
+#[cfg(not(target_family = "wasm"))]
+fn terminal() -> Option<usize> {
+    let (terminal_size::Width(width), _) = terminal_size::terminal_size_of(std::io::stdout())?;
+    Some(width.into())
+}
+
+/// A page has no terminal.
+#[cfg(target_family = "wasm")]
+fn terminal() -> Option<usize> {
+    None
 }
 
 /// Wraps `head` and `text`. Further lines are indented to the beginning of the text, or only a little if the head is long.

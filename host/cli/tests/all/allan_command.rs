@@ -589,7 +589,7 @@ fn at_a_rate_that_has_no_power_of_ten_the_nearest_averaging_times_are_printed() 
             .filter(|l| l.trim_start().starts_with(time.trim()));
         // Of gyro and accelerometer; a table that is too wide goes on below.
         let count = rows.count();
-        assert!(count == 2 || count == 4, "{time}: {text}");
+        assert!((2..=4).contains(&count), "{time}: {text}");
     }
 }
 

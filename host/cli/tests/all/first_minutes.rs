@@ -198,7 +198,7 @@ fn poses_for_hands_are_in_words_and_say_whose_noise_is_assumed() {
     );
     assert!(text.contains("up to 25 degrees off"), "{text}");
     assert!(
-        text.contains("MMA7260QT is assumed: --noise takes yours"),
+        text.contains("that of an MMA7260QT: --noise takes yours"),
         "{text}"
     );
     assert!(

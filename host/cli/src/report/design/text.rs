@@ -129,13 +129,14 @@ fn summary(out: &mut String, report: &Design) {
         "time",
         format!("{time}: {dwells} of {} s", significant(report.dwell_s)),
     );
-    line("sigma of a dwell mean", sigma(report));
-    if let Some(part) = report.assumed_noise {
-        line(
-            "noise",
-            format!("that of {part} is assumed: --noise takes yours"),
-        );
-    }
+    let sigma = match report.assumed_noise {
+        Some(part) => format!(
+            "{}, if the noise is that of {part}: --noise takes yours",
+            mean_sigma(report)
+        ),
+        None => sigma(report),
+    };
+    line("sigma of a dwell mean", sigma);
     line(
         "spare",
         format!("{}, which alone reveal a wrong model", spare(report)),
@@ -165,7 +166,7 @@ fn summary(out: &mut String, report: &Design) {
     let cell = |k: usize| {
         if report.is_by_hand() {
             let up = words(&report.positions[k].into());
-            return format!("{:>3}: {up:<28}", k + 1);
+            return format!("{:>3}: {up:<26}", k + 1);
         }
         let [x, y, z] = report.positions[k].map(|c| round(c, 1e3));
         let rate = report.rates_dps.as_ref().and_then(|rates| rates.get(k));
@@ -197,6 +198,12 @@ fn spare(report: &Design) -> String {
 /// Wrapped text next to a name.
 pub(super) fn wrapped(out: &mut String, name: &str, text: &str) {
     wrap(out, &format!("  {name:<22}"), text);
+}
+
+/// Sigma of a dwell mean with its unit.
+fn mean_sigma(report: &Design) -> String {
+    let Readable { factor, unit } = readable::parameter(report.dwell_sigma.unit);
+    format!("{} {unit}", significant(report.dwell_sigma.value * factor))
 }
 
 fn sigma(report: &Design) -> String {
