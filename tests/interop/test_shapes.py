@@ -165,8 +165,8 @@ def shapes():
     yield "words of another language", simple("時刻", names("加速度{1}"), names("角速度{1}")), "ask"
     # From files of strangers, at their first try.
     yield "a tenth of a unit in the name", simple("time (ms)", names("accelerometer {0} (mg)"), names("gyroscope {0} (0.1 deg/s)"), t=T * 1000, a=1000 / G, w=10 * dps, whole=True, decimals=0), "ask"
-    yield "axes with a unit only", table(names("{0}(m/s^2)") + ["timestamp_ns"], xyz(F) + [T * 1e9]), "si"
-    yield "giro_x", simple("tempo_ms", names("acel_{0}"), names("giro_{0}"), t=T * 1000, a=1 / G, w=dps), "si"
+    yield "axes with a unit only", {"a.csv": table(names("{0}(m/s^2)") + ["timestamp_ns"], xyz(F) + [T * 1e9]), "b.csv": table(names("{0}(deg/s)") + ["timestamp_ns"], xyz(W, dps) + [T * 1e9])}, "si"
+    yield "giro_x", simple("time_ms", names("acel_{0}"), names("giro_{0}"), t=T * 1000, a=1 / G, w=dps), "si"
     yield "a triad of an unknown word, and no gyro", simple("t", A, names("foo_{0}")), "ask"
     two = [w for pair in zip(xyz(F), xyz(F), strict=True) for w in pair] + [w for pair in zip(xyz(W), xyz(W), strict=True) for w in pair]
     both = [n for n in names("acc_{0}") + names("gyr_{0}") for _ in range(2)]
