@@ -343,9 +343,14 @@ function verdict(html) {
 async function report(html) {
   const parsed = new DOMParser().parseFromString(html, "text/html");
   const tables = [];
-  for (let at = parsed.getElementById("calibration")?.nextElementSibling; at && at.tagName !== "H2"; at = at.nextElementSibling)
-    tables.push(...(at.matches("div.scroll") ? [at] : at.querySelectorAll("div.scroll")));
-  $("parameters").replaceChildren(...tables.slice(0, 1).map((table) => document.importNode(table, true)));
+  let sensor = "";
+  for (let at = parsed.getElementById("calibration")?.nextElementSibling; at && at.tagName !== "H2"; at = at.nextElementSibling) {
+    if (at.tagName === "H3") sensor = at.textContent;
+    const own = at.matches("div.scroll") ? [at] : [...at.querySelectorAll("div.scroll")];
+    const physical = own.filter((table) => table.querySelector("caption")?.textContent.startsWith("Physical"));
+    for (const table of physical) tables.push(made("h3", { textContent: sensor }), document.importNode(table, true));
+  }
+  $("parameters").replaceChildren(...tables);
   $("report-part").hidden = false;
   await new Promise((loaded) => {
     $("report").onload = () => {
