@@ -81,6 +81,7 @@ impl ThermalFit {
             },
             usual: USUAL,
             cause: None,
+            few: None,
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Typical sessions of users: thirteen poses, ten on a fixture, six faces; with a disturbed dwell, or with a correct dwell that no other confirms.
 
 use mimu::fit::{Fit, Method, Options, fit};
+use mimu::judge::errors::{BEYOND_NOISE, held_out_by_noise};
+use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::Keep;
@@ -10,8 +12,10 @@ use mimu_recording::error::Error;
 use mimu_recording::{Batch, Manifest, RawUnit, Reference};
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
+use mimu_rig::random::Random;
 use mimu_rig::record::samples;
 use mimu_rig::rig_file::{RigFile, RigTruth};
+use nalgebra::{DMatrix, DVector};
 
 const THIRTEEN: &str = include_str!("../../../rig/plans/thirteen.toml");
 const FIXTURE: &str = include_str!("../../../rig/plans/fixture.toml");
@@ -135,6 +139,54 @@ fn a_right_dwell_that_the_few_others_happen_not_to_predict_is_kept() {
         let left_out = &found.prepared.dwells.left_out;
         let poses = left_out.iter().filter(|l| l.sensor == Sensor::Accel);
         assert_eq!(poses.count(), 0, "seed {seed}: {left_out:?}");
+    }
+}
+
+/// The unit is sound, so nothing may be called unexplained: 13 poses for nine parameters leave too little to hold out.
+#[test]
+fn a_sound_unit_in_few_poses_is_untested_or_good() {
+    let mut held_out_beyond_noise = 0;
+    for seed in 1..=10 {
+        let found = Session::of(THIRTEEN, QUIET, seed)
+            .fit()
+            .expect("thirteen poses");
+        let accel = found.sensor(Sensor::Accel).expect("recorded");
+        let held_out = accel.held_out_rms().expect("held out");
+        held_out_beyond_noise += u32::from(held_out > BEYOND_NOISE * accel.noise_floor());
+        let judgement = Judgement::of_fit(&found);
+        println!(
+            "seed {seed}: held out {:.1} times the noise; {judgement}",
+            held_out / accel.noise_floor()
+        );
+        assert!(
+            judgement.kind <= JudgementKind::Untested,
+            "seed {seed}: {judgement}"
+        );
+    }
+    // Otherwise the sessions show nothing.
+    assert!(held_out_beyond_noise >= 2, "{held_out_beyond_noise} of 10");
+}
+
+/// Regressions on random designs, fitted to three quarters of the rows: the mean square error of one more row.
+#[test]
+fn noise_held_out_is_that_of_simulated_regressions() {
+    let mut random = Random::new(1, "regressions");
+    for (rows, parameters) in [(12_usize, 4_usize), (20, 9)] {
+        let train = rows * 3 / 4;
+        let runs = 20_000;
+        let mut sum = 0.0;
+        for _ in 0..runs {
+            let design = DMatrix::from_fn(train, parameters, |_, _| random.normal());
+            let noise = DVector::from_fn(train, |_, _| random.normal());
+            let normal = (design.transpose() * &design).cholesky().expect("regular");
+            let fitted = normal.solve(&(design.transpose() * noise));
+            let next = DVector::from_fn(parameters, |_, _| random.normal());
+            sum += (random.normal() - next.dot(&fitted)).powi(2);
+        }
+        let found = (sum / f64::from(runs)).sqrt();
+        let stated = held_out_by_noise(rows as f64, parameters as f64, 4);
+        println!("{rows} rows, {parameters} parameters: {found:.3}, stated {stated:.3}");
+        assert!((found / stated - 1.0).abs() < 0.05);
     }
 }
 

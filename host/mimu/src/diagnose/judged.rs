@@ -3,7 +3,7 @@
 use super::decision::{Leftover, WANDERS};
 use super::{Diagnosis, SensorDiagnosis};
 use crate::fit::plausible::input_size;
-use crate::judge::errors::{self, ErrorFigures};
+use crate::judge::errors::{self, ErrorFigures, Few};
 use crate::judge::input;
 use crate::judgement::{Judgement, JudgementKind};
 use crate::readable;
@@ -41,6 +41,7 @@ impl Diagnosis {
             input: input_size(&self.before.prepared, fit),
             usual: WANDERS,
             cause: None,
+            few: Few::of_fit(&self.before, fit),
         })
     }
 }

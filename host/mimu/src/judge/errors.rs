@@ -30,12 +30,44 @@ pub struct ErrorFigures {
     pub usual: f64,
     /// What is known of the causes of the error, as a sentence fragment.
     pub cause: Option<String>,
+    /// Set if the data are too few for a part of them to be held out.
+    pub few: Option<Few>,
+}
+
+/// Data so few for their parameters that noise alone may give a held-out error beyond `usual`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Few {
+    /// Number of dwells or turns.
+    pub residuals: usize,
+    /// What they are: `dwells` or `turns`.
+    pub what: &'static str,
+    /// Number of parameters that each row of them helps to determine.
+    pub parameters: usize,
+    /// The error in sample, corrected for the degrees of freedom that the parameters took.
+    pub corrected_rms: f64,
+    /// Number of dwells or turns from which on the held-out error can be compared with the noise.
+    pub wanted: usize,
+}
+
+/// Held-out error over the noise floor that noise alone gives, if `rows` determine `parameters` and one of `parts` is held out. For a random
+/// design (Breiman and Freedman 1983): the variance of the prediction by m rows is p / (m - p - 1) of that of a row.
+pub fn held_out_by_noise(rows: f64, parameters: f64, parts: usize) -> f64 {
+    let parts = parts as f64;
+    let spare = rows * (parts - 1.0) / parts - parameters - 1.0;
+    match spare > 0.0 {
+        true => (1.0 + parameters / spare).sqrt(),
+        false => f64::INFINITY,
+    }
 }
 
 impl ErrorFigures {
-    /// The error of unseen data; without them, that in sample.
+    /// The error that is judged: of unseen data; without them, that in sample. If the data are too few for that, the corrected one in sample.
     pub fn error(&self) -> f64 {
-        self.held_out_rms.unwrap_or(self.rms)
+        match (&self.few, self.held_out_rms) {
+            (Some(few), _) => few.corrected_rms,
+            (None, Some(held_out)) => held_out,
+            (None, None) => self.rms,
+        }
     }
 
     /// [`Self::error`] over the noise floor.
@@ -55,9 +87,9 @@ impl ErrorFigures {
 
     /// How the error was found.
     fn how(&self) -> &'static str {
-        match self.held_out_rms {
-            Some(_) => "of unseen data",
-            None => "in sample",
+        match (&self.few, self.held_out_rms) {
+            (None, Some(_)) => "of unseen data",
+            (Some(_), _) | (None, None) => "in sample",
         }
     }
 
@@ -84,6 +116,13 @@ impl ErrorFigures {
                 significant(self.over_noise())
             );
             return Some(Judgement::new(JudgementKind::Unexplained, reason));
+        }
+        if let Some(few) = &self.few {
+            let reason = format!(
+                "{sensor}: {} {} for {} parameters are too few to test the model; record at least {}",
+                few.residuals, few.what, few.parameters, few.wanted
+            );
+            return Some(Judgement::new(JudgementKind::Untested, reason));
         }
         if self.held_out_rms.is_none() {
             let reason = format!("{sensor}: nothing was held out, so no unseen data test it");
@@ -132,6 +171,7 @@ mod tests {
             input: 9.8,
             usual: BEYOND_NOISE,
             cause: None,
+            few: None,
         }
     }
 
@@ -148,6 +188,27 @@ mod tests {
     }
 
     #[test]
+    fn an_error_by_too_few_data_is_untested_unless_the_fit_itself_is_bad() {
+        let of_few = |corrected_rms| {
+            let few = Few {
+                residuals: 12,
+                what: "dwells",
+                parameters: 9,
+                corrected_rms,
+                wanted: 18,
+            };
+            judge(&[ErrorFigures {
+                few: Some(few),
+                ..accel(0.9, true, 0.001)
+            }])
+        };
+        assert_eq!(of_few(0.0015).kind, Untested);
+        assert_eq!(of_few(0.0031).kind, Unexplained);
+        assert_eq!(of_few(0.9).kind, Misfit);
+        assert!(of_few(0.0015).reason.contains("at least 18"));
+    }
+
+    #[test]
     fn the_reason_names_the_sensor_that_errs_most() {
         let gyro = ErrorFigures {
             sensor: Sensor::Gyro,
@@ -158,6 +219,7 @@ mod tests {
             input: 1.0,
             usual: BEYOND_NOISE,
             cause: None,
+            few: None,
         };
         let both = judge(&[accel(0.003, true, 0.001), gyro]);
         assert_eq!(both.kind, Unexplained);

@@ -68,6 +68,7 @@ fn figures(
         input: input_size(prepared, sensor, s.figure),
         usual: BEYOND_NOISE,
         cause: s.causes.as_ref().map(Causes::words),
+        few: None,
     }
 }
 
