@@ -132,12 +132,7 @@ fn is_units(row: &[String]) -> bool {
     let unit = |cell: &&String| {
         let cell = cell.trim();
         let bracketed = cell.starts_with(['(', '[']) && cell.ends_with([')', ']']);
-        let known = [
-            "s", "ms", "us", "µs", "ns", "g", "mg", "m/s^2", "m/s2", "m/s²", "mps2", "deg/s",
-            "dps", "°/s", "mdps", "rad/s", "deg", "°C", "C", "degC", "uT", "µT", "Gauss", "gauss",
-            "V", "counts", "count", "LSB", "raw", "Pa", "hPa", "-", "",
-        ];
-        bracketed || known.contains(&cell)
+        bracketed || UNITS.contains(&cell) || ["-", ""].contains(&cell)
     };
     let filled = row.iter().filter(|cell| !cell.trim().is_empty());
     filled.clone().count() > 0
@@ -145,10 +140,20 @@ fn is_units(row: &[String]) -> bool {
         && filled.count() * 2 >= row.len()
 }
 
-/// Separators of lines with a label before each number: `ax:1,ay:2`, `AcX = 1 | AcY = 2`, `gx: 1 gy: 2`.
-const OF_LABELS: [&str; 8] = [":,", ":;", "=,", "=;", "=|", ":|", ": ", "= "];
+/// Units as they stand alone in a cell.
+const UNITS: [&str; 31] = [
+    "s", "ms", "us", "µs", "ns", "g", "mg", "m/s^2", "m/s2", "m/s²", "mps2", "deg/s", "dps", "°/s",
+    "mdps", "rad/s", "deg", "°C", "C", "degC", "uT", "µT", "Gauss", "gauss", "V", "counts",
+    "count", "LSB", "raw", "Pa", "hPa",
+];
 
-/// Lines whose cells alternate between a label, the same in all lines, and a number.
+/// Separators of lines with labels among the numbers: `ax:1,ay:2`, `AcX = 1 | AcY = 2`, `gx: 1 gy: 2`, `ACC: X=1,Y=2,Z=3`. Those that leave the
+/// fewest empty cells come first.
+const OF_LABELS: [&str; 13] = [
+    ":,", ":;", "=,", "=;", "=|", ":|", ": ", "= ", ":=,", ":, ", "=, ", ":=, ", ":=,; |",
+];
+
+/// Lines of labels, the same in all lines, and numbers.
 fn labelled(lines: &[&[u8]], most: usize) -> Option<Preview> {
     OF_LABELS.iter().find_map(|text| {
         let separator: Separator = text.parse().ok()?;
@@ -158,41 +163,100 @@ fn labelled(lines: &[&[u8]], most: usize) -> Option<Preview> {
             let text = |cell: &[u8]| String::from_utf8_lossy(cell).into_owned();
             record.iter().map(text).collect()
         };
-        let number = |cell: &String| cell::number(cell.as_bytes()).is_ok_and(f64::is_finite);
-        let is_row = |row: &[String]| {
-            let (pairs, rest) = row.as_chunks::<2>();
-            !pairs.is_empty()
-                && rest.is_empty()
-                && pairs
-                    .iter()
-                    .all(|[label, value]| !number(label) && number(value))
-        };
         let rows: Vec<Vec<String>> = lines
             .iter()
             .map(|line| cells(line))
-            .filter(|row| is_row(row))
+            .filter(|row| names_between(row).is_some())
             .take(most)
             .collect();
-        let first = rows.first()?;
-        let labels = |row: &[String]| row.iter().step_by(2).cloned().collect::<Vec<String>>();
+        let names = names_between(rows.first()?)?;
         let alike = rows
             .iter()
-            .filter(|row| labels(row) == labels(first))
+            .filter(|row| names_between(row).as_ref() == Some(&names))
             .count();
         // A line of a title, or a cut one, has other labels.
-        if rows.len() < 2 || first.len() < 4 || 10 * alike < 9 * rows.len() {
+        if rows.len() < 2 || 10 * alike < 9 * rows.len() {
             return None;
         }
-        let names = first
-            .chunks(2)
-            .flat_map(|pair| [String::new(), pair[0].clone()]);
         Some(Preview {
-            names: names.collect(),
+            names,
             separator: Some(separator),
             rows,
             ..Preview::default()
         })
     })
+}
+
+/// A number of a line, and what stands around it.
+struct Labelled<'a> {
+    cell: usize,
+    /// The labels since the number before.
+    labels: Vec<&'a str>,
+    /// The unit behind it.
+    unit: Option<&'a str>,
+}
+
+/// The names of the cells of a line of labels and numbers: that of a number consists of the labels before it, that of a label is empty. A label
+/// before several axes, as in `ACC: X=1,Y=2,Z=3`, or before three numbers, as in `acc 1 2 3`, belongs to each of them; a unit behind a
+/// number belongs to it. `None` for fewer than two numbers, and if labels do not tell them apart.
+fn names_between(row: &[String]) -> Option<Vec<String>> {
+    let is_axis = |label: &str| ["x", "y", "z"].contains(&label.to_lowercase().as_str());
+    let mut numbers: Vec<Labelled> = Vec::new();
+    let mut labels: Vec<&str> = Vec::new();
+    let is_number = |text: &str| cell::number(text.as_bytes()).is_ok_and(f64::is_finite);
+    for (cell, text) in row.iter().enumerate() {
+        // Another separator cuts these.
+        let several = text.contains([',', ';', '|']) || text.split([' ', ':', '=']).any(is_number);
+        if !is_number(text) && several {
+            return None;
+        }
+        if is_number(text) {
+            numbers.push(Labelled {
+                cell,
+                labels: std::mem::take(&mut labels),
+                unit: None,
+            });
+            continue;
+        }
+        match numbers.last_mut() {
+            Some(number) if labels.is_empty() && UNITS.contains(&text.as_str()) => {
+                number.unit = Some(text);
+            }
+            _ if text.is_empty() => {}
+            // `ACC: X` behind a separator that is not the colon.
+            _ => match text.rsplit_once([':', ' ']) {
+                Some((of, axis)) if is_axis(axis) => {
+                    labels.extend([of.trim_end_matches([':', ' ']), axis]);
+                }
+                _ => labels.push(text),
+            },
+        }
+    }
+    if numbers.len() < 2 || numbers[0].labels.is_empty() || !labels.is_empty() {
+        return None;
+    }
+    let mut names = vec![String::new(); row.len()];
+    let mut group = String::new();
+    // A number with labels, and those without any behind it.
+    for run in numbers.chunk_by(|_, next| next.labels.is_empty()) {
+        let (last, of) = run[0].labels.split_last()?;
+        let each: Vec<String> = match run.len() {
+            1 if of.is_empty() && is_axis(last) => vec![format!("{group} {last}")],
+            1 => {
+                group = of.join(" ");
+                vec![run[0].labels.join(" ")]
+            }
+            3 => ["x", "y", "z"]
+                .map(|axis| format!("{} {axis}", run[0].labels.join(" ")))
+                .to_vec(),
+            _ => return None,
+        };
+        for (number, name) in run.iter().zip(each) {
+            let unit = number.unit.map(|unit| format!(" [{unit}]"));
+            names[number.cell] = name.trim().to_owned() + &unit.unwrap_or_default();
+        }
+    }
+    Some(names)
 }
 
 #[cfg(test)]
@@ -211,6 +275,36 @@ mod tests {
         assert_eq!(preview.rows, [["0,01", "2", "3"], ["0,02", "4", "5"]]);
         assert_eq!(of("# t wx ax\n0 1 2\n1 1 2\n").names, ["t", "wx", "ax"]);
         assert!(of("1\t2\n3\t4\n").names.is_empty());
+    }
+
+    #[test]
+    fn labels_among_the_numbers_are_their_names() {
+        for (line, names) in [
+            ("t:1,ax:2,ay:-3", "t|ax|ay"),
+            ("AcX = 1 | AcY = 2", "AcX|AcY"),
+            (
+                "GYRO: X=1.5,Y=-2,Z=3,ACC: X=4,Y=5,Z=6",
+                "GYRO X|GYRO Y|GYRO Z|ACC X|ACC Y|ACC Z",
+            ),
+            (
+                "Gyro: 1, 2, 3 Accel: 4, 5, 6",
+                "Gyro x|Gyro y|Gyro z|Accel x|Accel y|Accel z",
+            ),
+            ("ax: 1.0 m/s^2, ay: 2.0 m/s^2", "ax [m/s^2]|ay [m/s^2]"),
+            ("t=12 gyro x=1 y=2 z=3", "t|gyro x|gyro y|gyro z"),
+        ] {
+            let lines = [line.as_bytes(); 3];
+            let preview = labelled(&lines, 10).expect(line);
+            let named: Vec<String> = preview
+                .names
+                .into_iter()
+                .filter(|n| !n.is_empty())
+                .collect();
+            assert_eq!(named.join("|"), names, "{line}");
+        }
+        for line in ["a:1,2", "1:a,2:b", "hello", "v: 1 2 3 4"] {
+            assert!(labelled(&[line.as_bytes(); 3], 10).is_none(), "{line}");
+        }
     }
 
     #[test]

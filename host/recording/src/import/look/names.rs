@@ -149,7 +149,7 @@ const OTHER: [&str; 40] = [
     "norm",
     "vector",
 ];
-const TIME: [&str; 35] = [
+const TIME: [&str; 39] = [
     "t",
     "ts",
     "time",
@@ -184,7 +184,11 @@ const TIME: [&str; 35] = [
     "headerstamp",
     "timeusec",
     "timesec",
-    "zeit",
+    "zeit",   // German
+    "tempo",  // Portuguese, Italian
+    "tiempo", // Spanish
+    "temps",  // French
+    "tijd",   // Dutch
 ];
 const NANOSECONDS: [&str; 5] = ["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"];
 const TEMPERATURE: [&str; 9] = [
