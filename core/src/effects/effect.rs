@@ -3,7 +3,10 @@
 use nalgebra::{RealField, convert};
 
 use super::code::{BITS, FARTHEST_ZERO};
-use super::law::{COEFFICIENTS, Evaluation, FACTORS, Fast, Law, Nonlinear, Slowly, term};
+use super::law::{
+    COEFFICIENTS, Evaluation, FACTORS, Fast, Law, Nonlinear, Slowly, error_at_ends, is_bounded,
+    term,
+};
 use crate::Sensor;
 
 /// A quantity that a [term](DeviceEffect::term) is a product of. Its number is that of the stored layout.
@@ -74,7 +77,7 @@ pub enum EffectError {
         /// The required number (for a term: the largest).
         needed: usize,
     },
-    /// A coefficient is not finite; a nonlinear constant is missing, superfluous or outside
+    /// A coefficient is not finite, or its error at the end of a range is larger than any sensor's; a nonlinear constant is missing, superfluous or outside
     /// [`TIME_CONSTANT_RANGE_S`], a weight is not positive; or the axis does not exist.
     Value,
     /// The room is full, or an axis has a code already.
@@ -195,6 +198,9 @@ impl<T: RealField + Copy> DeviceEffect<T> {
             }
             *all = *coefficient;
         }
+        if !law.is_bounded(sensor, &all) {
+            return Err(EffectError::Value);
+        }
         Ok(Self {
             sensor,
             numbers: Numbers::Named {
@@ -220,8 +226,22 @@ impl<T: RealField + Copy> DeviceEffect<T> {
             return Err(EffectError::Value);
         }
         let mut all = [None; FACTORS];
+        let mut alone = Fast {
+            law: term,
+            coefficients: [T::zero(); COEFFICIENTS],
+            factors: [0; FACTORS],
+        };
         for (one, variable) in all.iter_mut().zip(variables) {
             *one = Some(*variable);
+        }
+        for (factor, variable) in alone.factors.iter_mut().zip(variables) {
+            *factor = *variable as u8;
+        }
+        if let Some(one) = alone.coefficients.get_mut(axis) {
+            *one = coefficient;
+        }
+        if !is_bounded(error_at_ends(&alone, sensor), sensor) {
+            return Err(EffectError::Value);
         }
         Ok(Self {
             sensor,

@@ -1,6 +1,8 @@
 //! The effects that the device removes by name: a table with one row for each.
 
-use nalgebra::{Matrix3, RealField, Vector3};
+use nalgebra::{Matrix3, RealField, Vector3, convert};
+
+use crate::Sensor;
 
 /// Most coefficients of an effect.
 pub(super) const COEFFICIENTS: usize = 9;
@@ -29,6 +31,53 @@ pub(super) struct Fast<T: RealField> {
     pub coefficients: [T; COEFFICIENTS],
     /// For a term: the numbers of its variables.
     pub factors: [u8; FACTORS],
+}
+
+/// Largest inputs of consumer and tactical parts: 4000 deg/s, and 100 g.
+const LARGEST: [f64; 2] = [70.0, 1000.0];
+/// Largest difference from the reference temperature, °C.
+const LARGEST_TEMPERATURE: f64 = 150.0;
+/// Error of one coefficient over the largest input that is refused beyond. A coefficient of a part with a small range is extrapolated to the
+/// largest input here: a cubic error of 10 % at 1 g is 1000 times the largest input at 100 g.
+const MOST_ERROR: f64 = 1e4;
+
+fn largest<T: RealField>(sensor: Sensor) -> T {
+    let [rate, force] = LARGEST;
+    convert(match sensor {
+        Sensor::Gyro => rate,
+        Sensor::Accel => force,
+    })
+}
+
+/// Whether an error at the ends of the ranges is one that a sensor can have.
+pub(super) fn is_bounded<T: RealField + Copy>(error: T, sensor: Sensor) -> bool {
+    error <= largest::<T>(sensor) * convert(MOST_ERROR)
+}
+
+/// The largest error of an axis by `law` at the ends of the ranges.
+pub(super) fn error_at_ends<T: RealField + Copy>(law: &Fast<T>, sensor: Sensor) -> T {
+    let [rate, force]: [T; 2] = LARGEST.map(convert);
+    let both = [rate, rate, rate, force, force, force];
+    let mut values = [T::one(); 10];
+    for (value, end) in values.iter_mut().skip(1).zip(both) {
+        *value = end;
+    }
+    // Temperature, its rate in °C/s, and three hours.
+    for (value, end) in values
+        .iter_mut()
+        .skip(7)
+        .zip([LARGEST_TEMPERATURE, 1.0, 1e4])
+    {
+        *value = convert(end);
+    }
+    let at = Conditions {
+        values,
+        angular_acceleration: Vector3::repeat(convert(1e4)),
+        sensed: Vector3::repeat(largest(sensor)),
+    };
+    let mut error = Vector3::zeros();
+    (law.law)(law, &at, &mut error);
+    error.amax()
 }
 
 /// Adds an effect to the error of the three sensors, SI.
@@ -154,6 +203,44 @@ impl<T: RealField + Copy> Law<T> {
             e.bias += each(c) * at.lag;
         }),
     ];
+
+    /// Whether the errors by each coefficient alone are at most [`MOST_ERROR`] times the largest input of `sensor`, at any reading within range.
+    pub fn is_bounded(&self, sensor: Sensor, coefficients: &[T; COEFFICIENTS]) -> bool {
+        let largest = largest(sensor);
+        coefficients.iter().enumerate().all(|(k, coefficient)| {
+            // Alone, because two may cancel at one input and not at another.
+            let mut alone = [T::zero(); COEFFICIENTS];
+            if let Some(one) = alone.get_mut(k) {
+                *one = *coefficient;
+            }
+            let error = match self.evaluation {
+                Evaluation::Fast(law) => {
+                    let law = Fast {
+                        law,
+                        coefficients: alone,
+                        factors: [0; FACTORS],
+                    };
+                    error_at_ends(&law, sensor)
+                }
+                Evaluation::Slow(law) => {
+                    let mut slow = Slow {
+                        bias: Vector3::zeros(),
+                        along: Vector3::zeros(),
+                        across: Matrix3::zeros(),
+                    };
+                    let at = Ambient {
+                        time: T::zero(),
+                        settled: false,
+                        temperature_offset: convert(LARGEST_TEMPERATURE),
+                        lag: convert(LARGEST_TEMPERATURE),
+                    };
+                    law(&alone, T::one(), &at, &mut slow);
+                    slow.bias.amax() + (slow.along.amax() + slow.across.amax()) * largest
+                }
+            };
+            is_bounded(error, sensor)
+        })
+    }
 
     const fn fast(name: &'static str, coefficients: usize, law: FastLaw<T>) -> Self {
         Self {

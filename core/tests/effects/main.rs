@@ -434,8 +434,8 @@ fn a_late_die_lags_behind_a_ramp_by_slope_times_lag() {
 fn terms_are_products_of_what_they_name() {
     use Variable::{ForceY, RateX, Temperature, TemperatureRate, Time};
     let term = |axis, c, v: &[Variable]| DeviceEffect::term(Sensor::Gyro, axis, c, v).unwrap();
-    let cubic = term(0, 2.0, &[RateX, ForceY, ForceY]);
-    let warm = term(1, 0.5, &[Temperature, Time]);
+    let cubic = term(0, 2e-3, &[RateX, ForceY, ForceY]);
+    let warm = term(1, 0.05, &[Temperature, Time]);
     let rising = term(2, 10.0, &[TemperatureRate]);
     let mixed = term(2, 0.25, &[RateX, Temperature]);
     assert!(!cubic.is_slow() && warm.is_slow() && rising.is_slow() && !mixed.is_slow());
@@ -450,7 +450,7 @@ fn terms_are_products_of_what_they_name() {
     let accel = Vector3::new(0.0, -4.0, 0.0);
     let removed = gyro - effects.remove(&mut state, &Sample { gyro, accel }).gyro;
     let settled = 0.02 * (1.0 - (-400.0 / RATE_LAG_S).exp());
-    let expected = Vector3::new(96.0, 0.5 * 8.0 * 400.0, 10.0 * settled + 0.25 * 3.0 * 8.0);
+    let expected = Vector3::new(0.096, 0.05 * 8.0 * 400.0, 10.0 * settled + 0.25 * 3.0 * 8.0);
     assert!((removed - expected).norm() < 1e-9, "{removed} {expected}");
 }
 
@@ -468,6 +468,23 @@ fn what_cannot_be_removed_is_refused() {
     );
     assert_eq!(
         refused("gyro_scale_cubic", &[f64::NAN; 3], None),
+        EffectError::Value
+    );
+    // Whatever the reading, the error of a sensor is no multiple of a hundred ranges.
+    for (id, coefficients, size) in [
+        ("accel_scale_cubic", 3, 3e38),
+        ("accel_scale_cubic", 3, 1.0),
+        ("gyro_g_sensitivity", 9, 1e4),
+        ("gyro_thermal_bias", 6, 1e6),
+    ] {
+        for k in 0..coefficients {
+            let mut one = vec![0.0; coefficients];
+            one[k] = -size;
+            assert_eq!(refused(id, &one, None), EffectError::Value, "{id} {k}");
+        }
+    }
+    assert_eq!(
+        DeviceEffect::term(Sensor::Gyro, 1, 1e30, &[Variable::ForceX; 3]).unwrap_err(),
         EffectError::Value
     );
     assert_eq!(refused("gyro_warm_up", &[0.0; 3], None), EffectError::Value);

@@ -73,7 +73,7 @@ fn both_sides_count_warmth_from_the_same_temperature_and_filter_its_rate_alike()
 fn every_effect_that_a_calibration_holds_can_be_removed_by_the_device() {
     for effect in effects::all().filter(|e| e.on_device() != HowRemoved::Never) {
         let candidate = Candidate::new(effect.sensor, CandidateKind::Effect(effect));
-        let values = vec![1.0; candidate.active.len()];
+        let values = vec![1e-6; candidate.active.len()];
         let fitted = FittedEffect::new(candidate, 60.0, values);
         assert!(fitted.on_device::<f32>().is_ok(), "{}", effect.id);
     }
