@@ -213,6 +213,13 @@ impl Commands<'_> {
         let kept = self.slots.store(bytes, &self.front_end).await;
         storing(false);
         kept.map_err(|_| Refusal::FlashFailed)?;
+        let unusable = self.slots.younger_unusable();
+        self.pipeline.lock(|p| {
+            let mut p = p.borrow_mut();
+            p.flag(flags::YOUNGER_UNUSABLE, unusable);
+            // The converter's present factors were stored with it.
+            p.flag(flags::OWN_FACTORS, false);
+        });
         self.use_stored()?;
         self.upload.end();
         Ok(())

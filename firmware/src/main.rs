@@ -25,7 +25,7 @@ use embassy_sync::zerocopy_channel::Channel;
 use embassy_time::{Duration, Instant, Ticker};
 use heapless::Vec;
 use mimu_core::stored::{self, MAX_LENGTH};
-use mimu_core::wire::{Message, StoredInfo};
+use mimu_core::wire::{Message, StoredInfo, flags};
 use mimu_firmware::adc::{Converter, RING};
 use mimu_firmware::board::Board;
 use mimu_firmware::commands::{Commands, info};
@@ -53,13 +53,24 @@ async fn main(spawner: Spawner) {
     let board = Board::start();
     let stored = STORED.take();
     let mut slots = Slots::open(Flash::new(), stored).await;
-    let mut front_end = slots.front_end().await.unwrap_or_default();
+    let kept = slots.front_end().await;
+    let faults = [
+        (flags::YOUNGER_UNUSABLE, slots.younger_unusable()),
+        (
+            flags::OWN_FACTORS,
+            slots.in_use().is_some() && kept.is_none_or(|kept| kept.converter.is_none()),
+        ),
+    ];
+    let mut front_end = kept.unwrap_or_default();
     let supply = Supply::new(board.supply);
     let converter = Converter::new(board.sensors, SCANS.take(), front_end.converter);
     front_end.converter = converter.factors();
     // Sampling begins within some milliseconds.
     let powered_for_ms = powered_for_ms(before);
     let (pipeline, in_use) = pipeline(slots.in_use(), stored, powered_for_ms, front_end.pins_c);
+    for (flag, is) in faults {
+        pipeline.lock(|p| p.borrow_mut().flag(flag, is));
+    }
     let (events, events_out) = queue_of_events();
     let (replies, replies_out) = queue_of_replies();
     #[cfg(not(feature = "usb"))]

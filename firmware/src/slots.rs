@@ -79,6 +79,8 @@ pub struct Slots<F> {
     in_use: Option<InUse>,
     /// Highest generation found.
     generation: u32,
+    /// See [`Self::younger_unusable`].
+    younger_unusable: bool,
 }
 
 impl<F: NorFlash> Slots<F> {
@@ -92,10 +94,17 @@ impl<F: NorFlash> Slots<F> {
             state: [Slot::Empty; 2],
             in_use: None,
             generation: 0,
+            younger_unusable: false,
         };
-        for slot in 0..2 {
+        // Generations of the unusable ones; of a damaged header it is unknown.
+        let mut unusable = [None; 2];
+        for (slot, unusable) in unusable.iter_mut().enumerate() {
             let (state, front) = slots.look(slot, buffer).await;
             slots.state[slot] = state;
+            *unusable = match state {
+                Slot::Empty | Slot::Whole { .. } => None,
+                _ => Some(front.map_or(u32::MAX, |front| front.generation)),
+            };
             let Some(front) = front else { continue };
             slots.generation = slots.generation.max(front.generation);
             let younger = slots
@@ -105,6 +114,8 @@ impl<F: NorFlash> Slots<F> {
                 slots.in_use = Some(InUse { slot, front });
             }
         }
+        let used = slots.in_use.map_or(0, |it| it.front.generation);
+        slots.younger_unusable = unusable.iter().flatten().any(|unusable| *unusable > used);
         buffer.clear();
         if let Some(InUse { slot, front }) = slots.in_use {
             slots.read_all(slot, front.length, buffer).await;
@@ -120,6 +131,12 @@ impl<F: NorFlash> Slots<F> {
     /// Length, bytes, and hash of the calibration in use.
     pub fn in_use(&self) -> Option<(u32, u64)> {
         self.in_use.map(|it| (it.front.length, it.front.hash))
+    }
+
+    /// Whether a slot contains a calibration that cannot be used and that may be younger than the one in use: damaged, of another version of the
+    /// firmware, or not completely written.
+    pub fn younger_unusable(&self) -> bool {
+        self.younger_unusable
     }
 
     /// The flash memory.
@@ -179,6 +196,7 @@ impl<F: NorFlash> Slots<F> {
         self.generation = generation;
         self.state[slot] = Slot::Whole { generation };
         self.in_use = Some(InUse { slot, front });
+        self.younger_unusable = false;
         Ok(())
     }
 

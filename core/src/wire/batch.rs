@@ -40,6 +40,10 @@ pub mod flags {
     pub const NO_TEMPERATURE: u16 = 1 << 8;
     /// The time since power-on is unknown: decays after power-on count as over.
     pub const POWER_ON_UNKNOWN: u16 = 1 << 9;
+    /// A slot contains a calibration that cannot be used, and that may be younger than the one in use, if there is one.
+    pub const YOUNGER_UNUSABLE: u16 = 1 << 10;
+    /// The factors of the converter that belong to the calibration cannot be read: the converter calibrated itself at its start.
+    pub const OWN_FACTORS: u16 = 1 << 11;
 }
 
 /// Sums of the converter's codes of x, y, z over the scans of a sample; a mean would lose resolution.

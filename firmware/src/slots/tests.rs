@@ -291,6 +291,11 @@ fn damage_is_told_and_the_other_one_is_used() {
     assert!(store(&mut memory, &old, usize::MAX, 0));
     assert!(store(&mut memory, &new, usize::MAX, 0));
     let whole = |generation| Slot::Whole { generation };
+    let younger_unusable = |memory: &Memory| {
+        let mut buffer = heapless::Vec::new();
+        block_on(Slots::open(memory.clone(), &mut buffer)).younger_unusable()
+    };
+    assert!(!younger_unusable(&memory));
     for word in (0..BODY / WORD + new.len().div_ceil(WORD)).filter(|word| !(1..=2).contains(word)) {
         for bit in [0, 77, 255] {
             let mut memory = memory.clone();
@@ -305,6 +310,7 @@ fn damage_is_told_and_the_other_one_is_used() {
                 continue;
             }
             assert_eq!(in_use.as_ref(), Some(&old));
+            assert!(younger_unusable(&memory), "{word} {bit}");
             let expected = if word == 0 {
                 Slot::Unfinished
             } else {
@@ -315,6 +321,19 @@ fn damage_is_told_and_the_other_one_is_used() {
         let mut memory = memory.clone();
         memory.cells[USED + word] = Cell::Torn(None);
         assert_eq!(found(&memory).0.as_ref(), Some(&old));
+        assert!(younger_unusable(&memory));
+        // A third one replaces the damaged one.
+        let mut buffer = heapless::Vec::new();
+        let mut slots = block_on(Slots::open(memory, &mut buffer));
+        block_on(slots.store(&calibration(3, 2), &FRONT_END)).unwrap();
+        assert!(!slots.younger_unusable());
+    }
+    // Damage of the older one changes nothing.
+    for word in 3..5 {
+        let mut memory = memory.clone();
+        memory.cells[word] = Cell::Torn(None);
+        assert_eq!(found(&memory).0.as_ref(), Some(&new));
+        assert!(!younger_unusable(&memory));
     }
 }
 

@@ -21,6 +21,10 @@ pub struct Flagged {
     pub self_test: u64,
     /// The dies' temperature was outside the calibrated range.
     pub outside_range: u64,
+    /// A stored calibration, perhaps younger than the one in use, was not usable.
+    pub younger_unusable: u64,
+    /// The converter's stored factors were lost.
+    pub own_factors: u64,
 }
 
 impl Flagged {
@@ -38,6 +42,8 @@ impl Flagged {
             (flags::POWER_ON_UNKNOWN, &mut self.power_on_unknown),
             (flags::SELF_TEST, &mut self.self_test),
             (flags::OUTSIDE_NODES, &mut self.outside_range),
+            (flags::YOUNGER_UNUSABLE, &mut self.younger_unusable),
+            (flags::OWN_FACTORS, &mut self.own_factors),
         ] {
             if of & flag != 0 {
                 *counter += samples;
@@ -80,6 +86,14 @@ impl Flagged {
             self.outside_range,
             "outside the temperatures of the stored calibration: its curves continue in a straight line for 5 K and are constant beyond",
         );
+        warn(
+            self.younger_unusable,
+            "while the device could not use a stored calibration, perhaps a younger one; `mimu device info` shows its slots: upload the calibration again",
+        );
+        warn(
+            self.own_factors,
+            "with factors of the converter that it found itself, because those stored with the calibration are lost: upload the calibration again",
+        );
         all
     }
 }
@@ -108,6 +122,8 @@ mod tests {
             flags::POWER_ON_UNKNOWN,
             flags::SELF_TEST,
             flags::OUTSIDE_NODES,
+            flags::YOUNGER_UNUSABLE,
+            flags::OWN_FACTORS,
         ] {
             let mut one = Flagged::default();
             one.count(flag, 1);

@@ -197,7 +197,10 @@ impl From<&Greeting<'_>> for Identity {
             }),
             slots: greeting.slots.each_ref().map(slot),
             powered_for_ms: greeting.powered_for_ms,
-            warnings: version_warning(greeting.protocol).into_iter().collect(),
+            warnings: version_warning(greeting.protocol)
+                .into_iter()
+                .chain(slot_warnings(&greeting.slots))
+                .collect(),
         }
     }
 }
@@ -304,6 +307,27 @@ fn versions(device: Version) -> String {
 /// Default name of a unit: its number.
 pub fn unit_name(unit_id: &str) -> String {
     format!("mimu-{unit_id}")
+}
+
+/// A sentence for each calibration that the device cannot use. It uses the other one, which may be older.
+fn slot_warnings(slots: &[Slot; 2]) -> impl Iterator<Item = String> {
+    let of = |(k, is): (usize, &Slot)| {
+        let why = match is {
+            Slot::Damaged | Slot::Unfinished | Slot::NotUsable(_) => slot(is),
+            Slot::Empty | Slot::Whole { .. } | Slot::NotKnown => return None,
+        };
+        let other = match slots[1 - k] {
+            Slot::Whole { generation } => {
+                format!("number {generation} is in use, which may be older")
+            }
+            _ => "none is in use".into(),
+        };
+        Some(format!(
+            "the calibration in slot {} is {why}; {other}: upload the calibration again",
+            k + 1
+        ))
+    };
+    slots.iter().enumerate().filter_map(of)
 }
 
 /// Contents of a slot for a calibration, in words.
