@@ -73,7 +73,7 @@ pub enum Warning {
     #[error("its white noise of {} deg/s/sqrt(Hz) exceeds that of any gyro: check whether the readings are in deg/s, and the calibration belongs to this unit", degrees(*.white))]
     NoisierThanGyros { white: f64 },
     /// Gaps, the missing time in all, s, and the first data row after one.
-    #[error("{}, {missing_s:.3} s missing in all, the first before data row {row}: turns are not integrated across gaps", plural(*.count, "gap"))]
+    #[error("{}, {missing_s:.3} s missing in all, the first before data row {row}: turns are not integrated across longer ones than 25 ms, or than one lost sample", plural(*.count, "gap"))]
     Gaps {
         count: u64,
         missing_s: f64,
