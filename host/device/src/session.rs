@@ -73,7 +73,12 @@ impl Session {
 
     fn greet(port: Port) -> Result<Self> {
         let mut line = Line::new(port);
-        let Some(Answer::Greeting(who)) = line.ask(Request::Hello, PATIENCE)? else {
+        let mut greeting = line.ask(Request::Hello, PATIENCE)?;
+        if greeting.is_none() && line.receiver.count().frames > 0 {
+            // It speaks, but is busy: a commit to its flash takes seconds.
+            greeting = line.ask(Request::Hello, PATIENCE)?;
+        }
+        let Some(Answer::Greeting(who)) = greeting else {
             return Err(no_greeting(line.port.name(), &line.receiver.count()));
         };
         let mut session = Self { line, who: *who };
@@ -229,10 +234,8 @@ fn no_greeting(port: &str, count: &LineCount) -> Error {
         ),
         (_, frames) => Error::device(
             port,
-            format!(
-                "{frames} complete frames came but no greeting, so this is not mimu's firmware"
-            ),
-            "choose another port, or flash mimu-firmware",
+            format!("{frames} complete frames came, but no greeting within 9 s"),
+            "reset the board and run it again; if its firmware is another one, choose another port, or flash mimu-firmware",
         ),
     }
 }

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use mimu::signal::increment::pause_periods;
+
 use crate::identity::Started;
 
 /// Counts ticks of one sample period since the device began to sample. Ticks have 64 bits: the device's numbers wrap after 49 days, and start again
@@ -83,9 +85,10 @@ impl Clock {
             told => told,
         };
         let (tick, missing) = match restart {
-            // Only the PC's clock knows how long the restart took. At least one tick, so that the gap is visible.
+            // Only the PC's clock knows how long the restart took: at least so long that no turn is integrated across it.
             Some(_) => (
-                next + ((silence.as_secs_f64() * self.rate_hz) as u64).max(1),
+                next + ((silence.as_secs_f64() * self.rate_hz) as u64)
+                    .max(pause_periods(self.rate_hz)),
                 0,
             ),
             None => (next + u64::from(ahead), u64::from(ahead)),

@@ -172,7 +172,14 @@ pub fn record(
     let _ = ended
         .is_ok()
         .then(|| session.done(Request::Stop, "to stop streaming"));
-    let state = run.finish(&mut manifest, options.format, finishing)?;
+    let samples = run.state.samples;
+    // A disk that is full fails here too, and the first failure says why.
+    let state = match (run.finish(&mut manifest, options.format, finishing), &ended) {
+        (Ok(state), _) => state,
+        (Err(error), _) if samples == 0 => return Err(error),
+        (Err(_), Err(first)) => return Err(kept(first.clone(), samples, &options.directory)),
+        (Err(error), Ok(())) => return Err(kept(error, samples, &options.directory)),
+    };
     match ended {
         Ok(()) if state.samples == 0 => Err(Error::new(
             session.port(),

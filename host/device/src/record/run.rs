@@ -29,7 +29,10 @@ pub(super) struct Run {
     pub state: RecordingState,
     /// Tick of the first sample.
     pub begun: Option<u64>,
+    /// When the last samples came.
     pub heard: Instant,
+    /// When the device was last asked to stream again.
+    pub asked: Instant,
     pub unit_id: String,
     /// Starts of the device since its last power failure.
     pub starts: u32,
@@ -67,6 +70,7 @@ impl Run {
             state: RecordingState::default(),
             begun: None,
             heard: Instant::now(),
+            asked: Instant::now(),
             unit_id: who.unit_id.clone(),
             starts: who.starts,
             one_power_on: options.one_power_on,
@@ -86,7 +90,7 @@ impl Run {
         let end = self.steps.end().into_iter().chain(options.duration).min();
         let wanted = end.map(|d| (d.as_secs_f64() * rate_hz).round() as u64);
         loop {
-            match self.hear(session, wanted) {
+            match self.hear(session, options.reconnect, wanted) {
                 Ok(true) => return Ok(()),
                 Ok(false) => {}
                 Err(lost) if session.is_lost() => {
@@ -128,7 +132,12 @@ impl Run {
     }
 
     /// Processes the next event. Returns whether the recording is complete.
-    fn hear(&mut self, session: &mut Session, wanted: Option<u64>) -> Result<bool> {
+    fn hear(
+        &mut self,
+        session: &mut Session,
+        patience: Duration,
+        wanted: Option<u64>,
+    ) -> Result<bool> {
         match session.event()? {
             Some(Event::Raw(batch)) => {
                 self.take(session.port(), &batch, wanted)?;
@@ -148,16 +157,41 @@ impl Run {
                 session.done(RAW, "to stream")?;
             }
             Some(_) => {}
-            None if self.heard.elapsed() > SILENCE => {
-                // It may have restarted, and its greeting may be lost.
-                session.hello()?;
-                session.done(RAW, "to stream")?;
-                self.state.resumed += 1;
-                self.heard = Instant::now();
+            None if self.heard.elapsed() > SILENCE && self.asked.elapsed() > SILENCE => {
+                self.ask_again(session, patience)?;
             }
             None => {}
         }
         Ok(false)
+    }
+
+    /// Asks a silent device to greet and stream again: it may have restarted, and its greeting may be lost. The time without samples goes on, because
+    /// after a restart only this computer's clock knows how long it was.
+    ///
+    /// Errors: it has not answered for `patience`. Until then it may be without power although its port is there, as behind an ST-LINK.
+    fn ask_again(&mut self, session: &mut Session, patience: Duration) -> Result<()> {
+        let greeted = session.hello().map(|who| (who.starts, who.start.clone()));
+        self.asked = Instant::now();
+        match greeted {
+            Ok((starts, start)) => {
+                if starts != self.starts {
+                    self.starts = starts;
+                    self.clock.restarted(Some(start));
+                } else {
+                    // After a power failure the starts are counted anew.
+                    self.clock.reconnected(start);
+                }
+                session.done(RAW, "to stream")?;
+                self.state.resumed += 1;
+                self.state.waiting = false;
+                Ok(())
+            }
+            Err(_) if !session.is_lost() && self.heard.elapsed() < patience => {
+                self.state.waiting = true;
+                Ok(())
+            }
+            Err(error) => Err(error),
+        }
     }
 
     /// Waits until the unit is back; returns `false` if the person stops.
@@ -223,6 +257,7 @@ impl Run {
     fn take(&mut self, port: &str, samples: &Samples, wanted: Option<u64>) -> Result<()> {
         let silence = self.heard.elapsed();
         self.heard = Instant::now();
+        self.state.waiting = false;
         let arrival = self.clock.arrive(samples.head.first, silence);
         let first = arrival.tick;
         let begun = *self.begun.get_or_insert(first);

@@ -379,6 +379,31 @@ fn a_device_that_was_without_power_meanwhile_has_restarted() {
     assert_eq!(recording.manifest.recorded.unwrap().restarts.len(), 1);
 }
 
+/// The gap is measured by this computer's clock, over the calls that remain unanswered meanwhile.
+#[test]
+fn a_power_cut_behind_a_port_that_stays_is_a_gap_of_its_length() {
+    let place = Place::new();
+    let away_ms = 8_000;
+    let peer = Peer::new(Script {
+        acts: vec![(1_000, Act::PowerCut { away_ms })],
+        start: Start::PowerOn,
+        ..Script::default()
+    });
+    let arguments = [
+        "record", "--port", &peer.path, "-o", "rec", "--for", "14s", "--json", "-",
+    ];
+    let result = mimu(&place, &arguments).json();
+    assert_eq!(result["broken_off"], serde_json::Value::Null, "{result}");
+    assert_eq!(result["restarts"].as_array().unwrap().len(), 1, "{result}");
+    let (_, rows) = rows(&place, "rec");
+    let [(before, after)] = gaps(&rows)[..] else {
+        panic!("one gap: {:?}", gaps(&rows));
+    };
+    // It may be asked to stream up to seven seconds after it has started.
+    let gap_ms = after - before;
+    assert!(gap_ms > 7_900.0 && gap_ms < 16_000.0, "{gap_ms}");
+}
+
 #[test]
 fn a_row_takes_no_more_bytes_than_its_numbers_have_digits() {
     let place = Place::new();

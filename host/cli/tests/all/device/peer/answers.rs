@@ -69,10 +69,14 @@ impl Device {
     }
 
     pub(super) fn restart(&mut self) {
+        self.begin_anew();
+        self.greeting(0);
+    }
+
+    pub(super) fn begin_anew(&mut self) {
         (self.began, self.next) = (Instant::now(), 0);
         (self.streams, self.upload) = ((false, false), None);
         (self.calibrated, self.banks) = (None, [None, None]);
-        self.greeting(0);
     }
 
     pub(super) fn answer(&mut self, call: &Call<'_>) {
