@@ -38,7 +38,7 @@ def connect(page, lines, settings=True):
         page.fill("#board-name", "plane-7")
         page.eval_on_selector_all("#board-form details", "all => all.forEach(d => d.open = true)")
         page.fill("#board-dwell", str(web_board.DWELL_S))
-        page.fill("#more-wizard", "--warm-up 0 --as-planned")
+        page.fill("#more-wizard", "--warm-up 0 --as-planned --trust-clock")
     page.click("#connect")
     page.locator("#line-columns select").nth(6).wait_for()
 
@@ -185,7 +185,7 @@ def test_a_session_of_the_command_goes_on_in_the_page(usb, lines, tmp_path):
     usb.locator("#loaded", has_text=f"plane-7: {len(had)} dwells").wait_for()
     assert usb.input_value("#board-gravity") == "9.80665"
     usb.eval_on_selector_all("#board-form details", "all => all.forEach(d => d.open = true)")
-    usb.fill("#more-wizard", "--warm-up 0 --as-planned")
+    usb.fill("#more-wizard", "--warm-up 0 --as-planned --trust-clock")
     connect(usb, lines, settings=False)
     begin(usb)
     usb.locator("#log", has_text="the session goes on behind").wait_for(timeout=100_000)

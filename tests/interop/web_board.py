@@ -19,7 +19,7 @@ ACCEL = numpy.array([[1689.0, 0.0, 0.0], [14.0, 1655.0, 0.0], [-21.0, 9.0, 1702.
 COLUMNS = "t_us,ax,ay,az,gx,gy,gz"
 DWELL_S = 1.2
 # Options of `mimu wizard`, used on both sides.
-SESSION = ["--gravity", "9.80665", "--text", COLUMNS, "--device", "plane-7", "--dwell", str(DWELL_S), "--warm-up", "0", "--as-planned"]
+SESSION = ["--gravity", "9.80665", "--text", COLUMNS, "--device", "plane-7", "--dwell", str(DWELL_S), "--warm-up", "0", "--as-planned", "--trust-clock"]
 
 
 class Socket:

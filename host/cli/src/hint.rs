@@ -120,6 +120,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Replace => "--replace",
         Argument::Port => "--port",
         Argument::OtherUnit => "--other-unit",
+        Argument::TrustClock => "--trust-clock",
         Argument::Topic => "--topic",
         Argument::Where => "--where",
         Argument::Comment => "--comment",

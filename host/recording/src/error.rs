@@ -78,6 +78,8 @@ pub enum Argument {
     Port,
     /// Whether a calibration of another unit is stored.
     OtherUnit,
+    /// Whether a clock is used although it differs from the computer's.
+    TrustClock,
     /// Topic of a bag.
     Topic,
     /// Which of several sensors in a log.

@@ -66,9 +66,12 @@ pub fn mirrored(shown: &[[Vector3<f64>; 2]], limit_deg: f64) -> Option<String> {
     if shown.len() < FEWEST_POSES || others < FEWEST_OTHERS {
         return None;
     }
-    let by = exchanges()
-        .into_iter()
-        .find(|by| shown.iter().all(|s| is(by, s)))?;
+    // Few poses fit several exchanges: a rotation of three axes, say, and a swap of two of them. More poses decide.
+    let all = exchanges().into_iter();
+    let mut fitting = all.filter(|by| shown.iter().all(|s| is(by, s)));
+    let (Some(by), None) = (fitting.next(), fitting.next()) else {
+        return None;
+    };
     Some(format!(
         "{others} of {} poses differ from the requested ones, all in the same way: {}",
         shown.len(),

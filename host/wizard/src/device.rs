@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use mimu::signal::increment::pause_periods;
 use mimu_core::wire::{Request, flags};
 use mimu_device::record::shortest;
 use mimu_device::{Event, Identity, Samples, Session, Started};
@@ -78,10 +79,14 @@ impl DeviceSource {
     fn take(&mut self, samples: &Samples) -> Result<SourceEvent> {
         self.heard = Instant::now();
         let number = i64::from(samples.head.first);
-        // After a restart of the count the elapsed time is unknown. It is only assumed to be positive.
+        // After a restart of the count the elapsed time is unknown. It is assumed to be so long that no turn is integrated across it.
         let back = self.zero + number < self.next as i64;
         if self.anew || back {
-            self.zero = self.next as i64 + 1 - number;
+            let pause = match self.next {
+                0 => 1,
+                _ => pause_periods(self.unit.rate_hz),
+            };
+            self.zero = (self.next + pause) as i64 - number;
             self.anew = false;
         }
         let tick = (self.zero + number) as u64;

@@ -250,6 +250,15 @@ impl Folder {
         all
     }
 
+    /// The last valid dwell of any recording.
+    pub fn last_dwell(&self) -> Option<Step> {
+        let last = self.entries.iter().rev().find_map(|entry| match entry {
+            Entry::Dwell { part, .. } => Some(*part),
+            _ => None,
+        });
+        self.dwells(last?).last().map(|d| d.1)
+    }
+
     /// Poses of a recording that the user turned the unit to: requested and recorded direction up.
     pub fn shown(&self, of: Part) -> Vec<[Vector3<f64>; 2]> {
         let shown = self.entries.iter().filter_map(|entry| match entry {

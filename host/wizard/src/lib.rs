@@ -8,6 +8,7 @@
 //! | [`procedure`] | settings of a session; the first dwells, the most informative next one, and those for the verification |
 //! | [`source`], [`device`] | sources of samples |
 //! | [`text`], [`text_line`], [`regular`] | a board of another maker: its bytes, its lines, and samples at a regular rate from them |
+//! | [`clock`] | its clock, compared with the computer's |
 //! | [`text_port`], [`relay`] | its port: read by a thread, or by a caller who relays the bytes |
 //! | [`station`] | a unit and its line; a thread reads the port, and reopens it if it has vanished |
 //! | [`turn`] | a session pauses when it has to wait, and its caller resumes it |
@@ -27,13 +28,16 @@
 
 pub mod axes;
 pub mod bank;
+pub mod clock;
 pub mod device;
 pub mod event;
 pub mod folder;
 pub mod procedure;
+mod rails;
 pub mod refit;
 pub mod regular;
 pub mod relay;
+mod repeated;
 pub mod resumed;
 pub mod session;
 pub mod source;

@@ -146,6 +146,7 @@ impl RelayedText {
                 SourceEvent::Nothing => return Ok(()),
                 SourceEvent::Restarted(why) => StationEvent::Restarted(why),
                 SourceEvent::Note(words) => StationEvent::Note(words),
+                SourceEvent::Clock(rate) => StationEvent::Clock(rate),
                 SourceEvent::Samples(chunk) => {
                     self.next = chunk.tick + chunk.values.len() as u64;
                     StationEvent::Samples(chunk)
@@ -182,6 +183,7 @@ mod tests {
             columns: Columns::parse(columns).unwrap(),
             raw_unit: RawUnit::Count,
             name: Some("board".into()),
+            clock_trusted: false,
         }
     }
 

@@ -12,6 +12,7 @@ use mimu_recording::result_file::stage;
 use serde::Serialize;
 
 use crate::axes;
+use crate::clock::ClockRate;
 use crate::event::{Event, Phase, Question, View};
 use crate::folder::{Begun, Entry, Folder, Part};
 use crate::procedure::{Fixture, SessionConfig};
@@ -60,6 +61,8 @@ pub struct UnitOutcome {
     pub discarded: usize,
     /// Total time of the recordings, s.
     pub recorded_s: f64,
+    /// The board's clock by this computer's, if the board writes its own.
+    pub clock: Option<ClockRate>,
     /// The affine calibration judged by the verification.
     pub verified: Option<Judged>,
     /// Verdict of the diagnosis.
@@ -439,6 +442,7 @@ impl OpenSession<'_> {
             dwells: unit.folder.dwells(Part::Calibration).len(),
             discarded: unit.folder.discarded(),
             recorded_s: unit.state.samples as f64 / unit.station.unit.rate_hz,
+            clock: unit.clock,
             ..outcome.clone()
         })
         .collect()

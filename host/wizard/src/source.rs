@@ -5,6 +5,8 @@ use mimu_device::Session;
 use mimu_recording::RawUnit;
 use mimu_recording::error::Result;
 
+use crate::clock::ClockRate;
+
 /// The unit at a port.
 #[derive(Debug, Clone)]
 pub struct Unit {
@@ -52,6 +54,8 @@ pub enum SourceEvent {
     Restarted(String),
     /// Information for the user.
     Note(String),
+    /// The board's clock, compared with this computer's once more.
+    Clock(ClockRate),
     /// Nothing came for a short while.
     Nothing,
 }

@@ -8,6 +8,7 @@ use std::time::Duration;
 use mimu_device::Session;
 use mimu_recording::error::{Argument, Error, Result};
 
+use crate::clock::ClockRate;
 use crate::source::{Chunk, Opener, Source, SourceEvent, Unit};
 
 /// Interval between attempts to reopen a port.
@@ -22,6 +23,8 @@ pub enum StationEvent {
     Restarted(String),
     /// Information for the user.
     Note(String),
+    /// The board's clock, compared with this computer's once more.
+    Clock(ClockRate),
     /// The line was lost, and why.
     Lost(Error),
     /// Another unit is at the port.
@@ -217,6 +220,7 @@ fn listen(
                 Ok(SourceEvent::Nothing) => continue,
                 Ok(SourceEvent::Restarted(why)) => StationEvent::Restarted(why),
                 Ok(SourceEvent::Note(words)) => StationEvent::Note(words),
+                Ok(SourceEvent::Clock(rate)) => StationEvent::Clock(rate),
                 Ok(SourceEvent::Samples(chunk)) => {
                     next = chunk.tick + chunk.values.len() as u64;
                     StationEvent::Samples(chunk)

@@ -3,11 +3,15 @@
 
 use std::collections::VecDeque;
 
+use mimu::signal::increment::pause_periods;
 use mimu_core::compensation::Affine;
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
 
+use crate::clock::{ClockRate, Clocks, REFUSED_SHARE};
+use crate::rails::Rails;
 use crate::regular::{Regular, Timed};
+use crate::repeated::Repeated;
 use crate::source::{Chunk, SourceEvent, Unit};
 use crate::text_line::{Columns, Lines, Reading};
 
@@ -15,13 +19,8 @@ use crate::text_line::{Columns, Lines, Reading};
 pub(crate) const NOTHING_S: f64 = 5.0;
 /// Silence after which the port is opened again, s: a port may be unplugged without an error.
 const SILENCE_S: f64 = 5.0;
-/// Time over which the board's clock is compared with the computer's before its rate is trusted, s. Lines that waited in a buffer are then few in
-/// comparison with punctual ones.
-const COMPARED_S: f64 = 2.0;
-/// Rails of these sensors' converters: 16 bits, whatever range is set.
+/// Rails of these sensors' converters: 16 bits, whatever range is set. [`Rails`] finds others.
 const ENDS: [f64; 2] = [-32768.0, 32767.0];
-/// Difference between the clocks that is reported: crystals and ceramic resonators are within 0.5 %.
-const CLOCK_SHARE: f64 = 0.05;
 /// Ratio of the clocks that indicates a wrong unit, which gives 1000 or a million. No replay of a recording is so fast.
 const WRONG_UNIT: f64 = 100.0;
 /// Lines without data are reported again when their number has grown by this factor.
@@ -40,6 +39,8 @@ pub struct Text {
     pub raw_unit: RawUnit,
     /// Name of the board; by default its port.
     pub name: Option<String>,
+    /// Whether its clock is right although it differs from the computer's, as in a replay.
+    pub clock_trusted: bool,
 }
 
 /// Converts lines of a board into samples.
@@ -55,10 +56,11 @@ pub struct TextBoard {
     heard_s: f64,
     /// Refused lines whose time is impossible.
     garbled: u64,
-    /// Times of lines by the board's clock and by the computer's, s, until the two have been compared.
-    clocks: Vec<[f64; 2]>,
-    /// Rate of the board's clock relative to the computer's, once they have been compared.
-    clock_factor: Option<f64>,
+    /// The board's clock and the computer's.
+    clocks: Clocks,
+    clock_trusted: bool,
+    rails: Rails,
+    repeated: Repeated,
     ready: VecDeque<SourceEvent>,
     /// Number of lines without data at which they are reported next.
     tell_at: u64,
@@ -83,14 +85,21 @@ impl TextBoard {
         Self {
             port: text.port.clone(),
             lines: Lines::new(text.columns.clone()),
-            regular: Regular::new(rate_hz, text.columns.has_clock(), next + 1),
+            // Of a board that is back, nobody knows how long it was away.
+            regular: Regular::new(
+                rate_hz,
+                text.columns.has_clock(),
+                next + rate_hz.map_or(1, pause_periods),
+            ),
             unit,
             is_open: false,
             patience_s: NOTHING_S,
             heard_s: now_s,
             garbled: 0,
-            clocks: Vec::new(),
-            clock_factor: None,
+            clocks: Clocks::default(),
+            clock_trusted: text.clock_trusted,
+            rails: Rails::default(),
+            repeated: Repeated::default(),
             ready: VecDeque::new(),
             tell_at: 1,
         }
@@ -149,40 +158,29 @@ impl TextBoard {
             format!("{}: lines of text, {}", self.port, self.lines.description()),
             format!("{rate_hz:.2} samples a second, {clock}"),
         ];
-        if let Some(factor) = self.clock_factor.filter(|f| (f - 1.0).abs() > CLOCK_SHARE) {
-            self.unit.told.push(format!(
-                "the board's clock runs {factor:.3} times as fast as this computer's, and every rate of the gyro errs by that factor: unless this is a replay, check the clock that the board writes"
-            ));
-        }
         self.unit.told.extend(self.lines.others_in_words());
         self.unit.told.extend(self.lines.refused_in_words());
         self.tell_at = TOLD_AGAIN * self.lines.refused().max(1);
         Ok(())
     }
 
-    /// Compares the board's clock with the computer's after enough time.
+    /// Compares the board's clock with the computer's before the session begins.
     ///
-    /// Errors: their ratio shows that the clock column has another unit.
-    fn check_clock(&mut self) -> Result<()> {
-        let spent = self.clocks.last().zip(self.clocks.first());
-        let spent_s = spent.map_or(0.0, |(last, first)| last[1] - first[1]);
-        if self.clock_factor.is_some() || spent_s < COMPARED_S || self.clocks.len() < 8 {
+    /// Errors: the clock column has another unit, or the clock is wrong.
+    fn check_clock(&self) -> Result<()> {
+        let Some(rate) = self.clocks.rate() else {
             return Ok(());
-        }
-        // Few of the pairs contain a garbled time, so the median is unaffected.
-        let later = &self.clocks[self.clocks.len() / 2..];
-        let both = self.clocks.iter().zip(later);
-        let mut factors: Vec<f64> = both.map(|(a, b)| (b[0] - a[0]) / (b[1] - a[1])).collect();
-        factors.sort_by(f64::total_cmp);
-        let factor = factors[factors.len() / 2];
-        (self.clock_factor, self.clocks) = (Some(factor), Vec::new());
-        if (1.0 / WRONG_UNIT..WRONG_UNIT).contains(&factor) {
-            return Ok(());
+        };
+        if (1.0 / WRONG_UNIT..WRONG_UNIT).contains(&rate.factor) {
+            return match self.clock_trusted {
+                true => Ok(()),
+                false => refuse_clock(&self.port, &rate),
+            };
         }
         let problem = format!(
             "its clock runs {} times as fast as this computer's, as if its column were {}",
-            mimu::quantity::significant(factor),
-            self.lines.clock_in_words(factor)
+            mimu::quantity::significant(rate.factor),
+            self.lines.clock_in_words(rate.factor)
         );
         let remedy = "name the column t_us, t_ms or t_s as the board writes it, or `-` to use this computer's clock";
         Err(Error::device(&self.port, problem, remedy))
@@ -215,8 +213,9 @@ impl TextBoard {
         for reading in self.lines.take(bytes) {
             self.heard_s = now_s;
             let Reading { raw, temp_c, t_s } = reading;
-            if let (Some(t_s), None) = (t_s, self.clock_factor) {
-                self.clocks.push([t_s, now_s]);
+            let compared = t_s.and_then(|t_s| self.clocks.take(t_s, now_s));
+            if let Some(rate) = compared.filter(|_| !self.clock_trusted) {
+                self.ready.push_back(SourceEvent::Clock(rate));
             }
             let timed = Timed {
                 t_s: t_s.unwrap_or(now_s),
@@ -228,6 +227,7 @@ impl TextBoard {
                     self.emit(tick, &sample);
                 }
                 self.regular.begin_anew();
+                self.clocks = Clocks::default();
                 let why = "its clock has gone back".to_string();
                 self.ready.push_back(SourceEvent::Restarted(why));
             }
@@ -241,10 +241,20 @@ impl TextBoard {
         }
     }
 
-    /// Appends a sample to the current chunk.
+    /// Appends a sample to the current chunk, unless the board only repeats its last readings.
     fn emit(&mut self, tick: u64, sample: &Timed) {
+        if self.repeated.take(&sample.raw, self.unit.rate_hz) {
+            return;
+        }
+        if let Some(rows) = self.repeated.ended() {
+            let words = format!(
+                "it has repeated its last readings in {rows} lines, which count as missing: its sensor did not answer"
+            );
+            self.ready.push_back(SourceEvent::Note(words));
+        }
         let counts = self.unit.raw_unit == RawUnit::Count;
-        let saturated = counts && sample.raw.iter().any(|code| ENDS.contains(code));
+        let at_end = counts && sample.raw.iter().any(|code| ENDS.contains(code));
+        let saturated = self.rails.take(&sample.raw) || at_end;
         let fits = |c: &Chunk| {
             let same = c.temp_c == sample.temp_c || c.temp_c.is_nan() && sample.temp_c.is_nan();
             same && c.saturated == saturated && c.tick + c.values.len() as u64 == tick
@@ -292,4 +302,19 @@ impl TextBoard {
     pub(crate) fn refused(&self) -> u64 {
         self.lines.refused()
     }
+}
+
+/// Error if the clock of the board at `port` is certainly wrong.
+pub(crate) fn refuse_clock(port: &str, rate: &ClockRate) -> Result<()> {
+    if rate.differs_by() <= REFUSED_SHARE {
+        return Ok(());
+    }
+    let problem = format!(
+        "{}, and every rate of the gyro would err by that factor",
+        rate.words()
+    );
+    let remedy = "correct the times that the board writes, or name their column `-` to use this computer's clock";
+    Err(Error::device(port, problem, remedy)
+        .about(Argument::TextColumns)
+        .about(Argument::TrustClock))
 }

@@ -130,6 +130,7 @@ mod tests {
     use std::io::Write as _;
     use std::net::TcpListener;
 
+    use mimu::signal::increment::pause_periods;
     use mimu_recording::RawUnit;
 
     use super::*;
@@ -152,6 +153,7 @@ mod tests {
             columns: Columns::parse(columns).unwrap(),
             raw_unit: RawUnit::Count,
             name: None,
+            clock_trusted: true,
         };
         TextOpener {
             patience_s: 0.2,
@@ -182,7 +184,7 @@ mod tests {
                     samples.extend(numbered.map(|(tick, v)| (tick, v[3] as usize)));
                 }
                 SourceEvent::Restarted(words) | SourceEvent::Note(words) => notes.push(words),
-                SourceEvent::Nothing => {}
+                SourceEvent::Clock(_) | SourceEvent::Nothing => {}
             }
         }
         (samples, notes)
@@ -224,7 +226,8 @@ mod tests {
         let mut again = opener.open(next).unwrap();
         assert_eq!(again.unit().rate_hz, source.unit().rate_hz);
         let (samples, _) = all(&mut again);
-        assert_eq!(samples[0], (next + 1, 0));
+        // No turn is integrated across the time without a port.
+        assert_eq!(samples[0], (next + pause_periods(250.0), 0));
         assert!(samples.windows(2).all(|p| p[1].0 > p[0].0));
     }
 
@@ -265,6 +268,7 @@ mod tests {
             columns: Columns::parse(columns).unwrap(),
             raw_unit: RawUnit::Count,
             name: None,
+            clock_trusted: true,
         };
         TextOpener::new(text, None).open(0)
     }

@@ -5,22 +5,25 @@ mod rows;
 
 use mimu::fit::Fit;
 use mimu::quantity::Sensor;
+use mimu::signal::increment::is_bridged;
 use mimu::signal::stillness::GUARD_S;
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Columns, Manifest, Recorded};
 use nalgebra::Vector3;
 
-use self::conditions::{Turns, motion_limits, rate_limit_dps};
+use self::conditions::{Tilts, Turns, motion_limits, rate_limit_dps};
 use self::rows::{cut, known, shorten};
 use crate::axes;
 use crate::bank::DeviceBanks;
+use crate::clock::{ClockRate, REPORTED_SHARE};
 use crate::event::{Event, UnitState};
 use crate::folder::{Entry, Folder, OpenRecording, Part, append};
 use crate::procedure::{Fixture, SessionConfig};
 use crate::refit::{Parameter, Progress, calibrate, progress};
 use crate::source::Chunk;
 use crate::station::{Station, StationEvent};
+use crate::text::refuse_clock;
 use crate::waiting::{Interruption, Waiting};
 use crate::watch::{LastSecond, Watch, force, guessed};
 use mimu_equipment::step::Step;
@@ -91,6 +94,10 @@ pub struct UnitSession {
     watch: Watch,
     /// Model raw to SI: from the data sheet, estimated from gravity, or the calibration so far.
     nominal: Option<[Affine<f64>; 2]>,
+    /// Whether it is the calibration so far.
+    calibrated: bool,
+    /// Turns by the gyro and by the accelerometer, for their units.
+    tilts: Tilts,
     pending: Batch,
     next: Option<u64>,
     /// Time of power-on by the clock of the recordings, s.
@@ -105,6 +112,8 @@ pub struct UnitSession {
     turns: Turns,
     /// Samples at a rail since the last dwell.
     turn_clipped: u64,
+    /// The board's clock by the last comparison with this computer's.
+    pub clock: Option<ClockRate>,
     /// Consecutive refused fits for another reason than too few dwells.
     refused: u32,
     seen: Option<LastSecond>,
@@ -121,6 +130,8 @@ impl UnitSession {
         Self {
             watch: Watch::new(unit.rate_hz, config.fixture != Fixture::Table),
             nominal: unit.nominal,
+            calibrated: false,
+            tilts: Tilts::default(),
             state: UnitState {
                 unit: unit.name.clone(),
                 tilt_limit_deg: config.fixture.tolerance_deg(),
@@ -140,6 +151,7 @@ impl UnitSession {
             turn_missing: 0,
             turn_clipped: 0,
             turns: Turns::default(),
+            clock: None,
             refused: 0,
             seen: None,
             part: Part::Calibration,
@@ -246,6 +258,7 @@ impl UnitSession {
                 StationEvent::Note(words) => tell.push(Event::Note {
                     words: format!("{}: {words}", self.name()),
                 }),
+                StationEvent::Clock(rate) => self.compare_clock(rate, tell)?,
                 StationEvent::Lost(why) => self.interrupted(Interruption::Lost(why), tell)?,
                 StationEvent::Other(why) => {
                     let why = Interruption::OtherUnit(why);
@@ -259,6 +272,24 @@ impl UnitSession {
             }
         }
         Ok(some)
+    }
+
+    /// Keeps the comparison of the clocks, and reports a difference once.
+    ///
+    /// Errors: the clock is wrong.
+    fn compare_clock(&mut self, rate: ClockRate, tell: &mut Vec<Event>) -> Result<()> {
+        refuse_clock(&self.name(), &rate)?;
+        let reported = self.clock.is_some_and(|c| c.differs_by() > REPORTED_SHARE);
+        if rate.differs_by() > REPORTED_SHARE && !reported {
+            let words = format!(
+                "{}: {}: the gyro's scale factors will err by that factor; check what the board writes as its time",
+                self.name(),
+                rate.words()
+            );
+            tell.push(Event::Note { words });
+        }
+        self.clock = Some(rate);
+        Ok(())
     }
 
     fn interrupted(&mut self, why: Interruption, tell: &mut Vec<Event>) -> Result<()> {
@@ -281,8 +312,11 @@ impl UnitSession {
         self.next = Some(chunk.tick + chunk.values.len() as u64);
         self.power_on_s = chunk.power_on_s;
         self.state.lost += missing;
+        let rate_hz = self.station.unit.rate_hz;
         match &mut self.dwell {
             Some(dwell) => dwell.missing += missing,
+            // A turn is integrated across shorter gaps.
+            None if is_bridged((missing + 1) as f64 / rate_hz, 1.0 / rate_hz) => {}
             None => self.turn_missing += missing,
         }
         if chunk.saturated {
@@ -326,10 +360,9 @@ impl UnitSession {
         state.trend_c_per_min = seen.trend;
         state.up = Some(up.normalize().into()).filter(|up: &[f64; 3]| up[0].is_finite());
         state.tilt_deg = step.map(|s| up.angle(&s.up()).to_degrees());
-        let rate = self.watch.rate(seen, &nominal[0]);
         // An estimated gyro model has no scale.
-        let known = self.nominal.is_some();
-        state.rate_dps = known.then(|| rate.dot(&up.normalize()).to_degrees());
+        let rate = self.rate(seen);
+        self.state.rate_dps = rate.map(|rate| rate.dot(&up.normalize()).to_degrees());
     }
 
     /// Unit vector upwards, from the last second.
@@ -349,14 +382,25 @@ impl UnitSession {
     ) -> Result<()> {
         let config = round.config;
         let rate_hz = self.station.unit.rate_hz;
-        self.check_unit(seen, config)?;
+        if seen.learnt {
+            let words = format!(
+                "{}: the gyro's reading at rest has changed, and is measured again",
+                self.name()
+            );
+            tell.push(Event::Note { words });
+        }
         let up = self.up(seen, config);
+        self.compare_units(seen, &up)?;
         let running = self.dwell.map(|d| d.step);
         let wanted = running.unwrap_or(*step);
         let limits = motion_limits(wanted.rate_dps);
         self.moved |= (0..2).any(|k| seen.motion[k] > limits[k]);
         let found = match self.waits(seen, config, &wanted, round.busy) {
             Some(why) => Err(why),
+            // In motion an accelerometer does not read gravity alone.
+            None if wanted.rate_dps == 0.0 && self.check_unit(seen, config).is_err() => {
+                return self.check_unit(seen, config);
+            }
             None => self.pose(&up, round, &wanted, running.is_none()),
         };
         let found = found.and_then(|step| match self.turns_otherwise(seen, &step) {
@@ -591,6 +635,7 @@ impl UnitSession {
         self.hopeless = apart.map(|why| Error::device(self.name(), why, axes::REMEDY));
         if let (true, [Some(gyro), Some(accel)]) = (known, Sensor::BOTH.map(|s| fitted.sensor(s))) {
             self.nominal = Some([gyro, accel].map(|s| s.estimated.triad.inverse));
+            self.calibrated = true;
         }
         Some(fitted)
     }

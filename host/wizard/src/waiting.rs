@@ -70,10 +70,15 @@ impl fmt::Display for Waiting {
                 f,
                 "samples are missing, {missing} of the last {of:.0}: check the cable"
             ),
-            Self::Saturated => f.write_str("a reading is at the end of its range"),
+            Self::Saturated => f.write_str("a reading is at the end of its range: put it down"),
             Self::Exchanged => f.write_str("the gyro's readings follow the pose, but the accelerometer's do not: are the columns ax,ay,az and gx,gy,gz exchanged?"),
-            Self::Moves(sensor, times) => write!(f, "it moves ({sensor} {times:.1} times the limit)"),
-            Self::Turns(dps) => write!(f, "it turns at {dps:.1} deg/s"),
+            Self::Moves(sensor, times) => {
+                write!(f, "it moves ({sensor} {times:.1} times the limit): hold it still, or put it down")
+            }
+            Self::Turns(dps) => write!(
+                f,
+                "it turns at {dps:.1} deg/s; if it does not, put it down for 5 s: its reading at rest is then measured again"
+            ),
             Self::Unsteady(sensor, times) => {
                 write!(f, "the rate is not steady ({sensor} {times:.1} times the limit)")
             }

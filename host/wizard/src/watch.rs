@@ -21,6 +21,20 @@ const GYRO_TREMOR: f64 = 30.0;
 /// Thresholds of the squared change of the mean reading between poses. The first is relative to the squared reading at rest, or to that of a hundred
 /// times its noise; a gyro at rest stays below. The second is relative to the noise; every accelerometer exceeds it.
 const EXCHANGED: (f64, f64) = (0.1, 100.0);
+/// Largest relative change of the size of the gyro's reading: gravity keeps its size from pose to pose, and a rate has none at rest.
+const EXCHANGED_SIZE: f64 = 0.3;
+/// Time for which the gyro has to read the same, s, and the share of the change by which it may differ: a hand that turns the unit about the vertical
+/// does not keep its rate so steadily.
+const EXCHANGED_FOR: (f64, f64) = (3.0, 0.05);
+/// Time for which the unit has to be as quiet as on a table, at one level, before this level is used as its rest, s. No hand turns so steadily.
+const LEARNT_S: f64 = 5.0;
+/// Tremor of hands: the accelerometer's, as a share of gravity, and the gyro's, as a share of the largest mean rate so far. A turn by hand
+/// reaches 50 to 150 deg/s, so that is 2 to 6 deg/s. With half of it, people with a strong tremor (1.6 deg/s rms) needed 25 to 50 minutes. Without it, a sensor with less noise than hands tremble would never be at rest in them.
+const TREMOR: (f64, f64) = (0.01, 0.04);
+/// If this share of the rows of a block repeats the row before, and [`COARSE`] of all earlier rows does not, the board repeats its last reading.
+const HELD: f64 = 0.5;
+/// Share of repeated rows from which on a board's steps are coarser than its noise.
+const COARSE: f64 = 0.1;
 
 /// Means and squared deviations of the six channels.
 #[derive(Debug, Clone, Copy, Default)]
@@ -108,6 +122,10 @@ struct Block {
     moments: Moments,
     saturated: bool,
     missing: u64,
+    /// Rows that repeat the row before.
+    repeats: f64,
+    /// Whether the board repeated its last reading.
+    held: bool,
 }
 
 /// Statistics of the last second.
@@ -131,6 +149,8 @@ pub struct LastSecond {
     pub stuck: Option<usize>,
     /// Whether the gyro's readings follow the pose and the accelerometer's do not, as if the columns were exchanged.
     pub exchanged: bool,
+    /// Whether its level was taken for rest instead of an earlier one.
+    pub learnt: bool,
 }
 
 /// Analyses the samples of one unit while they arrive.
@@ -153,6 +173,15 @@ pub struct Watch {
     before: VecDeque<[[f64; 3]; 2]>,
     /// Whether [`Self::begin`] was called.
     begun: bool,
+    /// Mean readings and variances of the seconds that were as quiet as on a table, without an interruption.
+    quiet: VecDeque<[[f64; 6]; 2]>,
+    /// Mean rates while the columns seemed exchanged, without an interruption.
+    seems_exchanged: VecDeque<[f64; 3]>,
+    /// Largest mean rate so far relative to rest, raw.
+    largest_rate: f64,
+    last_row: Option<[f64; 6]>,
+    /// Rows so far, and those of them that repeat the row before; without those of a board that repeated its last reading.
+    rows: [f64; 2],
     temperatures: VecDeque<(u64, f64)>,
 }
 
@@ -172,6 +201,11 @@ impl Watch {
             moved: false,
             before: VecDeque::new(),
             begun: false,
+            quiet: VecDeque::new(),
+            seems_exchanged: VecDeque::new(),
+            largest_rate: 0.0,
+            last_row: None,
+            rows: [0.0; 2],
             temperatures: VecDeque::new(),
         }
     }
@@ -197,7 +231,10 @@ impl Watch {
                 codes.add(*value);
             }
             self.open.saturated |= chunk.saturated;
+            self.open.repeats += f64::from(self.last_row == Some(*row));
+            self.last_row = Some(*row);
             if self.open.moments.count >= self.block_rows {
+                self.count_repeats();
                 self.window.push_back(std::mem::take(&mut self.open));
                 let whole = (WINDOW_S / BLOCK_S).round() as usize;
                 if self.window.len() > whole {
@@ -212,10 +249,23 @@ impl Watch {
         seen
     }
 
+    /// Finds whether the board repeated its last reading in the open block. One that always does so has coarse steps.
+    fn count_repeats(&mut self) {
+        let (count, repeats) = (self.open.moments.count, self.open.repeats);
+        let [rows, repeated] = self.rows;
+        let held = repeats > HELD * count && rows > self.rate_hz && repeated < COARSE * rows;
+        if !held {
+            self.rows = [rows + count, repeated + repeats];
+        }
+        self.open.held = held;
+    }
+
     /// Discards the last second: later samples are unrelated to it.
     pub fn interrupted(&mut self) {
         (self.open, self.window) = (Block::default(), VecDeque::new());
         self.before.clear();
+        self.quiet.clear();
+        self.seems_exchanged.clear();
         self.temperatures.clear();
     }
 
@@ -259,6 +309,55 @@ impl Watch {
         self.before.push_back([mean, variance]);
     }
 
+    /// Uses the present level as rest, if the unit has been as quiet as on a table for [`LEARNT_S`] at one level, and the present rest is another one:
+    /// the unit may have moved when it was measured, and biases change. Returns whether it did.
+    fn learn_rest(&mut self, means: [f64; 6], variances: [f64; 6], floor: &[f64; 6]) -> bool {
+        if (0..6).any(|c| variances[c] > STILL_FACTOR * floor[c]) {
+            self.quiet.clear();
+            return false;
+        }
+        self.quiet.push_back([means, variances]);
+        if (self.quiet.len() as f64) < LEARNT_S / BLOCK_S {
+            return false;
+        }
+        let first = self.quiet[0];
+        let agrees = |[mean, variance]: &[[f64; 6]; 2]| {
+            (0..6).all(|c| {
+                let least = variance[c].min(first[1][c]).max(floor[c]);
+                (mean[c] - first[0][c]).powi(2) <= least
+            })
+        };
+        let steady = self.quiet.iter().all(agrees);
+        self.quiet.pop_front();
+        let is_rest = self.rest.is_some_and(|(rest, _)| {
+            (0..3).all(|c| (means[c] - rest[c]).powi(2) <= 9.0 * variances[c].max(floor[c]))
+        });
+        if !steady || is_rest {
+            return false;
+        }
+        self.rest = Some((means, variances[..3].iter().sum()));
+        true
+    }
+
+    /// Whether the columns have seemed exchanged, with one reading of the gyro, for long enough. `rate`: mean rates of the last second relative to
+    /// rest, if they seem so now.
+    fn are_exchanged(&mut self, rate: Option<[f64; 3]>) -> bool {
+        let Some(rate) = rate else {
+            self.seems_exchanged.clear();
+            return false;
+        };
+        self.seems_exchanged.push_back(rate);
+        if (self.seems_exchanged.len() as f64) < EXCHANGED_FOR.0 / BLOCK_S {
+            return false;
+        }
+        let first = Vector3::from(self.seems_exchanged[0]);
+        let near =
+            |now: &[f64; 3]| (Vector3::from(*now) - first).norm() < EXCHANGED_FOR.1 * first.norm();
+        let same = self.seems_exchanged.iter().all(near);
+        self.seems_exchanged.pop_front();
+        same
+    }
+
     fn follow(&mut self, tick: u64, temp_c: f64) {
         if temp_c.is_finite() {
             self.temperatures.push_back((tick, temp_c));
@@ -291,22 +390,27 @@ impl Watch {
 
     fn see(&mut self, tick: u64, temp_c: f64) -> LastSecond {
         let mut all = Moments::default();
-        let (mut saturated, mut missing) = (false, 0);
+        let (mut saturated, mut missing, mut held) = (false, 0, false);
         for block in &self.window {
             all.join(&block.moments);
             saturated |= block.saturated;
             missing += block.missing;
+            held |= block.held;
         }
         let own = all.squares.map(|s| s / (all.count - 1.0));
         for (codes, own) in self.codes.iter_mut().zip(&own) {
-            codes.judge(*own);
+            // A reading that is repeated says nothing about the noise.
+            if !held {
+                codes.judge(*own);
+            }
         }
         let (codes, moved) = (self.codes, self.moved);
         let stuck = (0..6).find(|&c| own[c] == 0.0 && codes[c].is_stuck(moved));
         // A coarse step hides at least this variance.
         let variance: [f64; 6] = std::array::from_fn(|c| own[c].max(codes[c].hidden()));
-        if stuck.is_none() && !saturated {
-            // Only before the unit may be turned: a steady rate is as quiet as rest.
+        let sound = stuck.is_none() && !saturated && !held;
+        if sound {
+            // Only before the unit may be turned: a table's steady rate is as quiet as rest.
             if !self.begun {
                 self.find_rest(all.mean, variance);
             }
@@ -317,28 +421,44 @@ impl Watch {
         }
         let floor = self.floor.unwrap_or(variance);
         let floor: [f64; 6] = std::array::from_fn(|c| floor[c].max(codes[c].hidden()));
+        let force = Vector3::from_fn(|c, _| all.mean[3 + c]).norm();
         let motion = Sensor::BOTH.map(|sensor| {
-            let allowed = match sensor {
-                Sensor::Gyro if self.by_hand => GYRO_TREMOR * STILL_FACTOR,
-                _ => STILL_FACTOR,
+            let (factor, tremor) = match (sensor, self.by_hand) {
+                (_, false) => (STILL_FACTOR, 0.0),
+                (Sensor::Gyro, true) => (GYRO_TREMOR * STILL_FACTOR, TREMOR.1 * self.largest_rate),
+                (Sensor::Accel, true) => (STILL_FACTOR, TREMOR.0 * force),
             };
+            let allowed = |c: usize| (factor * floor[c]).max(tremor * tremor);
             // A constant channel gives 0 / 0, which counts as rest.
-            let ratio = |c: usize| (variance[c] / (allowed * floor[c])).sqrt();
+            let ratio = |c: usize| (variance[c] / allowed(c)).sqrt();
             sensor.channels().map(ratio).fold(0.0, f64::max)
         });
-        self.moved |= self.begun && motion.iter().any(|m| *m > 1.0);
-        let exchanged = self.rest.is_some_and(|(rest, _)| {
+        let moves = motion.iter().any(|m| *m > 1.0);
+        self.moved |= self.begun && moves;
+        let rate = self
+            .rest
+            .map(|(rest, _)| [0, 1, 2].map(|c| all.mean[c] - rest[c]));
+        if let Some(rate) = rate.filter(|_| self.begun && !saturated) {
+            self.largest_rate = self.largest_rate.max(Vector3::from(rate).norm());
+        }
+        let seems_exchanged = self.rest.is_some_and(|(rest, _)| {
             let of = |sensor: Sensor, squares: &dyn Fn(usize) -> f64| {
                 sensor.channels().map(squares).sum::<f64>()
             };
             let changed = |sensor| of(sensor, &|c| (all.mean[c] - rest[c]).powi(2));
             let size = |sensor| of(sensor, &|c| rest[c] * rest[c]);
             let noise = |sensor| of(sensor, &|c| floor[c]);
+            let size_of = |row: [f64; 6]| Vector3::new(row[0], row[1], row[2]).norm();
             self.by_hand
+                && !moves
+                && (size_of(all.mean) / size_of(rest) - 1.0).abs() < EXCHANGED_SIZE
                 && changed(Sensor::Gyro)
                     > EXCHANGED.0 * size(Sensor::Gyro).max(1e4 * noise(Sensor::Gyro))
                 && changed(Sensor::Accel) < EXCHANGED.1 * noise(Sensor::Accel)
         });
+        let learns = sound && self.begun && self.by_hand && !seems_exchanged;
+        let learnt = learns && self.learn_rest(all.mean, variance, &floor);
+        let exchanged = self.are_exchanged(rate.filter(|_| seems_exchanged));
         LastSecond {
             tick,
             mean: all.mean,
@@ -349,6 +469,7 @@ impl Watch {
             trend: self.trend(),
             stuck,
             exchanged,
+            learnt,
         }
     }
 
@@ -507,7 +628,7 @@ mod tests {
     fn a_gyro_that_reads_the_pose_is_an_accelerometer() {
         let mut watch = Watch::new(1000.0, true);
         let at = |watch: &mut Watch, tick: u64, gyro: [f64; 3]| {
-            let mut one = chunk(tick, 2500, 0.0, 0.01);
+            let mut one = chunk(tick, 6000, 0.0, 0.01);
             for row in &mut one.values {
                 (row[0], row[1], row[2]) = (gyro[0] + row[0], gyro[1] + row[1], gyro[2] + row[2]);
             }
@@ -515,7 +636,84 @@ mod tests {
         };
         assert!(!at(&mut watch, 0, [0.1, 0.2, 9.8]).exchanged);
         watch.begin();
-        assert!(at(&mut watch, 5000, [9.8, 0.1, 0.2]).exchanged);
+        assert!(at(&mut watch, 6000, [9.8, 0.1, 0.2]).exchanged);
+    }
+
+    /// Rows whose gyro reads `rate(s)` beside noise; the accelerometer reads gravity.
+    fn in_hand(
+        watch: &mut Watch,
+        ticks: std::ops::Range<u64>,
+        rate: impl Fn(f64) -> f64,
+    ) -> Vec<LastSecond> {
+        ticks
+            .step_by(20)
+            .filter_map(|tick| {
+                let mut one = chunk(tick, 20, 0.0, 0.01);
+                for (k, row) in (tick..).zip(&mut one.values) {
+                    row[2] += rate(k as f64 / 1000.0);
+                    row[5] += 9.8;
+                }
+                watch.take(&one)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_unit_that_is_yawed_by_hand_has_no_exchanged_columns() {
+        let mut watch = Watch::new(1000.0, true);
+        in_hand(&mut watch, 0..3000, |_| 0.0);
+        watch.begin();
+        // A turn about the vertical within six seconds, faster in its middle.
+        let seen = in_hand(&mut watch, 3000..12_000, |s| {
+            (1.0 + 0.3 * (1.7 * s).sin()) * f64::from(u8::from((4.0..10.0).contains(&s)))
+        });
+        assert!(seen.iter().all(|s| !s.exchanged));
+    }
+
+    #[test]
+    fn a_rest_that_was_measured_in_motion_is_learned_again_where_the_unit_lies_still() {
+        let mut watch = Watch::new(1000.0, true);
+        in_hand(&mut watch, 0..2000, |_| 0.0);
+        in_hand(&mut watch, 2000..10_000, |s| 0.3 + 0.02 * (9.0 * s).sin());
+        watch.was_turning();
+        in_hand(&mut watch, 10_000..14_000, |s| 0.3 + 0.02 * (9.0 * s).sin());
+        assert!(watch.knows_rest());
+        watch.begin();
+        let plain = guessed(&in_hand(&mut watch, 14_000..16_000, |_| 0.0)[0], 9.8)[0];
+        let seen = in_hand(&mut watch, 16_000..26_000, |_| 0.0);
+        let learnt = seen.iter().position(|s| s.learnt).unwrap();
+        assert!(learnt < 60, "{learnt}");
+        assert_eq!(seen.iter().filter(|s| s.learnt).count(), 1);
+        assert!(watch.rate(&seen[seen.len() - 1], &plain).norm() < 0.01);
+    }
+
+    #[test]
+    fn a_reading_that_is_repeated_for_a_second_does_not_lower_the_noise() {
+        let mut watch = Watch::new(1000.0, true);
+        in_hand(&mut watch, 0..5000, |_| 0.0);
+        let noise = watch.noise().unwrap();
+        watch.begin();
+        let last = watch.last_row.unwrap();
+        let mut held = chunk(5000, 1000, 0.0, 0.0);
+        held.values.fill(last);
+        watch.take(&held);
+        let after = in_hand(&mut watch, 6000..9000, |_| 0.0);
+        assert!(after[after.len() - 1].motion.iter().all(|m| *m < 1.0));
+        let now = watch.noise().unwrap();
+        assert!((0..6).all(|c| now[c] > 0.9 * noise[c]), "{noise:?} {now:?}");
+    }
+
+    #[test]
+    fn a_sensor_with_less_noise_than_hands_tremble_comes_to_rest_in_them() {
+        let mut watch = Watch::new(1000.0, true);
+        in_hand(&mut watch, 0..3000, |_| 0.0);
+        watch.begin();
+        in_hand(&mut watch, 3000..5000, |_| 100.0);
+        // 2 units of rate, where the noise is 0.003.
+        let seen = in_hand(&mut watch, 5000..9000, |s| 2.0 * (40.0 * s).sin());
+        assert!(seen[seen.len() - 1].motion[0] < 1.0, "{:?}", seen.last());
+        let seen = in_hand(&mut watch, 9000..12_000, |s| 20.0 * (40.0 * s).sin());
+        assert!(seen[seen.len() - 1].motion[0] > 1.0);
     }
 
     #[test]

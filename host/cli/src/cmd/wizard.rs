@@ -120,6 +120,9 @@ struct TextArgs {
     /// Name of the unit [default: its port]
     #[arg(long, value_name = "NAME", requires = "text")]
     device: Option<String>,
+    /// Use the board's clock although it does not agree with this computer's: for a replay
+    #[arg(long, requires = "text")]
+    trust_clock: bool,
 }
 
 fn raw_unit(text: &str) -> std::result::Result<RawUnit, String> {
@@ -147,6 +150,7 @@ impl TextArgs {
             columns: Columns::parse(names)?,
             raw_unit: self.raw_unit,
             name: self.device.as_ref().map(numbered),
+            clock_trusted: self.trust_clock,
         })
     }
 }

@@ -162,6 +162,9 @@ fn unit_text(unit: &UnitOutcome, text: &mut String) {
         minutes(unit.recorded_s),
         unit.discarded
     );
+    if let Some(clock) = &unit.clock {
+        let _ = writeln!(text, "time: {}", clock.words());
+    }
     let judged = unit.confirmed.as_ref().or(unit.verified.as_ref());
     for line in judged.into_iter().flat_map(judged_lines) {
         let _ = writeln!(text, "{line}");

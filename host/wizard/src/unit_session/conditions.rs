@@ -21,6 +21,12 @@ const RATE_DPS: f64 = 2.0;
 
 /// If the magnitude of SI readings at rest differs from gravity by more than this factor, they are in another unit.
 const NEAR: f64 = 1.6;
+/// Ratio of the angles by gyro and accelerometer that no turn by hand gives, but another unit does: deg/s for rad/s is 57.
+const UNIT_RATIO: f64 = 10.0;
+/// Turn of the direction of gravity in a second that counts, rad.
+const LEAST_TILT: f64 = 0.1;
+/// Turns of the direction of gravity after which they are compared, rad: half a turn in all.
+const ENOUGH_TILT: f64 = 3.0;
 /// If this many consecutive turns, and more than half of all, lack samples, this is no accident: the gyro cannot be calibrated this way.
 const LOST_IN_A_ROW: u32 = 4;
 
@@ -65,8 +71,7 @@ impl UnitSession {
 
     /// Reports a rate that differs from the requested one.
     pub(super) fn turns_otherwise(&self, seen: &LastSecond, step: &Step) -> Option<Waiting> {
-        let nominal = self.nominal.as_ref()?;
-        let rate = self.watch.rate(seen, &nominal[0]);
+        let rate = self.rate(seen)?;
         let off = (rate - step.rate()).norm().to_degrees();
         (off > rate_limit_dps(step.rate_dps)).then(|| match step.rate_dps {
             0.0 => Waiting::Turns(off),
@@ -93,8 +98,12 @@ impl UnitSession {
         };
         let had = self.folder.dwells(self.part);
         let near = |d: &Step| off(d) < SAME_POSE_DEG;
-        // The same pose twice in a row is no turn. An earlier pose may be requested again.
-        let same = by_hand && had.last().is_some_and(|d| near(&d.1));
+        // The same pose twice in a row is no turn, also across parts. An earlier pose may be requested again.
+        let same = by_hand
+            && self
+                .folder
+                .last_dwell()
+                .is_some_and(|step| off(&step) < SAME_POSE_DEG);
         let again = same || by_hand && off(step) > limit && had.iter().any(|d| near(&d.1));
         if off(step) <= limit && !again {
             return Ok(as_it_is(step));
@@ -120,6 +129,21 @@ impl UnitSession {
 }
 
 impl UnitSession {
+    /// Rate, rad/s, relative to the gyro's reading at rest or, if that is less, by the calibration so far. The reading at rest may have been measured
+    /// in motion, and the bias may have changed since the calibration. `None` while the scale is unknown.
+    pub(super) fn rate(&self, seen: &LastSecond) -> Option<Vector3<f64>> {
+        let nominal = self.nominal.as_ref()?;
+        let by_rest = self.watch.rate(seen, &nominal[0]);
+        if !self.calibrated {
+            return Some(by_rest);
+        }
+        let by_fit = nominal[0].apply(&Vector3::from_fn(|c, _| seen.mean[c]));
+        Some(match by_fit.norm() < by_rest.norm() {
+            true => by_fit,
+            false => by_rest,
+        })
+    }
+
     /// Refuses readings that are declared as SI but are not.
     pub(super) fn check_unit(&self, seen: &LastSecond, config: &SessionConfig) -> Result<()> {
         let size = Vector3::from_fn(|k, _| seen.mean[3 + k]).norm();
@@ -137,6 +161,33 @@ impl UnitSession {
             config.gravity_mps2
         );
         let remedy = "declare the readings as counts, which may have any unit";
+        Err(Error::device(self.name(), problem, remedy).about(Argument::RawUnit))
+    }
+
+    /// Compares the angle by which the direction of gravity turns with the gyro's, if readings are declared as SI.
+    ///
+    /// Errors: the gyro's is so different that its unit is another one. In hands no dwell would ever begin, because the tremor is read as a turn.
+    pub(super) fn compare_units(&mut self, seen: &LastSecond, up: &Vector3<f64>) -> Result<()> {
+        if self.station.unit.raw_unit != RawUnit::Si || self.calibrated {
+            return Ok(());
+        }
+        let Some(rate) = self.rate(seen) else {
+            return Ok(());
+        };
+        let Some(ratio) = self.tilts.take(seen, up, &rate, self.station.unit.rate_hz) else {
+            return Ok(());
+        };
+        let as_if = match ratio {
+            r if (1.0 / UNIT_RATIO..UNIT_RATIO).contains(&r) => return Ok(()),
+            r if (r.to_radians() - 1.0).abs() < 0.5 => ", as if it were in deg/s",
+            _ => "",
+        };
+        let problem = format!(
+            "the gyro turns {} times as far as the accelerometer sees{as_if}",
+            significant(ratio)
+        );
+        let remedy =
+            "let the board write rad/s, or declare the readings as counts, which may have any unit";
         Err(Error::device(self.name(), problem, remedy).about(Argument::RawUnit))
     }
 
@@ -182,6 +233,44 @@ impl UnitSession {
             );
             tell.push(Event::Note { words });
         }
+    }
+}
+
+/// Turns of the direction of gravity, second by second.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Tilts {
+    /// Tick, and direction up, of the last second used.
+    last: Option<(u64, Vector3<f64>)>,
+    /// Angles by the gyro and by the accelerometer, rad.
+    angles: [f64; 2],
+}
+
+impl Tilts {
+    /// Adds a second, unless it overlaps the last one. Returns the gyro's angle over the accelerometer's, once there are enough turns.
+    fn take(
+        &mut self,
+        seen: &LastSecond,
+        up: &Vector3<f64>,
+        rate: &Vector3<f64>,
+        rate_hz: f64,
+    ) -> Option<f64> {
+        let Some((tick, before)) = self.last else {
+            self.last = Some((seen.tick, *up));
+            return None;
+        };
+        let passed_s = seen.tick.saturating_sub(tick) as f64 / rate_hz;
+        if passed_s < 1.0 {
+            return None;
+        }
+        self.last = Some((seen.tick, *up));
+        let tilt = up.angle(&before);
+        // Smaller ones are tremor, and after a gap the turn is unknown.
+        if passed_s > 1.5 || tilt < LEAST_TILT {
+            return None;
+        }
+        self.angles[0] += passed_s * rate.cross(up).norm();
+        self.angles[1] += tilt;
+        (self.angles[1] > ENOUGH_TILT).then(|| self.angles[0] / self.angles[1])
     }
 }
 

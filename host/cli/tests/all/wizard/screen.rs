@@ -107,6 +107,7 @@ fn session(size: [u16; 2], more: &[&str]) -> (WizardSession, Playback, tempfile:
     arguments.extend([
         "--text",
         "t_us,ax,ay,az,gx,gy,gz",
+        "--trust-clock",
         "--port",
         playback.path(),
     ]);

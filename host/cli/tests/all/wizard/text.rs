@@ -61,8 +61,7 @@ fn plan() -> Plan {
     Plan::parse(Source::new("PLAN.toml", plan)).unwrap()
 }
 
-/// The lines of the board: a greeting, its clock in microseconds, and counts. Some lines are lost and some truncated, but few, because a turn with a
-/// missing sample cannot be integrated.
+/// The lines of the board: a greeting, its clock in microseconds, and counts. Some lines are lost and some truncated.
 pub fn lines() -> Vec<String> {
     let (plan, truth) = (plan(), truth());
     let mut lines = vec!["MPU6050 OK\r\n".into(), "t,ax,ay,az,gx,gy,gz\r\n".into()];
@@ -91,7 +90,13 @@ fn a_board_that_writes_lines_ends_in_a_calibration_whose_intervals_hold_its_para
     let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
     command.current_dir(folder.path()).stdin(Stdio::null());
     command.args(["wizard", "-o", "out", "--gravity", "9.80665"]);
-    command.args(["--text", "t_us,ax,ay,az,gx,gy,gz", "--device", "plane-7"]);
+    command.args([
+        "--text",
+        "t_us,ax,ay,az,gx,gy,gz",
+        "--device",
+        "plane-7",
+        "--trust-clock",
+    ]);
     command.args(["--port", playback.path()]);
     command.args([
         "--fixture",
