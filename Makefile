@@ -22,7 +22,7 @@ BUILT := $(or $(CARGO_TARGET_DIR),target)/debug/.tests-built
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python
 
-.PHONY: help data test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example papers blind bench budget count device fuzz audit toolchain
+.PHONY: help data test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example papers blind clumsy bench budget count device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
@@ -117,7 +117,7 @@ web-tests: web ## the page in Chromium, if there is one, against the command
 	$(CARGO) build --locked -q -p mimu-cli -p mimu-rig --bin mimu --bin mimu-rig
 	MIMU_PAGE=$(CURDIR)/target/web ./tests/interop/run.sh target/debug/mimu -k test_web -s
 
-nightly: toolchain blind fuzz web-tests ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
+nightly: toolchain blind clumsy fuzz web-tests ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, clumsy, fuzz; prints its figures
 	$(FIRMWARE)
 	$(CARGO) test --locked --release $(ON_PC) -- --ignored --nocapture --test-threads=2
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/tests/run.sh -m nightly
@@ -153,6 +153,9 @@ papers: toolchain ## compute every table and plot in docs/papers, and every tabl
 blind: toolchain ## undeclared effects on hundreds of units and in real recordings, and their diagnoses
 	$(CARGO) run --locked --release -p mimu-tests --bin blind
 	$(CARGO) run --locked --release -p mimu-tests --bin blind planted
+
+clumsy: toolchain ## 200 sessions of the wizard with people and boards that err, in virtual time
+	$(CARGO) run --locked --release -p mimu-tests --features studies --bin clumsy 200
 
 bench: toolchain ## rates and peak memory on four hours at 1 kHz, and of a diagnosis
 	$(CARGO) bench --locked -p mimu-cli --bench four_hours

@@ -12,8 +12,10 @@
 //! | [`planted`]            | effects of the bench, planted in them                             |
 //! | [`niu`]                | niu's tables                                                      |
 //! | [`page`]               | tables in documents, between markers                              |
+//! | [`text_board`], [`stored_calibration`] | a board that writes text, in hands; its calibration file against its truth |
 //! | `tests/all/`           | agreement of estimators, intervals, diagnosis, published results  |
 //! | `papers/`, `blind/`    | figures of `docs/papers`; units with undeclared effects        |
+//! | `clumsy/`              | sessions of the wizard with a person who errs, on boards that err |
 //! | `board/`, `counted/`, `no_panic/` | separate crates: the firmware's image on the emulated board, the cost of its loops, freedom from panics |
 //! | `example.sh`, `example/` | the commands of `make example`, and the small recording that it uses if the public ones are absent |
 
@@ -28,3 +30,5 @@ pub mod page;
 pub mod planted;
 pub mod recordings;
 pub mod slow_bias;
+pub mod stored_calibration;
+pub mod text_board;

@@ -6,7 +6,6 @@
 mod mistakes;
 mod run;
 mod session;
-mod stored;
 mod text;
 mod text_mistakes;
 
@@ -55,6 +54,7 @@ const ALL: &[(&str, Scenario)] = &[
     ("text-in-g", text_mistakes::text_in_g),
     ("text-us-as-ms", text_mistakes::text_us_for_ms),
     ("text-ms-as-us", text_mistakes::text_ms_for_us),
+    ("text-clock", text_mistakes::text_clock),
     ("text-dropped", text_mistakes::text_dropped),
     ("text-garbled", text_mistakes::text_garbled),
     ("text-coarse", text_mistakes::text_coarse),

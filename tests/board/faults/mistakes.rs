@@ -8,7 +8,7 @@ use mimu_rig::rig_file::RigTruth;
 
 use crate::run::Ended;
 use crate::session::{WizardSession, unit};
-use crate::stored::half_widths;
+use mimu_tests::stored_calibration::half_widths;
 
 pub const BY_HAND: [&str; 4] = ["--fixture", "hands", "--dwell", "2"];
 /// Longest wait for a step before a person does something else.

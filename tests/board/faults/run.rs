@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::stored::{Truth, errors};
+use mimu_tests::stored_calibration::{Truth, errors};
 
 /// Longest time of a session by the wall clock.
 const LONGEST: Duration = Duration::from_secs(900);

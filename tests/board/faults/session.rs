@@ -8,7 +8,7 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::table::TableTruth;
 
 use crate::run::{Ended, Run};
-use crate::stored::Truth;
+use mimu_tests::stored_calibration::Truth;
 
 /// fang's unit, long warmed up, on a table without flaws on an Earth that does not turn: the only remaining errors are noise.
 pub fn unit(seed: u64, fixture: &str) -> Result<RigTruth, String> {

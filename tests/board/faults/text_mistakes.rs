@@ -4,8 +4,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::run::{Ended, Run};
-use crate::stored::half_widths;
-use crate::text::{IDENTITY, TextBoard, Writing};
+use crate::text::Writing;
+use mimu_tests::stored_calibration::half_widths;
+use mimu_tests::text_board::{IDENTITY, TextBoard};
 
 const Z_INVERTED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
 const NEGATED: [[f64; 3]; 3] = [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
@@ -22,8 +23,14 @@ pub fn text(
     more: &[&str],
 ) -> Result<(Writing, Run), String> {
     let truth = board.truth;
+    // Its time passes faster than the computer's, without being wrong.
+    let replayed: &[&str] = if board.speed == 1.0 {
+        &[]
+    } else {
+        &["--trust-clock"]
+    };
     let writing = Writing::begin(board, seed, folder.join("events.jsonl"))?;
-    let arguments = [&BY_HAND[..], more].concat();
+    let arguments = [&BY_HAND[..], more, replayed].concat();
     let mut run = Run::new(folder, &writing.port, truth, &arguments);
     run.run()?;
     Ok((writing, run))
@@ -103,6 +110,16 @@ pub fn text_ms_for_us(folder: &Path) -> Result<Ended, String> {
         ..TextBoard::new(38)
     };
     text_to_end(folder, 38, board, &TEXT)
+}
+
+/// A clock three times too fast, as of a period that was written wrongly.
+pub fn text_clock(folder: &Path) -> Result<Ended, String> {
+    let board = TextBoard {
+        speed: 1.0,
+        stamps_s: 1e-6 / 3.0,
+        ..TextBoard::new(42)
+    };
+    text_to_end(folder, 42, board, &TEXT)
 }
 
 pub fn text_dropped(folder: &Path) -> Result<Ended, String> {

@@ -10,14 +10,18 @@ type Vector = [f64; 3];
 /// Forward model of a triad: raw per SI and raw; rows are sensors, columns the body's axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Forward {
+    /// Raw per SI.
     pub matrix: Matrix,
+    /// Raw.
     pub bias: Vector,
 }
 
 /// Truth of a unit: gyro, accelerometer, and whether its calibration uses the accelerometer's own axes, as by hand.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
+    /// Gyro and accelerometer.
     pub triads: [Forward; 2],
+    /// Whether the calibration uses the accelerometer's own axes.
     pub by_hand: bool,
 }
 
