@@ -51,6 +51,7 @@ const ALL: &[(&str, Scenario)] = &[
     ("text-negated", text_mistakes::text_negated),
     ("text-x-y", text_mistakes::text_x_for_y),
     ("text-gyro-x-y", text_mistakes::text_gyro_swapped),
+    ("text-in-dps", text_mistakes::text_in_dps),
     ("text-in-g", text_mistakes::text_in_g),
     ("text-us-as-ms", text_mistakes::text_us_for_ms),
     ("text-ms-as-us", text_mistakes::text_ms_for_us),

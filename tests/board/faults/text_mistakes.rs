@@ -95,6 +95,29 @@ pub fn text_in_g(folder: &Path) -> Result<Ended, String> {
     )
 }
 
+/// Readings in m/s² and deg/s that are declared as SI.
+pub fn text_in_dps(folder: &Path) -> Result<Ended, String> {
+    let mut board = TextBoard::new(43);
+    for (triad, (was, is)) in board
+        .truth
+        .triads
+        .iter_mut()
+        .zip([(3754.9, 57.295_779_513), (1670.1, 1.0)])
+    {
+        let by = is / was;
+        triad.matrix = triad.matrix.map(|row| row.map(|m| m * by));
+        triad.bias = triad.bias.map(|b| b * by);
+    }
+    board.noise = [5.0 / 3754.9 * 57.295_779_513, 45.0 / 1670.1];
+    board.steps = [0.0; 2];
+    text_to_end(
+        folder,
+        43,
+        board,
+        &[&TEXT[..], &["--raw-unit", "SI"]].concat(),
+    )
+}
+
 pub fn text_us_for_ms(folder: &Path) -> Result<Ended, String> {
     let board = TextBoard {
         speed: 1.0,

@@ -85,8 +85,8 @@ pub fn lines() -> Vec<String> {
 #[test]
 fn a_board_that_writes_lines_ends_in_a_calibration_whose_intervals_hold_its_parameters() {
     let folder = tempfile::tempdir().unwrap();
-    // 100 lines per second by the board's clock, written 40 times faster.
-    let playback = Playback::begin(lines(), 4000.0);
+    // 100 lines per second by the board's clock, written 25 times faster.
+    let playback = Playback::begin(lines(), 2500.0);
     let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
     command.current_dir(folder.path()).stdin(Stdio::null());
     command.args(["wizard", "-o", "out", "--gravity", "9.80665"]);
