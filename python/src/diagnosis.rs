@@ -101,7 +101,7 @@ pub(crate) fn diagnose(
             given.as_ref().map(|(_, name)| name.as_str()),
         ];
         let created = mimu_cli::now();
-        let done = diagnosed(recordings, names, &created)?;
+        let done = diagnosed(recordings, names, &created, &|_| ())?;
         Ok(Diagnosis { done, created })
     })
 }

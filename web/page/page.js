@@ -51,7 +51,7 @@ function status(text, share) {
 
 /** The program, with the dropped files in its folder, or those of the session. */
 async function program() {
-  state.program ??= new Program(({ file, share }) => status(`reading ${file}: ${Math.round(100 * share)} %`, share));
+  state.program ??= new Program(({ what, share }) => status(`${what}: ${Math.round(100 * share)} %`, share));
   await state.program.files(state.files);
   if (state.session) await state.program.ask("unpack", { name: "session", files: state.session.files });
   return state.program;

@@ -18,17 +18,17 @@ class Exit extends Error {
 
 /**
  * Runs the program with these arguments on the files in `root`.
- * Returns its exit status and what it wrote to its standard streams. A trap of the program is thrown on.
+ * Returns its exit status and what it wrote to its standard streams. A trap of the program is thrown on. `heard(what, share)` is told how far it is.
  */
-export function run(module, root, args) {
-  return start(module, root, args)("_start");
+export function run(module, root, args, heard) {
+  return start(module, root, args, undefined, undefined, heard)("_start");
 }
 
 /**
  * Makes an instance of the program. Returns a function that calls one of its exports by name and answers like `run`. If `said` is given, it
- * receives the lines of the standard output at once.
+ * receives the lines of the standard output at once; `heard` receives the progress, which is then no part of the standard error.
  */
-export function start(module, root, args, input, said) {
+export function start(module, root, args, input, said, heard) {
   let memory;
   const view = () => new DataView(memory.buffer);
   const bytes = (at, length) => new Uint8Array(memory.buffer, at, length);
@@ -99,6 +99,7 @@ export function start(module, root, args, input, said) {
       if (handle.stream !== undefined) {
         streams[handle.stream] += utf8[handle.stream].decode(from.slice(), { stream: true });
         if (said && handle.stream === 0) hand();
+        if (heard && handle.stream === 1) hear();
       } else if (handle.node instanceof MemoryFile) handle.node.write(at + sum, from);
       else return ROFS;
       sum += from.length;
@@ -110,6 +111,12 @@ export function start(module, root, args, input, said) {
     const lines = streams[0].split("\n");
     streams[0] = lines.pop();
     lines.forEach(said);
+  };
+  const hear = () => {
+    streams[1] = streams[1].replace(/^progress: (.*) (\d+)\n/gm, (_, what, thousandths) => {
+      heard(what, Number(thousandths) / 1000);
+      return "";
+    });
   };
   const remove = (wantsFolder) => (fd, at, length) =>
     below(fd, at, length, (folder, name, node) => {

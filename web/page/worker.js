@@ -13,11 +13,11 @@ let session = null;
 
 const tell = (() => {
   let last = 0;
-  return (file, share) => {
+  return (what, share) => {
     const now = performance.now();
     if (share < 1 && now - last < EVERY) return;
     last = now;
-    postMessage({ progress: { file, share } });
+    postMessage({ progress: { what, share } });
   };
 })();
 
@@ -37,14 +37,14 @@ const answers = {
   /** Puts dropped files in the folder, which is emptied first. */
   files({ files }) {
     root.entries.clear();
-    for (const { name, file } of files) root.entries.set(name, new DroppedFile(file, (share) => tell(name, share)));
+    for (const { name, file } of files) root.entries.set(name, new DroppedFile(file, (share) => tell(`reading ${name}`, share)));
   },
   write({ name, text }) {
     root.entries.set(name, new MemoryFile(new TextEncoder().encode(text)));
   },
   run({ args }) {
     try {
-      return run(module, root, ["mimu", ...args]);
+      return run(module, root, ["mimu", ...args], tell);
     } catch (trap) {
       return { status: 1, stdout: "", stderr: `mimu: ${broken(trap)}` };
     }

@@ -452,10 +452,8 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<ImportSummary> {
     check_outputs(&[args.json.file()], &inputs)?;
     let arguments = options.arguments();
     let bar = progress("importing");
-    let mut summary = import(&options, &args.output, |share| {
-        bar.set_position((share * 1000.0) as u64)
-    })?;
-    bar.finish_and_clear();
+    let mut summary = import(&options, &args.output, |share| bar.reach(share))?;
+    bar.finish();
     summary.taken = looked.map_or(Vec::new(), |look| look.words());
     summary.arguments = arguments;
     summary.warnings.extend(assumed);

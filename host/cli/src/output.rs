@@ -58,13 +58,37 @@ pub fn now() -> String {
     now.unwrap_or_default().to_string()
 }
 
-/// Progress in thousandths, on a terminal only.
-pub(crate) fn progress(what: &'static str) -> ProgressBar {
+/// Progress of work that takes long: a bar on a terminal, nothing in a pipe. In the browser it is a line `progress: WHAT THOUSANDTHS` on the standard
+/// error for the page, which has no terminal.
+pub(crate) struct Progress {
+    bar: ProgressBar,
+    what: &'static str,
+}
+
+/// Begins to show the progress of `what`.
+pub(crate) fn progress(what: &'static str) -> Progress {
     let bar = ProgressBar::new(1000).with_message(what);
     if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {percent:>3} % {eta}") {
         bar.set_style(style);
     }
-    bar
+    Progress { bar, what }
+}
+
+impl Progress {
+    /// This share is done.
+    pub fn reach(&self, share: f64) {
+        let thousandths = (share * 1000.0) as u64;
+        let more = thousandths > self.bar.position();
+        self.bar.set_position(thousandths);
+        if cfg!(target_os = "wasi") && more {
+            eprintln!("progress: {} {thousandths}", self.what);
+        }
+    }
+
+    /// All is done: the bar disappears.
+    pub fn finish(&self) {
+        self.bar.finish();
+    }
 }
 
 /// Prints the text, or writes the JSON and prints the text unless both would go to standard output. The files are published only after all of them

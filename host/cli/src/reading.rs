@@ -137,9 +137,7 @@ pub(crate) fn read(
     inputs.extend(others.iter().flatten());
     check_outputs(outputs, &inputs)?;
     let bar = progress("reading");
-    let prepared = Prepared::read(&recording, finding, |share| {
-        bar.set_position((share * 1000.0) as u64)
-    });
-    bar.finish_and_clear();
+    let prepared = Prepared::read(&recording, finding, |share| bar.reach(share));
+    bar.finish();
     prepared
 }

@@ -4,7 +4,7 @@ use mimu_recording::error::{Error, Result};
 
 use crate::calibration::verify::verify;
 use crate::calibration::{Calibration, FIGURE_DIGITS};
-use crate::diagnose::{Diagnosis, Recordings, diagnose};
+use crate::diagnose::{Diagnosis, Heard, Recordings, diagnose_heard};
 use crate::effects::fitted::FittedEffect;
 use crate::fit::{Method, Options};
 use crate::plan::next_experiment::{self, Next};
@@ -27,6 +27,7 @@ pub struct Diagnosed {
 
 /// Finds the effects in `recordings`, and judges the calibration without and with them by the second recording, whose name is `second`.
 /// `given_name` is the name of the calibration that the recordings are diagnosed with; `created` is the time, RFC 3339.
+/// `heard` is told the share that is done.
 ///
 /// # Errors
 /// Those of [`diagnose`]; a given calibration with curves over temperature, or with an effect that was found anew.
@@ -34,6 +35,7 @@ pub fn diagnosed(
     recordings: Recordings,
     [second, given_name]: [Option<&str>; 2],
     created: &str,
+    heard: Heard,
 ) -> Result<Diagnosed> {
     let options = Options {
         method: Method::LeastSquares,
@@ -50,7 +52,7 @@ pub fn diagnosed(
         ));
     }
     let other = recordings.second.clone();
-    let mut diagnosis = diagnose(recordings, options)?;
+    let mut diagnosis = diagnose_heard(recordings, options, heard)?;
     let known = known(given, &mut diagnosis);
     let found = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
     let found = found.filter(|a| a.of_unit).map(|a| a.effect.lasting());

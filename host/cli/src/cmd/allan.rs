@@ -162,9 +162,9 @@ pub fn run(args: &AllanArgs) -> Result<Status> {
     };
     let bar = progress("reading and averaging");
     let surveys = survey_all(&recordings, calibration.as_ref(), options, |share| {
-        bar.set_position((share * 1000.0) as u64);
+        bar.reach(share);
     });
-    bar.finish_and_clear();
+    bar.finish();
     let surveys = surveys?;
     let result = AllanResult::of(&surveys);
     let mut text = report::allan_text(&result, args.verbose.verbose);

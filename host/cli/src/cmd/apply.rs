@@ -53,9 +53,9 @@ pub(crate) fn run(args: &ApplyArgs) -> Result<()> {
         &args.output,
         args.format,
         args.replace,
-        |share| bar.set_position((share * 1000.0) as u64),
+        |share| bar.reach(share),
     );
-    bar.finish_and_clear();
+    bar.finish();
     let applied = done?;
     print(&args.json, &report::apply_text(&applied), &applied, None)
 }

@@ -201,10 +201,10 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     };
     let bar = progress("writing parquet");
     let summary = record(&mut session, &options, known, look, |share| {
-        bar.set_position((share * 1000.0) as u64)
+        bar.reach(share)
     })?;
     spinner.finish_and_clear();
-    bar.finish_and_clear();
+    bar.finish();
     print(&args.json, &report::record_text(&summary), &summary, None)?;
     summary.broken_off.map_or(Ok(()), Err)
 }

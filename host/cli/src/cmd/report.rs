@@ -14,7 +14,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{KeepArgs, NoiseArgs, StillArgs};
-use crate::output::{now, show};
+use crate::output::{now, progress, show};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::report::text::problems;
@@ -184,5 +184,8 @@ fn found(
         given: None,
         accept: Vec::new(),
     };
-    diagnosed(recordings, [None, None], created)
+    let bar = progress("diagnosing");
+    let done = diagnosed(recordings, [None, None], created, &|share| bar.reach(share));
+    bar.finish();
+    done
 }

@@ -20,6 +20,7 @@ mod undecided;
 use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::Heard;
 use super::note::Note;
 use super::rejected::{Reason, Rejected};
 use super::rows::Rows;
@@ -158,13 +159,14 @@ impl Decision {
 
 /// Decides on the rows of one sensor. `dwell_ends` are the times between dwells, where a bias may have jumped: index of the recording and s.
 /// `unseen` are the rows of a second recording, in which no effects are sought; an effect that it contradicts is not accepted. `without` are
-/// effects that are not tried, each with the reason. `accept` are ids of terms that need no second recording.
+/// effects that are not tried, each with the reason. `accept` are ids of terms that need no second recording. `heard` is told the share that is done.
 pub fn decide(
     rows: &Rows,
     dwell_ends: &[(usize, f64)],
     unseen: Option<&Rows>,
     without: &[Rejected],
     accept: &[String],
+    heard: Heard,
 ) -> Option<Decision> {
     let (mut all, not_excited) = candidates(rows, dwell_ends);
     all.retain(|c| !without.iter().any(|w| w.id == c.id()));
@@ -175,7 +177,9 @@ pub fn decide(
         .fit_at(&search.basis, &search.variance.none())?;
     let dof = rows.y.len() as f64 - search.basis.ncols() as f64;
     let omnibus_p = ChiSquared::new(dof).map_or(1.0, |d| d.sf(known.chi2));
+    heard(0.2);
     let found = search.run()?;
+    heard(0.6);
     let superfluous = found.superfluous.clone();
     let judge = Acceptance::new(&search, unseen, &null);
     let Choice {
@@ -186,6 +190,7 @@ pub fn decide(
         mut rejected,
         mut not_excited,
     } = choose(&search, &judge, found, not_excited, without, accept)?;
+    heard(0.9);
     nonlinear::refine(&search, &mut kept, &mut with);
     others_in_time(&search, &mut kept, &with);
     let one_at_these_inputs = together(&search, &mut kept, &with);

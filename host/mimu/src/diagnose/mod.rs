@@ -29,6 +29,8 @@ pub mod search;
 pub mod uncertainty;
 pub mod variance;
 
+use std::cell::Cell;
+
 use decision::Decision;
 use mimu_core::compensation::Affine;
 use passes::{Pass, Passes, session};
@@ -360,6 +362,9 @@ fn singular(place: &str) -> Error {
     Error::new(place, "the calibration is singular", remedy)
 }
 
+/// Who is told the share of a diagnosis that is done, from 0 to 1. It never falls.
+pub type Heard<'a> = &'a dyn Fn(f64);
+
 /// How the recordings of a diagnosis are calibrated.
 struct Calibrator<'a> {
     recordings: &'a Recordings<'a>,
@@ -435,13 +440,13 @@ struct Found<'a> {
 
 impl Found<'_> {
     /// Seeks the effects of `sensor`, and removes them.
-    fn seek(&mut self, sensor: Sensor) -> Result<()> {
+    fn seek(&mut self, sensor: Sensor, heard: Heard) -> Result<()> {
         let Pass {
             rows,
             mut decision,
             found,
             after,
-        } = self.best_pass(sensor)?;
+        } = self.best_pass(sensor, heard)?;
         let affine = match self.effects.is_empty() {
             true => self.before.clone(),
             false => self.calibrator.judged(self.now.prepared.clone())?,
@@ -474,7 +479,7 @@ impl Found<'_> {
         Ok(())
     }
 
-    fn best_pass(&self, sensor: Sensor) -> Result<Pass> {
+    fn best_pass(&self, sensor: Sensor, heard: Heard) -> Result<Pass> {
         let recordings = self.calibrator.recordings;
         let passes = Passes {
             sensor,
@@ -486,6 +491,8 @@ impl Found<'_> {
             accept: &recordings.accept,
             calibrate: &|prepared| self.calibrator.calibrate(prepared),
             place: &recordings.first.place,
+            heard,
+            done: Cell::new(0),
         };
         passes.best()
     }
@@ -557,6 +564,11 @@ impl Found<'_> {
 ///
 /// The accelerometer comes first: without a table, its directions of gravity judge the gyro.
 pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
+    diagnose_heard(recordings, options, &|_| ())
+}
+
+/// [`diagnose`], with `heard` told the share that is done.
+pub fn diagnose_heard(recordings: Recordings, options: Options, heard: Heard) -> Result<Diagnosis> {
     recordings.check()?;
     let calibrator = Calibrator::of(&recordings, options);
     let before = calibrator.judged(calibrator.without_given_effects(&recordings.first)?)?;
@@ -576,9 +588,11 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         forces: None,
         open: Vec::new(),
     };
-    for sensor in [Sensor::Accel, Sensor::Gyro] {
+    // Fits and file take little beside the searches.
+    for (sensor, from) in [(Sensor::Accel, 0.0), (Sensor::Gyro, 0.5)] {
+        heard(from);
         if found.now.sensor(sensor).is_some() {
-            found.seek(sensor)?;
+            found.seek(sensor, &|share| heard(from + 0.5 * share))?;
         }
     }
     found.add_uncertainty()?;

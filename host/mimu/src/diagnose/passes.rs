@@ -6,6 +6,8 @@
 //! came out 1 % too small with `accel_cross_axis_product` beside it. By hand, products of two axes can change the magnitude of gravity like a
 //! quadratic, and took its place: of three units one was diagnosed wrongly, and two were refused.
 
+use std::cell::Cell;
+
 use mimu_core::compensation::Affine;
 use nalgebra::Matrix3;
 
@@ -15,7 +17,7 @@ use super::note::Note;
 use super::rejected::{Reason, Rejected};
 use super::rows::{ForceErrors, FreeParameters, RowFigure, Rows, Session};
 use super::search::Chosen;
-use super::singular;
+use super::{Heard, singular};
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
 use crate::fit::{Fit, session_bias};
@@ -47,6 +49,11 @@ fn dwell_ends(recordings: &[&Prepared]) -> (Vec<(usize, f64)>, usize) {
     let every = count.div_ceil(MOST_JUMPS).max(1);
     let kept = all.into_iter().skip(every / 2).step_by(every);
     (kept.collect(), count)
+}
+
+/// Share of the work after so many passes. Nobody knows how many there will be: most sensors need one, and each further one is half as likely.
+fn share_of(passes: f64) -> f64 {
+    1.0 - (-passes).exp2()
 }
 
 /// A recording with the calibrations of gyro and accelerometer.
@@ -157,6 +164,10 @@ pub(super) struct Passes<'a> {
     pub accept: &'a [String],
     pub calibrate: &'a dyn Fn(Prepared) -> Result<Fit>,
     pub place: &'a str,
+    /// Told the share of the search that is done.
+    pub heard: Heard<'a>,
+    /// Passes so far.
+    pub done: Cell<u32>,
 }
 
 impl Passes<'_> {
@@ -288,8 +299,11 @@ impl Passes<'_> {
         let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
         let (ends, of) = dwell_ends(&all);
         let decide = |without: &[Rejected]| {
-            decide(&rows, &ends, unseen.as_ref(), without, self.accept)
-                .ok_or_else(|| singular(self.place))
+            let done = self.done.get();
+            let heard = |share: f64| (self.heard)(share_of(f64::from(done) + share));
+            let decision = decide(&rows, &ends, unseen.as_ref(), without, self.accept, &heard);
+            self.done.set(done + 1);
+            decision.ok_or_else(|| singular(self.place))
         };
         let clean = |found: &[FittedEffect]| -> Result<(Fit, Vec<Prepared>)> {
             let lasting: Vec<FittedEffect> = found.iter().map(FittedEffect::lasting).collect();

@@ -69,9 +69,9 @@ pub fn run_check(args: &CheckArgs) -> Result<()> {
     let mut session = open(&args.port)?;
     let bar = progress("comparing");
     let found = check(&mut session, &calibration, &place, args.duration, |share| {
-        bar.set_position((share * 1000.0) as u64)
+        bar.reach(share)
     })?;
-    bar.finish_and_clear();
+    bar.finish();
     let port = session.port();
     let result = DeviceResult::new("check", port, found);
     print(&args.json, &report::check_text(&result), &result, None)?;
@@ -125,10 +125,8 @@ pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
         Ok(())
     };
     let bar = progress("estimating");
-    let run = kalman(&mut session, &plan, apply, |share| {
-        bar.set_position((share * 1000.0) as u64)
-    })?;
-    bar.finish_and_clear();
+    let run = kalman(&mut session, &plan, apply, |share| bar.reach(share))?;
+    bar.finish();
     let result = DeviceResult::new("kalman", session.port(), run);
     print(&args.json, &report::kalman_text(&result), &result, None)
 }

@@ -59,9 +59,9 @@ pub fn run_upload(args: &UploadArgs) -> Result<()> {
     image.check_device(&calibration, session.who(), &place)?;
     let bar = progress("uploading");
     let mut done = upload(&mut session, &image, args.other_unit, |share| {
-        bar.set_position((share * 1000.0) as u64)
+        bar.reach(share)
     })?;
-    bar.finish_and_clear();
+    bar.finish();
     done.warnings
         .extend(outside_now(&mut session, &calibration)?);
     let result = DeviceResult::new("upload", session.port(), done);

@@ -73,9 +73,9 @@ pub fn run_trim(args: &TrimArgs) -> Result<()> {
     let mut session = open(&args.port)?;
     let bar = progress("trimming");
     let done = trim(&mut session, &pose, args.duration, now_s, |share| {
-        bar.set_position((share * 1000.0) as u64)
+        bar.reach(share)
     });
-    bar.finish_and_clear();
+    bar.finish();
     let result = DeviceResult::new("trim", session.port(), done?);
     print(&args.json, &report::trim_text(&result), &result, None)
 }

@@ -83,10 +83,10 @@ pub(super) fn run(args: &RecordArgs) -> Result<()> {
         equipped,
         || stop.load(Ordering::Relaxed),
         |at| lines.show(at),
-        |share| bar.set_position((share * 1000.0) as u64),
+        |share| bar.reach(share),
     )?;
     lines.spinner.finish_and_clear();
-    bar.finish_and_clear();
+    bar.finish();
     print(&args.json, &report::thermal_record_text(&made), &made, None)?;
     match made.cut_short.or(made.not_at_rest.into_iter().next()) {
         Some(error) => Err(error),
