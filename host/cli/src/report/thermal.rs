@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use mimu::parameter::ParameterKind;
-use mimu::quantity::{Sensor, plural, plus_minus, significant};
+use mimu::quantity::{Sensor, plural, significant};
 use mimu::readable;
 use mimu_thermal::compare::{Comparison, Difference};
 use mimu_thermal::fit::FitVerdict;
@@ -176,24 +176,36 @@ fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult) {
     if !sensor.bins.is_empty() {
         *out += &bins(sensor).text("  ");
     }
-    for h in sensor.hysteresis.iter().flatten() {
-        let [mean, largest] = [(h.value, h.half_width), (h.largest, h.largest_half_width)]
-            .map(|(value, half)| plus_minus(value * unit.factor, half * unit.factor));
-        let kelvin = match h.kelvin {
-            Some(k) => format!(" ({} K)", significant(k)),
-            None => String::new(),
-        };
-        let text = format!(
-            "rms {}{kelvin}, largest {largest} at {:.0} °C, heating minus cooling on average {mean}",
-            significant(h.rms * unit.factor),
-            h.largest_at_c,
-        );
-        wrap(
-            out,
-            &format!("  hysteresis {}, {}: ", h.axis, unit.unit),
-            &text,
-        );
+    if sensor.hysteresis.is_some() {
+        *out += &hysteresis(sensor).text("  ");
     }
+}
+
+/// Difference between heating and cooling by axis.
+pub(super) fn hysteresis(sensor: &SensorResult) -> Table {
+    let unit = readable::error(&sensor.unit);
+    let mut table = Table::new(
+        "Hysteresis: difference between heating and cooling that remains after the lag; it is reported, not fitted",
+        format!("hysteresis, {}", unit.unit),
+    )
+    .numbers(["rms", "as K", "largest", "at, °C", "heating - cooling"]);
+    for h in sensor.hysteresis.iter().flatten() {
+        let [mean, largest] = [(h.value, h.half_width), (h.largest, h.largest_half_width)];
+        let interval = |(si, half)| Cell::Interval {
+            si,
+            half,
+            factor: unit.factor,
+        };
+        table.row([
+            Cell::from(h.axis),
+            Cell::number(h.rms, unit.factor),
+            Cell::known(h.kelvin, 1.0),
+            interval(largest),
+            Cell::from(format!("{:.0}", h.largest_at_c)),
+            interval(mean),
+        ]);
+    }
+    table
 }
 
 /// Errors by temperature of the die.

@@ -1,16 +1,15 @@
 //! A fit over temperature as a page.
 
 use maud::{Markup, html};
-use mimu::quantity::plus_minus;
-use mimu::readable;
 use mimu_thermal::fit::FitVerdict;
-use mimu_thermal::judge::Hysteresis;
-use mimu_thermal::result::{SensorResult, ThermalResult};
+use mimu_thermal::result::ThermalResult;
 
 use crate::hint;
 
-use super::page::{Made, number, page, spoken, written};
-use super::thermal::{SHOWN, VERDICT_MISFIT, VERDICT_ONE_WAY, bins, curves, errors, without_lag};
+use super::page::{Made, page, spoken, written};
+use super::thermal::{
+    SHOWN, VERDICT_MISFIT, VERDICT_ONE_WAY, bins, curves, errors, hysteresis, without_lag,
+};
 use super::thermal_plot;
 
 /// The page of a fit.
@@ -41,7 +40,7 @@ pub(super) fn body(result: &ThermalResult, made: &Made) -> Markup {
         @for (name, sensor) in result.sensors.present() {
             h2 class="sensor" { (spoken(name)) }
             @if !sensor.bins.is_empty() { (bins(sensor).html()) }
-            @if let Some(all) = &sensor.hysteresis { (hysteresis(sensor, all)) }
+            @if sensor.hysteresis.is_some() { (hysteresis(sensor).html()) }
             @if let Some(table) = curves(name, result, (0..SHOWN, SHOWN), true) { (table.html()) }
         }
         @if !result.warnings.is_empty() {
@@ -72,27 +71,5 @@ fn head(result: &ThermalResult, made: &Made) -> Markup {
             dt { "Judgement" } dd { (result.judgement) }
             dt { "Fitted" } dd { (made.created) }
         }
-    }
-}
-
-fn hysteresis(sensor: &SensorResult, all: &[Hysteresis]) -> Markup {
-    let unit = readable::error(&sensor.unit);
-    html! {
-        div class="scroll" { table {
-            caption { "Hysteresis: difference between heating and cooling that remains after the lag; it is reported, not fitted" }
-            thead { tr { th { "axis" } th class="n" { "rms, " (unit.unit) } th class="n" { "as a temperature, K" } th class="n" { "largest, " (unit.unit) } th class="n" { "at, °C" } th class="n" { "heating minus cooling on average, " (unit.unit) } } }
-            tbody {
-                @for h in all {
-                    tr {
-                        td { (h.axis) }
-                        td class="n" { (number(h.rms, unit.factor, "")) }
-                        td class="n" { (number(h.kelvin.unwrap_or(f64::NAN), 1.0, "")) }
-                        td class="n" { data value=(h.largest) { (written(&plus_minus(h.largest * unit.factor, h.largest_half_width * unit.factor))) } }
-                        td class="n" { (written(&format!("{:.0}", h.largest_at_c))) }
-                        td class="n" { data value=(h.value) { (written(&plus_minus(h.value * unit.factor, h.half_width * unit.factor))) } }
-                    }
-                }
-            }
-        } }
     }
 }

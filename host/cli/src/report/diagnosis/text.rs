@@ -10,6 +10,7 @@ use crate::hint;
 use crate::report::table::{Cell, Table};
 use crate::report::text::{counted, kinds, problems, wrap};
 use effect::effect;
+pub(super) use effect::table as coefficient_table;
 pub(super) use experiments::by_experiment;
 use experiments::experiments;
 use mimu::diagnose::decision::Leftover;

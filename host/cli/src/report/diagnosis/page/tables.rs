@@ -5,7 +5,7 @@ use maud::{Markup, PreEscaped, html};
 use super::{Shown, sentence};
 use crate::hint;
 use crate::report::diagnosis::remarks;
-use crate::report::diagnosis::text::{by_experiment, by_score, converter};
+use crate::report::diagnosis::text::{by_experiment, by_score, coefficient_table, converter};
 use crate::report::page::{number, spoken, written};
 use mimu::diagnose::decision::{Accepted, Leftover};
 use mimu::quantity::{Figure, Sensor, p_value, significant};
@@ -61,39 +61,8 @@ pub(super) fn errors(sensors: &[Shown]) -> Markup {
 /// Coefficients of an effect.
 pub fn coefficients(one: &Accepted) -> Markup {
     html! {
-        div class="scroll" { table {
-            thead { tr {
-                th { "coefficient" } th class="n" { "value" } th class="n" { "± 95 %" } th { "unit" }
-                th class="n" { "in data sheets" } th class="n" { "SI" } th { "SI unit" }
-            } }
-            tbody {
-                @for c in one.effect.coefficients() {
-                    @let sigma = c.sigma.unwrap_or_default();
-                    @let readable::Readable { factor, unit } = readable::coefficient(&c.unit);
-                    tr {
-                        td { (c.name) }
-                        td class="n" { (number(c.value, factor, "")) }
-                        td class="n" { data value=(sigma) { (written(&significant(2.0 * sigma * factor))) } }
-                        td { (unit) }
-                        td class="n" { @match c.typical { Some(t) => (number(t, factor, "")), None => "–" } }
-                        td class="n dim" { (written(&format!("{:.3e}", c.value))) }
-                        td class="dim" { (c.unit.replace("^2", "²")) }
-                    }
-                }
-                @if let Some(form) = one.effect.nonlinear_parameter() {
-                    tr {
-                        td { (form.name) }
-                        td class="n" { (number(form.value, 1.0, "")) }
-                        td class="n" { (form.interval()) } td { }
-                        td class="n" { (number(form.from, 1.0, "")) " to " (number(form.to, 1.0, "")) " sought" }
-                        td { } td { }
-                    }
-                }
-                @for c in one.effect.converters() {
-                    tr { td colspan="7" { (converter(&c)) } }
-                }
-            }
-        } }
+        (coefficient_table(one).html())
+        @for c in one.effect.converters() { p { (sentence(&converter(&c))) } }
     }
 }
 

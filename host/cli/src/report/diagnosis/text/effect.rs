@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{by, converter, shown};
+use crate::report::table::{Cell, Table};
 use crate::report::text::{columns, wrap};
 use mimu::diagnose::decision::Accepted;
 use mimu::effects::fitted::WrittenCoefficient;
@@ -31,15 +32,10 @@ pub(super) fn effect(
     let coefficients = a.effect.coefficients();
     wrap(out, "    held out ", &errors(s, a));
     match all {
-        true => {
-            for c in &coefficients {
-                let (value, unit) = coefficient(c);
-                let _ = writeln!(out, "    {:<12}{value:>19} {unit}", c.name);
-            }
-        }
+        true => *out += &table(a).text("    "),
         false => compact(out, &coefficients),
     }
-    if let Some(form) = a.effect.nonlinear_parameter() {
+    if let Some(form) = a.effect.nonlinear_parameter().filter(|_| !all) {
         let (value, interval) = (significant(form.value), form.interval());
         let _ = writeln!(out, "    {} {value} (95 %: {interval})", form.name);
     }
@@ -71,6 +67,39 @@ fn errors(s: &SensorDiagnosisResult, a: &Accepted) -> String {
         None => {}
     }
     format!("{text}; {}", p_value(a.chosen.p))
+}
+
+/// The coefficients of an effect, and its nonlinear parameter.
+pub(in crate::report::diagnosis) fn table(a: &Accepted) -> Table {
+    let mut table = Table::new("Coefficients with 95 % intervals", "coefficient")
+        .numbers(["value"])
+        .words("unit")
+        .numbers(["in data sheets"])
+        .on_page("SI");
+    for c in a.effect.coefficients() {
+        let Readable { factor, unit } = readable::coefficient(&c.unit);
+        table.row([
+            Cell::from(c.name.clone()),
+            Cell::Interval {
+                si: c.value,
+                half: 2.0 * c.sigma.unwrap_or_default(),
+                factor,
+            },
+            Cell::from(unit.into_owned()),
+            Cell::known(c.typical, factor),
+            Cell::from(format!("{:.3e} {}", c.value, c.unit.replace("^2", "²"))),
+        ]);
+    }
+    if let Some(form) = a.effect.nonlinear_parameter() {
+        let [from, to] = [form.from, form.to].map(significant);
+        table.row([
+            Cell::from(form.name.clone()),
+            Cell::from(format!("{} ({})", significant(form.value), form.interval())),
+            Cell::Empty,
+            Cell::from(format!("{from} to {to} sought")),
+        ]);
+    }
+    table
 }
 
 /// Value with its 95 % interval, and unit.
