@@ -40,6 +40,12 @@ pub struct HandsTruth {
     pub dwell_stretch: f64,
     /// Standard deviation of a turn from its axis, about each perpendicular axis.
     pub wander_deg: f64,
+    /// Range of the length of one of several whole turns, s.
+    pub whole_turn_s: [f64; 2],
+    /// Rms deviation of the axis of whole turns, about each axis, in the band of the sway times ten.
+    pub wobble_deg: f64,
+    /// Standard deviation of the attitude in which the board is put back after whole turns, about each axis.
+    pub put_back_deg: f64,
     /// Standard deviation of the position where the board is put down, in each horizontal direction.
     pub carry_mm: f64,
     /// Mean height of the arc from pose to pose. The lowest is half of it, the highest one and a half times it.
@@ -77,6 +83,9 @@ impl Default for HandsTruth {
             pause_s: [0.3, 1.5],
             dwell_stretch: 0.3,
             wander_deg: 15.0,
+            whole_turn_s: [2.0, 3.5],
+            wobble_deg: 3.0,
+            put_back_deg: 0.5,
             carry_mm: 100.0,
             lift_mm: 80.0,
             lever_mm: [20.0, -10.0, 15.0],
@@ -98,12 +107,15 @@ impl HandsTruth {
     /// Refuses impossible values.
     pub fn check(&self) -> Result<(), Refusal> {
         let (angle, size) = ([0.0, 90.0], [0.0, 1000.0]);
-        let ranges: [(&str, &[f64], [f64; 2]); 18] = [
+        let ranges: [(&str, &[f64], [f64; 2]); 21] = [
             ("aim_deg", &[self.aim_deg], angle),
             ("turn_s", &self.turn_s, [0.1, 60.0]),
             ("pause_s", &self.pause_s, [0.0, 600.0]),
             ("dwell_stretch", &[self.dwell_stretch], [0.0, 10.0]),
             ("wander_deg", &[self.wander_deg], angle),
+            ("whole_turn_s", &self.whole_turn_s, [0.1, 60.0]),
+            ("wobble_deg", &[self.wobble_deg], angle),
+            ("put_back_deg", &[self.put_back_deg], angle),
             ("carry_mm", &[self.carry_mm], size),
             ("lift_mm", &[self.lift_mm], size),
             ("lever_mm", &self.lever_mm, [-1000.0, 1000.0]),
@@ -123,6 +135,7 @@ impl HandsTruth {
         }
         for (key, [low, high]) in [
             ("turn_s", self.turn_s),
+            ("whole_turn_s", self.whole_turn_s),
             ("pause_s", self.pause_s),
             ("tremor_hz", self.tremor_hz),
             ("sway_hz", self.sway_hz),
@@ -204,6 +217,7 @@ pub struct Hands {
     tremor: Shake,
     sway: Shake,
     shake: Shake,
+    wobble: Shake,
     jolt_s: f64,
     still: Option<(usize, Motion)>,
     /// State under command; `None` if there is a plan.
@@ -223,8 +237,8 @@ impl Hands {
             let poses = match step.pose {
                 Pose::Up(up) => vec![up],
                 Pose::Many(count) => chosen(count, random),
-                // A plan by hand has a pose in every step.
-                Pose::Here => Vec::new(),
+                // A plan by hand has a pose in every step, or whole turns where the board lies.
+                Pose::Here => turns.last().map(|last| last.up).into_iter().collect(),
             };
             for up in poses {
                 for _ in 0..step.repeat {
@@ -233,11 +247,21 @@ impl Hands {
                     } else {
                         end_s
                     };
-                    let turn = Turn::draw(turns.last(), at_s, step, up, truth, random);
+                    let turn = match (&step.whole, turns.last()) {
+                        (Some(whole), Some(last)) => {
+                            Turn::whole(last, at_s, step, whole, truth, random)
+                        }
+                        (_, last) => Turn::draw(last, at_s, step, up, truth, random),
+                    };
                     end_s = turn.dwell[1] + between(truth.pause_s, random);
                     turns.push(turn);
                 }
             }
+        }
+        if turns.iter().any(|turn| turn.whole.is_some()) {
+            let band = truth.sway_hz.map(|hz| 10.0 * hz);
+            let mrad = 1e3 * truth.wobble_deg.to_radians();
+            hands.wobble = Shake::new(random, band, mrad, truth.sway_mm);
         }
         (hands.turns, hands.duration_s) = (turns, end_s);
         Ok(hands)
@@ -255,6 +279,7 @@ impl Hands {
             lever: scale(1e-3, truth.lever_mm),
             tremor,
             shake: sway.clone(),
+            wobble: sway.clone(),
             sway,
             jolt_s: truth.jolt_s,
             still: None,
@@ -328,6 +353,9 @@ impl Hands {
         if turning && turn.held != [true, true] {
             shift.add(&self.tremor.at(t_s), detour);
         }
+        if turning && turn.whole.is_some() {
+            shift.add(&self.wobble.at(t_s), detour);
+        }
         if turning && turn.shaken {
             shift.add(&self.shake.at(t_s), detour);
         }
@@ -365,6 +393,9 @@ impl Hands {
         let mut frame = Frame::ground(&self.place)
             .fixed(turn.from)
             .about(turn.axis, done.times(turn.angle));
+        if let Some((axis, angle)) = turn.whole {
+            frame = frame.about(axis, done.times(angle));
+        }
         if let Some((axis, angle)) = turn.even.map(|even| even.at(t_s)) {
             frame = frame.about(axis, angle);
         }

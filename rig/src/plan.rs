@@ -78,6 +78,8 @@ pub struct Step {
     pub spin: f64,
     /// A turn by an angle in place of the dwells.
     pub turn: Option<Turn>,
+    /// Whole turns by hand before the dwell.
+    pub whole: Option<WholeTurns>,
     /// Duration of each dwell, s; for a turn, without its ramps.
     pub dwell_s: f64,
     /// Successive dwells in each pose.
@@ -94,6 +96,7 @@ impl Step {
             rate: 0.0,
             spin: 0.0,
             turn: None,
+            whole: None,
             dwell_s,
             repeat: 1,
             at: Places::default(),
@@ -108,6 +111,15 @@ impl Step {
         };
         u64::from(poses) * u64::from(self.repeat)
     }
+}
+
+/// Turns by hand from where the board lies, after which it is put back there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WholeTurns {
+    /// Whole number of turns; negative: the other direction.
+    pub count: f64,
+    /// Their axis, unit vector in the body.
+    pub about: Vector,
 }
 
 /// Pose of a step.

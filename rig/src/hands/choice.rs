@@ -1,8 +1,10 @@
 //! Choices of a person carrying out a plan: the next pose, how well it is met, and how long everything takes.
 
+use std::f64::consts::TAU;
+
 use super::HandsTruth;
 use super::even::Even;
-use crate::plan::{Step, attitude};
+use crate::plan::{Step, WholeTurns, attitude};
 use crate::random::Random;
 use crate::rotation::{Rotation, Vector, norm};
 
@@ -32,6 +34,8 @@ pub(super) struct Turn {
     pub(super) shaken: bool,
     /// Rotation from its pose at which it arrives, rad, and the time to settle, s.
     pub(super) settling: Option<(Vector, f64)>,
+    /// Whole turns on the way: axis (unit, body axes before the turn) and angle, rad.
+    pub(super) whole: Option<(Vector, f64)>,
     /// A slow turn instead of a rest.
     pub(super) even: Option<Even>,
 }
@@ -109,9 +113,38 @@ impl Turn {
                 ..knock
             }),
             shaken: false,
+            whole: None,
             settling: None,
             even: None,
         }
+    }
+}
+
+impl Turn {
+    /// The whole turns of `step` from where the board lies since `last`, and the dwell where it is put back.
+    pub(super) fn whole(
+        last: &Turn,
+        at_s: f64,
+        step: &Step,
+        whole: &WholeTurns,
+        truth: &HandsTruth,
+        random: &mut Random,
+    ) -> Turn {
+        // All choices of a turn, so that those of later turns do not depend on what this one is.
+        let mut turn = Turn::draw(Some(last), at_s, step, last.up, truth, random);
+        let each_s = between(truth.whole_turn_s, random);
+        let [dwell, end] = turn.dwell;
+        let longer_s = each_s * whole.count.abs() - turn.turn_s;
+        turn.turn_s += longer_s;
+        turn.dwell = [dwell + longer_s, end + longer_s];
+        if let Some(jolt) = &mut turn.jolt {
+            jolt.start_s += longer_s;
+        }
+        let missed = [0; 3].map(|_| random.normal() * truth.put_back_deg.to_radians());
+        (turn.axis, turn.angle) = Rotation::by(missed).axis_angle();
+        turn.position[1] = turn.position[0];
+        turn.whole = Some((whole.about, TAU * whole.count));
+        turn
     }
 }
 

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::reader::{FASTEST_DPS, Reader};
-use super::{CarriedBy, Places, Pose, Step, TableAxis, Turn};
+use super::{CarriedBy, Places, Pose, Step, TableAxis, Turn, WholeTurns};
 use crate::located::written;
 use crate::rotation::{Vector, direction};
 
@@ -22,6 +22,8 @@ pub(super) struct RawStep {
     pub(super) turn_axis: Option<Spanned<TableAxis>>,
     pub(super) turn_deg: Option<Spanned<f64>>,
     pub(super) turn_dps: Option<Spanned<f64>>,
+    pub(super) whole_turns: Option<Spanned<f64>>,
+    pub(super) about: Option<Spanned<Vector>>,
     pub(super) dwell_s: Option<Spanned<f64>>,
     pub(super) repeat: Option<Spanned<u32>>,
 }
@@ -36,7 +38,8 @@ impl Reader<'_> {
         let (at, raw) = (raw.span(), raw.get_ref());
         self.on_table(raw, carrier)?;
         let turn = self.turn(raw)?;
-        let (pose, pose_at) = self.pose(raw, &at, turn.is_some())?;
+        let whole = self.whole_turns(raw, carrier)?;
+        let (pose, pose_at) = self.pose(raw, &at, turn.is_some() || whole.is_some())?;
         let dwell_s = self.dwell_s(raw, &at, turn.as_ref(), sample_rate_hz)?;
         let repeat = self.repeat(raw)?;
         let place = |value: Option<&Spanned<f64>>| value.map_or(at.clone(), Spanned::span);
@@ -49,6 +52,7 @@ impl Reader<'_> {
             rate: self.angle("rate_dps", &raw.rate_dps, FASTEST_DPS, "degrees per second")?,
             spin: self.angle("spin_dps", &raw.spin_dps, FASTEST_DPS, "degrees per second")?,
             turn,
+            whole,
             dwell_s,
             repeat,
             at: Places {
@@ -131,6 +135,45 @@ impl Reader<'_> {
         let place = raw.dwell_s.as_ref().map_or(at.clone(), Spanned::span);
         let remedy = "give the dwell in seconds, a sample or longer";
         Err(self.source.error(&place, problem, remedy))
+    }
+
+    /// Whole turns by hand, after which the board is put back.
+    fn whole_turns(&self, raw: &RawStep, carrier: CarriedBy) -> Result<Option<WholeTurns>, String> {
+        let (turns, about) = match (&raw.whole_turns, &raw.about) {
+            (None, None) => return Ok(None),
+            (Some(turns), Some(about)) => (turns, about),
+            (Some(only), None) => {
+                let remedy = "add `about = [...]`, the body axis of the turns";
+                return Err(self
+                    .source
+                    .error(&only.span(), "`about` is missing", remedy));
+            }
+            (None, Some(only)) => {
+                let remedy = "add `whole_turns = ...`, or remove it";
+                return Err(self
+                    .source
+                    .error(&only.span(), "`about` without turns", remedy));
+            }
+        };
+        let count = *turns.get_ref();
+        if carrier == CarriedBy::Table {
+            let remedy =
+                "give `turn_axis`, `turn_deg` and `turn_dps`, or set `carrier = \"hands\"`";
+            return Err(self
+                .source
+                .error(&turns.span(), "`whole_turns` on a table", remedy));
+        }
+        if count.fract() != 0.0 || count == 0.0 || count.abs() > 1000.0 {
+            let problem = format!("`whole_turns` is {}", written(count));
+            let remedy = "give a whole number, negative for the other direction";
+            return Err(self.source.error(&turns.span(), problem, remedy));
+        }
+        let remedy = "give a body direction, as [0.0, 0.0, 1.0]";
+        let about = direction(*about.get_ref()).ok_or_else(|| {
+            self.source
+                .error(&about.span(), "`about` has no length", remedy)
+        })?;
+        Ok(Some(WholeTurns { count, about }))
     }
 
     fn repeat(&self, raw: &RawStep) -> Result<u32, String> {
