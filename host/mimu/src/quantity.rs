@@ -4,6 +4,7 @@ use mimu_recording::RawUnit;
 use serde::{Serialize, Serializer};
 
 pub use mimu_core::{PerSensor, Sensor};
+pub use mimu_recording::digits::{duration, plural, rounded, significant, unsigned_zero};
 
 /// Names of the axes.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
@@ -89,30 +90,6 @@ pub fn scale_unit(raw: RawUnit, si: &str) -> String {
     }
 }
 
-/// `value` rounded to `digits` significant digits, for files that should contain no more digits than are known.
-pub fn rounded(value: f64, digits: usize) -> f64 {
-    let text = format!("{value:.*e}", digits.saturating_sub(1));
-    text.parse().unwrap_or(value)
-}
-
-/// `value` to three significant digits, without an exponent where that reads well.
-pub fn significant(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    // Rounded first: otherwise 0.0099998, which time stamps make of 0.01, would have one digit more. Whole numbers keep all their digits.
-    let value = match value.abs() < 100.0 {
-        true => rounded(value, 3),
-        false => value,
-    };
-    let digits = 2 - value.abs().log10().floor() as i32;
-    if (-3..=6).contains(&digits) {
-        format!("{value:.*}", digits.max(0) as usize)
-    } else {
-        format!("{value:.2e}")
-    }
-}
-
 /// `value ± half`, both to the second significant digit of `half`.
 pub fn plus_minus(value: f64, half: f64) -> String {
     if !(half > 0.0) || !half.is_finite() {
@@ -128,17 +105,7 @@ pub fn plus_minus(value: f64, half: f64) -> String {
     format!("{value:.digits$} ± {half:.digits$}")
 }
 
-/// A time in the unit that people use for it.
-pub fn duration(s: f64) -> String {
-    match s {
-        s if s < 120.0 => format!("{} s", significant(s)),
-        s if s < 7200.0 => format!("{} min", significant(s / 60.0)),
-        s if s < 172_800.0 => format!("{} h", significant(s / 3600.0)),
-        s => format!("{} days", significant(s / 86_400.0)),
-    }
-}
-
-/// The same to the second: `90.0 s`, `2 min 30 s`.
+/// A time to the second: `90.0 s`, `2 min 30 s`.
 pub fn minutes(seconds: f64) -> String {
     match seconds.round() {
         s if s < 120.0 => format!("{} s", significant(seconds)),
@@ -154,20 +121,6 @@ pub fn p_value(p: f64) -> String {
     }
 }
 
-/// `1 sample`, `2 samples`.
-pub fn plural(n: u64, noun: &str) -> String {
-    if n == 1 {
-        format!("1 {noun}")
-    } else {
-        format!("{n} {noun}s")
-    }
-}
-
-/// `value`, with -0 written as 0.
-pub fn unsigned_zero(value: f64) -> f64 {
-    value + 0.0
-}
-
 /// Normal gravity at sea level, m/s² (WGS 84, Somigliana), at a latitude in degrees. Local gravity differs by some
 /// 3e-4 m/s², and by 3.1e-6 m/s² for each metre of height.
 pub fn normal_gravity(latitude_deg: f64) -> f64 {
@@ -179,23 +132,6 @@ pub fn normal_gravity(latitude_deg: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn three_digits_are_shown_and_no_whole_number_is_cut() {
-        let cases = [
-            (0.009_999_8, "0.0100"),
-            (0.01, "0.0100"),
-            (99.96, "100"),
-            (-2.345, "-2.35"),
-            (2174.4, "2174"),
-            (1.5e-7, "1.50e-7"),
-            (0.0, "0"),
-        ];
-        for (value, text) in cases {
-            assert_eq!(significant(value), text);
-        }
-        assert_eq!(rounded(2.234_56e-6, 4), 2.235e-6);
-    }
 
     #[test]
     fn normal_gravity_is_that_of_the_ellipsoid_at_the_equator_and_the_poles() {

@@ -15,7 +15,7 @@ use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::signal::blocks::extent;
 use crate::signal::dwell::Change;
 use crate::warning::Warning;
-use mimu_recording::RawUnit;
+use mimu_recording::{RawUnit, health};
 
 /// Offset of an accelerometer beyond any data sheet, g: those of MEMS parts allow up to 0.15.
 const LARGEST_OFFSET_G: f64 = 0.5;
@@ -84,7 +84,7 @@ impl Seen {
             | Warning::Turning { .. }
             | Warning::CalibrationOfOther { .. }
             | Warning::NoisierThanGyros { .. } => Self::Unit,
-            Warning::Dead { .. } => Self::DeadChannel,
+            Warning::Health(finding) => Self::of_finding(finding.fault)?,
             Warning::EndOfConverter { .. }
             | Warning::FullScale { .. }
             | Warning::RunAtEnd { .. }
@@ -98,8 +98,7 @@ impl Seen {
                 fault: Some(Fault::Saturated(_)),
                 ..
             } => Self::Clipping,
-            Warning::Held { .. }
-            | Warning::DwellsNotUsed {
+            Warning::DwellsNotUsed {
                 fault: Fault::Stuck(_),
                 ..
             }
@@ -121,6 +120,15 @@ impl Seen {
                 Change::Range(_) => Self::RangeChange,
                 Change::Columns(..) => Self::ColumnsMoved,
             },
+            _ => return None,
+        })
+    }
+
+    /// Kind of a fault of the readings, if a fit may see it.
+    fn of_finding(fault: health::Fault) -> Option<Self> {
+        Some(match fault {
+            health::Fault::Dead { .. } => Self::DeadChannel,
+            health::Fault::Held { .. } => Self::HeldReadings,
             _ => return None,
         })
     }

@@ -26,7 +26,7 @@ use self::values::{Read, Values};
 use crate::calibration::Calibration;
 use crate::quantity::Sensor;
 use crate::signal::no_temperature;
-use crate::warning::{CHECK_WIRING, Warning};
+use crate::warning::Warning;
 use mimu_allan::deviation::Integrated;
 use mimu_allan::model::{
     Coefficient, Estimator, NoiseModel, Term, allan_factors, hadamard_factors,
@@ -34,6 +34,7 @@ use mimu_allan::model::{
 use mimu_allan::spectrum::{WithoutLines, remove_lines_after};
 use mimu_allan::{Deviation, NotFinite, Point, Spacing};
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::health::Finding;
 use mimu_recording::{Column, NoTemperatures, RAW_COLUMNS, RawUnit, Recording};
 
 /// What to compute.
@@ -71,7 +72,7 @@ pub struct Channel {
     /// Unit of its deviations.
     pub unit: Unit,
     /// Why it has no noise: it is constant, and nothing is computed from it.
-    pub dead: Option<String>,
+    pub dead: Option<Finding>,
     /// Samples that it was computed from.
     pub samples: usize,
     /// Short disturbances that were masked.
@@ -169,9 +170,9 @@ pub fn survey(
                 found.add(i, unit, values, next)?;
                 progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
             }
-            Read::Dead(why) => {
+            Read::Dead(dead) => {
                 next();
-                found.add_dead(i, unit, why);
+                found.add_dead(i, unit, dead);
             }
         }
         Ok(())
@@ -258,25 +259,30 @@ impl Found<'_> {
         Ok(())
     }
 
-    fn add_dead(&mut self, i: usize, unit: Unit, why: String) {
-        let warning = Warning::Dead { why: why.clone() };
-        self.warnings.push(warning.of_channel(i));
-        self.channels.push(Channel::dead(i, unit, why));
+    fn add_dead(&mut self, i: usize, unit: Unit, dead: Finding) {
+        self.warnings.push(Warning::Health(dead));
+        self.channels.push(Channel {
+            dead: Some(dead),
+            ..Channel::of(i, unit, 0)
+        });
     }
 
     fn refuse_all_dead(&self, place: &str) -> Result<()> {
         let first = self.channels.first().and_then(|c| c.dead.as_ref());
-        let Some(why) = first.filter(|_| self.judged.is_empty()) else {
+        let Some(dead) = first.filter(|_| self.judged.is_empty()) else {
             return Ok(());
         };
         let names: Vec<&str> = self.channels.iter().map(|c| c.name).collect();
         Err(Error::new(
             format!("{place}, columns {}", names.join(", ")),
             match self.channels.len() {
-                1 => why.clone(),
-                n => format!("all {n} channels are constant: of the first {why}"),
+                1 => dead.problem(),
+                n => format!(
+                    "all {n} channels are constant: of the first {}",
+                    dead.problem()
+                ),
             },
-            CHECK_WIRING,
+            dead.remedy(),
         ))
     }
 
@@ -418,13 +424,6 @@ impl Channel {
             without_lines: None,
             model: None,
             n_band_hz: None,
-        }
-    }
-
-    fn dead(i: usize, unit: Unit, why: String) -> Self {
-        Self {
-            dead: Some(why),
-            ..Self::of(i, unit, 0)
         }
     }
 

@@ -2,14 +2,14 @@
 
 mod words;
 
-pub(crate) use words::CHECK_WIRING;
 use words::{degrees, extreme, off, open};
 
 use std::fmt::Display;
 use std::mem::discriminant;
 
 use mimu_recording::error::Error;
-use mimu_recording::{Held, NoTemperatures, RAW_COLUMNS};
+use mimu_recording::health::Finding;
+use mimu_recording::{NoTemperatures, RAW_COLUMNS};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -88,16 +88,9 @@ pub enum Warning {
     /// Samples of the thermometer that cannot be temperatures.
     #[error("temp_c: {}", .which.warning().unwrap_or_default())]
     NoTemperatures { which: NoTemperatures },
-    /// A channel without noise, and how it shows.
-    #[error("{why}: it has no noise and is left out of a noise file; {CHECK_WIRING}")]
-    Dead { why: String },
-    /// A sensor that is slower than its log, of this many rows a second.
-    #[error(fmt = words::held)]
-    Held {
-        sensor: Sensor,
-        held: Held,
-        rate_hz: f64,
-    },
+    /// A fault of the readings.
+    #[error("{0}")]
+    Health(Finding),
     /// A row from which on the readings mean something else.
     #[error("from data row {} on {}: no calibration holds before and after it", .0.row + 1, .0.change)]
     LogFault(LogFault),
@@ -509,6 +502,7 @@ impl Warning {
                 warning.kind()
             }
             Self::Reading(warning) => warning.kind(),
+            Self::Health(finding) => finding.kind(),
             _ => self.into(),
         }
     }
@@ -519,6 +513,7 @@ impl Warning {
             Self::Of { sensor, .. } => Some(sensor.name()),
             Self::Channel { channel, .. } => Some(channel),
             Self::In { warning, .. } => warning.about(),
+            Self::Health(finding) => finding.about,
             _ => None,
         }
     }
@@ -567,6 +562,7 @@ impl Warning {
                 one.is_like(other)
             }
             (Self::Reading(one), Self::Reading(other)) => discriminant(one) == discriminant(other),
+            (Self::Health(one), Self::Health(other)) => one.kind() == other.kind(),
             (
                 Self::DwellsNotUsed {
                     fault: f,

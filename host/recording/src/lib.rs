@@ -6,7 +6,9 @@
 //! The features `parquet` and `bags` are on by default. Without them neither Parquet nor the readers of ROS bags and MCAP are compiled, recordings
 //! are CSV, and such files are refused.
 
+pub mod digits;
 pub mod error;
+pub mod health;
 pub mod result_file;
 pub mod signed_low_byte;
 pub mod units;
@@ -18,7 +20,6 @@ mod csv_file;
 mod csv_writer;
 mod digest;
 mod growing;
-mod held;
 mod import;
 mod in_memory;
 mod in_order;
@@ -54,7 +55,6 @@ use without_parquet as parquet_writer;
 pub use batch::Batch;
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
-pub use held::{Held, HeldReadings};
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, CommentSigns, Decimal, Face,
     ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse,

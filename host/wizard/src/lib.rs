@@ -37,7 +37,6 @@ mod rails;
 pub mod refit;
 pub mod regular;
 pub mod relay;
-mod repeated;
 pub mod resumed;
 pub mod session;
 pub mod source;

@@ -7,11 +7,11 @@ use mimu::signal::increment::pause_periods;
 use mimu_core::compensation::Affine;
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::health::Unanswered;
 
 use crate::clock::{ClockRate, Clocks, REFUSED_SHARE};
 use crate::rails::Rails;
 use crate::regular::{Regular, Timed};
-use crate::repeated::Repeated;
 use crate::source::{Chunk, SourceEvent, Unit};
 use crate::text_line::{Columns, Lines, Reading};
 
@@ -60,7 +60,7 @@ pub struct TextBoard {
     clocks: Clocks,
     clock_trusted: bool,
     rails: Rails,
-    repeated: Repeated,
+    unanswered: Unanswered,
     ready: VecDeque<SourceEvent>,
     /// Number of lines without data at which they are reported next.
     tell_at: u64,
@@ -99,7 +99,7 @@ impl TextBoard {
             clocks: Clocks::default(),
             clock_trusted: text.clock_trusted,
             rails: Rails::default(),
-            repeated: Repeated::default(),
+            unanswered: Unanswered::default(),
             ready: VecDeque::new(),
             tell_at: 1,
         }
@@ -243,14 +243,13 @@ impl TextBoard {
 
     /// Appends a sample to the current chunk, unless the board only repeats its last readings.
     fn emit(&mut self, tick: u64, sample: &Timed) {
-        if self.repeated.take(&sample.raw, self.unit.rate_hz) {
+        let rate_hz = self.unit.rate_hz;
+        let (raw, pause) = (&sample.raw, pause_periods(rate_hz));
+        if self.unanswered.take(raw, rate_hz, pause) {
             return;
         }
-        if let Some(rows) = self.repeated.ended() {
-            let words = format!(
-                "it has repeated its last readings in {rows} lines, which count as missing: its sensor did not answer"
-            );
-            self.ready.push_back(SourceEvent::Note(words));
+        if let Some(found) = self.unanswered.ended() {
+            self.ready.push_back(SourceEvent::Note(found.to_string()));
         }
         let counts = self.unit.raw_unit == RawUnit::Count;
         let at_end = counts && sample.raw.iter().any(|code| ENDS.contains(code));

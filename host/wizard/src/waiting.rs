@@ -4,8 +4,8 @@ use std::fmt;
 use std::mem::discriminant;
 
 use mimu::quantity::Sensor;
-use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::Error;
+use mimu_recording::health::Finding;
 use nalgebra::Vector3;
 use serde::{Serialize, Serializer};
 
@@ -22,8 +22,8 @@ pub enum Waiting {
     Warming(f64, f64),
     /// The table has not arrived.
     TableMoves,
-    /// A raw column, given by its index, repeats one value.
-    Stuck(usize),
+    /// The readings have a fault.
+    Faulty(Finding),
     /// Missing samples, and the expected number in the last second.
     SamplesLost(u64, f64),
     /// A reading is at a rail.
@@ -65,7 +65,7 @@ impl fmt::Display for Waiting {
                 )
             }
             Self::TableMoves => f.write_str("the table moves"),
-            Self::Stuck(c) => write!(f, "{} repeats one value: check its wiring", RAW_COLUMNS[*c]),
+            Self::Faulty(finding) => write!(f, "{finding}"),
             Self::SamplesLost(missing, of) => write!(
                 f,
                 "samples are missing, {missing} of the last {of:.0}: check the cable"

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::{STILL_FACTOR, WINDOW_S};
 use mimu_core::compensation::Affine;
+use mimu_recording::health::{Finding, Repetition, StuckChannel};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::source::Chunk;
@@ -31,10 +32,8 @@ const LEARNT_S: f64 = 5.0;
 /// Tremor of hands: the accelerometer's, as a share of gravity, and the gyro's, as a share of the largest mean rate so far. A turn by hand
 /// reaches 50 to 150 deg/s, so that is 2 to 6 deg/s. With half of it, people with a strong tremor (1.6 deg/s rms) needed 25 to 50 minutes. Without it, a sensor with less noise than hands tremble would never be at rest in them.
 const TREMOR: (f64, f64) = (0.01, 0.04);
-/// If this share of the rows of a block repeats the row before, and [`COARSE`] of all earlier rows does not, the board repeats its last reading.
+/// If this share of the rows of a block repeats the row before, and this is no habit of the board, the board repeats its last reading.
 const HELD: f64 = 0.5;
-/// Share of repeated rows from which on a board's steps are coarser than its noise.
-const COARSE: f64 = 0.1;
 
 /// Means and squared deviations of the six channels.
 #[derive(Debug, Clone, Copy, Default)]
@@ -68,54 +67,6 @@ impl Moments {
     }
 }
 
-/// Quantisation of a channel.
-#[derive(Debug, Clone, Copy, Default)]
-struct Codes {
-    last: Option<f64>,
-    /// Smallest change so far; `None` if there was none.
-    step: Option<f64>,
-    /// Whether the first second had a single value: either the quantisation step exceeds the noise, or a wire is broken.
-    constant: Option<bool>,
-    /// Variance of the quietest second with more than one value.
-    quietest: Option<f64>,
-}
-
-impl Codes {
-    fn add(&mut self, value: f64) {
-        let change = self.last.map_or(0.0, |last| (value - last).abs());
-        if change > 0.0 {
-            self.step = Some(self.step.map_or(change, |step| step.min(change)));
-        }
-        self.last = Some(value);
-    }
-
-    /// Records the variance of a second.
-    fn judge(&mut self, variance: f64) {
-        self.constant.get_or_insert(variance == 0.0);
-        if variance > 0.0 {
-            self.quietest = Some(self.quietest.map_or(variance, |least| least.min(variance)));
-        }
-    }
-
-    /// Whether the quantisation step exceeds the noise so far that a second may have a single value. If the noise is half a step, a hundred equal
-    /// samples occur once in 1e16 seconds.
-    fn is_coarse(&self) -> bool {
-        let hides = |(step, variance): (f64, f64)| variance < step * step / 3.0;
-        self.constant == Some(true) || self.step.zip(self.quietest).is_some_and(hides)
-    }
-
-    /// Whether a second with a single value is a fault; a coarse quantisation step also gives one. `moved`: the unit was turned since the beginning.
-    fn is_stuck(&self, moved: bool) -> bool {
-        !self.is_coarse() || moved && self.step.is_none()
-    }
-
-    /// Variance hidden by a coarse quantisation step.
-    fn hidden(&self) -> f64 {
-        let step = self.step.filter(|_| self.is_coarse());
-        step.map_or(0.0, |step| step * step / 12.0)
-    }
-}
-
 /// Statistics of a tenth of a second.
 #[derive(Debug, Clone, Copy, Default)]
 struct Block {
@@ -146,7 +97,7 @@ pub struct LastSecond {
     /// Rate of change of the temperature over the last minute, °C/min, once there are enough samples.
     pub trend: Option<f64>,
     /// The first channel with a single value that had more before, or that should have changed when the unit was turned.
-    pub stuck: Option<usize>,
+    pub stuck: Option<Finding>,
     /// Whether the gyro's readings follow the pose and the accelerometer's do not, as if the columns were exchanged.
     pub exchanged: bool,
     /// Whether its level was taken for rest instead of an earlier one.
@@ -166,7 +117,7 @@ pub struct Watch {
     floor: Option<[f64; 6]>,
     /// Mean readings at rest, and the sum of the gyro's variances in that second, once two successive seconds have agreed.
     rest: Option<([f64; 6], f64)>,
-    codes: [Codes; 6],
+    channels: [StuckChannel; 6],
     /// Whether the unit has moved since [`Self::begin`].
     moved: bool,
     /// The seconds that ended within the last one: means and variances of the gyro.
@@ -179,9 +130,7 @@ pub struct Watch {
     seems_exchanged: VecDeque<[f64; 3]>,
     /// Largest mean rate so far relative to rest, raw.
     largest_rate: f64,
-    last_row: Option<[f64; 6]>,
-    /// Rows so far, and those of them that repeat the row before; without those of a board that repeated its last reading.
-    rows: [f64; 2],
+    repetition: Repetition,
     temperatures: VecDeque<(u64, f64)>,
 }
 
@@ -197,15 +146,14 @@ impl Watch {
             next: None,
             floor: None,
             rest: None,
-            codes: [Codes::default(); 6],
+            channels: [StuckChannel::default(); 6],
             moved: false,
             before: VecDeque::new(),
             begun: false,
             quiet: VecDeque::new(),
             seems_exchanged: VecDeque::new(),
             largest_rate: 0.0,
-            last_row: None,
-            rows: [0.0; 2],
+            repetition: Repetition::default(),
             temperatures: VecDeque::new(),
         }
     }
@@ -227,12 +175,11 @@ impl Watch {
         let mut seen = None;
         for (k, row) in (1..).zip(&chunk.values) {
             self.open.moments.add(row);
-            for (codes, value) in self.codes.iter_mut().zip(row) {
-                codes.add(*value);
+            for (channel, value) in self.channels.iter_mut().zip(row) {
+                channel.take(*value);
             }
             self.open.saturated |= chunk.saturated;
-            self.open.repeats += f64::from(self.last_row == Some(*row));
-            self.last_row = Some(*row);
+            self.open.repeats += f64::from(self.repetition.take(row));
             if self.open.moments.count >= self.block_rows {
                 self.count_repeats();
                 self.window.push_back(std::mem::take(&mut self.open));
@@ -249,13 +196,12 @@ impl Watch {
         seen
     }
 
-    /// Finds whether the board repeated its last reading in the open block. One that always does so has coarse steps.
+    /// Finds whether the board repeated its last reading in the open block.
     fn count_repeats(&mut self) {
         let (count, repeats) = (self.open.moments.count, self.open.repeats);
-        let [rows, repeated] = self.rows;
-        let held = repeats > HELD * count && rows > self.rate_hz && repeated < COARSE * rows;
+        let held = repeats > HELD * count && self.repetition.is_fault(self.rate_hz);
         if !held {
-            self.rows = [rows + count, repeated + repeats];
+            self.repetition.count(count, repeats);
         }
         self.open.held = held;
     }
@@ -398,16 +344,19 @@ impl Watch {
             held |= block.held;
         }
         let own = all.squares.map(|s| s / (all.count - 1.0));
-        for (codes, own) in self.codes.iter_mut().zip(&own) {
+        for (channel, own) in self.channels.iter_mut().zip(&own) {
             // A reading that is repeated says nothing about the noise.
             if !held {
-                codes.judge(*own);
+                channel.second(*own);
             }
         }
-        let (codes, moved) = (self.codes, self.moved);
-        let stuck = (0..6).find(|&c| own[c] == 0.0 && codes[c].is_stuck(moved));
+        let (channels, rows) = (self.channels, all.count as u64);
+        let constant = (0..6).filter(|&c| own[c] == 0.0);
+        let stuck = constant
+            .filter_map(|c| channels[c].found(c, rows, self.moved))
+            .next();
         // A coarse step hides at least this variance.
-        let variance: [f64; 6] = std::array::from_fn(|c| own[c].max(codes[c].hidden()));
+        let variance: [f64; 6] = std::array::from_fn(|c| own[c].max(channels[c].hidden()));
         let sound = stuck.is_none() && !saturated && !held;
         if sound {
             // Only before the unit may be turned: a table's steady rate is as quiet as rest.
@@ -420,7 +369,7 @@ impl Watch {
             }
         }
         let floor = self.floor.unwrap_or(variance);
-        let floor: [f64; 6] = std::array::from_fn(|c| floor[c].max(codes[c].hidden()));
+        let floor: [f64; 6] = std::array::from_fn(|c| floor[c].max(channels[c].hidden()));
         let force = Vector3::from_fn(|c, _| all.mean[3 + c]).norm();
         let motion = Sensor::BOTH.map(|sensor| {
             let (factor, tremor) = match (sensor, self.by_hand) {
@@ -617,7 +566,8 @@ mod tests {
             );
         }
         let seen = coarse(&mut watch, 3000, [1.0, 2.0, 0.0, 251.0, 2.0, 4.0]).unwrap();
-        assert_eq!(seen.stuck, Some(2), "{seen:?}");
+        let stuck = seen.stuck.as_ref().and_then(|stuck| stuck.about);
+        assert_eq!(stuck, Some("gyro_z"), "{seen:?}");
         assert!(
             seen.motion.iter().all(|m| *m <= 1.0) && !seen.exchanged,
             "{seen:?}"
@@ -693,7 +643,8 @@ mod tests {
         in_hand(&mut watch, 0..5000, |_| 0.0);
         let noise = watch.noise().unwrap();
         watch.begin();
-        let last = watch.last_row.unwrap();
+        let mut last = chunk(4999, 1, 0.0, 0.01).values[0];
+        last[5] += 9.8;
         let mut held = chunk(5000, 1000, 0.0, 0.0);
         held.values.fill(last);
         watch.take(&held);

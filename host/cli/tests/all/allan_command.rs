@@ -281,7 +281,7 @@ fn what_is_not_at_rest_or_not_alive_is_refused_with_its_place() {
                 "gyro_x, gyro_y",
                 "accel_z",
                 "all 6 channels",
-                "is 0 throughout",
+                "stuck at 0 throughout",
             ],
         ),
         (
@@ -350,7 +350,7 @@ fn a_dead_channel_is_named_and_the_others_are_as_without_it() {
         let channels = found["channels"].as_array().unwrap();
         assert_eq!(channels.len(), 6);
         for (k, channel) in channels.iter().enumerate() {
-            let why = "the channel is 0 throughout";
+            let why = "the channel is stuck at 0 throughout";
             match k == dead {
                 true => {
                     assert_eq!(channel["n"], serde_json::Value::Null);

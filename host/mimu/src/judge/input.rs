@@ -3,6 +3,7 @@
 use crate::judgement::{Judgement, JudgementKind};
 use crate::recording_problem::RecordingProblem;
 use crate::warning::Warning;
+use mimu_recording::health::Fault;
 
 /// The kind of judgement that `warning` alone leads to; `None` if a good result may have it.
 ///
@@ -31,10 +32,10 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
         | Warning::RatesContradict { .. }
         | Warning::OtherUnit { .. }
         | Warning::OtherDevice { .. }
-        | Warning::Dead { .. }
         | Warning::BiasRemoved(_)
         | Warning::RunAtEnd { .. }
         | Warning::CalmEnd { .. } => Some(JudgementKind::Suspect),
+        Warning::Health(finding) => of_finding(finding.fault),
         Warning::NoResiduals
         | Warning::FewResiduals
         | Warning::PoorlyDetermined { .. }
@@ -48,6 +49,11 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
         | Warning::Outliers { .. } => Some(JudgementKind::Unexplained),
         _ => None,
     }
+}
+
+/// The same for a fault of the readings.
+fn of_finding(fault: Fault) -> Option<JudgementKind> {
+    matches!(fault, Fault::Dead { .. }).then_some(JudgementKind::Suspect)
 }
 
 /// The kind of judgement that a problem of a recording alone leads to; `None` if a good result may have it.

@@ -269,7 +269,10 @@ impl ChannelResult {
                     });
                 }
                 Some(Err(unseen)) => channel.unit.reason(term, unseen),
-                None => channel.dead.as_deref().unwrap_or(TOO_SHORT).to_owned(),
+                None => match &channel.dead {
+                    Some(dead) => dead.problem(),
+                    None => TOO_SHORT.to_owned(),
+                },
             };
             let key = term.letter().to_lowercase();
             if let Some(Err(Unseen {

@@ -14,7 +14,8 @@ use crate::signal::quantisation_step::QuantisationFinder;
 use crate::signal::signed_low_byte;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Batch, Column, HeldReadings, NoTemperatures, RAW_COLUMNS, Recording};
+use mimu_recording::health::HeldReadings;
+use mimu_recording::{Batch, Column, NoTemperatures, RAW_COLUMNS, Recording};
 
 /// Length of a block, s: a tenth of the shortest usable dwell, ten samples at 100 Hz.
 const BLOCK_S: f64 = 0.1;
@@ -287,7 +288,8 @@ impl Condenser {
             }
             for (sensor, held) in self.held.iter_mut().enumerate() {
                 let reading = |axis: usize| batch.raw[3 * sensor + axis].get(i).copied();
-                held.push([0, 1, 2].map(|axis| reading(axis).unwrap_or(f64::NAN)));
+                let row = batch.first_row + i as u64;
+                held.take(row, [0, 1, 2].map(|axis| reading(axis).unwrap_or(f64::NAN)));
             }
             self.last = Some((t, step));
         }
@@ -534,12 +536,8 @@ impl Condenser {
         out.warnings
             .extend(no_temperature::warning(&out.no_temperatures));
         for (sensor, held) in Sensor::BOTH.iter().zip(&self.held) {
-            let held = held.found();
-            out.warnings.extend(held.map(|held| Warning::Held {
-                sensor: *sensor,
-                held,
-                rate_hz: 1.0 / period,
-            }));
+            let held = held.found(sensor.name(), 1.0 / period);
+            out.warnings.extend(held.map(Warning::Health));
         }
         if let Some(integrator) = &mut self.integrator {
             out.increments.extend(integrator.take());

@@ -19,7 +19,7 @@ use crate::signal::slow_turns::{self, Reading};
 use crate::signal::stillness::{self, Detection, Finding, Steps, reference_spans};
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Manifest, Reference};
+use mimu_recording::{Manifest, Reference, health};
 
 /// Largest variance of a numbered dwell relative to the median of all: five times the standard deviation.
 const STEP_FACTOR: f64 = 25.0;
@@ -353,12 +353,7 @@ fn no_dwells(given: bool, has_steps: bool) -> Error {
     }
 }
 
-/// Limit for the variance of a reading that alternates between two codes, over the square of the quantisation step: a quarter at most, and
-/// a margin.
-const TWO_CODES: f64 = 0.3;
-
-/// Whether the quantisation `step` of channel `c` is coarser than its noise: if the channel changes within a dwell at all, it alternates
-/// between two codes. Such a channel repeats one value through whole dwells without being stuck.
+/// Whether the quantisation `step` of channel `c` is coarser than its noise within dwells. Such a channel repeats one value through whole dwells without being stuck.
 fn is_coarse(list: &[Dwell], step: Option<f64>, c: usize) -> bool {
     let Some(step) = step else { return false };
     let mut changing: Vec<f64> = list
@@ -366,7 +361,7 @@ fn is_coarse(list: &[Dwell], step: Option<f64>, c: usize) -> bool {
         .map(|d| d.raw[c].variance)
         .filter(|v| *v > 0.0)
         .collect();
-    quantile(&mut changing, 0.5).is_none_or(|v| v < TWO_CODES * step * step)
+    quantile(&mut changing, 0.5).is_none_or(|v| health::is_coarse(v, step))
 }
 
 fn by_step(condensed: &Condensed) -> Vec<StepBlocks> {

@@ -1,30 +1,25 @@
 //! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
 
-use crate::quantity::{significant, unsigned_zero};
 use crate::signal::blocks::{Condensed, Moments, Rails, extent, quantile};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::health::{Constant, Fault, RUN_LOG_ODDS, channel_run_by_chance, run_by_chance};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
-
-/// Natural logarithm of the odds against a run of equal samples by chance in the whole recording.
-const RUN_LOG_ODDS: f64 = 14.0;
 
 /// Longest run of equal samples that chance explains in channel `c`, from how often neighbours are equal while the channel works. `None` if
 /// most are equal: then there is no limit.
 pub(crate) fn longest_run_by_chance(condensed: &Condensed, c: usize) -> Option<f64> {
-    let odds = RUN_LOG_ODDS + (condensed.rows as f64).ln();
-    share_of_repeats(condensed, c).map(|share| (1.0 + odds / -share.ln()).max(5.0))
+    channel_run_by_chance(share_of_repeats(condensed, c)?, condensed.rows)
 }
 
-/// Share of equal neighbours in channel `c`, the median over its blocks. `None` if most are equal.
+/// Share of equal neighbours in channel `c`, the median over its blocks; `None` without blocks.
 fn share_of_repeats(condensed: &Condensed, c: usize) -> Option<f64> {
     let blocks = condensed.blocks.iter().map(|b| b.raw[c]);
     let mut shares: Vec<f64> = blocks
         .filter(|m| m.n > 1)
         .map(|m| f64::from(m.repeats) / f64::from(m.n - 1))
         .collect();
-    let share = quantile(&mut shares, 0.5)?.max(1e-3);
-    (share < 0.8).then_some(share)
+    quantile(&mut shares, 0.5)
 }
 
 /// Number of successive blocks that must be calm at an extreme.
@@ -185,7 +180,7 @@ fn converter_rail(
         return Some(Warning::FullScale { count: all, value }.of_channel(c));
     }
     // Only runs at the extreme are tested, so the length of the recording does not matter.
-    let chance = 1.0 + (RUN_LOG_ODDS - full_scale) / -share_of_repeats(condensed, c)?.ln();
+    let chance = run_by_chance(share_of_repeats(condensed, c)?, RUN_LOG_ODDS - full_scale)?;
     (longest > chance).then(|| {
         Warning::RunAtEnd {
             high,
@@ -280,39 +275,24 @@ pub fn refuse_dead_channels(condensed: &Condensed, place: &str) -> Result<()> {
         if !condensed.has_raw[c] {
             continue;
         }
-        let mut moments = condensed
-            .blocks
-            .iter()
-            .map(|b| b.raw[c])
-            .filter(|m| m.n > 0);
-        let Some(first) = moments.next() else {
+        let known = condensed.blocks.iter().map(|b| b.raw[c]);
+        let extremes = known.filter(|m| m.n > 0).flat_map(|m| [m.min, m.max]);
+        let channel = Constant::of(extremes);
+        if channel.is_empty() {
             return Err(Error::new(
                 format!("{place}, column {}", RAW_COLUMNS[c]),
                 "every cell is empty or not a number",
                 "leave the sensor's columns out, or import the right ones",
             ));
-        };
-        if first.min == first.max && moments.all(|m| m.min == first.min && m.max == first.min) {
-            let column = format!("{place}, column {}", RAW_COLUMNS[c]);
-            if let Some(step) = coarse_step_at_rest(condensed, c) {
-                let problem = format!(
-                    "the channel reads {} throughout while the unit is at rest; the sensor's other channels change by single quantisation steps of {}, so its noise may be below one step",
-                    unsigned_zero(first.min),
-                    significant(step)
-                );
-                let remedy =
-                    "record turns as well: they distinguish a coarse channel from a stuck one";
-                return Err(Error::new(column, problem, remedy));
-            }
-            return Err(Error::new(
-                column,
-                format!(
-                    "the channel is stuck at {} throughout",
-                    unsigned_zero(first.min)
-                ),
-                "check its wiring, and that the right column was imported",
-            ));
         }
+        let Some(mut dead) = channel.found(c, condensed.rows) else {
+            continue;
+        };
+        if let (Fault::Dead { value }, Some(step)) = (dead.fault, coarse_step_at_rest(condensed, c))
+        {
+            dead.fault = Fault::DeadOrCoarse { value, step };
+        }
+        return Err(dead.refusal(place));
     }
     Ok(())
 }

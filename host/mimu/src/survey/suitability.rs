@@ -1,12 +1,12 @@
 //! Whether a channel is at rest and alive: only then does its Allan curve show its noise.
 
 use super::segment::{FEWEST, Part, Segment, longest, segments};
-use crate::quantity::{duration, unsigned_zero};
 use crate::signal::blocks::{OF_MEDIAN, quantile};
 use crate::signal::stillness::{STILL_FACTOR, WINDOW_S};
 use crate::warning::Warning;
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::health::{Fault, Finding, channel_run_by_chance};
 
 /// Properties of a channel before it is integrated.
 #[derive(Debug, Clone)]
@@ -44,21 +44,17 @@ impl Suitability {
 const FEWEST_IN_WINDOW: usize = 16;
 /// A jump between the means of two windows that is not noise: ten of their sigmas.
 const STEP_SIGMAS: f64 = 10.0;
-/// Natural logarithm of the odds against a run of equal samples by chance in the whole recording.
-const RUN_LOG_ODDS: f64 = 14.0;
 /// Shorter runs of equal samples, s, are attributed to a converter coarser than the noise.
 const RUN_S: f64 = 0.5;
 
-/// Why a channel has no noise at all: it is constant throughout. [`suitability`] refuses a channel that sticks for a time, because its
-/// samples before and after are two records.
-pub(super) fn dead(raw: &[f64]) -> Option<String> {
-    let first = raw.first()?;
-    let constant = raw.iter().all(|u| u == first);
-    constant.then(|| format!("the channel is {} throughout", unsigned_zero(*first)))
-}
-
-/// Checks the raw samples of a channel that is not [`dead`]; `place` names it. Refuses one that is stuck.
-pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Suitability> {
+/// Checks the raw samples of channel `c`, which are not constant; `place` names it. Refuses one that sticks for a time, because its samples before and
+/// after are two records.
+pub(super) fn suitability(
+    raw: &[f64],
+    c: usize,
+    period_s: f64,
+    place: &str,
+) -> Result<Suitability> {
     if raw.len() < FEWEST {
         return Err(Error::new(
             place,
@@ -92,20 +88,17 @@ pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Sui
         }
         shares.push(f64::from(repeats) / n);
     }
-    let share = quantile(&mut shares, 0.5).unwrap_or(0.0).max(1e-3);
-    let by_chance = 1.0 + (RUN_LOG_ODDS + (raw.len() as f64).ln()) / -share.ln();
-    if share < 0.8 && run as f64 > by_chance && run as f64 * period_s > RUN_S {
+    let share = quantile(&mut shares, 0.5).unwrap_or(0.0);
+    let lasts_s = run as f64 * period_s;
+    let by_chance = channel_run_by_chance(share, raw.len() as u64);
+    if by_chance.is_some_and(|chance| run as f64 > chance) && lasts_s > RUN_S {
+        let value = raw[run_end];
+        let (first, fault) = (run_end + 1 - run, Fault::Stuck { value, lasts_s });
+        let stuck = Finding::new(RAW_COLUMNS[c], run as u64, fault).from_row(first as u64);
         return Err(Error::new(
-            format!(
-                "{place}, {}",
-                seconds_in((run_end + 1 - run) as f64 * period_s)
-            ),
-            format!(
-                "the channel is stuck at {} for {}",
-                raw[run_end],
-                duration(run as f64 * period_s)
-            ),
-            "check its wiring, or choose another segment",
+            format!("{place}, {}", seconds_in(first as f64 * period_s)),
+            stuck.problem(),
+            format!("{}, or choose another segment", stuck.remedy()),
         )
         .about(Argument::Stretch));
     }

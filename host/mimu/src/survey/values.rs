@@ -2,18 +2,19 @@
 
 use super::masking::{Masked, mask};
 use super::segment::{FEWEST, Part, Segment, longest};
-use super::suitability::{Suitability, dead, suitability};
+use super::suitability::{Suitability, suitability};
 use crate::survey::unit::Unit;
 use crate::warning::Warning;
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::health::{Constant, Finding};
 
 /// What a channel is found to be.
 pub(super) enum Read {
     /// Alive.
     Values(Values),
-    /// Without noise, and why.
-    Dead(String),
+    /// Without noise.
+    Dead(Finding),
 }
 
 /// One channel, prepared for the computation.
@@ -67,11 +68,11 @@ impl Values {
             values.drain(..from);
         }
         if values.len() >= FEWEST
-            && let Some(why) = dead(&values)
+            && let Some(dead) = Constant::of(values.iter().copied()).found(i, values.len() as u64)
         {
-            return Ok(Read::Dead(why));
+            return Ok(Read::Dead(dead));
         }
-        let mut suitability = suitability(&values, period_s, &place)?;
+        let mut suitability = suitability(&values, i, period_s, &place)?;
         let masked = match part {
             Part::Whole => mask(&mut values, &mut suitability, period_s),
             _ => None,

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
+use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::Error;
-use mimu_recording::{Held, RAW_COLUMNS};
 
 use crate::fault::{Fault, SHORTEST_S};
 use crate::quantity::{Sensor, duration, normal_gravity, plural, significant};
@@ -44,23 +44,11 @@ pub(super) fn degrees(rad: f64) -> String {
     significant(rad.abs().to_degrees())
 }
 
-/// What to do about a channel that never changes.
-pub(crate) const CHECK_WIRING: &str = "check its wiring, and that the right column was imported";
-
 pub(super) fn repeated(rows: &u64, f: &mut fmt::Formatter) -> fmt::Result {
     match rows {
         1 => f.write_str("1 row repeats the row before, time included: left out"),
         n => write!(f, "{n} rows repeat the row before, time included: left out"),
     }
-}
-
-pub(super) fn held(
-    sensor: &Sensor,
-    held: &Held,
-    rate_hz: &f64,
-    f: &mut fmt::Formatter,
-) -> fmt::Result {
-    f.write_str(&held.words(sensor.name(), *rate_hz))
 }
 
 pub(super) fn dwells_not_used(

@@ -4,9 +4,8 @@ use super::row::Row;
 use super::thermometer::{ZeroTally, Zeros};
 use super::two_sources::TwoSources;
 use crate::columns::Column;
-use crate::columns::RAW_COLUMNS;
 use crate::error::{Argument, Error, Result};
-use crate::held::HeldReadings;
+use crate::health::{Constant, HeldReadings};
 use crate::no_temperature::NoTemperatures;
 
 /// Temperatures that silicon and thermal chambers reach, °C.
@@ -35,8 +34,7 @@ pub(super) struct Plausibility {
     empty_accel: u64,
     /// Rows in which only the gyro has a reading, and those in which only the accelerometer has one.
     alone: [u64; 2],
-    /// Whether each of the six channels has shown a value other than 0.
-    alive: [bool; 6],
+    channels: [Constant; 6],
     rows: u64,
     /// Of both sensors.
     held: [HeldReadings; 2],
@@ -67,7 +65,7 @@ impl Plausibility {
             padding: 0,
             empty_accel: 0,
             alone: [0; 2],
-            alive: [false; 6],
+            channels: Default::default(),
             rows: 0,
             held: Default::default(),
             lowest_c: f64::INFINITY,
@@ -114,12 +112,11 @@ impl Plausibility {
             }
         }
         for &(place, channel) in self.sensors.iter().flatten() {
-            let value = row.values[place];
-            self.alive[channel] |= value != 0.0 && !value.is_nan();
+            self.channels[channel].take(row.values[place]);
         }
         for (sensor, held) in self.sensors.iter().zip(&mut self.held) {
             if let [x, y, z] = sensor[..] {
-                held.push([x, y, z].map(|(place, _)| row.values[place]));
+                held.take(row.number, [x, y, z].map(|(place, _)| row.values[place]));
             }
         }
         self.two_sources.push(row);
@@ -161,7 +158,7 @@ impl Plausibility {
     pub fn dead(&self) -> [Option<u64>; 2] {
         [0, 1].map(|s| {
             let all = &self.sensors[s];
-            let dead = !all.is_empty() && all.iter().all(|(_, c)| !self.alive[*c]);
+            let dead = !all.is_empty() && all.iter().all(|(_, c)| self.channels[*c].is_zero());
             (dead && self.rows > 0).then_some(self.rows)
         })
     }
@@ -198,8 +195,8 @@ impl Plausibility {
     pub fn warnings(&self, place: &str, rate_hz: f64) -> Vec<String> {
         let mut warnings = Vec::new();
         for (sensor, held) in ["gyro", "accel"].iter().zip(&self.held) {
-            let held = held.found().map(|held| held.words(sensor, rate_hz));
-            warnings.extend(held.map(|words| format!("{place}: {words}")));
+            let held = held.found(sensor, rate_hz);
+            warnings.extend(held.map(|held| format!("{place}: {held}")));
         }
         warnings.extend(self.two_sources.warning(place));
         warnings.extend(self.two_sources.overflows(place));
@@ -226,13 +223,10 @@ impl Plausibility {
             if self.rows == 0 || self.dead()[s].is_some() {
                 continue;
             }
-            for (_, c) in sensor.iter().filter(|(_, c)| !self.alive[*c]) {
-                warnings.push(format!(
-                    "{place}: {} is 0 in all of its {}: the channel seems not to be connected",
-                    RAW_COLUMNS[*c],
-                    rows(self.rows)
-                ));
-            }
+            // Zeros are those of a channel that is not connected. Another constant may be a rest with coarse steps, which a fit judges.
+            let zeros = sensor.iter().filter(|(_, c)| self.channels[*c].is_zero());
+            let dead = zeros.filter_map(|(_, c)| self.channels[*c].found(*c, self.rows));
+            warnings.extend(dead.map(|dead| format!("{place}: {dead}")));
         }
         let none = self.no_temperatures.warning();
         warnings.extend(none.map(|none| format!("{place}, column temp_c: {none}")));

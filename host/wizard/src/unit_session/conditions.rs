@@ -44,8 +44,8 @@ impl UnitSession {
         if busy {
             return Some(Waiting::TableMoves);
         }
-        if let Some(c) = seen.stuck {
-            return Some(Waiting::Stuck(c));
+        if let Some(stuck) = seen.stuck {
+            return Some(Waiting::Faulty(stuck));
         }
         if seen.missing as f64 > share * rate_hz {
             return Some(Waiting::SamplesLost(seen.missing, rate_hz));

@@ -25,14 +25,14 @@ fn a_sensor_that_is_logged_faster_than_it_updates_is_said_with_its_rate() {
     });
     let (summary, ..) = one(&slow, BOTH).unwrap();
     assert!(
-        warned(&summary, "the accel repeats its reading"),
+        warned(&summary, "accel: it repeats its reading"),
         "{summary:?}"
     );
     assert!(
         warned(&summary, "at 25.0 Hz, but the log has 100.0 Hz"),
         "{summary:?}"
     );
-    assert!(!warned(&summary, "the gyro repeats"), "{summary:?}");
+    assert!(!warned(&summary, "gyro: it repeats"), "{summary:?}");
 }
 
 #[test]
