@@ -85,10 +85,6 @@ impl Seen {
             | Warning::CalibrationOfOther { .. }
             | Warning::NoisierThanGyros { .. } => Self::Unit,
             Warning::Health(finding) => Self::of_finding(finding.fault)?,
-            Warning::EndOfConverter { .. }
-            | Warning::FullScale { .. }
-            | Warning::RunAtEnd { .. }
-            | Warning::CalmEnd { .. } => Self::Rails,
             Warning::Clipped { .. }
             | Warning::DwellsNotUsed {
                 fault: Fault::Saturated(_),
@@ -128,6 +124,10 @@ impl Seen {
     fn of_finding(fault: health::Fault) -> Option<Self> {
         Some(match fault {
             health::Fault::Dead { .. } => Self::DeadChannel,
+            health::Fault::EndOfConverter { .. }
+            | health::Fault::FullScale { .. }
+            | health::Fault::RunAtEnd { .. }
+            | health::Fault::CalmEnd { .. } => Self::Rails,
             health::Fault::Held { .. } => Self::HeldReadings,
             _ => return None,
         })

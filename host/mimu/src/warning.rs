@@ -2,7 +2,7 @@
 
 mod words;
 
-use words::{degrees, extreme, off, open};
+use words::{degrees, off, open};
 
 use std::fmt::Display;
 use std::mem::discriminant;
@@ -120,20 +120,6 @@ pub enum Warning {
         fault: Fault,
         effect: String,
     },
-    /// How often a channel reads a value at the end of a converter, and that value.
-    #[error("{} at {value}, the end of a 16-bit converter: treated as a rail", plural(*.count, "sample"))]
-    EndOfConverter { count: u64, value: f64 },
-    /// Whether the highest value is a rail or the lowest, that value, how often it occurs in a row, and how often chance explains.
-    #[error("the {} value {value} occurs {longest} times in a row, and chance explains {by_chance:.0}: treated as a rail", extreme(*.high))]
-    RunAtEnd {
-        high: bool,
-        value: f64,
-        longest: f64,
-        by_chance: f64,
-    },
-    /// Whether the noise ends at the highest values or the lowest, and from which one on.
-    #[error("at its {} values, from {from} on, the noise vanishes: treated as a rail of the sensor", extreme(*.high))]
-    CalmEnd { high: bool, from: f64 },
     /// Gravity that no height explains, m/s², and the latitude, degrees.
     #[error(fmt = words::gravity)]
     Gravity {
@@ -380,9 +366,6 @@ pub enum Warning {
         calibration: String,
         recording: String,
     },
-    /// Number of readings at a value that is the full scale of a part, in SI.
-    #[error("{} at {value}, the full scale of a sensor: treated as a rail", plural(*.count, "sample"))]
-    FullScale { count: u64, value: f64 },
     /// Names of the calibration's unit and of the recording's.
     #[error("the calibration belongs to {calibration:?}, the recording to {recording:?}")]
     OtherDevice {

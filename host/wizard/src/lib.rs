@@ -33,7 +33,6 @@ pub mod device;
 pub mod event;
 pub mod folder;
 pub mod procedure;
-mod rails;
 pub mod refit;
 pub mod regular;
 pub mod relay;

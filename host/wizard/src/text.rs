@@ -7,10 +7,9 @@ use mimu::signal::increment::pause_periods;
 use mimu_core::compensation::Affine;
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::health::Unanswered;
+use mimu_recording::health::{StreamRails, Unanswered};
 
 use crate::clock::{ClockRate, Clocks, REFUSED_SHARE};
-use crate::rails::Rails;
 use crate::regular::{Regular, Timed};
 use crate::source::{Chunk, SourceEvent, Unit};
 use crate::text_line::{Columns, Lines, Reading};
@@ -19,8 +18,6 @@ use crate::text_line::{Columns, Lines, Reading};
 pub(crate) const NOTHING_S: f64 = 5.0;
 /// Silence after which the port is opened again, s: a port may be unplugged without an error.
 const SILENCE_S: f64 = 5.0;
-/// Rails of these sensors' converters: 16 bits, whatever range is set. [`Rails`] finds others.
-const ENDS: [f64; 2] = [-32768.0, 32767.0];
 /// Ratio of the clocks that indicates a wrong unit, which gives 1000 or a million. No replay of a recording is so fast.
 const WRONG_UNIT: f64 = 100.0;
 /// Lines without data are reported again when their number has grown by this factor.
@@ -59,7 +56,7 @@ pub struct TextBoard {
     /// The board's clock and the computer's.
     clocks: Clocks,
     clock_trusted: bool,
-    rails: Rails,
+    rails: StreamRails,
     unanswered: Unanswered,
     ready: VecDeque<SourceEvent>,
     /// Number of lines without data at which they are reported next.
@@ -98,7 +95,7 @@ impl TextBoard {
             garbled: 0,
             clocks: Clocks::default(),
             clock_trusted: text.clock_trusted,
-            rails: Rails::default(),
+            rails: StreamRails::new(text.raw_unit == RawUnit::Count),
             unanswered: Unanswered::default(),
             ready: VecDeque::new(),
             tell_at: 1,
@@ -251,9 +248,7 @@ impl TextBoard {
         if let Some(found) = self.unanswered.ended() {
             self.ready.push_back(SourceEvent::Note(found.to_string()));
         }
-        let counts = self.unit.raw_unit == RawUnit::Count;
-        let at_end = counts && sample.raw.iter().any(|code| ENDS.contains(code));
-        let saturated = self.rails.take(&sample.raw) || at_end;
+        let saturated = self.rails.take(&sample.raw).is_some();
         let fits = |c: &Chunk| {
             let same = c.temp_c == sample.temp_c || c.temp_c.is_nan() && sample.temp_c.is_nan();
             same && c.saturated == saturated && c.tick + c.values.len() as u64 == tick

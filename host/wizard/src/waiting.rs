@@ -26,8 +26,6 @@ pub enum Waiting {
     Faulty(Finding),
     /// Missing samples, and the expected number in the last second.
     SamplesLost(u64, f64),
-    /// A reading is at a rail.
-    Saturated,
     /// The gyro columns follow the pose, and the accelerometer columns do not.
     Exchanged,
     /// A sensor is this many times noisier than accepted at rest.
@@ -49,7 +47,10 @@ impl Waiting {
     pub fn is_like(&self, other: &Self) -> bool {
         // In hands a unit alternates between the two several times a second.
         let in_hands = |why: &Self| matches!(why, Self::Moves(..) | Self::Turns(_));
-        discriminant(self) == discriminant(other) || in_hands(self) && in_hands(other)
+        match (self, other) {
+            (Self::Faulty(this), Self::Faulty(other)) => this.kind() == other.kind(),
+            _ => discriminant(self) == discriminant(other) || in_hands(self) && in_hands(other),
+        }
     }
 }
 
@@ -70,7 +71,6 @@ impl fmt::Display for Waiting {
                 f,
                 "samples are missing, {missing} of the last {of:.0}: check the cable"
             ),
-            Self::Saturated => f.write_str("a reading is at the end of its range: put it down"),
             Self::Exchanged => f.write_str("the gyro's readings follow the pose, but the accelerometer's do not: are the columns ax,ay,az and gx,gy,gz exchanged?"),
             Self::Moves(sensor, times) => {
                 write!(f, "it moves ({sensor} {times:.1} times the limit): hold it still, or put it down")

@@ -32,9 +32,7 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
         | Warning::RatesContradict { .. }
         | Warning::OtherUnit { .. }
         | Warning::OtherDevice { .. }
-        | Warning::BiasRemoved(_)
-        | Warning::RunAtEnd { .. }
-        | Warning::CalmEnd { .. } => Some(JudgementKind::Suspect),
+        | Warning::BiasRemoved(_) => Some(JudgementKind::Suspect),
         Warning::Health(finding) => of_finding(finding.fault),
         Warning::NoResiduals
         | Warning::FewResiduals
@@ -53,7 +51,11 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
 
 /// The same for a fault of the readings.
 fn of_finding(fault: Fault) -> Option<JudgementKind> {
-    matches!(fault, Fault::Dead { .. }).then_some(JudgementKind::Suspect)
+    let suspect = matches!(
+        fault,
+        Fault::Dead { .. } | Fault::RunAtEnd { .. } | Fault::CalmEnd { .. }
+    );
+    suspect.then_some(JudgementKind::Suspect)
 }
 
 /// The kind of judgement that a problem of a recording alone leads to; `None` if a good result may have it.

@@ -3,7 +3,7 @@
 use crate::signal::blocks::{Condensed, Moments, Rails, extent, quantile};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::health::{Constant, Fault, RUN_LOG_ODDS, channel_run_by_chance, run_by_chance};
+use mimu_recording::health::{Constant, Extreme, Fault, Finding, channel_run_by_chance};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 
 /// Longest run of equal samples that chance explains in channel `c`, from how often neighbours are equal while the channel works. `None` if
@@ -71,68 +71,6 @@ fn calm_end(condensed: &Condensed, c: usize, sign: f64, range: [f64; 2]) -> Opti
     (spread < 20.0 * CALM * quiet).then_some(widest)
 }
 
-/// Natural logarithm of the odds against an extreme that coincides by chance with the end of some converter.
-const FULL_SCALE_LOG_ODDS: f64 = 8.0;
-
-/// Natural logarithm of the odds against `value` being an extreme by chance; readings are multiples of `step`.
-///
-/// Almost all digital parts have 16 bits. A motion over thousands of codes that ends exactly at an end of their range was clipped there.
-fn full_scale_log_odds(value: f64, step: Option<f64>) -> f64 {
-    let codes = value / step.unwrap_or(1.0);
-    let whole = codes.round();
-    // The scale factor of an import rounds the last digits.
-    if (codes - whole).abs() > 1e-6 * whole.abs() {
-        return 0.0;
-    }
-    if [-32768.0, 32767.0, 65535.0].contains(&whole) {
-        return f64::INFINITY;
-    }
-    let is_end = |bits: i32| whole == 2f64.powi(bits) - 1.0 || whole == -(2f64.powi(bits));
-    match (7..=24).any(is_end) {
-        true => FULL_SCALE_LOG_ODDS,
-        false => 0.0,
-    }
-}
-
-/// Full scales of gyros, deg/s, and of accelerometers, g, by data sheets.
-const FULL_SCALES_DPS: [f64; 13] = [
-    62.5, 75.0, 125.0, 150.0, 245.0, 250.0, 300.0, 450.0, 500.0, 1000.0, 2000.0, 2400.0, 4000.0,
-];
-const FULL_SCALES_G: [f64; 12] = [
-    1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0,
-];
-/// What drivers multiply g by, m/s².
-const GRAVITIES: [f64; 4] = [9.806_65, 9.80, 9.81, 9.807];
-/// Largest relative difference from a full scale: drivers and imports round their factors to six digits.
-const FULL_SCALE_SHARE: f64 = 3e-6;
-
-/// Whether a reading in SI is the full scale of a part. Readings in SI have no codes, but a motion seldom ends at exactly 250 deg/s.
-fn is_full_scale(value: f64, c: usize) -> bool {
-    let is = |full: f64| (value.abs() / full - 1.0).abs() < FULL_SCALE_SHARE;
-    match c < 3 {
-        true => FULL_SCALES_DPS.iter().any(|dps| is(dps.to_radians())),
-        false => GRAVITIES
-            .iter()
-            .any(|gravity| FULL_SCALES_G.iter().any(|g| is(g * gravity))),
-    }
-}
-
-/// Natural logarithm of the odds against readings in SI whose extreme `value` is a full scale by chance. Each axis of the sensor with the same extreme
-/// is evidence: before its first sample a part may read its full scale on all of them.
-fn si_log_odds(condensed: &Condensed, c: usize, value: f64) -> f64 {
-    if !is_full_scale(value, c) {
-        return 0.0;
-    }
-    let same = |o: &usize| {
-        let known = condensed.blocks.iter().map(|b| &b.raw[*o]);
-        let [low, high] = extent(known.filter(|m| m.n > 0).flat_map(|m| [m.min, m.max]));
-        let near = |end: f64| (end.abs() / value.abs() - 1.0).abs() < FULL_SCALE_SHARE;
-        near(low) || near(high)
-    };
-    let axes = (c / 3 * 3..c / 3 * 3 + 3).filter(|o| condensed.has_raw[*o]);
-    FULL_SCALE_LOG_ODDS * axes.filter(same).count() as f64
-}
-
 /// How often the extreme `value` occurs: in all, and in a row.
 fn count(moments: impl Iterator<Item = Moments>, value: f64) -> (u64, f64) {
     // Blocks are short: a run continues through blocks that contain only its value.
@@ -156,40 +94,33 @@ fn count(moments: impl Iterator<Item = Moments>, value: f64) -> (u64, f64) {
     (all, longest)
 }
 
-/// The warning that the extreme `value` of channel `c` is a rail of the converter, if it is one.
+/// Lowest and highest reading of channel `c`; the infinities, the higher one first, without any.
+fn range(condensed: &Condensed, c: usize) -> [f64; 2] {
+    let known = condensed.blocks.iter().map(|b| &b.raw[c]);
+    extent(known.filter(|m| m.n > 0).flat_map(|m| [m.min, m.max]))
+}
+
+/// The finding that the extreme `value` of channel `c` is a rail of the converter or of the part, if it is one.
 fn converter_rail(
     condensed: &Condensed,
     in_si: bool,
     c: usize,
     value: f64,
     high: bool,
-) -> Option<Warning> {
+) -> Option<Finding> {
     let moments = condensed.blocks.iter().map(|b| b.raw[c]);
-    let (all, longest) = count(moments.filter(|m| m.n > 0), value);
-    let of_codes = full_scale_log_odds(value, condensed.quantisation_step[c]);
-    let of_si = if in_si {
-        si_log_odds(condensed, c, value)
-    } else {
-        0.0
+    let (count, longest) = count(moments.filter(|m| m.n > 0), value);
+    let axes = (c / 3 * 3..c / 3 * 3 + 3).filter(|o| in_si && condensed.has_raw[*o]);
+    let axes: Vec<[f64; 2]> = axes.map(|o| range(condensed, o)).collect();
+    let extreme = Extreme {
+        channel: c,
+        high,
+        value,
+        count,
+        longest,
+        repeats: share_of_repeats(condensed, c),
     };
-    let full_scale = of_codes.max(of_si);
-    if of_codes > RUN_LOG_ODDS {
-        return Some(Warning::EndOfConverter { count: all, value }.of_channel(c));
-    }
-    if of_si > RUN_LOG_ODDS || of_si > 0.0 && longest > 1.0 {
-        return Some(Warning::FullScale { count: all, value }.of_channel(c));
-    }
-    // Only runs at the extreme are tested, so the length of the recording does not matter.
-    let chance = run_by_chance(share_of_repeats(condensed, c)?, RUN_LOG_ODDS - full_scale)?;
-    (longest > chance).then(|| {
-        Warning::RunAtEnd {
-            high,
-            value,
-            longest,
-            by_chance: chance.floor(),
-        }
-        .of_channel(c)
-    })
+    extreme.rail(condensed.quantisation_step[c], &axes)
 }
 
 /// Rails of the six channels, as declared or as found. The largest or smallest value of a recording is a rail if it repeats in a row more
@@ -215,27 +146,21 @@ pub(crate) fn find(
             };
             continue;
         }
-        let moments = || condensed.blocks.iter().map(|b| &b.raw[c]);
-        let known = || moments().filter(|m| m.n > 0);
-        let [low, high] = extent(known().flat_map(|m| [m.min, m.max]));
+        let [low, high] = range(condensed, c);
         if low == high {
             continue;
         }
         let ends = [(high, true, &mut rail.high), (low, false, &mut rail.low)];
         for (value, is_high, end) in ends {
-            if let Some(remark) = converter_rail(condensed, in_si, c, value, is_high) {
-                warnings.push(remark);
+            if let Some(found) = converter_rail(condensed, in_si, c, value, is_high) {
+                warnings.push(Warning::Health(found));
                 *end = Some(value);
             } else if let Some(inner) =
                 calm_end(condensed, c, if is_high { 1.0 } else { -1.0 }, [low, high])
             {
-                warnings.push(
-                    Warning::CalmEnd {
-                        high: is_high,
-                        from: inner,
-                    }
-                    .of_channel(c),
-                );
+                let (high, from) = (is_high, inner);
+                let calm = Finding::new(RAW_COLUMNS[c], 0, Fault::CalmEnd { high, from });
+                warnings.push(Warning::Health(calm));
                 *end = Some(inner);
             }
         }
@@ -252,14 +177,7 @@ fn coarse_step_at_rest(condensed: &Condensed, c: usize) -> Option<f64> {
     let others = (c / 3 * 3..c / 3 * 3 + 3).filter(|o| *o != c && condensed.has_raw[*o]);
     let mut largest = None;
     for o in others {
-        let known = || {
-            condensed
-                .blocks
-                .iter()
-                .map(|b| &b.raw[o])
-                .filter(|m| m.n > 0)
-        };
-        let [low, high] = extent(known().flat_map(|m| [m.min, m.max]));
+        let [low, high] = range(condensed, o);
         let step = condensed.quantisation_step[o]?;
         if high - low > AT_REST_STEPS * step {
             return None;

@@ -410,7 +410,3 @@ pub(super) fn moves(
         significant(100.0 * *count as f64 / *of as f64)
     )
 }
-
-pub(super) fn extreme(high: bool) -> &'static str {
-    if high { "highest" } else { "lowest" }
-}

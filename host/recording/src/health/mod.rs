@@ -7,15 +7,17 @@
 //! | file | faults |
 //! |---|---|
 //! | `repeats` | a sensor slower than its log, one that does not answer, a channel that sticks or is dead |
+//! | `rails` | readings at the end of a range |
 //!
 //! Limits are for complete recordings and for streams alike. Where a stream has to be judged before its end, the detector says what it waits for.
 
+mod rails;
 mod repeats;
 mod words;
 
+pub use rails::{Extreme, StreamRails};
 pub use repeats::{
-    Constant, HeldReadings, RUN_LOG_ODDS, Repetition, StuckChannel, Unanswered,
-    channel_run_by_chance, is_coarse, run_by_chance,
+    Constant, HeldReadings, Repetition, StuckChannel, Unanswered, channel_run_by_chance, is_coarse,
 };
 
 use std::fmt::Display;
@@ -38,7 +40,7 @@ pub struct Finding {
 pub struct Rows {
     /// The first one, counted as whoever fed the samples counts; `None` if it is unknown.
     pub first: Option<u64>,
-    /// How many.
+    /// How many; 0 if they were not counted.
     pub count: u64,
 }
 
@@ -75,6 +77,36 @@ pub enum Fault {
         /// For how long, s.
         lasts_s: f64,
     },
+    /// A channel reads the end of a 16-bit converter.
+    EndOfConverter {
+        /// That value.
+        value: f64,
+    },
+    /// A channel in SI ends at the full scale of a part.
+    FullScale {
+        /// That value.
+        value: f64,
+    },
+    /// A channel stays at its extreme.
+    RunAtEnd {
+        /// Whether it is the highest value.
+        high: bool,
+        /// The extreme.
+        value: f64,
+        /// How often it occurs in a row.
+        longest: f64,
+        /// How often chance explains.
+        by_chance: f64,
+    },
+    /// The noise of a channel ends near an extreme.
+    CalmEnd {
+        /// Whether that is the highest value.
+        high: bool,
+        /// The innermost value without noise.
+        from: f64,
+    },
+    /// A reading of the last second is at a rail.
+    AtEnd,
 }
 
 impl Finding {
@@ -83,6 +115,15 @@ impl Finding {
         Self {
             about: Some(about),
             rows: Rows { first: None, count },
+            fault,
+        }
+    }
+
+    /// `fault` of all channels, in the stream of a session.
+    pub fn of_stream(fault: Fault) -> Self {
+        Self {
+            about: None,
+            rows: Rows::default(),
             fault,
         }
     }
@@ -101,6 +142,11 @@ impl Finding {
             Fault::Dead { .. } => "dead",
             Fault::DeadOrCoarse { .. } => "dead_or_coarse",
             Fault::Stuck { .. } => "stuck",
+            Fault::EndOfConverter { .. } => "end_of_converter",
+            Fault::FullScale { .. } => "full_scale",
+            Fault::RunAtEnd { .. } => "run_at_end",
+            Fault::CalmEnd { .. } => "calm_end",
+            Fault::AtEnd => "at_end",
         }
     }
 

@@ -10,7 +10,7 @@ use crate::columns::RAW_COLUMNS;
 /// steps are coarser than the noise. Below it, a run of such rows is a fault of the moment. A bus that fails occasionally repeats fewer.
 const HABIT: f64 = 0.1;
 /// Natural logarithm of the odds against a run of equal neighbours by chance, in a whole recording.
-pub const RUN_LOG_ODDS: f64 = 14.0;
+pub(super) const RUN_LOG_ODDS: f64 = 14.0;
 /// Least and largest share of equal neighbours for a limit. No share below the first is measured in few rows. From the second on runs are so long that
 /// none is conspicuous.
 const SHARES: [f64; 2] = [1e-3, 0.8];
@@ -22,7 +22,7 @@ const TWO_CODES: f64 = 0.3;
 
 /// Longest run of equal neighbours at one place that chance explains. `share` of all neighbours are equal while the channel works; `log_odds` against
 /// chance. `None` if most neighbours are equal.
-pub fn run_by_chance(share: f64, log_odds: f64) -> Option<f64> {
+pub(super) fn run_by_chance(share: f64, log_odds: f64) -> Option<f64> {
     (share < SHARES[1]).then(|| 1.0 + log_odds / -share.max(SHARES[0]).ln())
 }
 

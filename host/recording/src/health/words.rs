@@ -43,6 +43,29 @@ impl Finding {
                     duration(lasts_s)
                 )
             }
+            Fault::EndOfConverter { value } => format!(
+                "{} at {value}, the end of a 16-bit converter",
+                plural(count, "sample")
+            ),
+            Fault::FullScale { value } => format!(
+                "{} at {value}, the full scale of a sensor",
+                plural(count, "sample")
+            ),
+            Fault::RunAtEnd {
+                high,
+                value,
+                longest,
+                by_chance,
+            } => format!(
+                "the {} value {value} occurs {longest} times in a row, and chance explains {:.0}",
+                extreme(high),
+                by_chance.floor()
+            ),
+            Fault::CalmEnd { high, from } => format!(
+                "at its {} values, from {from} on, the noise vanishes",
+                extreme(high)
+            ),
+            Fault::AtEnd => "a reading is at the end of its range".into(),
         }
     }
 
@@ -56,8 +79,17 @@ impl Finding {
                 "record turns as well: they distinguish a coarse channel from a stuck one"
             }
             Fault::Stuck { .. } => "check its wiring",
+            Fault::EndOfConverter { .. }
+            | Fault::FullScale { .. }
+            | Fault::RunAtEnd { .. }
+            | Fault::CalmEnd { .. } => "treated as a rail",
+            Fault::AtEnd => "put it down",
         }
     }
+}
+
+fn extreme(high: bool) -> &'static str {
+    if high { "highest" } else { "lowest" }
 }
 
 impl fmt::Display for Finding {

@@ -3,6 +3,7 @@
 use mimu::quantity::{Sensor, significant};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::health::{Fault, Finding};
 use nalgebra::Vector3;
 
 use super::{Round, UnitSession};
@@ -51,7 +52,7 @@ impl UnitSession {
             return Some(Waiting::SamplesLost(seen.missing, rate_hz));
         }
         if seen.saturated {
-            return Some(Waiting::Saturated);
+            return Some(Waiting::Faulty(Finding::of_stream(Fault::AtEnd)));
         }
         if seen.exchanged && !self.station.unit.is_device {
             return Some(Waiting::Exchanged);
