@@ -127,7 +127,9 @@ impl Prepared {
         let gravity = at.and_then(|at| Warning::of_gravity(manifest.gravity_mps2, at));
         dwells.warnings.extend(gravity);
         let in_si = unit_in_si::at_rest(&dwells.list, &manifest);
-        dwells.warnings.extend(in_si);
+        dwells
+            .warnings
+            .extend(in_si.into_iter().map(Warning::Health));
         dwells
             .warnings
             .extend(bias_removal.map(Warning::BiasRemoved));

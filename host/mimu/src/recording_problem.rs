@@ -15,14 +15,13 @@ use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::signal::blocks::extent;
 use crate::signal::dwell::Change;
 use crate::warning::Warning;
-use mimu_recording::{RawUnit, health};
+use mimu_recording::RawUnit;
+use mimu_recording::health::{self, Finding};
 
 /// Offset of an accelerometer beyond any data sheet, g: those of MEMS parts allow up to 0.15.
 const LARGEST_OFFSET_G: f64 = 0.5;
 /// Sample rate below which turns by hand are too fast, Hz: between two samples at 20 Hz a hand at 200 deg/s changes its rate by a third.
 const SLOW_HZ: f64 = 40.0;
-/// Temperatures at which boards are used, °C.
-const USUAL_C: std::ops::RangeInclusive<f64> = -60.0..=150.0;
 
 /// What is wrong with a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,8 +30,8 @@ pub enum RecordingProblem {
     Offset(usize, f64),
     /// Sample rate of a recording in which the unit is turned by hand, Hz.
     SlowForTurns(f64),
-    /// Lowest and highest temperature, °C.
-    Temperatures(f64, f64),
+    /// Temperatures at which no board is used.
+    Temperatures(Finding),
     /// Faces that no pose had up.
     MissingPoses(String),
     /// Samples that were lost between the device and the PC.
@@ -79,11 +78,7 @@ impl Seen {
             Warning::Of { warning, .. } | Warning::Channel { warning, .. } => {
                 return Self::of(warning);
             }
-            Warning::NotSi { .. }
-            | Warning::NotCounts { .. }
-            | Warning::Turning { .. }
-            | Warning::CalibrationOfOther { .. }
-            | Warning::NoisierThanGyros { .. } => Self::Unit,
+            Warning::CalibrationOfOther { .. } | Warning::NoisierThanGyros { .. } => Self::Unit,
             Warning::Health(finding) => Self::of_finding(finding.fault)?,
             Warning::Clipped { .. }
             | Warning::DwellsNotUsed {
@@ -110,7 +105,6 @@ impl Seen {
                 fault: Fault::Missing(_),
                 ..
             } => Self::EmptySamples,
-            Warning::NoTemperatures { .. } => Self::Temperatures,
             Warning::BiasRemoved(_) => Self::BiasRemoved,
             Warning::LogFault(fault) => match fault.change {
                 Change::Range(_) => Self::RangeChange,
@@ -128,6 +122,11 @@ impl Seen {
             | health::Fault::FullScale { .. }
             | health::Fault::RunAtEnd { .. }
             | health::Fault::CalmEnd { .. } => Self::Rails,
+            health::Fault::NoGravity { .. }
+            | health::Fault::NotSi { .. }
+            | health::Fault::NotCounts { .. }
+            | health::Fault::Turning { .. } => Self::Unit,
+            health::Fault::NoTemperatures { .. } => Self::Temperatures,
             health::Fault::Held { .. } => Self::HeldReadings,
             _ => return None,
         })
@@ -240,9 +239,7 @@ impl RecordingProblem {
         let blocks = prepared.condensed.blocks.iter().map(|b| b.temp_c.mean);
         let known = blocks.filter(|t| t.is_finite());
         let [low, high] = extent(known);
-        if low <= high && !(USUAL_C.contains(&low) && USUAL_C.contains(&high)) {
-            all.push(Self::Temperatures(low, high));
-        }
+        all.extend(health::unusual_temperatures(low, high).map(Self::Temperatures));
         let lost = prepared.manifest.recorded.as_ref().map_or(0, |r| r.missing);
         if lost > 0 {
             all.push(Self::LostSamples(lost));
@@ -303,12 +300,7 @@ impl fmt::Display for RecordingProblem {
                 "{} Hz is a low rate for turns by hand: record at 50 Hz or more, or turn slowly",
                 significant(*hz)
             ),
-            Self::Temperatures(low, high) => write!(
-                f,
-                "temperatures of {} to {} °C are implausible for a board: convert the column temp_c, or leave it out",
-                significant(*low),
-                significant(*high)
-            ),
+            Self::Temperatures(found) => write!(f, "{found}"),
             Self::MissingPoses(faces) => write!(
                 f,
                 "no pose has {faces} up, so the errors there are unknown: add such poses"

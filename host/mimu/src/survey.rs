@@ -25,7 +25,6 @@ use self::unit::Unit;
 use self::values::{Read, Values};
 use crate::calibration::Calibration;
 use crate::quantity::Sensor;
-use crate::signal::no_temperature;
 use crate::warning::Warning;
 use mimu_allan::deviation::Integrated;
 use mimu_allan::model::{
@@ -34,8 +33,8 @@ use mimu_allan::model::{
 use mimu_allan::spectrum::{WithoutLines, remove_lines_after};
 use mimu_allan::{Deviation, NotFinite, Point, Spacing};
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::health::Finding;
-use mimu_recording::{Column, NoTemperatures, RAW_COLUMNS, RawUnit, Recording};
+use mimu_recording::health::{At, Finding, Temperatures};
+use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
 
 /// What to compute.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -203,10 +202,12 @@ fn read_temperature(
         return Ok(None);
     }
     let mut temp_c = columns.take(Column::Temperature)?;
-    let mut none = NoTemperatures::default();
+    let mut all = Temperatures::default();
     let times = (0..).map(|k| segment.span_s[0] + f64::from(k) * segment.period_s);
-    no_temperature::leave_empty(&mut temp_c[segment.rows.clone()], times, &mut none);
-    warnings.extend(no_temperature::warning(&none));
+    for (c, t_s) in temp_c[segment.rows.clone()].iter_mut().zip(times) {
+        *c = all.take(*c, At::Time(t_s));
+    }
+    warnings.extend(all.impossible().map(Warning::Health));
     Ok(temperature(&temp_c, &segment.rows))
 }
 

@@ -7,9 +7,9 @@ use words::{degrees, off, open};
 use std::fmt::Display;
 use std::mem::discriminant;
 
+use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::Error;
 use mimu_recording::health::Finding;
-use mimu_recording::{NoTemperatures, RAW_COLUMNS};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -85,9 +85,6 @@ pub enum Warning {
     /// Samples of a channel that are empty or not a number.
     #[error("{} of {channel} empty or not a number: masked", plural(*.count, "sample"))]
     Empty { count: u64, channel: &'static str },
-    /// Samples of the thermometer that cannot be temperatures.
-    #[error("temp_c: {}", .which.warning().unwrap_or_default())]
-    NoTemperatures { which: NoTemperatures },
     /// A fault of the readings.
     #[error("{0}")]
     Health(Finding),
@@ -142,24 +139,6 @@ pub enum Warning {
     /// The horizontal component of the Earth's rate is in the intervals of the gyro's biases, because the heading was lost this often.
     #[error("the heading of the table is lost {} between dwells (samples are missing there, or the gyro clips), so the horizontal component of the Earth's rate is in the intervals of the biases: record the table's motion without gaps", plural(*.times as u64, "time"))]
     HeadingLost { times: usize },
-    /// Readings in SI: whether they are at rest (and include biases), how many times their input they are, and the likely cause.
-    #[error(fmt = words::not_si)]
-    NotSi {
-        at_rest: bool,
-        times: f64,
-        cause: &'static str,
-    },
-    /// Readings that are declared as counts, but are fractions and have the scale factor of a unit: their number per SI unit, the unit that they
-    /// are in, and how to import them.
-    #[error("raw_unit = \"count\", but the readings are fractions, and the fit gives {} of them per SI unit: they are in {unit}; import them with {remedy}", significant(*.per_si))]
-    NotCounts {
-        per_si: f64,
-        unit: &'static str,
-        remedy: &'static str,
-    },
-    /// Reading of a gyro at rest, rad/s, that is larger than any bias.
-    #[error("at rest it reads {} deg/s, more than any bias: the unit turns evenly, or the readings are in deg/s", degrees(*.rate))]
-    Turning { rate: f64 },
     /// Firmware removes the bias of the gyro before it is recorded.
     #[error(
         "gyro: {0}; its scale factors and angles are calibrated, but the bias is not that of the sensor, so none is given"

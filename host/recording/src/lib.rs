@@ -24,7 +24,6 @@ mod import;
 mod in_memory;
 mod in_order;
 mod manifest;
-mod no_temperature;
 mod parents;
 #[cfg(feature = "parquet")]
 mod parquet_file;
@@ -63,7 +62,6 @@ pub use import::{
 };
 pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
-pub use no_temperature::NoTemperatures;
 pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};

@@ -7,6 +7,8 @@ use std::ops::Range;
 
 use serde::Serialize;
 
+use crate::health::LARGEST_BIAS;
+
 /// Length of the blocks between which gravity turns, s: a hand turns by 3 to 30 degrees in it.
 const BLOCK_S: f64 = 0.25;
 /// Least and largest angle between the forces of successive blocks, rad. Below it noise decides, above it the axis of the turn changes within it.
@@ -19,8 +21,6 @@ const ACCELERATED: f64 = 0.15;
 const FEWEST: usize = 5;
 /// Largest ratio of a unit's turns to those of gravity, and inverse of the smallest. Analog gyros in volts begin at a factor of 1.9.
 const TURNS_WITHIN: f64 = 1.5;
-/// No gyro's bias is larger, rad/s: 40 deg/s.
-const LARGEST_BIAS: f64 = 0.7;
 /// Gravity in each unit of an accelerometer, to within offsets of 0.15 g.
 const GRAVITY: [(&str, f64); 3] = [("m/s²", 9.80665), ("g", 1.0), ("mg", 1000.0)];
 const OFF_GRAVITY: f64 = 0.15;

@@ -3,8 +3,8 @@
 use mimu::quantity::{duration, significant};
 use mimu::signal::blocks::extent;
 use mimu::signal::blocks::{Block, Condensed};
-use mimu_recording::NoTemperatures;
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::health::Finding;
 
 /// Spacing of the series, s. A die's lag is tens of seconds.
 const STEP_S: f64 = 1.0;
@@ -24,8 +24,8 @@ const POWERED_UP_S: f64 = 60.0;
 const JUMP_FACTOR: f64 = 12.0;
 
 /// Refuses values that cannot be temperatures: curves over the rest would come from samples that only happen to look plausible.
-fn check_possible(found: &NoTemperatures, place: &str) -> Result<()> {
-    let Some(problem) = found.problem() else {
+fn check_possible(found: Option<&Finding>, place: &str) -> Result<()> {
+    let Some(problem) = found.map(Finding::problem) else {
         return Ok(());
     };
     let remedy = "import the readings again, with a factor and an offset for temp_c";
@@ -60,7 +60,7 @@ impl Thermometer {
         let (Some(first), Some(last)) = (blocks().next(), blocks().last()) else {
             return Err(missing(&place, "there is none"));
         };
-        check_possible(&condensed.no_temperatures, &place)?;
+        check_possible(condensed.no_temperatures.as_ref(), &place)?;
         if known.is_empty() {
             return Err(missing(&place, "temp_c is empty throughout"));
         }

@@ -8,12 +8,12 @@ use super::off_level::off_level;
 use super::sensor::{Residual, SensorFit};
 use crate::estimate::Failure;
 use crate::prepared::Prepared;
-use crate::quantity::Figure;
-use crate::quantity::significant;
-use crate::signal::unit_in_si::{not_counts, restless, wrong_gain};
+use crate::quantity::{Figure, Sensor, significant};
+use crate::signal::unit_in_si::restless;
 use crate::warning::Warning;
-use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{RAW_COLUMNS, RawUnit, Reference};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::health::{Against, accel_gain, gyro_gain, not_counts};
+use mimu_recording::{RawUnit, Reference};
 
 /// If the error of a fit over the spread of its inputs exceeds this, the readings do not follow the inputs. Swapped sensors are beyond one; the worst
 /// table is a hundred times below.
@@ -33,22 +33,16 @@ const TURNED_DEG: f64 = 20.0;
 
 /// Refuses readings that a firmware assembled wrongly: their errors of 256 counts do not come from a sensor.
 pub fn check_readings(prepared: &Prepared) -> Result<()> {
-    let faults = &prepared.condensed.signed_low_byte;
-    let found = (0..6).filter(|c| faults[*c].is_some());
-    let names: Vec<&str> = found.map(|c| RAW_COLUMNS[c]).collect();
-    let pairs: u64 = faults.iter().flatten().sum();
-    if names.is_empty() {
+    let found = &prepared.condensed.signed_low_byte;
+    let names: Vec<&str> = found.iter().filter_map(|found| found.about).collect();
+    let Some(mut all) = found.first().copied() else {
         return Ok(());
-    }
-    Err(Error::new(
-        &prepared.place,
-        format!(
-            "{}: {pairs} jumps between neighbouring samples show that readings whose low byte is 128 or more are 256 counts too low: the firmware reads the low byte as a signed number",
-            names.join(", ")
-        ),
-        "correct the firmware, and import this log again with corrected readings",
-    )
-    .about(Argument::SignedLowByte))
+    };
+    all.about = None;
+    all.rows.count = found.iter().map(|found| found.rows.count).sum();
+    let refusal = all.refusal(&prepared.place);
+    Err(refusal
+        .map(|refused| refused.problem = format!("{}: {}", names.join(", "), refused.problem)))
 }
 
 /// Refuses or adds warnings to the fit of one sensor.
@@ -219,17 +213,20 @@ fn has_fractions(prepared: &Prepared, fit: &SensorFit) -> bool {
 fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let matrix = &fit.estimated.triad.forward.matrix;
     let scale = matrix.row_iter().map(|r| r.norm()).sum::<f64>() / 3.0;
-    match prepared.manifest.raw_unit {
-        RawUnit::Volt => None,
-        RawUnit::Count if !has_fractions(prepared, fit) => None,
-        RawUnit::Count => not_counts(fit.sensor, scale),
-        RawUnit::Si => wrong_gain(
-            fit.sensor,
-            scale,
-            prepared.manifest.gravity_mps2,
-            fit.figure,
-        ),
-    }
+    let against = match fit.figure {
+        Figure::Input => Against::Inputs,
+        Figure::GravityMagnitude => Against::Gravity,
+        Figure::RateMagnitude => Against::TurntableRate,
+        Figure::Direction => Against::Turns,
+    };
+    let found = match (prepared.manifest.raw_unit, fit.sensor) {
+        (RawUnit::Volt, _) => None,
+        (RawUnit::Count, _) if !has_fractions(prepared, fit) => None,
+        (RawUnit::Count, sensor) => not_counts(sensor.name(), scale),
+        (RawUnit::Si, Sensor::Gyro) => gyro_gain(scale, against),
+        (RawUnit::Si, Sensor::Accel) => accel_gain(scale, prepared.manifest.gravity_mps2),
+    };
+    found.map(Warning::Health)
 }
 
 /// Warns about rests in which the gyro turns.

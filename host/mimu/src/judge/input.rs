@@ -13,10 +13,7 @@ use mimu_recording::health::Fault;
 pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
     match warning {
         Warning::Of { warning, .. } | Warning::Channel { warning, .. } => of_warning(warning),
-        Warning::NotSi { .. }
-        | Warning::NotCounts { .. }
-        | Warning::Turning { .. }
-        | Warning::CalibrationOfOther { .. }
+        Warning::CalibrationOfOther { .. }
         | Warning::NoisierThanGyros { .. }
         | Warning::ImplausibleRate { .. }
         | Warning::Restless { .. }
@@ -53,7 +50,13 @@ pub fn of_warning(warning: &Warning) -> Option<JudgementKind> {
 fn of_finding(fault: Fault) -> Option<JudgementKind> {
     let suspect = matches!(
         fault,
-        Fault::Dead { .. } | Fault::RunAtEnd { .. } | Fault::CalmEnd { .. }
+        Fault::Dead { .. }
+            | Fault::RunAtEnd { .. }
+            | Fault::CalmEnd { .. }
+            | Fault::NoGravity { .. }
+            | Fault::NotSi { .. }
+            | Fault::NotCounts { .. }
+            | Fault::Turning { .. }
     );
     suspect.then_some(JudgementKind::Suspect)
 }

@@ -9,13 +9,11 @@ use crate::signal::increment::{Increment, Integrator};
 use crate::signal::jump::Jump;
 pub(crate) use crate::signal::moments::pool;
 pub use crate::signal::moments::{Moments, Rails};
-use crate::signal::no_temperature;
 use crate::signal::quantisation_step::QuantisationFinder;
-use crate::signal::signed_low_byte;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::health::HeldReadings;
-use mimu_recording::{Batch, Column, NoTemperatures, RAW_COLUMNS, Recording};
+use mimu_recording::health::{At, Finding, HeldReadings, SignedLowByteFinder, Temperatures};
+use mimu_recording::{Batch, Column, RAW_COLUMNS, Recording};
 
 /// Length of a block, s: a tenth of the shortest usable dwell, ten samples at 100 Hz.
 const BLOCK_S: f64 = 0.1;
@@ -110,8 +108,8 @@ pub struct Condensed {
     pub rows: u64,
     /// Quantisation step of each raw channel, raw; `None` if none was found.
     pub quantisation_step: [Option<f64>; 6],
-    /// For each raw channel: the number of sample pairs that show a [low byte read as a signed number](crate::signal::signed_low_byte).
-    pub signed_low_byte: [Option<u64>; 6],
+    /// Raw channels whose low byte a firmware took for a signed number.
+    pub signed_low_byte: Vec<Finding>,
     /// Which of the six raw channels the recording has.
     pub has_raw: [bool; 6],
     /// Which of the six reference channels the recording has.
@@ -127,7 +125,7 @@ pub struct Condensed {
     /// Samples of each raw channel that are not numbers.
     pub missing: [u64; 6],
     /// Samples of the thermometer that cannot be temperatures.
-    pub no_temperatures: NoTemperatures,
+    pub no_temperatures: Option<Finding>,
     /// SHA-256 of the samples file, hexadecimal.
     pub sha256: String,
     /// What a person should know about this recording.
@@ -192,8 +190,9 @@ struct Condenser {
     integrator: Option<Integrator>,
     intervals: Intervals,
     quantisation_steps: [QuantisationFinder; 6],
-    signed_low_bytes: [signed_low_byte::Finder; 6],
+    signed_low_bytes: [SignedLowByteFinder; 6],
     held: [HeldReadings; 2],
+    temperatures: Temperatures,
     out: Condensed,
 }
 
@@ -227,12 +226,13 @@ impl Condenser {
             quantisation_steps: Default::default(),
             signed_low_bytes: Default::default(),
             held: Default::default(),
+            temperatures: Temperatures::default(),
             out: Condensed {
                 blocks: Vec::new(),
                 increments: Vec::new(),
                 rows: 0,
                 quantisation_step: [None; 6],
-                signed_low_byte: [None; 6],
+                signed_low_byte: Vec::new(),
                 has_raw: [false; 6],
                 has_reference: [false; 6],
                 has_steps: false,
@@ -240,7 +240,7 @@ impl Condenser {
                 gaps: (0, 0.0),
                 duplicates: 0,
                 missing: [0; 6],
-                no_temperatures: NoTemperatures::default(),
+                no_temperatures: None,
                 sha256: String::new(),
                 warnings: Vec::new(),
             },
@@ -393,9 +393,9 @@ impl Condenser {
         let (Some(&start_s), Some(&last_s)) = (open.t_s.first(), open.t_s.last()) else {
             return;
         };
-        let times = open.t_s.iter().copied();
-        let none = &mut self.out.no_temperatures;
-        no_temperature::leave_empty(&mut open.temp_c, times, none);
+        for (c, t_s) in open.temp_c.iter_mut().zip(&open.t_s) {
+            *c = self.temperatures.take(*c, At::Time(*t_s));
+        }
         let mut raw = [Moments::default(); 6];
         for (c, column) in open.raw.iter().enumerate() {
             if !column.is_empty() {
@@ -533,8 +533,9 @@ impl Condenser {
                 });
             }
         }
+        out.no_temperatures = self.temperatures.impossible();
         out.warnings
-            .extend(no_temperature::warning(&out.no_temperatures));
+            .extend(out.no_temperatures.map(Warning::Health));
         for (sensor, held) in Sensor::BOTH.iter().zip(&self.held) {
             let held = held.found(sensor.name(), 1.0 / period);
             out.warnings.extend(held.map(Warning::Health));
@@ -543,7 +544,8 @@ impl Condenser {
             out.increments.extend(integrator.take());
         }
         out.quantisation_step = self.quantisation_steps.map(QuantisationFinder::find);
-        out.signed_low_byte = self.signed_low_bytes.map(|finder| finder.find());
+        let finders = self.signed_low_bytes.iter().enumerate();
+        out.signed_low_byte = finders.filter_map(|(c, finder)| finder.found(c)).collect();
         Ok(self.out)
     }
 }

@@ -5,10 +5,11 @@ use nalgebra::Vector3;
 use super::Channel;
 use crate::calibration::Calibration;
 use crate::quantity::Sensor;
-use crate::signal::unit_in_si::{GAIN, of_sizes};
+use crate::signal::unit_in_si::of_sizes;
 use crate::warning::Warning;
 use mimu_allan::model::Term;
 use mimu_recording::Manifest;
+use mimu_recording::health::GAIN;
 
 /// White noise beyond that of any gyro, rad/s/√Hz: 0.25 deg/s/√Hz, two and a half times that of an ADXRS300. An ordinary gyro has 0.0001 rad/s/√Hz,
 /// and its numbers are 57 times larger in deg/s.
@@ -29,7 +30,7 @@ pub(super) fn input(
     let mut all = Vec::from_iter(Warning::of_rate(period_s.recip()));
     let Some(calibration) = calibration else {
         let sizes = Sensor::BOTH.map(|sensor| mean(sensor).map(|mean| mean.norm()));
-        all.extend(of_sizes(sizes, manifest));
+        all.extend(of_sizes(sizes, manifest).into_iter().map(Warning::Health));
         return all;
     };
     all.extend(calibration.other_unit(manifest));

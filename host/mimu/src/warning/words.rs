@@ -106,23 +106,6 @@ pub(super) fn other_gravity(
     f.write_str(who)
 }
 
-pub(super) fn not_si(
-    at_rest: &bool,
-    times: &f64,
-    cause: &str,
-    f: &mut fmt::Formatter,
-) -> fmt::Result {
-    let what = match at_rest {
-        true => "at rest the readings, biases included, are about",
-        false => "the readings are",
-    };
-    write!(
-        f,
-        "raw_unit = \"SI\", but {what} {} times the input: {cause}",
-        significant(*times)
-    )
-}
-
 pub(super) fn without_temperature(
     low_c: &f64,
     high_c: &f64,

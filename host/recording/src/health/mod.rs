@@ -8,17 +8,37 @@
 //! |---|---|
 //! | `repeats` | a sensor slower than its log, one that does not answer, a channel that sticks or is dead |
 //! | `rails` | readings at the end of a range |
+//! | `zeros` | padding, a sensor that is not connected, sensors in rows of their own |
+//! | `magnitude` | another unit, readings without gravity |
+//! | `two_sources` | rows of two devices or in two units |
+//! | `sixteen_bits` | unsigned codes, overflows, a low byte that was read with a sign |
+//! | `temperatures` | values that are no temperatures, a thermometer that is absent or silent |
 //!
-//! Limits are for complete recordings and for streams alike. Where a stream has to be judged before its end, the detector says what it waits for.
+//! Limits are for complete recordings and for streams alike. Where a stream has to be judged before its end, the detector says what differs.
 
+mod magnitude;
 mod rails;
 mod repeats;
+mod sixteen_bits;
+mod temperatures;
+mod two_sources;
 mod words;
+mod zeros;
 
+pub(crate) use magnitude::LARGEST_BIAS;
+pub use magnitude::{
+    Against, Cause, DeclaredUnit, GAIN, accel_at_rest, accel_gain, gyro_at_rest, gyro_gain,
+    not_counts,
+};
 pub use rails::{Extreme, StreamRails};
 pub use repeats::{
     Constant, HeldReadings, Repetition, StuckChannel, Unanswered, channel_run_by_chance, is_coarse,
 };
+pub use sixteen_bits::SignedLowByteFinder;
+pub(crate) use temperatures::impossible_temperature;
+pub use temperatures::{At, Temperatures, unusual_temperatures};
+pub(crate) use two_sources::TwoSources;
+pub(crate) use zeros::{RowKind, SENSORS, Zeros};
 
 use std::fmt::Display;
 
@@ -107,6 +127,85 @@ pub enum Fault {
     },
     /// A reading of the last second is at a rail.
     AtEnd,
+    /// Rows with nothing but zeros.
+    AllZero,
+    /// Rows in which the accelerometer alone has zeros.
+    NoForce,
+    /// A sensor has zeros in all rows.
+    NotConnected,
+    /// Gyro and accelerometer have rows of their own: how many.
+    SeparateRows {
+        /// Those of the gyro.
+        gyro: u64,
+        /// Those of the accelerometer.
+        accel: u64,
+    },
+    /// The specific force has no gravity.
+    NoGravity {
+        /// Its usual magnitude, m/s².
+        size: f64,
+    },
+    /// Readings are declared as SI, and have another magnitude than what they measure.
+    NotSi {
+        /// Whether biases are included.
+        at_rest: bool,
+        /// How many times their input they are.
+        times: f64,
+        /// Why.
+        cause: Cause,
+    },
+    /// A gyro reads more at rest than any bias.
+    Turning {
+        /// Its reading, rad/s.
+        rate: f64,
+    },
+    /// Readings are declared as counts, but are fractions and have the scale factor of a unit.
+    NotCounts {
+        /// Their number per SI unit.
+        per_si: f64,
+        /// The unit that they are in.
+        declared: DeclaredUnit,
+    },
+    /// A reading jumps away and returns in the next row.
+    Alternating {
+        /// Share of the rows.
+        share: f64,
+    },
+    /// The specific force has one magnitude in some rows and another one in others.
+    TwoMagnitudes {
+        /// The smaller.
+        low: f64,
+        /// The larger.
+        high: f64,
+        /// Rows in all.
+        of: u64,
+    },
+    /// Negative readings are written as unsigned codes of 16 bits.
+    Unsigned,
+    /// Signed readings of 16 bits overflow.
+    Overflow,
+    /// A firmware takes the low byte for a signed number.
+    SignedLowByte,
+    /// Readings that cannot be temperatures in °C.
+    NoTemperatures {
+        /// Of so many readings.
+        of: u64,
+        /// The first of them.
+        first_c: f64,
+        /// Where it is, if there are several.
+        at: Option<At>,
+    },
+    /// Temperatures at which no board is used.
+    UnusualTemperatures {
+        /// The lowest, °C.
+        low_c: f64,
+        /// The highest, °C.
+        high_c: f64,
+    },
+    /// The column of the thermometer has zeros only.
+    NoThermometer,
+    /// Zeros of a thermometer that did not answer.
+    SilentThermometer,
 }
 
 impl Finding {
@@ -147,6 +246,23 @@ impl Finding {
             Fault::RunAtEnd { .. } => "run_at_end",
             Fault::CalmEnd { .. } => "calm_end",
             Fault::AtEnd => "at_end",
+            Fault::AllZero => "all_zero",
+            Fault::NoForce => "no_force",
+            Fault::NotConnected => "not_connected",
+            Fault::SeparateRows { .. } => "separate_rows",
+            Fault::NoGravity { .. } => "no_gravity",
+            Fault::NotSi { .. } => "not_si",
+            Fault::Turning { .. } => "turning",
+            Fault::NotCounts { .. } => "not_counts",
+            Fault::Alternating { .. } => "alternating",
+            Fault::TwoMagnitudes { .. } => "two_magnitudes",
+            Fault::Unsigned => "unsigned",
+            Fault::Overflow => "overflow",
+            Fault::SignedLowByte => "signed_low_byte",
+            Fault::NoTemperatures { .. } => "no_temperatures",
+            Fault::UnusualTemperatures { .. } => "temperatures",
+            Fault::NoThermometer => "no_thermometer",
+            Fault::SilentThermometer => "silent_thermometer",
         }
     }
 
@@ -163,6 +279,13 @@ impl Finding {
 
     /// Settings of an import that its remedy is about.
     fn settings(&self) -> &'static [Argument] {
-        &[]
+        match self.fault {
+            Fault::AllZero => &[Argument::Columns],
+            Fault::Alternating { .. } => &[Argument::Where, Argument::Columns],
+            Fault::Unsigned => &[Argument::TwosComplement],
+            Fault::SignedLowByte => &[Argument::SignedLowByte],
+            Fault::NoTemperatures { .. } => &[Argument::Scale, Argument::Offset],
+            _ => &[],
+        }
     }
 }

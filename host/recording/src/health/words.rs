@@ -2,16 +2,14 @@
 
 use std::fmt;
 
-use super::{Fault, Finding};
+use super::{Cause, Fault, Finding};
 use crate::digits::{duration, plural, significant, unsigned_zero};
-
-/// What to do about a channel that never changes.
-const CHECK_WIRING: &str = "check its wiring, and that the right column was imported";
 
 impl Finding {
     /// What is wrong.
     pub fn problem(&self) -> String {
         let count = self.rows.count;
+        let rows = plural(count, "row");
         match self.fault {
             Fault::Held {
                 of,
@@ -22,27 +20,22 @@ impl Finding {
                 rate_hz / rows_per_reading
             ),
             Fault::Unanswered => format!(
-                "the last readings are repeated in {}, which count as missing: the sensor did not answer",
-                plural(count, "row")
+                "the last readings are repeated in {rows}, which count as missing: the sensor did not answer"
             ),
-            Fault::Dead { value } => {
-                format!(
-                    "the channel is stuck at {} throughout",
-                    unsigned_zero(value)
-                )
-            }
+            Fault::Dead { value } => format!(
+                "the channel is stuck at {} throughout",
+                unsigned_zero(value)
+            ),
             Fault::DeadOrCoarse { value, step } => format!(
                 "the channel reads {} throughout while the unit is at rest; the sensor's other channels change by single quantisation steps of {}, so its noise may be below one step",
                 unsigned_zero(value),
                 significant(step)
             ),
-            Fault::Stuck { value, lasts_s } => {
-                format!(
-                    "the channel is stuck at {} for {}",
-                    unsigned_zero(value),
-                    duration(lasts_s)
-                )
-            }
+            Fault::Stuck { value, lasts_s } => format!(
+                "the channel is stuck at {} for {}",
+                unsigned_zero(value),
+                duration(lasts_s)
+            ),
             Fault::EndOfConverter { value } => format!(
                 "{} at {value}, the end of a 16-bit converter",
                 plural(count, "sample")
@@ -66,15 +59,101 @@ impl Finding {
                 extreme(high)
             ),
             Fault::AtEnd => "a reading is at the end of its range".into(),
+            Fault::AllZero => format!("all readings are 0, in {rows}"),
+            Fault::NoForce => {
+                format!("it reads exactly 0 on all axes in {rows}, which is impossible at rest")
+            }
+            Fault::NotConnected => {
+                "it is exactly 0 on all axes in all rows: it was not connected".into()
+            }
+            Fault::SeparateRows { gyro, accel } => format!(
+                "{gyro} rows have the gyro alone and {accel} the accelerometer alone, so no turn is complete"
+            ),
+            Fault::Alternating { share } => format!(
+                "in {:.0} % of the rows the reading jumps away and returns in the next one: rows of two devices, or readings in two units, alternate",
+                100.0 * share
+            ),
+            Fault::TwoMagnitudes { low, high, of } => format!(
+                "the specific force is about {low:.3} in some rows and about {high:.3} in others, {count} of {of} of them, first in row {}: readings in two units, or of two devices",
+                self.rows.first.unwrap_or_default()
+            ),
+            Fault::Unsigned => "negative readings are written as unsigned codes of 16 bits: near 0 they jump to 65535".into(),
+            Fault::Overflow => format!(
+                "it jumps {count} times from one end of 16 bits to the other: the firmware's integers overflow, and the sensor's range is too small for this motion, or its factor too large"
+            ),
+            Fault::SignedLowByte => format!(
+                "{count} jumps between neighbouring samples show that readings whose low byte is 128 or more are 256 counts too low: the firmware reads the low byte as a signed number"
+            ),
+            _ => self.problem_of_size(),
+        }
+    }
+
+    /// What is wrong with a magnitude or a temperature.
+    fn problem_of_size(&self) -> String {
+        let count = self.rows.count;
+        match self.fault {
+            Fault::NoGravity { size } => format!(
+                "the usual specific force is {size:.3} m/s², although gravity is always there: a filter has removed it"
+            ),
+            Fault::NotSi {
+                at_rest,
+                times,
+                cause,
+            } => {
+                let what = match at_rest {
+                    true => "at rest the readings, biases included, are about",
+                    false => "the readings are",
+                };
+                format!(
+                    "raw_unit = \"SI\", but {what} {} times the input: {}",
+                    significant(times),
+                    cause.words()
+                )
+            }
+            Fault::Turning { rate } => format!(
+                "at rest it reads {} deg/s, more than any bias",
+                significant(rate.to_degrees())
+            ),
+            Fault::NotCounts { per_si, declared } => format!(
+                "raw_unit = \"count\", but the readings are fractions, and the fit gives {} of them per SI unit: they are in {}",
+                significant(per_si),
+                declared.unit
+            ),
+            Fault::NoTemperatures {
+                first_c, at: None, ..
+            } => {
+                format!("{first_c} is not a temperature in °C")
+            }
+            Fault::NoTemperatures {
+                of,
+                first_c,
+                at: Some(at),
+            } => format!(
+                "{count} of {of} values cannot be temperatures in °C, the first is {first_c} {at}"
+            ),
+            Fault::UnusualTemperatures { low_c, high_c } => format!(
+                "temperatures of {} to {} °C are implausible for a board",
+                significant(low_c),
+                significant(high_c)
+            ),
+            Fault::NoThermometer => format!(
+                "it is exactly 0 in all of its {}: there is no thermometer",
+                plural(count, "row")
+            ),
+            Fault::SilentThermometer => format!(
+                "it is exactly 0 in {}, far from all other temperatures: the thermometer did not answer",
+                plural(count, "row")
+            ),
+            _ => String::new(),
         }
     }
 
     /// What to do about it.
-    pub fn remedy(&self) -> &'static str {
-        match self.fault {
+    pub fn remedy(&self) -> String {
+        let remedy = match self.fault {
             Fault::Held { .. } => "log each reading once",
             Fault::Unanswered => "check the wires between sensor and board",
-            Fault::Dead { .. } => CHECK_WIRING,
+            Fault::Dead { .. } => "check its wiring, and that the right column was imported",
             Fault::DeadOrCoarse { .. } => {
                 "record turns as well: they distinguish a coarse channel from a stuck one"
             }
@@ -82,8 +161,101 @@ impl Finding {
             Fault::EndOfConverter { .. }
             | Fault::FullScale { .. }
             | Fault::RunAtEnd { .. }
-            | Fault::CalmEnd { .. } => "treated as a rail",
+            | Fault::CalmEnd { .. } => "give the sensor a larger range, or turn it more slowly",
             Fault::AtEnd => "put it down",
+            Fault::AllZero => {
+                "check that the right columns were named, and that the sensor was connected"
+            }
+            Fault::NoForce => "check its wiring",
+            Fault::NotConnected => "leave the file out, or skip the columns",
+            Fault::SeparateRows { .. } => {
+                "give a list of columns with the time for each, and they are joined on it"
+            }
+            Fault::NoGravity { .. } => "log the accelerometer with gravity",
+            Fault::NotSi { cause, .. } => cause.remedy(),
+            Fault::Turning { .. } => {
+                "check that the unit rests, and that the readings are in rad/s"
+            }
+            Fault::NotCounts { declared, .. } => {
+                return format!("import them with {}", declared.import);
+            }
+            Fault::Alternating { .. } => {
+                "if a column says whose each row is, choose by it, with a list of columns for each; otherwise import the rows of each from a separate file"
+            }
+            Fault::TwoMagnitudes { .. } => "import the rows of each separately",
+            Fault::Unsigned => {
+                let column = self.about.unwrap_or_default();
+                return format!("say that they are two's complement: {column}=16");
+            }
+            Fault::Overflow => "log wider integers, or give the sensor a larger range",
+            Fault::SignedLowByte => {
+                "correct the firmware, and import this log again with corrected readings"
+            }
+            Fault::UnusualTemperatures { low_c, high_c } if low_c > 200.0 && high_c < 400.0 => {
+                "convert kelvins to degrees Celsius with an offset of -273.15, or skip the column"
+            }
+            Fault::NoTemperatures { .. } | Fault::UnusualTemperatures { .. } => {
+                "convert it to degrees Celsius (counts of an MPU-6050 or MPU-9150: a factor of 0.00294118 and an offset of 36.53), or skip the column"
+            }
+            Fault::NoThermometer | Fault::SilentThermometer => "check the thermometer's wiring",
+        };
+        remedy.into()
+    }
+
+    /// What was done about it, if a reader of the recording does something.
+    fn handling(&self) -> Option<&'static str> {
+        Some(match self.fault {
+            Fault::EndOfConverter { .. } | Fault::FullScale { .. } | Fault::RunAtEnd { .. } => {
+                "treated as a rail"
+            }
+            Fault::CalmEnd { .. } => "treated as a rail of the sensor",
+            Fault::AllZero => "left out as padding",
+            Fault::NoForce => "its cells are left empty",
+            Fault::NotConnected => "left out",
+            Fault::NoTemperatures { .. } | Fault::SilentThermometer => "left empty",
+            Fault::NoThermometer => "the column is left out",
+            _ => return None,
+        })
+    }
+}
+
+impl Cause {
+    fn words(self) -> &'static str {
+        match self {
+            Self::DegreesPerSecond => "they are in deg/s, and SI is rad/s",
+            Self::RadiansTwice => "they were converted from deg/s to rad/s twice",
+            Self::RadiansTwiceOrRates => {
+                "the ref_ columns are not in deg/s, or the readings were converted to rad/s twice"
+            }
+            Self::SlowTurntable => {
+                "was the turntable at 33 1/3 rpm while the rate of 45 rpm is given?"
+            }
+            Self::FastTurntable => {
+                "was the turntable at 45 rpm while the rate of 33 1/3 rpm is given?"
+            }
+            Self::Milliseconds => "the time stamps are in ms, and must be in s",
+            Self::Times => {
+                "if the time stamps or the sample rate are wrong by this factor, so is every integrated angle"
+            }
+            Self::G => "they are in g, and SI is m/s²",
+            Self::MilliG => "they are in mg, and SI is m/s²",
+            Self::GravityTwice => "they were multiplied by gravity twice",
+            Self::Unknown => "the unit is another one, or the range that the part was set to",
+        }
+    }
+
+    fn remedy(self) -> &'static str {
+        match self {
+            Self::DegreesPerSecond => "import them with the factor gyro=0.0174533",
+            Self::G => "import them with the factor accel=9.80665",
+            Self::MilliG => "import them with the factor accel=0.00980665",
+            Self::Milliseconds => "give the unit of the time stamps",
+            Self::RadiansTwice | Self::RadiansTwiceOrRates | Self::GravityTwice => {
+                "leave one conversion out"
+            }
+            Self::SlowTurntable | Self::FastTurntable => "correct the rate",
+            Self::Times => "check the time stamps and the unit",
+            Self::Unknown => "check unit and range; counts need another raw unit",
         }
     }
 }
@@ -97,6 +269,10 @@ impl fmt::Display for Finding {
         if let Some(about) = self.about {
             write!(f, "{about}: ")?;
         }
-        write!(f, "{}: {}", self.problem(), self.remedy())
+        write!(f, "{}: ", self.problem())?;
+        match self.handling() {
+            Some(handling) => f.write_str(handling),
+            None => f.write_str(&self.remedy()),
+        }
     }
 }

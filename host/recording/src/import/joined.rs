@@ -3,17 +3,18 @@
 use super::first_pass;
 use super::foreign::{ForeignFile, HowToRead};
 use super::join::{Follower, Joined, check_order};
+use super::left_out::LeftOut;
 use super::options::{ImportOptions, file_name};
 use super::resample::{self, Resampler};
 use super::row::Row;
 use super::sequence_position::SequencePosition;
 use super::step_inputs::StepInputs;
 use super::summary::ImportSummary;
-use super::thermometer::{LeftOut, Zeros};
 use super::time::{TimeSummary, Times};
 use crate::batch::Batch;
 use crate::columns::{Column, Columns, Layout};
 use crate::error::{Argument, Error, Result};
+use crate::health::Fault;
 use crate::manifest::{Manifest, RawUnit, Reference};
 use crate::writer::Writer;
 
@@ -348,12 +349,11 @@ impl JoinedFiles {
     /// What is to be left out, because it is no reading in one of the files.
     pub fn to_leave_out(&self) -> LeftOut {
         let any = |is: &dyn Fn(&ForeignFile) -> bool| self.files().any(is);
+        let zeros = |fault| any(&|file| file.seen.zero_temperatures() == Some(fault));
         LeftOut {
-            sensors: [0, 1].map(|s| any(&|file| file.seen.dead()[s].is_some())),
-            thermometer: any(&|file| matches!(file.seen.zero_temperatures(), Zeros::Throughout(_))),
-            zero_temperatures: any(&|file| {
-                matches!(file.seen.zero_temperatures(), Zeros::Missing(_))
-            }),
+            sensors: [0, 1].map(|s| any(&|file| file.seen.not_connected()[s].is_some())),
+            thermometer: zeros(Fault::NoThermometer),
+            zero_temperatures: zeros(Fault::SilentThermometer),
         }
     }
 
@@ -392,8 +392,9 @@ impl JoinedFiles {
             summary.add(file);
             if manifest.raw_unit == RawUnit::Si {
                 let place = file_name(file.path());
-                let warning = file.seen.wrong_unit(&place, manifest.gravity_mps2);
-                summary.warnings.extend(warning);
+                let found = file.seen.wrong_unit(manifest.gravity_mps2);
+                let found = found.map(|found| format!("{place}: {found}"));
+                summary.warnings.extend(found);
             }
         }
         let not_chosen = self.not_chosen();

@@ -13,6 +13,7 @@ mod foreign;
 mod inputs;
 mod join;
 mod joined;
+mod left_out;
 mod log;
 pub mod look;
 mod options;
@@ -41,9 +42,7 @@ mod summary;
 #[cfg(all(test, feature = "parquet"))]
 mod tests;
 mod text_table;
-mod thermometer;
 mod time;
-mod two_sources;
 #[cfg(not(feature = "bags"))]
 mod without_bags;
 #[cfg(not(feature = "parquet"))]
@@ -73,9 +72,9 @@ pub use summary::{ImportSummary, SkippedLines};
 pub use time::{Decimal, Jitter, Rounds, TimeSummary};
 
 use joined::JoinedFiles;
+use left_out::{LeftOut, repeated};
 use options::source;
 use sequence::import_sequence;
-use thermometer::{LeftOut, repeated};
 
 use super::writer::Writer;
 use crate::error::Result;

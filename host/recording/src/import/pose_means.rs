@@ -7,13 +7,13 @@ use super::broken::Unreadable;
 use super::comment_signs::TextFormat;
 use super::log::is_log;
 use super::options::{ImportOptions, source};
-use super::plausibility::no_temperature;
 use super::text_table::{Cells, TextTable};
 use super::{ImportSummary, SkippedLines};
 use crate::cell::is_reading;
 use crate::columns::{Column, Columns, Layout};
 use crate::digest;
 use crate::error::{Argument, Error, Result};
+use crate::health::impossible_temperature;
 use crate::manifest::{MANIFEST_FILE, Manifest, Reference};
 use crate::separator::Separator;
 use crate::staging::Staging;
@@ -182,9 +182,8 @@ fn pose(
             }
             Role::Column(Column::Temperature) => {
                 pose.temp_c = scaled(Column::Temperature);
-                if let Some(remedy) = no_temperature(pose.temp_c) {
-                    let problem = format!("{} is not a temperature in °C", pose.temp_c);
-                    return refuse(role, problem, remedy);
+                if let Some(found) = impossible_temperature(pose.temp_c, None) {
+                    return Err(found.refusal(place));
                 }
             }
             Role::Deviation(c) => {

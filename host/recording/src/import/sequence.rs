@@ -8,14 +8,15 @@ use std::path::Path;
 
 use super::faces::Face;
 use super::joined::JoinedFiles;
+use super::left_out::LeftOut;
 use super::options::{file_name, source};
 use super::sequence_position::SequencePosition;
 use super::step_inputs::StepInputs;
 use super::step_labels::StepLabels;
-use super::thermometer::LeftOut;
 use super::{ImportOptions, ImportSummary};
 use crate::columns::Columns;
 use crate::error::{Argument, Error, Result};
+use crate::health::{Fault, Finding, SENSORS};
 use crate::manifest::{Manifest, Reference};
 use crate::writer::Writer;
 
@@ -128,10 +129,8 @@ impl<'a> Sequence<'a> {
     fn close(&mut self, import: &JoinedFiles, path: &Path) -> Result<()> {
         let dead = import.to_leave_out();
         if let Some(sensor) = dead.sensors.iter().position(|dead| *dead) {
-            let sensor = ["gyro", "accel"][sensor];
-            let problem = format!("{sensor} is exactly 0 throughout: it was not connected");
-            let remedy = "leave the file out, or skip the columns";
-            return Err(Error::new(path.display(), problem, remedy));
+            let found = Finding::new(SENSORS[sensor], 0, Fault::NotConnected);
+            return Err(found.refusal(path.display()));
         }
         // A thermometer that answers in none of the files is none; in some, its zeros are missing answers.
         self.without.thermometer &= dead.thermometer;

@@ -70,16 +70,10 @@ impl ImportSummary {
         let place = file_name(file.path());
         let notes = file.notes().iter().map(|note| format!("{place}: {note}"));
         self.notes.extend(notes);
-        self.warnings
-            .extend(file.seen.warnings(&place, file.rate_hz()));
-        self.padding += file.seen.padding;
-        for (sensor, rows) in ["gyro", "accel"].iter().zip(file.seen.dead()) {
-            self.warnings.extend(rows.map(|rows| {
-                format!(
-                    "{place}: {sensor} is exactly 0 on all axes in all of its {rows} rows: it was not connected, and is left out"
-                )
-            }));
-        }
+        let found = file.seen.found(file.rate_hz()).into_iter();
+        let warnings = found.map(|found| format!("{place}: {found}"));
+        self.warnings.extend(warnings);
+        self.padding += file.seen.padding();
         if file.zero_bytes() > 0 {
             self.warnings.push(format!(
                 "{place}: {} bytes of 0 before and after its lines were left out: reserved space that was never written",

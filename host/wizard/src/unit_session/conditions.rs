@@ -3,7 +3,7 @@
 use mimu::quantity::{Sensor, significant};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::health::{Fault, Finding};
+use mimu_recording::health::{Fault, Finding, accel_at_rest};
 use nalgebra::Vector3;
 
 use super::{Round, UnitSession};
@@ -20,8 +20,6 @@ const RATE_SHARE: f64 = 0.2;
 /// Accepted difference at any rate, deg/s: noise and drift of the null.
 const RATE_DPS: f64 = 2.0;
 
-/// If the magnitude of SI readings at rest differs from gravity by more than this factor, they are in another unit.
-const NEAR: f64 = 1.6;
 /// Ratio of the angles by gyro and accelerometer that no turn by hand gives, but another unit does: deg/s for rad/s is 57.
 const UNIT_RATIO: f64 = 10.0;
 /// Turn of the direction of gravity in a second that counts, rad.
@@ -148,20 +146,14 @@ impl UnitSession {
     /// Refuses readings that are declared as SI but are not.
     pub(super) fn check_unit(&self, seen: &LastSecond, config: &SessionConfig) -> Result<()> {
         let size = Vector3::from_fn(|k, _| seen.mean[3 + k]).norm();
-        let share = size / config.gravity_mps2;
-        if self.station.unit.raw_unit != RawUnit::Si || (1.0 / NEAR..NEAR).contains(&share) {
+        let in_si = self.station.unit.raw_unit == RawUnit::Si;
+        let found = in_si.then(|| accel_at_rest(size, config.gravity_mps2));
+        let Some(found) = found.flatten() else {
             return Ok(());
-        }
-        let cause = match share * config.gravity_mps2 {
-            g if (1.0 / NEAR..NEAR).contains(&g) => ", as if it were in g",
-            _ => "",
         };
-        let problem = format!(
-            "the accelerometer reads {} at rest{cause}, but gravity is {} m/s²",
-            significant(size),
-            config.gravity_mps2
-        );
-        let remedy = "declare the readings as counts, which may have any unit";
+        let problem = format!("accel: {}", found.problem());
+        let remedy =
+            "let the board write m/s², or declare the readings as counts, which may have any unit";
         Err(Error::device(self.name(), problem, remedy).about(Argument::RawUnit))
     }
 

@@ -22,7 +22,10 @@ fn rows_of_zeros_are_padding_and_left_out_counted_wherever_they_are() {
     let (summary, batch, _) = one(&text, BOTH).unwrap();
     assert_eq!((summary.padding, summary.rows), (29, 171));
     assert!(
-        warned(&summary, "29 rows left out as padding"),
+        warned(
+            &summary,
+            "all readings are 0, in 29 rows: left out as padding"
+        ),
         "{summary:?}"
     );
     assert!((batch.t_s[0] - 0.07).abs() < 1e-9 && (batch.t_s[170] - 1.79).abs() < 1e-9);
@@ -44,7 +47,7 @@ fn a_sensor_that_was_not_connected_is_left_out_and_a_dead_axis_is_named() {
     let (summary, batch, _) = one(&text, BOTH).unwrap();
     assert!(batch.raw[0].is_empty() && batch.raw[5].len() == 100);
     assert!(
-        warned(&summary, "gyro is exactly 0 on all axes"),
+        warned(&summary, "gyro: it is exactly 0 on all axes"),
         "{summary:?}"
     );
     let text = log(100, |i| {
@@ -54,7 +57,7 @@ fn a_sensor_that_was_not_connected_is_left_out_and_a_dead_axis_is_named() {
     let (summary, batch, _) = one(&text, BOTH).unwrap();
     assert!(batch.raw[3].is_empty() && batch.raw[1].len() == 100);
     assert!(
-        warned(&summary, "accel is exactly 0 on all axes"),
+        warned(&summary, "accel: it is exactly 0 on all axes"),
         "{summary:?}"
     );
     let text = log(100, |i| {

@@ -1,11 +1,31 @@
-//! Finds readings of firmware that combines two bytes and treats the low one as signed.
-//!
-//! A reading whose low byte is 128 or more is 256 counts too low. The low byte itself is right, so the fault can be undone. When the low
-//! byte passes 128, the error appears or disappears between two samples, and the readings jump by 256 counts while the signal moves by a
-//! few. A calibration could not fit this as an effect. It would take the share of time that a bit is set from the noise of the dwells,
-//! which contains the jumps: the coefficient was wrong by 40 to 64 counts of 256.
+//! Readings that a firmware puts together wrongly from two bytes: unsigned for signed, too large for 16 bits, or with a signed low byte.
 
-use mimu_recording::signed_low_byte::corrected;
+use super::{Fault, Finding};
+use crate::columns::RAW_COLUMNS;
+use crate::signed_low_byte::corrected;
+
+/// Number of codes of 16 bits, and the lowest of a signed reading.
+const CODES: f64 = 65_536.0;
+const LOWEST_SIGNED: f64 = -32_768.0;
+/// Fewest jumps across all codes that are no single damaged readings.
+const FEWEST_ACROSS: u64 = 3;
+
+/// The finding about the first `readings` of channel `c` if they jump between the ends of 16 bits.
+pub fn across_16_bits(c: usize, readings: &[f64]) -> Option<Finding> {
+    let jumps = readings.windows(2).map(|w| (w[1] - w[0]).abs());
+    let jumps = jumps.filter(|jump| *jump > 0.9 * CODES).count() as u64;
+    let within = |lowest: f64| {
+        let mut known = readings.iter().filter(|reading| !reading.is_nan());
+        known.all(|r| r.fract() == 0.0 && (lowest..lowest + CODES).contains(r))
+    };
+    let fault = match jumps {
+        0..FEWEST_ACROSS => return None,
+        _ if within(0.0) => Fault::Unsigned,
+        _ if within(LOWEST_SIGNED) => Fault::Overflow,
+        _ => return None,
+    };
+    Some(Finding::new(RAW_COLUMNS[c], jumps, fault))
+}
 
 /// Fewer pairs of samples between which the error came or went prove nothing.
 const FEWEST: u64 = 12;
@@ -16,9 +36,14 @@ const SHARE: f64 = 0.9;
 /// may move by a whole byte.
 const FAST: f64 = 64.0;
 
-/// Takes the samples of a channel in a stream.
+/// Finds readings whose low byte a firmware took for a signed number, in the samples of a channel as they come.
+///
+/// Such a reading is 256 counts too low if its low byte is 128 or more. The low byte itself is right, so the fault
+/// can be undone. When the low byte passes 128, the error appears or disappears between two samples, and the readings jump by 256 counts while the
+/// signal moves by a few. A calibration could not fit this as an effect. It would take the share of time that a bit is set from the noise of the dwells,
+/// which contains the jumps: the coefficient was wrong by 40 to 64 counts of 256.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Finder {
+pub struct SignedLowByteFinder {
     /// Up to three samples before the next one.
     before: Vec<f64>,
     /// Pairs of neighbours, in a slow signal, of which exactly one has a low byte of 128 or more.
@@ -28,7 +53,7 @@ pub(crate) struct Finder {
     fractions: bool,
 }
 
-impl Finder {
+impl SignedLowByteFinder {
     /// Looks at the samples of a block.
     pub fn push(&mut self, samples: &[f64]) {
         for &sample in samples {
@@ -55,10 +80,11 @@ impl Finder {
         }
     }
 
-    /// Number of sample pairs that show the fault; `None` if it is absent, or the readings are not whole counts.
-    pub fn find(&self) -> Option<u64> {
+    /// The finding about channel `c`, whose rows are the sample pairs that show the fault; `None` if the readings are not whole counts.
+    pub fn found(&self, c: usize) -> Option<Finding> {
         let shown = self.nearer >= FEWEST && self.nearer as f64 > SHARE * self.pairs as f64;
-        (shown && !self.fractions).then_some(self.nearer)
+        let fault = Fault::SignedLowByte;
+        (shown && !self.fractions).then(|| Finding::new(RAW_COLUMNS[c], self.nearer, fault))
     }
 }
 
@@ -86,10 +112,10 @@ mod tests {
         signal.iter().map(of).collect()
     }
 
-    fn found(samples: &[f64]) -> Option<u64> {
-        let mut finder = Finder::default();
+    fn found(samples: &[f64]) -> Option<Finding> {
+        let mut finder = SignedLowByteFinder::default();
         samples.chunks(50).for_each(|block| finder.push(block));
-        finder.find()
+        finder.found(0)
     }
 
     #[test]
