@@ -3,6 +3,7 @@
 use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
+use mimu_recording::health::Fault;
 use mimu_thermal::warning::Warning as OverTemperature;
 use mimu_wizard::waiting::Waiting;
 
@@ -74,7 +75,7 @@ pub(crate) fn of_warning(warning: &Warning) -> String {
 /// Why a unit of the wizard waits, with the flag that controls it.
 pub(crate) fn of_waiting(why: &Waiting) -> String {
     match why {
-        Waiting::Exchanged => format!("{why} (--text)"),
+        Waiting::Faulty(found) if found.fault == Fault::Exchanged => format!("{why} (--text)"),
         _ => why.to_string(),
     }
 }
@@ -172,6 +173,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use mimu::quantity::Sensor;
+    use mimu_recording::health::Finding;
 
     use super::*;
 
@@ -214,7 +216,7 @@ mod tests {
 
     #[test]
     fn columns_that_seem_exchanged_name_the_flag_that_orders_them() {
-        let said = of_waiting(&Waiting::Exchanged);
+        let said = of_waiting(&Waiting::Faulty(Finding::of_all(0, Fault::Exchanged)));
         assert!(said.ends_with("exchanged? (--text)"), "{said}");
         assert_eq!(of_waiting(&Waiting::TableMoves), "the table moves");
     }

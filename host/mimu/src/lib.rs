@@ -74,8 +74,6 @@ pub mod judge;
 #[doc(hidden)]
 pub mod judgement;
 #[doc(hidden)]
-pub mod log_fault;
-#[doc(hidden)]
 pub mod noise;
 #[doc(hidden)]
 pub mod observable;

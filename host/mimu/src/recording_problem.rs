@@ -13,7 +13,6 @@ use crate::fit::{Fit, SensorFit, faces_not_up};
 use crate::prepared::Prepared;
 use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::signal::blocks::extent;
-use crate::signal::dwell::Change;
 use crate::warning::Warning;
 use mimu_recording::RawUnit;
 use mimu_recording::health::{self, Finding};
@@ -106,10 +105,6 @@ impl Seen {
                 ..
             } => Self::EmptySamples,
             Warning::BiasRemoved(_) => Self::BiasRemoved,
-            Warning::LogFault(fault) => match fault.change {
-                Change::Range(_) => Self::RangeChange,
-                Change::Columns(..) => Self::ColumnsMoved,
-            },
             _ => return None,
         })
     }
@@ -127,6 +122,8 @@ impl Seen {
             | health::Fault::NotCounts { .. }
             | health::Fault::Turning { .. } => Self::Unit,
             health::Fault::NoTemperatures { .. } => Self::Temperatures,
+            health::Fault::RangeChanged { .. } => Self::RangeChange,
+            health::Fault::ColumnsMoved { .. } => Self::ColumnsMoved,
             health::Fault::Held { .. } => Self::HeldReadings,
             _ => return None,
         })

@@ -15,7 +15,6 @@ use serde::{Serialize, Serializer};
 
 use crate::bias_removal::BiasRemoval;
 use crate::fault::Fault;
-use crate::log_fault::LogFault;
 use crate::quantity::{Sensor, duration, normal_gravity, plural, significant};
 
 /// Range of the difference of local gravity from normal gravity at sea level, m/s²: heights of up to 5500 m subtract 0.017, and depths of
@@ -88,9 +87,6 @@ pub enum Warning {
     /// A fault of the readings.
     #[error("{0}")]
     Health(Finding),
-    /// A row from which on the readings mean something else.
-    #[error("from data row {} on {}: no calibration holds before and after it", .0.row + 1, .0.change)]
-    LogFault(LogFault),
     /// Dwells that were cut at their ends, and by how much in all, s.
     #[error("{} cut at the ends, by {cut_s:.1} s in all: the readings change there, as while the unit moves", plural(*.count, "dwell"))]
     DwellsCut { count: u64, cut_s: f64 },

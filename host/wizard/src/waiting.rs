@@ -26,8 +26,6 @@ pub enum Waiting {
     Faulty(Finding),
     /// Missing samples, and the expected number in the last second.
     SamplesLost(u64, f64),
-    /// The gyro columns follow the pose, and the accelerometer columns do not.
-    Exchanged,
     /// A sensor is this many times noisier than accepted at rest.
     Moves(Sensor, f64),
     /// Rate where rest was requested, deg/s.
@@ -60,10 +58,7 @@ impl fmt::Display for Waiting {
             Self::Interrupted(why) => write!(f, "{why}"),
             Self::TrendUnknown => f.write_str("its temperature is being watched"),
             Self::Warming(trend, limit) => {
-                write!(
-                    f,
-                    "warming up: {trend:+.2} °C/min, limit {limit}"
-                )
+                write!(f, "warming up: {trend:+.2} °C/min, limit {limit}")
             }
             Self::TableMoves => f.write_str("the table moves"),
             Self::Faulty(finding) => write!(f, "{finding}"),
@@ -71,16 +66,21 @@ impl fmt::Display for Waiting {
                 f,
                 "samples are missing, {missing} of the last {of:.0}: check the cable"
             ),
-            Self::Exchanged => f.write_str("the gyro's readings follow the pose, but the accelerometer's do not: are the columns ax,ay,az and gx,gy,gz exchanged?"),
             Self::Moves(sensor, times) => {
-                write!(f, "it moves ({sensor} {times:.1} times the limit): hold it still, or put it down")
+                write!(
+                    f,
+                    "it moves ({sensor} {times:.1} times the limit): hold it still, or put it down"
+                )
             }
             Self::Turns(dps) => write!(
                 f,
                 "it turns at {dps:.1} deg/s; if it does not, put it down for 5 s: its reading at rest is then measured again"
             ),
             Self::Unsteady(sensor, times) => {
-                write!(f, "the rate is not steady ({sensor} {times:.1} times the limit)")
+                write!(
+                    f,
+                    "the rate is not steady ({sensor} {times:.1} times the limit)"
+                )
             }
             Self::OtherRate(is, wanted) if is * wanted < 0.0 => write!(
                 f,

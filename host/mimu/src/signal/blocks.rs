@@ -288,7 +288,7 @@ impl Condenser {
             }
             for (sensor, held) in self.held.iter_mut().enumerate() {
                 let reading = |axis: usize| batch.raw[3 * sensor + axis].get(i).copied();
-                let row = batch.first_row + i as u64;
+                let row = batch.first_row + i as u64 + 1;
                 held.take(row, [0, 1, 2].map(|axis| reading(axis).unwrap_or(f64::NAN)));
             }
             self.last = Some((t, step));

@@ -8,7 +8,6 @@ use std::ops::Range;
 
 pub use crate::fault::Fault;
 use crate::fault::SHORTEST_S;
-pub use crate::log_fault::{Change, LogFault};
 use crate::quantity::{PerSensor, Sensor};
 use crate::signal::blocks::{Condensed, Level, Rails, StepBlocks, pool, quantile};
 use crate::signal::course::{Course, Motion, motion};
@@ -165,7 +164,7 @@ pub struct Dwells {
     /// How they were found; `None` if the `step` column gives them.
     pub detection: Option<Detection>,
     /// A row from which on the readings mean something else; no fit uses such a recording.
-    pub fault: Option<LogFault>,
+    pub fault: Option<health::Finding>,
     /// Rails of the six channels, as declared or as found.
     pub rails: [Rails; 6],
     /// Longest run of equal samples that chance explains, of the six channels; infinite if there is no such limit.
@@ -220,7 +219,7 @@ impl Dwells {
             leave_out_turning(&mut list, condensed);
             warnings.extend(mark_slow_turns(&mut list));
         }
-        warnings.extend(segments.fault.map(Warning::LogFault));
+        warnings.extend(segments.fault.map(Warning::Health));
         warn(&list, manifest, &mut warnings);
         Ok(Self {
             list,
@@ -275,7 +274,7 @@ fn are_given(condensed: &Condensed, finding: Finding) -> Result<bool> {
 struct Segments {
     ranges: Vec<StepBlocks>,
     detection: Option<Detection>,
-    fault: Option<LogFault>,
+    fault: Option<health::Finding>,
 }
 
 impl From<Vec<StepBlocks>> for Segments {

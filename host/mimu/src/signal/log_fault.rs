@@ -6,10 +6,10 @@
 
 use std::ops::Range;
 
-use crate::log_fault::{Change, LogFault};
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Condensed, pool, quantile};
-use mimu_recording::{Manifest, RawUnit};
+use mimu_recording::health::{Fault, Finding};
+use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 
 /// Ranges of accelerometers double from one to the next: 2, 4, 8, 16 g. Largest deviation of the ratio of two magnitudes at rest from a
 /// power of two, in powers of two: an offset of 0.1 g moves the magnitudes by up to a tenth.
@@ -28,12 +28,12 @@ struct Still {
     mean: [f64; 6],
 }
 
-/// The first fault that the still `segments` of a recording by hand show.
+/// The first fault that the still `segments` of a recording by hand show, and the block that contains its row.
 pub(crate) fn find(
     segments: &[Range<usize>],
     condensed: &Condensed,
     manifest: &Manifest,
-) -> Option<LogFault> {
+) -> Option<(Finding, usize)> {
     let still: Vec<Still> = segments
         .iter()
         .map(|blocks| {
@@ -45,18 +45,15 @@ pub(crate) fn find(
         })
         .collect();
     let columns = columns(&still, condensed);
-    let ([last, next], change) = columns.or_else(|| range(&still, manifest))?;
+    let ([last, next], fault) = columns.or_else(|| range(&still, manifest))?;
     let between = middle(&still[last].blocks)..middle(&still[next].blocks) + 1;
     let largest = between.max_by(|a, b| {
         let [a, b] = [a, b].map(|i| condensed.blocks[*i].jump.size);
         a.total_cmp(&b)
     })?;
     let row = condensed.blocks[largest].jump.row;
-    Some(LogFault {
-        row,
-        block: largest,
-        change,
-    })
+    let found = Finding::of_all(condensed.rows - row, fault).from_row(row + 1);
+    Some((found, largest))
 }
 
 fn middle(blocks: &Range<usize>) -> usize {
@@ -64,7 +61,7 @@ fn middle(blocks: &Range<usize>) -> usize {
 }
 
 /// The segments before and after the range changes, and the change.
-fn range(still: &[Still], manifest: &Manifest) -> Option<([usize; 2], Change)> {
+fn range(still: &[Still], manifest: &Manifest) -> Option<([usize; 2], Fault)> {
     // The zero of unsigned codes and of volts is not known yet.
     let about_zero = match manifest.raw_unit {
         RawUnit::Si => true,
@@ -103,11 +100,11 @@ fn range(still: &[Still], manifest: &Manifest) -> Option<([usize; 2], Change)> {
         .collect();
     let pair = classed.windows(2).find(|pair| pair[0].1 != pair[1].1)?;
     let ratio = 2f64.powf(if pair[1].1 { other } else { -other });
-    Some(([pair[0].0, pair[1].0], Change::Range(ratio)))
+    Some(([pair[0].0, pair[1].0], Fault::RangeChanged { ratio }))
 }
 
 /// The segments before and after the columns change places, and the change.
-fn columns(still: &[Still], condensed: &Condensed) -> Option<([usize; 2], Change)> {
+fn columns(still: &[Still], condensed: &Condensed) -> Option<([usize; 2], Fault)> {
     if still.len() < 2 * FEWEST || !condensed.has_raw.iter().all(|has| *has) {
         return None;
     }
@@ -175,5 +172,6 @@ fn columns(still: &[Still], condensed: &Condensed) -> Option<([usize; 2], Change
         .into_iter()
         .find(|(c, _)| Sensor::Accel.channels().contains(c));
     let (now, before) = of_accel.filter(|_| now.len() == 3)?;
-    Some(([first - 1, first], Change::Columns(now, before)))
+    let [now, before] = [now, before].map(|c| RAW_COLUMNS[c]);
+    Some(([first - 1, first], Fault::ColumnsMoved { now, before }))
 }

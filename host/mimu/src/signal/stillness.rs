@@ -5,7 +5,6 @@ use std::ops::Range;
 use serde::Serialize;
 
 use crate::fault::SHORTEST_S;
-use crate::log_fault::LogFault;
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Condensed, Level, StepBlocks, extent, quantile};
 use crate::signal::change_point;
@@ -13,6 +12,7 @@ use crate::signal::log_fault;
 use crate::signal::rate_at_rest::RateAtRest;
 use crate::signal::window::{Window, in_bursts, windows};
 use mimu_recording::error::{Error, Result};
+use mimu_recording::health;
 use mimu_recording::{Manifest, Reference};
 
 /// Length of the window whose variance decides on stillness, s. It is long enough for a slow turn to show in the accelerometer: the force
@@ -102,7 +102,7 @@ pub(crate) struct Segmentation {
     /// The thresholds; if the log has a fault, those before it.
     pub detection: Detection,
     /// A fault of the log: no calibration holds before and after it.
-    pub fault: Option<LogFault>,
+    pub fault: Option<health::Finding>,
 }
 
 /// Finds the still segments of a recording. The part before a fault of the log and the part after it are searched separately, because each
@@ -145,19 +145,19 @@ pub(crate) fn find(
     let fault = by_hand
         .then(|| log_fault::find(&search.quiet(), condensed, manifest))
         .flatten();
-    let Some(found) = &fault else {
+    let Some((fault, block)) = fault else {
         return Ok(Segmentation {
             ranges,
             detection,
-            fault,
+            fault: None,
         });
     };
-    let (mut ranges, detection) = search.still(0..found.block);
-    ranges.extend(search.still(found.block + 1..blocks.len()).0);
+    let (mut ranges, detection) = search.still(0..block);
+    ranges.extend(search.still(block + 1..blocks.len()).0);
     Ok(Segmentation {
         ranges,
         detection,
-        fault,
+        fault: Some(fault),
     })
 }
 

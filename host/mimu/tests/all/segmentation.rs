@@ -3,10 +3,10 @@
 use mimu::fit::{Options, fit};
 use mimu::quantity::Sensor;
 use mimu::recording_problem::RecordingProblem;
-use mimu::signal::dwell::Change;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::turntable::RatedDwells;
 use mimu::{Manifest, Prepared, RawUnit, Reference, Samples};
+use mimu_recording::health::Fault;
 use mimu_recording::{Turntable, TurntableRate};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -221,8 +221,8 @@ fn the_row_in_which_the_accelerometers_range_changes_is_named_and_neither_part_i
         let prepared = by_hand(&samples).unwrap();
         let fault = prepared.dwells.fault.expect("a fault");
         assert_eq!(
-            (fault.row, fault.change),
-            (row as u64, Change::Range(factor))
+            (fault.rows.first, fault.fault),
+            (Some(row as u64 + 1), Fault::RangeChanged { ratio: factor })
         );
         let problems = RecordingProblem::without_fit(&prepared);
         assert!(problems.iter().any(|p| p.id() == "range_change"));
@@ -251,8 +251,14 @@ fn the_row_in_which_columns_change_places_is_named_and_the_part_before_it_is_a_s
     let prepared = by_hand(&shifted).unwrap();
     let fault = prepared.dwells.fault.expect("a fault");
     assert_eq!(
-        (fault.row, fault.change),
-        (row as u64, Change::Columns(5, 0))
+        (fault.rows.first, fault.fault),
+        (
+            Some(row as u64 + 1),
+            Fault::ColumnsMoved {
+                now: "accel_z",
+                before: "gyro_x"
+            }
+        )
     );
     let before = prepared.dwells.list.iter();
     let before = before.filter(|d| (d.first_row as usize) < row).count();

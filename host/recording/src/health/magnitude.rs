@@ -1,5 +1,6 @@
 //! The magnitude of readings against what they measure: gravity, known rates and turns. It shows another unit than given.
 
+use super::words::{self, Cause};
 use super::{Fault, Finding};
 
 /// Standard gravity, m/s².
@@ -30,42 +31,6 @@ pub enum Against {
     Turns,
 }
 
-/// Why readings differ from what they measure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
-    /// A gyro in deg/s.
-    DegreesPerSecond,
-    /// A gyro that was converted to rad/s twice.
-    RadiansTwice,
-    /// The same, or known rates in rad/s.
-    RadiansTwiceOrRates,
-    /// A turntable at 33 1/3 rpm for which 45 rpm are given.
-    SlowTurntable,
-    /// A turntable at 45 rpm for which 33 1/3 rpm are given.
-    FastTurntable,
-    /// Times in ms.
-    Milliseconds,
-    /// Times or rates that are wrong by this factor.
-    Times,
-    /// An accelerometer in g.
-    G,
-    /// An accelerometer in mg.
-    MilliG,
-    /// An accelerometer that was multiplied by gravity twice.
-    GravityTwice,
-    /// Any other.
-    Unknown,
-}
-
-/// The unit of fractions that are declared as counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct DeclaredUnit {
-    /// The unit.
-    pub unit: &'static str,
-    /// How to import readings in it.
-    pub import: &'static str,
-}
-
 /// The finding about a gyro in SI whose readings are `times` its input.
 pub fn gyro_gain(times: f64, against: Against) -> Option<Finding> {
     let near = |factor: f64| (0.8..1.25).contains(&(times / factor));
@@ -73,15 +38,15 @@ pub fn gyro_gain(times: f64, against: Against) -> Option<Finding> {
     let degrees = 1f64.to_degrees();
     let (turns, table) = (Against::Turns, Against::TurntableRate);
     let cause = match against {
-        _ if near(degrees) => Cause::DegreesPerSecond,
-        Against::Turns if near(degrees.recip()) => Cause::RadiansTwice,
-        _ if near(degrees.recip()) => Cause::RadiansTwiceOrRates,
-        _ if against == table && rpm(200.0 / 270.0) => Cause::SlowTurntable,
-        _ if against == table && rpm(270.0 / 200.0) => Cause::FastTurntable,
-        _ if against == turns && near(1000.0) => Cause::Milliseconds,
+        _ if near(degrees) => words::DEGREES_PER_SECOND,
+        Against::Turns if near(degrees.recip()) => words::RADIANS_TWICE,
+        _ if near(degrees.recip()) => words::RADIANS_TWICE_OR_RATES,
+        _ if against == table && rpm(200.0 / 270.0) => words::SLOW_TURNTABLE,
+        _ if against == table && rpm(270.0 / 200.0) => words::FAST_TURNTABLE,
+        _ if against == turns && near(1000.0) => words::MILLISECONDS,
         // The gyro is integrated over the turns: time stamps that run twice as fast halve the scale factor.
-        _ if against == turns && (0.1..10.0).contains(&times) => Cause::Times,
-        _ => Cause::Unknown,
+        _ if against == turns && (0.1..10.0).contains(&times) => words::TIMES,
+        _ => words::UNKNOWN,
     };
     not_si("gyro", false, times, cause)
 }
@@ -103,10 +68,10 @@ pub fn accel_at_rest(size: f64, gravity_mps2: f64) -> Option<Finding> {
 fn accel_cause(times: f64, gravity_mps2: f64) -> Cause {
     let near = |factor: f64| (0.8..1.25).contains(&(times / factor));
     match times {
-        _ if near(1.0 / gravity_mps2) => Cause::G,
-        _ if near(1000.0 / gravity_mps2) => Cause::MilliG,
-        _ if near(gravity_mps2) => Cause::GravityTwice,
-        _ => Cause::Unknown,
+        _ if near(1.0 / gravity_mps2) => words::IN_G,
+        _ if near(1000.0 / gravity_mps2) => words::IN_MG,
+        _ if near(gravity_mps2) => words::GRAVITY_TWICE,
+        _ => words::UNKNOWN,
     }
 }
 
@@ -152,10 +117,10 @@ pub fn not_counts(about: &'static str, per_si: f64) -> Option<Finding> {
     };
     let is = |(of, ..): &&(f64, _, _)| (per_si / of - 1.0).abs() < OF_UNIT;
     let (_, unit, import) = *units.iter().find(is)?;
-    let declared = DeclaredUnit { unit, import };
-    Some(Finding::new(
-        about,
-        0,
-        Fault::NotCounts { per_si, declared },
-    ))
+    let fault = Fault::NotCounts {
+        per_si,
+        unit,
+        import,
+    };
+    Some(Finding::new(about, 0, fault))
 }

@@ -27,8 +27,7 @@ mod zeros;
 
 pub(crate) use magnitude::LARGEST_BIAS;
 pub use magnitude::{
-    Against, Cause, DeclaredUnit, GAIN, accel_at_rest, accel_gain, gyro_at_rest, gyro_gain,
-    not_counts,
+    Against, GAIN, accel_at_rest, accel_gain, gyro_at_rest, gyro_gain, not_counts,
 };
 pub use rails::{Extreme, StreamRails};
 pub use repeats::{
@@ -38,6 +37,7 @@ pub use sixteen_bits::SignedLowByteFinder;
 pub(crate) use temperatures::impossible_temperature;
 pub use temperatures::{At, Temperatures, unusual_temperatures};
 pub(crate) use two_sources::TwoSources;
+pub use words::Cause;
 pub(crate) use zeros::{RowKind, SENSORS, Zeros};
 
 use std::fmt::Display;
@@ -58,73 +58,46 @@ pub struct Finding {
 /// Rows that show a fault.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Rows {
-    /// The first one, counted as whoever fed the samples counts; `None` if it is unknown.
+    /// The first one, counted from 1; `None` if it is unknown.
     pub first: Option<u64>,
     /// How many; 0 if they were not counted.
     pub count: u64,
 }
 
 /// Kinds of faults. Values are raw readings.
+#[expect(
+    missing_docs,
+    reason = "the comment of a variant says what its fields are"
+)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fault {
-    /// A logger faster than the sensor writes each reading several times.
+    /// A logger faster than the sensor writes each reading several times: the rows in all, the mean number for each reading, and rows a second.
     Held {
-        /// Rows in which the sensor was watched.
         of: u64,
-        /// Mean number of rows for each reading.
         rows_per_reading: f64,
-        /// Rows a second.
         rate_hz: f64,
     },
     /// A board sends its last readings again, because its sensor does not answer.
     Unanswered,
-    /// A channel has one value in all rows.
-    Dead {
-        /// That value.
-        value: f64,
-    },
-    /// A channel has one value in all rows of a rest, and the other channels of its sensor change by single quantisation steps.
-    DeadOrCoarse {
-        /// That value.
-        value: f64,
-        /// Their quantisation step.
-        step: f64,
-    },
-    /// A channel has one value for longer than chance explains, and changes before or after.
-    Stuck {
-        /// That value.
-        value: f64,
-        /// For how long, s.
-        lasts_s: f64,
-    },
-    /// A channel reads the end of a 16-bit converter.
-    EndOfConverter {
-        /// That value.
-        value: f64,
-    },
-    /// A channel in SI ends at the full scale of a part.
-    FullScale {
-        /// That value.
-        value: f64,
-    },
-    /// A channel stays at its extreme.
+    /// A channel has this value in all rows.
+    Dead { value: f64 },
+    /// The same in a rest in which the other channels of the sensor change by single quantisation steps of this size.
+    DeadOrCoarse { value: f64, step: f64 },
+    /// A channel has this value for longer than chance explains, s, and changes before or after.
+    Stuck { value: f64, lasts_s: f64 },
+    /// A channel reads this value, the end of a 16-bit converter.
+    EndOfConverter { value: f64 },
+    /// A channel in SI ends at this value, the full scale of a part.
+    FullScale { value: f64 },
+    /// A channel stays at its extreme: whether it is the highest value, that value, how often it occurs in a row, and how often chance explains.
     RunAtEnd {
-        /// Whether it is the highest value.
         high: bool,
-        /// The extreme.
         value: f64,
-        /// How often it occurs in a row.
         longest: f64,
-        /// How often chance explains.
         by_chance: f64,
     },
-    /// The noise of a channel ends near an extreme.
-    CalmEnd {
-        /// Whether that is the highest value.
-        high: bool,
-        /// The innermost value without noise.
-        from: f64,
-    },
+    /// The noise of a channel ends at the highest values or the lowest, and from which one on.
+    CalmEnd { high: bool, from: f64 },
     /// A reading of the last second is at a rail.
     AtEnd,
     /// Rows with nothing but zeros.
@@ -133,79 +106,55 @@ pub enum Fault {
     NoForce,
     /// A sensor has zeros in all rows.
     NotConnected,
-    /// Gyro and accelerometer have rows of their own: how many.
-    SeparateRows {
-        /// Those of the gyro.
-        gyro: u64,
-        /// Those of the accelerometer.
-        accel: u64,
-    },
-    /// The specific force has no gravity.
-    NoGravity {
-        /// Its usual magnitude, m/s².
-        size: f64,
-    },
-    /// Readings are declared as SI, and have another magnitude than what they measure.
+    /// So many rows of gyro and accelerometer have one of the two alone.
+    SeparateRows { gyro: u64, accel: u64 },
+    /// The usual specific force, m/s², has no gravity.
+    NoGravity { size: f64 },
+    /// Readings declared as SI: whether they are at rest (and include biases), how many times their input they are, and why.
     NotSi {
-        /// Whether biases are included.
         at_rest: bool,
-        /// How many times their input they are.
         times: f64,
-        /// Why.
         cause: Cause,
     },
-    /// A gyro reads more at rest than any bias.
-    Turning {
-        /// Its reading, rad/s.
-        rate: f64,
-    },
-    /// Readings are declared as counts, but are fractions and have the scale factor of a unit.
+    /// Reading of a gyro at rest, rad/s, that is larger than any bias.
+    Turning { rate: f64 },
+    /// Readings declared as counts that are fractions and have the scale factor of a unit: their number per SI unit, the unit, and how to import them.
     NotCounts {
-        /// Their number per SI unit.
         per_si: f64,
-        /// The unit that they are in.
-        declared: DeclaredUnit,
+        unit: &'static str,
+        import: &'static str,
     },
-    /// A reading jumps away and returns in the next row.
-    Alternating {
-        /// Share of the rows.
-        share: f64,
-    },
-    /// The specific force has one magnitude in some rows and another one in others.
-    TwoMagnitudes {
-        /// The smaller.
-        low: f64,
-        /// The larger.
-        high: f64,
-        /// Rows in all.
-        of: u64,
-    },
+    /// A reading jumps away and returns in the next row, in this share of the rows.
+    Alternating { share: f64 },
+    /// The specific force has one magnitude in some rows and another one in others, of all rows.
+    TwoMagnitudes { low: f64, high: f64, of: u64 },
     /// Negative readings are written as unsigned codes of 16 bits.
     Unsigned,
     /// Signed readings of 16 bits overflow.
     Overflow,
     /// A firmware takes the low byte for a signed number.
     SignedLowByte,
-    /// Readings that cannot be temperatures in °C.
+    /// Of so many readings some cannot be temperatures in °C: the first of them, and where it is if there are several.
     NoTemperatures {
-        /// Of so many readings.
         of: u64,
-        /// The first of them.
         first_c: f64,
-        /// Where it is, if there are several.
         at: Option<At>,
     },
-    /// Temperatures at which no board is used.
-    UnusualTemperatures {
-        /// The lowest, °C.
-        low_c: f64,
-        /// The highest, °C.
-        high_c: f64,
-    },
+    /// Temperatures, °C, at which no board is used.
+    UnusualTemperatures { low_c: f64, high_c: f64 },
     /// The column of the thermometer has zeros only.
     NoThermometer,
     /// Zeros of a thermometer that did not answer.
     SilentThermometer,
+    /// From a row on the accelerometer has another range, and reads so many times as much.
+    RangeChanged { ratio: f64 },
+    /// From a row on a column reads what another one read before.
+    ColumnsMoved {
+        now: &'static str,
+        before: &'static str,
+    },
+    /// The gyro's readings follow the pose, and the accelerometer's do not.
+    Exchanged,
 }
 
 impl Finding {
@@ -218,12 +167,11 @@ impl Finding {
         }
     }
 
-    /// `fault` of all channels, in the stream of a session.
-    pub fn of_stream(fault: Fault) -> Self {
+    /// `fault` of all channels in `count` rows.
+    pub fn of_all(count: u64, fault: Fault) -> Self {
         Self {
             about: None,
-            rows: Rows::default(),
-            fault,
+            ..Self::new("", count, fault)
         }
     }
 
@@ -263,6 +211,8 @@ impl Finding {
             Fault::UnusualTemperatures { .. } => "temperatures",
             Fault::NoThermometer => "no_thermometer",
             Fault::SilentThermometer => "silent_thermometer",
+            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => "log_fault",
+            Fault::Exchanged => "exchanged",
         }
     }
 
@@ -283,6 +233,7 @@ impl Finding {
             Fault::AllZero => &[Argument::Columns],
             Fault::Alternating { .. } => &[Argument::Where, Argument::Columns],
             Fault::Unsigned => &[Argument::TwosComplement],
+            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => &[Argument::Rows],
             Fault::SignedLowByte => &[Argument::SignedLowByte],
             Fault::NoTemperatures { .. } => &[Argument::Scale, Argument::Offset],
             _ => &[],

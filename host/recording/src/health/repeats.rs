@@ -216,14 +216,8 @@ impl Unanswered {
 
     /// The finding, if the time of repeated rows has ended.
     pub fn ended(&mut self) -> Option<Finding> {
-        (self.run == 0 && self.found > 0).then(|| Finding {
-            about: None,
-            rows: Rows {
-                first: None,
-                count: std::mem::take(&mut self.found),
-            },
-            fault: Fault::Unanswered,
-        })
+        let ended = self.run == 0 && self.found > 0;
+        ended.then(|| Finding::of_all(std::mem::take(&mut self.found), Fault::Unanswered))
     }
 }
 

@@ -2,8 +2,64 @@
 
 use std::fmt;
 
-use super::{Cause, Fault, Finding};
+use super::{Fault, Finding};
 use crate::digits::{duration, plural, significant, unsigned_zero};
+
+/// Why readings differ from what they measure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cause {
+    problem: &'static str,
+    remedy: &'static str,
+}
+
+const fn cause(problem: &'static str, remedy: &'static str) -> Cause {
+    Cause { problem, remedy }
+}
+
+pub(super) const DEGREES_PER_SECOND: Cause = cause(
+    "they are in deg/s, and SI is rad/s",
+    "import them with the factor gyro=0.0174533",
+);
+pub(super) const RADIANS_TWICE: Cause = cause(
+    "they were converted from deg/s to rad/s twice",
+    "leave one conversion out",
+);
+pub(super) const RADIANS_TWICE_OR_RATES: Cause = cause(
+    "the ref_ columns are not in deg/s, or the readings were converted to rad/s twice",
+    "correct the ref_ columns, or leave one conversion out",
+);
+pub(super) const SLOW_TURNTABLE: Cause = cause(
+    "was the turntable at 33 1/3 rpm while the rate of 45 rpm is given?",
+    "give the rate at which it turned",
+);
+pub(super) const FAST_TURNTABLE: Cause = cause(
+    "was the turntable at 45 rpm while the rate of 33 1/3 rpm is given?",
+    "give the rate at which it turned",
+);
+pub(super) const MILLISECONDS: Cause = cause(
+    "the time stamps are in ms, and must be in s",
+    "import them with their unit",
+);
+pub(super) const TIMES: Cause = cause(
+    "if the stamps or the sample rate are wrong by this factor, so is every integrated angle",
+    "check the time stamps and the unit",
+);
+pub(super) const IN_G: Cause = cause(
+    "they are in g, and SI is m/s²",
+    "import them with the factor accel=9.80665",
+);
+pub(super) const IN_MG: Cause = cause(
+    "they are in mg, and SI is m/s²",
+    "import them with the factor accel=0.00980665",
+);
+pub(super) const GRAVITY_TWICE: Cause = cause(
+    "they were multiplied by gravity twice",
+    "leave one factor out",
+);
+pub(super) const UNKNOWN: Cause = cause(
+    "the unit is another one, or the range of the part",
+    "check the unit, and the range that the part was set to; counts need another raw unit",
+);
 
 impl Finding {
     /// What is wrong.
@@ -84,6 +140,17 @@ impl Finding {
             Fault::SignedLowByte => format!(
                 "{count} jumps between neighbouring samples show that readings whose low byte is 128 or more are 256 counts too low: the firmware reads the low byte as a signed number"
             ),
+            Fault::RangeChanged { ratio } => format!(
+                "from data row {} on the accelerometer reads {ratio} times as much at rest as before, so its range has changed",
+                self.rows.first.unwrap_or(1)
+            ),
+            Fault::ColumnsMoved { now, before } => format!(
+                "from data row {} on {now} reads what {before} read before, so the columns have changed places",
+                self.rows.first.unwrap_or(1)
+            ),
+            Fault::Exchanged => {
+                "the gyro's readings follow the pose, but the accelerometer's do not".into()
+            }
             _ => self.problem_of_size(),
         }
     }
@@ -107,17 +174,16 @@ impl Finding {
                 format!(
                     "raw_unit = \"SI\", but {what} {} times the input: {}",
                     significant(times),
-                    cause.words()
+                    cause.problem
                 )
             }
             Fault::Turning { rate } => format!(
                 "at rest it reads {} deg/s, more than any bias",
                 significant(rate.to_degrees())
             ),
-            Fault::NotCounts { per_si, declared } => format!(
-                "raw_unit = \"count\", but the readings are fractions, and the fit gives {} of them per SI unit: they are in {}",
-                significant(per_si),
-                declared.unit
+            Fault::NotCounts { per_si, unit, .. } => format!(
+                "raw_unit = \"count\", but the readings are fractions, and the fit gives {} of them per SI unit: they are in {unit}",
+                significant(per_si)
             ),
             Fault::NoTemperatures {
                 first_c, at: None, ..
@@ -172,13 +238,11 @@ impl Finding {
                 "give a list of columns with the time for each, and they are joined on it"
             }
             Fault::NoGravity { .. } => "log the accelerometer with gravity",
-            Fault::NotSi { cause, .. } => cause.remedy(),
+            Fault::NotSi { cause, .. } => cause.remedy,
             Fault::Turning { .. } => {
                 "check that the unit rests, and that the readings are in rad/s"
             }
-            Fault::NotCounts { declared, .. } => {
-                return format!("import them with {}", declared.import);
-            }
+            Fault::NotCounts { import, .. } => return format!("import them with {import}"),
             Fault::Alternating { .. } => {
                 "if a column says whose each row is, choose by it, with a list of columns for each; otherwise import the rows of each from a separate file"
             }
@@ -198,6 +262,14 @@ impl Finding {
                 "convert it to degrees Celsius (counts of an MPU-6050 or MPU-9150: a factor of 0.00294118 and an offset of 36.53), or skip the column"
             }
             Fault::NoThermometer | Fault::SilentThermometer => "check the thermometer's wiring",
+            Fault::RangeChanged { .. } | Fault::ColumnsMoved { .. } => {
+                let row = self.rows.first.unwrap_or(1);
+                return format!(
+                    "import the rows before it (..{}) or those from it on ({row}..) as a recording",
+                    row - 1
+                );
+            }
+            Fault::Exchanged => "are the columns ax,ay,az and gx,gy,gz exchanged?",
         };
         remedy.into()
     }
@@ -216,47 +288,6 @@ impl Finding {
             Fault::NoThermometer => "the column is left out",
             _ => return None,
         })
-    }
-}
-
-impl Cause {
-    fn words(self) -> &'static str {
-        match self {
-            Self::DegreesPerSecond => "they are in deg/s, and SI is rad/s",
-            Self::RadiansTwice => "they were converted from deg/s to rad/s twice",
-            Self::RadiansTwiceOrRates => {
-                "the ref_ columns are not in deg/s, or the readings were converted to rad/s twice"
-            }
-            Self::SlowTurntable => {
-                "was the turntable at 33 1/3 rpm while the rate of 45 rpm is given?"
-            }
-            Self::FastTurntable => {
-                "was the turntable at 45 rpm while the rate of 33 1/3 rpm is given?"
-            }
-            Self::Milliseconds => "the time stamps are in ms, and must be in s",
-            Self::Times => {
-                "if the time stamps or the sample rate are wrong by this factor, so is every integrated angle"
-            }
-            Self::G => "they are in g, and SI is m/s²",
-            Self::MilliG => "they are in mg, and SI is m/s²",
-            Self::GravityTwice => "they were multiplied by gravity twice",
-            Self::Unknown => "the unit is another one, or the range that the part was set to",
-        }
-    }
-
-    fn remedy(self) -> &'static str {
-        match self {
-            Self::DegreesPerSecond => "import them with the factor gyro=0.0174533",
-            Self::G => "import them with the factor accel=9.80665",
-            Self::MilliG => "import them with the factor accel=0.00980665",
-            Self::Milliseconds => "give the unit of the time stamps",
-            Self::RadiansTwice | Self::RadiansTwiceOrRates | Self::GravityTwice => {
-                "leave one conversion out"
-            }
-            Self::SlowTurntable | Self::FastTurntable => "correct the rate",
-            Self::Times => "check the time stamps and the unit",
-            Self::Unknown => "check unit and range; counts need another raw unit",
-        }
     }
 }
 

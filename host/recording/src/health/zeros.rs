@@ -1,7 +1,7 @@
 //! Zeros and empty cells in place of readings: padding, a sensor that is not connected, sensors in rows of their own.
 
 use super::repeats::Constant;
-use super::{Fault, Finding, Rows};
+use super::{Fault, Finding};
 
 /// Names of the sensors.
 pub(crate) const SENSORS: [&str; 2] = ["gyro", "accel"];
@@ -90,25 +90,14 @@ impl Zeros {
 
     fn padded(&self) -> Option<Finding> {
         let count = self.padding;
-        (count > 0).then(|| Finding {
-            about: None,
-            rows: Rows { first: None, count },
-            fault: Fault::AllZero,
-        })
+        (count > 0).then(|| Finding::of_all(count, Fault::AllZero))
     }
 
     /// The findings that a recording may have.
     pub fn found(&self) -> Vec<Finding> {
         let [gyro, accel] = self.alone;
         let apart = |rows: u64| rows as f64 > APART_SHARE * self.rows as f64;
-        let separate = Finding {
-            about: None,
-            rows: Rows {
-                first: None,
-                count: gyro + accel,
-            },
-            fault: Fault::SeparateRows { gyro, accel },
-        };
+        let separate = Finding::of_all(gyro + accel, Fault::SeparateRows { gyro, accel });
         let mut all = Vec::from_iter((apart(gyro) && apart(accel)).then_some(separate));
         all.extend(self.padded());
         let not_connected = self.not_connected();

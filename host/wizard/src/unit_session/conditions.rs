@@ -50,10 +50,10 @@ impl UnitSession {
             return Some(Waiting::SamplesLost(seen.missing, rate_hz));
         }
         if seen.saturated {
-            return Some(Waiting::Faulty(Finding::of_stream(Fault::AtEnd)));
+            return Some(Waiting::Faulty(Finding::of_all(0, Fault::AtEnd)));
         }
         if seen.exchanged && !self.station.unit.is_device {
-            return Some(Waiting::Exchanged);
+            return Some(Waiting::Faulty(Finding::of_all(0, Fault::Exchanged)));
         }
         let limits = motion_limits(step.rate_dps);
         for sensor in Sensor::BOTH {
