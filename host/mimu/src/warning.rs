@@ -520,7 +520,15 @@ impl Warning {
                 one.is_like(other)
             }
             (Self::Reading(one), Self::Reading(other)) => discriminant(one) == discriminant(other),
-            (Self::Health(one), Self::Health(other)) => one.kind() == other.kind(),
+            (Self::Health(one), Self::Health(other)) => {
+                let of_channel = |found: &Finding| {
+                    found
+                        .about
+                        .is_some_and(|about| RAW_COLUMNS.contains(&about))
+                };
+                let alike = one.about == other.about || of_channel(one) && of_channel(other);
+                alike && one.kind() == other.kind()
+            }
             (
                 Self::DwellsNotUsed {
                     fault: f,

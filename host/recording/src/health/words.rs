@@ -239,9 +239,7 @@ impl Finding {
             }
             Fault::NoGravity { .. } => "log the accelerometer with gravity",
             Fault::NotSi { cause, .. } => cause.remedy,
-            Fault::Turning { .. } => {
-                "check that the unit rests, and that the readings are in rad/s"
-            }
+            Fault::Turning { .. } => "the unit turns evenly, or the readings are in deg/s",
             Fault::NotCounts { import, .. } => return format!("import them with {import}"),
             Fault::Alternating { .. } => {
                 "if a column says whose each row is, choose by it, with a list of columns for each; otherwise import the rows of each from a separate file"

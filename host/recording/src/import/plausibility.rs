@@ -61,11 +61,9 @@ impl Plausibility {
         match self.zeros.take(&raw, zero_stamp && begun) {
             RowKind::Padding => return true,
             RowKind::NoForce => {
-                for c in 3..6 {
-                    raw[c] = f64::NAN;
-                    if let Some(place) = self.places[c] {
-                        row.values[place] = f64::NAN;
-                    }
+                raw[3..].fill(f64::NAN);
+                for place in self.places[3..].iter().flatten() {
+                    row.values[*place] = f64::NAN;
                 }
             }
             RowKind::Readings => {}
