@@ -142,6 +142,8 @@ impl Serialize for Interruption {
 
 #[cfg(test)]
 mod tests {
+    use mimu_recording::health::Fault;
+
     use super::*;
 
     #[test]
@@ -152,7 +154,7 @@ mod tests {
         let unsteady = Waiting::Unsteady(Sensor::Gyro, 1.1);
         for other in [
             Waiting::TableMoves,
-            Waiting::Exchanged,
+            Waiting::Faulty(Finding::of_all(0, Fault::Exchanged)),
             Waiting::Interrupted(Interruption::Back),
         ] {
             assert!(!unsteady.is_like(&other), "{other}");
