@@ -352,7 +352,8 @@ fn no_dwells(given: bool, has_steps: bool) -> Error {
     }
 }
 
-/// Whether the quantisation `step` of channel `c` is coarser than its noise within dwells. Such a channel repeats one value through whole dwells without being stuck.
+/// Whether the quantisation `step` of channel `c` is coarser than its noise within dwells. Such a channel repeats one value through whole dwells
+/// without being stuck.
 fn is_coarse(list: &[Dwell], step: Option<f64>, c: usize) -> bool {
     let Some(step) = step else { return false };
     let mut changing: Vec<f64> = list

@@ -5,8 +5,8 @@ use super::{Fault, Finding};
 
 /// Standard gravity, m/s².
 const STANDARD_GRAVITY: f64 = 9.806_65;
-/// Gain of readings in SI, or its inverse, that a wrong unit or time base has. Sensors are within ten per cent, and a rate of 33 1/3 rpm in place of 45
-/// is a third off.
+/// Gain of readings in SI, or its inverse, that a wrong unit or time base has. Sensors are within ten per cent, and a rate of 33 1/3 rpm in place of
+/// 45 is a third off.
 pub const GAIN: f64 = 1.3;
 /// The same for a magnitude at rest, which includes biases: data sheets allow 0.15 g on each axis besides ten per cent. Ranges differ by a
 /// factor of 2, units by nearly 10.
@@ -90,8 +90,8 @@ pub fn gyro_at_rest(rate: f64) -> Option<Finding> {
     (rate > LARGEST_BIAS).then(|| Finding::new("gyro", 0, Fault::Turning { rate }))
 }
 
-/// The finding about fractions that are declared as counts, if `per_si`, their number per SI unit, is that of a unit. Whole numbers are counts whatever
-/// their scale: many drivers give mg or mdps.
+/// The finding about fractions that are declared as counts, if `per_si`, their number per SI unit, is that of a unit. Whole numbers are counts
+/// whatever their scale: many drivers give mg or mdps.
 pub fn not_counts(about: &'static str, per_si: f64) -> Option<Finding> {
     let (g, degrees) = (STANDARD_GRAVITY, 1f64.to_degrees());
     let si = "raw unit SI";

@@ -118,7 +118,8 @@ pub enum Fault {
     },
     /// Reading of a gyro at rest, rad/s, that is larger than any bias.
     Turning { rate: f64 },
-    /// Readings declared as counts that are fractions and have the scale factor of a unit: their number per SI unit, the unit, and how to import them.
+    /// Readings declared as counts that are fractions and have the scale factor of a unit: their number per SI unit, the unit, and how to import
+    /// them.
     NotCounts {
         per_si: f64,
         unit: &'static str,

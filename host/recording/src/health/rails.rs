@@ -40,8 +40,8 @@ pub struct Extreme {
 }
 
 impl Extreme {
-    /// The finding if a complete recording ends at a rail; readings are multiples of `step`. `axes`: lowest and highest readings of the sensor's axes, if
-    /// they are in SI.
+    /// The finding if a complete recording ends at a rail; readings are multiples of `step`. `axes`: lowest and highest readings of the sensor's
+    /// axes, if they are in SI.
     ///
     /// Each axis with the same extreme is evidence: before its first sample a part may read its full scale on all of them.
     pub fn rail(&self, step: Option<f64>, axes: &[[f64; 2]]) -> Option<Finding> {

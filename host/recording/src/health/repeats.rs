@@ -11,8 +11,8 @@ use crate::columns::RAW_COLUMNS;
 const HABIT: f64 = 0.1;
 /// Natural logarithm of the odds against a run of equal neighbours by chance, in a whole recording.
 pub(super) const RUN_LOG_ODDS: f64 = 14.0;
-/// Least and largest share of equal neighbours for a limit. No share below the first is measured in few rows. From the second on runs are so long that
-/// none is conspicuous.
+/// Least and largest share of equal neighbours for a limit. No share below the first is measured in few rows. From the second on runs are so long
+/// that none is conspicuous.
 const SHARES: [f64; 2] = [1e-3, 0.8];
 /// A run is not conspicuous below this length, in rows: in a short recording rare repeats are not counted well enough.
 const SHORTEST_RUN: f64 = 5.0;

@@ -38,10 +38,10 @@ const FAST: f64 = 64.0;
 
 /// Finds readings whose low byte a firmware took for a signed number, in the samples of a channel as they come.
 ///
-/// Such a reading is 256 counts too low if its low byte is 128 or more. The low byte itself is right, so the fault
-/// can be undone. When the low byte passes 128, the error appears or disappears between two samples, and the readings jump by 256 counts while the
-/// signal moves by a few. A calibration could not fit this as an effect. It would take the share of time that a bit is set from the noise of the dwells,
-/// which contains the jumps: the coefficient was wrong by 40 to 64 counts of 256.
+/// Such a reading is 256 counts too low if its low byte is 128 or more. The low byte itself is right, so the fault can be undone. When the low byte
+/// passes 128, the error appears or disappears between two samples, and the readings jump by 256 counts while the signal moves by a few. A
+/// calibration could not fit this as an effect. It would take the share of time that a bit is set from the noise of the dwells, which contains the
+/// jumps: the coefficient was wrong by 40 to 64 counts of 256.
 #[derive(Debug, Clone, Default)]
 pub struct SignedLowByteFinder {
     /// Up to three samples before the next one.
