@@ -13,21 +13,33 @@
 //! | [`judged`] | judgements of the sources, and errors that every program inherits |
 //! | [`heading`] | the comments at the head of every file |
 //! | [`parameters`] | parameters of autopilots, and their file layouts |
+//! | `degrees_per_turn` | scale factors of a gyro alone, for SlimeNRF and the Pigeon 2 |
+//! | `flight_codes` | the accelerometer in whole codes, for Betaflight and INAV |
 
 pub mod ardupilot;
+pub mod autoware;
+pub mod basalt;
+pub mod betaflight;
 pub mod c;
 pub mod core;
+mod degrees_per_turn;
+pub mod depthai;
 pub mod driver;
 pub mod fastlio;
+mod flight_codes;
 pub mod fusion;
+pub mod gazebo;
 pub mod heading;
+pub mod iio;
 pub mod imu_calib;
 pub mod imu_tk;
+pub mod inav;
 pub mod intrinsics;
 pub mod json;
 pub mod judged;
 pub mod kalibr;
 pub mod liosam;
+pub mod matlab;
 pub mod misalignment;
 mod one_temperature;
 pub mod openvins;
@@ -35,10 +47,13 @@ pub mod openvins;
 mod options;
 pub mod orbslam3;
 pub mod parameters;
+pub mod pigeon;
 pub mod px4;
 pub mod realsense;
 pub mod remaining;
+pub mod ros_imu;
 pub mod rust;
+pub mod slimenrf;
 pub mod vins;
 pub mod worst_axis;
 pub mod yaml;
@@ -91,11 +106,35 @@ pub enum Format {
     /// Both triads for a RealSense camera: bytes of its EEPROM, or calibration.json
     #[cfg_attr(feature = "clap", command(name = "realsense"))]
     RealSense(realsense::Options),
+    /// Both triads and noise for an OAK camera: imuCalibrationParams of DepthAI
+    #[cfg_attr(feature = "clap", command(name = "depthai"))]
+    DepthAi(depthai::Options),
+    /// Both triads and noise for Basalt: the inertial part of its calibration
+    Basalt(basalt::Options),
     /// Parameters of PX4: TC_* over temperature, CAL_* at one
     Px4(px4::Options),
     /// Parameters of ArduPilot: INS_TCAL* over temperature, INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS at one
     #[cfg_attr(feature = "clap", command(name = "ardupilot"))]
     ArduPilot(ardupilot::Options),
+    /// Biases of the accelerometer for Betaflight: lines of its CLI
+    Betaflight(betaflight::Options),
+    /// Biases and scale factors of the accelerometer for INAV: lines of its CLI
+    Inav(inav::Options),
+    /// Scale factors of the gyro for a SlimeVR tracker with SlimeNRF: the line `sens x,y,z` of its console
+    #[cfg_attr(feature = "clap", command(name = "slimenrf"))]
+    SlimeNrf(slimenrf::Options),
+    /// Scale factors of the gyro for a Pigeon 2 of CTR Electronics: GyroScalarX, Y and Z in degrees per rotation
+    Pigeon(pigeon::Options),
+    /// Biases for the Linux driver inv_icm42600: a script that writes calibbias of IIO
+    Iio(iio::Options),
+    /// Covariances of sensor_msgs/Imu for ROS
+    RosImu(ros_imu::Options),
+    /// Biases of the gyro and noise for Autoware: imu_corrector.param.yaml
+    Autoware(autoware::Options),
+    /// Biases and noise for Gazebo: the element <imu> of SDF
+    Gazebo(gazebo::Options),
+    /// Errors and noise for MATLAB's imuSensor: JSON for loadparams
+    Matlab(matlab::Options),
     /// The bytes that a device stores, for programs with mimu-core
     Core,
 }
@@ -270,6 +309,12 @@ impl Format {
                 | Self::OrbSlam3(_)
                 | Self::LioSam(_)
                 | Self::FastLio(_)
+                | Self::DepthAi(_)
+                | Self::Basalt(_)
+                | Self::RosImu(_)
+                | Self::Autoware(_)
+                | Self::Gazebo(_)
+                | Self::Matlab(_)
         )
     }
 
@@ -298,6 +343,17 @@ impl Format {
             Self::RealSense(options) => realsense::export(from, options),
             Self::Px4(options) => px4::export(from, options),
             Self::ArduPilot(options) => ardupilot::export(from, options),
+            Self::DepthAi(options) => depthai::export(from, options),
+            Self::Basalt(options) => basalt::export(from, options),
+            Self::Betaflight(options) => betaflight::export(from, options),
+            Self::Inav(options) => inav::export(from, options),
+            Self::SlimeNrf(options) => slimenrf::export(from, options),
+            Self::Pigeon(options) => pigeon::export(from, options),
+            Self::Iio(options) => iio::export(from, options),
+            Self::RosImu(options) => ros_imu::export(from, options),
+            Self::Autoware(options) => autoware::export(from, options),
+            Self::Gazebo(options) => gazebo::export(from, options),
+            Self::Matlab(options) => matlab::export(from, options),
             Self::Core => core::export(from),
             Self::Json => json::export(from),
             Self::Rust => rust::export(from),

@@ -65,7 +65,8 @@ impl Remaining {
         }
     }
 
-    fn unknown(sensor: Sensor, source: &str, condition: &str) -> Self {
+    /// An error that nothing measured.
+    pub(crate) fn unknown(sensor: Sensor, source: &str, condition: &str) -> Self {
         Self {
             sensor,
             source: source.into(),
@@ -93,6 +94,23 @@ impl Remaining {
             at_input(sensor),
             &errors,
         )
+    }
+
+    /// The bias of readings that a program uses uncorrected, SI.
+    pub fn of_bias(sensor: Sensor, bias: &Vector3<f64>) -> Self {
+        Self::new(sensor, "bias", "without input", &[*bias])
+    }
+
+    /// Rounding to multiples of `step`, SI. The error is taken as uniform between half a step below and above.
+    pub fn of_rounding(sensor: Sensor, step: f64) -> Self {
+        Self {
+            sensor,
+            source: "rounding of the file's numbers".into(),
+            condition: "constant".into(),
+            unit: sensor.unit(),
+            rms: Some(step / f64::sqrt(12.0)),
+            max: Some(0.5 * step),
+        }
     }
 
     /// The Earth's rate in the bias of a gyro that was calibrated at rest in an unknown attitude.

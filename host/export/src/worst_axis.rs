@@ -110,6 +110,43 @@ impl WalkOptions {
         })
     }
 
+    /// N and K of every axis, times `gain` of the axis, for programs that have a number for each.
+    ///
+    /// # Errors
+    /// Those of [`Self::densities`], or an axis is missing.
+    pub fn axes(
+        &self,
+        noise: &NoiseFile,
+        gain: &PerSensor<[f64; 3]>,
+    ) -> Result<PerSensor<[Densities; 3]>> {
+        let of = |sensor: Sensor, axis: usize| -> Result<Densities> {
+            let name = format!("{sensor}_{}", AXES[axis]);
+            let mut channels = noise.of(sensor);
+            channels.retain(|channel| channel.name == name);
+            let term = |term, given| {
+                worst_of(
+                    noise,
+                    &channels,
+                    &name,
+                    (sensor, term),
+                    given,
+                    &gain[sensor],
+                )
+            };
+            Ok(Densities {
+                white: term(Term::N, None)?,
+                walk: term(Term::K, self.given(sensor))?,
+            })
+        };
+        let three = |sensor| -> Result<[Densities; 3]> {
+            Ok([of(sensor, 0)?, of(sensor, 1)?, of(sensor, 2)?])
+        };
+        Ok(PerSensor {
+            accel: three(Sensor::Accel)?,
+            gyro: three(Sensor::Gyro)?,
+        })
+    }
+
     /// [`Self::densities`] of calibrated readings.
     ///
     /// # Errors
@@ -124,6 +161,14 @@ impl WalkOptions {
             Sensor::Accel => self.accel_walk,
         }
     }
+}
+
+/// Bias instability B of an axis, if the record shows it; the largest, if it was recorded at several temperatures.
+pub(crate) fn instability(noise: &NoiseFile, sensor: Sensor, axis: &str) -> Option<f64> {
+    let name = format!("{sensor}_{axis}");
+    let channels = noise.of(sensor).into_iter().filter(|c| c.name == name);
+    let all = channels.filter_map(|c| Some(c.get(Term::B).ok()?.value));
+    all.reduce(f64::max)
 }
 
 /// A line of YAML: the value that a program takes, which `convert` makes of the density `from`, its unit, and its interval in the same unit.
@@ -153,12 +198,32 @@ fn worst(
     fallback: Option<f64>,
     gain: &[f64; 3],
 ) -> Result<Worst> {
-    let (channels, place) = (file.of(sensor), &file.place);
+    let name = format!("the {sensor}");
+    worst_of(
+        file,
+        &file.of(sensor),
+        &name,
+        (sensor, term),
+        fallback,
+        gain,
+    )
+}
+
+/// The same among these `channels`, which are those of `name`.
+fn worst_of(
+    file: &NoiseFile,
+    channels: &[&NoiseChannel],
+    name: &str,
+    (sensor, term): (Sensor, Term),
+    fallback: Option<f64>,
+    gain: &[f64; 3],
+) -> Result<Worst> {
+    let place = &file.place;
     let Some(first) = channels.first() else {
         return Err(Error::new(
             place,
-            format!("it has no channel of the {sensor}"),
-            "record both sensors: the file needs both",
+            format!("it has no channel of {name}"),
+            "record both sensors: the file needs all six axes",
         ));
     };
     if let Err(other) = first.model_in(sensor.unit()) {

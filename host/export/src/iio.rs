@@ -1,0 +1,117 @@
+//! Biases for the Linux driver inv_icm42600 (ICM-42600 and IIM-42600 families): a shell script that writes calibbias of its IIO devices.
+//!
+//! IIO calls calibbias "hardware applied calibration offset" and leaves its unit and sign to each driver. This driver takes SI and writes it to the
+//! chip's OFFSET_USER registers, in steps of 1/32 deg/s within ±64 deg/s and of 0.5 mg within ±1 g; the chip adds it to its readings. InvenSense's own
+//! driver writes the negative bias there. Therefore calibbias = -b.
+//!
+//! Other drivers take codes of a register, each in its own unit, so this file is for one driver. calibscale is missing in drivers of inertial units.
+//! mount_matrix is read-only, one rotation for both triads, and describes how the chip is mounted: neither has a place here.
+//!
+//! Source: Linux 6.15, drivers/iio/imu/inv_icm42600/inv_icm42600_gyro.c and _accel.c, `write_offset`, `*_init` (names); Documentation/ABI/testing,
+//! sysfs-bus-iio and sysfs-bus-iio-icm42600; InvenSenseInc/public.mcu.iim42652, Ixm42xxxSelfTest.c (5033be47, 2022-06) for the sign.
+
+use std::fmt::Write as _;
+
+use mimu::quantity::{AXES, PerSensor, Sensor};
+use mimu::readable::STANDARD_GRAVITY;
+use mimu_recording::error::{Argument, Result};
+
+use crate::one_temperature::within;
+use crate::remaining::{self, Places, Remaining};
+use crate::{Export, Sources, driver, heading};
+
+/// Options of the script.
+pub type Options = driver::Options;
+
+/// One step of the registers, SI.
+const STEP: PerSensor<f64> = PerSensor {
+    gyro: std::f64::consts::PI / 180.0 / 32.0,
+    accel: 0.5e-3 * STANDARD_GRAVITY,
+};
+/// Largest offset of the registers, steps: 12 bits with a sign.
+const MOST: f64 = 2047.0;
+
+/// Finds the one device that has both names, and stops where there are none or several.
+const FIND: &str = r#"set -eu
+root=${IIO_DEVICES:-/sys/bus/iio/devices}
+# The device named $1, as in the file `name`; without it, the only one that ends like it.
+find_device() {
+    found=
+    for device in "$root"/iio:device*; do
+        name=$(cat "$device/name" 2>/dev/null) || continue
+        case $name in
+            $1) [ -z "$found" ] || { echo "several devices are named like $1: name the chip, as in: sh $0 icm42688" >&2; exit 1; }
+                found=$device ;;
+        esac
+    done
+    [ -n "$found" ] || { echo "no device in $root is named like $1: is the driver inv_icm42600 loaded?" >&2; exit 1; }
+}
+"#;
+
+/// Text of the script.
+///
+/// # Errors
+/// The calibration is missing, C is singular, or a bias is beyond the range of the chip.
+pub fn export(from: &Sources, options: &Options) -> Result<Export> {
+    let (calibration, place) = from.calibration()?;
+    let mut export = Export::new("iio", from);
+    export.formulas.push(
+        "output = scale * raw + calibbias on each axis of the chip, SI; the chip adds calibbias"
+            .into(),
+    );
+    let places = Places {
+        cross_terms: false,
+        temperature: false,
+        effects: false,
+    };
+    export.remaining = remaining::of(calibration, places)?;
+    let mut body = String::new();
+    for sensor in Sensor::BOTH {
+        if calibration.table(sensor).is_none() {
+            export.notes.push(format!(
+                "The calibration has no {sensor}, so its calibbias stays as it is."
+            ));
+            continue;
+        }
+        let readings = options.readings(calibration, place, sensor)?;
+        export.notes.push(readings.line());
+        export.remaining.push(remaining::scale_factors(
+            sensor,
+            &readings.forward.matrix.diagonal(),
+        ));
+        export
+            .remaining
+            .push(Remaining::of_rounding(sensor, STEP[sensor]));
+        let (suffix, channel, argument) = match sensor {
+            Sensor::Gyro => ("gyro", "anglvel", Argument::GyroZero),
+            Sensor::Accel => ("accel", "accel", Argument::AccelZero),
+        };
+        let _ = writeln!(body, "find_device \"${{1:-i[ci]m4*}}-{suffix}\"");
+        for (i, axis) in AXES.iter().enumerate() {
+            let name = format!("in_{channel}_{axis}_calibbias");
+            let most = MOST * STEP[sensor];
+            let unit = format!(" {}", sensor.unit());
+            let value = -readings.forward.bias[i];
+            within(
+                sensor,
+                i,
+                (&name, value, &unit),
+                [-most, most],
+                ("give the zero of the readings", argument),
+            )?;
+            let _ = writeln!(body, "echo {value:.9} > \"$found/{name}\"");
+        }
+    }
+    export.notes.extend(heading::temperature(calibration));
+    export.notes.push("For the driver inv_icm42600. Record with calibbias 0, as after power-on, and in the axes of the chip: before mount_matrix.".into());
+    export.notes.push("Run it as root with the name of the chip, such as icm42688, if there are several; from a udev rule of the devices to have it at every start.".into());
+    let mut out = "#!/bin/sh\n".to_owned();
+    out.push_str(&heading::comments(
+        "#",
+        &heading::of_calibration(calibration, &export),
+    ));
+    out.push_str(FIND);
+    out.push_str(&body);
+    export.content = out.into_bytes();
+    Ok(export)
+}
