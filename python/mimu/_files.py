@@ -109,7 +109,7 @@ def verify(
 
 Format = Literal[
     "c", "rust", "json", "kalibr", "openvins", "vins", "orbslam3", "liosam", "fastlio", "imu-calib", "imu-tk", "fusion", "realsense",
-    "px4", "ardupilot", "core",
+    "depthai", "basalt", "px4", "ardupilot", "betaflight", "inav", "slimenrf", "pigeon", "iio", "ros-imu", "autoware", "gazebo", "matlab", "core",
 ]
 
 

@@ -161,12 +161,13 @@ def test_exports_are_those_of_the_command(by_hand: mimu.Recording, at_rest: mimu
         ("c", {}, []), ("rust", {}, []), ("json", {}, []), ("core", {}, []), ("px4", {"qgc": True}, ["--qgc"]), 
         ("ardupilot", {"accel_zero": 1.35, "gyro_zero": 2.04}, ["--accel-zero=1.35", "--gyro-zero=2.04"]),
         ("fusion", {}, []), ("imu-calib", {}, []), ("imu-tk", {"sensor": "gyro"}, ["--sensor=gyro"]), ("realsense", {}, []),
+        ("depthai", {"imu": "BMI270"}, ["--imu=BMI270"]), ("basalt", {}, []), ("matlab", {"name": "mine"}, ["--name=mine"]),
     ]:
         made = mimu.export(name, calibration=calibration, **options)
         done = run("export", name, *flags, "--calibration", tmp_path / "cal.toml", "-o", tmp_path / name)
         assert done.returncode == 0, f"{name}: {done.stderr}"
         assert made.content == (tmp_path / name).read_bytes(), name
-    for name in ("kalibr", "vins", "orbslam3", "liosam", "fastlio"):
+    for name in ("kalibr", "vins", "orbslam3", "liosam", "fastlio", "ros-imu", "gazebo"):
         made = mimu.export(name, noise=mimu.load_noise(tmp_path / "noise.toml"))
         done = run("export", name, "--noise", tmp_path / "noise.toml", "-o", tmp_path / name)
         assert done.returncode == 0, f"{name}: {done.stderr}"

@@ -54,3 +54,16 @@ def test_a_factor_that_is_no_error_of_a_gyro_is_refused(form, factor, says, tmp_
     command = [os.environ["MIMU"], "export", form, "--calibration", "cal.toml", "-o", "out.txt", "--gyro-si-per-raw", str(factor)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 1 and says in done.stderr and "--gyro-si-per-raw" in done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("form", ["slimenrf", "pigeon"])
+def test_counts_need_the_factor_of_the_firmware(form, tmp_path):
+    # Counts of 131 for 1 deg/s: with the calibration's own factor no error would be left.
+    factor = numpy.radians(1 / 131)
+    (tmp_path / "cal.toml").write_text(calibration("count", factor))
+    command = [os.environ["MIMU"], "export", form, "--calibration", "cal.toml", "-o", "out.txt"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1 and "--gyro-si-per-raw" in done.stderr, done.stderr
+    counts = line_of(tmp_path, form, "--gyro-si-per-raw", factor).splitlines()
+    (tmp_path / "cal.toml").write_text(calibration())
+    assert counts[-1] == line_of(tmp_path, form).splitlines()[-1]

@@ -12,13 +12,14 @@ use crate::{Export, heading};
 /// What the gyro reads on each axis for a rate of 1 about it, the diagonal of P of the driver's readings; adds to `export` what such a format leaves.
 ///
 /// # Errors
-/// No gyro is calibrated, C is singular, or this build cannot evaluate an effect.
+/// No gyro is calibrated, C is singular, the driver's factor is unknown, or this build cannot evaluate an effect.
 pub(crate) fn gains(
     calibration: &Calibration,
     place: &str,
     driver: &driver::Options,
     export: &mut Export,
 ) -> Result<Vector3<f64>> {
+    driver.needs_factor(calibration, Sensor::Gyro)?;
     let readings = driver.readings(calibration, place, Sensor::Gyro)?;
     let places = Places {
         cross_terms: false,

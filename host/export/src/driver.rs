@@ -94,6 +94,27 @@ impl Options {
         }
     }
 
+    /// Refuses readings that are not in SI without the factor of the driver: the calibration's own would leave no error of the scale factors to export.
+    ///
+    /// # Errors
+    /// The factor of `sensor` is not given.
+    pub(crate) fn needs_factor(&self, calibration: &Calibration, sensor: Sensor) -> Result<()> {
+        let raw = calibration.recording.raw_unit;
+        if raw == RawUnit::Si || self.conversions()[sensor].si_per_raw.is_some() {
+            return Ok(());
+        }
+        let argument = match sensor {
+            Sensor::Gyro => Argument::GyroConversion,
+            Sensor::Accel => Argument::AccelConversion,
+        };
+        Err(Error::new(
+            sensor,
+            format!("its scale factors are errors of the driver's factor, which is not given: the readings are in {raw}"),
+            format!("give the factor by which the program converts, {} per {raw}", sensor.unit()),
+        )
+        .about(argument))
+    }
+
     /// The driver's readings of `sensor`. If no factor is given, it is 1 for readings in SI, and otherwise one over the scale factor of the axis: the
     /// best conversion by three factors.
     ///

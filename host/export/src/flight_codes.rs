@@ -25,7 +25,7 @@ pub(crate) struct Codes {
 /// The accelerometer in codes. Adds notes and what no format of the family stores to `export`: cross terms, the gyro's scale factors, curves, effects.
 ///
 /// # Errors
-/// No accelerometer is calibrated, C is singular, or this build cannot evaluate an effect.
+/// No accelerometer is calibrated, C is singular, the driver's factor is unknown, or this build cannot evaluate an effect.
 pub(crate) fn codes(
     calibration: &Calibration,
     place: &str,
@@ -40,6 +40,7 @@ pub(crate) fn codes(
         driver.accel_si_per_raw = Some(step);
         export.notes.push(format!("accel: the counts of the recording are taken for the flight controller's codes, {acc_1g} for 1 g."));
     }
+    driver.needs_factor(calibration, Sensor::Accel)?;
     let accel = driver.readings(calibration, place, Sensor::Accel)?;
     export.notes.push(accel.line());
     export.notes.extend(heading::temperature(calibration));
