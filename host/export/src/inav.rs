@@ -18,7 +18,7 @@ const UNITY: f64 = 4096.0;
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct Options {
-    /// Codes of the accelerometer for 1 g: acc_1G in INAV's driver of the sensor, such as 4096 (MPU6000) or 2048 (BMI270, ICM42605)
+    /// Codes of the accelerometer for 1 g, acc_1G in INAV's driver of the sensor: 2048 where its range is ±16 g, as of an MPU6000
     #[cfg_attr(feature = "clap", arg(long = "acc-1g", value_name = "CODES", value_parser = crate::options::positive))]
     pub acc_1g: f64,
     /// The driver's conversion.

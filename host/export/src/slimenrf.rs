@@ -1,7 +1,7 @@
 //! Scale factors of the gyro for SlimeVR trackers with the SlimeNRF firmware: the line `sens x,y,z` of the tracker's console.
 //!
-//! The firmware multiplies the rate of each axis, after its own bias, by `1 / (1 - degrees / (360 revolutions))`. A gyro that reads `gain` times the rate
-//! therefore gets `degrees = 360 revolutions (1 - gain)`: a gyro that reads too much gets a negative number. `revolutions` is the firmware's
+//! The firmware multiplies the rate of each axis, after its own bias, by `1 / (1 - degrees / (360 revolutions))`. A gyro that reads `gain` times the
+//! rate therefore gets `degrees = 360 revolutions (1 - gain)`: a gyro that reads too much gets a negative number. `revolutions` is the firmware's
 //! SENSOR_SENS_REV, 2 unless it was built otherwise.
 //!
 //! Source: jitingcn/SlimeVR-Tracker-nRF, src/console.c, `command_sens`; src/sensor/sensor.c; Kconfig, SENSOR_SENS_REV (2025-11).
@@ -24,7 +24,7 @@ pub struct Options {
     pub driver: driver::Options,
 }
 
-/// Scale factors beyond this belong to another unit or range: the firmware's own calibration refuses them too (`SENS_CAL_MIN_SCALE`, `SENS_CAL_MAX_SCALE`).
+/// Scale factors beyond this belong to another unit or range: the firmware's own calibration refuses them too (`SENS_CAL_MIN_SCALE`).
 const MOST: f64 = 0.1;
 
 /// The line, below comments.
