@@ -22,7 +22,7 @@ use crate::output::{check_outputs, progress, quoted};
 
 #[derive(Args)]
 pub(crate) struct ImportArgs {
-    /// Text files (any separator), Parquet, bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap), logs of PX4 (.ulg) and ArduPilot (.bin), or the
+    /// Text files (any separator), Parquet, bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap), logs of PX4 (.ulg), of ArduPilot (.bin) and for Gyroflow (.gcsv), or the
     /// folder of a preset; later files are interpolated at the times of the first
     #[arg(required_unless_present = "faces")]
     files: Vec<PathBuf>,

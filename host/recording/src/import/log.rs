@@ -1,4 +1,4 @@
-//! Logs that describe their own contents: bags of ROS, logs of PX4 and of ArduPilot.
+//! Logs that describe their own contents: bags of ROS, logs of PX4, of ArduPilot and for Gyroflow.
 //!
 //! To add a format, write a module with a `read` and add it to [`FORMATS`].
 
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::readings::{Choice, Readings};
 use super::time::Decimal;
-use super::{ardupilot, px4, ros};
+use super::{ardupilot, gyroflow, px4, ros};
 use crate::error::{Argument, Error, Result};
 
 /// A format: the endings of its files, the unit in which it counts time, and its reader, which converts the stamps to ns.
@@ -16,7 +16,7 @@ struct LogFormat {
     read: fn(&Path, Choice<'_>) -> Result<Vec<Readings>>,
 }
 
-const FORMATS: [LogFormat; 5] = [
+const FORMATS: [LogFormat; 6] = [
     LogFormat {
         endings: &["bag"],
         unit: Decimal::Nanosecond,
@@ -41,6 +41,11 @@ const FORMATS: [LogFormat; 5] = [
         endings: &["bin"],
         unit: Decimal::Microsecond,
         read: ardupilot::read,
+    },
+    LogFormat {
+        endings: &["gcsv"],
+        unit: Decimal::Microsecond,
+        read: gyroflow::read,
     },
 ];
 

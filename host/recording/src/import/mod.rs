@@ -10,6 +10,7 @@ mod counter;
 mod faces;
 mod first_pass;
 mod foreign;
+mod gyroflow;
 mod inputs;
 mod join;
 mod joined;

@@ -77,6 +77,18 @@ impl Readings {
         self.stamps_ns.len()
     }
 
+    /// Stamps of all rows, ns.
+    #[cfg(test)]
+    pub fn stamps_of(&self) -> Vec<i64> {
+        self.stamps_ns.clone()
+    }
+
+    /// Values of all rows, row by row.
+    #[cfg(test)]
+    pub fn values_of(&self) -> Vec<f64> {
+        self.values.clone()
+    }
+
     /// Roles in the order of [`Cells::numbers`].
     pub fn roles(&self) -> Vec<Role> {
         let time = std::iter::once(Column::Time);
