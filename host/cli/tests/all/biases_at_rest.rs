@@ -200,6 +200,15 @@ fn everything_that_needs_a_calibration_refuses_the_file_by_its_name_and_says_wha
         "imu-tk --sensor accel",
         "fusion",
         "realsense",
+        "depthai",
+        "basalt",
+        "autoware",
+        "matlab",
+        "betaflight",
+        "inav --acc-1g 2048",
+        "slimenrf",
+        "pigeon",
+        "iio",
         "core",
     ]
     .map(|format| format!("export {format} --calibration biases.toml -o out"));

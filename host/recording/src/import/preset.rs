@@ -243,13 +243,9 @@ impl Preset {
             if recognise && matches!(list, ColumnList::ByPosition(_)) {
                 continue;
             }
-            let rate_hz = layout.rate_after.map(|words| rate_after(&head, words));
-            let outcome = match (rate_hz, layout.rate_after) {
-                (Some(None), Some(words)) => Err(Error::new(
-                    path.display(),
-                    format!("no line above the data contains {words:?} with the sample rate"),
-                    "export it with its header, or name the columns",
-                )),
+            let rate_hz = layout.rate_hz(path, &head);
+            let outcome = match rate_hz {
+                Some(None) => Err(layout.without_rate(path)),
                 _ => layout.read(path, list, separator),
             };
             match (outcome, layout.refusal) {
@@ -317,6 +313,36 @@ impl Preset {
 }
 
 impl Layout {
+    /// The sample rate that a line above the data or a file beside it contains: `None` if this layout has no such line, `Some(None)` if it is missing.
+    fn rate_hz(&self, path: &Path, head: &str) -> Option<Option<f64>> {
+        if let Some([ending, words]) = self.rate_beside {
+            let text = std::fs::read_to_string(path.with_extension(ending)).unwrap_or_default();
+            return Some(rate_after(&text, words));
+        }
+        Some(rate_after(head, self.rate_after?))
+    }
+
+    /// That [`Self::rate_hz`] is missing.
+    fn without_rate(&self, path: &Path) -> Error {
+        let (problem, remedy) = match self.rate_beside {
+            Some([ending, words]) => (
+                format!(
+                    "{} beside it, with the sample rate after {words:?}, is missing or has none",
+                    path.with_extension(ending).display()
+                ),
+                "put it beside the file, or name the columns and the rate",
+            ),
+            None => (
+                format!(
+                    "no line above the data contains {:?} with the sample rate",
+                    self.rate_after.unwrap_or_default()
+                ),
+                "export it with its header, or name the columns",
+            ),
+        };
+        Error::new(path.display(), problem, remedy)
+    }
+
     /// Its columns in `path`, including the optional ones that are there. If a column is the time, the first row must have a time.
     fn read(
         &self,

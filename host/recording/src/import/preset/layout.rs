@@ -33,6 +33,8 @@ pub(super) struct Layout {
     pub scales: &'static [&'static str],
     /// Words after which a line above the data has the sample rate in Hz. The line is required.
     pub rate_after: Option<&'static str>,
+    /// Ending of a file of the same name beside it, and words in that file after which it has the sample rate in Hz. The file is required.
+    pub rate_beside: Option<[&'static str; 2]>,
     /// Why such a file is refused, and the remedy.
     pub refusal: Option<[&'static str; 2]>,
 }
@@ -46,6 +48,7 @@ impl Layout {
             optional: "",
             scales: &[],
             rate_after: None,
+            rate_beside: None,
             refusal: None,
         }
     }

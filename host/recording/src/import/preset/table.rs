@@ -46,7 +46,7 @@ const XSENS: Layout = Layout {
 };
 
 /// All of them.
-pub(super) const PRESETS: [Preset; 7] = [
+pub(super) const PRESETS: [Preset; 8] = [
     // The header of every imu0/data.csv of the EuRoC sequences and of those laid out like them (TUM VI, MRPT, OpenVINS); Burri et al., The EuRoC
     // micro aerial vehicle datasets, IJRR 2016. Stamps count from 1970; sensor.yaml beside the file gives no units.
     Preset {
@@ -215,6 +215,24 @@ pub(super) const PRESETS: [Preset; 7] = [
             "rs-imu-calibration.py keeps the gyro's readings of the last of the six directions only, so a joined file has only that direction",
             "import each file separately",
         ]),
+        beside: None,
+    },
+    // github.com/jitingcn/SlimeVR-Tracker-nRF-Receiver at 87996f1: scripts/data_collect_hid.py and data_collect_cdc.py. The numbers are those of the
+    // firmware before its calibration, in deg/s and g (its meta.txt has the ranges in these units); `seq` is a counter of 16 bits that counts lost samples.
+    Preset {
+        name: "slimenrf",
+        title: "raw data of a SlimeNRF tracker, by the receiver's data_collect script: NAME.csv and NAME.meta.txt",
+        raw_unit: Some(RawUnit::Si),
+        layouts: &[Layout {
+            optional: "temp_c=temp",
+            scales: &["gyro=0.017453292519943295", "accel=9.80665"],
+            rate_beside: Some(["meta.txt", "gyro_odr_hz="]),
+            ..Layout::of(
+                "sample=seq,gyro_x=gx,gyro_y=gy,gyro_z=gz,accel_x=ax,accel_y=ay,accel_z=az",
+            )
+        }],
+        in_folder: &[],
+        not_joinable: None,
         beside: None,
     },
 ];

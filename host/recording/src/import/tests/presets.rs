@@ -337,3 +337,43 @@ fn every_preset_stands_in_the_documentation_and_its_lists_and_factors_are_those_
             .contains("euroc")
     );
 }
+
+fn slimenrf() -> String {
+    // A rate of 0.125 rad/s is 7.16197244 deg/s; the counter wraps at 16 bits.
+    let [gyro, accel] = [180.0 / std::f64::consts::PI, 1.0 / 9.80665];
+    String::from("seq,gx,gy,gz,ax,ay,az,mx,my,mz,temp\n")
+        + &rows(30, |i| {
+            let seq = (65_520 + i) % 65_536;
+            let values: Vec<String> = (0..6)
+                .map(|c| (READINGS[c] * if c < 3 { gyro } else { accel }).to_string())
+                .collect();
+            format!("{seq},{},0,0,0,31.5", values.join(","))
+        })
+}
+
+#[test]
+fn raw_data_of_a_slimenrf_tracker_have_the_rate_of_the_file_beside_them() {
+    let meta = "gyro_range_dps=1000.0\naccel_range_g=8.0\ngyro_odr_hz=200.0\naccel_odr_hz=100.0\nimu_id=7\n";
+    let bench = Bench::new(&[("walk.csv", &slimenrf()), ("walk.meta.txt", meta)]);
+    right(bench.import_with(None, &["walk.csv"]), "slimenrf", 200.0);
+    let (_, batch, _) = bench.import_with(None, &["walk.csv"]).unwrap();
+    assert_eq!(batch.raw[0].len(), 30);
+    assert_eq!(batch.temp_c[0], 31.5);
+}
+
+#[test]
+fn raw_data_of_a_slimenrf_tracker_without_the_rate_are_refused() {
+    let bench = Bench::new(&[
+        ("walk.csv", &slimenrf()),
+        ("walk.meta.txt", "accel_odr_hz=100.0\n"),
+    ]);
+    let error = bench
+        .preset(Some("slimenrf"), &["walk.csv"])
+        .map(|_| ())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("walk.meta.txt") && error.contains("gyro_odr_hz="),
+        "{error}"
+    );
+}
