@@ -28,8 +28,11 @@ use embassy_time::{Duration, Instant, with_deadline};
 
 use crate::board::{ADC_HZ, Irqs, SAMPLING_HALF_CYCLES, SCANS, Sensors};
 use crate::channels::{CHANNELS, Channels};
+use crate::convert::{SlowSums, scan};
 use crate::design_parameters::SAMPLE_HZ;
 use crate::front_end::{Factors, LINEARITY_WORDS};
+use crate::sampling::Acquire;
+use crate::source::{Fault, Scan};
 
 /// Conversions in one sample.
 const BLOCK: usize = SCANS * CHANNELS;
@@ -82,17 +85,6 @@ pub struct Sample {
     pub number: u32,
     /// Sums of the conversions of each channel.
     pub sums: Channels<u32>,
-}
-
-/// Why a stream ended. Samples were lost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-pub enum Fault {
-    /// The reader was late: by the clock or by the ring's count, the controller had begun to overwrite the sample.
-    Late,
-    /// The converter's FIFO overflowed: the controller did not fetch for 400 µs.
-    ConverterOverrun,
-    /// No data, and no flag that gives the reason.
-    Stalled,
 }
 
 /// ADC1 with its DMA channel and ring, powered up, calibrated and set to the scan, not yet running.
@@ -187,6 +179,20 @@ impl Converter {
     }
 }
 
+impl Acquire for Converter {
+    type Slow = SlowSums;
+
+    async fn acquire(&mut self, mut take: impl FnMut(Scan<SlowSums>)) -> Fault {
+        let mut stream = self.start();
+        loop {
+            match stream.next().await {
+                Ok(sample) => take(scan(sample.number, &sample.sums)),
+                Err(fault) => return fault,
+            }
+        }
+    }
+}
+
 /// Running conversion.
 pub struct Stream<'a> {
     ring: ReadableRingBuffer<'a, u16>,
@@ -231,8 +237,10 @@ impl Stream<'_> {
             // share a crystal, so the comparison is valid for any duration; a sample longer than a millisecond would fail during the run.
             // (The clock itself slips if interrupts are off for 32 ms.)
             Ok(Ok(_)) if Instant::now() < overwritten => {}
+            // By the clock or by the ring's count, the controller had begun to overwrite the sample.
             Ok(_) => return Err(Fault::Late),
-            Err(_) if pac::ADC1.isr().read().ovr() => return Err(Fault::ConverterOverrun),
+            // The controller did not fetch for 400 µs.
+            Err(_) if pac::ADC1.isr().read().ovr() => return Err(Fault::Overrun),
             Err(_) => return Err(Fault::Stalled),
         }
 

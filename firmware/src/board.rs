@@ -11,6 +11,8 @@
 //! | `REFERENCE_V`                               | voltage at VREF+                                       |
 //! | `ADC_HZ`, `SAMPLING_HALF_CYCLES`, `SCANS`   | timing of the converter, 1 kHz in all                  |
 //! | `CALIBRATION_SECTORS`                       | flash sectors of bank 2 that hold calibrations         |
+//! | `Source`, `Acquisition`, `Sensors`          | its sensors: what their integers mean, what takes them, and what it is made from |
+//! | `SelfTest`                                  | what the self-test needs                               |
 //! | `Irqs`                                      | interrupts of the peripherals that it hands out        |
 //! | `Board`, `Board::start`                     | starts the clocks, and hands out pins and parts by name |
 //!

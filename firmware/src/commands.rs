@@ -13,7 +13,7 @@ use mimu_core::wire::{
 };
 
 use crate::bank::Bank;
-use crate::board::{self, SelfTestPins};
+use crate::board;
 use crate::design_parameters::SAMPLE_HZ;
 use crate::flash::{self, Flash};
 use crate::front_end::FrontEnd;
@@ -21,15 +21,14 @@ use crate::link::{FrameSender, Input, send};
 use crate::pipeline::{Pipeline, Shared, Streams};
 use crate::restart::Before;
 use crate::sampling::Tally;
-use crate::self_test;
 use crate::slots::Slots;
-use crate::supply::Supply;
+use crate::source::Source;
 use crate::upload::Upload;
 
 /// Everything that a request may need.
 pub struct Commands<'a> {
     /// The path of the samples.
-    pub pipeline: &'a Shared,
+    pub pipeline: &'a Shared<board::Source>,
     /// Counters of sampling.
     pub tally: &'a Tally,
     /// Stored calibrations.
@@ -40,10 +39,8 @@ pub struct Commands<'a> {
     pub upload: Upload<'a>,
     /// Summary of the calibration in use.
     pub stored: Option<StoredInfo>,
-    /// Inputs of the sensors.
-    pub self_test: SelfTestPins,
-    /// Supply measurement for the self-test.
-    pub supply: Supply,
+    /// What the self-test needs.
+    pub self_test: board::SelfTest,
     /// Why the device started.
     pub before: &'a Before,
     /// Time since power-on at the start of sampling, ms, if it is known.
@@ -119,11 +116,7 @@ impl Commands<'_> {
             Request::Hello => return self.greet(id).await,
             Request::Download { offset, length } => self.download(offset, length, &mut part).await,
             Request::UploadCommit => self.commit().await.map(|()| Reply::Done),
-            Request::SelfTest => {
-                let pins = &mut self.self_test;
-                let result = self_test::run(pins, &mut self.supply, self.pipeline).await;
-                Ok(Reply::SelfTest(result))
-            }
+            Request::SelfTest => Ok(Reply::SelfTest(self.self_test.run(self.pipeline).await)),
             Request::Counters => Ok(Reply::Counters(self.counters(received))),
             Request::ResetCounters => {
                 self.reset_counters(received);
@@ -203,10 +196,10 @@ impl Commands<'_> {
     async fn commit(&mut self) -> Result<(), Refusal> {
         self.upload.check(&uid())?;
         let bytes = self.upload.bytes();
-        let before = self.front_end.pins_c;
-        self.front_end.pins_c = (self.pipeline).lock(|p| p.borrow().slow().pins_to_keep(before));
+        let kept = &mut self.front_end;
+        (self.pipeline).lock(|p| p.borrow().source().keep(kept));
         let storing = |on| {
-            let set = |p: &RefCell<Pipeline>| p.borrow_mut().flag(flags::STORING, on);
+            let set = |p: &RefCell<Pipeline<_>>| p.borrow_mut().flag(flags::STORING, on);
             self.pipeline.lock(set);
         };
         storing(true);

@@ -8,13 +8,23 @@
 //! look like 5 deg/s. The 2.5 V reference of gyro x is therefore converted too, through an equal divider. A ratio to it does not depend on
 //! the supply or on the dividers. The accelerometer's output is proportional to that supply, so its codes do not depend on it.
 
+use core::ops::AddAssign;
+
+use heapless::Vec;
+use mimu_core::PerSensor;
+use mimu_core::compensation::Sample;
 use mimu_core::wire::flags;
+use nalgebra::Vector3;
 
 use crate::board::{REFERENCE_V, SCANS};
+use crate::channels::Channels;
 use crate::design_parameters::{
-    DIVIDER_RATIO, GYRO_REFERENCE_V, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V,
-    GYRO_TEMPERATURE_V_PER_C, REFERENCE_TOLERANCE, SAMPLE_HZ, SLOW_S,
+    ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, DIVIDER_RATIO, GYRO_REFERENCE_V, GYRO_STOP_MARGIN_V,
+    GYRO_STOPS_V, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V, GYRO_TEMPERATURE_V_PER_C,
+    REFERENCE_TOLERANCE, SAMPLE_HZ, SLOW_S,
 };
+use crate::front_end::FrontEnd;
+use crate::source::{Counts, Scan, Source, THERMOMETERS};
 use crate::temperature::Thermometer;
 
 /// The code at the converter's reference voltage: full scale is 2^16 - 1 (RM0433 25.4.35).
@@ -52,11 +62,11 @@ impl Lag {
     }
 }
 
-/// Slow quantities, filtered: the gyros' reference and temperatures.
+/// The analog sensors behind the converter: their slow quantities, filtered, which are the gyros' reference and temperatures.
 ///
 /// Each batch is checked before filtering: the filter would hide a pin that has just come off, and would be distorted by it for seconds.
 #[derive(Clone, Copy, Debug)]
-pub struct Slow {
+pub struct Analog {
     /// Sum of the reference minus [`NOMINAL_REFERENCE`]. As a difference, so that a step of the filter is not lost to rounding of a large
     /// number.
     reference: Lag,
@@ -70,7 +80,7 @@ pub struct Slow {
     temp_c: Lag,
 }
 
-impl Slow {
+impl Analog {
     /// Before the first sample.
     pub const NEW: Self = Self {
         reference: Lag::NEW,
@@ -88,13 +98,8 @@ impl Slow {
         }
     }
 
-    /// Offsets between the TEMP pins, °C, to be stored with a calibration; `before`: those stored so far.
-    pub fn pins_to_keep(&self, before: Option<[f32; 3]>) -> Option<[f32; 3]> {
-        self.thermometer.to_keep(before)
-    }
-
     /// Processes `count` samples: totals of the sums of the reference and of the three temperatures.
-    pub fn update(&mut self, reference: u32, temperatures: [u32; 3], count: u32) {
+    fn follow(&mut self, reference: u32, temperatures: [u32; 3], count: u32) {
         if count == 0 {
             return;
         }
@@ -126,11 +131,6 @@ impl Slow {
         (self.reference_sum - NOMINAL_REFERENCE).abs() <= REFERENCE_TOLERANCE * NOMINAL_REFERENCE
     }
 
-    /// Whether any sample was processed.
-    pub fn begun(&self) -> bool {
-        self.pins_c[0].samples > 0.0
-    }
-
     /// Volts at a gyro per unit of its sum, about 42 µV.
     pub fn gyro_volts(&self) -> f32 {
         let reference = match self.has_reference() {
@@ -145,19 +145,6 @@ impl Slow {
         self.reference_sum / SUM_FULL_SCALE as f32 / DIVIDER_RATIO
     }
 
-    /// Temperature of the gyros from the pins that are used, °C. Without any, the last one; before the first one, 25 °C.
-    pub fn temp_c(&self) -> f32 {
-        match self.has_known_temperature() {
-            true => self.temp_c.value,
-            false => GYRO_TEMPERATURE_NULL_C,
-        }
-    }
-
-    /// Whether there has been a good temperature.
-    pub fn has_known_temperature(&self) -> bool {
-        self.temp_c.samples > 0.0
-    }
-
     /// Temperatures of the TEMP pins of gyro x, y, z, °C, including pins that are not used.
     pub fn gyro_temps_c(&self) -> [f32; 3] {
         self.pins_c.map(|pin| pin.value)
@@ -167,9 +154,94 @@ impl Slow {
     pub fn temperatures_that_count(&self) -> [bool; 3] {
         self.thermometer.that_count()
     }
+}
 
-    /// Faults, as [`flags`].
-    pub fn flags(&self) -> u16 {
+/// Totals of a scan's slow channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SlowSums {
+    /// The gyros' reference.
+    pub reference: u32,
+    /// The TEMP pins of gyro x, y, z.
+    pub temperature: [u32; 3],
+}
+
+impl AddAssign for SlowSums {
+    fn add_assign(&mut self, other: Self) {
+        self.reference += other.reference;
+        for (total, sum) in self.temperature.iter_mut().zip(other.temperature) {
+            *total += sum;
+        }
+    }
+}
+
+/// A sample of the converter as the pipeline takes it.
+pub fn scan(number: u32, channels: &Channels<u32>) -> Scan<SlowSums> {
+    // At most 2^17 with two conversions a sample.
+    let signed = |sums: [u32; 3]| sums.map(|sum| sum as i32);
+    Scan {
+        number,
+        counts: Counts {
+            gyro: signed(channels.gyro),
+            accel: signed(channels.accel),
+        },
+        slow: SlowSums {
+            reference: channels.reference,
+            temperature: channels.temperature,
+        },
+    }
+}
+
+impl Source for Analog {
+    type Slow = SlowSums;
+
+    fn new(kept: &FrontEnd) -> Self {
+        kept.pins_c.map_or(Self::NEW, Self::of_pins)
+    }
+
+    fn keep(&self, kept: &mut FrontEnd) {
+        kept.pins_c = self.thermometer.to_keep(kept.pins_c);
+    }
+
+    fn update(&mut self, total: &SlowSums, count: u32) {
+        self.follow(total.reference, total.temperature, count);
+    }
+
+    fn begun(&self) -> bool {
+        self.pins_c[0].samples > 0.0
+    }
+
+    fn scale(&self) -> PerSensor<f32> {
+        PerSensor {
+            gyro: self.gyro_volts(),
+            accel: ACCEL_VOLTS,
+        }
+    }
+
+    fn is_saturated(_: &Counts, raw: &Sample<f32>) -> bool {
+        let at_a_stop = |volts: &Vector3<f32>, [low, high]: [f32; 2], margin: f32| {
+            volts.min() <= low + margin || volts.max() >= high - margin
+        };
+        at_a_stop(&raw.gyro, GYRO_STOPS_V, GYRO_STOP_MARGIN_V)
+            || at_a_stop(&raw.accel, ACCEL_STOPS_V, ACCEL_STOP_MARGIN_V)
+    }
+
+    /// From the pins that are used.
+    fn temp_c(&self) -> f32 {
+        match self.has_known_temperature() {
+            true => self.temp_c.value,
+            false => GYRO_TEMPERATURE_NULL_C,
+        }
+    }
+
+    fn has_known_temperature(&self) -> bool {
+        self.temp_c.samples > 0.0
+    }
+
+    fn temperatures_c(&self) -> Vec<f32, THERMOMETERS> {
+        Vec::from_array(self.pins_c.map(|pin| pin.value))
+    }
+
+    fn flags(&self) -> u16 {
         let count = self.temperatures_that_count();
         let left_out = flags::TEMPERATURE_LEFT_OUT.iter().zip(count);
         let left_out = left_out.filter(|(_, counts)| !counts);
@@ -199,11 +271,11 @@ mod tests {
     }
 
     /// After `seconds` at these voltages of the sensors.
-    fn settled(reference_v: f64, temp_v: f64, vref_v: f64, seconds: u32) -> Slow {
-        let mut slow = Slow::NEW;
+    fn settled(reference_v: f64, temp_v: f64, vref_v: f64, seconds: u32) -> Analog {
+        let mut slow = Analog::NEW;
         for _ in 0..seconds * 50 {
             let reference = 20 * sum(reference_v * 0.6, vref_v);
-            slow.update(reference, [20 * sum(temp_v * 0.6, vref_v); 3], 20);
+            slow.follow(reference, [20 * sum(temp_v * 0.6, vref_v); 3], 20);
         }
         slow
     }
@@ -223,7 +295,7 @@ mod tests {
                 let mut volts = [2.5; 3];
                 volts[pin] = wrong_v;
                 for _ in 0..100 {
-                    slow.update(20 * REFERENCE, pins(volts), 20);
+                    slow.follow(20 * REFERENCE, pins(volts), 20);
                     assert_eq!(slow.flags(), flags::TEMPERATURE_LEFT_OUT[pin]);
                     assert!((slow.temp_c() - 25.0).abs() < 0.02, "{}", slow.temp_c());
                 }
@@ -231,7 +303,7 @@ mod tests {
                 let read = slow.gyro_temps_c()[pin];
                 assert!(!(-150.0..150.0).contains(&read), "{read}");
                 // And is back as soon as it is.
-                slow.update(20 * REFERENCE, pins([2.5; 3]), 20);
+                slow.follow(20 * REFERENCE, pins([2.5; 3]), 20);
                 assert_eq!(slow.flags(), 0);
             }
         }
@@ -241,13 +313,13 @@ mod tests {
     fn without_any_temperature_the_last_good_one_holds_and_without_that_25_degrees() {
         let mut slow = settled(2.5, 2.5 + 0.0084 * 15.0, 3.3, 5);
         for _ in 0..500 {
-            slow.update(20 * REFERENCE, pins([0.0; 3]), 20);
+            slow.follow(20 * REFERENCE, pins([0.0; 3]), 20);
         }
         assert!((slow.temp_c() - 40.0).abs() < 0.02, "{}", slow.temp_c());
         let all = flags::TEMPERATURE_LEFT_OUT.iter().sum::<u16>() | flags::NO_TEMPERATURE;
         assert_eq!(slow.flags(), all);
-        let mut slow = Slow::NEW;
-        slow.update(20 * REFERENCE, pins([0.0; 3]), 20);
+        let mut slow = Analog::NEW;
+        slow.follow(20 * REFERENCE, pins([0.0; 3]), 20);
         assert_eq!((slow.temp_c(), slow.flags()), (25.0, all));
     }
 
@@ -255,7 +327,7 @@ mod tests {
     fn a_reference_that_comes_off_moves_neither_a_rate_nor_a_temperature() {
         let mut slow = settled(2.5, 2.5, 3.3, 5);
         for _ in 0..50 {
-            slow.update(0, pins([2.5; 3]), 20);
+            slow.follow(0, pins([2.5; 3]), 20);
             assert_eq!(slow.flags(), flags::NO_REFERENCE);
             let read = sum(1.5, 3.3) as f32 * slow.gyro_volts();
             assert!((read - 2.5).abs() < 1e-3, "{read}");
@@ -288,17 +360,17 @@ mod tests {
 
     #[test]
     fn the_first_second_is_a_mean_and_then_it_forgets() {
-        let mut slow = Slow::NEW;
+        let mut slow = Analog::NEW;
         let nominal = NOMINAL_REFERENCE.round() as u32;
         for k in 0..500 {
             let sign = [-20, 20][k % 2];
-            slow.update(nominal.saturating_add_signed(sign), [nominal; 3], 1);
+            slow.follow(nominal.saturating_add_signed(sign), [nominal; 3], 1);
         }
         assert!((slow.reference.value + NOMINAL_REFERENCE - nominal as f32).abs() < 0.1);
         // A step of the reference: when the second is full the mean is halfway, and after three time constants more e⁻³ of that
         // half is left.
         for _ in 0..500 + 3000 {
-            slow.update(nominal + 200, [nominal; 3], 1);
+            slow.follow(nominal + 200, [nominal; 3], 1);
         }
         let left = f64::from(nominal as f32 + 200.0 - (slow.reference.value + NOMINAL_REFERENCE));
         assert!((left - 100.0 * (-3.0_f64).exp()).abs() < 0.1, "{left}");

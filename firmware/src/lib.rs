@@ -5,7 +5,8 @@
 //! | [`board`]             | pins, clocks, converter's timing, line, flash sectors: one file a board |
 //! | [`design_parameters`] | sensors, front end and timing, each constant with its reason     |
 //! | [`channels`]          | the channels of a sample, and their order in a scan              |
-//! | [`convert`]           | sums of converter codes, and their conversion                    |
+//! | [`source`]            | what a board measures with: integers, and what they mean         |
+//! | [`convert`]           | the analog sensors as a source: sums of converter codes, and their conversion |
 //! | [`temperature`]       | which of the gyros' TEMP pins are used                           |
 //! | [`front_end`]         | state stored with a calibration: the converter's factors, the TEMP pins' offsets |
 //! | [`pipeline`]          | from samples to the streams: compensation, batches, Kalman banks |
@@ -45,6 +46,7 @@ pub mod restart;
 pub mod sampling;
 pub mod self_test;
 pub mod slots;
+pub mod source;
 #[cfg(target_os = "none")]
 pub mod supply;
 pub mod temperature;

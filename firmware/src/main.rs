@@ -26,11 +26,11 @@ use embassy_time::{Duration, Instant, Ticker};
 use heapless::Vec;
 use mimu_core::stored::{self, MAX_LENGTH};
 use mimu_core::wire::{Message, StoredInfo, flags};
-use mimu_firmware::adc::{Converter, RING};
-use mimu_firmware::board::Board;
+use mimu_firmware::board::{self, Board};
 use mimu_firmware::commands::{Commands, info};
 use mimu_firmware::design_parameters as design;
 use mimu_firmware::flash::Flash;
+use mimu_firmware::front_end::FrontEnd;
 use mimu_firmware::link::{
     self, FrameReceiver, FrameSender, Input, Outgoing, Output, transmit, try_send,
 };
@@ -38,7 +38,6 @@ use mimu_firmware::pipeline::{Pipeline, Shared};
 use mimu_firmware::restart::{self, Before};
 use mimu_firmware::sampling::{self, QUEUE, TALLY};
 use mimu_firmware::slots::Slots;
-use mimu_firmware::supply::Supply;
 use mimu_firmware::upload::Upload;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -46,28 +45,22 @@ use static_cell::{ConstStaticCell, StaticCell};
 async fn main(spawner: Spawner) {
     static BEFORE: StaticCell<Before> = StaticCell::new();
     static STORED: ConstStaticCell<Vec<u8, MAX_LENGTH>> = ConstStaticCell::new(Vec::new());
-    /// Ring into which the controller writes samples.
-    static SCANS: ConstStaticCell<[u16; RING]> = ConstStaticCell::new([0; RING]);
 
     let before = &*BEFORE.init(restart::take());
     let board = Board::start();
     let stored = STORED.take();
     let mut slots = Slots::open(Flash::new(), stored).await;
     let kept = slots.front_end().await;
+    let mut front_end = kept.unwrap_or_default();
+    let own_factors = slots.in_use().is_some() && board.sensors.needs_factors(&front_end);
     let faults = [
         (flags::YOUNGER_UNUSABLE, slots.younger_unusable()),
-        (
-            flags::OWN_FACTORS,
-            slots.in_use().is_some() && kept.is_none_or(|kept| kept.converter.is_none()),
-        ),
+        (flags::OWN_FACTORS, own_factors),
     ];
-    let mut front_end = kept.unwrap_or_default();
-    let supply = Supply::new(board.supply);
-    let converter = Converter::new(board.sensors, SCANS.take(), front_end.converter);
-    front_end.converter = converter.factors();
+    let sensors = board.sensors.prepare(&mut front_end);
     // Sampling begins within some milliseconds.
     let powered_for_ms = powered_for_ms(before);
-    let (pipeline, in_use) = pipeline(slots.in_use(), stored, powered_for_ms, front_end.pins_c);
+    let (pipeline, in_use) = pipeline(slots.in_use(), stored, powered_for_ms, &front_end);
     for (flag, is) in faults {
         pipeline.lock(|p| p.borrow_mut().flag(flag, is));
     }
@@ -96,13 +89,12 @@ async fn main(spawner: Spawner) {
         upload: Upload::new(stored),
         stored: in_use,
         self_test: board.self_test,
-        supply,
         before,
         powered_for_ms,
         replies,
     };
 
-    sampling::start(converter);
+    sampling::start(sensors);
     spawner.spawn(process(pipeline, events).unwrap());
     spawner.spawn(output(to_host, replies_out, events_out).unwrap());
     spawner.spawn(commands(everything, from_host).unwrap());
@@ -111,12 +103,12 @@ async fn main(spawner: Spawner) {
 
 /// Processes the samples of the queue.
 #[embassy_executor::task]
-async fn process(pipeline: &'static Shared, mut events: FrameSender) {
+async fn process(pipeline: &'static Shared<board::Source>, mut events: FrameSender) {
     loop {
         let taken = QUEUE.receive().await;
         pipeline.lock(|p| {
             let mut send = |message: &Message<'_>| try_send(&mut events, message);
-            p.borrow_mut().take(taken.number, &taken.sums, &mut send);
+            p.borrow_mut().take(&taken.scan, &mut send);
         });
         let took = (Instant::now().as_micros() as u32).wrapping_sub(taken.at_us);
         TALLY.longest_us.fetch_max(took, Ordering::Relaxed);
@@ -152,7 +144,7 @@ fn powered_for_ms(before: &Before) -> Option<u32> {
 /// Feeds the watchdog as long as samples come and are processed, keeps the time since power-on, and logs.
 async fn watch(
     mut watchdog: IndependentWatchdog<'static, IWDG1>,
-    pipeline: &Shared,
+    pipeline: &Shared<board::Source>,
     before: &Before,
 ) -> ! {
     let mut due = Ticker::every(Duration::from_millis(design::WATCHDOG_FEED_MS));
@@ -190,17 +182,11 @@ fn pipeline(
     in_use: Option<(u32, u64)>,
     bytes: &[u8],
     powered_for_ms: Option<u32>,
-    pins_c: Option<[f32; 3]>,
-) -> (&'static Shared, Option<StoredInfo>) {
-    static PIPELINE: StaticCell<Shared> = StaticCell::new();
-    let pipeline = PIPELINE.init_with(|| Mutex::new(RefCell::new(Pipeline::new())));
-    pipeline.lock(|p| {
-        let mut p = p.borrow_mut();
-        p.powered_for(powered_for_ms);
-        if let Some(pins_c) = pins_c {
-            p.set_temp_offsets(pins_c);
-        }
-    });
+    kept: &FrontEnd,
+) -> (&'static Shared<board::Source>, Option<StoredInfo>) {
+    static PIPELINE: StaticCell<Shared<board::Source>> = StaticCell::new();
+    let pipeline = PIPELINE.init_with(|| Mutex::new(RefCell::new(Pipeline::new(kept))));
+    pipeline.lock(|p| p.borrow_mut().powered_for(powered_for_ms));
     let info = in_use.and_then(|(length, hash)| {
         let stored = stored::decode(bytes).ok()?;
         let info = info(length, hash, &stored);

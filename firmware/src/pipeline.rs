@@ -1,7 +1,7 @@
 //! Processing of samples: from sums of codes to the batches of the streams and to the Kalman banks.
 //!
-//! Once for every sample: volts, compensation, effects, banks. Once for every batch: reference and temperature, the model at that
-//! temperature, and other slow quantities. All samples of a batch are therefore compensated with the same numbers, which the batch
+//! Once for every sample: raw units, compensation, effects, banks. Once for every batch: scale and temperature by the source, the model at
+//! that temperature, and other slow quantities. All samples of a batch are therefore compensated with the same numbers, which the batch
 //! contains.
 
 mod calibrated;
@@ -24,14 +24,11 @@ use nalgebra::Vector3;
 use calibrated::Calibrated;
 
 use crate::bank::Bank;
-use crate::channels::Channels;
-use crate::convert::{ACCEL_VOLTS, Slow};
-use crate::design_parameters::{
-    ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, GYRO_STOP_MARGIN_V, GYRO_STOPS_V,
-};
+use crate::front_end::FrontEnd;
+use crate::source::{Scan, Source, THERMOMETERS};
 
 /// The pipeline, shared between tasks of one executor; no task borrows it while it waits.
-pub type Shared = Mutex<NoopRawMutex, RefCell<Pipeline>>;
+pub type Shared<S> = Mutex<NoopRawMutex, RefCell<Pipeline<S>>>;
 
 /// Which streams are sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,32 +53,32 @@ pub struct Losses {
 struct Measurement {
     wanted: u32,
     count: u32,
-    /// Gyro and accelerometer, V, summed.
+    /// Gyro and accelerometer in raw units, summed.
     total: Sample<f32>,
 }
 
 /// The batch being filled.
-struct Batch {
+struct Batch<Slow> {
     streams: Streams,
     head: BatchHead,
     /// Whether it ends before the next sample, because a new calibration starts a new batch.
     closed: bool,
     /// Temperatures of the dies at which it is compensated, see [`Calibrated::dies_c`].
     dies_c: (f32, Option<f32>),
-    gyro_volts: f32,
-    gyro_temps_c: [f32; 3],
+    /// Raw units per unit of the integers.
+    scale: PerSensor<f32>,
+    temps_c: Vec<f32, THERMOMETERS>,
     raw: Vec<[u8; RAW_BYTES], BATCH>,
     compensated: Vec<[u8; COMPENSATED_BYTES], BATCH>,
-    /// Totals for [`Slow::update`].
-    reference: u32,
-    temperatures: [u32; 3],
+    /// Total for [`Source::update`].
+    slow: Slow,
 }
 
 /// The path of the samples.
-pub struct Pipeline {
+pub struct Pipeline<S: Source> {
     calibrated: Option<Calibrated>,
-    slow: Slow,
-    batch: Batch,
+    source: S,
+    batch: Batch<S::Slow>,
     /// Number of the next sample, if none is lost.
     expected: Option<u32>,
     /// Streams from the next batch on.
@@ -96,23 +93,14 @@ pub struct Pipeline {
     pub banks: PerSensor<Option<Bank>>,
 }
 
-impl Default for Pipeline {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Pipeline {
-    /// Without a calibration and without streams.
-    pub const fn new() -> Self {
+impl<S: Source> Pipeline<S> {
+    /// Without a calibration and without streams; `kept` was stored with the calibration in use.
+    pub fn new(kept: &FrontEnd) -> Self {
         Self {
             calibrated: None,
-            slow: Slow::NEW,
+            source: S::new(kept),
             batch: Batch {
-                streams: Streams {
-                    raw: false,
-                    compensated: false,
-                },
+                streams: Streams::default(),
                 head: BatchHead {
                     first: 0,
                     samples_lost: 0,
@@ -122,29 +110,19 @@ impl Pipeline {
                 },
                 closed: false,
                 dies_c: (0.0, None),
-                gyro_volts: 0.0,
-                gyro_temps_c: [0.0; 3],
+                scale: PerSensor::both(0.0),
+                temps_c: Vec::new(),
                 raw: Vec::new(),
                 compensated: Vec::new(),
-                reference: 0,
-                temperatures: [0; 3],
+                slow: S::Slow::default(),
             },
             expected: None,
-            streams: Streams {
-                raw: false,
-                compensated: false,
-            },
+            streams: Streams::default(),
             held_flags: 0,
             powered_for_ms: Some(0),
-            losses: Losses {
-                samples: 0,
-                batches: 0,
-            },
+            losses: Losses::default(),
             measurement: None,
-            banks: PerSensor {
-                gyro: None,
-                accel: None,
-            },
+            banks: PerSensor::both(None),
         }
     }
 
@@ -165,14 +143,9 @@ impl Pipeline {
         self.batch.closed = true;
     }
 
-    /// Sets the stored offsets between the TEMP pins, °C. Call it before the first sample.
-    pub fn set_temp_offsets(&mut self, pins_c: [f32; 3]) {
-        self.slow = Slow::of_pins(pins_c);
-    }
-
-    /// The slow quantities.
-    pub fn slow(&self) -> &Slow {
-        &self.slow
+    /// The meaning of the samples at present.
+    pub fn source(&self) -> &S {
+        &self.source
     }
 
     /// Whether there is a calibration.
@@ -216,7 +189,7 @@ impl Pipeline {
         });
     }
 
-    /// The mean, V at the sensors, once it is complete.
+    /// The mean, in raw units, once it is complete.
     pub fn measured(&self) -> Option<Sample<f32>> {
         let done = self.measurement.filter(|m| m.count == m.wanted)?;
         let count = done.count as f32;
@@ -227,12 +200,8 @@ impl Pipeline {
     }
 
     /// Processes the next sample. `send` gets each event and returns whether there was room for it.
-    pub fn take(
-        &mut self,
-        number: u32,
-        channels: &Channels<u32>,
-        send: &mut impl FnMut(&Message<'_>) -> bool,
-    ) {
+    pub fn take(&mut self, scan: &Scan<S::Slow>, send: &mut impl FnMut(&Message<'_>) -> bool) {
+        let number = scan.number;
         let lost = number.wrapping_sub(self.expected.unwrap_or(number));
         self.expected = Some(number.wrapping_add(1));
         if lost > 0 {
@@ -250,20 +219,17 @@ impl Pipeline {
             self.end_batch(send);
         }
         if self.batch.raw.is_empty() {
-            self.begin_batch(number, channels);
+            self.begin_batch(scan);
         }
 
         let sums = Sums {
-            gyro: channels.gyro,
-            accel: channels.accel,
+            gyro: scan.counts.gyro.map(|count| count as u32),
+            accel: scan.counts.accel.map(|count| count as u32),
         };
         let batch = &mut self.batch;
-        batch.reference += channels.reference;
-        for (total, sum) in batch.temperatures.iter_mut().zip(channels.temperature) {
-            *total += sum;
-        }
-        let raw = volts(&sums, batch.gyro_volts, ACCEL_VOLTS);
-        if is_saturated(&raw) {
+        batch.slow += scan.slow;
+        let raw = volts(&sums, batch.scale.gyro, batch.scale.accel);
+        if S::is_saturated(&scan.counts, &raw) {
             batch.head.flags |= flags::SATURATED;
         }
         batch.head.flags |= self.held_flags;
@@ -304,27 +270,26 @@ impl Pipeline {
         }
     }
 
-    fn begin_batch(&mut self, number: u32, channels: &Channels<u32>) {
-        if !self.slow.begun() {
-            self.slow
-                .update(channels.reference, channels.temperature, 1);
+    fn begin_batch(&mut self, scan: &Scan<S::Slow>) {
+        let number = scan.number;
+        if !self.source.begun() {
+            self.source.update(&scan.slow, 1);
         }
-        let temp_c = self.slow.temp_c();
-        let thermometer_c = self.slow.has_known_temperature().then_some(temp_c);
+        let temp_c = self.source.temp_c();
+        let thermometer_c = self.source.has_known_temperature().then_some(temp_c);
         let batch = &mut self.batch;
         batch.closed = false;
         batch.streams = self.streams;
         batch.compensated.clear();
-        batch.gyro_volts = self.slow.gyro_volts();
-        batch.gyro_temps_c = self.slow.gyro_temps_c();
-        batch.reference = 0;
-        batch.temperatures = [0; 3];
+        batch.scale = self.source.scale();
+        batch.temps_c = self.source.temperatures_c();
+        batch.slow = S::Slow::default();
         batch.head = BatchHead {
             first: number,
             samples_lost: self.losses.samples,
             batches_dropped: self.losses.batches,
             temp_c,
-            flags: self.slow.flags(),
+            flags: self.source.flags(),
         };
         if let Some(calibrated) = &mut self.calibrated {
             if calibrated.follow(number, thermometer_c) != Place::Inside {
@@ -342,16 +307,17 @@ impl Pipeline {
             return;
         }
         let samples = batch.raw.len() as u32;
-        self.slow
-            .update(batch.reference, batch.temperatures, samples);
+        self.source.update(&batch.slow, samples);
         let (streams, head) = (batch.streams, batch.head);
         let mut dropped = 0;
         if streams.raw {
             let event = Event::Raw(RawBatch {
                 head,
-                gyro_volts: batch.gyro_volts,
-                accel_volts: ACCEL_VOLTS,
-                gyro_temps_c: batch.gyro_temps_c,
+                gyro_volts: batch.scale.gyro,
+                accel_volts: batch.scale.accel,
+                gyro_temps_c: core::array::from_fn(|i| {
+                    batch.temps_c.get(i).copied().unwrap_or_default()
+                }),
                 samples: batch.raw.as_flattened(),
             });
             dropped += u32::from(!send(&Message::Event(event)));
@@ -371,15 +337,6 @@ impl Pipeline {
         batch.raw.clear();
         self.losses.batches = self.losses.batches.wrapping_add(dropped);
     }
-}
-
-/// Whether a sensor's output is at an end of its range.
-fn is_saturated(raw: &Sample<f32>) -> bool {
-    let at_a_stop = |volts: &Vector3<f32>, [low, high]: [f32; 2], margin: f32| {
-        volts.min() <= low + margin || volts.max() >= high - margin
-    };
-    at_a_stop(&raw.gyro, GYRO_STOPS_V, GYRO_STOP_MARGIN_V)
-        || at_a_stop(&raw.accel, ACCEL_STOPS_V, ACCEL_STOP_MARGIN_V)
 }
 
 #[cfg(test)]

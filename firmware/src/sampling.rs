@@ -1,6 +1,7 @@
 //! Sampling: a task in a separate executor with the highest priority. However long another task computes, no sample is late. The task puts
 //! each sample into a queue and computes nothing.
 
+use core::future::Future;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_executor::InterruptExecutor;
@@ -10,18 +11,25 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::Instant;
 
-use crate::adc::{Converter, Fault};
-use crate::channels::Channels;
+use crate::board;
 use crate::design_parameters as design;
+use crate::source::{Fault, Scan, Source};
+
+/// The half of a source that takes its scans.
+pub trait Acquire {
+    /// See [`Source::Slow`].
+    type Slow;
+
+    /// Begins sampling and gives each scan to `take`, until samples were lost. The numbers of the next call go on where time is then.
+    fn acquire(&mut self, take: impl FnMut(Scan<Self::Slow>)) -> impl Future<Output = Fault>;
+}
 
 /// A sample to be processed.
 pub struct Taken {
-    /// See [`Sample`](crate::adc::Sample).
-    pub number: u32,
+    /// Its readings.
+    pub scan: Scan<<board::Source as Source>::Slow>,
     /// Time of reading, µs, low word of the clock.
     pub at_us: u32,
-    /// Sums of the conversions of each channel.
-    pub sums: Channels<u32>,
 }
 
 /// Queue of samples for processing.
@@ -78,39 +86,29 @@ fn SWPMI1() {
 }
 
 /// Starts sampling. Call it once.
-pub fn start(converter: Converter) {
+pub fn start(sensors: board::Acquisition) {
     // Below the controller's and the timer's interrupts (level 0): the ring's reader relies on
     // their counts being up to date.
     interrupt::SWPMI1.set_priority(Priority::P1);
     EXECUTOR
         .start(interrupt::SWPMI1)
-        .spawn(sample(converter).unwrap());
+        .spawn(sample(sensors).unwrap());
 }
 
 #[embassy_executor::task]
-async fn sample(mut converter: Converter) {
+async fn sample(mut sensors: board::Acquisition) {
     loop {
-        let mut stream = converter.start();
-        let fault = loop {
-            match stream.next().await {
-                Ok(sample) => {
-                    TALLY.samples.fetch_add(1, Ordering::Relaxed);
-                    TALLY.last.store(sample.number, Ordering::Relaxed);
-                    let taken = Taken {
-                        number: sample.number,
-                        at_us: Instant::now().as_micros() as u32,
-                        sums: sample.sums,
-                    };
-                    if QUEUE.try_send(taken).is_err() {
-                        TALLY.queue_overruns.fetch_add(1, Ordering::Relaxed);
-                    }
-                }
-                Err(fault) => break fault,
+        let fault = sensors.acquire(|scan| {
+            TALLY.samples.fetch_add(1, Ordering::Relaxed);
+            TALLY.last.store(scan.number, Ordering::Relaxed);
+            let at_us = Instant::now().as_micros() as u32;
+            if QUEUE.try_send(Taken { scan, at_us }).is_err() {
+                TALLY.queue_overruns.fetch_add(1, Ordering::Relaxed);
             }
-        };
-        let counter = match fault {
+        });
+        let counter = match fault.await {
             Fault::Late => &TALLY.late,
-            Fault::ConverterOverrun => &TALLY.converter_overruns,
+            Fault::Overrun => &TALLY.converter_overruns,
             Fault::Stalled => &TALLY.stalls,
         };
         counter.fetch_add(1, Ordering::Relaxed);

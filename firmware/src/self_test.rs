@@ -21,7 +21,7 @@ use crate::design_parameters::{
 #[cfg(target_os = "none")]
 mod deflect;
 #[cfg(target_os = "none")]
-pub use deflect::run;
+pub use deflect::SelfTest;
 
 /// Measurements of a self-test.
 #[derive(Clone, Copy, Debug)]

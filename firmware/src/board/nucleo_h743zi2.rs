@@ -116,7 +116,10 @@ const _: () = {
 #[cfg(all(target_os = "none", feature = "usb"))]
 pub use parts::UsbPins;
 #[cfg(target_os = "none")]
-pub use parts::{Board, Irqs, SelfTestPins, Sensors};
+pub use parts::{Acquisition, Board, Irqs, SelfTest, Sensors};
+
+/// What the integers of [`Acquisition`] mean.
+pub type Source = crate::convert::Analog;
 
 /// The parts of the board, for the target only.
 #[cfg(target_os = "none")]
@@ -124,7 +127,7 @@ mod parts {
     use embassy_stm32::adc::{AdcChannel, AnyAdcChannel};
     use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
     use embassy_stm32::pac::iwdg::vals::Key;
-    use embassy_stm32::peripherals::{self, ADC1, ADC3, DMA1_CH0, IWDG1};
+    use embassy_stm32::peripherals::{self, ADC1, DMA1_CH0, IWDG1};
     use embassy_stm32::rcc::{
         AHBPrescaler, APBPrescaler, Hse, HseMode, LsConfig, Pll, PllDiv, PllMul, PllPreDiv,
         PllSource, Sysclk, VoltageScale, mux,
@@ -136,8 +139,13 @@ mod parts {
     use embassy_stm32::{mode::Async, usart};
 
     use super::*;
+    use static_cell::ConstStaticCell;
+
+    use crate::adc::{Converter, RING};
     use crate::channels::Channels;
     use crate::design_parameters::WATCHDOG_US;
+    use crate::front_end::FrontEnd;
+    use crate::supply::Supply;
 
     bind_interrupts!(
         /// Handlers of the interrupts.
@@ -173,19 +181,31 @@ mod parts {
         pub pins: Channels<AnyAdcChannel<'static, ADC1>>,
     }
 
+    /// What takes the samples.
+    pub type Acquisition = Converter;
+
+    impl Sensors {
+        /// Whether the factors of the converter that a calibration was made with are missing.
+        pub fn needs_factors(&self, kept: &FrontEnd) -> bool {
+            kept.converter.is_none()
+        }
+
+        /// Powers up the converter with the factors that were kept, if there are any, and updates them.
+        pub fn prepare(self, kept: &mut FrontEnd) -> Acquisition {
+            /// Ring into which the controller writes samples.
+            static SCANS: ConstStaticCell<[u16; RING]> = ConstStaticCell::new([0; RING]);
+            let converter = Converter::new(self, SCANS.take(), kept.converter);
+            kept.converter = converter.factors();
+            converter
+        }
+    }
+
     /// Self-test and range inputs of the sensors. Low, as after reset: no test, and the finest range.
     ///
     /// Four outputs of the Zio header that are not shared with ADC1 or other parts of the board. A self-test input of the ADXRS300 needs at
     /// least 3.3 V for high, which a pin of a 3.3 V part just misses: both go through a 74AHCT buffer at 5 V. The accelerometer is a 3.3 V
     /// part.
-    pub struct SelfTestPins {
-        /// ST1 of the three gyros: PE13 (D3).
-        pub st1: Output<'static>,
-        /// ST2 of the three gyros: PE11 (D5).
-        pub st2: Output<'static>,
-        /// g-Select1 and g-Select2 of the accelerometer: PE9 (D6) and PD15 (D9).
-        pub range: [Output<'static>; 2],
-    }
+    pub type SelfTest = crate::self_test::SelfTest;
 
     /// USB of the part, at the connector beside the debugger's.
     #[cfg(feature = "usb")]
@@ -203,9 +223,7 @@ mod parts {
         /// The sensors' outputs.
         pub sensors: Sensors,
         /// The sensors' inputs.
-        pub self_test: SelfTestPins,
-        /// The converter that can read the internal reference.
-        pub supply: Peri<'static, ADC3>,
+        pub self_test: SelfTest,
         /// To the host: USART3, at the debugger's bridge, with [`BAUD`], 8 data bits, no parity, 1 stop bit.
         #[cfg(not(feature = "usb"))]
         pub line: usart::Uart<'static, Async>,
@@ -259,10 +277,11 @@ mod parts {
                         reference: p.PA7.degrade_adc(), // CN12 pin 15, Ethernet jumper off
                     },
                 },
-                self_test: SelfTestPins {
-                    st1: low(p.PE13.into()),
-                    st2: low(p.PE11.into()),
-                    range: [low(p.PE9.into()), low(p.PD15.into())],
+                self_test: SelfTest {
+                    st1: low(p.PE13.into()),                        // D3
+                    st2: low(p.PE11.into()),                        // D5
+                    range: [low(p.PE9.into()), low(p.PD15.into())], // D6, D9
+                    supply: Supply::new(p.ADC3),
                 },
                 #[cfg(not(feature = "usb"))]
                 line: {
@@ -279,7 +298,6 @@ mod parts {
                     dp: p.PA12,
                     dm: p.PA11,
                 },
-                supply: p.ADC3,
                 watchdog,
             }
         }

@@ -15,7 +15,8 @@ mod exchange;
 mod temperature;
 
 use super::*;
-use crate::convert::NOMINAL_REFERENCE;
+use crate::channels::Channels;
+use crate::convert::{Analog, NOMINAL_REFERENCE, scan};
 
 /// What was sent, as far as the tests ask.
 #[derive(Debug, PartialEq)]
@@ -51,10 +52,10 @@ fn sums(number: u32) -> Channels<u32> {
     }
 }
 
-fn run(pipeline: &mut Pipeline, numbers: impl IntoIterator<Item = u32>) -> Vec<Sent> {
+fn run(pipeline: &mut Pipeline<Analog>, numbers: impl IntoIterator<Item = u32>) -> Vec<Sent> {
     let mut all = Vec::new();
     for number in numbers {
-        pipeline.take(number, &sums(number), &mut |message| {
+        pipeline.take(&scan(number, &sums(number)), &mut |message| {
             all.push(keep(message));
             true
         });
@@ -123,7 +124,7 @@ fn times(times: f32, effects: &[DeviceEffect<f32>], lags_s: Option<PerSensor<f32
 
 #[test]
 fn nothing_is_sent_unasked_and_what_is_asked_begins_with_a_batch() {
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     assert_eq!(run(&mut pipeline, 0..25), []);
     pipeline.stream(Streams {
         raw: true,
@@ -145,7 +146,7 @@ fn nothing_is_sent_unasked_and_what_is_asked_begins_with_a_batch() {
 
 #[test]
 fn a_gap_ends_the_batch_and_is_counted() {
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.stream(Streams {
         raw: true,
         compensated: false,
@@ -164,11 +165,11 @@ fn a_gap_ends_the_batch_and_is_counted() {
 
 #[test]
 fn batches_without_room_are_counted_and_the_next_says_so() {
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.calibrate(calibration(&[]));
     pipeline.stream(both());
     for number in 0..40 {
-        pipeline.take(number, &sums(number), &mut |_| false);
+        pipeline.take(&scan(number, &sums(number)), &mut |_| false);
     }
     assert_eq!(pipeline.losses().batches, 4);
     let sent = run(&mut pipeline, 40..60);
@@ -181,7 +182,7 @@ fn batches_without_room_are_counted_and_the_next_says_so() {
 
 #[test]
 fn compensated_samples_are_those_of_the_raw_ones_at_the_stated_temperature() {
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.calibrate(calibration(&[]));
     pipeline.stream(both());
     let sent = run(&mut pipeline, 0..20);
@@ -214,7 +215,7 @@ fn errors_of_the_code_are_taken_out_of_the_reading_before_its_temperature_matter
     let mut errors = [0.0; 9];
     (errors[0], errors[2]) = (half as f32, eighth as f32);
     let code = DeviceEffect::code(Sensor::Accel, None, &errors, weight as f32, 0.0).unwrap();
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.calibrate(calibration(&[code]));
     pipeline.stream(both());
     let (mut seen, mut number) = ([false; 4], 0);
@@ -224,7 +225,7 @@ fn errors_of_the_code_are_taken_out_of_the_reading_before_its_temperature_matter
             // Over the whole range, in steps of none of the bits.
             sums.accel[axis] = 1000 + (number * 317 + axis as u32 * 41_003) % 129_000;
         }
-        pipeline.take(number, &sums, &mut |message| {
+        pipeline.take(&scan(number, &sums), &mut |message| {
             let Sent::Compensated(head, samples, _) = keep(message) else {
                 return true;
             };
@@ -258,7 +259,7 @@ fn errors_of_the_code_are_taken_out_of_the_reading_before_its_temperature_matter
 
 /// Heads of all batches of a stream in which `change` has its way with each sample.
 fn heads(
-    pipeline: &mut Pipeline,
+    pipeline: &mut Pipeline<Analog>,
     numbers: core::ops::Range<u32>,
     mut change: impl FnMut(u32, &mut Channels<u32>),
 ) -> Vec<BatchHead> {
@@ -266,7 +267,7 @@ fn heads(
     for number in numbers {
         let mut sums = sums(number);
         change(number, &mut sums);
-        pipeline.take(number, &sums, &mut |message| {
+        pipeline.take(&scan(number, &sums), &mut |message| {
             match keep(message) {
                 Sent::Raw(head, ..) | Sent::Compensated(head, ..) => heads.push(head),
                 Sent::Kalman(_) => {}
@@ -279,7 +280,7 @@ fn heads(
 
 #[test]
 fn flags_of_others_are_in_the_batch_that_has_them() {
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.stream(Streams {
         raw: true,
         compensated: false,
@@ -311,7 +312,7 @@ fn a_sensor_at_its_own_stop_saturates_both_streams() {
         (0.68, 0.45, false),
     ] {
         for axis in 0..3 {
-            let mut pipeline = Pipeline::new();
+            let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
             pipeline.calibrate(calibration(&[]));
             pipeline.stream(both());
             let heads = heads(&mut pipeline, 0..60, |number, sums| {
@@ -329,7 +330,7 @@ fn a_sensor_at_its_own_stop_saturates_both_streams() {
 
 #[test]
 fn an_open_temperature_pin_is_flagged_and_compensation_goes_by_the_two_others() {
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.calibrate(calibration(&[]));
     pipeline.stream(both());
     let heads = heads(&mut pipeline, 0..200, |number, sums| {
@@ -355,7 +356,7 @@ fn a_warm_up_goes_by_the_time_since_power_on_and_is_over_where_that_is_unknown()
     // What is left of it in the first sample.
     let left = |powered_for_ms| {
         let mut of = [None, Some(&warm_up)].map(|warm_up: Option<&DeviceEffect<f32>>| {
-            let mut pipeline = Pipeline::new();
+            let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
             pipeline.powered_for(powered_for_ms);
             pipeline.calibrate(calibration(warm_up.map_or(&[], core::slice::from_ref)));
             pipeline.stream(Streams {
@@ -381,7 +382,7 @@ fn a_warm_up_goes_by_the_time_since_power_on_and_is_over_where_that_is_unknown()
 
 #[test]
 fn a_bank_reports_five_times_a_second_and_takes_only_what_is_known() {
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     let bank = Bank::new(Sensor::Gyro, [1e-6; 3], Prior::Diffuse { span: 1.0 });
     pipeline.banks.gyro = bank;
     let sent = run(&mut pipeline, 0..500);

@@ -11,10 +11,10 @@ fn lag() -> DeviceEffect<f32> {
 /// Compensated samples of pipelines in which the TEMP pins read `temp_c`, where that is a number, and else are open. `before` is called with
 /// the number of each sample, before it is taken.
 fn compensated(
-    pipeline: &mut Pipeline,
+    pipeline: &mut Pipeline<Analog>,
     numbers: core::ops::Range<u32>,
     temp_c: impl Fn(u32) -> f64,
-    mut before: impl FnMut(u32, &mut Pipeline),
+    mut before: impl FnMut(u32, &mut Pipeline<Analog>),
 ) -> Vec<(u32, Sample<f32>, f32)> {
     let mut all = Vec::new();
     for number in numbers {
@@ -24,7 +24,7 @@ fn compensated(
             open if open.is_nan() => sums.temperature = [0; 3],
             temp_c => at_temperature(&mut sums, temp_c),
         }
-        pipeline.take(number, &sums, &mut |message| {
+        pipeline.take(&scan(number, &sums), &mut |message| {
             if let Sent::Compensated(head, samples, _) = keep(message) {
                 all.extend(
                     samples
@@ -38,8 +38,8 @@ fn compensated(
     all
 }
 
-fn streaming(stored: Stored) -> Pipeline {
-    let mut pipeline = Pipeline::new();
+fn streaming(stored: Stored) -> Pipeline<Analog> {
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.calibrate(stored);
     pipeline.stream(both());
     pipeline

@@ -20,7 +20,7 @@ fn on_the_ramp(lag_s: f64, t: f64) -> f64 {
 #[test]
 fn compensation_follows_the_dies_of_each_triad_and_the_raw_stream_the_thermometer() {
     for lags_s in [[40.0, 40.0], [-20.0, -20.0], [40.0, -20.0], [-20.0, 40.0]] {
-        let mut pipeline = Pipeline::new();
+        let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
         pipeline.calibrate(with_lags(
             &[],
             Some(PerSensor::from(lags_s).map(|s| s as f32)),
@@ -33,7 +33,7 @@ fn compensation_follows_the_dies_of_each_triad_and_the_raw_stream_the_thermomete
         for number in 0..65_000 {
             let mut sums = sums(number);
             at_temperature(&mut sums, at(number));
-            pipeline.take(number, &sums, &mut |message| {
+            pipeline.take(&scan(number, &sums), &mut |message| {
                 match keep(message) {
                     Sent::Raw(head, ..) => thermometer = f64::from(head.temp_c),
                     Sent::Compensated(head, samples, dies_c) => {
@@ -75,7 +75,7 @@ fn compensation_follows_the_dies_of_each_triad_and_the_raw_stream_the_thermomete
 
 #[test]
 fn samples_outside_the_range_are_flagged_from_the_first_degree_on() {
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.calibrate(calibration(&[]));
     pipeline.stream(both());
     let mut seen = [0; 2];
@@ -83,7 +83,7 @@ fn samples_outside_the_range_are_flagged_from_the_first_degree_on() {
         let mut sums = sums(number);
         // From 25 to 60 °C, beyond the 50 of the range and up to the last node.
         at_temperature(&mut sums, 25.0 + 0.5 * f64::from(number) / 1000.0);
-        pipeline.take(number, &sums, &mut |message| {
+        pipeline.take(&scan(number, &sums), &mut |message| {
             if let Sent::Compensated(head, ..) = keep(message) {
                 let outside = head.flags & flags::OUTSIDE_NODES != 0;
                 assert_eq!(outside, head.temp_c > 50.0, "{}", head.temp_c);
@@ -97,7 +97,7 @@ fn samples_outside_the_range_are_flagged_from_the_first_degree_on() {
 
 #[test]
 fn without_a_thermometer_the_last_good_temperature_is_used_and_flagged() {
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.calibrate(with_lags(&[], Some(PerSensor::both(40.0))));
     pipeline.stream(both());
     let mut last = None;
@@ -108,7 +108,7 @@ fn without_a_thermometer_the_last_good_temperature_is_used_and_flagged() {
             // All three are open.
             sums.temperature = [0; 3];
         }
-        pipeline.take(number, &sums, &mut |message| {
+        pipeline.take(&scan(number, &sums), &mut |message| {
             if let Sent::Compensated(head, ..) = keep(message) {
                 last = Some(head);
             }
@@ -119,7 +119,7 @@ fn without_a_thermometer_the_last_good_temperature_is_used_and_flagged() {
     assert!((head.temp_c - 35.0).abs() < 0.02, "{}", head.temp_c);
     assert_ne!(head.flags & flags::NO_TEMPERATURE, 0);
     // And without any the lag does not begin at what stands in for it.
-    let mut pipeline = Pipeline::new();
+    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
     pipeline.calibrate(with_lags(&[], Some(PerSensor::both(40.0))));
     pipeline.stream(both());
     let mut heads = Vec::new();
@@ -129,7 +129,7 @@ fn without_a_thermometer_the_last_good_temperature_is_used_and_flagged() {
             true => sums.temperature = [0; 3],
             false => at_temperature(&mut sums, 45.0),
         }
-        pipeline.take(number, &sums, &mut |message| {
+        pipeline.take(&scan(number, &sums), &mut |message| {
             if let Sent::Compensated(head, ..) = keep(message) {
                 heads.push(head);
             }
