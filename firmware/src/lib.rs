@@ -6,6 +6,8 @@
 //! | [`design_parameters`] | sensors, front end and timing, each constant with its reason     |
 //! | [`channels`]          | the channels of a sample, and their order in a scan              |
 //! | [`source`]            | what a board measures with: integers, and what they mean         |
+//! | [`icm42688p`]         | the digital inertial sensor: registers, FIFO, self-test          |
+//! | [`timebase`]          | times of a digital sensor's samples by the crystal               |
 //! | [`convert`]           | the analog sensors as a source: sums of converter codes, and their conversion |
 //! | [`temperature`]       | which of the gyros' TEMP pins are used                           |
 //! | [`front_end`]         | state stored with a calibration: the converter's factors, the TEMP pins' offsets |
@@ -37,6 +39,7 @@ pub mod design_parameters;
 #[cfg(target_os = "none")]
 pub mod flash;
 pub mod front_end;
+pub mod icm42688p;
 #[cfg(target_os = "none")]
 pub mod link;
 pub mod pipeline;
@@ -50,4 +53,5 @@ pub mod source;
 #[cfg(target_os = "none")]
 pub mod supply;
 pub mod temperature;
+pub mod timebase;
 pub mod upload;
