@@ -21,9 +21,10 @@ use crate::channels::Channels;
 use crate::design_parameters::{
     ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, DIVIDER_RATIO, GYRO_REFERENCE_V, GYRO_STOP_MARGIN_V,
     GYRO_STOPS_V, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V, GYRO_TEMPERATURE_V_PER_C,
-    REFERENCE_TOLERANCE, SAMPLE_HZ, SLOW_S,
+    REFERENCE_TOLERANCE, SAMPLE_HZ,
 };
 use crate::front_end::FrontEnd;
+use crate::lag::Lag;
 use crate::source::{Counts, Scan, Source, THERMOMETERS};
 use crate::temperature::Thermometer;
 
@@ -39,28 +40,6 @@ pub const ACCEL_VOLTS: f32 = REFERENCE_V / SUM_FULL_SCALE as f32;
 /// The sum of the gyros' reference at nominal voltages: 2.5 V after the divider.
 pub const NOMINAL_REFERENCE: f32 =
     GYRO_REFERENCE_V * DIVIDER_RATIO / REFERENCE_V * SUM_FULL_SCALE as f32;
-
-/// A mean over the first [`SLOW_S`], then a first-order lag with that time constant: with the lag alone the noise of the first reading
-/// would dominate the first seconds.
-#[derive(Clone, Copy, Debug)]
-struct Lag {
-    value: f32,
-    /// Number of samples in the mean so far.
-    samples: f32,
-}
-
-impl Lag {
-    const NEW: Self = Self {
-        value: 0.0,
-        samples: 0.0,
-    };
-
-    /// Takes in the mean of `count` samples.
-    fn take(&mut self, mean: f32, count: f32) {
-        self.samples = (self.samples + count).min(SLOW_S * SAMPLE_HZ as f32);
-        self.value += count / self.samples * (mean - self.value);
-    }
-}
 
 /// The analog sensors behind the converter: their slow quantities, filtered, which are the gyros' reference and temperatures.
 ///
@@ -174,12 +153,17 @@ impl AddAssign for SlowSums {
     }
 }
 
+/// Time between samples, µs. The converter's clock is the crystal's, so this is exact.
+const SAMPLE_US: u64 = 1_000_000 / SAMPLE_HZ as u64;
+
 /// A sample of the converter as the pipeline takes it.
 pub fn scan(number: u32, channels: &Channels<u32>) -> Scan<SlowSums> {
     // At most 2^17 with two conversions a sample.
     let signed = |sums: [u32; 3]| sums.map(|sum| sum as i32);
     Scan {
         number,
+        tick_us: u64::from(number) * SAMPLE_US,
+        period_ns: SAMPLE_US as u32 * 1000,
         counts: Counts {
             gyro: signed(channels.gyro),
             accel: signed(channels.accel),

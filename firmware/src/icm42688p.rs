@@ -198,7 +198,8 @@ pub fn samples_between(before: u16, after: u16, elapsed_us: u64) -> Option<u32> 
     let span = f64::from(u16::MAX) + 1.0;
     let expected = elapsed_us as f64 * RATE_HZ / 1e6 * STAMPS;
     let since = f64::from(after.wrapping_sub(before));
-    let wraps = ((expected - since) / span + 0.5).floor().max(0.0);
+    // Truncation of what is not negative: `core` has no `floor`.
+    let wraps = f64::from(((expected - since) / span + 0.5).max(0.0) as u32);
     let samples = (since + wraps * span) / STAMPS;
     // Positive, so this rounds to the nearest.
     let whole = (samples + 0.5) as u32;

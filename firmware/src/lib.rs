@@ -6,6 +6,7 @@
 //! | [`design_parameters`] | sensors, front end and timing, each constant with its reason     |
 //! | [`channels`]          | the channels of a sample, and their order in a scan              |
 //! | [`source`]            | what a board measures with: integers, and what they mean         |
+//! | [`digital`]           | a digital sensor as a source: polled, numbered by its stamps     |
 //! | [`icm42688p`]         | the digital inertial sensor: registers, FIFO, self-test          |
 //! | [`timebase`]          | times of a digital sensor's samples by the crystal               |
 //! | [`convert`]           | the analog sensors as a source: sums of converter codes, and their conversion |
@@ -36,10 +37,12 @@ pub mod channels;
 pub mod commands;
 pub mod convert;
 pub mod design_parameters;
+pub mod digital;
 #[cfg(target_os = "none")]
 pub mod flash;
 pub mod front_end;
 pub mod icm42688p;
+pub(crate) mod lag;
 #[cfg(target_os = "none")]
 pub mod link;
 pub mod pipeline;

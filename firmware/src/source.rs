@@ -26,6 +26,10 @@ pub type Counts = PerSensor<[i32; 3]>;
 pub struct Scan<Slow> {
     /// Number of the sample since sampling began. Lost samples have numbers too.
     pub number: u32,
+    /// When it was taken, µs since sampling began, by the crystal.
+    pub tick_us: u64,
+    /// True time between samples, ns, by the crystal.
+    pub period_ns: u32,
     /// Readings of both triads.
     pub counts: Counts,
     /// What the source needs only once per batch: references, temperatures.

@@ -12,6 +12,9 @@
 /// of 1 ppm is a tenth of what calibrations resolve.
 const MEMORY: f64 = 10_000.0;
 
+/// Points that a line keeps over a gap: the rate stays, and the new phase is found within a second.
+const RESUMED: f64 = 500.0;
+
 /// Largest error of a sensor's clock, as a fraction of its rate. The data sheet of the ICM-42688-P allows 1 %; a rate beyond this is
 /// another rate than the one that was set.
 pub const LARGEST_ERROR: f64 = 0.05;
@@ -57,10 +60,21 @@ impl Timebase {
         self.period_us = period_us.clamp(self.nominal_us - band_us, self.nominal_us + band_us);
     }
 
-    /// Time of a sample that is at most as new as the newest, µs.
+    /// The line continued after a gap: sample `number` was the newest when it was polled at `now_us`. The rate is still known, the phase is
+    /// not.
+    pub fn again(&self, number: u64, now_us: u64) -> Self {
+        Self {
+            number,
+            time_us: now_us as f64 - 0.5 * self.period_us,
+            points: self.points.min(RESUMED),
+            ..*self
+        }
+    }
+
+    /// Time of a sample, µs; it may be newer than the newest so far.
     pub fn at_us(&self, number: u64) -> u64 {
-        let ago = self.number.saturating_sub(number) as f64;
-        (self.time_us - ago * self.period_us).max(0.0) as u64
+        let since = number as i64 - self.number as i64;
+        (self.time_us + since as f64 * self.period_us).max(0.0) as u64
     }
 
     /// True period of the samples, µs.
