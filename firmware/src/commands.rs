@@ -273,12 +273,14 @@ impl Commands<'_> {
             stored_room: MAX_LENGTH as u32,
             sample_rate_hz: SAMPLE_HZ,
             channels: "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
-            raw_unit: "V",
+            raw_unit: board::Source::TRIADS.gyro.unit,
             start: self.before.start(),
             starts: self.before.starts(),
             stored: self.stored,
             slots: self.slots.state(),
             powered_for_ms: self.powered_for_ms,
+            triads: board::Source::TRIADS,
+            thermometers: board::Source::PLACES,
         };
         send(&mut self.replies, &Message::Greeting { id, greeting }).await;
     }

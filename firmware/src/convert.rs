@@ -13,15 +13,16 @@ use core::ops::AddAssign;
 use heapless::Vec;
 use mimu_core::PerSensor;
 use mimu_core::compensation::Sample;
-use mimu_core::wire::flags;
+use mimu_core::wire::{Triad, flags};
 use nalgebra::Vector3;
 
 use crate::board::{REFERENCE_V, SCANS};
 use crate::channels::Channels;
 use crate::design_parameters::{
-    ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, DIVIDER_RATIO, GYRO_REFERENCE_V, GYRO_STOP_MARGIN_V,
-    GYRO_STOPS_V, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V, GYRO_TEMPERATURE_V_PER_C,
-    REFERENCE_TOLERANCE, SAMPLE_HZ,
+    ACCEL_NULL_V, ACCEL_RANGE_G, ACCEL_SENSITIVITY_V_PER_G, ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V,
+    DIVIDER_RATIO, GYRO_NULL_V, GYRO_RANGE_DPS, GYRO_REFERENCE_V, GYRO_SENSITIVITY_V_PER_DPS,
+    GYRO_STOP_MARGIN_V, GYRO_STOPS_V, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V,
+    GYRO_TEMPERATURE_V_PER_C, RADIANS, REFERENCE_TOLERANCE, SAMPLE_HZ, STANDARD_GRAVITY,
 };
 use crate::front_end::FrontEnd;
 use crate::lag::Lag;
@@ -33,6 +34,9 @@ pub const FULL_SCALE: u32 = u16::MAX as u32;
 
 /// A sum at the end of the range.
 pub const SUM_FULL_SCALE: u32 = SCANS as u32 * FULL_SCALE;
+
+/// Bits of a sum.
+const SUM_BITS: u8 = (SUM_FULL_SCALE.ilog2() + 1) as u8;
 
 /// Volts at the accelerometer per unit of its sum, 25.2 µV. With the nominal reference, because it is ratiometric.
 pub const ACCEL_VOLTS: f32 = REFERENCE_V / SUM_FULL_SCALE as f32;
@@ -177,6 +181,33 @@ pub fn scan(number: u32, channels: &Channels<u32>) -> Scan<SlowSums> {
 
 impl Source for Analog {
     type Slow = SlowSums;
+
+    const TRIADS: PerSensor<Triad<'static>> = PerSensor {
+        gyro: Triad {
+            part: "ADXRS300",
+            unit: "V",
+            bits: SUM_BITS,
+            range: GYRO_RANGE_DPS * RADIANS,
+            null: GYRO_NULL_V,
+            per_si: GYRO_SENSITIVITY_V_PER_DPS / RADIANS,
+            rate_hz: SAMPLE_HZ as f32,
+            filter: "40 Hz",
+        },
+        accel: Triad {
+            part: "MMA7260QT",
+            unit: "V",
+            bits: SUM_BITS,
+            range: ACCEL_RANGE_G * STANDARD_GRAVITY,
+            null: ACCEL_NULL_V,
+            per_si: ACCEL_SENSITIVITY_V_PER_G / STANDARD_GRAVITY,
+            rate_hz: SAMPLE_HZ as f32,
+            filter: "1.6 kHz",
+        },
+    };
+
+    const PLACES: &'static str = "gyro_x,gyro_y,gyro_z";
+
+    const COUNTS: bool = false;
 
     fn new(kept: &FrontEnd) -> Self {
         kept.pins_c.map_or(Self::NEW, Self::of_pins)

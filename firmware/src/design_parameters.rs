@@ -17,6 +17,12 @@ pub const REFERENCE_TOLERANCE: f32 = 0.1;
 /// Sensitivity of an ADXRS300 at its own pin, V per (deg/s): 1.0 to 4.0 V for its 300 deg/s.
 pub const GYRO_SENSITIVITY_V_PER_DPS: f32 = 0.005;
 
+/// Specified range of an ADXRS300, degrees per second.
+pub const GYRO_RANGE_DPS: f32 = 300.0;
+
+/// Radians of a degree.
+pub const RADIANS: f32 = core::f32::consts::PI / 180.0;
+
 /// Voltage of an ADXRS300's TEMP pin at [`GYRO_TEMPERATURE_NULL_C`], V. Proportional to absolute
 /// temperature, which the two constants below state as a tangent.
 pub const GYRO_TEMPERATURE_NULL_V: f32 = 2.5;
@@ -80,6 +86,12 @@ pub const ACCEL_NULL_V: f32 = 1.65;
 /// calibration on a turntable never leaves 1 g by much; 1.5 g is 0.45 to 2.85 V, within the
 /// reference.
 pub const ACCEL_SENSITIVITY_V_PER_G: f32 = 0.8;
+
+/// That range, g.
+pub const ACCEL_RANGE_G: f32 = 1.5;
+
+/// The g of data sheets, m/s².
+pub const STANDARD_GRAVITY: f32 = 9.806_65;
 
 /// Ends of the output of an MMA7260QT at 3.3 V, V: 0.25 V from either rail (data sheet, full scale output range; recalled). The 0.45 and
 /// 2.85 V of 1.5 g would be wrong: with a null of 1.815 V, which is allowed, 2.85 V is a valid reading of 1.3 g.

@@ -10,10 +10,11 @@ use heapless::Vec;
 use mimu_core::PerSensor;
 use mimu_core::compensation::Sample;
 use mimu_core::effects::REFERENCE_C;
-use mimu_core::wire::flags;
+use mimu_core::wire::{Triad, flags};
 
+use crate::design_parameters::{RADIANS, STANDARD_GRAVITY};
 use crate::front_end::FrontEnd;
-use crate::icm42688p::{self, Bus, Icm42688p, Packet, RATE_HZ, samples_between};
+use crate::icm42688p::{self, Bus, FILTERS, Icm42688p, Packet, RATE_HZ, samples_between};
 use crate::lag::Lag;
 use crate::source::{Counts, Fault, Scan, Source, THERMOMETERS};
 use crate::timebase::Timebase;
@@ -63,6 +64,18 @@ pub struct Digital {
 
 impl Source for Digital {
     type Slow = DieSum;
+
+    const TRIADS: PerSensor<Triad<'static>> = PerSensor {
+        gyro: triad(icm42688p::RANGE.gyro * RADIANS as f64, icm42688p::BITS.gyro),
+        accel: triad(
+            icm42688p::RANGE.accel * STANDARD_GRAVITY as f64,
+            icm42688p::BITS.accel,
+        ),
+    };
+
+    const PLACES: &'static str = "die";
+
+    const COUNTS: bool = true;
 
     fn new(_: &FrontEnd) -> Self {
         Self {
@@ -120,6 +133,20 @@ impl Source for Digital {
             true => 0,
             false => flags::NO_TEMPERATURE,
         }
+    }
+}
+
+/// A triad whose readings of so many bits end at `range`, SI.
+const fn triad(range: f64, bits: u32) -> Triad<'static> {
+    Triad {
+        part: "ICM-42688-P",
+        unit: "count",
+        bits: bits as u8,
+        range: range as f32,
+        null: 0.0,
+        per_si: ((1_u32 << (bits - 1)) as f64 / range) as f32,
+        rate_hz: RATE_HZ as f32,
+        filter: FILTERS,
     }
 }
 

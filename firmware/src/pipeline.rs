@@ -16,8 +16,8 @@ use mimu_core::compensation::Sample;
 use mimu_core::stored::Stored;
 use mimu_core::table::Place;
 use mimu_core::wire::{
-    BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, Event, Message, RAW_BYTES, RawBatch,
-    Sums, flags, volts,
+    BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, CountBatch, Event, Message, RAW_BYTES,
+    RawBatch, flags, reading,
 };
 use nalgebra::Vector3;
 
@@ -67,6 +67,9 @@ struct Batch<Slow> {
     dies_c: (f32, Option<f32>),
     /// Raw units per unit of the integers.
     scale: PerSensor<f32>,
+    /// Time of the first sample, µs, and time between samples, ns.
+    tick_us: u64,
+    period_ns: u32,
     temps_c: Vec<f32, THERMOMETERS>,
     raw: Vec<[u8; RAW_BYTES], BATCH>,
     compensated: Vec<[u8; COMPENSATED_BYTES], BATCH>,
@@ -111,6 +114,8 @@ impl<S: Source> Pipeline<S> {
                 closed: false,
                 dies_c: (0.0, None),
                 scale: PerSensor::both(0.0),
+                tick_us: 0,
+                period_ns: 0,
                 temps_c: Vec::new(),
                 raw: Vec::new(),
                 compensated: Vec::new(),
@@ -222,19 +227,15 @@ impl<S: Source> Pipeline<S> {
             self.begin_batch(scan);
         }
 
-        let sums = Sums {
-            gyro: scan.counts.gyro.map(|count| count as u32),
-            accel: scan.counts.accel.map(|count| count as u32),
-        };
         let batch = &mut self.batch;
         batch.slow += scan.slow;
-        let raw = volts(&sums, batch.scale.gyro, batch.scale.accel);
+        let raw = reading(&scan.counts, &batch.scale);
         if S::is_saturated(&scan.counts, &raw) {
             batch.head.flags |= flags::SATURATED;
         }
         batch.head.flags |= self.held_flags;
         // There is always room, because a full batch ends below.
-        let _ = batch.raw.push(RawBatch::pack(&sums));
+        let _ = batch.raw.push(CountBatch::pack(&scan.counts));
         // Even without a stream, because the effects need every sample; the load is then always the same.
         if let Some(calibrated) = &mut self.calibrated {
             let sample = calibrated.apply(&raw);
@@ -282,6 +283,7 @@ impl<S: Source> Pipeline<S> {
         batch.streams = self.streams;
         batch.compensated.clear();
         batch.scale = self.source.scale();
+        (batch.tick_us, batch.period_ns) = (scan.tick_us, scan.period_ns);
         batch.temps_c = self.source.temperatures_c();
         batch.slow = S::Slow::default();
         batch.head = BatchHead {
@@ -309,17 +311,9 @@ impl<S: Source> Pipeline<S> {
         let samples = batch.raw.len() as u32;
         self.source.update(&batch.slow, samples);
         let (streams, head) = (batch.streams, batch.head);
-        let mut dropped = 0;
+        let (mut dropped, mut temperatures) = (0, [0; 4 * THERMOMETERS]);
         if streams.raw {
-            let event = Event::Raw(RawBatch {
-                head,
-                gyro_volts: batch.scale.gyro,
-                accel_volts: batch.scale.accel,
-                gyro_temps_c: core::array::from_fn(|i| {
-                    batch.temps_c.get(i).copied().unwrap_or_default()
-                }),
-                samples: batch.raw.as_flattened(),
-            });
+            let event = raw_event::<S>(batch, &mut temperatures);
             dropped += u32::from(!send(&Message::Event(event)));
         }
         if streams.compensated {
@@ -337,6 +331,36 @@ impl<S: Source> Pipeline<S> {
         batch.raw.clear();
         self.losses.batches = self.losses.batches.wrapping_add(dropped);
     }
+}
+
+/// The raw samples of a batch; `temperatures` gets the bytes of their temperatures.
+fn raw_event<'a, S: Source>(
+    batch: &'a Batch<S::Slow>,
+    temperatures: &'a mut [u8; 4 * THERMOMETERS],
+) -> Event<'a> {
+    let (head, samples) = (batch.head, batch.raw.as_flattened());
+    if !S::COUNTS {
+        let temp_c = |i: usize| batch.temps_c.get(i).copied().unwrap_or_default();
+        return Event::Raw(RawBatch {
+            head,
+            gyro_volts: batch.scale.gyro,
+            accel_volts: batch.scale.accel,
+            gyro_temps_c: core::array::from_fn(temp_c),
+            samples,
+        });
+    }
+    let (places, _) = temperatures.as_chunks_mut::<4>();
+    for (bytes, temp_c) in places.iter_mut().zip(&batch.temps_c) {
+        *bytes = temp_c.to_le_bytes();
+    }
+    Event::Counts(CountBatch {
+        head,
+        tick_us: batch.tick_us,
+        period_ns: batch.period_ns,
+        scale: batch.scale,
+        temperatures: &temperatures[..4 * batch.temps_c.len()],
+        samples,
+    })
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use core::ops::AddAssign;
 use heapless::Vec;
 use mimu_core::PerSensor;
 use mimu_core::compensation::Sample;
+use mimu_core::wire::Triad;
 
 use crate::front_end::FrontEnd;
 
@@ -19,7 +20,7 @@ use crate::front_end::FrontEnd;
 pub const THERMOMETERS: usize = 3;
 
 /// Integers of both triads, x, y, z: at most 24 bits with their sign.
-pub type Counts = PerSensor<[i32; 3]>;
+pub use mimu_core::wire::Counts;
 
 /// A sample as a source gives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +53,15 @@ pub enum Fault {
 pub trait Source {
     /// Slow quantities of a scan; the pipeline adds up those of a batch.
     type Slow: Copy + Default + AddAssign;
+
+    /// The triads by their data sheets. The rate is the nominal one.
+    const TRIADS: PerSensor<Triad<'static>>;
+
+    /// Places of the thermometers, separated by commas.
+    const PLACES: &'static str;
+
+    /// Whether the raw stream has signed counts with the crystal's time, or the sums of a converter whose clock is the crystal's.
+    const COUNTS: bool;
 
     /// Before the first scan, with what was stored with the calibration in use.
     fn new(kept: &FrontEnd) -> Self;

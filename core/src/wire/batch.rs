@@ -46,6 +46,12 @@ pub mod flags {
     pub const OWN_FACTORS: u16 = 1 << 11;
 }
 
+/// Bytes of a sample of signed counts: six of three bytes.
+pub const COUNT_BYTES: usize = 18;
+
+/// Signed readings of x, y, z of a digital sensor: at most 24 bits.
+pub type Counts = PerSensor<[i32; 3]>;
+
 /// Sums of the converter's codes of x, y, z over the scans of a sample; a mean would lose resolution.
 pub type Sums = PerSensor<[u32; 3]>;
 
@@ -90,6 +96,23 @@ pub struct RawBatch<'a> {
     pub samples: &'a [u8],
 }
 
+/// Raw readings of a digital sensor, which samples by a clock of its own. Since protocol 2.3.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CountBatch<'a> {
+    /// What holds for all of them.
+    pub head: BatchHead,
+    /// Time of the first sample by the device's crystal, µs since sampling began.
+    pub tick_us: u64,
+    /// True time between the samples by the crystal, ns.
+    pub period_ns: u32,
+    /// Raw units of [`Triad::unit`](super::Triad::unit) per count. Reading = count * this, in `f32`, as the device compensates it.
+    pub scale: PerSensor<f32>,
+    /// Temperatures of the thermometers of the greeting in their order, °C, each an `f32`, little end first.
+    pub temperatures: &'a [u8],
+    /// [`Counts`]: gyro x, y, z, accel x, y, z, each three bytes, two's complement, little end first; sample after sample.
+    pub samples: &'a [u8],
+}
+
 /// Compensated samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CompensatedBatch<'a> {
@@ -124,20 +147,7 @@ impl<'a> RawBatch<'a> {
 
     /// Numbers and sums of the samples, in order.
     pub fn sums(&self) -> impl Iterator<Item = (u32, Sums)> + 'a {
-        let numbers = numbers(self.head.first);
-        numbers.zip(self.samples.as_chunks::<RAW_BYTES>().0.iter().map(|bytes| {
-            let mut sums = [0; 6];
-            for (sum, bytes) in sums.iter_mut().zip(bytes.as_chunks::<3>().0) {
-                for byte in bytes.iter().rev() {
-                    *sum = *sum << 8 | u32::from(*byte);
-                }
-            }
-            let [gx, gy, gz, ax, ay, az] = sums;
-            Sums {
-                gyro: [gx, gy, gz],
-                accel: [ax, ay, az],
-            }
-        }))
+        numbers(self.head.first).zip(sums(self.samples))
     }
 
     /// Numbers and readings of the samples, V, in order; identical to the readings that the device compensates, to the last bit.
@@ -145,6 +155,69 @@ impl<'a> RawBatch<'a> {
         let (gyro, accel) = (self.gyro_volts, self.accel_volts);
         self.sums()
             .map(move |(number, sums)| (number, volts(&sums, gyro, accel)))
+    }
+}
+
+impl<'a> CountBatch<'a> {
+    /// The bytes of a sample; bits beyond 24 are cut off.
+    pub fn pack(counts: &Counts) -> [u8; COUNT_BYTES] {
+        // Two's complement: the lower three bytes are those of the unsigned number.
+        let unsigned = |counts: [i32; 3]| counts.map(|count| count as u32);
+        RawBatch::pack(&Sums {
+            gyro: unsigned(counts.gyro),
+            accel: unsigned(counts.accel),
+        })
+    }
+
+    /// Whether the lengths are those that a device sends.
+    pub fn is_whole(&self) -> bool {
+        self.samples.len().is_multiple_of(COUNT_BYTES)
+            && (1..=BATCH).contains(&(self.samples.len() / COUNT_BYTES))
+            && self.temperatures.len().is_multiple_of(4)
+    }
+
+    /// Numbers and counts of the samples, in order.
+    pub fn counts(&self) -> impl Iterator<Item = (u32, Counts)> + 'a {
+        // The sign is the highest of 24 bits.
+        let signed = |sums: [u32; 3]| sums.map(|sum| ((sum << 8) as i32) >> 8);
+        numbers(self.head.first)
+            .zip(sums(self.samples))
+            .map(move |(number, sums)| {
+                let counts = Counts {
+                    gyro: signed(sums.gyro),
+                    accel: signed(sums.accel),
+                };
+                (number, counts)
+            })
+    }
+
+    /// Numbers and readings of the samples in raw units, in order; identical to the readings that the device compensates, to the last bit.
+    pub fn readings(&self) -> impl Iterator<Item = (u32, Sample<f32>)> + 'a {
+        let scale = self.scale;
+        self.counts()
+            .map(move |(number, counts)| (number, reading(&counts, &scale)))
+    }
+
+    /// Times of the samples by the crystal, s since sampling began, in order.
+    pub fn times_s(&self) -> impl Iterator<Item = f64> + 'a {
+        let (tick_us, period_ns) = (self.tick_us, u64::from(self.period_ns));
+        (0_u64..).map(move |k| tick_us as f64 * 1e-6 + (k * period_ns) as f64 * 1e-9)
+    }
+
+    /// Temperatures of the thermometers, °C.
+    pub fn temperatures_c(&self) -> impl Iterator<Item = f32> + 'a {
+        let (bytes, _) = self.temperatures.as_chunks::<4>();
+        bytes.iter().map(|bytes| f32::from_le_bytes(*bytes))
+    }
+}
+
+/// Reading of a sample in raw units; see [`CountBatch::scale`].
+#[inline]
+pub fn reading(counts: &Counts, scale: &PerSensor<f32>) -> Sample<f32> {
+    let of = |counts: [i32; 3], scale: f32| Vector3::from(counts).map(|count| count as f32) * scale;
+    Sample {
+        gyro: of(counts.gyro, scale.gyro),
+        accel: of(counts.accel, scale.accel),
     }
 }
 
@@ -205,6 +278,23 @@ impl<'a> CompensatedBatch<'a> {
                 }),
         )
     }
+}
+
+/// Six numbers of three bytes, sample after sample.
+fn sums(samples: &[u8]) -> impl Iterator<Item = Sums> {
+    samples.as_chunks::<RAW_BYTES>().0.iter().map(|bytes| {
+        let mut sums = [0; 6];
+        for (sum, bytes) in sums.iter_mut().zip(bytes.as_chunks::<3>().0) {
+            for byte in bytes.iter().rev() {
+                *sum = *sum << 8 | u32::from(*byte);
+            }
+        }
+        let [gx, gy, gz, ax, ay, az] = sums;
+        Sums {
+            gyro: [gx, gy, gz],
+            accel: [ax, ay, az],
+        }
+    })
 }
 
 /// Sample numbers from the first on; after 49 days they wrap to 0.

@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::extensible;
+use crate::PerSensor;
 use crate::effects::{DeviceEffect, EffectError};
 use crate::stored;
 
@@ -11,7 +12,7 @@ use crate::stored;
 pub const MAGIC: [u8; 4] = *b"mimu";
 
 /// The protocol of this build.
-pub const PROTOCOL: Version = Version { major: 2, minor: 2 };
+pub const PROTOCOL: Version = Version { major: 2, minor: 3 };
 
 /// Version of a protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -63,6 +64,32 @@ pub struct Greeting<'a> {
     pub slots: [Slot; 2],
     /// Time since power-on at the start of sampling, ms; `None` if unknown.
     pub powered_for_ms: Option<u32>,
+    /// The sensors. Since protocol 2.3.
+    #[serde(borrow)]
+    pub triads: PerSensor<Triad<'a>>,
+    /// Places of the thermometers in the order of their temperatures, separated by commas. Since protocol 2.3.
+    pub thermometers: &'a str,
+}
+
+/// A triad of sensors: what its readings are, by the data sheet.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Triad<'a> {
+    /// Name of the part.
+    pub part: &'a str,
+    /// Unit of a raw reading: `V` or `count`.
+    pub unit: &'a str,
+    /// Bits of a reading before it is scaled, with its sign.
+    pub bits: u8,
+    /// Largest input, rad/s or m/s².
+    pub range: f32,
+    /// Raw reading without an input.
+    pub null: f32,
+    /// Nominal scale factor: raw units per rad/s or per m/s².
+    pub per_si: f32,
+    /// Samples per second by the device's crystal, as far as it knows them now.
+    pub rate_hz: f32,
+    /// Filters and rate as they are set: with part and range, what a calibration belongs to.
+    pub filter: &'a str,
 }
 
 /// Bits of [`Greeting::capabilities`].

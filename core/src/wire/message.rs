@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::batch::{CompensatedBatch, RawBatch};
+use super::batch::{CompensatedBatch, CountBatch, RawBatch};
 use super::greeting::Greeting;
 use crate::Sensor;
 
@@ -163,6 +163,8 @@ pub enum Event<'a> {
     Compensated(#[serde(borrow)] CompensatedBatch<'a>),
     /// A running bank, five times a second.
     Kalman(KalmanState),
+    /// Raw readings of a digital sensor, instead of [`Event::Raw`]. Since protocol 2.3.
+    Counts(#[serde(borrow)] CountBatch<'a>),
 }
 
 /// Why a call was not done.

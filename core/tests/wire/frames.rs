@@ -1,10 +1,11 @@
 //! Frames: what is sent arrives, garbled frames are counted, and the next frame arrives again.
 
+use mimu_core::PerSensor;
 use mimu_core::effects::DeviceEffect;
 use mimu_core::wire::{
-    BATCH, BatchHead, COMPENSATED_BYTES, Call, Compatibility, CompensatedBatch, Decoder, EFFECTS,
-    Event, Greeting, MAGIC, MAX_FRAME, MAX_PAYLOAD, Message, PROTOCOL, RAW_BYTES, RawBatch,
-    Request, Version, compatibility, effects_of_this_build, encode,
+    BATCH, BatchHead, COMPENSATED_BYTES, COUNT_BYTES, Call, Compatibility, CompensatedBatch,
+    CountBatch, Decoder, EFFECTS, Event, Greeting, MAGIC, MAX_FRAME, MAX_PAYLOAD, Message,
+    PROTOCOL, RAW_BYTES, RawBatch, Request, Version, compatibility, effects_of_this_build, encode,
 };
 use proptest::prelude::*;
 
@@ -67,6 +68,16 @@ fn full_batches_fit() {
         gyro_temps_c: [1.0; 3],
         samples: &raw,
     })));
+    let counts = [255; BATCH * COUNT_BYTES];
+    let counts = frame(&Message::Event(Event::Counts(CountBatch {
+        head: head(),
+        // A year.
+        tick_us: 31_536_000_000_000,
+        period_ns: u32::MAX,
+        scale: PerSensor::both(1.0),
+        temperatures: &[255; 12],
+        samples: &counts,
+    })));
     let compensated = [255; BATCH * COMPENSATED_BYTES];
     let compensated = frame(&Message::Event(Event::Compensated(CompensatedBatch {
         head: head(),
@@ -75,8 +86,10 @@ fn full_batches_fit() {
     })));
     let frames_a_second = 1000 / BATCH;
     assert!(raw.len() * frames_a_second <= 24_000, "{}", raw.len());
+    assert!(counts.len() <= MAX_FRAME, "{}", counts.len());
     assert!(compensated.len() <= MAX_FRAME, "{}", compensated.len());
-    println!("{} and {} bytes", raw.len(), compensated.len());
+    let all = [raw.len(), counts.len(), compensated.len()];
+    println!("{all:?} bytes");
     let (payloads, garbled) = decode(&compensated);
     assert_eq!((payloads.len(), garbled), (1, 0));
     assert!(mimu_core::wire::Frame(&payloads[0]).message().is_some());

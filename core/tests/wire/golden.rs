@@ -1,13 +1,13 @@
 //! The bytes of every message, written by hand from the specification of postcard: a variant is its number; integers above 127 are varints; `f32` are
 //! little-endian (1.0 is `0000803f`, -2.0 is `000000c0`, 0.5 is `0000003f`); text is preceded by its length.
 
-use mimu_core::Sensor;
 use mimu_core::stored;
 use mimu_core::wire::{
-    BatchHead, Call, Capabilities, CompensatedBatch, Counters, Event, Frame, Greeting, KalmanAxis,
-    KalmanState, MAGIC, Message, Prior, RawBatch, Refusal, Reply, Request, SelfTest, Slot, Start,
-    StoredInfo, Sums, Version, checks, flags,
+    BatchHead, Call, Capabilities, CompensatedBatch, CountBatch, Counters, Counts, Event, Frame,
+    Greeting, KalmanAxis, KalmanState, MAGIC, Message, Prior, RawBatch, Refusal, Reply, Request,
+    SelfTest, Slot, Start, StoredInfo, Sums, Triad, Version, checks, flags,
 };
+use mimu_core::{PerSensor, Sensor};
 use serde::{Deserialize, Serialize};
 
 fn hex(text: &str) -> Vec<u8> {
@@ -134,9 +134,27 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
             stored,
             slots,
             powered_for_ms: Some(300),
+            triads: PerSensor {
+                gyro: Triad {
+                    part: "G",
+                    unit: "count",
+                    bits: 19,
+                    range: 0.5,
+                    null: -2.0,
+                    per_si: 1.0,
+                    rate_hz: 1000.0,
+                    filter: "F",
+                },
+                accel: Triad::default(),
+            },
+            thermometers: "die",
         },
     }
 }
+
+/// The gyro, an accelerometer of which nothing is known, and the thermometers. 0x447a0000 is 1000.0.
+const SENSORS: &str = "01 47 05 636f756e74 13 0000003f 000000c0 0000803f 00007a44 01 46 \
+                       00 00 00 00000000 00000000 00000000 00000000 00 03 646965";
 
 /// A greeting up to `start`. 0xfffff in groups of seven bits is 7f 7f 3f; 4096 is 32 * 128.
 const BEFORE: &str = "00 01 6d696d75 02 01 05 302e312e30 01 42 0102030405060708090a0b0c \
@@ -160,7 +178,9 @@ fn greetings() {
         (Start::Fault { pc: 128, cfsr: 1 }, "04 05 8001 01"),
         (Start::Other, "01 06"),
     ] {
-        let bytes = hex(&format!("{BEFORE} {bytes} 03 00 0100 0100 01 ac02"));
+        let bytes = hex(&format!(
+            "{BEFORE} {bytes} 03 00 0100 0100 01 ac02 {SENSORS}"
+        ));
         frozen(greeting(start, None, none), &bytes);
     }
     let stored = StoredInfo {
@@ -179,7 +199,7 @@ fn greetings() {
         (Slot::NotUsable(stored::StoredError::Check), "02 04 03"),
     ] {
         let bytes = hex(&format!(
-            "{BEFORE} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00 01 ac02",
+            "{BEFORE} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00 01 ac02 {SENSORS}",
             "ab".repeat(12)
         ));
         frozen(
@@ -364,6 +384,23 @@ fn events() {
         &hex("03 01 ac02 01 8001 0000003f 8204 03 010203 01 000000c0"),
     );
     frozen(
+        Message::Event(Event::Counts(CountBatch {
+            head,
+            tick_us: 300_000,
+            period_ns: 1_000_000,
+            scale: PerSensor {
+                gyro: 1.0,
+                accel: -2.0,
+            },
+            temperatures: &[0, 0, 0, 0x3f],
+            samples,
+        })),
+        // 300000 in groups of seven bits is e0 a7 12, a million c0 84 3d.
+        &hex(
+            "03 03 ac02 01 8001 0000003f 8204 e0a712 c0843d 0000803f 000000c0 04 0000003f 03 010203",
+        ),
+    );
+    frozen(
         Message::Event(Event::Kalman(kalman())),
         &hex(&format!("03 02 {KALMAN} {}", axis().repeat(3))),
     );
@@ -404,6 +441,35 @@ fn samples_of_a_batch() {
     assert_eq!(read, [(u32::MAX, sums), (0, sevens)]);
     let (number, volts) = batch.volts().nth(1).unwrap();
     assert_eq!((number, volts.gyro.y, volts.accel.z), (0, 1.75, 3.5));
+
+    // -1 is ffffff, the most negative number of 24 bits 800000.
+    let counts = Counts {
+        gyro: [-1, 0x7f_ffff, -0x80_0000],
+        accel: [-300_000, 0, 1],
+    };
+    let bytes = CountBatch::pack(&counts);
+    assert_eq!(
+        bytes.to_vec(),
+        hex("ffffff ffff7f 000080 206cfb 000000 010000")
+    );
+    let of_counts = CountBatch {
+        head: batch.head,
+        tick_us: 5_000_000,
+        period_ns: 1_030_000,
+        scale: PerSensor {
+            gyro: 1.0,
+            accel: 0.5,
+        },
+        temperatures: &[],
+        samples: &[bytes, bytes].concat(),
+    };
+    assert!(of_counts.is_whole());
+    let read: Vec<_> = of_counts.counts().collect();
+    assert_eq!(read, [(u32::MAX, counts), (0, counts)]);
+    let (_, reading) = of_counts.readings().next().unwrap();
+    assert_eq!((reading.gyro.x, reading.accel.x), (-1.0, -150_000.0));
+    let times: Vec<f64> = of_counts.times_s().take(2).collect();
+    assert!((times[0] - 5.0).abs() < 1e-12 && (times[1] - 5.00103).abs() < 1e-12);
 
     let bytes = CompensatedBatch::pack(&mimu_core::compensation::Sample {
         gyro: [1.0, -2.0, 0.5].into(),

@@ -8,7 +8,7 @@ use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::DeviceEffect;
 use mimu_core::stored::{self, Curves};
 use mimu_core::table::Node;
-use mimu_core::wire::Prior;
+use mimu_core::wire::{Prior, Sums};
 use nalgebra::Matrix3;
 
 mod exchange;

@@ -60,6 +60,7 @@ impl Device {
             stored,
             slots: [first, Slot::Empty],
             powered_for_ms: self.script.powered_for_ms,
+            ..Greeting::default()
         };
         let message = Message::Greeting { id, greeting };
         match id {
