@@ -116,7 +116,7 @@ impl Commands<'_> {
             Request::Hello => return self.greet(id).await,
             Request::Download { offset, length } => self.download(offset, length, &mut part).await,
             Request::UploadCommit => self.commit().await.map(|()| Reply::Done),
-            Request::SelfTest => Ok(Reply::SelfTest(self.self_test.run(self.pipeline).await)),
+            Request::SelfTest => self.self_test.run(self.pipeline).await.map(Reply::SelfTest),
             Request::Counters => Ok(Reply::Counters(self.counters(received))),
             Request::ResetCounters => {
                 self.reset_counters(received);
@@ -263,7 +263,7 @@ impl Commands<'_> {
             capabilities: Capabilities::TEMPERATURE_NODES
                 .and(Capabilities::TERMS)
                 .and(Capabilities::KALMAN)
-                .and(Capabilities::SELF_TEST)
+                .and(board::CAPABILITIES)
                 .and(Capabilities::CURVES)
                 .and(Capabilities::TWO_LAGS)
                 .and(usb),

@@ -1,4 +1,4 @@
-//! An analog inertial unit on an STM32H743: sampled at exactly 1 kHz, compensated, streamed, calibrated.
+//! An inertial unit on an STM32H743, of analog sensors or a digital one: sampled, compensated, streamed, calibrated.
 //!
 //! | module                | what it is                                                       |
 //! |-----------------------|------------------------------------------------------------------|
@@ -17,6 +17,7 @@
 //! | [`upload`]            | an upload in progress                                            |
 //! | [`slots`]             | stored calibrations, safe against a failing supply               |
 //! | `adc`                 | the converter's driver, the only place with its registers        |
+//! | `spi`                 | the line to a digital sensor                                     |
 //! | `flash`               | the same of the flash memory                                     |
 //! | `sampling`            | the task that takes samples, with the highest priority           |
 //! | `link`                | the line to the host: serial, or USB                             |
@@ -28,13 +29,15 @@
 //! Those with links compile for the PC as well and are tested there.
 #![no_std]
 
-#[cfg(target_os = "none")]
+#[cfg(all(target_os = "none", not(feature = "matek-h743")))]
 pub mod adc;
 pub mod bank;
 pub mod board;
+#[cfg(not(feature = "matek-h743"))]
 pub mod channels;
 #[cfg(target_os = "none")]
 pub mod commands;
+#[cfg(not(feature = "matek-h743"))]
 pub mod convert;
 pub mod design_parameters;
 pub mod digital;
@@ -50,11 +53,15 @@ pub mod pipeline;
 pub mod restart;
 #[cfg(target_os = "none")]
 pub mod sampling;
+#[cfg(not(feature = "matek-h743"))]
 pub mod self_test;
 pub mod slots;
 pub mod source;
-#[cfg(target_os = "none")]
+#[cfg(all(target_os = "none", feature = "matek-h743"))]
+pub mod spi;
+#[cfg(all(target_os = "none", not(feature = "matek-h743")))]
 pub mod supply;
+#[cfg(not(feature = "matek-h743"))]
 pub mod temperature;
 pub mod timebase;
 pub mod upload;

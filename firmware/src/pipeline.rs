@@ -363,5 +363,5 @@ fn raw_event<'a, S: Source>(
     })
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "matek-h743")))]
 mod tests;

@@ -3,7 +3,7 @@
 use embassy_stm32::gpio::Output;
 use embassy_time::Timer;
 use mimu_core::compensation::Sample;
-use mimu_core::wire::{self, flags};
+use mimu_core::wire::{self, Refusal, flags};
 
 use super::{Measured, judge};
 use crate::convert::Analog;
@@ -25,7 +25,7 @@ pub struct SelfTest {
 
 impl SelfTest {
     /// Takes about a second, and restores the inputs.
-    pub async fn run(&mut self, pipeline: &Shared<Analog>) -> wire::SelfTest {
+    pub async fn run(&mut self, pipeline: &Shared<Analog>) -> Result<wire::SelfTest, Refusal> {
         pipeline.lock(|p| p.borrow_mut().flag(flags::SELF_TEST, true));
         let rest = mean(pipeline).await;
         self.st1.set_high();
@@ -52,7 +52,7 @@ impl SelfTest {
             reference_v: slow.reference_share() * supply_v,
             supply_v,
         };
-        wire::SelfTest {
+        Ok(wire::SelfTest {
             gyro_st1_v: measured.gyro_st1_v,
             gyro_st2_v: measured.gyro_st2_v,
             accel_fine_v: measured.accel_fine_v,
@@ -61,7 +61,7 @@ impl SelfTest {
             reference_v: measured.reference_v,
             supply_v,
             passed: judge(&measured),
-        }
+        })
     }
 }
 
