@@ -60,12 +60,19 @@ clippy:
 	$(CARGO) clippy --locked -p mimu-recording --no-default-features --target $(WEB_TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --profile image --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --profile image --features usb --target $(TARGET) -- -D warnings
+	$(CARGO) clippy --locked -p mimu-firmware --profile image --features matek-h743 --target $(TARGET) -- -D warnings
+	$(CARGO) clippy --locked -p mimu-firmware --profile image --features matek-h743,usb --target $(TARGET) -- -D warnings
 
 rustdoc:
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 
-# With USB first: the image without it has the same name, and is the one that the tests run.
+# The tests run the images without USB. All images have the same name, so the Matek's is copied, and the Nucleo's is built last.
+MATEK := $(FIRMWARE) --features matek-h743
+IMAGES := $(or $(CARGO_TARGET_DIR),target)/$(TARGET)/image
 images:
+	$(MATEK),usb
+	$(MATEK)
+	cp $(IMAGES)/mimu-firmware $(IMAGES)/mimu-firmware-matek-h743
 	$(CARGO) build --locked -p mimu-firmware --profile image --features usb --target $(TARGET)
 	$(FIRMWARE)
 	$(COUNTED)

@@ -8,6 +8,7 @@
 //! | [`schematic`] | what is wired to which pin                                                    |
 //! | [`front`]     | voltages at the converter's pins at any time                                  |
 //! | [`sampler`]   | the converter, which gets the voltages at the time of each conversion         |
+//! | [`inertial`]  | a digital sensor, which gets the unit's state at the time of each sample      |
 //! | [`flash`]     | what is being written, and the contents after a cut of the supply             |
 //! | `watchdog`    | a model that the emulator lacks                                               |
 //! | `line`        | the serial line                                                               |
@@ -27,6 +28,7 @@ pub mod findings;
 pub mod flash;
 pub mod front;
 pub mod image;
+pub mod inertial;
 mod interference;
 mod line;
 mod memory;

@@ -17,13 +17,40 @@ use rigless::time::VirtualNanos;
 
 use crate::flash::Watched;
 use crate::front::Front;
+use crate::inertial::{INTERFACE, Inertial, select};
 use crate::line::FarEnd;
 use crate::sampler::Sampler;
 use crate::schematic::{DRIVEN, Drives, HSE_HZ, LSE_HZ};
 use crate::watchdog::Watchdog;
 
-/// The serial port that is wired to the debugger's USB bridge.
-const SERIAL: &str = "USART3";
+/// What differs between the boards.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wiring {
+    /// Name of the board.
+    pub(crate) name: &'static str,
+    /// The serial port that is wired to the host.
+    serial: &'static str,
+    /// Frequency of the crystal, Hz.
+    hse_hz: u64,
+}
+
+impl Wiring {
+    /// The NUCLEO-H743ZI2, whose debugger's USB bridge is at USART3.
+    pub(crate) const NUCLEO: Self = Self {
+        name: "nucleo-h743zi2",
+        serial: "USART3",
+        hse_hz: HSE_HZ,
+    };
+
+    /// The Matek H743, whose telemetry port is UART7, with a crystal at this fraction of its nominal frequency.
+    pub(crate) fn matek(crystal: f64) -> Self {
+        Self {
+            name: "matek-h743",
+            serial: "UART7",
+            hse_hz: (HSE_HZ as f64 * crystal).round() as u64,
+        }
+    }
+}
 
 /// Address of the part's 96-bit unique number (RM0433, section 61.1).
 const UNIT_ID_AT: u64 = 0x1FF1_E800;
@@ -32,6 +59,7 @@ const UNIT_ID_AT: u64 = 0x1FF1_E800;
 #[derive(Debug)]
 pub(crate) struct Part {
     mcu: Stm32h743,
+    wiring: Wiring,
     pub(crate) sampler: Sampler,
     pub(crate) flash: Watched,
     watchdog: Watchdog,
@@ -50,24 +78,34 @@ struct Slots {
 }
 
 /// The part when its supply comes up.
-fn powered_up() -> Result<Stm32h743, Error> {
+fn powered_up(wiring: &Wiring) -> Result<Stm32h743, Error> {
     let mut mcu = Stm32h743::new()?;
-    mcu.rcc.attach_crystals(HSE_HZ, LSE_HZ);
+    mcu.rcc.attach_crystals(wiring.hse_hz, LSE_HZ);
     mcu.set_supply(3300);
     mcu.set_analog_supply(3300);
     Ok(mcu)
 }
 
-/// The serial port that is wired to the debugger.
-fn serial_port(mcu: &mut Stm32h743) -> &mut Usart {
-    let nth = usart::INSTANCES.iter().position(|&name| name == SERIAL);
+/// The serial port that is wired to the host.
+fn serial_port<'a>(mcu: &'a mut Stm32h743, wiring: &Wiring) -> &'a mut Usart {
+    let nth = usart::INSTANCES
+        .iter()
+        .position(|&name| name == wiring.serial);
     &mut mcu.usart[nth.expect("the part has the port")]
 }
 
 impl Part {
-    fn new(front: Front, far_end: FarEnd) -> Result<Self, Error> {
-        let mut mcu = powered_up()?;
-        serial_port(&mut mcu).attach(far_end);
+    fn new(
+        front: Front,
+        sensor: Option<Inertial>,
+        wiring: Wiring,
+        far_end: FarEnd,
+    ) -> Result<Self, Error> {
+        let mut mcu = powered_up(&wiring)?;
+        serial_port(&mut mcu, &wiring).attach(far_end);
+        if let Some(sensor) = sensor {
+            mcu.spi[INTERFACE].attach_selected(sensor, select());
+        }
         let mut ports = [0; DRIVEN.len()];
         for (slot, (port, _)) in ports.iter_mut().zip(DRIVEN) {
             *slot = mcu.bus().slot(PORTS[port])?;
@@ -77,10 +115,11 @@ impl Part {
             adc1: mcu.bus().slot("ADC1")?,
             flash: mcu.bus().slot("Flash")?,
             watchdog: mcu.bus().slot("IWDG")?,
-            serial: mcu.bus().slot(SERIAL)?,
+            serial: mcu.bus().slot(wiring.serial)?,
         };
         let mut part = Self {
             mcu,
+            wiring,
             sampler: Sampler::new(front),
             flash: Watched::new(),
             watchdog: Watchdog::new(),
@@ -92,7 +131,7 @@ impl Part {
 
     /// The serial port, to garble its line.
     pub(crate) fn serial(&mut self) -> &mut Usart {
-        serial_port(&mut self.mcu)
+        serial_port(&mut self.mcu, &self.wiring)
     }
 
     /// Cuts or restores the supply when the run continues from this stop.
@@ -115,8 +154,13 @@ impl Mcu for Part {
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         if cause == ResetCause::PowerOn {
             // The emulator's part keeps what a system reset keeps, and refuses a power-on reset.
-            let mut fresh = powered_up().expect("built once already");
-            serial_port(&mut fresh).inherit(serial_port(&mut self.mcu));
+            let wiring = self.wiring;
+            let mut fresh = powered_up(&wiring).expect("built once already");
+            serial_port(&mut fresh, &wiring).inherit(serial_port(&mut self.mcu, &wiring));
+            fresh.spi[INTERFACE].inherit(&mut self.mcu.spi[INTERFACE]);
+            if let Some(sensor) = fresh.spi[INTERFACE].chip_mut::<Inertial>(0) {
+                sensor.power_on();
+            }
             self.mcu = fresh;
         } else {
             self.mcu.reset(at, cause);
@@ -186,14 +230,20 @@ pub(crate) struct Machine {
 
 impl Machine {
     /// `unit_id`: the number programmed by the part's manufacturer.
-    pub(crate) fn new(front: Front, far_end: FarEnd, unit_id: [u8; 12]) -> Result<Self, Error> {
+    pub(crate) fn new(
+        front: Front,
+        sensor: Option<Inertial>,
+        wiring: Wiring,
+        far_end: FarEnd,
+        unit_id: [u8; 12],
+    ) -> Result<Self, Error> {
         // The emulator describes this part's core only here.
         let mut core = Stm32h743Bench::new()?.targets().swap_remove(0).core;
         let written = Image::new(Path::new("unit id"), unit_id.to_vec(), Some(UNIT_ID_AT));
         core.factory_images
             .push(written.expect("bytes that are no ELF file have an address"));
         Ok(Self {
-            part: Part::new(front, far_end)?,
+            part: Part::new(front, sensor, wiring, far_end)?,
             core,
         })
     }
@@ -204,7 +254,7 @@ impl Store for Machine {}
 
 impl Board for Machine {
     fn name(&self) -> &'static str {
-        "nucleo-h743zi2"
+        self.part.wiring.name
     }
 
     fn targets(&mut self) -> Vec<Target<'_>> {

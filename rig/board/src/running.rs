@@ -15,10 +15,12 @@ use crate::findings::{Findings, findings};
 use crate::flash::{BANK, BASE, Operation};
 use crate::front::Front;
 use crate::image::Image;
+use crate::inertial::{Feed, Inertial};
 use crate::line::{FarEnd, Line};
 use crate::memory::{program, read};
-use crate::part::Machine;
+use crate::part::{Machine, Wiring};
 use crate::sampler::Conversions;
+use crate::schematic::Volts;
 
 /// First address of the bank without the program, where a device stores its data.
 pub const STORE: u64 = BASE + BANK;
@@ -68,9 +70,35 @@ impl Board {
     ///
     /// Errors: as [`Board::new`].
     pub fn numbered(image: &Image, front: Front, unit_id: [u8; 12]) -> Result<Self, String> {
+        Self::wired(image, front, None, Wiring::NUCLEO, unit_id)
+    }
+
+    /// The Matek H743 with its digital sensor, which senses what `feed` says. `crystal` is the frequency of the board's crystal over the nominal
+    /// one. The sensor's clock keeps virtual time, and bench and firmware that of the crystal, so for both of them the sensor's clock is off by
+    /// the inverse.
+    ///
+    /// Errors: as [`Board::new`].
+    pub fn digital(
+        image: &Image,
+        feed: Feed,
+        crystal: f64,
+        unit_id: [u8; 12],
+    ) -> Result<Self, String> {
+        let sensor = Inertial::new(feed, crystal);
+        let front = Front::Still(Volts::GROUND);
+        Self::wired(image, front, Some(sensor), Wiring::matek(crystal), unit_id)
+    }
+
+    fn wired(
+        image: &Image,
+        front: Front,
+        sensor: Option<Inertial>,
+        wiring: Wiring,
+        unit_id: [u8; 12],
+    ) -> Result<Self, String> {
         let line = Line::default();
-        let machine =
-            Machine::new(front, FarEnd(line.clone()), unit_id).map_err(|e| e.to_string())?;
+        let machine = Machine::new(front, sensor, wiring, FarEnd(line.clone()), unit_id)
+            .map_err(|e| e.to_string())?;
         let (orders, orders_in) = channel();
         let (reports_out, reports) = channel();
         let images = vec![image.placed.clone()];

@@ -2,8 +2,8 @@
 
 use mimu_board::running::Board;
 use mimu_core::wire::{
-    BatchHead, CHUNK, Call, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request, SelfTest,
-    Sums, encode,
+    BatchHead, CHUNK, Call, Counts, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request,
+    SelfTest, Sums, encode,
 };
 
 use crate::MS;
@@ -42,6 +42,21 @@ pub struct Sample {
     pub sums: Sums,
 }
 
+/// A received sample of a digital sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Number since sampling began.
+    pub number: u32,
+    /// Time by the crystal since sampling began, s.
+    pub t_s: f64,
+    /// Its integers.
+    pub counts: Counts,
+    /// True time between samples according to its batch, ns.
+    pub period_ns: u32,
+    /// Flags of its batch.
+    pub flags: u16,
+}
+
 /// A board and the host at its line.
 pub struct Conversation {
     /// The board.
@@ -51,9 +66,11 @@ pub struct Conversation {
     answers: Vec<(u16, Answer)>,
     /// Samples of the raw stream since they were last taken.
     pub samples: Vec<Sample>,
+    /// The same of a digital sensor.
+    pub readings: Vec<Reading>,
     /// Samples and batches that the device has lost, according to the last batch.
     pub lost: (u32, u32),
-    /// Head of the last raw batch, and its temperatures of the TEMP pins, °C.
+    /// Head of the last raw batch, and the temperatures of its thermometers, °C: of the TEMP pins, or first that of a digital sensor's die.
     pub last: Option<(BatchHead, [f32; 3])>,
     /// Every received byte, if a test has put a list here.
     pub kept: Option<Vec<u8>>,
@@ -68,6 +85,7 @@ impl Conversation {
             next_id: 0,
             answers: Vec::new(),
             samples: Vec::new(),
+            readings: Vec::new(),
             lost: (0, 0),
             last: None,
             kept: None,
@@ -120,6 +138,24 @@ impl Conversation {
                     self.last = Some((batch.head, batch.gyro_temps_c));
                     let sample = |(number, sums)| Sample { number, sums };
                     self.samples.extend(batch.sums().map(sample));
+                }
+                Message::Event(Event::Counts(batch)) => {
+                    assert!(batch.is_whole(), "{batch:?}");
+                    self.lost = (batch.head.samples_lost, batch.head.batches_dropped);
+                    let mut temps_c = [f32::NAN; 3];
+                    for (to, temp_c) in temps_c.iter_mut().zip(batch.temperatures_c()) {
+                        *to = temp_c;
+                    }
+                    self.last = Some((batch.head, temps_c));
+                    let of = batch.counts().zip(batch.times_s());
+                    self.readings
+                        .extend(of.map(|((number, counts), t_s)| Reading {
+                            number,
+                            t_s,
+                            counts,
+                            period_ns: batch.period_ns,
+                            flags: batch.head.flags,
+                        }));
                 }
                 Message::Event(_) => {}
             }

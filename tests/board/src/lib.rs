@@ -37,6 +37,20 @@ pub fn image() -> Image {
     }
 }
 
+/// The release image for the Matek H743: the one that `MIMU_FIRMWARE_MATEK` names, or the last one that `make images` built.
+///
+/// # Panics
+///
+/// If it was not built.
+pub fn digital_image() -> Image {
+    let path = std::env::var_os("MIMU_FIRMWARE_MATEK")
+        .map_or_else(|| built("mimu-firmware-matek-h743"), PathBuf::from);
+    match Image::read(&path) {
+        Ok(image) => image,
+        Err(problem) => panic!("{problem}; `make images` builds it"),
+    }
+}
+
 /// Path of the release build of a program for the target.
 pub fn built(name: &str) -> PathBuf {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");

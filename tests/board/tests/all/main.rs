@@ -4,6 +4,7 @@ mod board;
 mod budget;
 mod control;
 mod front_end;
+mod matek;
 mod power;
 mod restart;
 mod serial;

@@ -1,0 +1,210 @@
+//! The board with a digital sensor: its stream against what the bench let the sensor sense.
+//!
+//! The accelerometer's z axis is a clock: 4 g/s, so each sample says when it was taken by the board's crystal, to 30 µs and the 100 µs within which
+//! the bench brings the sensor up to date. Nothing of the firmware takes part in this evaluation.
+
+use mimu_board::inertial::{Feed, Sensed};
+use mimu_board::running::Board;
+use mimu_board_tests::conversation::{Answer, Conversation, Reading};
+use mimu_board_tests::{MS, digital_image};
+use mimu_core::wire::{Request, flags};
+
+/// The clock on the z axis, g/s, and its first value, g.
+const CLOCK: [f64; 2] = [4.0, -15.5];
+
+/// Counts per g and per degree per second of the sensor's data sheet.
+const PER_G: f64 = 8192.0;
+const PER_DPS: f64 = 131.072;
+
+/// The clock begins anew before the range ends.
+const ROUND_S: f64 = 7.5;
+
+/// What is sensed `t` s after the power came: a turning unit in a chamber that warms up.
+fn sensed(t: f64) -> Sensed {
+    let turn = std::f64::consts::TAU * t;
+    Sensed {
+        rate_dps: [
+            120.0 * (0.7 * turn).sin(),
+            -35.5 + 60.0 * (1.1 * turn).cos(),
+            250.0 * (0.3 * turn).sin(),
+        ],
+        force_g: [
+            0.25 * turn.sin(),
+            -0.125,
+            CLOCK[1] + CLOCK[0] * (t % ROUND_S),
+        ],
+        die_c: 31.5 + 0.2 * t,
+    }
+}
+
+fn feed() -> Feed {
+    Box::new(|ns| sensed(ns as f64 * 1e-9))
+}
+
+/// A board that streams, `crystal` times as fast as nominal.
+fn streaming(feed: Feed, crystal: f64) -> Conversation {
+    let board = Board::digital(&digital_image(), feed, crystal, [7; 12]).unwrap();
+    let mut device = Conversation::new(board);
+    device.greeting();
+    let raw = Request::Stream {
+        raw: true,
+        compensated: false,
+    };
+    assert_eq!(device.ask(raw), Answer::Done);
+    device
+}
+
+/// When a sample was taken, s after the power came, within the round of the clock that `near_s` is in.
+fn taken_s(reading: &Reading, near_s: f64) -> f64 {
+    let within = (f64::from(reading.counts.accel[2]) / PER_G - CLOCK[1]) / CLOCK[0];
+    let round = ((near_s - within) / ROUND_S).round();
+    within + round * ROUND_S
+}
+
+/// Checks that numbers differ as the samples that the sensor made, one every `period_s`; returns how many are missing.
+fn missing(readings: &[Reading], period_s: f64) -> u32 {
+    let mut missing = 0;
+    let mut at_s = taken_s(&readings[0], readings[0].t_s);
+    for pair in readings.windows(2) {
+        let next_s = taken_s(&pair[1], pair[1].t_s);
+        let made = ((next_s - at_s) / period_s).round() as u32;
+        assert_eq!(pair[1].number - pair[0].number, made, "{pair:?}");
+        missing += made - 1;
+        at_s = next_s;
+    }
+    missing
+}
+
+#[test]
+fn every_sample_is_what_the_sensor_sensed_when_the_device_says_that_it_was_taken() {
+    for crystal in [0.97, 1.0004, 1.03] {
+        let mut device = streaming(feed(), crystal);
+        device.run_for(9_000 * MS);
+        let readings = &device.readings;
+        assert!(readings.len() > 8_000, "{}", readings.len());
+        assert_eq!((device.lost, device.garbled()), ((0, 0), 0));
+        // The sensor's millisecond is virtual time; the crystal counts `crystal` ms meanwhile.
+        assert_eq!(missing(readings, 1e-3 * crystal), 0);
+
+        // The device's time begins when sampling does, some milliseconds after the power came.
+        let off_s = |r: &Reading| r.t_s - taken_s(r, r.t_s);
+        let settled: Vec<&Reading> = readings.iter().filter(|r| r.t_s > 4.0).collect();
+        let offs: Vec<f64> = settled.iter().map(|r| off_s(r)).collect();
+        let mean = offs.iter().sum::<f64>() / offs.len() as f64;
+        let worst = offs
+            .iter()
+            .map(|off| (off - mean).abs())
+            .fold(0.0, f64::max);
+        assert!((-0.02..0.001).contains(&mean), "{crystal}: {mean}");
+        assert!(worst < 200e-6, "{crystal}: {worst}");
+        let period_ns = f64::from(settled.last().unwrap().period_ns);
+        let error = period_ns / (1e6 * crystal) - 1.0;
+        assert!(error.abs() < 20e-6, "{crystal}: {error:e}");
+        println!(
+            "crystal {crystal}: times within {:.0} us, period off by {:.1} ppm",
+            worst * 1e6,
+            error * 1e6
+        );
+
+        for r in readings {
+            let t_s = taken_s(r, r.t_s);
+            let true_at = |dt: f64| sensed(t_s + dt);
+            // Within the grid of the bench, and half a count.
+            let (low, high) = (true_at(-200e-6), true_at(200e-6));
+            for axis in 0..3 {
+                let between = |found: i32, per: f64, a: f64, b: f64| {
+                    let (a, b) = (a * per, b * per);
+                    let found = f64::from(found);
+                    (a.min(b) - 1.6..=a.max(b) + 1.6).contains(&found)
+                };
+                let gyro = r.counts.gyro[axis];
+                assert!(
+                    between(gyro, PER_DPS, low.rate_dps[axis], high.rate_dps[axis]),
+                    "{crystal} {axis}: {r:?}"
+                );
+                if axis < 2 {
+                    let accel = r.counts.accel[axis];
+                    let (low, high) = (low.force_g[axis], high.force_g[axis]);
+                    assert!(between(accel, PER_G, low, high), "{crystal} {axis}: {r:?}");
+                }
+            }
+        }
+        let (head, temps_c) = device.last.unwrap();
+        // The filter of a second is behind the ramp by 0.2 K.
+        let die_c = sensed(9.0 * crystal).die_c;
+        assert!((f64::from(temps_c[0]) - die_c).abs() < 0.35, "{temps_c:?}");
+        assert_eq!((head.temp_c, head.flags), (temps_c[0], 0));
+    }
+}
+
+/// The interrupts of the DMA streams 3 and 4, which end the transfers to the sensor: without them the reader waits.
+const STREAMS: u32 = 1 << 14 | 1 << 15;
+/// Set-enable and clear-enable registers of the processor's interrupts 0 to 31.
+const ISER: u64 = 0xe000_e100;
+const ICER: u64 = 0xe000_e180;
+
+#[test]
+fn samples_that_a_starved_reader_loses_are_counted_and_no_others() {
+    for (starved_ms, crystal) in [(60, 0.99), (95, 1.03), (140, 0.97), (300, 1.0)] {
+        let mut device = streaming(feed(), crystal);
+        device.run_for(1_500 * MS);
+        let bits = STREAMS.to_le_bytes().to_vec();
+        device.board.set_memory(ICER, bits.clone()).unwrap();
+        device.run_for(starved_ms * MS);
+        device.board.set_memory(ISER, bits).unwrap();
+        device.run_for(1_000 * MS);
+        let lost = missing(&device.readings, 1e-3 * crystal);
+        assert_eq!(device.lost, (lost, 0), "{starved_ms}");
+        // The FIFO keeps 101 packets; the poll before and the one after it add one each.
+        let expected = starved_ms as i64 - 101;
+        let off = i64::from(lost) - expected.max(0);
+        assert!((-2..=2).contains(&off), "{starved_ms} ms: {lost} lost");
+        println!("{starved_ms} ms without a reader: {lost} samples lost and counted");
+    }
+}
+
+#[test]
+fn a_rate_beyond_the_range_is_flagged_as_saturated() {
+    let over = |ns: u64| {
+        let beyond = (3_000_000_000..3_005_000_000).contains(&ns);
+        let rate = if beyond { 2_100.0 } else { 1_900.0 };
+        Sensed {
+            rate_dps: [0.0, -rate, 0.0],
+            ..sensed(ns as f64 * 1e-9)
+        }
+    };
+    let mut device = streaming(Box::new(over), 1.0);
+    device.run_for(3_500 * MS);
+    let of = |flagged: bool| {
+        let is = |r: &&Reading| (r.flags & flags::SATURATED != 0) == flagged;
+        device.readings.iter().filter(is).count()
+    };
+    // One batch or two.
+    assert!((20..=40).contains(&of(true)), "{}", of(true));
+    assert!(of(false) > 2_000);
+}
+
+#[test]
+fn after_the_supply_comes_back_the_sensor_is_set_up_again() {
+    let mut device = streaming(feed(), 1.0);
+    device.run_for(1_000 * MS);
+    device.board.cut_supply(1).unwrap();
+    device.run_for(50 * MS);
+    device.board.restore_supply().unwrap();
+    device.greeting();
+    device.readings.clear();
+    let raw = Request::Stream {
+        raw: true,
+        compensated: false,
+    };
+    assert_eq!(device.ask(raw), Answer::Done);
+    device.run_for(1_500 * MS);
+    assert!(device.readings.len() > 800, "{}", device.readings.len());
+    assert_eq!(device.lost, (0, 0));
+    assert!(
+        device
+            .readings
+            .windows(2)
+            .all(|p| p[1].number == p[0].number + 1)
+    );
+}
