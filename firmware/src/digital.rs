@@ -3,6 +3,7 @@
 //! The sensor samples by its own clock and keeps its packets, so a poll that comes late loses nothing until the FIFO is full. Which samples
 //! were lost then, the stamps say; how long a sample is, the [`Timebase`].
 
+use core::marker::PhantomData;
 use core::ops::AddAssign;
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
@@ -12,9 +13,8 @@ use mimu_core::compensation::Sample;
 use mimu_core::effects::REFERENCE_C;
 use mimu_core::wire::{Triad, flags};
 
-use crate::design_parameters::{RADIANS, STANDARD_GRAVITY};
+use crate::chip::{Bus, Chip, Packet, Part};
 use crate::front_end::FrontEnd;
-use crate::icm42688p::{self, Bus, FILTERS, Icm42688p, Packet, RATE_HZ, samples_between};
 use crate::lag::Lag;
 use crate::source::{Counts, Fault, Scan, Source, THERMOMETERS};
 use crate::timebase::Timebase;
@@ -30,12 +30,6 @@ const SILENCE_US: u64 = 20_000;
 
 /// Wait after a fault before the sensor is reset, µs: a chip without supply must not occupy the sampling task.
 const PAUSE_US: u32 = 10_000;
-
-/// Temperature that the chip reports while it has no valid one (14.34 of the data sheet).
-const NO_TEMPERATURE: i16 = i16::MIN;
-
-/// Nominal period of the samples, µs.
-const NOMINAL_US: f64 = 1e6 / RATE_HZ;
 
 /// Readings of the die's thermometer in a batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,23 +49,18 @@ impl AddAssign for DieSum {
 
 /// The meaning of the sensor's integers: counts, and one thermometer in the die.
 #[derive(Clone, Copy, Debug)]
-pub struct Digital {
+pub struct Digital<C> {
+    part: PhantomData<C>,
     temp_c: Lag,
     /// Whether any batch was processed, and whether the last one had a valid temperature.
     begun: bool,
     has_temperature: bool,
 }
 
-impl Source for Digital {
+impl<C: Part> Source for Digital<C> {
     type Slow = DieSum;
 
-    const TRIADS: PerSensor<Triad<'static>> = PerSensor {
-        gyro: triad(icm42688p::RANGE.gyro * RADIANS as f64, icm42688p::BITS.gyro),
-        accel: triad(
-            icm42688p::RANGE.accel * STANDARD_GRAVITY as f64,
-            icm42688p::BITS.accel,
-        ),
-    };
+    const TRIADS: PerSensor<Triad<'static>> = C::TRIADS;
 
     const PLACES: &'static str = "die";
 
@@ -79,6 +68,7 @@ impl Source for Digital {
 
     fn new(_: &FrontEnd) -> Self {
         Self {
+            part: PhantomData,
             temp_c: Lag::NEW,
             begun: false,
             has_temperature: false,
@@ -92,8 +82,7 @@ impl Source for Digital {
         self.has_temperature = total.valid > 0;
         if self.has_temperature {
             let mean = total.total as f32 / total.valid as f32;
-            self.temp_c
-                .take(icm42688p::celsius(mean), total.valid as f32);
+            self.temp_c.take(C::celsius(mean), total.valid as f32);
         }
     }
 
@@ -107,7 +96,7 @@ impl Source for Digital {
     }
 
     fn is_saturated(counts: &Counts, _: &Sample<f32>) -> bool {
-        icm42688p::is_saturated(counts)
+        C::is_saturated(counts)
     }
 
     fn temp_c(&self) -> f32 {
@@ -133,20 +122,6 @@ impl Source for Digital {
             true => 0,
             false => flags::NO_TEMPERATURE,
         }
-    }
-}
-
-/// A triad whose readings of so many bits end at `range`, SI.
-const fn triad(range: f64, bits: u32) -> Triad<'static> {
-    Triad {
-        part: "ICM-42688-P",
-        unit: "count",
-        bits: bits as u8,
-        range: range as f32,
-        null: 0.0,
-        per_si: ((1_u32 << (bits - 1)) as f64 / range) as f32,
-        rate_hz: RATE_HZ as f32,
-        filter: FILTERS,
     }
 }
 
@@ -202,8 +177,8 @@ impl Default for Controls {
 }
 
 /// The sensor and where its samples are in time.
-pub struct Polled<B> {
-    chip: Icm42688p<B>,
+pub struct Polled<C> {
+    chip: C,
     controls: &'static Controls,
     base: Option<Timebase>,
     /// Number of the newest packet, from the first packet of all.
@@ -214,11 +189,11 @@ pub struct Polled<B> {
     started_us: Option<u64>,
 }
 
-impl<B: Bus> Polled<B> {
+impl<C: Chip> Polled<C> {
     /// Not yet running.
-    pub const fn new(bus: B, controls: &'static Controls) -> Self {
+    pub const fn new(chip: C, controls: &'static Controls) -> Self {
         Self {
-            chip: Icm42688p { bus },
+            chip,
             controls,
             base: None,
             newest: 0,
@@ -229,13 +204,13 @@ impl<B: Bus> Polled<B> {
 
     /// Starts the sensor and gives its samples to `take`, until it has to be started again.
     pub async fn run(&mut self, mut take: impl FnMut(Scan<DieSum>)) -> Fault {
-        let now_us = self.chip.bus.now_us();
+        let now_us = self.chip.bus().now_us();
         self.started_us.get_or_insert(now_us);
         let fault = match self.chip.start().await {
             Ok(()) => self.poll(&mut take).await,
             Err(_) => Fault::Stalled,
         };
-        self.chip.bus.wait_us(PAUSE_US).await;
+        self.chip.bus().wait_us(PAUSE_US).await;
         fault
     }
 
@@ -245,13 +220,13 @@ impl<B: Bus> Polled<B> {
             Err(_) => return Fault::Stalled,
         }
         let mut stamp = None;
-        let (mut heard_us, mut polls, mut deflected) = (self.chip.bus.now_us(), 0_u32, 0);
+        let (mut heard_us, mut polls, mut deflected) = (self.chip.bus().now_us(), 0_u32, 0);
         let mut due_us = heard_us;
         loop {
             due_us += POLL_US;
-            let now_us = self.chip.bus.now_us();
+            let now_us = self.chip.bus().now_us();
             match due_us.checked_sub(now_us) {
-                Some(wait_us) => self.chip.bus.wait_us(wait_us as u32).await,
+                Some(wait_us) => self.chip.bus().wait_us(wait_us as u32).await,
                 // Late: polls that were missed are not made up for, because the FIFO kept the packets.
                 None => due_us = now_us,
             }
@@ -263,7 +238,7 @@ impl<B: Bus> Polled<B> {
                     return Fault::Stalled;
                 }
             }
-            let now_us = self.chip.bus.now_us();
+            let now_us = self.chip.bus().now_us();
             let mut elapsed_us = now_us - heard_us;
             let (mut newest, mut lost_track, mut packets) = (self.newest, false, 0_u32);
             let (base, started_us) = (&self.base, self.started_us);
@@ -271,7 +246,7 @@ impl<B: Bus> Polled<B> {
             let zero = self.zero.filter(|_| polls > 0);
             let polled = self.chip.poll(|packet| {
                 newest += match stamp.replace(packet.stamp) {
-                    Some(before) => match samples_between(before, packet.stamp, elapsed_us) {
+                    Some(before) => match C::samples_between(before, packet.stamp, elapsed_us) {
                         Some(samples) => u64::from(samples),
                         None => {
                             lost_track = true;
@@ -302,7 +277,13 @@ impl<B: Bus> Polled<B> {
             match &mut self.base {
                 Some(base) if polls > 0 => base.poll(newest, now_us),
                 Some(base) => *base = base.again(newest, now_us),
-                none => *none = Some(Timebase::new(NOMINAL_US, newest, now_us)),
+                none => {
+                    *none = Some(Timebase::new(
+                        1e6 / f64::from(C::TRIADS.gyro.rate_hz),
+                        newest,
+                        now_us,
+                    ))
+                }
             }
             polls = polls.saturating_add(1);
             if polls == MEASURED && self.zero.is_none() {
@@ -321,7 +302,6 @@ fn first_after(base: &Option<Timebase>, newest: u64, now_us: u64) -> u64 {
 }
 
 fn scan(packet: &Packet, number: u64, base: &Timebase) -> Option<Scan<DieSum>> {
-    let valid = packet.temperature != NO_TEMPERATURE;
     Some(Scan {
         // Wraps after 49 days, like every number of a sample.
         number: number as u32,
@@ -330,12 +310,8 @@ fn scan(packet: &Packet, number: u64, base: &Timebase) -> Option<Scan<DieSum>> {
         // Without a valid reading the sample is missing.
         counts: packet.counts?,
         slow: DieSum {
-            total: if valid {
-                i32::from(packet.temperature)
-            } else {
-                0
-            },
-            valid: i32::from(valid),
+            total: packet.temperature.map_or(0, i32::from),
+            valid: i32::from(packet.temperature.is_some()),
         },
     })
 }

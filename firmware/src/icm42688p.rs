@@ -12,29 +12,29 @@
 //! - The automatic adjustment of the sampling phase (bits 7:6 of INTF_CONFIG1, not described) can make the gyro repeat its last reading for
 //!   some milliseconds. The autopilots switch it off with the value 01, and so does this driver.
 
-use core::future::Future;
-
 use mimu_core::PerSensor;
+use mimu_core::wire::{Counts, Triad};
 
-use crate::source::Counts;
+use crate::chip::{Bus, BusFault, Chip, Packet, Part, Problem};
+use crate::design_parameters::{RADIANS, STANDARD_GRAVITY};
 
 /// Samples per second by the chip's nominal clock.
-pub const RATE_HZ: f64 = 1_000.0;
+const RATE_HZ: f64 = 1_000.0;
 
 /// Range of the gyro, degrees per second, and of the accelerometer, g, in packets of 20 bits (6.1).
-pub const RANGE: PerSensor<f64> = PerSensor {
+const RANGE: PerSensor<f64> = PerSensor {
     gyro: 2_000.0,
     accel: 16.0,
 };
 
 /// Bits of a reading with its sign. The packet has 20; the lowest bit of the gyro and the lowest two of the accelerometer are zero (6.1).
-pub const BITS: PerSensor<u32> = PerSensor {
+const BITS: PerSensor<u32> = PerSensor {
     gyro: 19,
     accel: 18,
 };
 
 /// Rate and filters as they are set below, which determine the readings beside the range: a calibration belongs to them.
-pub const FILTERS: &str = "1 kHz, second order, 250 Hz";
+const FILTERS: &str = "1 kHz, second order, 250 Hz";
 
 /// Counts of the time stamp between samples: [`RATE_HZ`], 30 counts in 32 µs, and 16 of these in a step.
 const STAMPS: f64 = 1e6 / RATE_HZ * 30.0 / 32.0 / 16.0;
@@ -51,6 +51,9 @@ const BURST: usize = 4;
 /// Header of a packet with accelerometer, gyro, 20 bits and time stamp (6.2); the two lowest bits tell of a new rate.
 const HEADER: u8 = 0b0111_1000;
 const HEADER_MASK: u8 = 0b1111_1000;
+
+/// Temperature of a packet while there is no valid one (14.34).
+const NO_TEMPERATURE: i16 = i16::MIN;
 
 /// A reading of 20 bits that is not valid (14.34).
 const INVALID: i32 = -(1 << 19);
@@ -107,104 +110,74 @@ const SETTINGS: [(u8, u8); 10] = [
     (PWR_MGMT0, 0x0f),
 ];
 
-/// The line to the chip, and time.
-pub trait Bus {
-    /// Reads successive registers.
-    fn read(&mut self, register: u8, into: &mut [u8])
-    -> impl Future<Output = Result<(), BusFault>>;
-    /// Writes one register; the chip takes no more at a time (9.6).
-    fn write(&mut self, register: u8, value: u8) -> impl Future<Output = Result<(), BusFault>>;
-    /// Waits.
-    fn wait_us(&mut self, us: u32) -> impl Future<Output = ()>;
-    /// The crystal's time, µs.
-    fn now_us(&self) -> u64;
-}
-
-/// A transfer failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BusFault;
-
-/// What is wrong with the chip.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Problem {
-    /// A transfer failed.
-    Bus,
-    /// Another chip, or none: WHO_AM_I as it was read.
-    Identity(u8),
-    /// What comes is no packet of 20 bits.
-    Packet(u8),
-    /// The time stamp is none of a next sample.
-    Stamp,
-}
-
-impl From<BusFault> for Problem {
-    fn from(_: BusFault) -> Self {
-        Self::Bus
+/// A packet from its bytes (6.1, packet 4).
+pub fn decode(bytes: &[u8; PACKET]) -> Result<Packet, Problem> {
+    let [header, words @ .., x, y, z] = bytes;
+    if header & HEADER_MASK != HEADER {
+        return Err(Problem::Packet(*header));
     }
+    let word = |k: usize| i16::from_be_bytes([words[2 * k], words[2 * k + 1]]);
+    let low = [*x, *y, *z].map(i32::from);
+    let whole = |k: usize, low: i32| i32::from(word(k)) << 4 | low;
+    let accel: [i32; 3] = core::array::from_fn(|i| whole(i, low[i] >> 4));
+    let gyro: [i32; 3] = core::array::from_fn(|i| whole(3 + i, low[i] & 0xf));
+    let valid = gyro.iter().chain(&accel).all(|reading| *reading != INVALID);
+    Ok(Packet {
+        counts: valid.then_some(Counts {
+            gyro: gyro.map(|reading| reading >> (20 - BITS.gyro)),
+            accel: accel.map(|reading| reading >> (20 - BITS.accel)),
+        }),
+        temperature: Some(word(6)).filter(|temperature| *temperature != NO_TEMPERATURE),
+        stamp: u32::from(word(7) as u16),
+    })
 }
 
-/// A packet of the FIFO.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Packet {
-    /// Gyro, 131.072 counts per dps, and accelerometer, 8192 per g; `None` where the chip says that it has no valid reading.
-    pub counts: Option<Counts>,
-    /// Temperature of the die, 132.48 counts per °C from 25 °C.
-    pub temperature: i16,
-    /// Time stamp, in steps of 16.
-    pub stamp: u16,
-}
-
-impl Packet {
-    /// From its bytes (6.1, packet 4).
-    pub fn decode(bytes: &[u8; PACKET]) -> Result<Self, Problem> {
-        let [header, words @ .., x, y, z] = bytes;
-        if header & HEADER_MASK != HEADER {
-            return Err(Problem::Packet(*header));
-        }
-        let word = |k: usize| i16::from_be_bytes([words[2 * k], words[2 * k + 1]]);
-        let low = [*x, *y, *z].map(i32::from);
-        let whole = |k: usize, low: i32| i32::from(word(k)) << 4 | low;
-        let accel: [i32; 3] = core::array::from_fn(|i| whole(i, low[i] >> 4));
-        let gyro: [i32; 3] = core::array::from_fn(|i| whole(3 + i, low[i] & 0xf));
-        let valid = gyro.iter().chain(&accel).all(|reading| *reading != INVALID);
-        Ok(Self {
-            counts: valid.then_some(Counts {
-                gyro: gyro.map(|reading| reading >> (20 - BITS.gyro)),
-                accel: accel.map(|reading| reading >> (20 - BITS.accel)),
-            }),
-            temperature: word(6),
-            stamp: word(7) as u16,
-        })
-    }
-}
-
-/// Whether a reading is at the end of its range.
-pub fn is_saturated(counts: &Counts) -> bool {
-    let at_an_end = |counts: &[i32; 3], bits: u32| {
-        let end = (1 << (bits - 1)) - (END >> (20 - bits)) - 1;
-        counts.iter().any(|count| count.abs() >= end)
+impl<B> Part for Icm42688p<B> {
+    const TRIADS: PerSensor<Triad<'static>> = PerSensor {
+        gyro: triad(RANGE.gyro * RADIANS as f64, BITS.gyro),
+        accel: triad(RANGE.accel * STANDARD_GRAVITY as f64, BITS.accel),
     };
-    at_an_end(&counts.gyro, BITS.gyro) || at_an_end(&counts.accel, BITS.accel)
+
+    fn is_saturated(counts: &Counts) -> bool {
+        let at_an_end = |counts: &[i32; 3], bits: u32| {
+            let end = (1 << (bits - 1)) - (END >> (20 - bits)) - 1;
+            counts.iter().any(|count| count.abs() >= end)
+        };
+        at_an_end(&counts.gyro, BITS.gyro) || at_an_end(&counts.accel, BITS.accel)
+    }
+
+    /// 4.13.
+    fn celsius(temperature: f32) -> f32 {
+        temperature / 132.48 + 25.0
+    }
+
+    /// Half of the stamp's 1.1 s is room enough for a poll's delay and a wrong clock.
+    fn samples_between(before: u32, after: u32, elapsed_us: u64) -> Option<u32> {
+        let span = f64::from(u16::MAX) + 1.0;
+        let expected = elapsed_us as f64 * RATE_HZ / 1e6 * STAMPS;
+        let since = f64::from((after as u16).wrapping_sub(before as u16));
+        // Truncation of what is not negative: `core` has no `floor`.
+        let wraps = f64::from(((expected - since) / span + 0.5).max(0.0) as u32);
+        let samples = (since + wraps * span) / STAMPS;
+        // Positive, so this rounds to the nearest.
+        let whole = (samples + 0.5) as u32;
+        let fits = (samples - f64::from(whole)).abs() <= STAMP_TOLERANCE;
+        (whole > 0 && fits).then_some(whole)
+    }
 }
 
-/// Temperature of a packet, °C (4.13).
-pub fn celsius(temperature: f32) -> f32 {
-    temperature / 132.48 + 25.0
-}
-
-/// Samples from one time stamp to the next, 1 if none was lost. `elapsed_us` by the crystal resolves how often the stamp has wrapped; half
-/// of its 1.1 s is room enough for a poll's delay and a wrong clock.
-pub fn samples_between(before: u16, after: u16, elapsed_us: u64) -> Option<u32> {
-    let span = f64::from(u16::MAX) + 1.0;
-    let expected = elapsed_us as f64 * RATE_HZ / 1e6 * STAMPS;
-    let since = f64::from(after.wrapping_sub(before));
-    // Truncation of what is not negative: `core` has no `floor`.
-    let wraps = f64::from(((expected - since) / span + 0.5).max(0.0) as u32);
-    let samples = (since + wraps * span) / STAMPS;
-    // Positive, so this rounds to the nearest.
-    let whole = (samples + 0.5) as u32;
-    let fits = (samples - f64::from(whole)).abs() <= STAMP_TOLERANCE;
-    (whole > 0 && fits).then_some(whole)
+/// A triad whose readings of so many bits end at `range`, SI.
+const fn triad(range: f64, bits: u32) -> Triad<'static> {
+    Triad {
+        part: "ICM-42688-P",
+        unit: "count",
+        bits: bits as u8,
+        range: range as f32,
+        null: 0.0,
+        per_si: ((1_u32 << (bits - 1)) as f64 / range) as f32,
+        rate_hz: RATE_HZ as f32,
+        filter: FILTERS,
+    }
 }
 
 /// The chip.
@@ -213,9 +186,14 @@ pub struct Icm42688p<B> {
     pub bus: B,
 }
 
-impl<B: Bus> Icm42688p<B> {
-    /// Resets the chip, checks its identity, and starts both sensors with an empty FIFO.
-    pub async fn start(&mut self) -> Result<(), Problem> {
+impl<B: Bus> Chip for Icm42688p<B> {
+    type Bus = B;
+
+    fn bus(&mut self) -> &mut B {
+        &mut self.bus
+    }
+
+    async fn start(&mut self) -> Result<(), Problem> {
         self.bus.write(REG_BANK_SEL, 0).await?;
         self.bus.write(DEVICE_CONFIG, 1).await?;
         // 14.1: 1 ms.
@@ -235,8 +213,7 @@ impl<B: Bus> Icm42688p<B> {
         Ok(())
     }
 
-    /// Gives all packets in the FIFO to `take`, the oldest first. Returns whether the FIFO was full.
-    pub async fn poll(&mut self, mut take: impl FnMut(Packet)) -> Result<bool, Problem> {
+    async fn poll(&mut self, mut take: impl FnMut(Packet)) -> Result<bool, Problem> {
         let [status, high, low] = self.registers(INT_STATUS).await?;
         let mut left = usize::from(u16::from_be_bytes([high, low]));
         let mut bytes = [0; BURST * PACKET];
@@ -245,21 +222,19 @@ impl<B: Bus> Icm42688p<B> {
             let burst = &mut bytes[..count * PACKET];
             self.bus.read(FIFO_DATA, burst).await?;
             for packet in burst.as_chunks::<PACKET>().0 {
-                take(Packet::decode(packet)?);
+                take(decode(packet)?);
             }
             left -= count;
         }
         Ok(status & FIFO_FULL != 0)
     }
 
-    /// Deflects the axes with these bits (gyro x, y, z, then accelerometer x, y, z), or none.
-    pub async fn deflect(&mut self, gyro: bool, accel: bool) -> Result<(), Problem> {
+    async fn deflect(&mut self, gyro: bool, accel: bool) -> Result<(), Problem> {
         let bits = u8::from(gyro) * 0b0111 | u8::from(accel) * 0b0111_1000;
         Ok(self.bus.write(SELF_TEST_CONFIG, bits).await?)
     }
 
-    /// Responses to the self-test that the factory stored, dps and g; `None` where it stored none.
-    pub async fn factory_responses(&mut self) -> Result<PerSensor<[Option<f32>; 3]>, Problem> {
+    async fn factory_responses(&mut self) -> Result<PerSensor<[Option<f32>; 3]>, Problem> {
         self.bus.write(REG_BANK_SEL, 1).await?;
         let gyro: [u8; 3] = self.registers(XG_ST_DATA).await?;
         self.bus.write(REG_BANK_SEL, 2).await?;
@@ -272,7 +247,9 @@ impl<B: Bus> Icm42688p<B> {
             accel: accel.map(|code| response(code, 2620.0 * 2.0 / 32_768.0)),
         })
     }
+}
 
+impl<B: Bus> Icm42688p<B> {
     async fn registers<const N: usize>(&mut self, first: u8) -> Result<[u8; N], BusFault> {
         let mut values = [0; N];
         self.bus.read(first, &mut values).await?;

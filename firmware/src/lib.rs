@@ -6,6 +6,7 @@
 //! | [`design_parameters`] | sensors, front end and timing, each constant with its reason     |
 //! | [`channels`]          | the channels of a sample, and their order in a scan              |
 //! | [`source`]            | what a board measures with: integers, and what they mean         |
+//! | [`chip`]              | what a driver of a digital sensor has to offer                   |
 //! | [`digital`]           | a digital sensor as a source: polled, numbered by its stamps     |
 //! | [`icm42688p`]         | the digital inertial sensor: registers, FIFO, self-test          |
 //! | [`timebase`]          | times of a digital sensor's samples by the crystal               |
@@ -35,6 +36,7 @@ pub mod bank;
 pub mod board;
 #[cfg(not(feature = "matek-h743"))]
 pub mod channels;
+pub mod chip;
 #[cfg(target_os = "none")]
 pub mod commands;
 #[cfg(not(feature = "matek-h743"))]

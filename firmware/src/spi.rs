@@ -6,12 +6,12 @@ use embassy_stm32::spi::Spi;
 use embassy_stm32::spi::mode::Master;
 use embassy_time::{Instant, Timer};
 
+use crate::chip::{Bus, BusFault, Chip};
 use crate::digital::{DieSum, Polled};
-use crate::icm42688p::{Bus, BusFault};
 use crate::sampling::Acquire;
 use crate::source::{Fault, Scan};
 
-/// Direction bit of the first byte: read (DS-000347, 9.6).
+/// Direction bit of the first byte: read. The sensors of InvenSense, ST and Bosch have it alike.
 const READ: u8 = 0x80;
 
 /// Longest transfer: the address, and a burst of the FIFO.
@@ -68,7 +68,7 @@ impl Bus for Line {
     }
 }
 
-impl Acquire for Polled<Line> {
+impl<C: Chip> Acquire for Polled<C> {
     type Slow = DieSum;
 
     fn acquire(&mut self, take: impl FnMut(Scan<DieSum>)) -> impl Future<Output = Fault> {

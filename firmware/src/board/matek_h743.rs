@@ -5,6 +5,8 @@
 
 use mimu_core::wire::Capabilities;
 
+use crate::icm42688p::Icm42688p;
+
 /// Name of the board.
 pub const NAME: &str = "Matek H743";
 
@@ -26,7 +28,7 @@ pub const CAPABILITIES: Capabilities = Capabilities(0);
 pub const SENSOR_HZ: u32 = 12_500_000;
 
 /// What the integers of [`Acquisition`] mean.
-pub type Source = crate::digital::Digital;
+pub type Source = crate::digital::Digital<Icm42688p<()>>;
 
 #[cfg(all(target_os = "none", feature = "usb"))]
 pub use parts::UsbPins;
@@ -78,7 +80,7 @@ mod parts {
     pub struct Sensors(Line);
 
     /// What takes the samples.
-    pub type Acquisition = Polled<Line>;
+    pub type Acquisition = Polled<Icm42688p<Line>>;
 
     impl Sensors {
         /// No converter takes part.
@@ -88,7 +90,7 @@ mod parts {
 
         /// The sensor is started with the first sample.
         pub fn prepare(self, _: &mut FrontEnd) -> Acquisition {
-            Polled::new(self.0, &CONTROLS)
+            Polled::new(Icm42688p { bus: self.0 }, &CONTROLS)
         }
     }
 

@@ -7,13 +7,14 @@ use std::vec::Vec;
 use embassy_futures::block_on;
 
 use super::*;
-use crate::icm42688p::BusFault;
+use crate::chip::BusFault;
+use crate::icm42688p::Icm42688p;
 
 /// Packets that the FIFO holds: 2048 bytes without one packet, 20 bytes each (6.3).
 const CAPACITY: usize = 101;
 
 /// The chip, with a clock of its own.
-struct Chip {
+struct OwnClock {
     registers: [u8; 128],
     bank: u8,
     /// Period of its samples in the crystal's time, µs.
@@ -32,7 +33,7 @@ struct Chip {
     invalid: Vec<u64>,
 }
 
-impl Chip {
+impl OwnClock {
     fn new(error: f64, end_us: f64) -> Self {
         Self {
             registers: [0; 128],
@@ -87,7 +88,7 @@ impl Chip {
     }
 }
 
-impl Bus for Chip {
+impl Bus for OwnClock {
     async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), BusFault> {
         self.answers()?;
         self.catch_up();
@@ -138,8 +139,8 @@ impl Bus for Chip {
 static CONTROLS: Controls = Controls::new();
 
 /// All scans until the chip's end; after a fault the sensor is started again, as the sampling task does.
-fn scans(chip: Chip) -> (Vec<Scan<DieSum>>, Polled<Chip>) {
-    let mut polled = Polled::new(chip, &CONTROLS);
+fn scans(bus: OwnClock) -> (Vec<Scan<DieSum>>, Polled<Icm42688p<OwnClock>>) {
+    let mut polled = Polled::new(Icm42688p { bus }, &CONTROLS);
     let mut all = Vec::new();
     while polled.chip.bus.now_us < polled.chip.bus.end_us {
         block_on(polled.run(|scan| all.push(scan)));
@@ -150,7 +151,7 @@ fn scans(chip: Chip) -> (Vec<Scan<DieSum>>, Polled<Chip>) {
 #[test]
 fn every_sample_comes_once_with_its_time_by_the_crystal_however_wrong_the_chip_s_clock_is() {
     for error in [-0.03, -0.004, 0.0, 0.004, 0.03] {
-        let (all, polled) = scans(Chip::new(error, 20e6));
+        let (all, polled) = scans(OwnClock::new(error, 20e6));
         let chip = polled.chip.bus;
         let (on_us, period_us) = (chip.on_us.unwrap(), chip.period_us);
         assert!(all.len() > 18_500);
@@ -183,7 +184,7 @@ fn samples_that_a_starved_reader_loses_are_missing_from_the_numbers_and_no_other
         (700.0, -0.03),
         (1900.0, 0.03),
     ] {
-        let mut chip = Chip::new(error, 9e6);
+        let mut chip = OwnClock::new(error, 9e6);
         chip.starved_us = Some([4e6, 4e6 + 1000.0 * starved_ms]);
         let (all, _) = scans(chip);
         let mut lost = 0;
@@ -203,7 +204,7 @@ fn samples_that_a_starved_reader_loses_are_missing_from_the_numbers_and_no_other
 
 #[test]
 fn a_sample_without_a_valid_reading_is_a_lost_one() {
-    let mut chip = Chip::new(0.0123, 2e6);
+    let mut chip = OwnClock::new(0.0123, 2e6);
     chip.invalid = std::vec![1000, 1001, 1500];
     let (all, _) = scans(chip);
     let gaps: Vec<_> = (all.windows(2))
@@ -215,7 +216,7 @@ fn a_sample_without_a_valid_reading_is_a_lost_one() {
 
 #[test]
 fn a_chip_that_was_gone_is_started_again_and_the_numbers_go_on_by_the_crystal() {
-    let mut chip = Chip::new(-0.02, 6e6);
+    let mut chip = OwnClock::new(-0.02, 6e6);
     chip.gone_us = Some([2e6, 3.5e6]);
     let (all, polled) = scans(chip);
     let period_us = polled.chip.bus.period_us;
@@ -234,7 +235,7 @@ fn a_chip_that_was_gone_is_started_again_and_the_numbers_go_on_by_the_crystal() 
 
 #[test]
 fn the_temperature_is_that_of_the_die_and_flagged_where_the_chip_has_none() {
-    let mut source = Digital::new(&FrontEnd::default());
+    let mut source = Digital::<Icm42688p<()>>::new(&FrontEnd::default());
     assert_eq!(
         (source.temp_c(), source.has_known_temperature()),
         (25.0, false)

@@ -8,6 +8,8 @@ use embassy_futures::block_on;
 
 use super::*;
 
+type Sensor = Icm42688p<()>;
+
 /// Registers of four banks and the FIFO behind them, and every write in order.
 struct Registers {
     banks: [[u8; 128]; 4],
@@ -87,25 +89,30 @@ fn a_packet_of_20_bits_keeps_every_bit() {
     // 1 g is 8192 counts of 18 bits; 100 dps are 13 107 of 19.
     let accel = [8192 << 2, -(8191 << 2), 3 << 2];
     let gyro = [13_107 << 1, -(13_107 << 1), -(1 << 1)];
-    let read = Packet::decode(&packet(accel, gyro, -1325, 0xfedc)).unwrap();
+    let read = decode(&packet(accel, gyro, -1325, 0xfedc)).unwrap();
     let counts = read.counts.unwrap();
     assert_eq!(counts.accel, [8192, -8191, 3]);
     assert_eq!(counts.gyro, [13_107, -13_107, -1]);
-    assert!((celsius(f32::from(read.temperature)) - 15.0).abs() < 0.01);
+    assert!((Sensor::celsius(f32::from(read.temperature.unwrap())) - 15.0).abs() < 0.01);
     assert_eq!(read.stamp, 0xfedc);
 }
 
 #[test]
 fn what_is_no_packet_and_what_is_not_valid_is_told() {
     // An empty FIFO reads 0xff; a packet of 16 bits has another header.
-    assert_eq!(Packet::decode(&[0xff; 20]), Err(Problem::Packet(0xff)));
+    assert_eq!(decode(&[0xff; 20]), Err(Problem::Packet(0xff)));
     let mut bytes = packet([0; 3], [0; 3], 0, 0);
     bytes[0] = 0x68;
-    assert_eq!(Packet::decode(&bytes), Err(Problem::Packet(0x68)));
+    assert_eq!(decode(&bytes), Err(Problem::Packet(0x68)));
     let mut accel = [0; 3];
     accel[1] = -524_288;
     let invalid = packet(accel, [0; 3], 0, 0);
-    assert_eq!(Packet::decode(&invalid).unwrap().counts, None);
+    assert_eq!(decode(&invalid).unwrap().counts, None);
+    let without = decode(&packet([0; 3], [0; 3], i16::MIN, 0)).unwrap();
+    assert_eq!(
+        (without.counts, without.temperature),
+        (Some(Counts::both([0; 3])), None)
+    );
 }
 
 #[test]
@@ -115,33 +122,33 @@ fn readings_at_the_ends_of_the_ranges_are_saturated() {
         accel: [accel, 0, 0],
     };
     // 1999 dps and 15.99 g are within the ranges; the lowest valid readings of 20 bits are -524 256.
-    assert!(!is_saturated(&of(262_012, -130_990)));
+    assert!(!Sensor::is_saturated(&of(262_012, -130_990)));
     for counts in [
         of(262_143, 0),
         of(-524_256 >> 1, 0),
         of(0, 131_071),
         of(0, -524_256 >> 2),
     ] {
-        assert!(is_saturated(&counts), "{counts:?}");
+        assert!(Sensor::is_saturated(&counts), "{counts:?}");
     }
 }
 
 #[test]
 fn stamps_count_the_samples_whatever_was_lost() {
     // 937.5 counts of 1 µs between samples are 58.6 of 16.
-    let stamp = |sample: u64| (sample * 9375 / 160 % 65_536) as u16;
+    let stamp = |sample: u64| (sample * 9375 / 160 % 65_536) as u32;
     for first in [0, 1117, 123_456] {
         for lost in [1_u64, 2, 3, 59, 70, 101, 500, 1118, 1119, 1999] {
             for clock in [0.97, 1.0, 1.03] {
                 let elapsed_us = (lost as f64 * 1000.0 * clock) as u64 + 900;
-                let found = samples_between(stamp(first), stamp(first + lost), elapsed_us);
+                let found = Sensor::samples_between(stamp(first), stamp(first + lost), elapsed_us);
                 assert_eq!(found, Some(lost as u32), "{first} {lost} {clock}");
             }
         }
     }
     // The same stamp again, and one between two samples.
-    assert_eq!(samples_between(7, 7, 1000), None);
-    assert_eq!(samples_between(0, 29, 1000), None);
+    assert_eq!(Sensor::samples_between(7, 7, 1000), None);
+    assert_eq!(Sensor::samples_between(0, 29, 1000), None);
 }
 
 #[test]
@@ -179,12 +186,12 @@ fn a_poll_takes_all_packets_in_order_and_says_if_the_fifo_was_full() {
         chip.bus.banks[0][usize::from(INT_STATUS)] = u8::from(full) << 1;
         let mut taken = Vec::new();
         assert_eq!(block_on(chip.poll(|p| taken.push(p))), Ok(full));
-        let numbers: Vec<i32> = taken.iter().map(|p| i32::from(p.stamp)).collect();
+        let numbers: Vec<i32> = taken.iter().map(|p| p.stamp as i32).collect();
         assert_eq!(numbers, (0..waiting).collect::<Vec<_>>());
         assert!(
             taken
                 .iter()
-                .all(|p| p.counts.unwrap().gyro[1] == -i32::from(p.stamp))
+                .all(|p| p.counts.unwrap().gyro[1] == -(p.stamp as i32))
         );
     }
 }
