@@ -13,7 +13,7 @@ use mimu_core::single;
 use mimu_core::stored::{self, Curves, NODES, Origin, ROOM, Stored, TooLong};
 use mimu_core::table::{self, Node, Table};
 use mimu_core::wire::{
-    Call, CompensatedBatch, Decoder, EncodeError, MAX_FRAME, Message, RawBatch, Sums,
+    Call, CompensatedBatch, CountBatch, Decoder, EncodeError, MAX_FRAME, Message, RawBatch, Sums,
     effects_of_this_build, encode, volts,
 };
 use mimu_core::{PerSensor, Sensor};
@@ -248,6 +248,21 @@ pub fn wire_raw(batch: &RawBatch<'_>, take: &mut dyn FnMut(u32, Sums, Sample<f32
     if batch.is_whole() {
         for ((number, sums), (_, sample)) in batch.sums().zip(batch.volts()) {
             take(number, sums, sample);
+        }
+    }
+}
+
+/// [`CountBatch`] as a host reads it, and its samples as a device packs them.
+#[inline(never)]
+pub fn wire_counts(
+    batch: &CountBatch<'_>,
+    take: &mut dyn FnMut(u32, [u8; 18], Sample<f32>, f64, Option<f32>),
+) {
+    if batch.is_whole() {
+        let temp_c = batch.temperatures_c().next();
+        let of = batch.counts().zip(batch.readings()).zip(batch.times_s());
+        for (((number, counts), (_, reading)), t_s) in of {
+            take(number, CountBatch::pack(&counts), reading, t_s, temp_c);
         }
     }
 }
