@@ -79,8 +79,12 @@ pub trait Chip: Part {
     /// Resets the chip, checks its identity, and starts both triads with an empty FIFO.
     fn start(&mut self) -> impl Future<Output = Result<(), Problem>>;
 
-    /// Gives all packets in the FIFO to `take`, the oldest first. Returns whether the FIFO was full.
-    fn poll(&mut self, take: impl FnMut(Packet)) -> impl Future<Output = Result<bool, Problem>>;
+    /// Gives the oldest packets in the FIFO to `take`, at most `most`. Returns how many were left when it looked.
+    fn poll(
+        &mut self,
+        most: usize,
+        take: impl FnMut(Packet),
+    ) -> impl Future<Output = Result<usize, Problem>>;
 
     /// Deflects all axes of these triads, and of no other.
     fn deflect(&mut self, gyro: bool, accel: bool) -> impl Future<Output = Result<(), Problem>>;

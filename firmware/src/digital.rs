@@ -25,6 +25,10 @@ const POLL_US: u64 = 1_000;
 /// Polls before the first sample: the rate is then known to 0.1 %, and the line of the [`Timebase`] moves by less than a sample.
 const MEASURED: u32 = 500;
 
+/// Most packets in a poll. The backlog of a late reader, up to a tenth of a second, then reaches the queue of samples and the line within some
+/// milliseconds each, instead of flooding both.
+const MOST: usize = 8;
+
 /// Without a packet for this long, µs, the sensor counts as stalled: 20 samples.
 const SILENCE_US: u64 = 20_000;
 
@@ -244,7 +248,7 @@ impl<C: Chip> Polled<C> {
             let (base, started_us) = (&self.base, self.started_us);
             // The first poll after a start only finds the new phase.
             let zero = self.zero.filter(|_| polls > 0);
-            let polled = self.chip.poll(|packet| {
+            let polled = self.chip.poll(MOST, |packet| {
                 newest += match stamp.replace(packet.stamp) {
                     Some(before) => match C::samples_between(before, packet.stamp, elapsed_us) {
                         Some(samples) => u64::from(samples),
@@ -264,9 +268,10 @@ impl<C: Chip> Polled<C> {
                     take(Scan { tick_us, ..scan });
                 }
             });
-            if polled.await.is_err() || lost_track {
-                return Fault::Stalled;
-            }
+            let left = match polled.await {
+                Ok(left) if !lost_track => left,
+                _ => return Fault::Stalled,
+            };
             if packets == 0 {
                 if elapsed_us > SILENCE_US {
                     return Fault::Stalled;
@@ -274,6 +279,10 @@ impl<C: Chip> Polled<C> {
                 continue;
             }
             (self.newest, heard_us) = (newest, now_us);
+            if left > 0 {
+                // The newest packet was not read, so the poll does not say when it was made.
+                continue;
+            }
             match &mut self.base {
                 Some(base) if polls > 0 => base.poll(newest, now_us),
                 Some(base) => *base = base.again(newest, now_us),

@@ -64,7 +64,7 @@ const END: i32 = 32;
 // Bank 0.
 const DEVICE_CONFIG: u8 = 0x11;
 const FIFO_CONFIG: u8 = 0x16;
-const INT_STATUS: u8 = 0x2d;
+const FIFO_COUNTH: u8 = 0x2e;
 const FIFO_DATA: u8 = 0x30;
 const SIGNAL_PATH_RESET: u8 = 0x4b;
 const INTF_CONFIG0: u8 = 0x4c;
@@ -86,8 +86,6 @@ const XA_ST_DATA: u8 = 0x3b;
 
 /// WHO_AM_I of this chip.
 const IDENTITY: u8 = 0x47;
-
-const FIFO_FULL: u8 = 1 << 1;
 
 /// Settings, in order, with what differs from the reset value. All readings are big end first, as after reset.
 const SETTINGS: [(u8, u8); 10] = [
@@ -213,9 +211,10 @@ impl<B: Bus> Chip for Icm42688p<B> {
         Ok(())
     }
 
-    async fn poll(&mut self, mut take: impl FnMut(Packet)) -> Result<bool, Problem> {
-        let [status, high, low] = self.registers(INT_STATUS).await?;
-        let mut left = usize::from(u16::from_be_bytes([high, low]));
+    async fn poll(&mut self, most: usize, mut take: impl FnMut(Packet)) -> Result<usize, Problem> {
+        let [high, low] = self.registers(FIFO_COUNTH).await?;
+        let waiting = usize::from(u16::from_be_bytes([high, low]));
+        let mut left = waiting.min(most);
         let mut bytes = [0; BURST * PACKET];
         while left > 0 {
             let count = left.min(BURST);
@@ -226,7 +225,7 @@ impl<B: Bus> Chip for Icm42688p<B> {
             }
             left -= count;
         }
-        Ok(status & FIFO_FULL != 0)
+        Ok(waiting.saturating_sub(most))
     }
 
     async fn deflect(&mut self, gyro: bool, accel: bool) -> Result<(), Problem> {

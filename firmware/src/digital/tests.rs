@@ -96,8 +96,8 @@ impl Bus for OwnClock {
         for (k, byte) in into.iter_mut().enumerate() {
             *byte = match (self.bank, register, k) {
                 (0, 0x30, _) => self.fifo.pop_front().unwrap_or(0xff),
-                (0, 0x2d, 1) => length[0],
-                (0, 0x2d, 2) => length[1],
+                (0, 0x2e, 0) => length[0],
+                (0, 0x2e, 1) => length[1],
                 (0, 0x75, 0) => 0x47,
                 _ => 0,
             };

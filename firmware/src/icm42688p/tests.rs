@@ -172,27 +172,33 @@ fn it_starts_only_the_chip_that_it_knows_and_leaves_it_as_set() {
 }
 
 #[test]
-fn a_poll_takes_all_packets_in_order_and_says_if_the_fifo_was_full() {
+fn a_poll_takes_the_oldest_packets_in_order_and_says_how_many_are_left() {
     let mut chip = Icm42688p {
         bus: Registers::new(),
     };
     block_on(chip.start()).unwrap();
-    for waiting in [0, 1, 2, 4, 5, 101] {
+    for (waiting, most) in [
+        (0, 8),
+        (1, 8),
+        (2, 8),
+        (4, 8),
+        (5, 8),
+        (9, 8),
+        (101, 8),
+        (101, 200),
+    ] {
+        chip.bus.fifo.clear();
         for k in 0..waiting {
             let bytes = packet([k << 2; 3], [-k << 1; 3], 0, k as u16);
             chip.bus.fifo.extend(bytes);
         }
-        let full = waiting == 101;
-        chip.bus.banks[0][usize::from(INT_STATUS)] = u8::from(full) << 1;
         let mut taken = Vec::new();
-        assert_eq!(block_on(chip.poll(|p| taken.push(p))), Ok(full));
+        let left = block_on(chip.poll(most as usize, |p| taken.push(p)));
+        assert_eq!(left, Ok((waiting - most).max(0) as usize));
         let numbers: Vec<i32> = taken.iter().map(|p| p.stamp as i32).collect();
-        assert_eq!(numbers, (0..waiting).collect::<Vec<_>>());
-        assert!(
-            taken
-                .iter()
-                .all(|p| p.counts.unwrap().gyro[1] == -(p.stamp as i32))
-        );
+        assert_eq!(numbers, (0..waiting.min(most)).collect::<Vec<_>>());
+        let gyro_y = |p: &Packet| p.counts.unwrap().gyro[1];
+        assert!(taken.iter().all(|p| gyro_y(p) == -(p.stamp as i32)));
     }
 }
 
