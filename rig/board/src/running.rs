@@ -256,6 +256,11 @@ impl Board {
         self.with(|s| s.session.board_mut().part.flash.stuck = true)
     }
 
+    /// Holds the core, or lets it go: time and peripherals go on, and no instruction is executed.
+    pub fn hold(&mut self, held: bool) -> Result<(), String> {
+        self.with(move |s| s.host.hold(held))
+    }
+
     /// Reads a peripheral's register, unnoticed by the firmware.
     ///
     /// Errors: also an address without a register.
