@@ -137,11 +137,19 @@ fn every_sample_is_what_the_sensor_sensed_when_the_device_says_that_it_was_taken
     }
 }
 
+/// Output register of port C, and the pin of the sensor's chip select, low in a transfer.
+const GPIOC_ODR: u64 = 0x5802_0814;
+const SELECT: u64 = 1 << 15;
+
 #[test]
 fn samples_that_a_starved_reader_loses_are_counted_and_no_others() {
     for (starved_ms, crystal) in [(60, 0.99), (95, 1.03), (140, 0.97), (300, 1.0)] {
         let mut device = streaming(feed(), crystal);
         device.run_for(1_500 * MS);
+        // Between two transfers: during one the emulated sensor makes no samples.
+        while device.board.register(GPIOC_ODR).unwrap() & SELECT == 0 {
+            device.run_for(MS / 100);
+        }
         device.board.hold(true).unwrap();
         device.run_for(starved_ms * MS);
         device.board.hold(false).unwrap();
