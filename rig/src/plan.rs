@@ -116,7 +116,7 @@ impl Step {
 /// Turns by hand from where the board lies, after which it is put back there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WholeTurns {
-    /// Whole number of turns; negative: the other direction.
+    /// Number of turns; negative: the other direction. If it is not whole, the board is not put back where it lay.
     pub count: f64,
     /// Their axis, unit vector in the body.
     pub about: Vector,

@@ -32,3 +32,4 @@ pub mod recordings;
 pub mod slow_bias;
 pub mod stored_calibration;
 pub mod text_board;
+pub mod whole_turns;

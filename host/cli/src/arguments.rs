@@ -10,6 +10,7 @@ use mimu::quantity::Sensor;
 use mimu::signal::dwell::Keep;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
 use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{Reference, WholeTurns};
 
 use crate::status::Status;
 
@@ -78,6 +79,43 @@ fn still(text: &str) -> std::result::Result<f64, String> {
     match text.parse() {
         Ok(f) if (1.0..=1e9).contains(&f) => Ok(f),
         _ => Err("write a number from 1 to 1e9".into()),
+    }
+}
+
+#[derive(Args)]
+pub(crate) struct WholeTurnArgs {
+    /// Turns of the unit that end where they began: several times about any axis, then put back where it lay, at rest before and after
+    ///
+    /// The gyro's scale factors follow from them better than from turns between poses, also about the vertical. With a number, each has that many turns: the
+    /// scale factors then need not be known to a few per cent. recording.toml may say the same: whole_turns = { turns = 10, placement_deg = 1.0 }.
+    #[arg(long = "whole-turns", value_name = "N", num_args = 0..=1, require_equals = true)]
+    turns: Option<Option<u32>>,
+    /// With --whole-turns: how well the unit is put back, degrees, half-width of the 95 % interval of its heading [default: 1]
+    #[arg(long, value_name = "DEG", requires = "turns")]
+    placement: Option<f64>,
+}
+
+impl WholeTurnArgs {
+    /// `prepared`, with what is stated of its whole turns.
+    pub(crate) fn apply(&self, mut prepared: Prepared) -> Result<Prepared> {
+        let Some(turns) = self.turns else {
+            return Ok(prepared);
+        };
+        let default = WholeTurns::default();
+        let stated = WholeTurns {
+            placement_deg: self.placement.unwrap_or(default.placement_deg),
+            turns,
+        };
+        stated.check("whole turns")?;
+        if prepared.manifest.reference != Reference::Gravity {
+            return Err(Error::new(
+                &prepared.place,
+                "whole turns are turned by hand, with gravity as the reference",
+                "leave --whole-turns out, or give a recording with reference = \"gravity\"",
+            ));
+        }
+        prepared.manifest.whole_turns = Some(stated);
+        Ok(prepared)
     }
 }
 

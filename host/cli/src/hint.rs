@@ -107,6 +107,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Reference => "--reference",
         Argument::TurntableRates => "--rate-dps",
         Argument::TurntableRateError => "--rate-error",
+        Argument::WholeTurns => "--whole-turns and --placement",
         Argument::Device => "--device",
         Argument::StepsGiven => "--steps given",
         Argument::StepsFound => "--steps found",

@@ -30,7 +30,7 @@ pub struct Diagnosed {
 /// `heard` is told the share that is done.
 ///
 /// # Errors
-/// Those of [`diagnose`]; a given calibration with curves over temperature, or with an effect that was found anew.
+/// Those of [`diagnose_heard`]; a given calibration with curves over temperature, or with an effect that was found anew.
 pub fn diagnosed(
     recordings: Recordings,
     [second, given_name]: [Option<&str>; 2],

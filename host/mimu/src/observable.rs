@@ -17,6 +17,12 @@ pub enum Observable {
     Second(usize),
     /// Directions of gravity after turns.
     Turns,
+    /// Directions of gravity after whole turns.
+    AfterWholeTurns,
+    /// Headings after whole turns.
+    WholeTurns,
+    /// What a data sheet says of the angles between the axes.
+    AsDelivered,
     /// Rates at rest.
     Rest,
     /// Magnitudes of specific force.
@@ -33,6 +39,9 @@ impl fmt::Display for Observable {
             Self::AtRest(axis) => write!(f, "{} at rest", AXES[*axis]),
             Self::Second(axis) => write!(f, "means of {} over a second", AXES[*axis]),
             Self::Turns => f.write_str("turns"),
+            Self::AfterWholeTurns => f.write_str("directions after whole turns"),
+            Self::WholeTurns => f.write_str("whole turns"),
+            Self::AsDelivered => f.write_str("axes as delivered"),
             Self::Rest => f.write_str("rest"),
             Self::Magnitude => f.write_str("magnitude of specific force"),
             Self::Force => f.write_str("force"),

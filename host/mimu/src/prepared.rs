@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::bias_removal::BiasRemoval;
 use crate::estimate::earth::{Earth, poses};
 use crate::estimate::earth_on_table::EarthOnTable;
+use crate::estimate::whole_turns::Stated;
 use crate::estimate::{EarthShare, Failure, Observation, known_input, magnitude};
 use crate::noise::Noise;
 use crate::noise::noise_file::NoiseFile;
@@ -525,6 +526,7 @@ impl Prepared {
             turns.push(Turn {
                 from: pair[0],
                 to: pair[1],
+                steps: [a.step, b.step],
                 increments: pieces,
                 before: accel.apply(&a.raw_mean(Sensor::Accel)),
                 after: accel.apply(&b.raw_mean(Sensor::Accel)),
@@ -536,6 +538,17 @@ impl Prepared {
             });
         }
         (turns, refused)
+    }
+
+    /// What is stated of turns that end where they began.
+    pub(crate) fn whole_turns(&self) -> Option<Stated> {
+        let given = self.manifest.whole_turns?;
+        Some(Stated {
+            placement: given.placement_deg.to_radians(),
+            turns: given.turns,
+            vertical: self.earth().about_vertical(),
+            nominal: self.is_in_si().then(Matrix3::identity),
+        })
     }
 
     /// Whether a sample of the gyro in block `i` lies at a rail.

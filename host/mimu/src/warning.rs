@@ -214,6 +214,54 @@ pub enum Warning {
         error: f64,
         sigmas: f64,
     },
+    /// A whole turn, from dwell to dwell, that is no longer than a turn from pose to pose, because the unit was not put back: the number of turns, and how
+    /// far off it ended, rad.
+    #[error("the {turns:.1} turns from dwell {from} to {to} are not used as whole turns: they end {} deg from where they began; put the unit back as it lay, or state how well it is put back", significant(.off.to_degrees()))]
+    NotPutBack {
+        from: i32,
+        to: i32,
+        turns: f64,
+        off: f64,
+    },
+    /// Whole turns whose error exceeds the stated placement: the error, rad, and the same in sigmas.
+    #[error("the whole turns from dwell {from} to {to} are not used: they end {} deg from where the others predict, {sigmas:.0} sigma; repeat them, and put the unit back as it lay", significant(.off.to_degrees()))]
+    WholeTurnLeftOut {
+        from: i32,
+        to: i32,
+        off: f64,
+        sigmas: f64,
+    },
+    /// Whole turns whose number is not the stated one.
+    #[error(
+        "from dwell {from} to {to} the unit turned {turned:.2} times, not {counted}: the number that the gyro shows is used"
+    )]
+    Miscounted {
+        from: i32,
+        to: i32,
+        counted: u32,
+        turned: f64,
+    },
+    /// Whole turns whose number the scale factor leaves open.
+    #[error(
+        "the turns from dwell {from} to {to}, about {turns:.1}, are not used as whole turns: the scale factor is not known well enough to count them; say how many turns each has, or record ten poses as well"
+    )]
+    WholeTurnsOpen { from: i32, to: i32, turns: f64 },
+    /// Whole turns with clipped readings: their axis (0..3), and the rate not to exceed, rad/s.
+    #[error("the turns from dwell {from} to {to} reach the end of the range of gyro {axis}: turn more slowly than {} deg/s", significant(.fastest.to_degrees()))]
+    WholeTurnClipped {
+        from: i32,
+        to: i32,
+        axis: &'static str,
+        fastest: f64,
+    },
+    /// Whole turns were stated, and none was found.
+    #[error(
+        "no whole turns were found: turn the unit several times about one axis, put it back where it lay, and let it rest before and after"
+    )]
+    NoWholeTurn,
+    /// The accelerometer is not calibrated, because the poses do not determine it; the gyro takes it as delivered.
+    #[error("the poses do not determine the accelerometer, so it is not calibrated: the gyro's frame is that of its readings as delivered, {} deg in doubt", significant(.doubt.to_degrees()))]
+    AccelAsDelivered { doubt: f64 },
     /// A turn that is kept though it is suspect: the parameter that the others hardly determine, and how many times as wide its interval
     /// would be without the turn.
     #[error("the turn from dwell {from} to {to} is kept, although it is suspect: {}; repeat it", open(.parameter, *.wider))]

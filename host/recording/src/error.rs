@@ -72,6 +72,8 @@ pub enum Argument {
     TurntableRates,
     /// Uncertainty of these rates.
     TurntableRateError,
+    /// Turns by hand that end where they began.
+    WholeTurns,
     /// Whether an existing result is replaced.
     Replace,
     /// Serial port.

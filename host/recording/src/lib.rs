@@ -61,7 +61,9 @@ pub use import::{
     Zero, import, is_log, look, preview,
 };
 pub use in_memory::{InMemory, usual_rate_hz};
-pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
+pub use manifest::{
+    Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source, WholeTurns,
+};
 pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};

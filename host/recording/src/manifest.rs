@@ -121,6 +121,57 @@ pub struct Rails {
     pub accel: Option<[f64; 2]>,
 }
 
+/// Turns by hand, whole ones, after which the unit is put back where it lay.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WholeTurns {
+    /// Half-width of the 95 % interval of the heading in which it is put back, degrees.
+    #[serde(default = "placement_deg")]
+    pub placement_deg: f64,
+    /// Number of turns of each, if somebody has counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turns: Option<u32>,
+}
+
+/// Against the edge of a table with a box, people are within a degree.
+const PLACEMENT_DEG: f64 = 1.0;
+
+fn placement_deg() -> f64 {
+    PLACEMENT_DEG
+}
+
+impl Default for WholeTurns {
+    fn default() -> Self {
+        Self {
+            placement_deg: PLACEMENT_DEG,
+            turns: None,
+        }
+    }
+}
+
+impl WholeTurns {
+    /// Refuses impossible values; `place` names them.
+    pub fn check(&self, place: &str) -> Result<()> {
+        if !(0.01..=20.0).contains(&self.placement_deg) {
+            return Err(Error::new(
+                place,
+                format!("the placement is {:?} degrees", self.placement_deg),
+                "give the half-width of its 95 % interval, 0.01 to 20 degrees",
+            )
+            .about(Argument::WholeTurns));
+        }
+        if self.turns.is_some_and(|turns| !(1..=1000).contains(&turns)) {
+            return Err(Error::new(
+                place,
+                "the number of turns is not 1 to 1000",
+                "give the turns of each, or leave it out",
+            )
+            .about(Argument::WholeTurns));
+        }
+        Ok(())
+    }
+}
+
 /// A file that the recording was imported from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -179,6 +230,9 @@ pub struct Manifest {
     /// Where readings saturate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rails: Option<Rails>,
+    /// What is stated of turns by hand that end where they began.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub whole_turns: Option<WholeTurns>,
     /// The known rates, if the reference is the magnitude of the rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turntable: Option<Turntable>,
@@ -254,6 +308,7 @@ impl Manifest {
             imported_with: Vec::new(),
             recorded: None,
             rails: None,
+            whole_turns: None,
             turntable: None,
             sources: Vec::new(),
         }
@@ -323,6 +378,9 @@ impl Manifest {
                 return Err(Error::new(at("turntable"), problem, remedy).about(Argument::Reference));
             }
             (_, None) => {}
+        }
+        if let Some(whole) = &self.whole_turns {
+            whole.check(&at("whole_turns"))?;
         }
         let rails = self.rails.unwrap_or_default();
         for (sensor, rails) in [("gyro", rails.gyro), ("accel", rails.accel)] {

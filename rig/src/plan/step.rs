@@ -163,9 +163,9 @@ impl Reader<'_> {
                 .source
                 .error(&turns.span(), "`whole_turns` on a table", remedy));
         }
-        if count.fract() != 0.0 || count == 0.0 || count.abs() > 1000.0 {
+        if !(0.1..=1000.0).contains(&count.abs()) {
             let problem = format!("`whole_turns` is {}", written(count));
-            let remedy = "give a whole number, negative for the other direction";
+            let remedy = "give 0.1 to 1000 turns, negative for the other direction";
             return Err(self.source.error(&turns.span(), problem, remedy));
         }
         let remedy = "give a body direction, as [0.0, 0.0, 1.0]";

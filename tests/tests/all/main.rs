@@ -30,3 +30,4 @@ mod stated_noise;
 mod strong_nonlinearity;
 mod temperature;
 mod turning;
+mod whole_turns;

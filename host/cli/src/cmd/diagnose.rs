@@ -14,9 +14,9 @@ use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{
-    JsonArgs, KeepArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WritingArgs,
+    JsonArgs, KeepArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs, WritingArgs,
 };
-use crate::output::{now, print};
+use crate::output::{now, print, progress};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::status::Status;
@@ -57,6 +57,8 @@ pub struct DiagnoseArgs {
     #[command(flatten)]
     keep: KeepArgs,
     #[command(flatten)]
+    whole: WholeTurnArgs,
+    #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
     writing: WritingArgs,
@@ -82,7 +84,8 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
     let open = |path: &PathBuf| {
         let prepared = read(path, &args.log, args.still.finding(), &outputs, &inputs)?;
-        Ok(args.keep.apply(args.noise.apply(prepared)?))
+        args.whole
+            .apply(args.keep.apply(args.noise.apply(prepared)?))
     };
     let given = args.calibration.as_deref().map(Calibration::read);
     let given = given.transpose()?;
@@ -104,7 +107,10 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     let all = all.chain(&recordings.second);
     let problems: Vec<_> = all.flat_map(OfRecording::prepared).collect();
     let several = args.recordings.len() > 1 || args.verify.is_some();
-    let done = diagnosed(recordings, by, &now).inspect_err(|_| refused(&problems, several))?;
+    let bar = progress("diagnosing");
+    let done = diagnosed(recordings, by, &now, &|share| bar.reach(share));
+    bar.finish();
+    let done = done.inspect_err(|_| refused(&problems, several))?;
     let Diagnosed {
         diagnosis,
         next,

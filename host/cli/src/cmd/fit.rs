@@ -12,7 +12,8 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{
-    JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs, WritingArgs,
+    JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs,
+    WritingArgs,
 };
 use crate::output::{now, print};
 use crate::reading::{LogArgs, read_samples_or_means};
@@ -39,6 +40,8 @@ pub(crate) struct FitArgs {
     still: StillArgs,
     #[command(flatten)]
     keep: KeepArgs,
+    #[command(flatten)]
+    whole: WholeTurnArgs,
     #[command(flatten)]
     noise: NoiseArgs,
     /// List the dwells
@@ -107,6 +110,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<Status> {
     )?;
     args.writing.check(args.output.as_deref())?;
     let prepared = args.keep.apply(args.noise.apply(prepared)?);
+    let prepared = args.whole.apply(prepared)?;
     if args.method.is_some() && prepared.manifest.reference != Reference::Table {
         return Err(Error::new(
             args.recording.display(),

@@ -7,7 +7,7 @@ use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
 use mimu_recording::error::Result;
 
-use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs};
+use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs};
 use crate::output::print;
 use crate::reading::{LogArgs, read_samples_or_means};
 use crate::report;
@@ -24,6 +24,8 @@ pub(crate) struct VerifyArgs {
     log: LogArgs,
     #[command(flatten)]
     still: StillArgs,
+    #[command(flatten)]
+    whole: WholeTurnArgs,
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
@@ -45,7 +47,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
         &outputs,
         &[Some(&args.calibration), args.noise.file.as_deref()],
     )?;
-    let prepared = args.noise.apply(prepared)?;
+    let prepared = args.whole.apply(args.noise.apply(prepared)?)?;
     let result = verify(&prepared, &calibration)?;
     print(
         &args.json,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use mimu::calibration::verify::{Causes, SensorVerification, Verification};
+use mimu::calibration::verify::{Causes, SensorVerification, Verification, WholeTurnsOfAxis};
 use mimu::judge::errors::BEYOND_NOISE;
 use mimu::judgement::JudgementKind;
 use mimu::quantity::{AXES, Figure, Sensor, plural, plus_minus, significant};
@@ -21,6 +21,9 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
     let _ = writeln!(out);
     let one = [(String::new(), verification.clone())];
     out += &errors(&one, false).text("");
+    for turned in &verification.whole_turns {
+        wrap(&mut out, "gyro: ", &whole_turns(turned));
+    }
     for (name, s) in verification.sensors.present() {
         let _ = writeln!(out, "{name}: {}, rms", s.figure.description());
     }
@@ -49,6 +52,25 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
     }
     let _ = writeln!(out, "next: {}", next(verification));
     out
+}
+
+/// `360 deg about x read as 360.4 ± 0.1 deg (356.1 uncalibrated): 40 turns, put back 4 times`.
+fn whole_turns(turned: &WholeTurnsOfAxis) -> String {
+    let WholeTurnsOfAxis {
+        axis,
+        times,
+        turns,
+        error_deg_per_turn: error,
+        half_width_deg_per_turn: half,
+        uncalibrated_deg_per_turn: before,
+    } = turned;
+    let before = before.map(|before| format!(" ({:.2} uncalibrated)", 360.0 + before));
+    format!(
+        "360 deg about {axis} read as {} deg{}: {turns} turns, put back {}",
+        plus_minus(360.0 + error, *half),
+        before.unwrap_or_default(),
+        plural(*times as u64, "time")
+    )
 }
 
 /// Errors on recordings that the calibration was not made from, by recording and sensor; `named`: with the names of the recordings.

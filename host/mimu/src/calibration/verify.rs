@@ -2,8 +2,10 @@
 
 mod causes;
 mod judged;
+mod whole_turns;
 
 pub use causes::{Causes, Share};
+pub use whole_turns::WholeTurnsOfAxis;
 
 use std::borrow::Cow;
 
@@ -75,6 +77,9 @@ pub struct Verification {
     /// The triads, as far as both the calibration and the recording have them.
     #[serde(serialize_with = "present")]
     pub sensors: PerSensor<Option<SensorVerification>>,
+    /// What the gyro reads for whole turns about each axis; absent without any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub whole_turns: Vec<WholeTurnsOfAxis>,
     /// What a person should know.
     pub warnings: Vec<Warning>,
 }
@@ -110,6 +115,8 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     if sensors.present().next().is_none() {
         return Err(nothing_to_judge(&readings.as_read));
     }
+    let (whole_turns, of_turns) = whole_turns::verify(&readings.as_read, calibration);
+    warnings.extend(of_turns);
     let at_rest = sensors.present().filter_map(|(_, s)| s.static_rms);
     warnings.extend(at_rest.filter_map(restless));
     let worse = sensors.present();
@@ -120,6 +127,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         judgement: judged::judgement(&readings.as_read, &all, &warnings),
         same_recording,
         sensors,
+        whole_turns,
         warnings,
     })
 }
@@ -316,7 +324,8 @@ fn judge(
         // Means of poses do not show how the unit turned between them.
         (Reference::Gravity, Sensor::Gyro) if prepared.manifest.means => None,
         (Reference::Gravity, Sensor::Gyro) => {
-            let accel = calibration.inverse(Sensor::Accel)?;
+            let delivered = || prepared.whole_turns().map(|_| Affine::identity());
+            let accel = calibration.inverse(Sensor::Accel).or_else(delivered)?;
             turns(prepared, &inverse, &accel, &mut warnings)
         }
     };

@@ -45,6 +45,11 @@ impl Earth {
         unit(up).map_or_else(Vector3::zeros, |up| up * self.vertical)
     }
 
+    /// The known rate about the vertical, rad/s, and the variance of the rest, rad²/s².
+    pub fn about_vertical(&self) -> [f64; 2] {
+        [self.vertical, self.vertical_error]
+    }
+
     /// Variance of the unknown part on each axis, rad²/s².
     pub fn variance(&self, up: &Vector3<f64>) -> Vector3<f64> {
         let level = |up: Vector3<f64>| up.map(|u| self.level * (1.0 - u * u));

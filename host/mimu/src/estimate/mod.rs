@@ -7,6 +7,7 @@
 //! | [`moving_input`]  | table     | the same least squares if inputs move within dwells        |
 //! | [`magnitude`]     | gravity, turntable | accelerometer from the magnitude of gravity over many poses; gyro from that of a turntable's rate |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
+//! | [`whole_turns`]   | gravity   | the same with turns that end where they began            |
 //! | [`with_turns`]    | gravity   | accelerometer from magnitudes and turns together         |
 //! | [`chains`]        | gravity   | dwells that turns connect one to the next                 |
 //! | [`earth`]         | gravity   | the Earth's rate in the gyro's readings                   |
@@ -25,6 +26,7 @@ pub mod magnitude;
 pub mod moving_input;
 pub mod rotation;
 pub mod six_positions;
+pub mod whole_turns;
 pub mod with_turns;
 
 use mimu_core::compensation::Affine;

@@ -1,9 +1,11 @@
-//! Gyro calibration without a table: from the turns between dwells, and from the dwells themselves.
+//! Gyro calibration without a table: from the turns between dwells, from the dwells themselves, and from whole turns ([`super::whole_turns`]).
 //!
 //! Gravity is the reference. The integrated gyro rotates the direction of gravity of one dwell into the frame of the next, where it must agree with
 //! the measured direction (references 19 of xu and 12 of fang); at rest the rate is zero. Both are fitted together, because the turns and the
 //! readings at rest may need different biases if the model lacks something. The frame is that of the accelerometer, so the full 3x3 matrix contains
 //! the alignment of gyro to accelerometer.
+
+use std::ops::Range;
 
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
@@ -12,10 +14,51 @@ use super::chains::Chains;
 use super::least_squares::{Grouped, Linearized, Minimum, Observability, Reweighted, Solved};
 use super::{Estimated, Failure};
 use crate::observable::Observable;
+use crate::observation::closure::{ClosureError, Closures};
 use crate::observation::turn::{Motion, Rest, Rotations, Turn, TurnError};
 use crate::observation::{ByTriad, from_centre};
 use crate::quantity::AXES;
 use crate::triad::{Covariance, Part, Triad, affine};
+
+/// What the rows of each group are. Whole turns are long, and errors of the model grow on the way, so that their directions scatter by themselves.
+const GROUPS: [Observable; 6] = [
+    Observable::Turns,
+    Observable::AfterWholeTurns,
+    Observable::WholeTurns,
+    Observable::AsDelivered,
+    Observable::Force,
+    Observable::Rest,
+];
+
+/// The group of the accelerometer's errors.
+const ERRORS: usize = 4;
+
+/// The elements of C across the axes.
+const CROSS: [usize; 6] = [1, 2, 3, 5, 6, 7];
+
+/// A square root of a covariance: one column for each direction of it that has a variance.
+fn root(covariance: &Covariance) -> DMatrix<f64> {
+    let eigen = covariance.symmetric_eigen();
+    let largest = eigen.eigenvalues.max();
+    let used = (0..12).filter(|k| eigen.eigenvalues[*k] > 1e-14 * largest);
+    let columns = used.map(|k| eigen.eigenvectors.column(k) * eigen.eigenvalues[k].sqrt());
+    let columns: Vec<_> = columns.collect();
+    DMatrix::from_fn(12, columns.len(), |i, j| columns[j][i])
+}
+
+/// Rows of each of [`GROUPS`].
+struct Rows([Range<usize>; 6]);
+
+impl Rows {
+    /// Of these lengths, one behind the other.
+    fn of(lengths: [usize; 6]) -> Self {
+        let mut end = 0;
+        Self(lengths.map(|length| {
+            end += length;
+            end - length..end
+        }))
+    }
+}
 
 /// Number of parameters: nine of C, three of o.
 pub const PARAMETERS: usize = 12;
@@ -24,7 +67,7 @@ pub const PARAMETERS: usize = 12;
 /// in C. It works for any mounting of the gyro and any scale.
 ///
 /// If hands shake, the accelerometer shows more than gravity: a pair has the less weight, the more its magnitude is off.
-fn guess(motions: &[Motion], rest: &Vector3<f64>, gravity: f64) -> Option<Matrix3<f64>> {
+pub(super) fn guess(motions: &[Motion], rest: &Vector3<f64>, gravity: f64) -> Option<Matrix3<f64>> {
     let mut normal = SMatrix::<f64, 9, 9>::zeros();
     let mut right = SVector::<f64, 9>::zeros();
     for m in motions {
@@ -54,16 +97,22 @@ fn guess(motions: &[Motion], rest: &Vector3<f64>, gravity: f64) -> Option<Matrix
     c.iter().all(|x| x.is_finite()).then_some(c)
 }
 
-/// The turns and rests of a gyro about its mean reading at rest. Parameters are of order one: C in units of its own size, o about that reading, and the
+/// The turns, whole turns and rests of a gyro about its mean reading at rest. Parameters are of order one: C in units of its own size, o about that reading, and the
 /// Earth's level rate in each chain.
 struct ByTurns<'a> {
     turns: &'a [Turn<'a>],
     rest: &'a [Rest],
+    whole: &'a Closures,
     at_rest: Vector3<f64>,
     /// Units of the twelve parameters.
     scale: ByTriad,
     rotations: Rotations,
     chains: Chains,
+    /// First of the two rows of each turn.
+    row_of: Vec<usize>,
+    rows: Rows,
+    /// Errors of the accelerometer, as columns, if they are parameters: each is one standard deviation of it.
+    of_errors: Option<DMatrix<f64>>,
     /// Covariance of C and o of the accelerometer.
     of_accel: Covariance,
 }
@@ -73,14 +122,38 @@ impl<'a> ByTurns<'a> {
     fn of(
         turns: &'a [Turn<'a>],
         rest: &'a [Rest],
+        whole: &'a Closures,
         at_rest: Vector3<f64>,
         size: f64,
         of_accel: Covariance,
     ) -> Self {
+        // Headings do not depend on the accelerometer, and directions do, all of them by the same errors. To weigh one against the other these errors have to be
+        // parameters: without them, directions of a tenth of a degree were believed to a fiftieth, and the headings that contradicted them were not.
+        let with_errors = !whole.list.is_empty();
+        let of_errors = with_errors.then(|| root(&of_accel));
+        let of_whole = |t: usize| whole.list.iter().any(|c| c.turns.contains(&t));
+        let rows = Rows::of([
+            2 * (0..turns.len()).filter(|t| !of_whole(*t)).count(),
+            2 * (0..turns.len()).filter(|t| of_whole(*t)).count(),
+            whole.list.len(),
+            whole.delivered.map_or(0, |_| CROSS.len()),
+            of_errors.as_ref().map_or(0, DMatrix::ncols),
+            3 * rest.len(),
+        ]);
+        let mut next = [rows.0[0].start, rows.0[1].start];
+        let row_of = (0..turns.len()).map(|t| {
+            let group = usize::from(of_whole(t));
+            next[group] += 2;
+            next[group] - 2
+        });
         Self {
+            row_of: row_of.collect(),
+            rows,
+            of_errors,
             of_accel,
             turns,
             rest,
+            whole,
             at_rest,
             scale: ByTriad::from_fn(|k, _| if k < 9 { size } else { 1.0 }),
             rotations: Rotations::new(turns, &at_rest),
@@ -88,14 +161,25 @@ impl<'a> ByTurns<'a> {
         }
     }
 
-    /// Numbers of rows of turns and of rests.
-    fn rows(&self) -> [usize; 2] {
-        [2 * self.turns.len(), 3 * self.rest.len()]
+    /// Number of rows of directions and headings, which depend on the accelerometer.
+    fn by_directions(&self) -> usize {
+        self.rows.0[2].end
+    }
+
+    /// Number of rows that determine C.
+    fn by_matrix(&self) -> usize {
+        self.rows.0[3].end
+    }
+
+    /// First of the errors of the accelerometer among the parameters.
+    fn first_error(&self) -> usize {
+        PARAMETERS + 2 * self.chains.count
     }
 
     /// Number of parameters.
     fn parameters(&self) -> usize {
-        PARAMETERS + 2 * self.chains.count
+        let errors = self.of_errors.as_ref().map_or(0, DMatrix::ncols);
+        self.first_error() + errors
     }
 
     /// The parameters of a gyro with the matrix `first`.
@@ -111,16 +195,16 @@ impl<'a> ByTurns<'a> {
         affine(&ByTriad::from_fn(|k, _| self.scale[k] * p[k]))
     }
 
-    fn errors(&self, model: &Affine<f64>) -> Vec<TurnError> {
+    fn errors(&self, model: &Affine<f64>) -> (Vec<TurnError>, Vec<ClosureError>) {
         let turned = self.rotations.at(&model.matrix, &model.offset);
         let each = self.turns.iter().zip(&turned);
-        each.map(|(turn, turned)| TurnError::of(turn, turned))
-            .collect()
+        let errors = each.map(|(turn, turned)| TurnError::of(turn, turned));
+        (errors.collect(), self.whole.errors(self.turns, &turned))
     }
 
     /// How well the turns determine C.
     fn shape(&self, found: &Minimum) -> Observability {
-        let turns = self.rows()[0];
+        let turns = self.by_matrix();
         Observability::of(&found.at.jacobian.rows(0, turns).columns(0, 9).into_owned())
     }
 
@@ -130,18 +214,29 @@ impl<'a> ByTurns<'a> {
         for (mut row, weight) in weighted.row_iter_mut().zip(&found.weights) {
             row *= *weight;
         }
-        let by_turns = found.at.jacobian.rows(0, self.rows()[0]);
+        let by_turns = found.at.jacobian.rows(0, self.by_directions());
         covariance * by_turns.transpose() * weighted
     }
 
-    /// Derivatives of the turns' residuals by C and o of the accelerometer.
+    /// Derivatives of the residuals of turns and whole turns by C and o of the accelerometer.
     fn by_accelerometer(&self, p: &DVector<f64>) -> DMatrix<f64> {
-        let mut by = DMatrix::zeros(self.rows()[0], 12);
-        let errors = self.errors(&self.model(p));
+        let (errors, whole) = self.errors(&self.model(p));
+        self.by_accelerometer_of(&errors, &whole)
+    }
+
+    /// The same for these errors.
+    fn by_accelerometer_of(&self, errors: &[TurnError], whole: &[ClosureError]) -> DMatrix<f64> {
+        let mut by = DMatrix::zeros(self.by_directions(), 12);
         for (t, (turn, error)) in self.turns.iter().zip(errors).enumerate() {
             for (k, columns) in error.by_accel(&turn.raw).iter().enumerate() {
-                by.row_mut(2 * t + k).copy_from(&columns.transpose());
+                by.row_mut(self.row_of[t] + k)
+                    .copy_from(&columns.transpose());
             }
+        }
+        let first = self.rows.0[2].start;
+        for (k, (closure, error)) in self.whole.list.iter().zip(whole).enumerate() {
+            let columns = error.by_accel(&closure.raw(self.turns));
+            by.row_mut(first + k).copy_from(&columns.transpose());
         }
         by
     }
@@ -158,18 +253,33 @@ impl<'a> ByTurns<'a> {
     }
 }
 
-impl Grouped<2> for ByTurns<'_> {
+impl Grouped<6> for ByTurns<'_> {
     const SHARE: f64 = 1e-3;
     /// The first weights are a guess.
     const ROUNDS: usize = 2;
 
-    /// Rad, then rad/s.
+    /// Rad, and rad/s of the rests.
     fn linearize(&self, p: &DVector<f64>) -> Linearized {
         let model = self.model(p);
-        let errors = self.errors(&model);
+        let (errors, whole) = self.errors(&model);
         let rows = (self.chains).rows(self.turns, &errors, self.rest, &model, &self.at_rest);
-        let mut out = Linearized::zeros(rows.len(), self.parameters());
+        let [_, _, headings, delivered, prior, rests] = &self.rows.0;
+        let mut out = Linearized::zeros(rests.end, self.parameters());
+        for (row, k) in delivered.clone().zip(CROSS) {
+            out.residuals[row] = p[k];
+            out.jacobian[(row, k)] = 1.0;
+        }
+        for (k, error) in whole.iter().enumerate() {
+            let own = error.block.by(0).component_mul(&self.scale).transpose();
+            let row = headings.start + k;
+            out.residuals[row] = error.block.residual[0];
+            out.jacobian.view_mut((row, 0), (1, 12)).copy_from(&own);
+        }
         for (row, found) in rows.iter().enumerate() {
+            let row = match self.row_of.get(row / 2) {
+                Some(first) => first + row % 2,
+                None => rests.start + row - 2 * self.turns.len(),
+            };
             out.residuals[row] = found.residual;
             let own = found.by.component_mul(&self.scale).transpose();
             out.jacobian.view_mut((row, 0), (1, 12)).copy_from(&own);
@@ -177,6 +287,19 @@ impl Grouped<2> for ByTurns<'_> {
                 let column = PARAMETERS + place;
                 out.jacobian[(row, column)] = by;
                 out.residuals[row] += by * p[column];
+            }
+        }
+        if let Some(of_errors) = &self.of_errors {
+            let first = self.first_error();
+            let by = self.by_accelerometer_of(&errors, &whole) * of_errors;
+            let moved = &by * p.rows(first, of_errors.ncols());
+            for (residual, moved) in out.residuals.iter_mut().zip(&moved) {
+                *residual += moved;
+            }
+            out.jacobian.view_mut((0, first), by.shape()).copy_from(&by);
+            for (k, row) in prior.clone().enumerate() {
+                out.residuals[row] = p[first + k];
+                out.jacobian[(row, first + k)] = 1.0;
             }
         }
         out
@@ -188,20 +311,33 @@ impl Grouped<2> for ByTurns<'_> {
         let mean = squared.sum() / 3.0;
         // In a chain the Earth's level rate is among the parameters.
         let unknown = |chain: &Option<usize>| f64::from(u8::from(chain.is_none()));
-        let turns = self.turns.iter().zip(&self.chains.of_turn);
-        let turns =
-            turns.flat_map(|(t, chain)| [t.variance(mean) + unknown(chain) * t.earth_variance; 2]);
         let rest = self.rest.iter().zip(&self.chains.of_rest);
         let rest = rest.flat_map(|(o, chain)| {
             let v = squared * o.variance + o.rate_variance * unknown(chain) + o.vertical_variance;
             <[f64; 3]>::from(v)
         });
-        turns.chain(rest).map(|v| v.max(1e-20)).collect()
+        let [_, _, headings, delivered, prior, rests] = &self.rows.0;
+        let mut all = vec![0.0; headings.start];
+        all.extend(self.whole.variances(self.turns, mean));
+        let cross = self.whole.delivered.unwrap_or_default();
+        all.extend(delivered.clone().map(|_| cross * cross));
+        all.extend(prior.clone().map(|_| 1.0));
+        all.extend(rest);
+        debug_assert_eq!(all.len(), rests.end);
+        let chains = self.chains.of_turn.iter();
+        for ((turn, chain), first) in self.turns.iter().zip(chains).zip(&self.row_of) {
+            let known = turn.variance(mean) + unknown(chain) * turn.earth_variance;
+            all[*first..first + 2].fill(known);
+        }
+        all.into_iter().map(|v| v.max(1e-20)).collect()
     }
 
     /// Errors of the accelerometer's calibration are common to all turns. They go into the parameters in full, and into the size that residuals
     /// may have, but not into the weights.
     fn allowed(&self, found: &Minimum, mut variances: Vec<f64>) -> Vec<f64> {
+        if self.of_errors.is_some() {
+            return variances;
+        }
         let by_accel = self.by_accelerometer(&found.parameters);
         let common = (&by_accel * self.of_accel)
             .component_mul(&by_accel)
@@ -250,7 +386,27 @@ pub fn estimate(
     start: Option<&Affine<f64>>,
     gravity: f64,
 ) -> Result<Estimated, Failure> {
-    if rest.is_empty() || 2 * turns.len() + 3 < PARAMETERS {
+    refuse_few(turns, rest, &Closures::default())?;
+    let at_rest = mean_at_rest(rest);
+    let first = match start {
+        Some(start) => start.matrix,
+        None => guess(motions, &at_rest, gravity).ok_or_else(|| {
+            Failure::NoSolution(
+                "no scale factor of the gyro makes its turns agree with those of gravity".into(),
+            )
+        })?,
+    };
+    from(turns, rest, accel, &first, &Closures::default())
+}
+
+/// Mean reading at rest.
+pub(super) fn mean_at_rest(rest: &[Rest]) -> Vector3<f64> {
+    rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / rest.len() as f64
+}
+
+/// Refuses turns that are too few for C.
+pub(super) fn refuse_few(turns: &[Turn], rest: &[Rest], whole: &Closures) -> Result<(), Failure> {
+    if rest.is_empty() || 2 * turns.len() + whole.list.len() + 3 < PARAMETERS {
         return Err(Failure::Undetermined {
             parameters: "C of the gyro".into(),
             add: format!(
@@ -260,43 +416,58 @@ pub fn estimate(
             .into(),
         });
     }
-    let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / rest.len() as f64;
-    let first = match start {
-        Some(start) => start.matrix,
-        None => guess(motions, &at_rest, gravity).ok_or_else(|| {
-            Failure::NoSolution(
-                "no scale factor of the gyro makes its turns agree with those of gravity".into(),
-            )
-        })?,
-    };
+    Ok(())
+}
+
+/// The fit from the matrix `first` on, with the `whole` ones among the turns.
+pub(super) fn from(
+    turns: &[Turn],
+    rest: &[Rest],
+    accel: &Triad,
+    first: &Matrix3<f64>,
+    whole: &Closures,
+) -> Result<Estimated, Failure> {
+    refuse_few(turns, rest, whole)?;
+    let at_rest = mean_at_rest(rest);
     let of_accel = Covariance::from_fn(|i, j| accel.inverse_covariance[(i, j)]);
     let size = first.norm() / 3f64.sqrt();
-    let by = ByTurns::of(turns, rest, at_rest, size, of_accel);
-    let [n_turns, n_rest] = by.rows();
-    let p = by.start(&first);
+    let by = ByTurns::of(turns, rest, whole, at_rest, size, of_accel);
+    let p = by.start(first);
     // The first weights: half a degree, and the scatter of the dwells.
     let residuals = by.linearize(&p).residuals;
-    let of_rest = residuals.rows(n_turns, n_rest).norm_squared() / n_rest as f64;
+    let rests = by.rows.0[5].clone();
+    let of_rest = residuals.rows(rests.start, rests.len());
+    let of_rest = of_rest.norm_squared() / rests.len() as f64;
+    let half_degree = 0.5f64.to_radians().powi(2);
     let mut groups = Reweighted::new(
-        [0..n_turns, n_turns..n_turns + n_rest],
-        [0.5f64.to_radians().powi(2), of_rest],
+        by.rows.0.clone(),
+        [half_degree, half_degree, 0.0, 0.0, 0.0, of_rest],
     );
     let Solved {
         found, covariance, ..
     } = groups.solve(&by, p)?;
     let (inverse, change) = by.about_zero(&found.parameters);
-    let own = groups.rows.iter().zip(&groups.scatter);
-    let own = own.map(|(rows, group)| {
+    let of_accelerometer = accel.inverse_parts();
+    let accel_dof = of_accelerometer.iter().map(|part| part.dof);
+    let accel_dof = accel_dof.fold(f64::INFINITY, f64::min);
+    let own = groups.rows.iter().zip(&groups.scatter).enumerate();
+    let own = own.filter(|(_, (rows, _))| !rows.is_empty());
+    let own = own.map(|(group, (rows, scatter))| {
         let own = found.at.part(&covariance, rows);
         Part {
             covariance: Covariance::from_fn(|i, j| own[(i, j)]),
-            dof: group.variance_dof(),
+            dof: match group {
+                ERRORS => accel_dof,
+                _ => scatter.variance_dof(),
+            },
         }
     });
-    let gain = by.gain(&found, &covariance);
-    let gain = Covariance::from_fn(|i, j| gain[(i, j)]);
-    let of_accelerometer = accel.inverse_parts();
-    let shared = of_accelerometer.iter().map(|part| part.seen_by(&gain));
+    let gain = by.of_errors.is_none().then(|| {
+        let gain = by.gain(&found, &covariance);
+        Covariance::from_fn(|i, j| gain[(i, j)])
+    });
+    let shared = of_accelerometer.iter();
+    let shared = shared.filter_map(|part| Some(part.seen_by(gain.as_ref()?)));
     let parts = own.chain(shared).map(|part| part.seen_by(&change));
     let triad = Triad::from_inverse(inverse, parts.collect()).ok_or_else(|| {
         Failure::NoSolution(
@@ -305,9 +476,12 @@ pub fn estimate(
     })?;
     Ok(Estimated {
         triad,
-        scatter: [Observable::Turns, Observable::Rest]
+        scatter: GROUPS
             .into_iter()
             .zip(groups.scatter)
+            .zip(&groups.rows)
+            .filter(|((observable, _), rows)| *observable == Observable::Turns || !rows.is_empty())
+            .map(|(group, _)| group)
             .collect(),
         condition: by.shape(&found).condition,
         delays: None,

@@ -1,20 +1,23 @@
 //! Both triads with gravity as the only reference: the accelerometer by its magnitude, the gyro by the turns between dwells.
 
 use mimu_core::compensation::Affine;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::determined::{faces_not_up, unseen_poses};
 use super::hold_out::{Refits, Split, determined};
 use super::sensor::{Residual, SensorFit, rms, typical};
 use super::{Options, finish, refuse_wrong_gravity, uncalibrated};
+use crate::estimate::whole_turns::Data;
 use crate::estimate::with_turns::JointFit;
 use crate::estimate::{Estimated, Failure, Observation, magnitude, rotation};
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::{Rest, Turn, TurnError};
-use crate::observation::vector;
+use crate::observation::{place, vector};
 use crate::prepared::Prepared;
-use crate::quantity::{Figure, Sensor};
-use crate::triad::Triad;
+use crate::quantity::{AXES, Figure, Sensor};
+use crate::signal::blocks::quantile;
+use crate::signal::dwell::Fault;
+use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
@@ -34,9 +37,15 @@ pub(super) fn fit_gravity(
         poses: &poses,
         variances: &by_sphere,
     };
-    let (accel, with_turns) = by_poses
-        .estimate()
-        .map_err(|f| prepared.refused(by_poses.with_faces(f), Sensor::Accel))?;
+    let estimated = by_poses.estimate();
+    // Whole turns do not need the accelerometer, and the turns that would help it are few.
+    if !matches!(&estimated, Ok((_, None)))
+        && let Some(accel) = by_poses.as_delivered()
+    {
+        return turns_alone(prepared, options, accel, warnings);
+    }
+    let (accel, with_turns) =
+        estimated.map_err(|f| prepared.refused(by_poses.with_faces(f), Sensor::Accel))?;
     let floors = prepared.magnitude_floors(&accel.triad.inverse, &poses);
     let parts = options.holdout_blocks.min(poses.len());
     let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
@@ -109,6 +118,74 @@ pub(super) fn fit_gravity(
     Ok(sensors)
 }
 
+/// The gyro alone, by whole turns, if the poses do not determine the accelerometer: its readings as delivered give the directions of gravity.
+fn turns_alone(
+    prepared: &Prepared,
+    options: Options,
+    accel: Estimated,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<SensorFit>> {
+    if options.only == Some(Sensor::Accel) || !prepared.has(Sensor::Gyro) {
+        return Ok(Vec::new());
+    }
+    let dwells = prepared.dwells.list.len();
+    let parts = options.holdout_blocks.min(dwells);
+    let parts = Parts {
+        count: parts,
+        of: &|split, dwell| split.part(dwell, dwells, parts),
+        accel_without: &|_, _| Ok(accel.clone()),
+    };
+    let fit = fit_turns(prepared, &accel, &parts, warnings)?;
+    warnings.push(Warning::AccelAsDelivered {
+        doubt: DELIVERED.0.hypot(DELIVERED.1),
+    });
+    Ok(fit.into_iter().collect())
+}
+
+/// The gyro by turns, and by whole turns if these are stated.
+pub(super) fn by_turns(prepared: &Prepared, data: &Data) -> Outcome<Estimated> {
+    match prepared.whole_turns() {
+        Some(stated) => stated.estimate(data),
+        None => rotation::estimate(
+            data.turns,
+            data.rest,
+            data.accel,
+            data.motions,
+            data.start,
+            data.gravity,
+        ),
+    }
+}
+
+/// Warnings about turns with clipped readings, if turns are whole: the rate that they may have.
+fn clipped(prepared: &Prepared, gyro: &Affine<f64>) -> Vec<Warning> {
+    if prepared.whole_turns().is_none() {
+        return Vec::new();
+    }
+    let refused = prepared.turns(&Affine::identity()).1.into_iter();
+    let each = refused.filter_map(|warning| {
+        let Warning::TurnNotUsed {
+            from,
+            to,
+            fault: Some(Fault::Saturated(axis)),
+        } = warning
+        else {
+            return None;
+        };
+        let by = gyro.matrix[(axis, axis)].abs();
+        let rest = -gyro.offset[axis] / gyro.matrix[(axis, axis)];
+        let fastest = by * prepared.dwells.rails[axis].nearest(rest);
+        let axis = AXES[axis];
+        fastest.is_finite().then_some(Warning::WholeTurnClipped {
+            from,
+            to,
+            axis,
+            fastest,
+        })
+    });
+    each.collect()
+}
+
 /// The poses of the accelerometer.
 ///
 /// # Errors
@@ -140,6 +217,9 @@ fn poses(prepared: &Prepared) -> Result<Vec<Observation>> {
 /// Condition of the poses from which on the turns between them help to determine the accelerometer. Twenty poses all around have 2 to 5. Ten poses of
 /// a fixture that tips by 60 degrees have 73 to 96: the misfit of 5 mm/s² in real recordings then becomes 4 % of a scale factor.
 pub(super) const POOR_POSES: f64 = 100.0;
+/// Errors of an accelerometer as delivered, standard deviations: of each element of its matrix, and of its biases in g. Data sheets of hobby parts give
+/// 3 % of sensitivity, 2 % across axes, and 60 to 80 mg, as largest values.
+const DELIVERED: (f64, f64) = (0.02, 0.05);
 /// Fewest turns between the poses: as many as determine a gyro.
 const FEWEST_TURNS: usize = 5;
 
@@ -199,10 +279,52 @@ impl ByPoses<'_> {
         }
         let exact = Triad::from_inverse(accel, Vec::new())?;
         let (rest, motions) = (prepared.rest(&accel), prepared.motions(&accel));
-        let gyro = rotation::estimate(&turns, &rest, &exact, &motions, None, self.gravity());
+        let gyro = by_turns(
+            prepared,
+            &Data {
+                turns: &turns,
+                rest: &rest,
+                accel: &exact,
+                motions: &motions,
+                start: None,
+                gravity: self.gravity(),
+            },
+        );
         Some(Guesses {
             accel,
             gyro: gyro.ok()?.triad.inverse,
+        })
+    }
+
+    /// The accelerometer as delivered, with what data sheets allow it to err. `None` unless whole turns are to determine the gyro without it, or if the
+    /// zero of its readings is not known.
+    fn as_delivered(&self) -> Option<Estimated> {
+        let by_turns = self.prepared.whole_turns().is_some();
+        if !by_turns || self.prepared.manifest.raw_unit == RawUnit::Volt {
+            return None;
+        }
+        let mut sizes: Vec<f64> = self.poses.iter().map(|o| o.raw.norm()).collect();
+        let scale = self.gravity() / quantile(&mut sizes, 0.5)?;
+        let errors = Covariance::from_fn(|i, j| match (i == j, place(i).1) {
+            (false, _) => 0.0,
+            (true, Some(_)) => (DELIVERED.0 * scale).powi(2),
+            (true, None) => (DELIVERED.1 * self.gravity()).powi(2),
+        });
+        let part = Part {
+            covariance: errors,
+            dof: f64::INFINITY,
+        };
+        let inverse = Affine {
+            matrix: Matrix3::identity() * scale,
+            offset: Vector3::zeros(),
+        };
+        Some(Estimated {
+            triad: Triad::from_inverse(inverse, vec![part])?,
+            scatter: Vec::new(),
+            condition: 1.0,
+            delays: None,
+            earth: Vec::new(),
+            notes: Vec::new(),
         })
     }
 
@@ -295,8 +417,16 @@ fn fit_turns(
         return Ok(None);
     }
     let motions = prepared.motions(by_full);
-    let gyro = rotation::estimate(&turns, &rest, &accel.triad, &motions, None, g)
-        .map_err(|f| prepared.refused(f, Sensor::Gyro))?;
+    let data = Data {
+        turns: &turns,
+        rest: &rest,
+        accel: &accel.triad,
+        motions: &motions,
+        start: None,
+        gravity: g,
+    };
+    let gyro = by_turns(prepared, &data).map_err(|f| prepared.refused(f, Sensor::Gyro))?;
+    warnings.extend(clipped(prepared, &gyro.triad.inverse));
     let c = gyro.triad.inverse.matrix;
     let mean_square = c.norm_squared() / 3.0;
     let mut residuals: Vec<Residual> = turns
@@ -323,7 +453,17 @@ fn fit_turns(
             .collect();
         let rest: Vec<_> = rest.iter().filter(|o| !of_part(o.dwell)).copied().collect();
         let start = Some(&gyro.triad.inverse);
-        let refit = rotation::estimate(&kept, &rest, &accel.triad, &[], start, g)?;
+        let refit = by_turns(
+            prepared,
+            &Data {
+                turns: &kept,
+                rest: &rest,
+                accel: &accel.triad,
+                motions: &[],
+                start,
+                gravity: g,
+            },
+        )?;
         let open = turns.iter().filter(|t| of_part(t.to)).map(|t| {
             let block = TurnError::at(t, &gyro.triad.inverse).block;
             [0, 1]

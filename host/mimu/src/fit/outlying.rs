@@ -9,8 +9,9 @@ mod deletion;
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, Matrix3x2, Vector3};
 
-use super::by_gravity::POOR_POSES;
-use crate::estimate::{Estimated, Observation, magnitude, rotation};
+use super::by_gravity::{POOR_POSES, by_turns};
+use crate::estimate::whole_turns::Data;
+use crate::estimate::{Estimated, Observation, magnitude};
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::{Turn, TurnError};
 use crate::observation::{LOWER, free, vector};
@@ -187,7 +188,15 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
     }
     let rest = prepared.rest(&accel.triad.inverse);
     let motions = prepared.motions(model);
-    let Ok(gyro) = rotation::estimate(&turns, &rest, &accel.triad, &motions, None, g) else {
+    let data = Data {
+        turns: &turns,
+        rest: &rest,
+        accel: &accel.triad,
+        motions: &motions,
+        start: None,
+        gravity: g,
+    };
+    let Ok(gyro) = by_turns(prepared, &data) else {
         return out;
     };
     let matrix = gyro.triad.inverse.matrix;

@@ -4,6 +4,7 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Rotation3, SVector, Vector3};
 
+use super::closure::ClosureError;
 use super::magnitude::Magnitude;
 use super::turn::{Turn, TurnError};
 use super::{ByTriad, about, from_centre, of_output, vector};
@@ -129,7 +130,55 @@ fn kinds() -> Vec<Kind> {
         Kind::new("magnitude of force", of_magnitude),
         Kind::new("magnitude of rate", of_rate),
         turn,
+        Kind {
+            unit: agreeing,
+            ..Kind::new("whole turns", |unit, _| of_whole_turns(unit))
+        },
     ]
+}
+
+/// Two turns, whole in sum to within some degrees, judged by the accelerometer's readings before and after them. The first goes round about an axis that
+/// no axis of the unit is parallel to.
+fn of_whole_turns(unit: &Unit) -> Found {
+    let gyro = self::unit().gyro;
+    let raw = |rate: Vector3<f64>| {
+        let inverse = gyro.matrix.try_inverse().expect("a unit");
+        inverse * (rate - gyro.offset)
+    };
+    let rate = Vector3::new(0.4, -0.7, 1.0).normalize() * std::f64::consts::TAU;
+    let pieces = |share: f64| -> Vec<Increment> {
+        let piece = |k: u32| Increment {
+            end_s: 0.01 * f64::from(k + 1),
+            duration_s: 0.01,
+            integral: (raw(rate * share) * 0.01).into(),
+            ..Increment::EMPTY
+        };
+        (0..100).map(piece).collect()
+    };
+    let [first, second] = [pieces(0.62), pieces(0.39)];
+    let readings = [[1.9, 1.1, 2.1], [2.0, 2.3, 1.5], [1.93, 1.08, 2.09]].map(Vector3::from);
+    let turn = |increments, from: usize| {
+        let raw = [readings[from], readings[from + 1]];
+        let [before, after] = raw.map(|raw| unit.accel.apply(&raw));
+        Turn {
+            from,
+            to: from + 1,
+            steps: [0, 1],
+            increments,
+            before,
+            after,
+            raw,
+            direction_variance: 0.0,
+            earth_variance: 0.0,
+            integral_variance: 0.0,
+            duration_s: 1.0,
+        }
+    };
+    let turns = [turn(&first, 0), turn(&second, 1)];
+    let error = ClosureError::at(&turns, &unit.gyro, 1e-4).expect("two turns");
+    let by_accel = error.by_accel(&[readings[0], readings[2]]);
+    let by = vec![(Sensor::Gyro, error.block.by(0)), (Sensor::Accel, by_accel)];
+    vec![(error.block.residual[0], by)]
 }
 
 /// A turn, judged by the accelerometer's readings before and after it.
@@ -140,6 +189,7 @@ fn of_turn(unit: &Unit) -> Found {
     let turn = Turn {
         from: 0,
         to: 1,
+        steps: [0, 1],
         increments: &pieces,
         before,
         after,

@@ -8,12 +8,14 @@
 //! |---|---|---|
 //! | [`vector`] | error of a known vector: an input of a table, or the rate at rest | by its triad |
 //! | [`magnitude`] | error of a known magnitude: of gravity, or of a turntable's rate | by its triad |
+//! | [`closure`] | error of the heading after whole turns that end where they began | by the gyro, by the forces before and after, and so by the accelerometer |
 //! | [`turn`] | error of the direction of gravity after a turn, two components | by the gyro, by the forces before and after, and so by the accelerometer; by the Earth's level rate |
 //!
 //! A new kind is a file with a function that gives [`Block`], a row in this table, and a case in the tests of `battery.rs`.
 
 #[cfg(test)]
 mod battery;
+pub mod closure;
 pub mod magnitude;
 pub mod turn;
 pub mod vector;

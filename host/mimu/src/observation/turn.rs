@@ -6,7 +6,7 @@
 use std::cell::RefCell;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::{Block, ByTriad, place, slope};
 use crate::signal::increment::Increment;
@@ -18,6 +18,8 @@ pub struct Turn<'a> {
     pub from: usize,
     /// Index of the dwell that it ends in.
     pub to: usize,
+    /// Numbers of these dwells.
+    pub steps: [i32; 2],
     /// The raw gyro, integrated piece by piece.
     pub increments: &'a [Increment],
     /// Specific force before and after, m/s², by the calibrated accelerometer.
@@ -152,7 +154,64 @@ pub(crate) struct Turned {
     /// Transforms a direction from the body frame before the turn into that after it.
     pub rotation: Matrix3<f64>,
     /// Derivatives of the turn (rad, in the frame after) by each column of C and by o.
-    by: [Matrix3<f64>; 4],
+    pub(super) by: [Matrix3<f64>; 4],
+}
+
+impl Turned {
+    /// Under the calibration `gyro`, raw to rad/s.
+    pub(crate) fn at(turn: &Turn, gyro: &Affine<f64>) -> Self {
+        let pieces = about_zero(turn);
+        integrate(pieces, &gyro.matrix, &gyro.offset, |_, _| ())
+    }
+
+    /// This turn and the `next`, as one.
+    pub(super) fn then(self, next: &Self) -> Self {
+        let rotation = next.rotation;
+        Self {
+            rotation: rotation * self.rotation,
+            by: [0, 1, 2, 3].map(|k| rotation * self.by[k] + next.by[k]),
+        }
+    }
+}
+
+/// The pieces of a turn, with nothing subtracted from the readings.
+fn about_zero(turn: &Turn) -> impl DoubleEndedIterator<Item = Centred> + ExactSizeIterator {
+    let pieces = turn.increments.iter();
+    pieces.map(|increment| Centred::new(increment, &Vector3::zeros()))
+}
+
+/// How far the unit turned on its way, by the calibration `gyro`.
+#[derive(Debug, Clone, Copy)]
+pub struct Path {
+    /// The angle about the mean axis, rad.
+    pub angle: f64,
+    /// The mean axis, unit vector in the body; zero without a turn.
+    pub axis: Vector3<f64>,
+    /// The fastest rate over some 10 ms, rad/s.
+    pub fastest: f64,
+}
+
+impl Path {
+    /// Of neighbouring `turns`.
+    pub fn of(turns: &[Turn], gyro: &Affine<f64>) -> Self {
+        let half = cofactor(&gyro.matrix) * 0.5;
+        let (mut sum, mut fastest) = (Vector3::zeros(), 0.0_f64);
+        for piece in turns.iter().flat_map(about_zero) {
+            let turned = piece.rotation(&gyro.matrix, &gyro.offset, &half);
+            sum += turned;
+            fastest = fastest.max(turned.norm() / piece.duration);
+        }
+        Self {
+            angle: sum.norm(),
+            axis: sum.try_normalize(0.0).unwrap_or_else(Vector3::zeros),
+            fastest,
+        }
+    }
+
+    /// Number of turns.
+    pub fn turns(&self) -> f64 {
+        self.angle / std::f64::consts::TAU
+    }
 }
 
 /// The turn over `pieces` under `ω = C (u - rest) + o`. `each` is called with the index of each piece, and with the matrix that takes its rotation vector
@@ -302,9 +361,7 @@ impl TurnError {
         gyro: &Affine<f64>,
         each: impl FnMut(usize, &Matrix3<f64>),
     ) -> Self {
-        let pieces = turn.increments.iter();
-        let pieces = pieces.map(|increment| Centred::new(increment, &Vector3::zeros()));
-        let turned = integrate(pieces, &gyro.matrix, &gyro.offset, each);
+        let turned = integrate(about_zero(turn), &gyro.matrix, &gyro.offset, each);
         Self::of(turn, &turned)
     }
 
@@ -347,6 +404,18 @@ fn between(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
     } else {
         axis
     }
+}
+
+/// The rotation vector by which a turn errs, in the body frame after it: `rotation` minus the shortest turn from the unit vector `before` to `after`.
+pub(super) fn attitude_error(
+    rotation: &Matrix3<f64>,
+    before: &Vector3<f64>,
+    after: &Vector3<f64>,
+) -> Vector3<f64> {
+    let shortest = Rotation3::from_scaled_axis(between(before, after));
+    let error = Rotation3::from_matrix_unchecked(*rotation) * shortest.inverse();
+    // Directions turn in the body the other way than the body does.
+    -UnitQuaternion::from_rotation_matrix(&error).scaled_axis()
 }
 
 /// Two unit vectors across `w`.
@@ -402,6 +471,7 @@ mod tests {
         let turn = Turn {
             from: 0,
             to: 1,
+            steps: [0, 1],
             increments: &increments,
             before,
             after: brute_force(rate, 0.0, 1.0).transpose() * before,

@@ -130,6 +130,15 @@ impl Rails {
     }
 }
 
+impl Rails {
+    /// Distance of the nearer rail from `reading`; infinite without one.
+    pub fn nearest(&self, reading: f64) -> f64 {
+        let all = [self.low, self.high].into_iter().flatten();
+        all.map(|rail| (rail - reading).abs())
+            .fold(f64::INFINITY, f64::min)
+    }
+}
+
 /// Pooled moments of several blocks; extremes are not kept.
 pub(crate) fn pool(parts: impl Iterator<Item = Moments>) -> Moments {
     parts.fold(Moments::default(), |a, b| {

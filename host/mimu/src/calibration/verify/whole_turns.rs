@@ -1,0 +1,138 @@
+//! What a calibrated gyro reads for whole turns, in degrees for each turn.
+
+use std::f64::consts::TAU;
+
+use mimu_core::compensation::Affine;
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use crate::calibration::Calibration;
+use crate::estimate::whole_turns::Stated;
+use crate::observation::closure::{Closure, ClosureError};
+use crate::observation::turn::{Path, Turn};
+use crate::prepared::Prepared;
+use crate::quantity::{AXES, Sensor};
+use crate::warning::Warning;
+
+/// Whole turns count for an axis if their axis is within 25 degrees of it, cosine.
+const NEAR_AXIS: f64 = 0.9;
+
+/// The whole turns about an axis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WholeTurnsOfAxis {
+    /// The axis of the gyro, or `other` for turns about none of them.
+    pub axis: &'static str,
+    /// How often the unit was turned and put back.
+    pub times: usize,
+    /// Turns of all of them together.
+    pub turns: u32,
+    /// What the gyro reads for one turn less 360 degrees, mean over both directions.
+    pub error_deg_per_turn: f64,
+    /// Half-width of the 95 % interval of that, by the stated placement and the noise.
+    pub half_width_deg_per_turn: f64,
+    /// The same error of the readings as they came, with the rate at rest subtracted; absent if they are not in SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncalibrated_deg_per_turn: Option<f64>,
+}
+
+/// What was read for one axis, in sum: times, turns, errors (rad), their variance, and errors of the readings as they came.
+#[derive(Default, Clone, Copy)]
+struct Sum {
+    times: usize,
+    turns: f64,
+    error: f64,
+    variance: f64,
+    uncalibrated: f64,
+}
+
+/// The whole turns of `prepared` by its gyro's `calibration`, and what could not be used. Empty unless whole turns are stated.
+pub(super) fn verify(
+    prepared: &Prepared,
+    calibration: &Calibration,
+) -> (Vec<WholeTurnsOfAxis>, Vec<Warning>) {
+    let (Some(stated), Some(gyro)) = (
+        prepared.whole_turns(),
+        calibration
+            .inverse(Sensor::Gyro)
+            .filter(|_| prepared.has(Sensor::Accel)),
+    ) else {
+        return Default::default();
+    };
+    // The turn about the vertical hardly depends on the accelerometer's errors, so its readings as they came will do.
+    let accel = calibration
+        .inverse(Sensor::Accel)
+        .unwrap_or_else(Affine::identity);
+    let (turns, _) = prepared.turns(&accel);
+    let covariance = calibration.covariance(Sensor::Gyro);
+    let found = stated.find(&turns, &gyro, &|_, by| {
+        covariance.map_or(0.0, |c| (by.transpose() * c * by)[0].max(0.0).sqrt())
+    });
+    let rest = prepared.rest(&accel);
+    let at_rest = rest.iter().map(|r| r.raw).sum::<Vector3<f64>>() / rest.len().max(1) as f64;
+    let as_came = prepared.is_in_si().then(|| Affine {
+        offset: -at_rest,
+        ..Affine::identity()
+    });
+    let c2 = gyro.matrix.norm_squared() / 3.0;
+    let mut sums = [Sum::default(); 4];
+    let variances = found.closures.variances(&turns, c2);
+    for (closure, variance) in found.closures.list.iter().zip(variances) {
+        let own = &turns[closure.turns.clone()];
+        let largest = closure.path.axis.iamax();
+        let near = closure.path.axis[largest].abs() >= NEAR_AXIS;
+        let sum = &mut sums[if near { largest } else { 3 }];
+        let read = |model: &Affine<f64>| error_along(&stated, own, closure, model);
+        let Some(error) = read(&gyro) else { continue };
+        sum.times += 1;
+        sum.turns += closure.path.turns().round();
+        sum.error += error;
+        sum.variance += variance;
+        sum.uncalibrated += as_came.as_ref().and_then(read).unwrap_or(f64::NAN);
+    }
+    let names = AXES.into_iter().chain(["other"]);
+    let each = names.zip(sums).filter(|(_, sum)| sum.times > 0);
+    let each = each.map(|(axis, sum)| {
+        let per_turn = |rad: f64| rad.to_degrees() / sum.turns;
+        WholeTurnsOfAxis {
+            axis,
+            times: sum.times,
+            turns: sum.turns as u32,
+            error_deg_per_turn: per_turn(sum.error),
+            half_width_deg_per_turn: per_turn(1.96 * sum.variance.sqrt()),
+            uncalibrated_deg_per_turn: as_came.map(|_| per_turn(sum.uncalibrated)),
+        }
+    });
+    (each.collect(), found.warnings)
+}
+
+/// How much too far `gyro` turns in whole turns, rad, about their axis. The closure gives it but for whole turns, and the integral along the axis those.
+fn error_along(
+    stated: &Stated,
+    turns: &[Turn],
+    closure: &Closure,
+    gyro: &Affine<f64>,
+) -> Option<f64> {
+    let error = ClosureError::at(turns, gyro, stated.vertical[0])?;
+    let about = Path::of(turns, gyro);
+    // The residual is about the vertical; along the axis of the turns, which may lean, it is the part that turning further would change.
+    let up = turns.last()?.after.normalize();
+    let part = up.dot(&about.axis);
+    let closed = match part.abs() > 0.5 {
+        true => error.block.residual[0] / part,
+        false => tilted(turns, gyro)?,
+    };
+    let near = about.angle - TAU * closure.path.turns().round();
+    Some(closed + TAU * ((near - closed) / TAU).round())
+}
+
+/// The same by gravity, about an axis that is nearer to level.
+fn tilted(turns: &[Turn], gyro: &Affine<f64>) -> Option<f64> {
+    let (first, last) = (turns.first()?, turns.last()?);
+    let about = Path::of(turns, gyro).axis;
+    let turned = ClosureError::rotation(turns, gyro)? * first.before.normalize();
+    let after = last.after.normalize();
+    let flat = |v: Vector3<f64>| v - about * about.dot(&v);
+    let (a, b) = (flat(turned), flat(after));
+    // Directions turn in the body the other way than the body does.
+    Some(a.cross(&b).dot(&about).atan2(a.dot(&b)))
+}

@@ -1,0 +1,205 @@
+//! Whole turns by hand: scale factors of a gyro without equipment.
+
+use mimu::calibration::Calibration;
+use mimu::calibration::verify::verify;
+use mimu::fit::{Options, fit};
+use mimu::quantity::Sensor;
+use mimu::warning::Warning;
+use mimu_recording::WholeTurns;
+use mimu_tests::by_hand::{Grade, unit};
+use mimu_tests::whole_turns::{Session, case, recorded, scales};
+use rayon::prelude::*;
+
+fn median(mut all: Vec<f64>) -> f64 {
+    all.sort_by(f64::total_cmp);
+    all[all.len() / 2]
+}
+
+/// Prints a row for a session; returns the median half-width of the scale factors, and the share of all parameters inside of their intervals.
+fn row(grade: Grade, session: Session, seeds: std::ops::Range<u64>) -> (f64, f64) {
+    let count = seeds.end - seeds.start;
+    let all: Vec<_> = seeds
+        .into_par_iter()
+        .filter_map(|seed| match case(grade, session, seed) {
+            Ok(scales) => Some(scales),
+            Err(refused) => {
+                println!("{grade:?}, {}, seed {seed}: {refused}", session.name());
+                None
+            }
+        })
+        .collect();
+    let each = |of: &dyn Fn(&mimu_tests::whole_turns::Scales) -> [f64; 3]| -> Vec<f64> {
+        all.iter().flat_map(of).map(f64::abs).collect()
+    };
+    let scale_inside = all.iter().flat_map(|s| {
+        let pairs = s.errors.iter().zip(s.half_widths);
+        pairs.map(|(error, half)| f64::from(u8::from(error.abs() <= half)))
+    });
+    let scale_inside = scale_inside.sum::<f64>() / (3 * all.len()) as f64;
+    let inside = all.iter().map(|s| f64::from(s.inside)).sum::<f64>() / (12 * all.len()) as f64;
+    let half = median(each(&|s| s.half_widths));
+    println!(
+        "| {grade:?} | {} | {:.1} | {} of {count} | {:.3} | {:.3} | {:.1} | {:.1} |",
+        session.name(),
+        median(all.iter().map(|s| s.duration_s / 60.0).collect()),
+        all.len(),
+        100.0 * median(each(&|s| s.errors)),
+        100.0 * half,
+        100.0 * scale_inside,
+        100.0 * inside,
+    );
+    (half, inside)
+}
+
+const HEAD: &str = "| grade | session | min | fitted | scale error, median % | half interval, median % | scale inside, % | all inside, % |";
+
+#[test]
+fn whole_turns_make_the_scale_factors_of_the_same_recording_more_certain() {
+    println!("{HEAD}");
+    let (without, _) = row(Grade::Consumer, Session::Unstated, 0..12);
+    let (with, inside) = row(Grade::Consumer, Session::PosesAndTurns, 0..12);
+    assert!(with < 0.0003, "{with}");
+    assert!(with < 0.8 * without, "{with} {without}");
+    assert!(inside > 0.9, "{inside}");
+}
+
+#[test]
+fn whole_turns_alone_give_the_scale_factors() {
+    let (turns, inside) = row(Grade::Consumer, Session::Turns, 0..12);
+    assert!(turns < 0.001, "{turns}");
+    assert!(inside > 0.9, "{inside}");
+}
+
+#[test]
+#[ignore = "minutes; prints the table of docs/whole-turns.md"]
+fn what_whole_turns_buy() {
+    println!("{HEAD}");
+    for grade in [Grade::Consumer, Grade::Tactical, Grade::Analog] {
+        for session in Session::ALL {
+            // Nobody knows the zero of an accelerometer in volts before poses show it.
+            if grade != Grade::Analog || session != Session::Turns {
+                row(grade, session, 0..100);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_miscounted_turn_is_named_and_does_no_harm() {
+    let file = unit(&[], Grade::Consumer, 3);
+    let plan = Session::PosesAndTurns
+        .plan(10)
+        .replacen("whole_turns = 10", "whole_turns = 9", 1);
+    let stated = WholeTurns {
+        turns: Some(10),
+        ..WholeTurns::default()
+    };
+    let fitted = fit(recorded(&file, &plan, 3, Some(stated)), Options::IN_SAMPLE).unwrap();
+    let named = fitted.all_warnings().map(ToString::to_string);
+    let named: Vec<String> = named.filter(|w| w.contains("not 10")).collect();
+    assert_eq!(named.len(), 1, "{named:?}");
+    assert!(
+        named[0].contains("turned 8.9") || named[0].contains("turned 9.0"),
+        "{named:?}"
+    );
+    let scales = scales(&fitted, &file, 3, &plan);
+    assert!((0..3).all(|k| scales.errors[k].abs() < 1e-3), "{scales:?}");
+}
+
+#[test]
+fn a_unit_that_is_not_put_back_is_named_and_left_out() {
+    let file = unit(&[], Grade::Consumer, 4);
+    let right = Session::PosesAndTurns.plan(10);
+    // 4 degrees off, which only the other turns tell, and 40.
+    for off in ["whole_turns = 10.011", "whole_turns = 10.11"] {
+        let plan = right.replacen("whole_turns = 10", off, 1);
+        let stated = WholeTurns {
+            placement_deg: 0.5,
+            turns: None,
+        };
+        let mut careful = file.clone();
+        careful.hands.put_back_deg = 0.25;
+        let fitted = fit(
+            recorded(&careful, &plan, 4, Some(stated)),
+            Options::IN_SAMPLE,
+        )
+        .unwrap();
+        let named = fitted.all_warnings().map(ToString::to_string);
+        let named: Vec<String> = named.filter(|w| w.contains("are not used")).collect();
+        assert_eq!(named.len(), 1, "{off}: {named:?}");
+        let scales = scales(&fitted, &file, 4, &plan);
+        assert!((0..3).all(|k| scales.errors[k].abs() < 5e-4), "{scales:?}");
+    }
+}
+
+#[test]
+fn headings_that_scatter_more_than_stated_widen_the_intervals() {
+    let inside = (20..40).into_par_iter().map(|seed| {
+        let mut file = unit(&[], Grade::Consumer, seed);
+        file.hands.put_back_deg = 2.0;
+        let plan = Session::PosesAndTurns.plan(10);
+        let stated = Some(WholeTurns::default());
+        let fitted = fit(recorded(&file, &plan, seed, stated), Options::IN_SAMPLE).unwrap();
+        scales(&fitted, &file, seed, &plan).inside
+    });
+    let inside: u32 = inside.sum();
+    println!("{inside} of 240");
+    assert!(inside >= 216, "{inside} of 240");
+}
+
+#[test]
+fn clipped_turns_are_refused_with_the_rate_not_to_exceed() {
+    let mut file = unit(&[], Grade::Consumer, 5);
+    // Twice as fast as the range of ±250 deg/s allows.
+    file.hands.whole_turn_s = [1.0, 1.2];
+    let plan = Session::PosesAndTurns.plan(10);
+    let fitted = fit(
+        recorded(&file, &plan, 5, Some(WholeTurns::default())),
+        Options::IN_SAMPLE,
+    )
+    .unwrap();
+    let clipped: Vec<f64> = fitted
+        .all_warnings()
+        .filter_map(|w| match w {
+            Warning::WholeTurnClipped { fastest, .. } => Some(fastest.to_degrees()),
+            _ => None,
+        })
+        .collect();
+    println!("{clipped:?}");
+    assert_eq!(clipped.len(), 6);
+    assert!(
+        clipped.iter().all(|rate| (225.0..600.0).contains(rate)),
+        "{clipped:?}"
+    );
+}
+
+#[test]
+fn a_session_of_turns_verifies_a_calibration_in_degrees_for_each_turn() {
+    let file = unit(&[], Grade::Consumer, 6);
+    let made = recorded(
+        &file,
+        &Session::PosesAndTurns.plan(10),
+        6,
+        Some(WholeTurns::default()),
+    );
+    let fitted = fit(made, Options::IN_SAMPLE).unwrap();
+    let calibration = Calibration::of(&fitted, &[], "2026-01-02T03:04:05Z").unwrap();
+    let other = recorded(
+        &file,
+        &Session::PosesAndTurns.plan(5),
+        7,
+        Some(WholeTurns::default()),
+    );
+    let found = verify(&other, &calibration).unwrap();
+    assert_eq!(found.whole_turns.len(), 3);
+    for axis in &found.whole_turns {
+        println!("{axis:?}");
+        assert_eq!((axis.times, axis.turns), (2, 10), "{axis:?}");
+        assert!(
+            axis.error_deg_per_turn.abs() < 2.0 * axis.half_width_deg_per_turn,
+            "{axis:?}"
+        );
+        assert!(axis.half_width_deg_per_turn < 0.2, "{axis:?}");
+    }
+    assert!(found.sensors[Sensor::Gyro].is_some());
+}
