@@ -17,9 +17,11 @@
 //! | `Board`, `Board::start`                     | starts the clocks, and hands out pins and parts by name |
 //!
 //! All other files use these names. `memory.x` gives the addresses of flash and RAM, and has to agree with `CALIBRATION_SECTORS`; the
-//! firmware checks this at its start. A board with another microcontroller also needs drivers instead of `adc` and `flash`, which use the
+//! firmware checks this at its start. A board with another microcontroller also needs drivers instead of `board::adc` and `flash`, which use the
 //! registers of this one.
 
+#[cfg(all(target_os = "none", not(feature = "matek-h743")))]
+pub mod adc;
 pub mod clocks;
 
 #[cfg(feature = "matek-h743")]

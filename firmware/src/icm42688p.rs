@@ -229,7 +229,7 @@ impl<B: Bus> Chip for Icm42688p<B> {
     }
 
     async fn deflect(&mut self, gyro: bool, accel: bool) -> Result<(), Problem> {
-        let bits = u8::from(gyro) * 0b0111 | u8::from(accel) * 0b0111_1000;
+        let bits = (u8::from(gyro) * 0b0111) | (u8::from(accel) * 0b0111_1000);
         Ok(self.bus.write(SELF_TEST_CONFIG, bits).await?)
     }
 

@@ -17,7 +17,7 @@
 //! | [`bank`]              | a Kalman bank with its known input, fed from the stream           |
 //! | [`upload`]            | an upload in progress                                            |
 //! | [`slots`]             | stored calibrations, safe against a failing supply               |
-//! | `adc`                 | the converter's driver, the only place with its registers        |
+//! | `board::adc`          | the converter's driver, the only place with its registers        |
 //! | `spi`                 | the line to a digital sensor                                     |
 //! | `flash`               | the same of the flash memory                                     |
 //! | `sampling`            | the task that takes samples, with the highest priority           |
@@ -30,8 +30,6 @@
 //! Those with links compile for the PC as well and are tested there.
 #![no_std]
 
-#[cfg(all(target_os = "none", not(feature = "matek-h743")))]
-pub mod adc;
 pub mod bank;
 pub mod board;
 #[cfg(not(feature = "matek-h743"))]

@@ -78,10 +78,11 @@ mod parts {
     #[cfg(not(feature = "usb"))]
     use embassy_stm32::{mode::Async, usart};
 
-    use super::*;
+    #[cfg(not(feature = "usb"))]
+    use super::BAUD;
     use static_cell::ConstStaticCell;
 
-    use crate::adc::{Converter, RING};
+    use crate::board::adc::{Converter, RING};
     use crate::board::clocks;
     use crate::channels::Channels;
     use crate::front_end::FrontEnd;
