@@ -131,7 +131,7 @@ pub enum Format {
     RosImu(ros_imu::Options),
     /// Biases of the gyro and noise for Autoware: imu_corrector.param.yaml
     Autoware(autoware::Options),
-    /// Biases and noise for Gazebo: the element <imu> of SDF
+    /// Biases and noise for Gazebo: the element imu of SDF
     Gazebo(gazebo::Options),
     /// Errors and noise for MATLAB's imuSensor: JSON for loadparams
     Matlab(matlab::Options),

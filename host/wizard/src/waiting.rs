@@ -142,9 +142,9 @@ impl Serialize for Interruption {
 
 #[cfg(test)]
 mod tests {
-    use mimu_recording::health::Fault;
 
     use super::*;
+    use mimu_recording::health::Fault;
 
     #[test]
     fn a_reason_with_other_numbers_is_the_same_and_one_that_begins_with_the_same_word_is_not() {

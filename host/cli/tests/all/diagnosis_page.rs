@@ -253,8 +253,23 @@ fn numbers_of_the_page_are_those_of_the_json_and_are_read_in_its_units() {
     }
     for coefficient in effect["coefficients"].as_array().unwrap() {
         // ppm/(deg/s)²; the page shows twice the standard deviation.
-        seen(&coefficient["value"], 1e6 / (deg * deg), "");
-        seen(&coefficient["sigma"], 2.0 * 1e6 / (deg * deg), "");
+        let factor = 1e6 / (deg * deg);
+        let [value, sigma] = ["value", "sigma"].map(|key| coefficient[key].as_f64().unwrap());
+        let expected = [value * factor, 2.0 * sigma * factor];
+        // Two digits of the interval.
+        let fits = |text: &str| {
+            let parts = text.split_once(" ± ").map(|(value, half)| [value, half]);
+            let parts = parts.map(|parts| parts.map(|part| part.replace('−', "-").parse()));
+            parts.is_some_and(|parts: [Result<f64, _>; 2]| {
+                let mut both = parts.into_iter().zip(expected);
+                both.all(|(part, known)| {
+                    part.is_ok_and(|part| (part - known).abs() < 0.051 * expected[1])
+                })
+            })
+        };
+        let found = shown.iter().any(|(v, text)| same(*v, value) && fits(text));
+        assert!(found, "{expected:?} in {shown:?}");
+        checked += 2;
     }
     assert_eq!(checked, 20);
     // The other way round: every number in the table of errors is in the JSON.

@@ -94,7 +94,11 @@ pub(in crate::report::diagnosis) fn table(a: &Accepted) -> Table {
         let [from, to] = [form.from, form.to].map(significant);
         table.row([
             Cell::from(form.name.clone()),
-            Cell::from(format!("{} ({})", significant(form.value), form.interval())),
+            Cell::from(format!(
+                "{} (95 %: {})",
+                significant(form.value),
+                form.interval()
+            )),
             Cell::Empty,
             Cell::from(format!("{from} to {to} sought")),
         ]);
