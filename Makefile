@@ -20,7 +20,7 @@ PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device m
 BUILT := $(or $(CARGO_TARGET_DIR),target)/debug/.tests-built
 
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
-STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python page
+STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python
 
 .PHONY: help data test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example papers blind clumsy bench budget count device fuzz audit toolchain
 
@@ -119,13 +119,7 @@ package: toolchain ## every published crate as an archive, and a build from it
 web: toolchain ## the page that calibrates in the browser: static files in target/web, to put on any server
 	./web/build.sh $(CARGO)
 
-# Optimised, the page takes four minutes of processor time to compile, so `make test` has a part of its tests on one that is not.
-CHROMIUM := $(shell command -v chromium chromium-browser google-chrome | head -1)
-page: toolchain build-tests
-	@if [ -z "$(CHROMIUM)" ]; then echo "the page is not tested: there is no Chromium on the PATH"; else \
-	  MIMU_WEB_PROFILE=page-test ./web/build.sh $(CARGO) -q > /dev/null && \
-	  MIMU_PAGE=$(abspath $(or $(CARGO_TARGET_DIR),target))/web-test ./tests/interop/run.sh target/debug/mimu -m short; fi
-
+# Compiling the page takes four minutes of processor time, so `make test` compiles its program for the PC only.
 web-tests: web ## the page in Chromium, if there is one, against the command
 	$(CARGO) build --locked -q -p mimu-cli -p mimu-rig --bin mimu --bin mimu-rig
 	MIMU_PAGE=$(CURDIR)/target/web ./tests/interop/run.sh target/debug/mimu -k test_web -s

@@ -1,29 +1,24 @@
 #!/usr/bin/env bash
 # Builds the page: static files in target/web. Usage: build.sh CARGO [its arguments]
-# With MIMU_WEB_PROFILE=page-test, in target/web-test: not optimised, for a short test.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 target=${CARGO_TARGET_DIR:-$here/../target}
 mkdir -p "$target"
 target=$(cd "$target" && pwd)
-profile=${MIMU_WEB_PROFILE:-page}
-case $profile in
-    page-test) out=$target/web-test ;;
-    *) out=$target/web ;;
-esac
+out=$target/web
 
 venv=$target/web-cc
 "$here/../packaging/environment.sh" "$here/requirements.txt" "$venv"
 export MIMU_WEB_PYTHON=$venv/bin/python ZIG_GLOBAL_CACHE_DIR=$venv/cache ZIG_LOCAL_CACHE_DIR=$venv/cache
 export CC_wasm32_wasip1=$here/cc.sh AR_wasm32_wasip1=$here/ar.sh
-"$@" build --locked -p mimu-web --profile "$profile" --target wasm32-wasip1
+"$@" build --locked -p mimu-web --profile page --target wasm32-wasip1
 
 rm -rf "$out"
 mkdir -p "$out/example"
 cp "$here"/page/* "$out"
 cp "$here/../tests/example"/{accel,gyro}.txt "$out/example"
 cp "$here/../host/cli/src/report/page/style.css" "$out/report.css"
-cp "$target/wasm32-wasip1/$profile/mimu-web.wasm" "$out/mimu.wasm"
+cp "$target/wasm32-wasip1/page/mimu-web.wasm" "$out/mimu.wasm"
 cd "$out"
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$here/../Cargo.toml" | head -1)
 sed -i "s/MIMU_VERSION/$version/" index.html

@@ -10,10 +10,6 @@ import numpy
 import pytest
 from browser import chromium, page, server  # noqa: F401
 
-def pytest_configure(config):
-    config.addinivalue_line("markers", "short: the part of the page's tests that `make test` runs")
-
-
 EXAMPLE = pathlib.Path(__file__).parent.parent / "example"
 G = 9.80665
 

@@ -22,7 +22,6 @@ def calibrate(page):
     page.wait_for_selector("#work:not([hidden]) #progress[hidden]", state="attached", timeout=PATIENCE)
 
 
-@pytest.mark.short
 def test_the_example_gives_what_the_command_gives(page, tmp_path):
     begun = time.monotonic()
     page.click("#example")
@@ -63,7 +62,6 @@ def test_an_export_is_the_file_of_the_command(page, tmp_path):
     assert page.input_value("#gravity") == ""
 
 
-@pytest.mark.short
 def test_columns_are_taken_by_their_names_and_can_be_corrected(page, tmp_path):
     rows = web_logs.by_hand()
     # x and y of the accelerometer have each other's names.
