@@ -100,7 +100,7 @@ def shapes():
     yield "blanks and labels", "\n".join(" ".join(f"{n}: {v:.5f}" for n, v in zip(pairs, row, strict=True)) for row in zip(*values, strict=True)), "si"
     rows = list(zip(*values, strict=True))
     yield "groups of axes", "\n".join(f"T: {t:.5f}, ACC: X={a:.5f},Y={b:.5f},Z={c:.5f}, GYRO: X={p:.5f},Y={q:.5f},Z={r:.5f}" for t, a, b, c, p, q, r in rows), "si"
-    yield "three numbers behind a word", "\n".join(f"t: {t:.5f} acc: {a:.5f},{b:.5f},{c:.5f} gyro: {p:.5f},{q:.5f},{r:.5f}" for t, a, b, c, p, q, r in rows), "ask"
+    yield "three numbers behind a word", "\n".join(f"t: {t:.5f} acc: {a:.5f},{b:.5f},{c:.5f} gyro: {p:.5f},{q:.5f},{r:.5f}" for t, a, b, c, p, q, r in rows), "si"
     units = ["s"] + ["m/s2"] * 3 + ["rad/s"] * 3
     yield "labels and units", "\n".join(", ".join(f"{n}: {v:.5f} {u}" for n, v, u in zip(pairs, row, units, strict=True)) for row in rows), "si"
     yield "semicolons and decimal commas", simple("Zeit (s)", names("Accel {1} [m/s²]"), names("Gyro {1} [°/s]"), w=dps, separator=";").replace(".", ","), "si"

@@ -100,9 +100,14 @@ fn intervals_hold_the_truth_where_inputs_move_within_dwells() {
     turning_inputs(24);
 }
 
-/// Rates known to 0.3 %, twenty times the noise of a scale factor here, and to 0.01 %, which is below it.
-fn record_players(runs: u64) {
-    for rate_error in [0.003, 0.0001] {
+/// Rates known to 0.3 %, twenty times the noise of a scale factor here.
+const INEXACT: f64 = 0.003;
+
+/// Rates known to 0.01 %, which is below the noise of a scale factor here.
+const EXACT: f64 = 0.0001;
+
+fn record_players(runs: u64, rate_errors: &[f64]) {
+    for &rate_error in rate_errors {
         println!("rates known to {} %", 100.0 * rate_error);
         on_a_record_player(runs, rate_error).iter().for_each(judge);
     }
@@ -110,13 +115,13 @@ fn record_players(runs: u64) {
 
 #[test]
 fn intervals_hold_the_truth_on_a_record_player_of_which_the_rates_are_known_to_within_an_error() {
-    record_players(24);
+    record_players(24, &[INEXACT]);
 }
 
 #[test]
 #[ignore = "nightly: more recordings"]
 fn intervals_of_many_hold_the_truth_on_a_record_player() {
-    record_players(200);
+    record_players(200, &[INEXACT, EXACT]);
 }
 
 #[test]
@@ -152,7 +157,6 @@ fn intervals_of_many_hold_the_truth_of_dwells_that_share_the_wander() {
 
 #[test]
 fn intervals_hold_the_truth_where_only_gravity_is_known() {
-    by_hand(FEW / 2, false).iter().for_each(judge);
     by_hand(FEW / 2, true).iter().for_each(judge);
 }
 
@@ -220,7 +224,7 @@ fn held_out_error_of_a_perfect_model_is_the_noise_and_that_of_the_parameters() {
     let plan = bench::hand_plan(40);
     let options = options(4);
     let mut ratios = [[0.0; 2]; 2];
-    const RUNS: u64 = 8;
+    const RUNS: u64 = 3;
     for seed in 0..RUNS {
         let mut random = Random::new(seed, "unit");
         let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));

@@ -121,6 +121,7 @@ fn a_diagnosis_that_accepted_thermal_effects_does_not_say_that_the_model_has_no_
 /// Cubics of bias and scale factor, and dies that lag the thermometer by 150 s, from -20 to 70 °C and back: 43 rounds take 6000 s. 20 rounds would
 /// show only the way up. There a lag looks like a bias, and the held-out blocks reject it.
 #[test]
+#[ignore = "nightly: a recording of 6000 s"]
 fn what_is_found_from_the_data_does_not_keep_out_a_lag_and_what_is_significant_is_rejected_with_a_reason()
  {
     let ramp = plan(

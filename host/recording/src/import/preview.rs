@@ -66,17 +66,35 @@ pub fn preview(path: &Path, separator: Option<Separator>, most: usize) -> Result
     if head.len() as u64 >= enough - BOM.len() as u64 {
         lines.pop();
     }
-    let found = of_lines(&lines, separator, most);
-    let found = found.or_else(|| match separator {
-        None => labelled(&lines, most),
-        Some(_) => None,
-    });
+    let found = table_or_labelled(&lines, separator, most);
     found.ok_or_else(|| {
         let problem = "no line is a row of numbers";
         let remedy =
             "give a text file with one sample a line, Parquet, or a log with its usual ending";
         Error::new(path.display(), problem, remedy)
     })
+}
+
+/// Lines with labels can look like a table: `acc: 1,2,3 gyro: 4,5,6` cut at its commas has more numbers than words.
+fn table_or_labelled(
+    lines: &[&[u8]],
+    separator: Option<Separator>,
+    most: usize,
+) -> Option<Preview> {
+    let table = of_lines(lines, separator, most);
+    let is_table =
+        |t: &Preview| !t.names.is_empty() || !t.rows.iter().flatten().any(begins_with_label);
+    if separator.is_some() || table.as_ref().is_some_and(is_table) {
+        return table;
+    }
+    labelled(lines, most).or(table)
+}
+
+/// Whether a label and more stand in the cell, as in `acc: 1`. A time of day does not begin with a letter.
+fn begins_with_label(cell: &String) -> bool {
+    let cell = cell.trim();
+    let rest = cell.trim_start_matches(char::is_alphanumeric);
+    cell.starts_with(char::is_alphabetic) && rest.starts_with([':', '='])
 }
 
 fn of_lines(lines: &[&[u8]], separator: Option<Separator>, most: usize) -> Option<Preview> {
@@ -265,7 +283,21 @@ mod tests {
 
     fn of(text: &str) -> Preview {
         let lines: Vec<&[u8]> = text.lines().map(str::as_bytes).collect();
-        of_lines(&lines, None, 10).unwrap()
+        table_or_labelled(&lines, None, 10).unwrap()
+    }
+
+    #[test]
+    fn labels_before_three_numbers_are_no_cells_of_a_table() {
+        let line = "t: 0.1 acc: 1,2,3 gyro: 4,5,6";
+        let names = of(&[line; 3].join("\n")).names;
+        let named: Vec<&String> = names.iter().filter(|n| !n.is_empty()).collect();
+        assert_eq!(
+            named,
+            ["t", "acc x", "acc y", "acc z", "gyro x", "gyro y", "gyro z"]
+        );
+        // A state and a time of day in a table.
+        let table = of("T:ok,12:30:01,1,2,3,4\nT:ok,12:30:02,1,2,3,4\n");
+        assert_eq!(table.rows[0].len(), 6);
     }
 
     #[test]

@@ -78,6 +78,18 @@ fn affine_designs_attain_the_optimum_wherever_spherical_2_designs_exist() {
 
 #[test]
 fn five_dwells_are_best_on_a_triangular_bipyramid() {
+    let problem = accel(Reference::Table, "affine");
+    let judged = problem.judge(&problem.best(5, 1).unwrap(), 1.0);
+    assert!(
+        close(judged.determinant, 22.5 / 625.0, 1e-9),
+        "{}",
+        judged.determinant
+    );
+}
+
+#[test]
+#[ignore = "nightly: a search by trial"]
+fn of_five_dwells_anywhere_none_are_better_than_a_triangular_bipyramid() {
     let of_sphere = |x: &[f64]| {
         let f = DMatrix::from_fn(5, 4, |i, j| {
             let (t, p) = (x[2 * i], x[2 * i + 1]);
@@ -88,13 +100,6 @@ fn five_dwells_are_best_on_a_triangular_bipyramid() {
     let known = brute_force::best(10, PI, of_sphere);
     // Poles and an equilateral triangle: 5 * (3/2)(3/2) 2.
     assert!(close(known, 22.5, 1e-6), "{known}");
-    let problem = accel(Reference::Table, "affine");
-    let judged = problem.judge(&problem.best(5, 1).unwrap(), 1.0);
-    assert!(
-        close(judged.determinant, 22.5 / 625.0, 1e-9),
-        "{}",
-        judged.determinant
-    );
 }
 
 #[test]
@@ -124,13 +129,23 @@ fn four_are_a_tetrahedron_and_six_an_octahedron() {
 
 #[test]
 fn the_size_of_gravity_is_best_measured_all_over_the_sphere() {
+    all_over_the_sphere(&[12, 13]);
+}
+
+#[test]
+#[ignore = "nightly: more numbers of dwells"]
+fn the_size_of_gravity_by_any_number_of_dwells_is_best_measured_all_over_the_sphere() {
+    all_over_the_sphere(&[9, 10, 11, 12, 13, 14, 15, 16, 20]);
+}
+
+fn all_over_the_sphere(numbers: &[usize]) {
     // The optimum is invariant under rotation, so it has the moments of the whole sphere: E x² = 1/3, E x⁴ = 1/5, E x²y² = 1/15. Cross products 1/15,
     // linear terms 1/3, squares det 4/675.
     let uniform = 15_f64.powi(-3) * 3_f64.powi(-3) * 4.0 / 675.0;
     let problem = accel(Reference::Gravity, "affine");
     assert!(close(problem.optimum.log_det.exp(), uniform, 1e-6));
     // Spherical 4-designs exist for 12, 14 and from 16 on, but not for 13 and 15 (Hardin and Sloane 1996). 12 is the icosahedron.
-    for n in [9, 10, 11, 12, 13, 14, 15, 16, 20] {
+    for &n in numbers {
         let judged = problem.judge(&problem.best(n, 1).unwrap(), 1.0);
         let attains = (judged.d_efficiency - 1.0).abs() < 1e-6;
         assert_eq!(
@@ -219,8 +234,7 @@ fn own_squares_are_best_measured_on_six_faces() {
     }
 }
 
-/// Each term and each fixture, with and without a known input, among problems with and without an optimum; the nightly run has the other
-/// combinations.
+/// Each term and each fixture, with and without a known input; the nightly run has all combinations.
 #[test]
 fn problems_have_an_optimum_that_designs_approach_or_name_what_they_cannot_tell_apart() {
     use Fixture::{Faces, ThreeAxis, TwoAxis};
@@ -228,13 +242,9 @@ fn problems_have_an_optimum_that_designs_approach_or_name_what_they_cannot_tell_
     for (list, fixture, reference) in [
         ("affine", TwoAxis, Gravity),
         ("affine,quadratic", ThreeAxis, Gravity),
-        ("affine,cubic", TwoAxis, Table),
-        ("affine,cross", TwoAxis, Table),
-        ("affine,quadratic", Faces, Table),
         ("affine,cubic", Faces, Table),
+        ("affine,cross", TwoAxis, Table),
         ("affine,cross", Faces, Gravity),
-        ("affine,cross", ThreeAxis, Gravity),
-        ("affine,quadratic,cubic,cross", ThreeAxis, Table),
     ] {
         approached_or_refused(list, fixture, reference);
     }
