@@ -6,9 +6,8 @@
 //! [`Compensator::follow`] runs several times per second, with the temperature and the elapsed time; [`Compensator::apply`] runs with every
 //! sample:
 //!
-//! 1. errors of the converter's code are removed from the raw reading ([`Effects::without_code_errors`]);
-//! 2. `x = C u + o`, C and o at the temperature of the dies ([`Table`], [`DieLag`]);
-//! 3. the other effects are removed from x ([`Effects::remove`]).
+//! 1. `x = C u + o`, C and o at the temperature of the dies ([`Table`], [`DieLag`]);
+//! 2. the effects are removed from x ([`Effects::remove`]).
 
 use nalgebra::{RealField, convert};
 
@@ -125,17 +124,7 @@ impl<T: RealField + Copy, const NODES: usize, const ROOM: usize> Compensator<T, 
     /// Converts a raw sample to SI. Call it with every sample in order, and [`State::gap`] if samples are missing.
     #[inline]
     pub fn apply(&self, state: &mut State<T, ROOM>, raw: &Sample<T>) -> Sample<T> {
-        match &self.effects {
-            Some(all) => self.apply_clean(state, &all.without_code_errors(raw)),
-            None => state.model.model.apply(raw),
-        }
-    }
-
-    /// The same for a reading without errors of the converters' codes: the PC can remove these more accurately than the device has time
-    /// for.
-    #[inline]
-    pub fn apply_clean(&self, state: &mut State<T, ROOM>, clean: &Sample<T>) -> Sample<T> {
-        let input = state.model.model.apply(clean);
+        let input = state.model.model.apply(raw);
         match &self.effects {
             Some(all) => all.remove(&mut state.effects, &input),
             None => input,

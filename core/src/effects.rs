@@ -15,11 +15,7 @@
 //!
 //! Effects that depend on temperature and time only are folded into one matrix and one bias by [`Effects::slow`], so the cost per sample
 //! does not depend on their number.
-//!
-//! Errors of the converter are functions of the raw reading. [`Effects::without_code_errors`] removes them before compensation. Each
-//! belongs to an axis, because an axis may have a separate converter; [`DeviceEffect::code`] makes them.
 
-mod code;
 mod directions;
 mod effect;
 mod law;
@@ -34,9 +30,8 @@ use crate::{PerSensor, Sensor};
 use law::Conditions;
 use triad::{Memory, Triad, put};
 
-pub use code::FARTHEST_ZERO;
 pub use directions::Directions;
-pub use effect::{Converter, DeviceEffect, EffectError, TIME_CONSTANT_RANGE_S, Variable};
+pub use effect::{DeviceEffect, EffectError, TIME_CONSTANT_RANGE_S, Variable};
 
 /// Temperature that temperature offsets count from, °C.
 pub const REFERENCE_C: f64 = 25.0;
@@ -228,15 +223,6 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         let triads = &mut state.triads;
         (self.triads.gyro).slow(&mut triads.gyro, dt, risen, settled, at);
         (self.triads.accel).slow(&mut triads.accel, dt, risen, settled, at);
-    }
-
-    /// Raw readings without the errors of the converters' codes, to be compensated instead of the original ones.
-    #[inline]
-    pub fn without_code_errors(&self, raw: &Sample<T>) -> Sample<T> {
-        Sample {
-            gyro: self.triads.gyro.without_code_errors(&raw.gyro),
-            accel: self.triads.accel.without_code_errors(&raw.accel),
-        }
     }
 
     /// Removes the effects from a compensated sample, SI in the body frame. Call it with every sample in order, and [`State::gap`] if

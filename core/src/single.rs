@@ -27,12 +27,6 @@ pub fn compensate(model: &Compensation<f32>, raw: &Sample<f32>) -> Sample<f32> {
     model.apply(raw)
 }
 
-/// [`Effects::without_code_errors`].
-#[inline(never)]
-pub fn without_code_errors(effects: &Effects<f32, ROOM>, raw: &Sample<f32>) -> Sample<f32> {
-    effects.without_code_errors(raw)
-}
-
 /// [`Effects::remove`].
 #[inline(never)]
 pub fn remove(

@@ -20,8 +20,6 @@
 //! A named effect: 0; length of the id, the id; number of coefficients, these, `f32`; its nonlinear constant (time constant, s), or 0 if
 //! it has none.
 //! A term: 1; triad (0 gyro, 1 accelerometer); axis; number of variables, these, a byte each as in [`Variable`]; coefficient.
-//! A code: 2; triad; axis (0 to 2, or 3 for all); weight of the converter's first bit, V; reading of code 0, V; errors of nine bits in
-//! units of the weight; `f32` each.
 //!
 //! [`Variable`]: crate::effects::Variable
 //!
@@ -92,7 +90,7 @@ pub struct Stored {
     pub compensator: Compensator<f32, NODES, ROOM>,
     /// Lags of the dies behind the thermometer, s, if known; otherwise no lag is applied.
     pub lags_s: Option<PerSensor<f32>>,
-    /// Number of effects; the code errors of a converter count as one.
+    /// Number of effects.
     pub effect_count: u8,
 }
 

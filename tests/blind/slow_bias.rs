@@ -7,12 +7,11 @@ use mimu_tests::slow_bias::Kind;
 use rayon::prelude::*;
 
 /// Effects that may be named first, by the end of their id.
-const NAMED: [(&str, &str); 5] = [
+const NAMED: [(&str, &str); 4] = [
     ("bias_drift", "drift"),
     ("warm_up", "warm-up"),
     ("thermal_bias", "thermal bias"),
     ("thermal_lag", "thermal lag"),
-    ("readout_code", "code"),
 ];
 
 #[derive(Debug, Clone, Copy, Default)]

@@ -176,25 +176,6 @@ def test_with_effects(thermal_unit, unit_with_effects, name):
         assert numpy.abs(applied - without).max() > 100 * bound.max()
 
 
-def test_errors_of_a_converter_by_its_code(tmp_path, unit):
-    compiler("gcc")
-    shutil.copytree(unit.folder / "by-hand", tmp_path / "recording")
-    # 12-bit counts: bit 0 is worth 2048, and its errors are some counts.
-    bits = [("bit 0", 1e-3), ("bit -1", -5e-4), ("bit -4", 4e-4)]
-    names = {f"bit {-k}" if k else "bit 0": 0.0 for k in range(9)} | dict(bits)
-    text = effect(
-        "accel_readout_code", [(n, v, "1") for n, v in names.items()],
-        converters='[{ axes = "xyz", weight_of_bit_0_raw = 2048.0, reading_of_code_0_raw = 0.0, reading_of_code_0_within_raw = 0.0 }]',
-    )  # fmt: skip
-    (tmp_path / "cal.toml").write_text((unit.folder / "cal.toml").read_text() + "\n" + text)
-    coded = Unit(tmp_path, "recording")
-    ours = by_c(coded, "gcc")
-    # The reading without its error is rounded once more.
-    off = numpy.abs(ours["accel"] - triad(coded.applied, "accel"))
-    assert (off <= 8 * U * magnitude(coded, "accel")).all()
-    assert numpy.abs(triad(coded.applied, "accel") - triad(unit.applied, "accel")).max() > 0.01
-
-
 def test_the_head_says_what_to_compute_with_it(thermal_unit):
     path, result = thermal_unit.export("c", "--prefix", "left_imu")
     head = path.read_text().split("#ifndef LEFT_IMU_H")[0]

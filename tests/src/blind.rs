@@ -127,16 +127,6 @@ pub fn is_listed(id: &str) -> bool {
     effects::by_id(id).is_some()
 }
 
-/// Whether the effect `found` describes the bench's effect `id`. Missing codes, separate converters for each axis and a signed low byte are all
-/// functions of the code.
-pub fn is_right(found: &str, id: &str) -> bool {
-    let of_code = ["missing_codes", "converters", "sign_extension"]
-        .iter()
-        .any(|k| id.ends_with(k));
-    let sensor = id.split('_').next().unwrap_or_default();
-    found == id || of_code && found == format!("{sensor}_readout_code")
-}
-
 /// One unit of the suite.
 #[derive(Debug, Clone)]
 pub struct Case {

@@ -25,7 +25,6 @@ use mimu_rig::thermal::Temperatures;
 use nalgebra::{DMatrix, DVector, Vector3};
 use tempfile::TempDir;
 
-use crate::blind::is_right;
 use crate::recordings::{Foreign, mikoff_session, xsens_session};
 
 /// Made course of the temperature: it rises and falls by this much, K, in half a sine over the session. The recordings have no thermometer, and their
@@ -117,7 +116,7 @@ pub enum Outcome {
 impl Planting {
     /// What became of it.
     pub fn outcome(&self) -> Outcome {
-        let right = |f: &Vec<String>| f.iter().any(|f| is_right(f, self.truth));
+        let right = |f: &Vec<String>| f.iter().any(|f| f == self.truth);
         let listed = |f: &Vec<String>| !f[0].starts_with("term:");
         match () {
             () if self.verdict == "refused" => Outcome::Refused,
@@ -135,7 +134,7 @@ impl Planting {
 
     /// Effects that are named although they were not planted.
     pub fn not_there(&self) -> impl Iterator<Item = &str> {
-        let wrong = |f: &&Vec<String>| !f.iter().any(|f| is_right(f, self.truth));
+        let wrong = |f: &&Vec<String>| !f.iter().any(|f| f == self.truth);
         self.found.iter().filter(wrong).map(|f| f[0].as_str())
     }
 }
@@ -406,7 +405,7 @@ fn reasons(diagnosis: &Diagnosis, id: &str) -> Vec<String> {
     let mut reasons = Vec::new();
     for sensor in &diagnosis.sensors {
         let decision = &sensor.decision;
-        let rejected = decision.rejected.iter().filter(|r| is_right(&r.id, id));
+        let rejected = decision.rejected.iter().filter(|r| r.id == id);
         reasons.extend(rejected.map(|r| format!("{}: {}", r.id, r.reason)));
         let left = decision.leftover.iter().map(|l| {
             let usual = if l.usual { " (usual)" } else { "" };

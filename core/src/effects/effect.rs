@@ -2,7 +2,6 @@
 
 use nalgebra::{RealField, convert};
 
-use super::code::{BITS, FARTHEST_ZERO};
 use super::law::{
     COEFFICIENTS, Evaluation, FACTORS, Fast, Law, Nonlinear, Slowly, error_at_ends, is_bounded,
     term,
@@ -120,52 +119,17 @@ pub(super) enum Numbers<T: RealField> {
         coefficient: T,
         variables: [Option<Variable>; FACTORS],
     },
-    Code {
-        /// Axis whose readings err; `None`: all three in the same way.
-        axis: Option<u8>,
-        /// In units of the weight of bit 0.
-        errors: [T; BITS],
-        /// Of bit 0, raw.
-        weight: T,
-        /// Reading of code 0, raw.
-        zero: T,
-    },
 }
 
 /// How an effect is removed.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Kind<'a, T: RealField> {
+pub(super) enum Kind<T: RealField> {
     Fast(Fast<T>),
     Slow(Slowly<T>),
-    Code {
-        /// Axis whose readings err.
-        axes: [bool; 3],
-        errors: &'a [T; BITS],
-        weight: T,
-        zero: T,
-    },
 }
 
 /// Names of the axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// The converter whose codes err.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Converter<T> {
-    /// Axis that it converts; `None`: all three.
-    pub axis: Option<usize>,
-    /// Weight of bit 0, raw.
-    pub weight: T,
-    /// Reading of code 0, raw.
-    pub zero: T,
-}
-
-impl<T> Converter<T> {
-    /// Names of the axes that it converts.
-    pub fn axes(&self) -> &'static str {
-        self.axis.map_or("xyz", axis_name)
-    }
-}
 
 impl<T: RealField + Copy> DeviceEffect<T> {
     /// The effect with a public id like `gyro_scale_cubic`. Coefficients are in SI, those of a matrix by rows; the nonlinear constant, if
@@ -253,56 +217,6 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         })
     }
 
-    /// Errors of a converter as a function of the bits of its code, for one axis (0 to 2) or for all three.
-    ///
-    /// `weight`: that of bit 0, the highest, raw; each of the nine bits has half the weight of the one before. `errors`: excess of a
-    /// reading if the bit is set, in units of `weight`. `zero`: the reading of code 0, raw; it differs from 0 if a number was subtracted
-    /// from the readings. A reading that is less than 1/65536 of `weight` below the transition of a bit counts as at the transition,
-    /// whichever way it was rounded. Codes repeat beyond the range of nine bits. Refused if a number is not finite, the weight is not
-    /// positive, or `zero` is farther from a reading of 0 than [`FARTHEST_ZERO`] weights.
-    ///
-    /// ```
-    /// # use mimu_core::compensation::Sample;
-    /// # use mimu_core::effects::{DeviceEffect, Directions, Effects};
-    /// # use mimu_core::{PerSensor, Sensor};
-    /// # use nalgebra::{Matrix3, Vector3};
-    /// // Bit 0 of a converter of ±2.5 V weighs 2.5 V plus an error of 1 mV.
-    /// let code = DeviceEffect::code(Sensor::Gyro, Some(2), &[4e-4, 0., 0., 0., 0., 0., 0., 0., 0.], 2.5, -2.5).unwrap();
-    /// let directions = Directions { sensed: Matrix3::identity(), to_body: Matrix3::identity() };
-    /// let mut effects = Effects::<f64, 8>::of(PerSensor::both(directions));
-    /// effects.push(code).unwrap();
-    /// let read = Sample { gyro: Vector3::new(0.5, 0.5, 0.5), accel: Vector3::repeat(1.7) };
-    /// let clean = effects.without_code_errors(&read);
-    /// assert_eq!(clean.gyro, Vector3::new(0.5, 0.5, 0.499));
-    /// assert_eq!(clean.accel, read.accel);
-    /// ```
-    pub fn code(
-        sensor: Sensor,
-        axis: Option<usize>,
-        errors: &[T; BITS],
-        weight: T,
-        zero: T,
-    ) -> Result<Self, EffectError> {
-        // Checked in single precision: a number that overflows there would become infinite in the tables.
-        let codes = convert::<_, T>(256.0) / weight;
-        let most = errors.iter().fold(T::zero(), |sum, e| sum + e.abs()) * weight;
-        let finite = [weight, codes, most].iter().all(T::is_finite);
-        let near = zero.abs() <= convert::<_, T>(FARTHEST_ZERO) * weight;
-        let axis_known = axis.is_none_or(|axis| axis < 3);
-        if !(finite && near && weight > T::zero() && axis_known) {
-            return Err(EffectError::Value);
-        }
-        Ok(Self {
-            sensor,
-            numbers: Numbers::Code {
-                axis: axis.map(|axis| axis as u8),
-                errors: *errors,
-                weight,
-                zero,
-            },
-        })
-    }
-
     /// Triad whose readings err.
     pub fn sensor(&self) -> Sensor {
         self.sensor
@@ -316,14 +230,13 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         }
     }
 
-    /// Its coefficients: all of a named effect, the single one of a term, the errors of the nine bits of a code.
+    /// Its coefficients: all of a named effect, the single one of a term.
     pub fn coefficients(&self) -> &[T] {
         match &self.numbers {
             Numbers::Named {
                 law, coefficients, ..
             } => coefficients.get(..law.coefficients).unwrap_or(coefficients),
             Numbers::Term { coefficient, .. } => core::slice::from_ref(coefficient),
-            Numbers::Code { errors, .. } => errors,
         }
     }
 
@@ -331,20 +244,6 @@ impl<T: RealField + Copy> DeviceEffect<T> {
     pub fn nonlinear(&self) -> Option<T> {
         match self.numbers {
             Numbers::Named { nonlinear, .. } => nonlinear,
-            _ => None,
-        }
-    }
-
-    /// Converter of a code.
-    pub fn converter(&self) -> Option<Converter<T>> {
-        match self.numbers {
-            Numbers::Code {
-                axis, weight, zero, ..
-            } => Some(Converter {
-                axis: axis.map(usize::from),
-                weight,
-                zero,
-            }),
             _ => None,
         }
     }
@@ -370,12 +269,11 @@ impl<T: RealField + Copy> DeviceEffect<T> {
         match &self.numbers {
             Numbers::Named { law, .. } => law.nonlinear == Nonlinear::Lag,
             Numbers::Term { variables, .. } => variables.contains(&Some(Variable::TemperatureRate)),
-            Numbers::Code { .. } => false,
         }
     }
 
     /// How it is removed.
-    pub(super) fn kind(&self) -> Kind<'_, T> {
+    pub(super) fn kind(&self) -> Kind<T> {
         match &self.numbers {
             Numbers::Named {
                 law,
@@ -414,17 +312,6 @@ impl<T: RealField + Copy> DeviceEffect<T> {
                     false => Kind::Fast(term),
                 }
             }
-            Numbers::Code {
-                axis,
-                errors,
-                weight,
-                zero,
-            } => Kind::Code {
-                axes: [0, 1, 2].map(|i| axis.is_none_or(|axis| axis == i)),
-                errors,
-                weight: *weight,
-                zero: *zero,
-            },
         }
     }
 }

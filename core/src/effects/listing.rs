@@ -5,7 +5,7 @@ use core::fmt;
 use nalgebra::RealField;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
-use super::effect::{Converter, DeviceEffect, Numbers, axis_name};
+use super::effect::{DeviceEffect, Numbers, axis_name};
 
 /// The public id; that of a term has the form `term:accel_y~rate_x*force_y^2`.
 impl<T: RealField + Copy> fmt::Display for DeviceEffect<T> {
@@ -13,7 +13,6 @@ impl<T: RealField + Copy> fmt::Display for DeviceEffect<T> {
         let sensor = self.sensor;
         match &self.numbers {
             Numbers::Named { law, .. } => write!(f, "{sensor}_{}", law.name),
-            Numbers::Code { .. } => write!(f, "{sensor}_readout_code"),
             Numbers::Term {
                 axis, variables, ..
             } => {
@@ -36,22 +35,10 @@ impl<T: RealField + Copy> fmt::Display for DeviceEffect<T> {
 /// For people and programs: the stored numbers, unrounded.
 impl<T: RealField + Copy + Serialize> Serialize for DeviceEffect<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut all = serializer.serialize_struct("DeviceEffect", 4)?;
+        let mut all = serializer.serialize_struct("DeviceEffect", 3)?;
         all.serialize_field("id", &Text(self))?;
         all.serialize_field("coefficients", self.coefficients())?;
         all.serialize_field("time_constant_s", &self.nonlinear())?;
-        all.serialize_field("converter", &self.converter())?;
-        all.end()
-    }
-}
-
-/// Raw unit V, as on a device.
-impl<T: Serialize> Serialize for Converter<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut all = serializer.serialize_struct("Converter", 3)?;
-        all.serialize_field("axes", self.axes())?;
-        all.serialize_field("weight_of_bit_0_v", &self.weight)?;
-        all.serialize_field("reading_of_code_0_v", &self.zero)?;
         all.end()
     }
 }

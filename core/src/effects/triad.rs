@@ -3,7 +3,6 @@
 use heapless::Vec;
 use nalgebra::{Matrix3, RealField, Vector3};
 
-use super::code::Code;
 use super::directions::Directions;
 use super::effect::{EffectError, Kind};
 use super::law::{Ambient, Conditions, Fast, Slow, Slowly, Values};
@@ -19,8 +18,6 @@ pub(super) struct Triad<T: RealField, const N: usize> {
     directions: Directions<T>,
     fast: Vec<Fast<T>, N>,
     slow: Vec<Slowly<T>, N>,
-    /// By axis, because each may have a separate converter.
-    code: [Option<Code<T>>; 3],
 }
 
 /// Memory of the effects of one triad.
@@ -59,30 +56,11 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
             directions,
             fast: Vec::new(),
             slow: Vec::new(),
-            code: [None; 3],
         }
     }
 
-    pub fn push(&mut self, effect: &Kind<'_, T>) -> Result<(), EffectError> {
+    pub fn push(&mut self, effect: &Kind<T>) -> Result<(), EffectError> {
         match effect {
-            Kind::Code {
-                axes,
-                errors,
-                weight,
-                zero,
-            } => {
-                // All are checked before any is set, so a refusal changes nothing.
-                let mut both = self.code.iter().zip(axes);
-                if both.any(|(code, meant)| *meant && code.is_some()) {
-                    return Err(EffectError::Full);
-                }
-                let new = Code::new(errors, *weight, *zero);
-                for (code, meant) in self.code.iter_mut().zip(axes) {
-                    if *meant {
-                        *code = Some(new);
-                    }
-                }
-            }
             Kind::Fast(fast) => self.fast.push(*fast).map_err(|_| EffectError::Full)?,
             Kind::Slow(slow) => self.slow.push(*slow).map_err(|_| EffectError::Full)?,
         }
@@ -162,18 +140,6 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         }
         memory.slope = Matrix3::from_diagonal(&total.along) * self.directions.sensed + total.across;
         memory.bias = total.bias;
-    }
-
-    /// Raw readings without the errors of the converters.
-    #[inline]
-    pub fn without_code_errors(&self, raw: &Vector3<T>) -> Vector3<T> {
-        let mut clean = *raw;
-        for (value, code) in clean.iter_mut().zip(&self.code) {
-            if let Some(code) = code {
-                *value = code.clean(*value);
-            }
-        }
-        clean
     }
 
     /// The input of the triad without its errors; `own` selects it among the conditions, which stay unchanged.

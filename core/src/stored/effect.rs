@@ -8,9 +8,6 @@ use crate::effects::{DeviceEffect, EffectError, Variable};
 
 const NAMED: u8 = 0;
 const TERM: u8 = 1;
-const CODE: u8 = 2;
-/// Axis number of a code that applies to all three axes.
-const ALL: u8 = 3;
 /// Most coefficients of an effect.
 const COEFFICIENTS: usize = 9;
 /// Most variables of a term.
@@ -65,17 +62,6 @@ pub(super) fn read(from: &mut Reader<'_>) -> Option<Result<DeviceEffect<f32>, Ef
             let axis = usize::from(axis);
             Some(DeviceEffect::term(sensor, axis, coefficient, &variables))
         }
-        CODE => {
-            let [triad, axis] = from.bytes()?;
-            let (weight, zero) = (from.f32()?, from.f32()?);
-            let mut errors = [0.0; COEFFICIENTS];
-            for error in &mut errors {
-                *error = from.f32()?;
-            }
-            let axis = (axis != ALL).then_some(usize::from(axis));
-            let of = |sensor| DeviceEffect::code(sensor, axis, &errors, weight, zero);
-            Some(sensor(triad).and_then(of))
-        }
         // A kind of a later version.
         _ => Some(Err(EffectError::Unknown)),
     }
@@ -99,13 +85,6 @@ pub(super) fn write(effect: &DeviceEffect<f32>, to: &mut Writer<'_>) -> Result<(
         variables
             .map(|v| v as u8)
             .try_for_each(|v| to.bytes(&[v]))?;
-        numbers(to)?;
-    }
-    if let Some(converter) = effect.converter() {
-        let axis = converter.axis.map_or(ALL, |axis| axis as u8);
-        to.bytes(&[CODE, sensor as u8, axis])?;
-        to.f32(converter.weight)?;
-        to.f32(converter.zero)?;
         numbers(to)?;
     }
     Ok(())

@@ -143,13 +143,8 @@ pub const EFFECTS: &[&str] = &[
     "accel_thermal_misalignment",
     "gyro_thermal_lag",
     "accel_thermal_lag",
-    "gyro_readout_code",
-    "accel_readout_code",
     "gyro_g_squared",
 ];
-
-/// Bits of the effects that are [`DeviceEffect::code`] instead of named laws.
-const CODES: u32 = 0b11 << 18;
 
 /// Bits of the effects that this build removes. Each named one is tried, so the bits cannot be out of date.
 pub fn effects_of_this_build() -> u32 {
@@ -161,7 +156,7 @@ pub fn effects_of_this_build() -> u32 {
         )
     };
     let bits = EFFECTS.iter().enumerate();
-    bits.fold(CODES, |bits, (bit, id)| bits | u32::from(known(id)) << bit)
+    bits.fold(0, |bits, (bit, id)| bits | u32::from(known(id)) << bit)
 }
 
 /// Reset cause of the device.

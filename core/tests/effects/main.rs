@@ -1,7 +1,5 @@
 //! Each effect against its physics: readings are made as by a sensor with the effect.
 
-mod codes;
-
 use std::f64::consts::TAU;
 
 use mimu_core::compensation::{Affine, Sample};
@@ -488,10 +486,6 @@ fn what_cannot_be_removed_is_refused() {
         EffectError::Value
     );
     assert_eq!(refused("gyro_warm_up", &[0.0; 3], None), EffectError::Value);
-    for form in [None, Some(1.0)] {
-        let code = refused("gyro_readout_code", &[0.0; 9], form);
-        assert_eq!(code, EffectError::Unknown);
-    }
     assert_eq!(
         refused("gyro_warm_up", &[0.0; 3], Some(0.0)),
         EffectError::Value

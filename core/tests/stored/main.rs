@@ -2,9 +2,8 @@
 
 mod table;
 
-use mimu_core::compensation::{Affine, Compensation, Sample};
+use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{self, DeviceEffect, Variable};
-use mimu_core::single;
 use mimu_core::stored::{
     Curves, MAX_LENGTH, NODES, Origin, ROOM, StoredError, decode, encode, hash, read, trim,
 };
@@ -93,20 +92,6 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     let effects = [
         DeviceEffect::named("gyro_warm_up", &[1.0, 2.0, 3.0], Some(60.0)),
         DeviceEffect::term(Sensor::Accel, 1, -2.0, &[Variable::RateX, Variable::ForceY]),
-        DeviceEffect::code(
-            Sensor::Gyro,
-            None,
-            &[0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0005],
-            1.65,
-            0.0,
-        ),
-        DeviceEffect::code(
-            Sensor::Accel,
-            Some(2),
-            &[0.0, -0.002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-            2.0,
-            -1.25,
-        ),
     ]
     .map(Result::unwrap);
     // Sensors along -y, x and z with 2, 4 and 0.5 V per unit; and C of a gyro with its sensors along y, -x and z.
@@ -142,8 +127,8 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     let all = &all[..length];
     let mut expected = b"mimc\x06\x00".to_vec();
     expected.extend((all.len() as u16).to_le_bytes());
-    // One node, four effects, the TEMP pins; range and lags are known.
-    expected.extend([1, 4, 0, 3]);
+    // One node, two effects, the TEMP pins; range and lags are known.
+    expected.extend([1, 2, 0, 3]);
     expected.extend([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
     expected.extend([0x00, 0xb9, 0x55, 0x69, 0, 0, 0, 0]);
     expected.extend([0xab; 32]);
@@ -171,27 +156,12 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     }
     expected.extend([1, 1, 1, 2, 1, 5]);
     expected.extend((-2.0_f32).to_le_bytes());
-    // Half of the converter's 3.3 V, and nine bits.
-    expected.extend([2, 0, 3]);
-    let all_axes = [
-        1.65_f32, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0005,
-    ];
-    for value in all_axes {
-        expected.extend(value.to_le_bytes());
-    }
-    expected.extend([2, 1, 2]);
-    let one_axis = [
-        2.0_f32, -1.25, 0.0, -0.002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-    ];
-    for value in one_axis {
-        expected.extend(value.to_le_bytes());
-    }
     expected.extend(crc32(&expected).to_le_bytes());
     assert_eq!(all, &expected[..]);
     let stored = decode(all).unwrap();
     assert_eq!(
         (stored.compensator.table.len(), stored.effect_count),
-        (1, 4)
+        (1, 2)
     );
     assert_eq!(stored.origin, origin);
     assert_eq!(stored.compensator.table.range_c(), Some([-10.5, 60.25]));
@@ -200,22 +170,6 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         stored.compensator.lags.map(|lag| lag.lag_s()),
         PerSensor::from([61.5, -4.25])
     );
-    // 384 of 256 codes to 1.65 V have bits 0 and -1, and 255 have bits -1 to -8. Another half code keeps every error from causing a transition.
-    let right = Vector3::new(384.5, 0.5, 255.5) * (1.65 / 256.0);
-    let read = Sample {
-        gyro: right + Vector3::new(0.001, 0.0, -0.0005) * 1.65,
-        // 2.25 V at the converter of the third axis, whose second bit, worth 1 V, is not set; and 1.25 V, where it is set.
-        accel: Vector3::new(2.475, 0.0, 1.0),
-    };
-    let clean = single::without_code_errors(stored.compensator.effects.as_ref().unwrap(), &read);
-    assert_eq!(clean.accel, read.accel);
-    assert!((clean.gyro - right).amax() < 1e-6, "{}", clean.gyro);
-    let set = Sample {
-        accel: Vector3::new(2.475, 0.0, 0.0),
-        ..read
-    };
-    let clean = single::without_code_errors(stored.compensator.effects.as_ref().unwrap(), &set);
-    assert_eq!(clean.accel, Vector3::new(2.475, 0.0, 0.004));
 }
 
 #[test]
@@ -397,28 +351,6 @@ fn what_is_not_known_of_an_origin_is_zero() {
 }
 
 #[test]
-fn a_code_of_no_axis_is_not_one_of_all() {
-    let code = |axis| DeviceEffect::code(Sensor::Accel, axis, &[0.0; 9], 1.0, 0.0).unwrap();
-    let refused = |all: &[DeviceEffect<f32>]| decode(&bytes(&[node(0.0, &regular())], all)).err();
-    assert_eq!(refused(&[code(None)]), None);
-    let three = [0, 1, 2].map(|axis| code(Some(axis)));
-    assert_eq!(refused(&three), None);
-    // In bytes, an axis of 3 means all axes; eleven numbers and the CRC follow it.
-    for axis in 3..=u8::MAX {
-        let mut all = bytes(&[node(0.0, &regular())], &[code(Some(1))]);
-        let at = all.len() - 4 - 4 * 11 - 1;
-        all[at] = axis;
-        let expected = (axis > 3).then_some(StoredError::EffectValue { at: 0 });
-        assert_eq!(decode(&resealed(all)).err(), expected, "{axis}");
-        let made = DeviceEffect::code(Sensor::Accel, Some(axis.into()), &[0.0; 9], 1.0, 0.0);
-        assert_eq!(made.err(), Some(effects::EffectError::Value), "{axis}");
-    }
-    let full = Some(StoredError::EffectsFull { at: 1 });
-    assert_eq!(refused(&[code(None), code(Some(1))]), full);
-    assert_eq!(refused(&[code(Some(1)), code(None)]), full);
-}
-
-#[test]
 fn everything_at_its_longest_has_room() {
     let nodes: Vec<_> = (0..NODES).map(|k| node(k as f32, &regular())).collect();
     let named = |id, coefficients: &[f32]| DeviceEffect::named(id, coefficients, None).unwrap();
@@ -430,14 +362,8 @@ fn everything_at_its_longest_has_room() {
         all.extend([named(fast, &[0.0; 9]); ROOM]);
         all.extend([named(slow, &[0.0; 6]); ROOM]);
     }
-    for sensor in [Sensor::Gyro, Sensor::Accel] {
-        all.extend(
-            [0, 1, 2]
-                .map(|axis| DeviceEffect::code(sensor, Some(axis), &[0.0; 9], 1.0, 0.0).unwrap()),
-        );
-    }
     let stored = decode(&bytes(&nodes, &all)).unwrap();
-    assert_eq!(stored.effect_count, 2 * (2 * ROOM as u8 + 3));
+    assert_eq!(stored.effect_count, 2 * 2 * ROOM as u8);
 }
 
 #[test]
@@ -549,8 +475,8 @@ proptest! {
     #[test]
     fn no_bytes_are_too_bad_to_be_refused(noise in prop::collection::vec(any::<u8>(), 0..600), at in 12..360_usize) {
         let named = DeviceEffect::named("gyro_scale_cubic", &[0.0; 3], None).unwrap();
-        let code = DeviceEffect::code(Sensor::Gyro, Some(1), &[0.0; 9], 1.0, 0.0).unwrap();
-        let mut all = bytes(&[node(0.0, &regular())], &[named, code]);
+        let term = DeviceEffect::term(Sensor::Gyro, 1, 0.0, &[Variable::Time]).unwrap();
+        let mut all = bytes(&[node(0.0, &regular())], &[named, term]);
         for (place, byte) in all.iter_mut().skip(at).zip(&noise) {
             *place = *byte;
         }

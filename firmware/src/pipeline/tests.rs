@@ -207,56 +207,6 @@ fn compensated_samples_are_those_of_the_raw_ones_at_the_stated_temperature() {
     }
 }
 
-#[test]
-fn errors_of_the_code_are_taken_out_of_the_reading_before_its_temperature_matters() {
-    // Bits of half of 3.3 V and of an eighth are worth more than they say, at any temperature and on all axes of the triad alike.
-    let weight = 1.65;
-    let (half, eighth) = (2e-4, -1e-4);
-    let mut errors = [0.0; 9];
-    (errors[0], errors[2]) = (half as f32, eighth as f32);
-    let code = DeviceEffect::code(Sensor::Accel, None, &errors, weight as f32, 0.0).unwrap();
-    let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
-    pipeline.calibrate(calibration(&[code]));
-    pipeline.stream(both());
-    let (mut seen, mut number) = ([false; 4], 0);
-    while number < 400 {
-        let mut sums = sums(number);
-        for axis in 0..3 {
-            // Over the whole range, in steps of none of the bits.
-            sums.accel[axis] = 1000 + (number * 317 + axis as u32 * 41_003) % 129_000;
-        }
-        pipeline.take(&scan(number, &sums), &mut |message| {
-            let Sent::Compensated(head, samples, _) = keep(message) else {
-                return true;
-            };
-            let gain = 2.0 + 2.0 * (f64::from(head.temp_c) + 10.0) / 70.0;
-            for (of, value) in samples {
-                for axis in 0..3 {
-                    let sum = 1000 + (of * 317 + axis as u32 * 41_003) % 129_000;
-                    let read = f64::from(sum) * 3.3 / 131_070.0;
-                    let set = |bit: f64| (read / bit).floor() as u32 % 2 == 1;
-                    let bits = (set(weight), set(weight / 4.0));
-                    // Within the error of a turn a reading may stand for either side of it.
-                    let turn = (read / (weight / 4.0)).round() * weight / 4.0;
-                    if (read - turn).abs() < 5e-4 {
-                        continue;
-                    }
-                    seen[usize::from(bits.0) + 2 * usize::from(bits.1)] = true;
-                    let off =
-                        f64::from(u8::from(bits.0)) * half + f64::from(u8::from(bits.1)) * eighth;
-                    let expected = gain * (read - weight * off - 1.0);
-                    // The step of a bit is 5e-4 at the least.
-                    let left = f64::from(value.accel[axis]) - expected;
-                    assert!(left.abs() < 2e-5, "{of} {axis}: {left:e}");
-                }
-            }
-            true
-        });
-        number += 1;
-    }
-    assert_eq!(seen, [true; 4]);
-}
-
 /// Heads of all batches of a stream in which `change` has its way with each sample.
 fn heads(
     pipeline: &mut Pipeline<Analog>,

@@ -256,14 +256,13 @@ pub(super) fn effects_of(calibration: &Calibration, place: &str) -> Result<Vec<D
             Error::new(at, why.to_string(), remedy)
         })
     });
-    Ok(parts.collect::<Result<Vec<_>>>()?.concat())
+    parts.collect()
 }
 
 /// Refuses the first effect that does not fit into `room`, counted for each triad separately for effects with every sample and for slow ones.
 fn check_room(effects: &[DeviceEffect<f32>], room: usize, place: &str) -> Result<()> {
     let mut taken = PerSensor::both([0; 2]);
-    // Converter nonlinearity is not counted: each axis has room for one, and a file with two for an axis was refused.
-    for effect in effects.iter().filter(|e| e.converter().is_none()) {
+    for effect in effects {
         let count = &mut taken[effect.sensor()][usize::from(effect.is_slow())];
         *count += 1;
         if *count > room {

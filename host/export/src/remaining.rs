@@ -327,11 +327,9 @@ fn effects(calibration: &Calibration) -> Result<Vec<Remaining>> {
             Remaining::unknown(effect.sensor(), &effect.id(), why)
         };
         let mut one = Effects::<f64, 8>::new(&models).map(|e| e.within(limits));
-        let parts = effect.on_device().ok();
-        let pushed = one.as_mut().zip(parts).map(|(one, parts)| {
-            let mut parts = parts.into_iter();
-            parts.all(|part| one.push(part).is_ok())
-        });
+        let on_device = effect.on_device().ok();
+        let pushed = one.as_mut().zip(on_device);
+        let pushed = pushed.map(|(one, effect)| one.push(effect).is_ok());
         let (Some(one), Some(true)) = (one, pushed) else {
             all.push(unknown());
             continue;

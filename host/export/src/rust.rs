@@ -75,10 +75,7 @@ impl Module<'_> {
             let _ = writeln!(out, "use mimu_core::effects::{{{}}};", used.join(", "));
         }
         out.push_str("use mimu_core::table::{Node, Table};\n");
-        let sensors = self
-            .effects
-            .iter()
-            .any(|e| e.product().is_some() || e.converter().is_some());
+        let sensors = self.effects.iter().any(|e| e.product().is_some());
         out.push_str(match sensors {
             true => "use mimu_core::{PerSensor, Sensor};\n",
             false => "use mimu_core::PerSensor;\n",
@@ -181,12 +178,6 @@ fn constructed(effect: &DeviceEffect<f32>) -> String {
         };
         let names = names.join(", ");
         return format!("DeviceEffect::term({sensor}, {axis}, {coefficient:?}, &[{names}])");
-    }
-    if let Some(of) = effect.converter() {
-        let (axis, weight, zero) = (of.axis, of.weight, of.zero);
-        return format!(
-            "DeviceEffect::code({sensor}, {axis:?}, &{coefficients}, {weight:?}, {zero:?})"
-        );
     }
     let nonlinear = effect.nonlinear();
     format!("DeviceEffect::named(\"{effect}\", &{coefficients}, {nonlinear:?})")

@@ -58,10 +58,7 @@ pub fn diagnosed(
     let found = found.filter(|a| a.of_unit).map(|a| a.effect.lasting());
     let mut effects = known.clone();
     for effect in found {
-        effect.join(&mut effects).map_err(|problem| {
-            let remedy = "diagnose with a calibration that lacks this effect";
-            Error::new(given_name, problem, remedy)
-        })?;
+        effect.join(&mut effects);
     }
     let mut judged = None;
     if let (Some(other), Some(name)) = (other, second) {

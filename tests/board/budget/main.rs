@@ -74,13 +74,6 @@ fn figures() -> Result<BTreeMap<String, f64>, String> {
     }
     figures.insert("no_effect_instructions".into(), none);
     figures.insert("effects_of_a_triad_instructions".into(), shared - none);
-    // Without a converter's errors, with one axis, a triad, both triads.
-    let (none, one, triad, both) = (next()?, next()?, next()?, next()?);
-    let each = [one - none, (triad - none) / 3.0, (both - none) / 6.0];
-    let each = each.into_iter().fold(0.0, f64::max);
-    figures.insert("readout_code_instructions".into(), each);
-    figures.insert("no_readout_code_instructions".into(), none);
-    figures.insert("readout_codes_instructions".into(), both);
     // Not the firmware's: xu's comparison (docs/papers/xu.md).
     figures.insert("forward_model_kept_inverse_instructions".into(), next()?);
     figures.insert("forward_model_inverse_instructions".into(), next()?);

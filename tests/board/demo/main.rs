@@ -12,7 +12,7 @@ use mimu_rig::rig_file::RigTruth;
 use mimu_tests::blind::{is_listed, unit};
 use serde_json::Value;
 
-/// Possible effects of the unit: those that a table at one temperature can show, and two that the diagnosis does not know.
+/// Possible effects of the unit: those that a table at one temperature can show, and three that the diagnosis does not know.
 const EFFECTS: [&str; 9] = [
     "gyro_g_sensitivity",
     "accel_scale_quadratic",

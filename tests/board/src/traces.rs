@@ -203,20 +203,6 @@ fn with_effects() -> Vec<u8> {
         ),
         DeviceEffect::term(Sensor::Accel, 0, 1e-5, &[Variable::Time]),
         DeviceEffect::term(Sensor::Accel, 1, 1e-3, &[Variable::RateX, Variable::ForceY]),
-        DeviceEffect::code(
-            Sensor::Gyro,
-            None,
-            &[2e-4, -1e-4, 2e-4, 1e-4, -2e-4, 1e-4, -1e-4, 2e-4, 1e-4],
-            1.65,
-            0.0,
-        ),
-        DeviceEffect::code(
-            Sensor::Accel,
-            Some(2),
-            &[3e-4, 0.0, -2e-4, 0.0, 1e-4, 0.0, 0.0, 0.0, 2e-4],
-            1.1,
-            -0.31,
-        ),
     ]
     .map(|effect| effect.expect("its numbers make sense"));
     stored(&[20.0, 30.0, 40.0], None, &effects)

@@ -89,26 +89,6 @@ fn main() -> ! {
             }
         }
     }
-    // Without code errors, with those of one axis, of a triad, and of both triads.
-    let mut all = none();
-    let clean = |all: &Effects<f32, ROOM>| between(|| single::without_code_errors(all, &raw));
-    clean(&all);
-    for (sensor, axes) in [
-        (Sensor::Gyro, 0..1),
-        (Sensor::Gyro, 1..3),
-        (Sensor::Accel, 0..3),
-    ] {
-        for axis in axes {
-            // A different value for each axis.
-            let weight = 1.65 + 0.1 * axis as f32;
-            if let Ok(code) =
-                DeviceEffect::code(sensor, Some(axis), &[1e-4; 9], weight, 0.01 * weight)
-            {
-                let _ = all.push(code);
-            }
-        }
-        clean(&all);
-    }
     // xu's claim: what the forward model `u = P x + b` of both triads costs, with P⁻¹ kept and with an inverse for every sample.
     let forward = black_box(Compensation {
         gyro: affine(0.29),

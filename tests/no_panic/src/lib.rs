@@ -52,18 +52,6 @@ pub fn effect_term(
     DeviceEffect::term(sensor, axis, coefficient, variables)
 }
 
-/// [`DeviceEffect::code`].
-#[inline(never)]
-pub fn effect_code(
-    sensor: Sensor,
-    axis: Option<usize>,
-    errors: &[f32; 9],
-    weight: f32,
-    zero: f32,
-) -> Result<DeviceEffect<f32>, EffectError> {
-    DeviceEffect::code(sensor, axis, errors, weight, zero)
-}
-
 /// [`Effects::push`].
 #[inline(never)]
 pub fn effects_push(
@@ -93,12 +81,6 @@ pub fn effects_remove(
     compensated: &Sample<f32>,
 ) -> Sample<f32> {
     effects.remove(state, compensated)
-}
-
-/// [`Effects::without_code_errors`].
-#[inline(never)]
-pub fn effects_codes(effects: &Effects<f32, 8>, raw: &Sample<f32>) -> Sample<f32> {
-    effects.without_code_errors(raw)
 }
 
 /// [`Filter::with_prior`].

@@ -2,14 +2,11 @@
 
 use mimu_tests::joint::{Set, case};
 
-/// Five sessions from power-on of a unit that warms up. The bits of a converter once added up to minus the reading here, and the scale factor
-/// compensated for it: the file had an error of 1 m/s², against 0.01 m/s² without effects.
+/// Five sessions from power-on of a unit that warms up.
 #[test]
 #[ignore = "nightly: a diagnosis of five sessions"]
 fn a_file_with_effects_is_no_worse_on_another_session_than_one_without() {
     let case = case(&Set::of_warm_up(5, 6));
     assert!(case.as_written.is_some(), "{case:?}");
     assert!(!case.is_worse(), "{case:?}");
-    let is_code = |f: &Vec<String>| f[0].ends_with("readout_code");
-    assert!(!case.found.iter().any(is_code), "{case:?}");
 }

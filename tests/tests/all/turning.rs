@@ -71,7 +71,6 @@ fn g_sensitivity_and_a_lever_arm_are_named_where_gravity_turns_through_the_unit(
 #[test]
 #[ignore = "nightly: a plan of half an hour"]
 fn noise_of_blocks_makes_no_effect_of_a_clean_unit_whose_inputs_turn() {
-    // When the block means, with their noise, determined the bits of a gyro's code, those passed for an effect here.
     let case = case_on(&turning_plan(0), &[], 0);
     assert_eq!(case.verdict, "clean", "{case:?}");
 }

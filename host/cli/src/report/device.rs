@@ -197,15 +197,6 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
         if let Some(time) = effect.nonlinear() {
             line!(out, "  time constant {time} s");
         }
-        if let Some(converter) = effect.converter() {
-            line!(
-                out,
-                "  converter of {}: bit 0 weighs {} V, code 0 is {} V",
-                converter.axes(),
-                converter.weight,
-                converter.zero
-            );
-        }
     }
     if let Some(file) = &found.file {
         line!(

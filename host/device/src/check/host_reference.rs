@@ -3,7 +3,6 @@
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::compensator::{Compensator, State};
 use mimu_core::die::{self, DieLag};
-use mimu_core::single;
 use mimu_core::stored::{NODES, ROOM};
 use mimu_core::wire::BatchHead;
 use nalgebra::{RealField, Vector3};
@@ -14,10 +13,6 @@ use crate::received::Samples;
 use mimu::calibration::{Calibration, compensator};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
-
-/// Relative error of single precision at a bit's transition: of the reading, its product, and the sum with the code at reading 0. That code can be 64
-/// weights of the bit where the reading is one.
-const TURN: f64 = 64.0 * f32::EPSILON as f64;
 
 /// A compensator and its state in one stream.
 struct Running<T: RealField> {
@@ -168,42 +163,15 @@ impl HostReference {
         compensator.follow_at(state, dt_s, thermometer_c.map(f64::from), dies_c);
     }
 
-    /// Removes the converter's nonlinearity in double precision. Within rounding of a bit's transition both sides are right, but they differ by the
-    /// bit's error. The side that single precision takes is used.
-    fn without_code_errors(&self, raw: &Sample<f32>) -> Sample<f64> {
-        let exact = raw.map(|u| u.map(f64::from));
-        let (Some(stored), Some(file)) = (
-            &self.single.compensator.effects,
-            &self.double.compensator.effects,
-        ) else {
-            return exact;
-        };
-        let single = single::without_code_errors(stored, raw);
-        let single = single.map(|u| u.map(f64::from));
-        let beside = |by: f64| {
-            let moved = exact.map(|u| u * (1.0 + by));
-            let clean = file.without_code_errors(&moved);
-            Sample::from_fn(|s| exact[s] - moved[s] + clean[s])
-        };
-        let sides = [0.0, TURN, -TURN].map(beside);
-        Sample::from_fn(|s| {
-            Vector3::from_fn(|axis, _| {
-                let off = |side: &Sample<f64>| (side[s][axis] - single[s][axis]).abs();
-                let nearest = sides.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-                nearest.map_or(f64::NAN, |side| side[s][axis])
-            })
-        })
-    }
-
     /// The sample in double precision, and the largest error that rounding can cause in it.
     fn double(&mut self, raw: &Sample<f32>) -> (Sample<f64>, Sample<f64>) {
-        let clean = self.without_code_errors(raw);
+        let raw = raw.map(|u| u.map(f64::from));
         // On a curve each coefficient is itself a sum of four terms.
         let times = if self.on_curves { 2.0 } else { 1.0 };
         let Running { compensator, state } = &mut self.double;
-        let of = state.models().as_ref().zip(clean.as_ref());
+        let of = state.models().as_ref().zip(raw.as_ref());
         let bounds = of.map(|(model, raw)| rounding(model, raw) * times);
-        let sample = compensator.apply_clean(state, &clean);
+        let sample = compensator.apply(state, &raw);
         (sample, bounds)
     }
 }

@@ -8,7 +8,7 @@ use mimu::effects::quantity::Quantity;
 use mimu::effects::regressor::{Product, Regressor};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_core::die::BEYOND_C;
-use mimu_core::effects::{DeviceEffect, Directions, RATE_LAG_S};
+use mimu_core::effects::{Directions, RATE_LAG_S};
 use mimu_recording::error::{Error, Result};
 
 use super::number;
@@ -23,8 +23,6 @@ pub(super) struct Effects {
     pub lags_s: Vec<f64>,
     /// Summed error of each of the three axes.
     errors: PerSensor<[Vec<String>; 3]>,
-    codes: PerSensor<[Option<usize>; 3]>,
-    converters: Vec<DeviceEffect<f64>>,
     directions: PerSensor<Option<Directions<f64>>>,
     quantities: Vec<Quantity>,
     /// Temperatures that they see, °C.
@@ -42,8 +40,6 @@ impl Effects {
             left_out: Vec::new(),
             lags_s: Vec::new(),
             errors: PerSensor::default(),
-            codes: PerSensor::default(),
-            converters: Vec::new(),
             directions: PerSensor::from_fn(direction),
             quantities: Vec::new(),
             seen_c: calibration
@@ -63,11 +59,7 @@ impl Effects {
                     "fit the recording again",
                 ));
             }
-            let done = match effect.candidate.reads_code() {
-                true => all.add_codes(effect),
-                false => all.add(effect),
-            };
-            match done {
+            match all.add(effect) {
                 Some(()) => all.written.push(effect.id()),
                 None => all.left_out.push(effect.id()),
             }
@@ -91,10 +83,6 @@ impl Effects {
     /// Whether some effects depend on temperature or time.
     pub fn is_slow(&self) -> bool {
         self.quantities.iter().any(|q| q.is_slow())
-    }
-
-    pub fn reads_code(&self) -> bool {
-        !self.converters.is_empty()
     }
 
     fn has(&self, of: impl Fn(&Quantity) -> bool) -> bool {
@@ -131,20 +119,6 @@ impl Effects {
         Some(())
     }
 
-    fn add_codes(&mut self, effect: &FittedEffect) -> Option<()> {
-        for part in effect.on_device::<f64>().ok()? {
-            let converter = part.converter()?;
-            let at = self.converters.len();
-            self.converters.push(part);
-            for (axis, code) in self.codes[effect.sensor()].iter_mut().enumerate() {
-                if converter.axis.is_none_or(|only| only == axis) {
-                    *code = Some(at);
-                }
-            }
-        }
-        Some(())
-    }
-
     fn regressor(&mut self, of: &Regressor, parameter: f64, axis: usize) -> Option<String> {
         let mut quantity = |q: Quantity| self.quantity(q, parameter, axis);
         Some(match of {
@@ -158,7 +132,6 @@ impl Effects {
             Regressor::Logarithm(q) => {
                 format!("log1pf({} / {})", quantity(*q)?, number(parameter))
             }
-            Regressor::Bit(_) => return None,
         })
     }
 

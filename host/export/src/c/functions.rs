@@ -23,9 +23,6 @@ impl Header<'_> {
         if self.follows() {
             self.follow(out);
         }
-        if self.effects.reads_code() {
-            out.push_str(&CODE.replace("PREFIX", prefix));
-        }
         for sensor in self.sensors() {
             self.affine(sensor, out);
         }
@@ -147,14 +144,9 @@ impl Header<'_> {
             "// {} from the raw reading of the {sensor}, {raw_unit}.\nstatic inline void {prefix}_{sensor}({state}const float raw[3], float x[3])\n{{\n    int i;",
             sensor.unit()
         );
-        if let Some(clean) = self.effects.without_code_errors(prefix, sensor) {
-            out.push_str(&clean);
-        } else {
-            out.push_str("    const float *const u = raw;\n");
-        }
         let row = match curves {
-            true => "s->SENSOR_model[3 * i] * u[0] + s->SENSOR_model[3 * i + 1] * u[1] + s->SENSOR_model[3 * i + 2] * u[2]\n             + s->SENSOR_model[9 + i]".to_string(),
-            false => "PREFIX_SENSOR_C[i][0] * u[0] + PREFIX_SENSOR_C[i][1] * u[1] + PREFIX_SENSOR_C[i][2] * u[2] + PREFIX_SENSOR_o[i]".to_string(),
+            true => "s->SENSOR_model[3 * i] * raw[0] + s->SENSOR_model[3 * i + 1] * raw[1] + s->SENSOR_model[3 * i + 2] * raw[2]\n             + s->SENSOR_model[9 + i]".to_string(),
+            false => "PREFIX_SENSOR_C[i][0] * raw[0] + PREFIX_SENSOR_C[i][1] * raw[1] + PREFIX_SENSOR_C[i][2] * raw[2] + PREFIX_SENSOR_o[i]".to_string(),
         };
         let row = row
             .replace("PREFIX", prefix)
@@ -201,32 +193,6 @@ static inline float PREFIX_lagged(float behind, float dt, float step, float lag_
     if (!(z > 0.0f))
         return behind - step;
     return behind - behind * gone - step * (gone / z);
-}
-
-";
-
-/// Same as in `mimu_core::effects`: nine bits from the highest, in units of the weight of bit 0.
-const CODE: &str = "\
-// Error of a reading by the bits of its code, raw.
-static inline float PREFIX_code_error(float u, float weight, float zero, const float errors[9])
-{
-    // 32 full ranges are added so that codes below zero keep their bits, and half a code of 16 bits against rounding.
-    const float codes = u * (256.0f / weight) + (8192.00390625f - zero * (256.0f / weight));
-    const unsigned long bits = codes > 0.0f && codes < 4294967040.0f ? (unsigned long)codes : 0UL;
-    float sum = 0.0f;
-    int k;
-    for (k = 0; k < 9; k++)
-        sum += (bits >> (8 - k)) & 1UL ? errors[k] * weight : 0.0f;
-    return sum;
-}
-
-// A reading without it. The error is that of the code that the reading should have had, so it is looked up twice.
-static inline float PREFIX_clean(float u, float weight, float zero, const float errors[9])
-{
-    const float first = PREFIX_code_error(u, weight, zero, errors);
-    const float second = PREFIX_code_error(u - first, weight, zero, errors);
-    const float moved = second - first;
-    return moved * moved < first * first ? u - second : u - first;
 }
 
 ";

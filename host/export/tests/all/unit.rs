@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use mimu::calibration::Calibration;
 use nalgebra::{Matrix3, Vector3};
 
-const EFFECTS: [(&str, &str, &str); 5] = [
+const EFFECTS: [(&str, &str, &str); 4] = [
     (
         "gyro_g_sensitivity",
         "",
@@ -25,11 +25,6 @@ const EFFECTS: [(&str, &str, &str); 5] = [
         "term:gyro_y~rate_x*force_z^2",
         "",
         r#"{ name = "y", value = 1e-4, unit = "rad/s/((rad/s)*(m/s^2)*(m/s^2))" }"#,
-    ),
-    (
-        "accel_readout_code",
-        r#"converters = [{ axes = "x", weight_of_bit_0_raw = 1.65, reading_of_code_0_raw = 0.0, reading_of_code_0_within_raw = 0.0 }]"#,
-        r#"{ name = "x bit 0", value = 1e-4, unit = "1" }, { name = "x bit -3", value = -2e-4, unit = "1" }"#,
     ),
 ];
 

@@ -67,16 +67,14 @@ impl Calibration {
                 Error::new(format!("{place}, [[effect]] {id}"), problem, remedy)
             };
             const WITHOUT: &str = "update the device, or use the calibration without effects";
-            let parts = effect.on_device().map_err(|why| match why {
+            let on_device = effect.on_device().map_err(|why| match why {
                 NotOnDevice::Numbers => refuse(why.to_string(), "diagnose the recording again"),
                 _ => refuse(why.to_string(), WITHOUT),
             })?;
-            for part in parts {
-                all.push(part).map_err(|_| {
-                    let problem = format!("the device has no room for it: at most {N} of a kind");
-                    refuse(problem, WITHOUT)
-                })?;
-            }
+            all.push(on_device).map_err(|_| {
+                let problem = format!("the device has no room for it: at most {N} of a kind");
+                refuse(problem, WITHOUT)
+            })?;
         }
         Ok(all)
     }

@@ -4,49 +4,23 @@ use nalgebra::{DMatrix, DVector};
 
 use super::rows::Rows;
 use crate::effects::candidate::{Candidate, CandidateKind};
-use crate::effects::converter::{self, Converter};
-use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
 
 /// Step of a central difference in the logarithm of a parameter. The error is a millionth of the derivative, far above rounding.
 const STEP: f64 = 1e-3;
 
-/// Number of leading bits of a code that are tried together at first. The sum of more bits is nearly the reading, which all of them add up to.
-const FIRST_BITS: usize = 4;
-
 impl Candidate {
-    /// An effect in `rows`; `None` if it depends on a converter's codes and the readings have no quantisation step.
-    pub fn effect_in(effect: &'static Effect, rows: &Rows) -> Option<Self> {
-        let candidate = Self::new(rows.sensor, CandidateKind::Effect(effect));
-        if !candidate.reads_code() {
-            return Some(candidate);
-        }
-        let [lowest, highest] = rows.reading_range();
-        let weight = converter::first_weight(rows.step?, lowest, highest);
-        Some(candidate.behind_one(Converter::of(weight, 0.0)))
-    }
-
     /// The candidates that it is tried as. The search starts from the best of these, and adds or drops [offered](Self::offered) coefficients.
     ///
-    /// A code is tried with each bit alone, and with the first few together. Another effect is tried with the coefficients that are
+    /// An effect is tried with the coefficients that are
     /// [excited](Self::excited), with all that the rows determine, and with each alone; each time with and without the coefficients that are
     /// specific to the recording. A thermal effect is tried with and without the thermometer's self-heating.
     pub fn variants(mut self, rows: &Rows) -> Vec<Self> {
-        // Bits that would not be seen at data-sheet size are offered only if no bit would be: among many of these, one always fits by chance.
-        if self.reads_code() && !self.excited.is_empty() {
-            self.active.clone_from(&self.excited);
-        }
         self.offered.clone_from(&self.active);
         let with = |one: &Self, active: Vec<usize>| Self {
             active,
             ..one.clone()
         };
-        if self.reads_code() {
-            let offered = &self.offered;
-            let alone = offered.iter().map(|bit| vec![*bit]);
-            let down = (2..=offered.len().min(FIRST_BITS)).map(|k| offered[..k].to_vec());
-            return alone.chain(down).map(|bits| with(&self, bits)).collect();
-        }
         self.offered.extend(self.of_recording());
         let mut all = vec![self.clone()];
         if !self.excited.is_empty() && self.excited.len() < self.active.len() {
@@ -104,15 +78,12 @@ impl Candidate {
         })
     }
 
-    /// Number of choices of coefficients that this one is the best of. For bits, all choices are equally likely. For other effects, all numbers of
-    /// coefficients are equally likely, and all choices of the same number.
+    /// Number of choices of coefficients that this one is the best of. All numbers of coefficients are equally likely, and all choices of the
+    /// same number.
     pub fn choices_of_coefficients(&self) -> f64 {
         let (n, k) = (self.offered.len(), self.active.len());
         if n < 2 {
             return 1.0;
-        }
-        if self.reads_code() {
-            return (n as f64).exp2();
         }
         let ratios = (0..k.min(n - k)).map(|i| (n - i) as f64 / (i + 1) as f64);
         n as f64 * ratios.product::<f64>()
@@ -151,8 +122,8 @@ impl Candidate {
         }
     }
 
-    /// Its columns out of those [with all that are offered](Self::with_all_offered). A bit's share of the time takes an error function for each of
-    /// the conditions, and a search over choices of bits needs the same columns again and again.
+    /// Its columns out of those [with all that are offered](Self::with_all_offered): a search over choices needs the same columns again and
+    /// again.
     pub fn columns_of(&self, all_offered: &DMatrix<f64>) -> DMatrix<f64> {
         let places = self.active.iter();
         let places: Vec<usize> = places
@@ -172,28 +143,6 @@ impl Candidate {
             self.regressors(at, parameter, out)
         });
         self.by_coefficient(all)
-    }
-
-    /// Columns of a code in `rows` [by dwell](Rows::by_dwell) at the conditions of [`Rows::conditions_without`]. `slots` are its [columns by
-    /// slot](Self::columns_by_slot) there. Those of turns are kept: a bit's share of the time takes an error function for each of their many
-    /// thousands of conditions.
-    pub fn columns_without(
-        &self,
-        rows: &Rows,
-        slots: &DMatrix<f64>,
-        conditions: &[Conditions],
-    ) -> DMatrix<f64> {
-        let all = rows.columns_without(slots.clone(), conditions, &self.axes(), |at, out| {
-            self.regressors(at, 0.0, out)
-        });
-        self.by_coefficient(all)
-    }
-
-    /// Columns of each of its [slots](Self::slots) in `rows`.
-    pub fn columns_by_slot(&self, rows: &Rows) -> DMatrix<f64> {
-        rows.columns(&rows.conditions(None), &self.axes(), |at, out| {
-            self.regressors(at, 0.0, out)
-        })
     }
 
     /// Columns of its active coefficients out of those of its slots.

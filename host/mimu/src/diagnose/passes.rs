@@ -16,7 +16,6 @@ use super::decision::{Decision, decide, noisier};
 use super::note::Note;
 use super::rejected::{Reason, Rejected};
 use super::rows::{ForceErrors, FreeParameters, RowFigure, Rows, Session};
-use super::search::Chosen;
 use super::{Heard, singular};
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
@@ -326,16 +325,12 @@ impl Passes<'_> {
         let mut decision = decide(without)?;
         let mut found = effects_of(&decision);
         let mut after = (!found.is_empty()).then(|| clean(&removed_of(&decision)));
-        // Readings may be useless after removal of bits that are nearly sums of each other, or of coefficients far larger than any sensor's.
+        // Readings may be useless after removal of coefficients far larger than any sensor's.
         // Such an effect explains nothing, and the recording need not be refused for it.
         let mut without = without.to_vec();
         while let Some(Err(error)) = after {
             let accepted = decision.accepted.iter().map(|a| &a.chosen);
-            let strangest = accepted.max_by(|a, b| {
-                let of = |c: &Chosen| (c.candidate.reads_code(), c.unlikely);
-                let (a, b) = (of(a), of(b));
-                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-            });
+            let strangest = accepted.max_by(|a, b| a.unlikely.total_cmp(&b.unlikely));
             let Some(strangest) = strangest else {
                 after = Some(Err(error));
                 break;

@@ -30,7 +30,6 @@ use crate::effects::fitted::FittedEffect;
 use crate::effects::quantity::Conditions;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
 use crate::estimate::earth::poses;
-use crate::signal::blocks::extent;
 pub use forces::ForceErrors;
 use terms::Quantities;
 
@@ -208,8 +207,6 @@ pub struct Rows {
     pub figure: RowFigure,
     /// Number of rows, from the first on, that the error figures include; and how many of these count as one dwell or turn.
     pub judged: (usize, usize),
-    /// Quantisation step of the readings, raw, if it is the same on all axes and in all recordings; else `None`.
-    pub step: Option<f64>,
     rows: Vec<Row>,
     conditions: Vec<Conditions>,
     /// Recording and block of each of the conditions.
@@ -415,12 +412,6 @@ impl Rows {
         conditions
     }
 
-    /// Lowest and highest reading of any axis, raw, each a mean under one set of conditions.
-    pub fn reading_range(&self) -> [f64; 2] {
-        let all = self.conditions.iter().flat_map(|m| m.reading.mean.iter());
-        extent(all.copied())
-    }
-
     /// The conditions, with the temperature that an effect follows.
     pub fn conditions(&self, followed: Option<Followed>) -> Cow<'_, [Conditions]> {
         let Some(followed) = followed else {
@@ -490,27 +481,6 @@ impl Rows {
                         columns[(r, k)] += w * at[p * m + k];
                     }
                 }
-            }
-        }
-        columns
-    }
-
-    /// `columns` of some regressors, updated to the conditions of [Self::conditions_without]. These differ only in rows with a single set of
-    /// conditions.
-    pub fn columns_without(
-        &self,
-        mut columns: DMatrix<f64>,
-        conditions: &[Conditions],
-        axes: &[usize],
-        values: impl Fn(&Conditions, &mut [f64]),
-    ) -> DMatrix<f64> {
-        let mut at = vec![0.0; axes.len()];
-        for (r, row) in self.rows.iter().enumerate() {
-            let [weight] = &row.weights[..] else { continue };
-            values(&conditions[row.conditions.start], &mut at);
-            for (k, axis) in axes.iter().enumerate() {
-                let w = weight[*axis];
-                columns[(r, k)] = if w == 0.0 { 0.0 } else { w * at[k] };
             }
         }
         columns

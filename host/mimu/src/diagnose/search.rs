@@ -19,8 +19,8 @@ use super::variance::{Fitted, LikelihoodKind, VarianceModel};
 use crate::effects::candidate::{Candidate, CandidateKind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
+use chosen::score;
 pub use chosen::{Alternative, COEFFICIENT, Chosen};
-use chosen::{price, score};
 use refine::{Beside, With};
 use screen::Screened;
 
@@ -63,10 +63,8 @@ pub struct Search<'a> {
     /// Basis of the columns of the affine parameters.
     pub basis: DMatrix<f64>,
     candidates: Vec<Candidate>,
-    /// Columns of each candidate at each parameter that is screened; empty for codes, whose columns depend on the effects beside them.
+    /// Columns of each candidate at each parameter that is screened.
     screened: Vec<Vec<Columns>>,
-    /// Codes with all of their bits, and their columns by slot in the rows by dwells.
-    codes: Vec<(Candidate, DMatrix<f64>)>,
     tests: [f64; 2],
 }
 
@@ -107,7 +105,6 @@ impl<'a> Search<'a> {
                         };
                         (0..axes.len()).map(of_axis).collect()
                     }
-                    (one, None) if one.reads_code() => vec![Vec::new()],
                     (one, None) => {
                         let at = |parameter| {
                             let plain = one.columns(rows, parameter);
@@ -123,23 +120,12 @@ impl<'a> Search<'a> {
                 }
             })
             .collect();
-        let by_dwell = rows.by_dwell();
-        let of_code = candidates.iter().filter(|c| c.reads_code());
-        let mut codes: Vec<(Candidate, DMatrix<f64>)> = Vec::new();
-        for code in of_code {
-            if !codes.last().is_some_and(|last| last.0.is_variant_of(code)) {
-                let all = code.with_all_offered();
-                let slots = all.columns_by_slot(&by_dwell);
-                codes.push((all, slots));
-            }
-        }
         Self {
             rows,
             screened,
-            codes,
             basis: basis(&rows.nuisance),
             tests: [count(true), count(false)],
-            by_dwell,
+            by_dwell: rows.by_dwell(),
             variance,
             candidates,
         }
@@ -156,43 +142,6 @@ impl<'a> Search<'a> {
         self.by_dwell.conditions_without(&left)
     }
 
-    /// Columns of all offered bits of a code, at the conditions of [`Rows::conditions_without`]; `None` if it is not a code.
-    pub(super) fn bits(&self, code: &Candidate, conditions: &[Conditions]) -> Option<DMatrix<f64>> {
-        let (all, slots) = self.codes.iter().find(|(c, _)| c.is_variant_of(code))?;
-        Some(all.columns_without(&self.by_dwell, slots, conditions))
-    }
-
-    /// Computes the columns of codes again, from readings without the errors of the effects added since.
-    fn read_again(&self, chosen: &mut [Chosen], now: &mut Fitted) {
-        for k in 0..chosen.len() {
-            if !chosen[k].candidate.reads_code() || chosen.len() == 1 {
-                continue;
-            }
-            let conditions = self.conditions_beside(chosen, k, now);
-            let one = &chosen[k].candidate;
-            let Some(all) = self.bits(one, &conditions) else {
-                continue;
-            };
-            let columns = one.columns_of(&all);
-            let before = std::mem::replace(&mut chosen[k].columns, columns);
-            match self.fit(chosen) {
-                Some(fit) => *now = fit,
-                // The fit is singular if two bits change together at these readings.
-                None => chosen[k].columns = before,
-            }
-        }
-    }
-
-    /// Conditions by dwell whose readings are free from noise and from the error of chosen effect `k`.
-    fn conditions_beside(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Vec<Conditions> {
-        let before = chosen[..k].iter().map(|c| c.columns.ncols()).sum::<usize>();
-        let first = self.basis.ncols() + before;
-        let columns = &chosen[k].columns;
-        let own = columns * now.coefficients.rows(first, columns.ncols());
-        let left = &self.rows.y - self.model(chosen) * &now.coefficients + own;
-        self.by_dwell.conditions_without(&left)
-    }
-
     /// Adds the [siblings](Candidate::siblings) of each chosen effect's coefficients, if the rows would show them at data-sheet size beside all
     /// others.
     pub fn complete(&self, chosen: &mut [Chosen], now: &mut Fitted) {
@@ -202,9 +151,6 @@ impl<'a> Search<'a> {
                 continue;
             };
             let mut more = before.candidate.siblings();
-            if before.candidate.reads_code() {
-                continue;
-            }
             let first: usize = chosen[..k].iter().map(|c| c.columns.ncols()).sum();
             while !more.is_empty() {
                 let one = &mut chosen[k];
@@ -293,25 +239,16 @@ impl<'a> Search<'a> {
         let chance = |candidate: &Candidate, with: &With| {
             self.chance(with.drop, with.columns.ncols(), affine, candidate)
         };
-        let (mut candidate, parameter, with, whole) = match candidate.reads_code() {
-            true => {
-                let (candidate, with) = beside_these.bits(candidate)?;
-                (candidate, screened.parameter, with, 1.0)
-            }
-            false => {
-                let at = |c: &&Columns| c.parameter == screened.parameter;
-                let first = self.screened[screened.index].iter().find(at)?;
-                let (parameter, with) = beside_these.parameter(candidate, first)?;
-                // With all of its coefficients an effect is one test, whichever of them are chosen afterwards.
-                let whole = chance(candidate, &with);
-                let before = candidate.active.len();
-                let (candidate, with) = beside_these.coefficients(candidate, parameter, with)?;
-                let (parameter, with) = match candidate.active.len() == before {
-                    true => (parameter, with),
-                    false => beside_these.climb(&candidate, (parameter, with), |c| c)?,
-                };
-                (candidate, parameter, with, whole)
-            }
+        let at = |c: &&Columns| c.parameter == screened.parameter;
+        let first = self.screened[screened.index].iter().find(at)?;
+        let (parameter, with) = beside_these.parameter(candidate, first)?;
+        // With all of its coefficients an effect is one test, whichever of them are chosen afterwards.
+        let whole = chance(candidate, &with);
+        let before = candidate.active.len();
+        let (mut candidate, with) = beside_these.coefficients(candidate, parameter, with)?;
+        let (parameter, with) = match candidate.active.len() == before {
+            true => (parameter, with),
+            false => beside_these.climb(&candidate, (parameter, with), |c| c)?,
         };
         candidate.choices *= candidate.choices_of_coefficients();
         let p = chance(&candidate, &with).min(whole);

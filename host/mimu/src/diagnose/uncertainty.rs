@@ -87,7 +87,7 @@ pub fn of_forces(session: &Session, magnitudes: &Rows, decision: &Decision) -> O
         let values = DVector::from_column_slice(&a.effect.values);
         slopes.push(one.candidate.slope(&rows, one.parameter, &values));
     }
-    for one in accepted.iter().filter(|c| !c.candidate.reads_code()) {
+    for one in &accepted {
         add(&one.candidate, one.parameter, &|_| 0.0);
     }
     for effect in effects::all().filter(|e| is_of_force(e)) {
@@ -156,6 +156,5 @@ fn is_of_force(effect: &Effect) -> bool {
     let mut all = effect.coefficients.iter();
     effect.sensor == Sensor::Accel
         && effect.parameter.is_none()
-        && !effect.reads_code()
         && all.all(|c| c.regressor.quantities().iter().all(force))
 }

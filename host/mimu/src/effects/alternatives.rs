@@ -86,7 +86,7 @@ const fn by_turning(sensor: Sensor) -> Effect {
     law("by_turning", sensor, about, &TURNING, None)
 }
 
-const BY_HAND: &str = "the same rates from another supply, and turned by hand: errors of codes do not depend on what turns the unit";
+const BY_HAND: &str = "the same rates from another supply, and turned by hand: errors of the readings do not depend on what turns the unit";
 
 const LONGER: &str =
     "a cold start recorded for several hours: an exponential ends, a logarithm does not";
@@ -94,16 +94,12 @@ const LONGER: &str =
 static ALTERNATIVES: [Alternative; 5] = [
     Alternative {
         law: by_turning(Sensor::Gyro),
-        of: &[
-            "gyro_readout_code",
-            "gyro_scale_asymmetry",
-            "gyro_scale_quadratic",
-        ],
+        of: &["gyro_scale_asymmetry", "gyro_scale_quadratic"],
         discriminating_experiment: BY_HAND,
     },
     Alternative {
         law: by_turning(Sensor::Accel),
-        of: &["accel_readout_code", "accel_size_effect"],
+        of: &["accel_size_effect"],
         discriminating_experiment: BY_HAND,
     },
     Alternative {

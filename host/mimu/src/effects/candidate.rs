@@ -2,10 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::converter::{BITS, Converter, Converters};
 use super::effect::{Coefficient, Effect, NonlinearParameter, Role, Scope};
 use super::quantity::{Conditions, Need, Quantity, RATE_LAG_S};
-use super::readout;
 use super::regressor::{Product, Regressor};
 use super::temperature::Followed;
 use crate::quantity::AXES;
@@ -38,8 +36,6 @@ pub struct Candidate {
     pub kind: CandidateKind,
     /// Coefficients that the experiment determines.
     pub active: Vec<usize>,
-    /// For errors that depend on the code: the converter of each axis that has one. Axes may share one.
-    pub codes: Converters,
     /// As in [`Followed`].
     pub without_self_heating: bool,
     /// Coefficients that the experiment would show at data-sheet size.
@@ -50,17 +46,6 @@ pub struct Candidate {
     pub choices: f64,
     /// Coefficients among which the search chooses.
     pub offered: Vec<usize>,
-}
-
-/// Errors of a converter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ConverterErrors {
-    /// Axis that it reads; `None` for all axes.
-    pub axis: Option<usize>,
-    /// Relation between its codes and readings.
-    pub converter: Converter,
-    /// Errors of its bits from the first down, in units of the weight of the first.
-    pub errors: [f64; BITS],
 }
 
 /// Number of values of a nonlinear parameter that are screened.
@@ -133,25 +118,12 @@ impl Candidate {
             sensor,
             kind,
             active,
-            codes: [None; 3],
             without_self_heating: false,
             excited: Vec::new(),
             inseparable: Vec::new(),
             choices: 1.0,
             offered: Vec::new(),
         }
-    }
-
-    /// The candidate with one converter for all axes.
-    pub fn behind_one(mut self, converter: Converter) -> Self {
-        self.active = (0..BITS).collect();
-        self.codes = [Some(converter); 3];
-        self
-    }
-
-    /// Whether its errors are a function of the converter's code.
-    pub fn reads_code(&self) -> bool {
-        matches!(self.kind, CandidateKind::Effect(e) if e.reads_code())
     }
 
     /// Coefficients specific to the recording, for the axes that have an active coefficient.
@@ -305,52 +277,6 @@ impl Candidate {
         }
     }
 
-    /// For errors that depend on the code: the errors of each converter, from the values of the active coefficients. If all three are equal, one
-    /// entry for all axes.
-    pub fn by_converter(&self, values: &[f64]) -> Vec<ConverterErrors> {
-        let all: Vec<ConverterErrors> = (0..3)
-            .filter_map(|axis| {
-                let mut errors = [0.0; BITS];
-                for (k, value) in self.active.iter().zip(values) {
-                    let own = k.checked_sub(readout::first_of(axis));
-                    let bit = if *k < errors.len() { Some(*k) } else { own };
-                    if let Some(error) = bit.and_then(|bit| errors.get_mut(bit)) {
-                        *error += value;
-                    }
-                }
-                Some(ConverterErrors {
-                    axis: Some(axis),
-                    converter: self.codes[axis]?,
-                    errors,
-                })
-            })
-            .collect();
-        let first = all.first().copied();
-        let alike = |one: &ConverterErrors| {
-            first.is_some_and(|f| (f.converter, f.errors) == (one.converter, one.errors))
-        };
-        match first {
-            Some(one) if all.len() == 3 && all.iter().all(alike) => {
-                vec![ConverterErrors { axis: None, ..one }]
-            }
-            _ => all,
-        }
-    }
-
-    /// For errors that depend on the code: the scale factor contained in the errors of the bits (the part that is proportional to their weights),
-    /// from the values of the active coefficients; the largest over the converters.
-    pub(crate) fn share_of_scale(&self, values: &[f64]) -> f64 {
-        let weight = |bit: usize| 0.5_f64.powi(bit as i32);
-        let all: f64 = (0..BITS).map(|bit| weight(bit).powi(2)).sum();
-        let mut sums = [0.0; 4];
-        for (k, value) in self.active.iter().zip(values) {
-            sums[k / BITS] += value * weight(k % BITS) / all;
-        }
-        let [common, own @ ..] = sums;
-        let each = own.map(|own| (common + own).abs());
-        each.into_iter().fold(0.0, f64::max)
-    }
-
     /// Name and unit of each of its active coefficients.
     pub fn names(&self) -> Vec<(String, String)> {
         match &self.kind {
@@ -374,10 +300,6 @@ impl Candidate {
     pub fn regressors(&self, at: &Conditions, parameter: f64, out: &mut [f64]) {
         match &self.kind {
             CandidateKind::Effect(e) => {
-                let at = match self.reads_code() {
-                    true => &at.in_bits(&self.codes),
-                    false => at,
-                };
                 let mut out = out.iter_mut();
                 for k in &self.active {
                     let Coefficient {

@@ -159,8 +159,6 @@ pub(super) const fn times(first: Quantity, second: Quantity) -> Regressor {
 pub enum OnDevice {
     /// Never: it is a true input, or specific to a session.
     Never,
-    /// From the raw reading, by its code.
-    ByCode,
     /// With every sample.
     EverySample,
     /// Folded into a bias and a matrix, when temperature or time changes.
@@ -185,12 +183,6 @@ impl Effect {
         self.coefficients.iter().all(of_session)
     }
 
-    /// Whether its errors are a function of the converter's code.
-    pub fn reads_code(&self) -> bool {
-        let of_code = |c: &Coefficient| matches!(c.regressor, Regressor::Bit(_));
-        self.coefficients.iter().any(of_code)
-    }
-
     /// The coefficients that are written to a file and removed.
     pub fn of_unit(&self) -> impl Iterator<Item = &'static Coefficient> {
         self.coefficients.iter().filter(|c| c.scope == Scope::Unit)
@@ -200,7 +192,6 @@ impl Effect {
     pub fn on_device(&self) -> OnDevice {
         match self {
             e if !e.is_error() || e.is_of_session() => OnDevice::Never,
-            e if e.reads_code() => OnDevice::ByCode,
             e if e.of_unit().all(|c| c.regressor.folds(e.sensor)) => OnDevice::Folded,
             _ => OnDevice::EverySample,
         }
@@ -211,10 +202,7 @@ impl Effect {
         let mut formulas: Vec<String> = Vec::new();
         for c in self.coefficients {
             // Coefficients of the axes with the same law share one formula; those of a matrix are distinguished by the other axis.
-            let formula = match c.regressor {
-                Regressor::Bit(_) => "probability, over the noise, that the bit is set".into(),
-                regressor => regressor.formula(None),
-            };
+            let formula = c.regressor.formula(None);
             let formula = match c.scope {
                 Scope::Recording => {
                     format!("{formula} (specific to the session: neither written nor removed)")
@@ -243,7 +231,6 @@ impl Effect {
         let device = match self.on_device() {
             OnDevice::Never if self.is_error() => "never: it is specific to a session",
             OnDevice::Never => "never: it is a true input",
-            OnDevice::ByCode => "with every sample, from the code",
             OnDevice::EverySample => "with every sample",
             OnDevice::Folded => "when temperature or time changes",
         };

@@ -14,7 +14,7 @@ use written::WrittenEffect;
 
 pub use on_device::NotOnDevice;
 pub(crate) use written::candidate;
-pub use written::{WrittenCoefficient, WrittenConverter, WrittenParameter};
+pub use written::{WrittenCoefficient, WrittenParameter};
 
 /// An effect with its numbers.
 ///
@@ -138,29 +138,14 @@ impl FittedEffect {
         })
     }
 
-    /// Its converters: one for all axes, or one for each.
-    pub fn converters(&self) -> Vec<WrittenConverter> {
-        WrittenConverter::of(&self.candidate.codes)
-    }
-
     /// Adds it to the effects of a unit. Known effects were removed before this one was found, so coefficients of the same law add up. The same law
     /// with another time constant is a separate effect.
-    ///
-    /// # Errors
-    ///
-    /// In words, if both depend on the code: an axis has only one converter.
-    pub fn join(self, all: &mut Vec<Self>) -> Result<(), String> {
+    pub fn join(self, all: &mut Vec<Self>) {
         let same = |e: &&mut Self| e.id() == self.id() && e.parameter == self.parameter;
         let Some(known) = all.iter_mut().find(same) else {
             all.push(self);
-            return Ok(());
+            return;
         };
-        if self.candidate.reads_code() {
-            return Err(format!(
-                "[[effect]] {}: its other coefficients belong to another converter, and an axis has only one",
-                self.id()
-            ));
-        }
         let sigmas =
             known.sigmas.len() == known.values.len() && self.sigmas.len() == self.values.len();
         for (at, (k, value)) in self.candidate.active.iter().zip(&self.values).enumerate() {
@@ -179,7 +164,6 @@ impl FittedEffect {
         if !sigmas {
             known.sigmas.clear();
         }
-        Ok(())
     }
 }
 

@@ -3,10 +3,9 @@
 //! | module | what |
 //! |---|---|
 //! | [`quantity`] | what an error can be a function of |
-//! | [`converter`] | bits of the code behind a reading |
 //! | [`regressor`] | products of powers, absolute values, decays: what an error is proportional to |
 //! | [`effect`] | coefficients of regressors, with what excites and what removes them |
-//! | `gyro`, `accel`, `drift`, `thermal`, [`readout`] | the effects, one list each |
+//! | `gyro`, `accel`, `drift`, `thermal` | the effects, one list each |
 //! | [`alternatives`] | unlisted laws that may explain the same residuals as an effect |
 //! | [`candidate`] | an effect, a product found from the data or a jump, with the choice of its coefficients |
 //! | [`temperature`] | the temperature that an effect follows |
@@ -19,11 +18,9 @@
 
 pub mod alternatives;
 pub mod candidate;
-pub mod converter;
 pub mod effect;
 pub mod fitted;
 pub mod quantity;
-pub mod readout;
 pub mod regressor;
 pub mod removal;
 pub mod temperature;
@@ -42,7 +39,6 @@ pub fn all() -> impl Iterator<Item = &'static Effect> {
         accel::EFFECTS,
         drift::EFFECTS,
         thermal::EFFECTS,
-        readout::EFFECTS,
     ];
     LISTS.iter().copied().flatten()
 }
@@ -101,7 +97,7 @@ mod tests {
             let parameter = effect.parameter.map(|p| p.from);
             let of_core = DeviceEffect::<f64>::named(effect.id, &numbers, parameter);
             match effect.on_device() {
-                OnDevice::Never | OnDevice::ByCode => assert!(of_core.is_err(), "{}", effect.id),
+                OnDevice::Never => assert!(of_core.is_err(), "{}", effect.id),
                 how => {
                     let folded = of_core.map(|e| e.is_slow());
                     assert_eq!(folded, Ok(how == OnDevice::Folded), "{}", effect.id);

@@ -49,12 +49,9 @@ impl Conditions {
             all.iter().map(|c| of(c) * (c.duration_s / total)).sum()
         };
         let level = mean(&|c| c.reading.mean);
-        let square = |v: Vector3<f64>| v.component_mul(&v);
-        let variance = mean(&|c| square(c.reading.sd) + square(c.reading.mean - level));
         let mut pooled = all[0];
         pooled.duration_s = total;
         pooled.reading.mean = level;
-        pooled.reading.sd = variance.map(f64::sqrt);
         pooled
     }
 
@@ -71,8 +68,6 @@ impl Conditions {
 pub struct Reading {
     /// Their mean, raw.
     pub mean: Vector3<f64>,
-    /// Standard deviation of a sample, raw.
-    pub sd: Vector3<f64>,
     /// Scale factors, raw/SI, positive.
     pub scale: Vector3<f64>,
 }
@@ -81,20 +76,14 @@ impl Reading {
     /// For conditions that were not recorded: without noise, in SI.
     pub const NONE: Self = Self {
         mean: Vector3::new(0.0, 0.0, 0.0),
-        sd: Vector3::new(0.0, 0.0, 0.0),
         scale: Vector3::new(1.0, 1.0, 1.0),
     };
 
     /// The reading with these statistical `moments` of the three axes.
     pub fn of(moments: &[Moments], scale: &Vector3<f64>) -> Self {
         let mean = |i: usize| moments[i].mean;
-        let sd = |i: usize| match moments[i].n {
-            0 | 1 => 0.0,
-            n => (moments[i].m2 / f64::from(n - 1)).sqrt(),
-        };
         Self {
             mean: Vector3::from_fn(|i, _| mean(i)),
-            sd: Vector3::from_fn(|i, _| sd(i)),
             scale: *scale,
         }
     }

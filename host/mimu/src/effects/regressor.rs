@@ -3,7 +3,6 @@
 //! Its value, unit, formula, what it depends on and how often the device has to evaluate it all follow from the same few numbers, so an effect states
 //! its law once.
 
-use super::converter::share_set;
 use super::quantity::{Conditions, Need, Quantity};
 use crate::quantity::Sensor;
 
@@ -187,9 +186,6 @@ pub enum Regressor {
     Decay(Quantity),
     /// ln(1 + quantity / parameter).
     Logarithm(Quantity),
-    /// The share of the time in which this bit, counted from the first down, is set in the code of the reading, divided by the scale factor. Readings
-    /// are in units of the weight of bit 0, counted from code 0.
-    Bit(usize),
 }
 
 impl Regressor {
@@ -211,11 +207,6 @@ impl Regressor {
             Self::Absolute(q) => q.of(at, axis).abs(),
             Self::Decay(q) => (-q.of(at, axis) / parameter).exp(),
             Self::Logarithm(q) => (q.of(at, axis) / parameter).ln_1p(),
-            Self::Bit(bit) => {
-                let of_bit = 0.5_f64.powi(*bit as i32);
-                let reading = &at.reading;
-                share_set(reading.mean[axis], reading.sd[axis], of_bit) / reading.scale[axis]
-            }
         }
     }
 
@@ -227,7 +218,6 @@ impl Regressor {
             Self::Absolute(q) | Self::Decay(q) | Self::Logarithm(q) => {
                 [Some(Product::power(*q, 1)), None]
             }
-            Self::Bit(_) => [None, None],
         }
     }
 
@@ -311,7 +301,6 @@ impl Regressor {
             Self::Product(product) | Self::Sum(product, _) => product.unit(sensor),
             Self::Absolute(q) => Product::power(*q, 1).unit(sensor),
             Self::Decay(_) | Self::Logarithm(_) => sensor.unit().into(),
-            Self::Bit(_) => "1".into(),
         }
     }
 
@@ -334,7 +323,6 @@ impl Regressor {
             Self::Absolute(q) => format!("abs {}", q.symbol(axis)),
             Self::Decay(q) => format!("exp(-{}/τ)", q.symbol(axis)),
             Self::Logarithm(q) => format!("ln(1 + {}/τ)", q.symbol(axis)),
-            Self::Bit(bit) => format!("bit -{bit} set"),
         }
     }
 }

@@ -129,7 +129,7 @@ struct SensorEffects<'a> {
 impl SensorEffects<'_> {
     /// The conditions without `error` of the sensor.
     fn without(&self, at: &Conditions, error: &Vector3<f64>) -> Conditions {
-        let mut clean = at.read_without(error);
+        let mut clean = *at;
         let input = match self.sensor {
             Sensor::Gyro => &mut clean.rate,
             Sensor::Accel => &mut clean.force,
@@ -141,12 +141,9 @@ impl SensorEffects<'_> {
 
     /// Errors of the axes under conditions within block `at`, SI.
     fn error(&self, conditions: &Conditions, at: usize) -> Vector3<f64> {
-        let sum = |conditions: &Conditions, codes: bool| {
+        let sum = |conditions: &Conditions| {
             let mut error = Vector3::zeros();
             for (effect, followed) in self.effects.iter().zip(&self.followed_temperatures) {
-                if effect.candidate.reads_code() != codes {
-                    continue;
-                }
                 let now = (conditions.temperature_offset, conditions.temperature_offset);
                 let (temperature_offset, lagged_temperature) =
                     followed.as_ref().map_or(now, |l| l[at]);
@@ -159,22 +156,12 @@ impl SensorEffects<'_> {
             }
             error
         };
-        // As on the device: if the error is steeper than the input, a second evaluation would diverge. Each axis has its own code. Errors that depend
-        // on the code are removed first, because all others are functions of the reading without them.
-        let first = sum(conditions, true);
-        let second = sum(&self.without(conditions, &first), true);
-        let codes = first.zip_map(&second, |first, second| {
-            match (second - first).powi(2) < first.powi(2) {
-                true => second,
-                false => first,
-            }
-        });
-        let conditions = &self.without(conditions, &codes);
-        let first = sum(conditions, false);
-        let second = sum(&self.without(conditions, &first), false);
+        // As on the device: if the error is steeper than the input, a second evaluation would diverge.
+        let first = sum(conditions);
+        let second = sum(&self.without(conditions, &first));
         match (second - first).norm_squared() < first.norm_squared() {
-            true => codes + second,
-            false => codes + first,
+            true => second,
+            false => first,
         }
     }
 }
@@ -298,7 +285,7 @@ impl<'a> Removal<'a> {
         rate: Vector3<f64>,
         force: Vector3<f64>,
     ) -> Conditions {
-        let (block, from) = (&self.blocks()[at], self.first_channel());
+        let block = &self.blocks()[at];
         let input = match self.effects.sensor {
             Sensor::Gyro => rate,
             Sensor::Accel => force,
@@ -315,10 +302,7 @@ impl<'a> Removal<'a> {
             sensed: self.effects.direction * input,
             temperature_offset: self.recorded[at].1,
             lagged_temperature: self.recorded[at].1,
-            reading: Reading {
-                mean: self.raw(at, from),
-                ..Reading::of(&block.raw[from..from + 3], &self.scale)
-            },
+            reading: Reading::NONE,
         }
     }
 
@@ -341,7 +325,6 @@ impl<'a> Removal<'a> {
         let mean = Vector3::from(piece.integral) / piece.duration_s;
         let force = apply(self.models[1], self.raw(at, 3));
         let mut conditions = self.conditions(at, t_s, self.model.apply(&mean), force);
-        conditions.reading.mean = mean;
         conditions.duration_s = piece.duration_s;
         let error = self.effects.error(&conditions, at);
         for i in 0..3 {

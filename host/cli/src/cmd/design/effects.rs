@@ -51,13 +51,6 @@ fn targets(ids: &[String]) -> Result<Vec<Target>> {
             ));
         };
         let target = Target::listed(effect);
-        if target.candidate.reads_code() {
-            return Err(Error::new(
-                format!("--effects {id}"),
-                "noise and bias decide which codes of a converter a dwell meets, so no dwell can be planned for it",
-                format!("needs {}", effect.needs),
-            ));
-        }
         if !all.iter().any(|t| t.candidate.id() == effect.id) {
             all.push(target);
         }

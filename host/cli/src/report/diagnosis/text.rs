@@ -14,9 +14,8 @@ pub(super) use effect::table as coefficient_table;
 pub(super) use experiments::by_experiment;
 use experiments::experiments;
 use mimu::diagnose::decision::Leftover;
-use mimu::effects::fitted::WrittenConverter;
 use mimu::plan::next_experiment::NotShown;
-use mimu::quantity::{Sensor, plural, plus_minus, significant};
+use mimu::quantity::{Sensor, plural, significant};
 use mimu::readable;
 use mimu::result::diagnosis::{DiagnosisResult, SecondResult, SensorDiagnosisResult};
 use mimu::warning::Warning;
@@ -252,16 +251,6 @@ fn residuals(out: &mut String, d: &DiagnosisResult, name: Sensor, all: bool) {
         let more: usize = groups[listed..].iter().map(Vec::len).sum();
         let _ = writeln!(out, "  and {more} more residuals (--verbose)");
     }
-}
-
-/// A converter in words.
-pub(super) fn converter(c: &WrittenConverter) -> String {
-    format!(
-        "converter of {}, raw: bit 0 turns every {} from {} on; errors are in units of bit 0",
-        c.axes,
-        significant(c.weight_of_bit_0_raw),
-        plus_minus(c.reading_of_code_0_raw, c.reading_of_code_0_within_raw)
-    )
 }
 
 /// Difference in score: worse or, compared with later effects, better.

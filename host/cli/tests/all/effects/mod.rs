@@ -1,7 +1,6 @@
 //! Effects in a calibration: written, read, removed by the PC and the device alike, and shown by `mimu verify`.
 
 mod applied;
-mod codes;
 mod core_program;
 mod gaps;
 mod kept;
@@ -14,7 +13,6 @@ use std::process::Command;
 use mimu::calibration::Calibration;
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, CandidateKind};
-use mimu::effects::converter::Converter;
 use mimu::effects::effect::OnDevice;
 use mimu::effects::fitted::FittedEffect;
 use mimu::effects::quantity::Quantity;
@@ -26,7 +24,7 @@ use mimu_core::effects::{Effects, State};
 use mimu_device::Image;
 use nalgebra::Vector3;
 
-use unit::{BIT_0_V, CUBIC, SAG, THERMAL, fitted, fitted_effect, named, record};
+use unit::{CUBIC, SAG, THERMAL, fitted, fitted_effect, named, record};
 
 /// All named effects, some with only part of their coefficients, and three terms; at ten times data-sheet size.
 fn every_effect() -> Vec<FittedEffect> {
@@ -35,11 +33,6 @@ fn every_effect() -> Vec<FittedEffect> {
         .enumerate()
         .map(|(n, effect)| {
             let mut candidate = Candidate::new(effect.sensor, CandidateKind::Effect(effect));
-            if candidate.reads_code() {
-                let zero = 0.123;
-                let weight = BIT_0_V;
-                candidate = candidate.behind_one(Converter::of(weight, zero));
-            }
             if n % 2 == 1 {
                 candidate.active.remove(1);
             }
@@ -48,7 +41,6 @@ fn every_effect() -> Vec<FittedEffect> {
                 .active
                 .iter()
                 .map(|k| {
-                    // Square roots: no sum of coefficients equals another, so the second look at a code never moves an error by exactly its size.
                     sign(*k) * effect.coefficients[*k].typical * (10.0 + 3.0 * (*k as f64).sqrt())
                 })
                 .collect();
@@ -89,18 +81,8 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
             (read.parameter, &read.values),
             (written.parameter, &written.values)
         );
-        assert_eq!(read.candidate.codes, written.candidate.codes);
     }
 
-    // Effects of the code are left out: the PC derives the bits from mean and scatter of a block, which the device does not.
-    let effects: Vec<FittedEffect> = every_effect()
-        .into_iter()
-        .filter(|e| !e.candidate.reads_code())
-        .collect();
-    let text = Calibration::of(&fit, &effects, "2026-01-01T00:00:00Z")
-        .unwrap()
-        .to_toml();
-    let calibration = Calibration::parse(&text, "cal.toml").unwrap();
     let before = &fit.prepared;
     let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
     let after = remove(before, Some(&gyro), Some(&accel), calibration.effects()).unwrap();
@@ -172,12 +154,10 @@ fn every_effect_goes_into_the_bytes_of_a_device() {
                     accel: accel.apply(&from.accel),
                 }
             };
-            let si = removed(&double.without_code_errors(&raw));
-            let by_double = double.remove(&mut of_double, &si);
-            let coded = single.without_code_errors(&raw_single);
+            let by_double = double.remove(&mut of_double, &removed(&raw));
             let si_single = removed(&Sample {
-                gyro: coded.gyro.cast(),
-                accel: coded.accel.cast(),
+                gyro: raw_single.gyro.cast(),
+                accel: raw_single.accel.cast(),
             });
             let by_single = single.remove(
                 &mut of_single,
@@ -196,9 +176,7 @@ fn every_effect_goes_into_the_bytes_of_a_device() {
             most = most.max(moved);
         }
         assert!(most > 1e-5, "{id}: {most}");
-        // Codes are counted in single precision, to a thousandth of the finest bit: for three axes this fraction of the samples is on the other side.
-        let allowed = if effect.candidate.reads_code() { 6 } else { 0 };
-        assert!(beside <= allowed, "{id}: {beside} of 600");
+        assert_eq!(beside, 0, "{id}: {beside} of 600");
     }
 }
 

@@ -3,7 +3,6 @@
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, CandidateKind};
 use mimu::effects::fitted::FittedEffect;
-use mimu::effects::readout::TYPICAL;
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
@@ -49,39 +48,8 @@ pub const CUBIC: f64 = 3e-5;
 /// Thermal bias of gyro z, rad/s/K.
 pub const THERMAL: f64 = 5e-4;
 
-/// Weight of bit 0 of the converters, V.
-pub const BIT_0_V: f64 = 1.6384;
-/// Bits of each converter of the accelerometer that are worth more than nominal, V, up to three times data-sheet size.
-pub const WORTH_V: [[(i32, f64); 3]; 3] = {
-    let one = TYPICAL * BIT_0_V;
-    [
-        [(0, 3.0 * one), (3, -2.0 * one), (6, one)],
-        [(1, -3.0 * one), (2, 2.0 * one), (5, -one)],
-        [(0, -2.0 * one), (4, 3.0 * one), (7, -one)],
-    ]
-};
-/// Readings of code 0, V: the subtracted value is not a multiple of a code.
-pub const ZERO_V: [f64; 3] = [-0.0713, -1.1234, -0.5061];
-
-/// Error that the accelerometer's converters add to a reading `u` of an axis, V.
-pub fn worth(axis: usize, u: f64) -> f64 {
-    let each = WORTH_V[axis].iter().map(|(bit, worth)| {
-        let code = ((u - ZERO_V[axis]) / (BIT_0_V * 0.5_f64.powi(*bit))).floor();
-        if code.rem_euclid(2.0) == 1.0 {
-            *worth
-        } else {
-            0.0
-        }
-    });
-    each.sum()
-}
-
 /// Records the unit on a table, with or without its flaws; `temp` says whether temp_c is recorded.
 pub fn record(folder: &Path, flawed: bool, temp: bool) {
-    write_recording(folder, flawed, false, temp);
-}
-
-pub fn write_recording(folder: &Path, flawed: bool, converted: bool, temp: bool) {
     std::fs::create_dir(folder).unwrap();
     let manifest = format!(
         "format = \"mimu-recording/1\"\ndevice = \"bench\"\nsample_rate_hz = {RATE_HZ:?}\n\
@@ -121,14 +89,9 @@ pub fn write_recording(folder: &Path, flawed: bool, converted: bool, temp: bool)
                 }),
             };
             let read = p * *input + b + scale.component_mul(&error);
-            for (axis, u) in read.iter().enumerate() {
+            for u in &read {
                 let u = u + NOISE[sensor] * normal();
-                let more = if converted && sensor == 1 {
-                    worth(axis, u)
-                } else {
-                    0.0
-                };
-                write!(out, ",{:.9}", u + more).unwrap();
+                write!(out, ",{u:.9}").unwrap();
             }
         }
         for v in rate_dps.iter().chain(force.iter()) {

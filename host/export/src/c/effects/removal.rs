@@ -9,7 +9,7 @@ use super::super::{list, number};
 use super::Effects;
 
 impl Effects {
-    /// Sensitive directions of the sensors, and the converters' nonlinearity.
+    /// Sensitive directions of the sensors.
     pub fn constants(&self, prefix: &str, out: &mut String) {
         for sensor in Sensor::BOTH.into_iter().filter(|s| !self.is_none_of(*s)) {
             let Some(directions) = &self.directions[sensor] else {
@@ -32,32 +32,6 @@ impl Effects {
             }
             out.push('\n');
         }
-        for (at, converter) in self.converters.iter().enumerate() {
-            let _ = writeln!(
-                out,
-                "// Errors of the nine highest bits of a converter, in units of the weight of bit 0.\nstatic const float {prefix}_code_{at}[9] = {};\n",
-                list(converter.coefficients().iter().copied())
-            );
-        }
-    }
-
-    /// `u`, the reading of `sensor` without converter nonlinearity; `None` if none is known.
-    pub fn without_code_errors(&self, prefix: &str, sensor: Sensor) -> Option<String> {
-        let codes = &self.codes[sensor];
-        codes.iter().flatten().next()?;
-        let of = |axis: usize| {
-            let clean = codes[axis].and_then(|at| {
-                let converter = self.converters[at].converter()?;
-                let (weight, zero) = (number(converter.weight), number(converter.zero));
-                Some(format!(
-                    "{prefix}_clean(raw[{axis}], {weight}, {zero}, {prefix}_code_{at})"
-                ))
-            });
-            let value = clean.unwrap_or_else(|| format!("raw[{axis}]"));
-            format!("    u[{axis}] = {value};\n")
-        };
-        let each: String = (0..3).map(of).collect();
-        Some(format!("    float u[3];\n{each}"))
     }
 
     pub fn state(&self, out: &mut String) {

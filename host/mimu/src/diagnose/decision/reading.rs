@@ -174,16 +174,16 @@ fn of_axis(
     })
 }
 
-/// How much lower the score is with steps at some readings in place of a smooth nonlinearity, `one` of the chosen, and of all converter
-/// nonlinearities; negative if it is higher. Missing codes, and bits of converters with another zero, are such steps. With few different
-/// inputs they look like a smooth nonlinearity.
+/// How much lower the score is with steps at some readings in place of a smooth nonlinearity, `one` of the chosen; negative if it is higher. Missing
+/// codes, and bits of a converter that weigh more or less than their nominal value, are such steps. With few different inputs they look like
+/// a smooth nonlinearity.
 pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -> Option<f64> {
     const PLACES: usize = PIECES[2];
     let (group, rest): (Vec<_>, Vec<_>) = chosen
         .iter()
         .cloned()
         .enumerate()
-        .partition(|(k, c)| *k == one || c.candidate.reads_code());
+        .partition(|(k, _)| *k == one);
     let rest: Vec<Chosen> = rest.into_iter().map(|c| c.1).collect();
     let columns: usize = group.iter().map(|c| c.1.columns.ncols()).sum();
     let (null, now) = (search.fit(&rest)?, search.fit(chosen)?);

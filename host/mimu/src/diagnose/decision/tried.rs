@@ -45,10 +45,7 @@ pub(super) fn candidates(
             continue;
         }
         let mut not_seen = || not_excited.push(effect);
-        let Some(mut candidate) = Candidate::effect_in(effect, rows) else {
-            not_seen();
-            continue;
-        };
+        let mut candidate = Candidate::new(sensor, CandidateKind::Effect(effect));
         // How many sigmas a coefficient of 1 would be from zero, at the nonlinear parameter at which it shows best.
         let mut best = vec![0.0_f64; effect.coefficients.len()];
         for parameter in candidate.parameters() {
@@ -61,7 +58,7 @@ pub(super) fn candidates(
         }
         let sigmas = |k: &usize| best[*k] * effect.coefficients[*k].typical;
         candidate.active.retain(|k| sigmas(k) > EXCITED / LARGEST);
-        if !candidate.reads_code() && candidate.parameter().is_none() {
+        if candidate.parameter().is_none() {
             let white = whitener.whiten(&candidate.columns(rows, 0.0));
             separate(&mut candidate, &(&white - &q * q.tr_mul(&white)));
         }

@@ -14,14 +14,11 @@ use crate::diagnose::decision::Accepted;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::Search;
 use crate::diagnose::variance::Fitted;
-use crate::effects::quantity::Conditions;
 use crate::quantity::AXES;
 use crate::signal::blocks::extent;
 
 /// Points of a curve.
 const POINTS: usize = 81;
-/// Points of a curve with steps.
-const POINTS_OF_STEPS: usize = 801;
 
 /// Abscissa of a panel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -88,9 +85,6 @@ struct Group {
 /// Groups the coefficients of one axis that depend on the same quantity, such as the linear and quadratic parts of a thermal bias.
 fn groups(one: &Accepted) -> Vec<Group> {
     let candidate = &one.chosen.candidate;
-    if candidate.reads_code() {
-        return Vec::new();
-    }
     let mut groups: Vec<Group> = Vec::new();
     for (slot, (member, axis)) in candidate.slots().into_iter().enumerate() {
         let on = dependence(candidate, slot);
@@ -133,10 +127,6 @@ pub(super) fn panels(
     tracks: &[Track],
 ) -> Option<Vec<Panel>> {
     let mut panels = Vec::new();
-    if one.chosen.candidate.reads_code() {
-        let input = tracks.iter().filter(|t| t.kind == ResidualKind::Input);
-        panels.extend(input.filter_map(|t| coded(rows, one, t)));
-    }
     for group in groups(one) {
         let of_axis = tracks
             .iter()
@@ -249,7 +239,6 @@ fn variable(
         members: &group.members,
         sloped: affine_in(search, &x, track),
         x,
-        points: POINTS,
     };
     let title = match members[..] {
         [name] if name != axis => format!("{} {axis}, {name}", candidate.sensor),
@@ -262,47 +251,6 @@ fn variable(
     ))
 }
 
-/// Converter nonlinearity of the axis of `track` against its reading. `None` if there is none.
-fn coded(rows: &Rows, one: &Accepted, track: &Track) -> Option<Panel> {
-    let axis = track.axis?;
-    let candidate = &one.chosen.candidate;
-    let slots = candidate.slots();
-    let ours = || slots.iter().enumerate().filter(|(_, s)| s.1 == axis);
-    let members: Vec<usize> = ours().map(|(_, s)| s.0).collect();
-    let conditions = rows.conditions(None);
-    let mut like = *conditions.first().filter(|_| !members.is_empty())?;
-    let of_rows = |value: &dyn Fn(&Conditions) -> f64| -> Vec<f64> {
-        let rows_of = track.rows.iter();
-        rows_of.map(|r| rows.mean(*r, &conditions, value)).collect()
-    };
-    let sds = of_rows(&|at| at.reading.sd[axis]);
-    like.reading.sd[axis] = sds.iter().sum::<f64>() / sds.len() as f64;
-    let values = |x: f64| {
-        let mut at = like;
-        at.reading.mean[axis] = x;
-        let mut all = vec![0.0; slots.len()];
-        candidate.regressors(&at, 0.0, &mut all);
-        ours().map(|(slot, _)| all[slot]).collect()
-    };
-    let drawn = Drawn {
-        one,
-        track,
-        members: &members,
-        x: of_rows(&|at| at.reading.mean[axis]),
-        // The reading is linear in the input.
-        sloped: true,
-        points: POINTS_OF_STEPS,
-    };
-    let reading = Abscissa {
-        name: format!("what {} {} reads", candidate.sensor, AXES[axis]),
-        unit: "raw".into(),
-        factor: 1.0,
-        offset: 0.0,
-    };
-    let title = format!("{} {}", candidate.sensor, AXES[axis]);
-    Some(drawn.panel(title, reading, values))
-}
-
 /// Coefficients of an effect that are functions of one abscissa, on one track.
 struct Drawn<'a> {
     one: &'a Accepted,
@@ -313,8 +261,6 @@ struct Drawn<'a> {
     x: Vec<f64>,
     /// Whether the affine calibration can absorb a straight line in x.
     sloped: bool,
-    /// Points of the curve.
-    points: usize,
 }
 
 impl Drawn<'_> {
@@ -336,8 +282,8 @@ impl Drawn<'_> {
             self.one.conditional[(self.members[i], self.members[j])]
         });
         let [low, high] = extent(self.x.iter().copied());
-        let curve = (0..self.points).map(|i| {
-            let x = low + (high - low) * i as f64 / (self.points - 1) as f64;
+        let curve = (0..POINTS).map(|i| {
+            let x = low + (high - low) * i as f64 / (POINTS - 1) as f64;
             let values = values(x);
             let at = DVector::from_fn(count, |m, _| less(m, x, values[m]));
             Curve {

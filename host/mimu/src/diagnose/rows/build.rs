@@ -36,8 +36,6 @@ pub(super) struct Part {
     pub figure: RowFigure,
     /// As in [`super::Rows`].
     pub judged: (usize, usize),
-    /// As in [`super::Rows`], of this recording.
-    pub step: Option<f64>,
     pub rows: Vec<Row>,
     pub conditions: Vec<Conditions>,
     pub block: Vec<usize>,
@@ -87,14 +85,6 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: FreeParameters) -> O
 pub(super) fn forces(session: &Session) -> Option<Part> {
     let inverse = session.model(Sensor::Accel)?;
     Builder::of(session, Sensor::Accel)?.forces(&inverse)
-}
-
-/// Common quantisation step of several channels: their mean, if they agree to within the rounding of a text file.
-pub(super) fn common_step(steps: &[Option<f64>]) -> Option<f64> {
-    let steps: Vec<f64> = steps.iter().copied().collect::<Option<_>>()?;
-    let mean = steps.iter().sum::<f64>() / steps.len() as f64;
-    let alike = steps.iter().all(|s| (s / mean - 1.0).abs() < 1e-3);
-    alike.then_some(mean)
 }
 
 impl<'a> Builder<'a> {
@@ -228,7 +218,6 @@ impl Builder<'_> {
                 && self.prepared.manifest.reference != Reference::Table,
             figure: figure.0,
             judged: (figure.1, figure.2),
-            step: common_step(&self.prepared.condensed.quantisation_step[self.sensor.channels()]),
             rows: self.rows,
             conditions: self.conditions,
             block: self.block,

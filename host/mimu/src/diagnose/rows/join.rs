@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::build::{Part, common_step};
+use super::build::Part;
 use super::{Row, Rows};
 use crate::diagnose::columns::unit_columns;
 use crate::effects::quantity::Conditions;
@@ -158,7 +158,6 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         false => 0,
     };
     let judged: Vec<usize> = parts.iter().map(judged_rows).collect();
-    let steps: Vec<Option<f64>> = parts.iter().map(|p| p.1.step).collect();
     let joined = Joined::of(&parts, sessions);
     let (places, columns) = places(&parts);
     let total: usize = parts.iter().map(|p| p.1.y.len()).sum();
@@ -192,7 +191,6 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         earth_unknown: parts.iter().all(|p| p.1.earth_unknown),
         figure,
         judged: (judged.iter().sum(), together),
-        step: common_step(&steps),
         rows,
         conditions: joined.conditions,
         block: joined.block,

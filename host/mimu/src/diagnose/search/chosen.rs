@@ -79,17 +79,8 @@ pub(super) fn score(c: &Chosen) -> f64 {
         CandidateKind::Term(_, product) => f64::from(product.order()),
         _ => 0.0,
     };
-    c.drop - price(&c.candidate) * coefficients - order - c.unlikely
+    c.drop - COEFFICIENT * coefficients - order - c.unlikely
 }
 
 /// What a coefficient costs.
 pub const COEFFICIENT: f64 = 4.0;
-
-/// The same for a candidate. If no bit of a code would be seen at data-sheet size, the search is among up to 36 bits, and the best of so
-/// many needless ones lowers the deviance by 7.
-pub(super) fn price(candidate: &Candidate) -> f64 {
-    match candidate.reads_code() && candidate.excited.is_empty() {
-        true => COEFFICIENT + 2.0 * (candidate.offered.len().max(1) as f64).ln(),
-        false => COEFFICIENT,
-    }
-}

@@ -87,7 +87,6 @@ impl Search<'_> {
                 continue;
             };
             now = fit;
-            self.read_again(&mut chosen, &mut now);
             self.again(&mut chosen, &mut now)?;
             let stays = |id: &String| chosen.iter().any(|c| c.candidate.id() == *id);
             gone.extend(before.into_iter().filter(|id| !stays(id)));
@@ -138,7 +137,6 @@ impl Search<'_> {
             return Some(false);
         };
         (*chosen, *now) = (there, fit);
-        self.read_again(chosen, now);
         self.again(chosen, now)?;
         Some(true)
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Columns, Search, price};
+use super::{COEFFICIENT, Columns, Search};
 use crate::diagnose::columns::{beside, independent_of, unit_columns};
 use crate::diagnose::variance::{Components, Fitted, LikelihoodKind};
 use crate::effects::candidate::Candidate;
@@ -14,12 +14,6 @@ pub(super) struct Beside<'a> {
     pub model: DMatrix<f64>,
     pub null: &'a Fitted,
 }
-
-/// Largest share of the scale factor that the bits of a code may add up to.
-///
-/// All bits together are the reading, whose coefficient is the scale factor. A fit that removes the reading with nine bits has no residual,
-/// but leaves a unit whose readings do not depend on the input. The errors of bits in data sheets add up to 2e-4.
-const OF_SCALE: f64 = 0.1;
 
 /// A candidate, fitted beside the model.
 #[derive(Clone)]
@@ -101,16 +95,7 @@ impl Beside<'_> {
         Some(best)
     }
 
-    /// A code with the best choice of bits. Its columns are those at the readings with the residuals of the model subtracted.
-    pub fn bits(&self, from: &Candidate) -> Option<(Candidate, With)> {
-        let conditions = self.search.freed(&self.model, self.null);
-        let all = self.search.bits(from, &conditions)?;
-        let first = self.fit(from.columns_of(&all), &self.null.components)?;
-        let found = self.choice(from, &all, first)?;
-        (found.0.share_of_scale(&found.1.values) < OF_SCALE).then_some(found)
-    }
-
-    /// An effect other than a code with the best choice of its coefficients at a value of its nonlinear parameter, from `start` on.
+    /// An effect with the best choice of its coefficients at a value of its nonlinear parameter, from `start` on.
     pub fn coefficients(
         &self,
         from: &Candidate,
@@ -136,7 +121,7 @@ impl Beside<'_> {
         let (rows, model) = (self.search.rows.y.len() as f64, self.model.ncols() as f64);
         let cost = |c: &Candidate| {
             let count = c.active.len() as f64;
-            price(c) * count * rows / (rows - model - count - 1.0).max(0.1)
+            COEFFICIENT * count * rows / (rows - model - count - 1.0).max(0.1)
         };
         loop {
             let toggled = from.offered.iter().filter_map(|&coefficient| {

@@ -34,25 +34,15 @@ impl Search<'_> {
         let others = white.qr().q();
         let left = across(&others, &y);
         let total = left.norm_squared();
-        let freed = self.freed(&self.model(chosen), null);
         let taken = |c: &Candidate| chosen.iter().any(|k| k.candidate.is_variant_of(c));
-        // Once for each code, for all of its variants.
-        let of_code = |c: &'_ (Candidate, _)| Some((c.0.clone(), self.bits(&c.0, &freed)?));
-        let codes: Vec<(Candidate, DMatrix<f64>)> = self.codes.iter().filter_map(of_code).collect();
         let mut found: Vec<Screened> = (0..self.candidates.len())
             .into_par_iter()
             .filter(|i| !taken(&self.candidates[*i]))
             .flat_map_iter(|index| {
-                let candidate = &self.candidates[index];
                 let mut best: Option<Screened> = None;
-                let code = codes.iter().find(|c| c.0.is_variant_of(candidate));
-                let code =
-                    code.map(|(_, all)| (0.0, self.variance.rotate(&candidate.columns_of(all))));
-                let known = self.screened[index]
-                    .iter()
-                    .map(|c| (c.parameter, c.rotated.clone()));
-                for (parameter, rotated) in known.chain(code) {
-                    let white = whitener.whiten_rotated(rotated);
+                for columns in &self.screened[index] {
+                    let parameter = columns.parameter;
+                    let white = whitener.whiten_rotated(columns.rotated.clone());
                     let Some((p, gain)) = self.explained(&others, &left, total, &white) else {
                         continue;
                     };

@@ -8,10 +8,8 @@ use mimu_core::wire::EFFECTS;
 use nalgebra::convert;
 
 use super::{FittedEffect, candidate};
-use crate::effects::candidate::{CandidateKind, ConverterErrors};
-use crate::effects::converter::Converter;
+use crate::effects::candidate::CandidateKind;
 use crate::effects::quantity::Quantity;
-use crate::effects::readout;
 
 /// Why no device removes an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,26 +38,17 @@ impl fmt::Display for NotOnDevice {
 }
 
 impl FittedEffect {
-    /// The effect as the device takes it, in the device's precision or a better one. Different converters of the axes give one device effect each.
+    /// The effect as the device takes it, in the device's precision or a better one.
     ///
     /// # Errors
     /// Why no device removes it.
-    pub fn on_device<T: RealField + Copy>(&self) -> Result<Vec<DeviceEffect<T>>, NotOnDevice> {
+    pub fn on_device<T: RealField + Copy>(&self) -> Result<DeviceEffect<T>, NotOnDevice> {
         let candidate = &self.candidate;
         let sensor = candidate.sensor;
         let numbers = |made: Result<_, EffectError>| made.map_err(|_| NotOnDevice::Numbers);
         match &candidate.kind {
             CandidateKind::Effect(effect) if !EFFECTS.contains(&effect.id) => {
                 Err(NotOnDevice::NoLaw)
-            }
-            CandidateKind::Effect(_) if candidate.reads_code() => {
-                let of = |c: ConverterErrors| {
-                    let (weight, zero) = (convert(c.converter.weight), convert(c.converter.zero));
-                    let errors = c.errors.map(convert);
-                    numbers(DeviceEffect::code(sensor, c.axis, &errors, weight, zero))
-                };
-                let all = candidate.by_converter(&self.values);
-                all.into_iter().map(of).collect()
             }
             CandidateKind::Effect(effect) => {
                 // Coefficients of a recording come last; no file has them, and the device takes none.
@@ -71,7 +60,7 @@ impl FittedEffect {
                 }
                 let nonlinear = effect.parameter.map(|_| convert(self.parameter));
                 let named = DeviceEffect::named(effect.id, &coefficients, nonlinear);
-                Ok(vec![numbers(named)?])
+                numbers(named)
             }
             CandidateKind::Term(axis, product) => {
                 let value = self.values.first().copied().unwrap_or_default();
@@ -81,53 +70,27 @@ impl FittedEffect {
                     variables.extend(std::iter::repeat_n(variable, usize::from(power)));
                 }
                 let term = DeviceEffect::term(sensor, *axis, convert(value), &variables);
-                Ok(vec![numbers(term)?])
+                numbers(term)
             }
             CandidateKind::Jump { .. } => Err(NotOnDevice::Jump),
         }
     }
 
-    /// The effects that a device stores; converters of the axes of a triad are joined into one effect.
+    /// The effects that a device stores.
     ///
     /// # Errors
     /// The first effect that this program does not know.
     pub fn all_of_device(on_device: &[DeviceEffect<f32>]) -> Result<Vec<Self>, DeviceEffect<f32>> {
-        let mut all: Vec<Self> = Vec::new();
-        for one in on_device {
-            let effect = Self::of_device(one).ok_or(*one)?;
-            let codes = effect.candidate.reads_code();
-            let mut known = all.iter_mut();
-            match known.find(|e| codes && e.id() == effect.id()) {
-                Some(known) => {
-                    let axes = known.candidate.codes.iter_mut();
-                    for (code, more) in axes.zip(effect.candidate.codes) {
-                        *code = code.or(more);
-                    }
-                    known.candidate.active.extend(effect.candidate.active);
-                    known.values.extend(effect.values);
-                }
-                None => all.push(effect),
-            }
-        }
-        Ok(all)
+        let each = on_device.iter();
+        each.map(|one| Self::of_device(one).ok_or(*one)).collect()
     }
 
     fn of_device(one: &DeviceEffect<f32>) -> Option<Self> {
         let mut candidate = candidate(&one.to_string())?;
         let all = one.coefficients();
         // Coefficients that were not determined are zero on the device, and are left out of the file.
-        let any = all.iter().any(|c| *c != 0.0);
-        let first = match one.converter() {
-            Some(of) => {
-                let converter = Converter::of(f64::from(of.weight), f64::from(of.zero));
-                candidate.codes =
-                    [0, 1, 2].map(|i| of.axis.is_none_or(|a| a == i).then_some(converter));
-                of.axis.map_or(0, readout::first_of)
-            }
-            None => 0,
-        };
-        let whole = one.converter().is_some() || !any;
-        let (active, values): (Vec<usize>, Vec<f64>) = (first..)
+        let whole = all.iter().all(|c| *c == 0.0);
+        let (active, values): (Vec<usize>, Vec<f64>) = (0..)
             .zip(all)
             .filter(|(_, value)| whole || **value != 0.0)
             .map(|(k, value)| (k, f64::from(*value)))

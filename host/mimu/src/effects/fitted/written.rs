@@ -1,11 +1,9 @@
 //! An effect as written in files: a table of named numbers with their units.
 
-use mimu_core::effects::FARTHEST_ZERO;
 use serde::{Deserialize, Serialize};
 
 use super::{FittedEffect, Interval};
 use crate::effects::candidate::{Candidate, CandidateKind};
-use crate::effects::converter::{Converter, Converters};
 use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
 use crate::quantity::{AXES, Sensor, significant};
@@ -33,9 +31,6 @@ pub(super) struct WrittenEffect {
     /// Its nonlinear parameter, if it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     nonlinear_parameter: Option<WrittenParameter>,
-    /// For errors that depend on the code: one converter for all axes, or one for each.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    converters: Vec<WrittenConverter>,
     /// Those that the experiment determined; the others are zero.
     coefficients: Vec<WrittenCoefficient>,
 }
@@ -61,21 +56,6 @@ pub struct WrittenParameter {
     /// Largest.
     #[serde(default)]
     pub to: f64,
-}
-
-/// Relation between a converter's codes and readings, as it is written.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub struct WrittenConverter {
-    /// Axes whose readings it gives: x, y or z, or xyz.
-    pub axes: String,
-    /// Weight of its first bit, raw.
-    pub weight_of_bit_0_raw: f64,
-    /// Reading of its code 0, raw.
-    pub reading_of_code_0_raw: f64,
-    /// 95 % uncertainty of `reading_of_code_0_raw`, raw; 0 if that is taken as given, as every diagnosis does now.
-    pub reading_of_code_0_within_raw: f64,
 }
 
 /// A coefficient in a file.
@@ -106,7 +86,6 @@ impl From<FittedEffect> for WrittenEffect {
             formula: FORMULA.into(),
             direction: DIRECTION.into(),
             nonlinear_parameter: effect.nonlinear_parameter(),
-            converters: effect.converters(),
             coefficients: effect.coefficients(),
         }
     }
@@ -131,80 +110,6 @@ impl WrittenParameter {
             [Some(lower), None] => format!("at least {lower}"),
             [None, None] => "the whole searched range".into(),
         }
-    }
-}
-
-impl WrittenConverter {
-    /// Converters of the axes: one for each, or one if all are the same.
-    pub(super) fn of(codes: &Converters) -> Vec<Self> {
-        let one = |axes: &str, converter: &Converter| Self {
-            axes: axes.into(),
-            weight_of_bit_0_raw: converter.weight,
-            reading_of_code_0_raw: converter.zero,
-            reading_of_code_0_within_raw: 0.0,
-        };
-        match codes {
-            [Some(x), Some(y), Some(z)] if x == y && y == z => vec![one("xyz", x)],
-            _ => {
-                let each = AXES.iter().zip(codes);
-                each.filter_map(|(axis, c)| Some(one(axis, c.as_ref()?)))
-                    .collect()
-            }
-        }
-    }
-
-    /// The converters of the axes, or what is wrong.
-    fn codes(all: &[Self]) -> Result<Converters, String> {
-        let mut codes: Converters = [None; 3];
-        for one in all {
-            let ours: Vec<usize> = match one.axes.as_str() {
-                "xyz" => (0..3).collect(),
-                axes => AXES.iter().position(|a| *a == axes).into_iter().collect(),
-            };
-            if ours.is_empty() {
-                return Err(format!(
-                    "a converter: axes is {:?}; write x, y, z or xyz",
-                    one.axes
-                ));
-            }
-            let (weight, zero) = (one.weight_of_bit_0_raw, one.reading_of_code_0_raw);
-            let within = one.reading_of_code_0_within_raw;
-            let farthest = FARTHEST_ZERO * weight;
-            let wrong = if !(weight > 0.0 && weight.is_finite()) {
-                Some((
-                    "weight_of_bit_0_raw",
-                    weight,
-                    "has to be a positive number".into(),
-                ))
-            } else if !(zero.abs() <= farthest) {
-                let why = format!(
-                    "has to be from {:e} to {farthest:e}: beyond, single precision does not distinguish the codes",
-                    -farthest
-                );
-                Some(("reading_of_code_0_raw", zero, why))
-            } else if !(within >= 0.0 && within.is_finite()) {
-                Some((
-                    "reading_of_code_0_within_raw",
-                    within,
-                    "has to be a number that is not negative".into(),
-                ))
-            } else {
-                None
-            };
-            if let Some((key, value, why)) = wrong {
-                return Err(format!(
-                    "converter of {}: {key} is {value:?}, and {why}",
-                    one.axes
-                ));
-            }
-            for axis in ours {
-                let converter = Converter::of(weight, zero);
-                if codes[axis].replace(converter).is_some() {
-                    return Err(format!("there are two converters of {}", AXES[axis]));
-                }
-            }
-        }
-        Ok(codes)
     }
 }
 
@@ -274,30 +179,6 @@ impl WrittenEffect {
         candidate.active.retain(|k| numbers[*k].is_some());
         if candidate.active.is_empty() {
             return Err("it has no coefficients".into());
-        }
-        candidate.codes = WrittenConverter::codes(&self.converters)?;
-        match (candidate.reads_code(), self.converters.is_empty()) {
-            (true, true) => return Err("it has no converters".into()),
-            (false, false) => {
-                return Err(
-                    "it has converters, although the effect does not depend on their codes".into(),
-                );
-            }
-            _ => {}
-        }
-        if candidate.reads_code() {
-            let axes = candidate.axes();
-            for (axis, name) in AXES.iter().enumerate() {
-                match (axes.contains(&axis), candidate.codes[axis]) {
-                    (true, None) => {
-                        return Err(format!("{name} has coefficients and no converter"));
-                    }
-                    (false, Some(_)) => {
-                        return Err(format!("{name} has a converter and no coefficients"));
-                    }
-                    _ => {}
-                }
-            }
         }
         let (values, sigmas): (Vec<f64>, Vec<Option<f64>>) = numbers.into_iter().flatten().unzip();
         let sigmas: Option<Vec<f64>> = sigmas.into_iter().collect();

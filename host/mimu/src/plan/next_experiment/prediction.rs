@@ -77,7 +77,7 @@ impl Target {
                 .collect(),
             rivals: rivals
                 .filter(|r| effect.is_error() && r.is_error())
-                .filter(|r| !r.reads_code() && r.is_slow() == slow)
+                .filter(|r| r.is_slow() == slow)
                 .collect(),
             candidate,
             each: true,
@@ -137,9 +137,6 @@ impl Target {
 /// The candidate without the coefficients that no attitude, rate, temperature or time distinguishes from a bias and from the coefficients
 /// before: in gravity the squares of the force along three axes add up to a constant.
 fn apart_from_bias(mut candidate: Candidate) -> Candidate {
-    if candidate.reads_code() {
-        return candidate;
-    }
     let parameter = quarters(&candidate)[1];
     let slots = candidate.slots();
     let mut values = vec![0.0; slots.len()];

@@ -5,7 +5,7 @@ use maud::{Markup, PreEscaped, html};
 use super::{Shown, sentence};
 use crate::hint;
 use crate::report::diagnosis::remarks;
-use crate::report::diagnosis::text::{by_experiment, by_score, coefficient_table, converter};
+use crate::report::diagnosis::text::{by_experiment, by_score, coefficient_table};
 use crate::report::page::{number, spoken, written};
 use mimu::diagnose::decision::{Accepted, Leftover};
 use mimu::quantity::{Figure, Sensor, p_value, significant};
@@ -62,7 +62,6 @@ pub(super) fn errors(sensors: &[Shown]) -> Markup {
 pub fn coefficients(one: &Accepted) -> Markup {
     html! {
         (coefficient_table(one).html())
-        @for c in one.effect.converters() { p { (sentence(&converter(&c))) } }
     }
 }
 

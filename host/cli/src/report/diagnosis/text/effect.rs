@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{by, converter, shown};
+use super::{by, shown};
 use crate::report::table::{Cell, Table};
 use crate::report::text::{columns, wrap};
 use mimu::diagnose::decision::Accepted;
@@ -38,9 +38,6 @@ pub(super) fn effect(
     if let Some(form) = a.effect.nonlinear_parameter().filter(|_| !all) {
         let (value, interval) = (significant(form.value), form.interval());
         let _ = writeln!(out, "    {} {value} (95 %: {interval})", form.name);
-    }
-    for c in a.effect.converters() {
-        wrap(out, "    ", &converter(&c));
     }
     alternatives(out, a);
     for u in d.undecided.iter().filter(|u| u.id == a.effect.id()) {
