@@ -341,6 +341,43 @@ pub(crate) fn imported_log(
     imported(<Alone as clap::Parser>::parse_from(words).import)
 }
 
+/// Size of gravity, m/s², and what is said where it is assumed.
+fn gravity_of(args: &ImportArgs, reference: Reference) -> (f64, Option<String>) {
+    match (args.gravity, args.latitude) {
+        (Some(gravity), latitude) => {
+            let off = latitude.and_then(|at| Warning::of_gravity(gravity, at));
+            (gravity, off.map(|w| w.to_string()))
+        }
+        (None, Some(latitude)) => (normal_gravity(latitude), None),
+        (None, None) if reference == Reference::Table => (9.80665, None),
+        (None, None) => (9.80665, Some("gravity is assumed to be 9.80665 m/s². It ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude".to_string())),
+    }
+}
+
+/// Takes over what a look at the files has found, where the command leaves it open.
+fn take_look(args: &mut ImportArgs, look: &Look, faces: bool) {
+    // One list holds for all files that follow one another.
+    args.columns = look.columns();
+    if args.sequence || faces {
+        args.columns.truncate(1);
+    }
+    args.scale.extend(look.scales.iter().cloned());
+    args.time_unit = args.time_unit.or(look.time_unit());
+    args.separator = args
+        .separator
+        .or(look.files.iter().find_map(|f| f.separator));
+}
+
+/// What is said of a rate that is low for an inertial unit, if the unit of the times was guessed.
+fn low_rate(summary: &ImportSummary) -> Option<String> {
+    let recognised = summary.time.first().filter(|time| time.recognised);
+    let unit = recognised.and_then(|time| time.unit)?;
+    let rate_hz = summary.sample_rate_hz;
+    (rate_hz < SLOW_HZ).then(|| {
+        format!("{rate_hz} Hz is a low rate for an inertial unit: if the times are not in {unit}, give their unit (--time-unit)")
+    })
+}
+
 /// Makes the recording, and prints nothing.
 pub(crate) fn imported(mut args: ImportArgs) -> Result<ImportSummary> {
     let (files, faces) = faces(&args)?;
@@ -366,17 +403,7 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<ImportSummary> {
         (None, true) => Reference::Table,
         (None, false) => Reference::Gravity,
     });
-    let (gravity, assumed) = match (args.gravity, args.latitude) {
-        (Some(gravity), latitude) => (
-            gravity,
-            latitude
-                .and_then(|at| Warning::of_gravity(gravity, at))
-                .map(|w| w.to_string()),
-        ),
-        (None, Some(latitude)) => (normal_gravity(latitude), None),
-        (None, None) if reference == Reference::Table => (9.80665, None),
-        (None, None) => (9.80665, Some("gravity is assumed to be 9.80665 m/s². It ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer errs by the same ratio: give --gravity or --latitude".to_string())),
-    };
+    let (gravity, assumed) = gravity_of(&args, reference);
     let raw_unit = args
         .raw_unit
         .or(by_units)
@@ -394,20 +421,8 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<ImportSummary> {
                 remedy,
             )
         })?;
-    let by_look = |args: &mut ImportArgs, look: &Look| {
-        // One list holds for all files that follow one another.
-        args.columns = look.columns();
-        if args.sequence || !faces.is_empty() {
-            args.columns.truncate(1);
-        }
-        args.scale.extend(look.scales.iter().cloned());
-        args.time_unit = args.time_unit.or(look.time_unit());
-        args.separator = args
-            .separator
-            .or(look.files.iter().find_map(|f| f.separator));
-    };
     if let Some(look) = &looked {
-        by_look(&mut args, look);
+        take_look(&mut args, look, !faces.is_empty());
     }
     let options = ImportOptions {
         topics: args.topic,
@@ -457,14 +472,6 @@ pub(crate) fn imported(mut args: ImportArgs) -> Result<ImportSummary> {
     summary.taken = looked.map_or(Vec::new(), |look| look.words());
     summary.arguments = arguments;
     summary.warnings.extend(assumed);
-    let recognised = summary.time.first().filter(|time| time.recognised);
-    if let Some(unit) = recognised.and_then(|time| time.unit)
-        && summary.sample_rate_hz < SLOW_HZ
-    {
-        summary.warnings.push(format!(
-            "{} Hz is a low rate for an inertial unit: if the times are not in {unit}, give their unit (--time-unit)",
-            summary.sample_rate_hz
-        ));
-    }
+    summary.warnings.extend(low_rate(&summary));
     Ok(summary)
 }

@@ -399,6 +399,55 @@ struct Parts<'a> {
     accel_without: &'a (dyn Fn(Split, usize) -> std::result::Result<Estimated, Failure> + Sync),
 }
 
+/// Fits of the gyro, and of the accelerometer whose directions it takes, without each part of the dwells. `typical`: of the direction's errors, rad.
+fn refits(
+    prepared: &Prepared,
+    data: &Data,
+    gyro: &Estimated,
+    parts: &Parts,
+    typical: f64,
+) -> Refits<(Estimated, Estimated)> {
+    Refits::of(parts.count, |split, part| {
+        let accel = (parts.accel_without)(split, part).map_err(|failure| {
+            let problem = failure.problem();
+            Failure::NoSolution(format!("the accelerometer is not determined: {problem}"))
+        })?;
+        let of_part = |dwell: usize| (parts.of)(split, dwell) == part;
+        let kept: Vec<_> = prepared.turns(&accel.triad.inverse).0;
+        let kept: Vec<_> = kept
+            .into_iter()
+            .filter(|t| !of_part(t.from) && !of_part(t.to))
+            .collect();
+        let rest: Vec<_> = data
+            .rest
+            .iter()
+            .filter(|o| !of_part(o.dwell))
+            .copied()
+            .collect();
+        let start = Some(&gyro.triad.inverse);
+        let refit = by_turns(
+            prepared,
+            &Data {
+                turns: &kept,
+                rest: &rest,
+                accel: &accel.triad,
+                motions: &[],
+                start,
+                gravity: data.gravity,
+            },
+        )?;
+        let open = data.turns.iter().filter(|t| of_part(t.to)).map(|t| {
+            let block = TurnError::at(t, &gyro.triad.inverse).block;
+            [0, 1]
+                .map(|k| refit.triad.variance(&block.by(k)))
+                .iter()
+                .sum()
+        });
+        determined(open, typical, (Figure::Direction, Sensor::Gyro))?;
+        Ok((refit, accel))
+    })
+}
+
 /// The gyro from the turns. A turn belongs to the part of the dwell in which it ends. While a part is left out, no turn that touches one of its
 /// dwells is used.
 fn fit_turns(
@@ -440,40 +489,7 @@ fn fit_turns(
         })
         .collect();
     let typical = typical(Figure::Direction, &residuals);
-    let held = Refits::of(parts.count, |split, part| {
-        let accel = (parts.accel_without)(split, part).map_err(|failure| {
-            let problem = failure.problem();
-            Failure::NoSolution(format!("the accelerometer is not determined: {problem}"))
-        })?;
-        let of_part = |dwell: usize| (parts.of)(split, dwell) == part;
-        let kept: Vec<_> = prepared.turns(&accel.triad.inverse).0;
-        let kept: Vec<_> = kept
-            .into_iter()
-            .filter(|t| !of_part(t.from) && !of_part(t.to))
-            .collect();
-        let rest: Vec<_> = rest.iter().filter(|o| !of_part(o.dwell)).copied().collect();
-        let start = Some(&gyro.triad.inverse);
-        let refit = by_turns(
-            prepared,
-            &Data {
-                turns: &kept,
-                rest: &rest,
-                accel: &accel.triad,
-                motions: &[],
-                start,
-                gravity: g,
-            },
-        )?;
-        let open = turns.iter().filter(|t| of_part(t.to)).map(|t| {
-            let block = TurnError::at(t, &gyro.triad.inverse).block;
-            [0, 1]
-                .map(|k| refit.triad.variance(&block.by(k)))
-                .iter()
-                .sum()
-        });
-        determined(open, typical, (Figure::Direction, Sensor::Gyro))?;
-        Ok((refit, accel))
-    });
+    let held = refits(prepared, &data, &gyro, parts, typical);
     let without = |dwell: usize| held.without((parts.of)(held.split, dwell));
     for (residual, turn) in residuals.iter_mut().zip(&turns) {
         residual.held_out = without(turn.to).map(|(gyro, accel)| {

@@ -121,6 +121,62 @@ enum TimeSource {
     Rows(f64),
 }
 
+/// Refuses a choice of columns or rows for a log, whose messages have fixed fields.
+fn fits_log(path: &Path, how: &HowToRead<'_>) -> Result<()> {
+    if is_log(path) && how.list.is_some() {
+        let problem = "a list of columns is given, but the messages of a log have fixed columns";
+        return Err(Error::new(path.display(), problem, "leave it out").about(Argument::Columns));
+    }
+    if is_log(path) && !how.filters.is_empty() {
+        let problem = "rows are chosen by a column, but the messages of a log have no columns";
+        let remedy = "leave the choice out, and choose the topic or the instance";
+        return Err(Error::new(path.display(), problem, remedy).about(Argument::Where));
+    }
+    Ok(())
+}
+
+/// Refuses columns that a recording of samples cannot take.
+fn check_roles(path: &Path, parquet: bool, roles: &[Role]) -> Result<()> {
+    let of_means = |role: &&Role| matches!(role, Role::Deviation(_) | Role::Averaged(_));
+    if let Some(role) = roles.iter().find(of_means) {
+        return Err(Error::new(
+            path.display(),
+            format!(
+                "the column {} belongs to a table of means, but samples are to be imported",
+                role.name()
+            ),
+            "skip the column, or import the file as a table of means",
+        )
+        .about(Argument::Means));
+    }
+    if parquet && roles.contains(&Role::Nanoseconds) {
+        let problem = "nanoseconds beside seconds are read from text only";
+        let remedy = "give a column with the whole time, or convert the file to text";
+        return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
+    }
+    Ok(())
+}
+
+/// Where the times of the rows come from.
+fn time_source(path: &Path, how: &HowToRead<'_>, roles: &[Role]) -> Result<TimeSource> {
+    let at = |role| roles.iter().position(|&other| other == role);
+    let needs_rate = || {
+        how.rate_hz.ok_or_else(|| {
+            Error::new(
+                path.display(),
+                "no column is t_s, so the time between rows is unknown",
+                "name the time column, or give the rate",
+            )
+            .about(Argument::SampleRate)
+        })
+    };
+    match (at(Role::Column(Column::Time)), at(Role::Sample)) {
+        (Some(_), _) => Ok(TimeSource::Stamp),
+        (None, Some(cell)) => needs_rate().map(|_| TimeSource::Sample(cell)),
+        (None, None) => needs_rate().map(TimeSource::Rows),
+    }
+}
+
 impl ForeignFile {
     /// Opens `path` and finds its columns.
     pub fn open(path: &Path, how: &HowToRead<'_>) -> Result<ForeignFile> {
@@ -128,18 +184,7 @@ impl ForeignFile {
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
         let mut parts = 1;
-        if is_log(path) && how.list.is_some() {
-            let problem =
-                "a list of columns is given, but the messages of a log have fixed columns";
-            return Err(
-                Error::new(path.display(), problem, "leave it out").about(Argument::Columns)
-            );
-        }
-        if is_log(path) && !how.filters.is_empty() {
-            let problem = "rows are chosen by a column, but the messages of a log have no columns";
-            let remedy = "leave the choice out, and choose the topic or the instance";
-            return Err(Error::new(path.display(), problem, remedy).about(Argument::Where));
-        }
+        fits_log(path, how)?;
         let table = match parquet {
             _ if is_log(path) => {
                 let mut all = log::read(path, how.choice)?;
@@ -159,39 +204,9 @@ impl ForeignFile {
             Table::Parquet(table) => table.roles(),
             Table::Log(readings) => readings.roles(),
         };
-        let of_means = |role: &&Role| matches!(role, Role::Deviation(_) | Role::Averaged(_));
-        if let Some(role) = roles.iter().find(of_means) {
-            return Err(Error::new(
-                path.display(),
-                format!(
-                    "the column {} belongs to a table of means, but samples are to be imported",
-                    role.name()
-                ),
-                "skip the column, or import the file as a table of means",
-            )
-            .about(Argument::Means));
-        }
-        if parquet && roles.contains(&Role::Nanoseconds) {
-            let problem = "nanoseconds beside seconds are read from text only";
-            let remedy = "give a column with the whole time, or convert the file to text";
-            return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
-        }
+        check_roles(path, parquet, &roles)?;
         let at = |role| roles.iter().position(|&other| other == role);
-        let needs_rate = || {
-            how.rate_hz.ok_or_else(|| {
-                Error::new(
-                    path.display(),
-                    "no column is t_s, so the time between rows is unknown",
-                    "name the time column, or give the rate",
-                )
-                .about(Argument::SampleRate)
-            })
-        };
-        let source = match (at(Role::Column(Column::Time)), at(Role::Sample)) {
-            (Some(_), _) => TimeSource::Stamp,
-            (None, Some(cell)) => needs_rate().map(|_| TimeSource::Sample(cell))?,
-            (None, None) => TimeSource::Rows(needs_rate()?),
-        };
+        let source = time_source(path, how, &roles)?;
         let numbers = roles
             .iter()
             .enumerate()
