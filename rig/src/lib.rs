@@ -21,6 +21,7 @@
 //! | [`effects`]                    | errors that the affine model lacks, enabled one by one            |
 //! | [`curves`]                     | each sensor over the temperature of its die                       |
 //! | [`pins`], [`converter`]        | from the pins to the readings of a recording                      |
+//! | [`history`]                    | what happened to a unit before a session                          |
 //! | [`catalog`], [`rig_file`], [`refusal`] | sensors by their data sheets; RIG.toml, and the truth drawn by it |
 //! | [`ideal`]                      | forward models of papers, for Monte Carlo studies                 |
 
@@ -34,6 +35,7 @@ pub mod effects;
 pub mod filter;
 pub mod flaws;
 pub mod hands;
+pub mod history;
 pub mod ideal;
 pub mod located;
 pub mod motion;

@@ -5,6 +5,7 @@
 //! | [`mod@bench`]          | units with known truth on the virtual bench, read as a user's would be |
 //! | [`blind`], [`by_hand`] | units with undeclared effects, on a table and by hand             |
 //! | [`joint`]              | several sessions of one unit together, and their file on another session |
+//! | [`sessions`]           | several sessions of one unit, and one that they predict           |
 //! | [`slow_bias`]          | units by hand whose biases move with time or temperature, at once or with a lag |
 //! | [`coverage`]           | how often intervals contain the truth, from recording to fit      |
 //! | [`earth`]              | the Earth's rate in the biases of gyros on a table                |
@@ -29,6 +30,7 @@ pub mod niu;
 pub mod page;
 pub mod planted;
 pub mod recordings;
+pub mod sessions;
 pub mod slow_bias;
 pub mod stored_calibration;
 pub mod text_board;

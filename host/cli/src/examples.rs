@@ -30,6 +30,7 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
             "mimu fit log.csv -o cal.toml",
             "mimu fit rec -o cal.toml",
             "mimu fit rec --noise noise.toml --verbose",
+            "mimu fit monday tuesday friday -o cal.toml",
             "mimu fit rec --json -",
         ],
     ),

@@ -208,16 +208,20 @@ fn held_out(calibration: &Calibration, sensor: Sensor) -> Option<f64> {
     judged.held_out_rms.filter(|_| judged.unit == sensor.unit())
 }
 
-/// Half of the 95 % interval of the calibrated output, from the covariance of C and o. If unseen data erred by more, that error: intervals include
-/// what the fit knew, and a misfit of another recording is none of that.
+/// Half of the 95 % interval of the calibrated output, from the covariance of C and o: at the next power-on, if the calibration is of several sessions. If
+/// unseen data erred by more, that error: intervals include what the fit knew, and a misfit of another recording is none of that.
 fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> Remaining {
     const SOURCE: &str = "95 % interval of the calibrated output";
+    const TOMORROW: &str = "95 % interval of the calibrated output at the next power-on";
     let forward = Forward::of(model);
-    let both = calibration
-        .table(sensor)
-        .zip(calibration.covariance(sensor));
-    let (Some((table, covariance)), Some(forward)) = (both, forward) else {
-        return Remaining::unknown(sensor, SOURCE, "the calibration has no intervals");
+    let next = calibration.next_power_on(sensor);
+    let source = if next.is_some() { TOMORROW } else { SOURCE };
+    let of_fit = || {
+        let table = calibration.table(sensor)?;
+        Some((calibration.covariance(sensor)?, table.interval_sigmas()))
+    };
+    let (Some((covariance, sigmas)), Some(forward)) = (next.or_else(of_fit), forward) else {
+        return Remaining::unknown(sensor, source, "the calibration has no intervals");
     };
     let half = inputs(sensor).map(|x| {
         let raw = forward.matrix * x + forward.bias;
@@ -229,10 +233,10 @@ fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> R
                 .flat_map(|i| (0..12).map(move |j| (i, j)))
                 .map(|(i, j)| gradient[i] * covariance[(i, j)] * gradient[j])
                 .sum();
-            table.interval_sigmas() * variance.max(0.0).sqrt()
+            sigmas * variance.max(0.0).sqrt()
         })
     });
-    let interval = Remaining::new(sensor, SOURCE, at_input(sensor), &half.collect::<Vec<_>>());
+    let interval = Remaining::new(sensor, source, at_input(sensor), &half.collect::<Vec<_>>());
     interval.at_least(held_out(calibration, sensor))
 }
 

@@ -6,17 +6,21 @@ mod check;
 pub mod comparison;
 pub mod die_temperature;
 mod effect;
+mod next_power_on;
 mod of_curves;
 mod of_device;
 mod of_fit;
+mod of_sessions;
 mod on_device;
 mod over_temperature;
 pub mod thermal_biases;
 pub mod verify;
 
+pub use next_power_on::{BetweenSessions, NextPowerOn, SessionOrigin};
 pub use of_curves::{CurvesOfUnit, TriadOfCurves};
 pub use of_device::DeviceCalibration;
 pub(crate) use of_fit::FIGURE_DIGITS;
+pub use of_sessions::Combined;
 pub use on_device::compensator;
 pub use over_temperature::{
     Curves, DieTable, NodeTable, OverTemperature, TemperatureNode, reference_node,
@@ -73,6 +77,11 @@ const HEADER_OF_KEPT: &str = "\
 # Numbers have single precision. temp_c is the temperature at which the device lists it, in degrees Celsius.
 ";
 
+const HEADER_OF_SESSIONS: &str = "\
+# Made from several sessions. C and o are what is expected at the next power-on. sigma_ and interval_ are those of this expectation;
+# [gyro.next_power_on] and [accel.next_power_on] have the intervals of what the next power-on makes of it: use these for tomorrow.
+";
+
 /// A calibration as a file holds it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -98,6 +107,12 @@ pub struct Calibration {
     pub judgement: Option<Judgement>,
     /// The recording that it was made from.
     pub recording: Origin,
+    /// How it was made, if from several sessions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub between_sessions: Option<BetweenSessions>,
+    /// The sessions that it was made from; empty for one. `recording` is then the last one used.
+    #[serde(default, rename = "session", skip_serializing_if = "Vec::is_empty")]
+    pub sessions: Vec<SessionOrigin>,
     /// Gyro triad.
     #[serde(default)]
     pub gyro: Option<TriadTable>,
@@ -184,6 +199,9 @@ pub struct TriadTable {
     /// Error figures of its fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub judged: Option<Judged>,
+    /// The uncertainty at the next power-on, if several sessions show it. That of the entries above is that of the expected values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub next_power_on: Option<NextPowerOn>,
     /// The same calibration in the other direction.
     pub forward: ForwardTable,
     /// The same calibration as physical quantities.
@@ -299,7 +317,12 @@ impl Calibration {
             None => "",
             Some(_) => HEADER_OF_CURVES,
         };
-        crate::toml_layout::to_toml(&format!("{HEADER}{effects}{curves}{keys}"), self)
+        let sessions = match self.between_sessions {
+            None => "",
+            Some(_) => HEADER_OF_SESSIONS,
+        };
+        let header = format!("{HEADER}{effects}{curves}{keys}{sessions}");
+        crate::toml_layout::to_toml(&header, self)
     }
 
     /// The errors that the affine models lack.

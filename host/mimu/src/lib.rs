@@ -96,6 +96,8 @@ pub mod recording_problem;
 #[doc(hidden)]
 pub mod result;
 #[doc(hidden)]
+pub mod sessions;
+#[doc(hidden)]
 pub mod signal;
 #[doc(hidden)]
 pub mod survey;

@@ -52,6 +52,13 @@ impl ParameterKind {
 }
 
 impl TriadParameter {
+    /// The physical parameters in the order of [`Triad::physical_parts`].
+    pub fn physical() -> [Self; 12] {
+        use ParameterKind::{Bias, Misalignment, NonOrthogonality, Scale};
+        let kinds = [Scale, Misalignment, NonOrthogonality, Bias];
+        std::array::from_fn(|i| Self(kinds[i / 3], i % 3))
+    }
+
     /// Whether it is a bias, in either direction of the model.
     pub fn is_bias(self) -> bool {
         let Self(kind, k) = self;

@@ -245,38 +245,31 @@ impl Triad {
 
     /// Physical quantities, with sigmas by the derivatives of the decomposition.
     pub fn physical(&self, angles: Angles) -> Physical {
-        let decompose = |p: &SVector<f64, 12>| {
-            let Affine { matrix, offset } = affine(p);
-            Physical::vector_of(
-                &Forward {
-                    matrix,
-                    bias: offset,
-                },
-                angles,
-            )
-        };
-        let at = vector(&self.forward.matrix, &self.forward.bias);
-        let values = decompose(&at);
-        let scale = self.forward.matrix.norm();
-        let mut jacobian = SMatrix::<f64, 12, 12>::zeros();
-        for k in 0..12 {
-            // Central differences with steps of 1e-4: their error is of second order, 1e-9 of the slope.
-            let step = if k < 9 { 1e-4 * scale } else { scale.max(1e-6) };
-            let (mut up, mut down) = (at, at);
-            up[k] += step;
-            down[k] -= step;
-            let slope = (decompose(&up) - decompose(&down)) / (2.0 * step);
-            jacobian.set_column(k, &slope);
-        }
-        let all = self.estimates(&values, &jacobian);
-        let triple = |from: usize| [all[from], all[from + 1], all[from + 2]];
-        Physical {
-            angles,
-            scale: triple(0),
-            misalignment: triple(3),
-            non_orthogonality: triple(6),
-            bias: triple(9),
-        }
+        let values = Physical::vector_of(&self.forward, angles);
+        let jacobian = Physical::jacobian(&self.forward, angles);
+        Physical::of(angles, &self.estimates(&values, &jacobian))
+    }
+
+    /// The same twelve numbers as a vector: scale factors, misalignments, non-orthogonalities and biases, and the parts of their covariance.
+    pub fn physical_parts(&self) -> (SVector<f64, 12>, Vec<Part>) {
+        let jacobian = Physical::jacobian(&self.forward, Angles::Exact);
+        let parts = self.forward_parts.iter().map(|p| p.seen_by(&jacobian));
+        let values = Physical::vector_of(&self.forward, Angles::Exact);
+        (values, parts.collect())
+    }
+
+    /// From the physical quantities, as [`Self::physical_parts`] gives them. `None` if they are no regular model.
+    pub fn from_physical(values: &SVector<f64, 12>, parts: &[Part]) -> Option<Self> {
+        let exact = values.map(|value| Estimate {
+            value,
+            sigma: 0.0,
+            interval: 0.0,
+        });
+        let all: [Estimate; 12] = exact.into();
+        let forward = Physical::of(Angles::Exact, &all).forward();
+        let back = Physical::jacobian(&forward, Angles::Exact).try_inverse()?;
+        let parts = parts.iter().map(|p| p.seen_by(&back)).collect();
+        Self::from_forward(forward, parts)
     }
 }
 
@@ -343,6 +336,39 @@ pub struct Physical {
 }
 
 impl Physical {
+    fn of(angles: Angles, all: &[Estimate; 12]) -> Self {
+        let triple = |from: usize| [all[from], all[from + 1], all[from + 2]];
+        Self {
+            angles,
+            scale: triple(0),
+            misalignment: triple(3),
+            non_orthogonality: triple(6),
+            bias: triple(9),
+        }
+    }
+
+    /// Derivatives of the physical quantities by P and b.
+    fn jacobian(forward: &Forward, angles: Angles) -> Covariance {
+        let at = vector(&forward.matrix, &forward.bias);
+        let scale = forward.matrix.norm();
+        let decompose = |p: &SVector<f64, 12>| {
+            let Affine { matrix, offset } = affine(p);
+            let bias = offset;
+            Self::vector_of(&Forward { matrix, bias }, angles)
+        };
+        let mut jacobian = Covariance::zeros();
+        for k in 0..12 {
+            // Central differences with steps of 1e-4: their error is of second order, 1e-9 of the slope.
+            let step = if k < 9 { 1e-4 * scale } else { scale.max(1e-6) };
+            let (mut up, mut down) = (at, at);
+            up[k] += step;
+            down[k] -= step;
+            let slope = (decompose(&up) - decompose(&down)) / (2.0 * step);
+            jacobian.set_column(k, &slope);
+        }
+        jacobian
+    }
+
     fn vector_of(forward: &Forward, angles: Angles) -> SVector<f64, 12> {
         let p = &forward.matrix;
         let (scale, theta, beta) = match angles {

@@ -72,6 +72,7 @@ impl RigFile {
         }
         self.check_numbers()?;
         self.curves.check()?;
+        self.history.check()?;
         self.table.check()?;
         self.hands.check()?;
         self.flaws.check()?;

@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::converter::RawUnit;
 use crate::flaws::FlawsTruth;
 use crate::hands::HandsTruth;
+use crate::history::History;
 use crate::located::Source;
 use crate::rotation::Vector;
 use crate::table::TableTruth;
@@ -50,6 +51,9 @@ pub struct RigFile {
     /// The sensors over temperature.
     #[serde(default)]
     pub curves: CurvesFile,
+    /// What happened to the unit before this session. The truth contains the changed unit instead.
+    #[serde(default, skip_serializing_if = "History::is_empty")]
+    pub history: History,
     /// The converter.
     #[serde(default)]
     pub converter: ConverterFile,
@@ -254,6 +258,7 @@ impl Default for RigFile {
             unit: UnitFile::default(),
             thermal: ThermalFile::default(),
             curves: CurvesFile::default(),
+            history: History::default(),
             converter: ConverterFile::default(),
             table: TableTruth::default(),
             hands: HandsTruth::default(),

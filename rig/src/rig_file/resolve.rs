@@ -53,6 +53,13 @@ impl RigTruth {
         let mut gyro_truth = triad(&mut unit.gyro_axes, affine, gyro, "gyro", seed);
         let affine = unit.accel_affine.as_ref();
         let mut accel_truth = triad(&mut unit.accel_axes, affine, accel, "accel", seed);
+        let history = std::mem::take(&mut file.history);
+        if !history.is_empty() {
+            history.apply(&mut gyro_truth, true, seed);
+            history.apply(&mut accel_truth, false, seed);
+            changed(&mut unit.gyro_affine, &mut unit.gyro_axes, &gyro_truth);
+            changed(&mut unit.accel_affine, &mut unit.accel_axes, &accel_truth);
+        }
         let gyro_reference_v = gyro_reference_pins(unit, gyro, seed);
         let temperature = temperature(unit, gyro[0], seed);
         let supply = supply(unit, accel[0], seed);
@@ -88,6 +95,19 @@ impl RigTruth {
             hands,
             flaws,
         })
+    }
+}
+
+/// Puts the model of `truth` into the file, in the form in which the file has it.
+fn changed(affine: &mut Option<AffineFile>, axes: &mut AxesFile, truth: &TriadTruth) {
+    let (matrix, bias) = truth.affine();
+    match affine {
+        Some(affine) => *affine = AffineFile { matrix, bias },
+        None => {
+            axes.directions = Some(truth.axes.each_ref().map(|a| a.direction));
+            axes.sensitivity_raw_per_si = Some(truth.axes.each_ref().map(|a| a.sensitivity));
+            axes.null_raw = Some(truth.axes.each_ref().map(|a| a.null));
+        }
     }
 }
 

@@ -75,6 +75,11 @@ fn the_page_has_every_key_of_both_files_and_no_other() {
             "`[curves.accel]`",
             rig(&format!("[curves.accel]\n{unknown}")),
         ),
+        ("`[history]`", rig(&format!("[history]\n{unknown}"))),
+        (
+            "`[history.power_on]`",
+            rig(&format!("[history.power_on]\n{unknown}")),
+        ),
         ("`[converter]`", rig(&format!("[converter]\n{unknown}"))),
         ("`[table]`", rig(&format!("[table]\n{unknown}"))),
         (

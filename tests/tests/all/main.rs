@@ -23,6 +23,7 @@ mod real_mikoff;
 mod real_xsens;
 mod record_player;
 mod recording_problems;
+mod sessions;
 mod several_recordings;
 mod signed_low_byte;
 mod slow_biases;

@@ -1,15 +1,21 @@
 //! `mimu fit`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
-use mimu::fit::{Method, Options, fit};
+use mimu::fit::{Fit, Method, Options, fit};
+use mimu::judgement::Judgement;
+use mimu::prepared::Prepared;
 use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
+use mimu::result::sessions::SessionsResult;
+use mimu::sessions::Sessions;
+use mimu::sessions::class::PartClass;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
+use serde::Serialize;
 
 use crate::arguments::{
     JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs,
@@ -23,8 +29,14 @@ use crate::status::Status;
 
 #[derive(Args)]
 pub(crate) struct FitArgs {
-    /// Recording, of samples or of means, or a log that `mimu import` reads
-    recording: PathBuf,
+    /// Recording, of samples or of means, or a log that `mimu import` reads. Several are sessions of one unit, in the order in which they took place
+    ///
+    /// One calibration is then made from all, with two intervals for each parameter: of the expected value, and of what the next power-on makes of it.
+    #[arg(required = true, value_name = "RECORDING")]
+    recordings: Vec<PathBuf>,
+    /// For one or two sessions: how much the parameters of this class of parts change from one power-on to the next [default for two: consumer]
+    #[arg(long, value_enum)]
+    class: Option<ClassArg>,
     /// Hold out N contiguous blocks in turn, refit without each, and report the error on it
     #[arg(long, value_name = "blocks=N", default_value = "blocks=4", value_parser = holdout)]
     holdout: usize,
@@ -61,6 +73,14 @@ pub(crate) struct FitArgs {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+enum ClassArg {
+    /// Digital units of phones and drones
+    Consumer,
+    /// Units of a few degrees per hour
+    Tactical,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
 enum MethodArg {
     /// Forward form, all dwells at once
     LeastSquares,
@@ -89,7 +109,14 @@ const CHECK: &str =
     "check range, columns and unit of the readings and record again, or write it all the same";
 
 pub(crate) fn run(args: &FitArgs) -> Result<Status> {
-    let options = Options {
+    match (&args.recordings[..], args.class) {
+        ([recording], None) => one(args, recording),
+        _ => several(args),
+    }
+}
+
+fn options(args: &FitArgs) -> Options {
+    Options {
         method: match args.method {
             None | Some(MethodArg::LeastSquares) => Method::LeastSquares,
             Some(MethodArg::Kalman) => Method::Kalman,
@@ -98,22 +125,21 @@ pub(crate) fn run(args: &FitArgs) -> Result<Status> {
         },
         holdout_blocks: args.holdout,
         only: args.only.map(SensorArg::sensor),
-    };
+    }
+}
+
+/// Reads and prepares a recording as the arguments say.
+fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
     let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref()];
-    let prepared = read_samples_or_means(
-        &args.recording,
-        &args.log,
-        args.still.finding(),
-        &outputs,
-        &inputs,
-    )?;
+    let finding = args.still.finding();
+    let prepared = read_samples_or_means(recording, &args.log, finding, &outputs, &inputs)?;
     args.writing.check(args.output.as_deref())?;
     let prepared = args.keep.apply(args.noise.apply(prepared)?);
     let prepared = args.whole.apply(prepared)?;
     if args.method.is_some() && prepared.manifest.reference != Reference::Table {
         return Err(Error::new(
-            args.recording.display(),
+            recording.display(),
             format!(
                 "--method chooses between estimators for known inputs, and reference is \"{}\"",
                 prepared.manifest.reference
@@ -121,29 +147,77 @@ pub(crate) fn run(args: &FitArgs) -> Result<Status> {
             "leave --method out, or give the dwells their inputs (reference = \"table\")",
         ));
     }
-    let (found, place) = (DwellResult::list(&prepared), prepared.place.clone());
-    // After a refusal the user first needs the list of dwells. The error line comes last.
+    Ok(prepared)
+}
+
+/// Fits a recording. After a refusal the user first needs the list of dwells; the error line comes last.
+fn fitted(args: &FitArgs, prepared: Prepared) -> Result<Fit> {
+    let found = DwellResult::list(&prepared);
     let problems = OfRecording::prepared(&prepared);
-    let fitted = fit(prepared, options).inspect_err(|_| {
+    fit(prepared, options(args)).inspect_err(|_| {
         refused(&problems, false);
         eprint!("{}", report::dwell_table(&found));
-    })?;
+    })
+}
+
+fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
+    let prepared = prepared(args, recording)?;
+    let place = prepared.place.clone();
+    let fitted = fitted(args, prepared)?;
     let result = FitResult::of(&fitted);
     let mut text = report::fit_text(&result, args.verbose.verbose);
     if args.dwells {
         text.push('\n');
         text.push_str(&report::dwell_table(&result.dwells));
     }
-    let refusal = args.writing.refusal(&result.judgement, &place, CHECK);
+    let made = || Calibration::of(&fitted, &[], &now());
+    write(args, text, &result, &result.judgement, &place, made)
+}
+
+/// One calibration of several sessions.
+fn several(args: &FitArgs) -> Result<Status> {
+    let fits: Result<Vec<Fit>> = args
+        .recordings
+        .iter()
+        .map(|recording| fitted(args, prepared(args, recording)?))
+        .collect();
+    let class = match args.class {
+        None | Some(ClassArg::Consumer) => PartClass::Consumer,
+        Some(ClassArg::Tactical) => PartClass::Tactical,
+    };
+    let sessions = Sessions::combine(fits?, class)?;
+    let combined = Calibration::of_sessions(&sessions, &now())?;
+    let result = SessionsResult::of(&sessions, &combined);
+    let mut text = report::sessions_text(&result, args.verbose.verbose);
+    if args.dwells {
+        for fit in &sessions.fits {
+            let dwells = DwellResult::list(&fit.prepared);
+            text += &format!("\n{}\n{}", fit.prepared.place, report::dwell_table(&dwells));
+        }
+    }
+    let place = sessions.fits[0].prepared.place.clone();
+    let made = || Ok(combined.calibration.clone());
+    write(args, text, &result, &combined.judgement, &place, made)
+}
+
+/// Prints the result and writes the calibration, unless it is a misfit.
+fn write(
+    args: &FitArgs,
+    mut text: String,
+    result: &impl Serialize,
+    judgement: &Judgement,
+    place: &str,
+    made: impl FnOnce() -> Result<Calibration>,
+) -> Result<Status> {
+    let refusal = args.writing.refusal(judgement, place, CHECK);
     let mut calibration = None;
     if let Some(path) = args.output.as_ref().filter(|_| refusal.is_none()) {
-        let made = Calibration::of(&fitted, &[], &now())?;
-        calibration = Some(stage(path, made.to_toml())?);
+        calibration = Some(stage(path, made()?.to_toml())?);
         text.push_str(&format!("\ncalibration: {}\n", path.display()));
     }
-    print(&args.json, &text, &result, calibration)?;
+    print(&args.json, &text, result, calibration)?;
     match refusal {
         Some(error) => Err(error),
-        None => Ok(args.strict.status(&result.judgement)),
+        None => Ok(args.strict.status(judgement)),
     }
 }

@@ -194,11 +194,18 @@ fn verdict(s: &SensorVerification) -> String {
         true => format!("{rms} rms instead of {before} {what}"),
         false => format!("{rms} rms, not better than {before} {what}"),
     };
-    match s.noise_floor.is_finite() && s.noise_floor > 0.0 {
+    let noise = match s.noise_floor.is_finite() && s.noise_floor > 0.0 {
         true => format!(
             "{how}; {} times the noise",
             significant(s.rms / s.noise_floor)
         ),
         false => format!("{how}; the noise is unknown"),
+    };
+    match s.next_power_on {
+        Some(next) => format!(
+            "{noise}; a power-on changes it by up to {}, as the sessions showed",
+            figure.write(next)
+        ),
+        None => noise,
     }
 }

@@ -61,6 +61,9 @@ impl Calibration {
                     "fit the recording again",
                 ));
             }
+            if let Some(fault) = table.next_power_on.as_ref().and_then(|n| n.fault()) {
+                return Err(Error::new(place, fault, "fit the recordings again"));
+            }
             let inverse = self.inverse(sensor);
             let problem = inverse.as_ref().and_then(|model| implausible(model, None));
             let forward = inverse.as_ref().and_then(Forward::of);

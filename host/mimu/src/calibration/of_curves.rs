@@ -86,6 +86,8 @@ impl Calibration {
             unit_id: unit.unit_id.clone(),
             created: Some(created.into()),
             trimmed: None,
+            between_sessions: None,
+            sessions: Vec::new(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             judgement: Some(unit.judgement),
             recording: Origin {

@@ -65,6 +65,8 @@ impl Calibration {
             unit_id: stored.unit_id.clone(),
             created: stored.created.clone(),
             trimmed: stored.trimmed.clone(),
+            between_sessions: None,
+            sessions: Vec::new(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             judgement: None,
             recording: Origin {
@@ -144,6 +146,7 @@ fn triad_table(model: &Affine<f32>, sensor: Sensor) -> Option<TriadTable> {
         parameters: Vec::new(),
         covariance: Vec::new(),
         judged: None,
+        next_power_on: None,
         forward: forward_table(&triad.forward),
         physical: physical_table(&triad.physical(Angles::Exact)),
     })

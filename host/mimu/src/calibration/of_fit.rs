@@ -11,7 +11,7 @@ use crate::effects::fitted::FittedEffect;
 use crate::fit::{Fit, SensorFit};
 use crate::judgement::Judgement;
 use crate::quantity::{Sensor, inverse_names, rounded};
-use crate::triad::{Angles, Estimate, Forward, Physical, Triad};
+use crate::triad::{Angles, Covariance, Estimate, Forward, Physical, Triad};
 use mimu_recording::error::Result;
 use mimu_recording::{RawUnit, Reference};
 
@@ -42,6 +42,8 @@ impl Calibration {
             unit_id: manifest.unit_id().map(str::to_owned),
             created: Some(created.into()),
             trimmed: None,
+            between_sessions: None,
+            sessions: Vec::new(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             judgement: Some(Judgement::of_fit(fit)),
             recording: Origin {
@@ -136,10 +138,9 @@ pub(super) fn triad_table(
         interval_C: Some([0, 3, 6].map(|i| [i, i + 1, i + 2].map(intervals))),
         interval_o: Some([9, 10, 11].map(intervals)),
         parameters: inverse_names().into(),
-        covariance: (0..12)
-            .map(|i| (0..12).map(|j| covariance[(i, j)] + 0.0).collect())
-            .collect(),
+        covariance: nested(covariance),
         judged: Some(judged),
+        next_power_on: None,
         forward: forward_table(&triad.forward),
         physical: PhysicalTable {
             sigma_scale_factor: Some(sigmas_of(&physical.scale, 1.0)),
@@ -149,6 +150,17 @@ pub(super) fn triad_table(
             ..physical_table(&physical)
         },
     }
+}
+
+/// A covariance as the file holds it.
+pub(super) fn nested(covariance: &Covariance) -> Vec<Vec<f64>> {
+    let row = |i| (0..12).map(|j| covariance[(i, j)] + 0.0).collect();
+    (0..12).map(row).collect()
+}
+
+/// A standard deviation or an interval with the digits that it has in files.
+pub(super) fn uncertainty(value: f64) -> f64 {
+    rounded(value, SIGMA_DIGITS)
 }
 
 /// The forward model.
@@ -180,7 +192,7 @@ pub(super) fn physical_table(physical: &Physical) -> PhysicalTable {
 
 // Adding 0.0 makes minus zero, which only puzzles, zero.
 
-fn by_rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
+pub(super) fn by_rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)] + 0.0))
 }
 

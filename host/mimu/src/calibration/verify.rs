@@ -50,6 +50,10 @@ pub struct SensorVerification {
     pub max: f64,
     /// By noise alone, in [`Self::unit`]; null if the noise is not known.
     pub noise_floor: f64,
+    /// What a power-on adds to the noise by the calibration's own account, rms in [`Self::unit`]: the largest in 95 % of cases. Absent for a calibration of one
+    /// session, which does not show how much parameters change.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub next_power_on: Option<f64>,
     /// SI unit of the figures.
     pub unit: &'static str,
     /// The quantity that they describe.
@@ -332,7 +336,13 @@ fn judge(
     let judged = judged?;
     let accel = calibration.inverse(Sensor::Accel);
     let causes = causes::of(prepared, sensor, &inverse, accel.as_ref());
-    Some((SensorVerification { causes, ..judged }, warnings))
+    let next_power_on = causes::at_next_power_on(prepared, sensor, calibration);
+    let judged = SensorVerification {
+        causes,
+        next_power_on,
+        ..judged
+    };
+    Some((judged, warnings))
 }
 
 /// The calibration of a unit whose sensors are all alike and perfectly mounted: every sensor with the mean scale factor
@@ -384,6 +394,7 @@ fn judged(
         rms: rms(after),
         max: largest(after),
         noise_floor: rms(floor),
+        next_power_on: None,
         static_rms: None,
         causes: None,
         count: floor.len(),

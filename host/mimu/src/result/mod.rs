@@ -7,6 +7,7 @@ pub mod design;
 pub mod diagnosis;
 pub mod fit;
 pub mod next_experiment;
+pub mod sessions;
 
 /// Program and version that a result is from.
 const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));

@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 use mimu::calibration::{Calibration, TriadTable};
+use mimu::parameter::ParameterKind;
 use mimu::quantity::{AXES, Sensor, plus_minus};
 use mimu::readable;
 use mimu_recording::RawUnit;
@@ -48,28 +49,36 @@ fn physical(table: &TriadTable) -> Markup {
     };
     let bias = readable::parameter(&raw);
     let k = table.interval_sigmas();
-    let half = |sigmas: Option<[f64; 3]>, i: usize| sigmas.map(|s| k * s[i]);
+    // The page is for those who use the calibration tomorrow.
+    let next = table.next_power_on.as_ref();
+    let half = |sigmas: Option<[f64; 3]>, kind: ParameterKind, i: usize| {
+        let next = next.and_then(|n| n.intervals(kind)).map(|all| all[i]);
+        next.or_else(|| sigmas.map(|s| k * s[i]))
+    };
     let angles = ["yz", "zy", "zx"];
     html! {
         div class="scroll" { table {
-            caption { "Physical parameters with 95 % intervals" }
+            caption {
+                "Physical parameters with 95 % intervals"
+                @if next.is_some() { " at the next power-on, from several sessions" }
+            }
             thead { tr { th { "parameter" } @for axis in AXES { th class="n" { (axis) } } } }
             tbody {
                 tr {
                     td { "scale factor" @if !gain.unit.is_empty() { ", " (gain.unit) } }
-                    @for i in 0..3 { td class="n" { (value(p.scale_factor[i], half(p.sigma_scale_factor, i), gain.factor)) } }
+                    @for i in 0..3 { td class="n" { (value(p.scale_factor[i], half(p.sigma_scale_factor, ParameterKind::Scale, i), gain.factor)) } }
                 }
                 tr {
                     td { "bias, " (bias.unit) }
-                    @for i in 0..3 { td class="n" { (value(p.bias[i], half(p.sigma_bias, i), bias.factor)) } }
+                    @for i in 0..3 { td class="n" { (value(p.bias[i], half(p.sigma_bias, ParameterKind::Bias, i), bias.factor)) } }
                 }
                 tr {
                     td { "misalignment, deg" }
-                    @for i in 0..3 { td class="n" { (value(p.misalignment_deg[i], half(p.sigma_misalignment_deg, i), 1.0)) } }
+                    @for i in 0..3 { td class="n" { (value(p.misalignment_deg[i], half(p.sigma_misalignment_deg, ParameterKind::Misalignment, i), 1.0)) } }
                 }
                 tr {
                     td { "non-orthogonality " (angles.join(", ")) ", deg" }
-                    @for i in 0..3 { td class="n" { (value(p.non_orthogonality_deg[i], half(p.sigma_non_orthogonality_deg, i), 1.0)) } }
+                    @for i in 0..3 { td class="n" { (value(p.non_orthogonality_deg[i], half(p.sigma_non_orthogonality_deg, ParameterKind::NonOrthogonality, i), 1.0)) } }
                 }
             }
         } }

@@ -66,7 +66,8 @@ fn figures(
         held_out_rms: unseen.then_some(s.rms),
         noise_floor: s.noise_floor,
         input: input_size(prepared, sensor, s.figure),
-        usual: BEYOND_NOISE,
+        // A calibration that errs by as much as it says is right.
+        usual: BEYOND_NOISE * (s.next_power_on.unwrap_or(0.0) / s.noise_floor).hypot(1.0),
         cause: s.causes.as_ref().map(Causes::words),
         few: None,
     }
