@@ -125,14 +125,30 @@ fn unit(seed: u64) -> RigFile {
     file
 }
 
+/// A session of the unit `seed`, and the seed of its noise.
+fn session(seed: u64, life: Life, session: u32) -> (RigFile, u64) {
+    let mut file = unit(seed);
+    file.history = life.history(seed, session);
+    (file, 1000 * seed + u64::from(session))
+}
+
 /// Sessions of 24 poses by hand of the unit `seed`, in order of time.
 pub fn on_bench(seed: u64, life: Life, sessions: u32) -> Vec<Fit> {
     let plan = bench::hand_plan(24);
-    let of = |session: u32| {
-        let mut file = unit(seed);
-        file.history = life.history(seed, session);
-        let prepared = bench::recorded(&plan, &file, 1000 * seed + u64::from(session));
+    let of = |number: u32| {
+        let (file, noise) = session(seed, life, number);
+        let prepared = bench::recorded(&plan, &file, noise);
         fit(prepared, Options::IN_SAMPLE).expect("it can be fitted")
+    };
+    (0..sessions).map(of).collect()
+}
+
+/// The recordings of such sessions, each in the folder `recording` of a temporary folder.
+pub fn recorded(seed: u64, life: Life, sessions: u32) -> Vec<tempfile::TempDir> {
+    let plan = bench::hand_plan(24);
+    let of = |number: u32| {
+        let (file, noise) = session(seed, life, number);
+        bench::written(&plan, &file, noise)
     };
     (0..sessions).map(of).collect()
 }

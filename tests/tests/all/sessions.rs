@@ -1,12 +1,15 @@
 //! Several sessions of one unit: what they predict, and what is named.
 
-use mimu::Calibration;
+use std::ffi::OsStr;
+
 use mimu::judgement::JudgementKind;
 use mimu::sessions::Sessions;
 use mimu::sessions::class::PartClass;
 use mimu::sessions::contradiction::Kind;
+use mimu::{Calibration, Sensor, verify};
 use mimu_tests::sessions::{
-    ARRAY_UNITS, Life, Shares, by_others, by_single, of_array, of_model, of_next, on_bench, study,
+    ARRAY_UNITS, Life, Shares, by_others, by_single, of_array, of_model, of_next, on_bench,
+    recorded, study,
 };
 
 fn combined(fits: Vec<mimu::Fit>) -> Sessions {
@@ -67,12 +70,100 @@ fn two_sessions_take_the_class_and_its_name_is_written() {
 }
 
 #[test]
+fn an_error_that_the_calibration_announces_is_no_fault_of_it() {
+    let mut fits = on_bench(4, Life::PowerOn, 4);
+    let tomorrow = fits.pop().expect("four").prepared;
+    let one = Calibration::of(&fits[0], &[], "2026-01-01T00:00:00Z").expect("a calibration");
+    let several = Calibration::of_sessions(&combined(fits), "2026-01-01T00:00:00Z");
+    let several = several.expect("a calibration").calibration;
+    let by_one = verify(&tomorrow, &one).expect("judged");
+    let by_several = verify(&tomorrow, &several).expect("judged");
+    // Of one session nobody knows what a power-on does, so what it did is unexplained.
+    assert_eq!(
+        by_one.judgement.kind,
+        JudgementKind::Unexplained,
+        "{}",
+        by_one.judgement
+    );
+    assert_eq!(
+        by_several.judgement.kind,
+        JudgementKind::Good,
+        "{}",
+        by_several.judgement
+    );
+    let accel = by_several.sensors[Sensor::Accel]
+        .as_ref()
+        .expect("an accelerometer");
+    let announced = accel.next_power_on.expect("of several sessions");
+    assert!(
+        accel.rms < announced.hypot(2.0 * accel.noise_floor),
+        "{accel:?}"
+    );
+    assert!(
+        announced < 0.2,
+        "it announces {announced} m/s², and 3 mg is usual"
+    );
+}
+
+#[test]
 fn a_temperature_that_nobody_records_is_named() {
     let all = combined(on_bench(3, Life::Temperature, 7));
     let found = all.together.as_ref().expect("biases move together");
     assert!(found.share > 0.6 && found.p < 0.01, "{found:?}");
     let named = all.sentences().iter().any(|s| s.contains("temperature"));
     assert!(named, "{:?}", all.sentences());
+}
+
+#[test]
+fn the_command_makes_one_calibration_of_several_recordings_and_its_export_means_tomorrow() {
+    let folders = recorded(5, Life::PowerOn, 3);
+    let out = tempfile::tempdir().expect("a folder");
+    let [cal, json, header] = ["cal.toml", "fit.json", "cal.h"].map(|f| out.path().join(f));
+    let run = |arguments: &[&OsStr]| {
+        let all = std::iter::once(OsStr::new("mimu")).chain(arguments.iter().copied());
+        mimu_cli::run(all.map(OsStr::to_owned))
+    };
+    let recordings: Vec<_> = folders.iter().map(|f| f.path().join("recording")).collect();
+    let mut arguments: Vec<&OsStr> = vec!["fit".as_ref()];
+    arguments.extend(recordings.iter().map(|r| r.as_os_str()));
+    arguments.extend([
+        "-o".as_ref(),
+        cal.as_os_str(),
+        "--json".as_ref(),
+        json.as_os_str(),
+    ]);
+    assert_eq!(run(&arguments), 0);
+    let text = std::fs::read_to_string(&json).expect("JSON");
+    let found: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(found["format"], "mimu-fit-sessions/1");
+    assert_eq!(found["sessions"].as_array().map(Vec::len), Some(3));
+    let parameters = found["sensors"]["gyro"]["parameters"].as_array();
+    for parameter in parameters.expect("a list") {
+        let number = |key: &str| parameter[key].as_f64().expect("a number");
+        let next = parameter["next_power_on"].as_array().expect("an interval");
+        let next: Vec<f64> = next.iter().filter_map(|x| x.as_f64()).collect();
+        let wider = next[0] < number("lower") && number("upper") < next[1];
+        assert!(wider, "{parameter}");
+        assert_eq!(parameter["sessions"].as_array().map(Vec::len), Some(3));
+    }
+    let export = [
+        "export".as_ref(),
+        "c".as_ref(),
+        "--calibration".as_ref(),
+        cal.as_os_str(),
+        "-o".as_ref(),
+        header.as_os_str(),
+    ];
+    assert_eq!(run(&export), 0);
+    let header = std::fs::read_to_string(&header).expect("a header");
+    assert!(header.contains("at the next power-on"), "{header}");
+    // One recording twice is no second session.
+    let twice = [
+        "fit".as_ref(),
+        recordings[0].as_os_str(),
+        recordings[0].as_os_str(),
+    ];
+    assert_eq!(run(&twice), 1);
 }
 
 #[test]

@@ -10,8 +10,8 @@ use mimu::prepared::Prepared;
 use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
-use mimu::sessions::Sessions;
 use mimu::sessions::class::PartClass;
+use mimu::sessions::{Sessions, fit_determined};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
@@ -151,10 +151,14 @@ fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
 }
 
 /// Fits a recording. After a refusal the user first needs the list of dwells; the error line comes last.
-fn fitted(args: &FitArgs, prepared: Prepared) -> Result<Fit> {
+fn fitted(
+    args: &FitArgs,
+    prepared: Prepared,
+    by: fn(Prepared, Options) -> Result<Fit>,
+) -> Result<Fit> {
     let found = DwellResult::list(&prepared);
     let problems = OfRecording::prepared(&prepared);
-    fit(prepared, options(args)).inspect_err(|_| {
+    by(prepared, options(args)).inspect_err(|_| {
         refused(&problems, false);
         eprint!("{}", report::dwell_table(&found));
     })
@@ -163,7 +167,7 @@ fn fitted(args: &FitArgs, prepared: Prepared) -> Result<Fit> {
 fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
     let prepared = prepared(args, recording)?;
     let place = prepared.place.clone();
-    let fitted = fitted(args, prepared)?;
+    let fitted = fitted(args, prepared, fit)?;
     let result = FitResult::of(&fitted);
     let mut text = report::fit_text(&result, args.verbose.verbose);
     if args.dwells {
@@ -179,7 +183,7 @@ fn several(args: &FitArgs) -> Result<Status> {
     let fits: Result<Vec<Fit>> = args
         .recordings
         .iter()
-        .map(|recording| fitted(args, prepared(args, recording)?))
+        .map(|recording| fitted(args, prepared(args, recording)?, fit_determined))
         .collect();
     let class = match args.class {
         None | Some(ClassArg::Consumer) => PartClass::Consumer,

@@ -58,14 +58,14 @@ impl PartClass {
     fn typical(self, sensor: Sensor) -> Typical {
         let consumer = PerSensor {
             gyro: Typical {
-                scale: 1e-3,
+                scale: 1.2e-3,
                 angle: 1e-3,
-                bias: 3e-3,
+                bias: 1.4e-3,
             },
             accel: Typical {
-                scale: 3e-4,
-                angle: 3e-4,
-                bias: 0.03,
+                scale: 1e-4,
+                angle: 4e-4,
+                bias: 0.023,
             },
         };
         let typical = match sensor {

@@ -128,11 +128,12 @@ fn changes(change: &DVector<f64>, without: &[Mixture], covariance: &DMatrix<f64>
 }
 
 /// Probability of the changes of all triads without a cause, the parameter that shows it most, and its change.
-fn judged(all: &[(Changes, &[bool])]) -> (f64, (usize, usize), f64) {
+fn judged(all: &[(Changes, &[bool])], biases: bool) -> (f64, (usize, usize), f64) {
     let each = || {
         let triads = all.iter().enumerate();
         triads.flat_map(|(t, (c, bias))| {
             let each = c.normal.iter().zip(*bias).enumerate();
+            let each = each.filter(move |(_, (_, bias))| biases || !**bias);
             each.map(move |(i, (z, bias))| ((t, i), *z, *bias, c.change[i]))
         })
     };
@@ -140,9 +141,12 @@ fn judged(all: &[(Changes, &[bool])]) -> (f64, (usize, usize), f64) {
     let fixed = each().filter(|e| !e.2);
     let (count, sum) = fixed.fold((0.0, 0.0), |(n, sum), e| (n + 1.0, sum + e.1 * e.1));
     let of_shape = ChiSquared::new(count).map_or(1.0, |d| d.sf(sum));
-    let biases = each().filter(|e| e.2).count() as f64;
+    let count_of_biases = each().filter(|e| e.2).count() as f64;
     let largest = each().filter(|e| e.2).map(|e| e.1).fold(0.0, f64::max);
-    let of_bias = (biases * two_sided(largest)).min(1.0);
+    let of_bias = match count_of_biases > 0.0 {
+        true => (count_of_biases * two_sided(largest)).min(1.0),
+        false => 1.0,
+    };
     let by_bias = of_bias < of_shape;
     let most = each().filter(|e| e.2 == by_bias);
     let most = most.max_by(|a, b| a.1.total_cmp(&b.1));
@@ -151,7 +155,7 @@ fn judged(all: &[(Changes, &[bool])]) -> (f64, (usize, usize), f64) {
 }
 
 /// How improbable session `s` is, given the others.
-pub fn session(triads: &[Triads], s: usize) -> Option<Finding> {
+pub fn session(triads: &[Triads], s: usize, biases: bool) -> Option<Finding> {
     let mut all = Vec::new();
     for triad in triads {
         let own = triad.sessions.iter().find(|(k, _)| *k == s);
@@ -168,7 +172,7 @@ pub fn session(triads: &[Triads], s: usize) -> Option<Finding> {
         let covariance = &own.covariance + model.covariance.view((0, 0), (n, n));
         all.push((changes(&change, &without, &covariance), &triad.bias[..]));
     }
-    let (p, most, change) = judged(&all);
+    let (p, most, change) = judged(&all, biases);
     Some(Finding {
         kind: Kind::Session(s),
         p,
@@ -185,7 +189,7 @@ fn empty() -> Changes {
 }
 
 /// How improbable the difference is between the sessions from `first` on and those before.
-fn step(triads: &[Triads], first: usize) -> Option<Finding> {
+fn step(triads: &[Triads], first: usize, biases: bool) -> Option<Finding> {
     let mut all = Vec::new();
     for triad in triads {
         let after = triad.sessions.iter().filter(|(s, _)| *s >= first).count();
@@ -202,7 +206,7 @@ fn step(triads: &[Triads], first: usize) -> Option<Finding> {
             &triad.bias[..],
         ));
     }
-    let (p, most, change) = judged(&all);
+    let (p, most, change) = judged(&all, biases);
     Some(Finding {
         kind: Kind::Step(first),
         p,
@@ -246,8 +250,9 @@ pub fn drift(triads: &[Triads], sessions: &[usize]) -> Option<(Finding, Vec<Vec<
     Some((finding, drifting))
 }
 
-/// The least probable session, and the least probable step, of `sessions`; their probabilities consider how many were tried.
-pub fn search(triads: &[Triads], sessions: &[usize]) -> Vec<Finding> {
+/// The least probable session, and the least probable step, of `sessions`; their probabilities consider how many were tried. Without `biases`, which a
+/// temperature moves together, only scale factors and angles count.
+pub fn search(triads: &[Triads], sessions: &[usize], biases: bool) -> Vec<Finding> {
     let several = |tried: f64, found: Finding| Finding {
         p: (tried * found.p).min(1.0),
         ..found
@@ -257,11 +262,13 @@ pub fn search(triads: &[Triads], sessions: &[usize]) -> Vec<Finding> {
         let least = all.into_iter().min_by(|a, b| a.p.total_cmp(&b.p));
         least.map(|f| several(tried, f))
     };
-    let each = sessions.iter().filter_map(|s| session(triads, *s));
+    let each = sessions.iter().filter_map(|s| session(triads, *s, biases));
     let mut found: Vec<Finding> = least(each.collect()).into_iter().collect();
     if sessions.len() >= LEAST_FOR_STEP {
         let splits = &sessions[2..sessions.len() - 1];
-        let each = splits.iter().filter_map(|first| step(triads, *first));
+        let each = splits
+            .iter()
+            .filter_map(|first| step(triads, *first, biases));
         found.extend(least(each.collect()));
     }
     found

@@ -23,8 +23,9 @@ use contradiction::{FALSE_FINDING, Finding, Kind, Triads};
 use mixture::Matched;
 use together::Direction;
 
-use crate::fit::Fit;
+use crate::fit::{Fit, Options, fit};
 use crate::parameter::{ParameterKind, TriadParameter};
+use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
 use crate::triad::{Covariance, Part, Triad};
 use mimu_recording::are_two_units;
@@ -90,6 +91,27 @@ impl LeftOut {
     /// Whether the interval contains the estimate.
     pub fn is_inside(&self) -> bool {
         (self.value - self.predicted).abs() <= self.half_width
+    }
+}
+
+/// Fits both triads of a session, or the one that it determines: sessions may differ in what they show.
+///
+/// # Errors
+/// As [`fit`]; that of both triads if it determines neither.
+pub fn fit_determined(prepared: Prepared, options: Options) -> Result<Fit> {
+    let only = |sensor| {
+        let options = Options {
+            only: Some(sensor),
+            ..options
+        };
+        fit(prepared.clone(), options).ok()
+    };
+    match fit(prepared.clone(), options) {
+        Err(error @ Error::Undetermined(_)) if options.only.is_none() => {
+            let one = only(Sensor::Accel).or_else(|| only(Sensor::Gyro));
+            one.ok_or(error)
+        }
+        other => other,
     }
 }
 
@@ -281,6 +303,8 @@ struct Judged {
 /// Excludes sessions until those that remain agree, as far as at least two remain.
 fn judge(data: &[Triads], count: usize) -> Judged {
     let mut used = vec![true; count];
+    // A session at another temperature has other biases, and does not contradict the others.
+    let biases = together(data, &used).is_none();
     let mut findings = Vec::new();
     let mut drifting = vec![Vec::new(); data.len()];
     loop {
@@ -289,7 +313,7 @@ fn judge(data: &[Triads], count: usize) -> Judged {
             break;
         }
         let kept: Vec<Triads> = data.iter().map(|d| d.of(|s| used[s])).collect();
-        let mut found = contradiction::search(&kept, &numbers);
+        let mut found = contradiction::search(&kept, &numbers, biases);
         let drift = contradiction::drift(&kept, &numbers);
         found.extend(drift.iter().map(|d| d.0.clone()));
         let least = found.into_iter().min_by(|a, b| a.p.total_cmp(&b.p));

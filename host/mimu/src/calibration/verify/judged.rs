@@ -67,7 +67,7 @@ fn figures(
         noise_floor: s.noise_floor,
         input: input_size(prepared, sensor, s.figure),
         // A calibration that errs by as much as it says is right.
-        usual: BEYOND_NOISE * (s.next_power_on.unwrap_or(0.0) / s.noise_floor).hypot(1.0),
+        usual: BEYOND_NOISE.hypot(s.next_power_on.unwrap_or(0.0) / s.noise_floor),
         cause: s.causes.as_ref().map(Causes::words),
         few: None,
     }
