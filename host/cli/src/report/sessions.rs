@@ -44,6 +44,7 @@ pub fn sessions_text(result: &SessionsResult, verbose: bool) -> String {
         let head = format!("{sensor}, ± of 95 % of the expected value");
         if verbose {
             parameters(&mut out, &head, triad, |p| {
+                p.next_power_on?;
                 Some((p.value, 0.5 * (p.upper - p.lower)))
             });
             each_session(&mut out, result, triad);

@@ -178,7 +178,8 @@ fn judgement(sessions: &Sessions) -> Judgement {
     let mut all = Vec::new();
     for (k, (fit, used)) in sessions.fits.iter().zip(&sessions.used).enumerate() {
         let own = Judgement::of_fit(fit);
-        if *used && !own.is_good() {
+        // What a session has too little of to test itself, the others test.
+        if *used && own.kind > JudgementKind::Untested {
             let reason = format!("session {}: {}", k + 1, own.reason);
             all.push(Judgement::new(own.kind, reason));
         }

@@ -381,19 +381,16 @@ fn parts(free: &[usize], between: &Between, matched: &[Matched]) -> Vec<Part> {
     }
     let mut parts = Vec::with_capacity(n + 1);
     for (i, k) in free.iter().enumerate() {
-        let own = shared[(*k, *k)];
-        let rest = matched[i].variance - own;
-        if !(rest > 0.0) {
-            // Less than the expected value has by REML: the correlations of this parameter are scaled down with it.
-            let by = (matched[i].variance / own).sqrt();
-            shared.row_mut(*k).scale_mut(by);
-            shared.column_mut(*k).scale_mut(by);
-            continue;
-        }
+        let variance = matched[i].variance;
+        // At most half of it, so that the other part can have the degrees of freedom. Correlations stay.
+        let by = (0.5 * variance / shared[(*k, *k)]).sqrt().min(1.0);
+        shared.row_mut(*k).scale_mut(by);
+        shared.column_mut(*k).scale_mut(by);
+        let rest = variance - shared[(*k, *k)];
         let mut covariance = Covariance::zeros();
         covariance[(*k, *k)] = rest;
         // Welch and Satterthwaite, the other way round.
-        let dof = matched[i].dof * (rest / matched[i].variance).powi(2);
+        let dof = matched[i].dof * (rest / variance).powi(2);
         parts.push(Part { covariance, dof });
     }
     parts.push(Part {

@@ -98,7 +98,13 @@ pub(super) fn judgement(
             _ => f,
         })
         .collect();
-    let by_errors = errors::judge(&figures);
+    let mut by_errors = errors::judge(&figures);
+    let changed = |(_, s): &&(Sensor, &SensorVerification)| {
+        s.next_power_on.is_some() && s.rms > BEYOND_NOISE * s.noise_floor
+    };
+    if by_errors.is_good() && sensors.iter().any(|s| changed(&s)) {
+        by_errors.reason += ", and within what the calibration announces for the next power-on";
+    }
     let all = input::judgements(&problems, warnings);
     Judgement::worst(all.into_iter().chain([by_errors.clone()])).unwrap_or(by_errors)
 }
