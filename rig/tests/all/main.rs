@@ -6,6 +6,7 @@ mod curves;
 mod effects;
 mod extremes;
 mod flaws;
+mod history;
 mod motion;
 mod noise;
 mod page;
