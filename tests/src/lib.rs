@@ -11,6 +11,7 @@
 //! | [`earth`]              | the Earth's rate in the biases of gyros on a table                |
 //! | [`recordings`]         | recordings by other people                                        |
 //! | [`planted`]            | effects of the bench, planted in them                             |
+//! | [`noise_in_use`]       | noise in motion of units that are wrong in a known way             |
 //! | [`niu`]                | niu's tables                                                      |
 //! | [`page`]               | tables in documents, between markers                              |
 //! | [`text_board`], [`stored_calibration`] | a board that writes text, in hands; its calibration file against its truth |
@@ -27,6 +28,7 @@ pub mod coverage;
 pub mod earth;
 pub mod joint;
 pub mod niu;
+pub mod noise_in_use;
 pub mod page;
 pub mod planted;
 pub mod recordings;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use mimu::data_sheet::Part;
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
@@ -136,6 +137,23 @@ impl NoiseArgs {
             Some(path) => prepared.with_noise(&NoiseFile::read(path)?),
             None => Ok(prepared),
         }
+    }
+}
+
+#[derive(Args)]
+pub(crate) struct PartArgs {
+    /// Compare the unit with the data sheet of its part: a name (icm42688p, mpu6050, lsm6dso, lsm6dsv16x, bmi088, bmi270), or a file NAME.toml
+    ///
+    /// Sensitivity, zero-rate and zero-g offset, cross-axis sensitivity, nonlinearity and noise density (with --noise), each passed or failed with its
+    /// interval taken into account.
+    #[arg(long = "part", value_name = "NAME|FILE.toml")]
+    name: Option<String>,
+}
+
+impl PartArgs {
+    /// The part, if one is given.
+    pub(crate) fn part(&self) -> Result<Option<Part>> {
+        self.name.as_deref().map(Part::find).transpose()
     }
 }
 

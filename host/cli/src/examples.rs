@@ -5,7 +5,7 @@ use clap::CommandFactory;
 use crate::Cli;
 
 /// Name of a subcommand, and its command lines.
-const EXAMPLES: [(&str, &[&str]); 16] = [
+const EXAMPLES: [(&str, &[&str]); 17] = [
     (
         "wizard",
         &[
@@ -70,6 +70,13 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
     (
         "allan",
         &["mimu allan at-rest --calibration cal.toml -o noise.toml --plot noise.svg"],
+    ),
+    (
+        "noise",
+        &[
+            "mimu noise by-hand --calibration cal.toml --noise noise.toml -o imu.yaml",
+            "mimu noise mav0/imu0 --calibration cal.toml --noise noise.toml --trajectory truth.csv -o in-use.toml",
+        ],
     ),
     (
         "export",

@@ -73,6 +73,8 @@ enum Command {
     Thermal(thermal::ThermalArgs),
     /// Determine the noise of a unit at rest: Allan deviation, N, B, K, Q and R
     Allan(allan::AllanArgs),
+    /// Find the noise that a filter wants: what explains the errors of dead reckoning in motion
+    Noise(cmd::noise::NoiseInUseArgs),
     /// Write a calibration, or noise, in the format of another program
     Export(cmd::export::ExportArgs),
     /// Write one page with everything that is known of a unit: verdict, errors, calibration, effects, noise, recordings
@@ -117,6 +119,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Design(args) => design::run(&args).map(done),
         Command::Thermal(args) => thermal::run(&args, &typed),
         Command::Allan(args) => allan::run(&args),
+        Command::Noise(args) => cmd::noise::run(&args),
         Command::Export(args) => cmd::export::run(&args).map(done),
         Command::Report(args) => cmd::report::run(&args, &typed).map(done),
         #[cfg(not(target_family = "wasm"))]

@@ -59,6 +59,8 @@ pub mod bias_removal;
 #[doc(hidden)]
 pub mod calibration;
 #[doc(hidden)]
+pub mod data_sheet;
+#[doc(hidden)]
 pub mod diagnose;
 #[doc(hidden)]
 pub mod diagnosed;
@@ -69,6 +71,8 @@ pub mod estimate;
 mod fault;
 #[doc(hidden)]
 pub mod fit;
+#[doc(hidden)]
+pub mod in_use;
 #[doc(hidden)]
 pub mod judge;
 #[doc(hidden)]

@@ -12,6 +12,7 @@ mod joint;
 mod judgement;
 mod module_circles;
 mod next_experiment;
+mod noise_in_use;
 mod noise_of_the_bench;
 mod papers;
 mod planted;

@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
+use mimu::data_sheet::DataSheet;
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::judgement::Judgement;
+use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
@@ -18,12 +20,13 @@ use mimu_recording::result_file::stage;
 use serde::Serialize;
 
 use crate::arguments::{
-    JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs,
+    JsonArgs, KeepArgs, NoiseArgs, PartArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs,
     WritingArgs,
 };
 use crate::output::{now, print};
 use crate::reading::{LogArgs, read_samples_or_means};
 use crate::report;
+use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
 use crate::report::refused;
 use crate::status::Status;
 
@@ -56,6 +59,8 @@ pub(crate) struct FitArgs {
     whole: WholeTurnArgs,
     #[command(flatten)]
     noise: NoiseArgs,
+    #[command(flatten)]
+    part: PartArgs,
     /// List the dwells
     #[arg(long)]
     dwells: bool,
@@ -109,6 +114,8 @@ const CHECK: &str =
     "check range, columns and unit of the readings and record again, or write it all the same";
 
 pub(crate) fn run(args: &FitArgs) -> Result<Status> {
+    // A part that is not known is refused before anything is computed.
+    args.part.part()?;
     match (&args.recordings[..], args.class) {
         ([recording], None) => one(args, recording),
         _ => several(args),
@@ -204,6 +211,18 @@ fn several(args: &FitArgs) -> Result<Status> {
     write(args, text, &result, &combined.judgement, &place, made)
 }
 
+/// The calibration that `made` gives against the data sheet of the `--part`.
+fn data_sheet(
+    args: &FitArgs,
+    made: impl Fn() -> Result<Calibration>,
+) -> Result<Option<DataSheet>> {
+    let Some(part) = args.part.part()? else {
+        return Ok(None);
+    };
+    let noise = args.noise.file.as_deref().map(NoiseFile::read).transpose()?;
+    Ok(Some(DataSheet::of(&made()?, noise.as_ref(), &part)))
+}
+
 /// Prints the result and writes the calibration, unless it is a misfit.
 fn write(
     args: &FitArgs,
@@ -211,15 +230,21 @@ fn write(
     result: &impl Serialize,
     judgement: &Judgement,
     place: &str,
-    made: impl FnOnce() -> Result<Calibration>,
+    made: impl Fn() -> Result<Calibration>,
 ) -> Result<Status> {
+    let sheet = data_sheet(args, &made)?;
+    text.extend(sheet.as_ref().map(data_sheet_text));
     let refusal = args.writing.refusal(judgement, place, CHECK);
     let mut calibration = None;
     if let Some(path) = args.output.as_ref().filter(|_| refusal.is_none()) {
         calibration = Some(stage(path, made()?.to_toml())?);
         text.push_str(&format!("\ncalibration: {}\n", path.display()));
     }
-    print(&args.json, &text, result, calibration)?;
+    let both = WithDataSheet {
+        result,
+        data_sheet: sheet.as_ref(),
+    };
+    print(&args.json, &text, &both, calibration)?;
     match refusal {
         Some(error) => Err(error),
         None => Ok(args.strict.status(judgement)),

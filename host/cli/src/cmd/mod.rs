@@ -12,6 +12,7 @@ pub(crate) mod export;
 pub(crate) mod fit;
 pub(crate) mod import;
 pub(crate) mod man;
+pub(crate) mod noise;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) mod record;
 pub(crate) mod report;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
+use mimu::data_sheet::DataSheet;
 use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
 use mimu::noise::noise_file::NoiseFile;
@@ -13,7 +14,7 @@ use mimu::recording_problem::OfRecording;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
-use crate::arguments::{KeepArgs, NoiseArgs, StillArgs};
+use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs};
 use crate::output::{now, progress, show};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;
@@ -42,6 +43,8 @@ pub struct ReportArgs {
     keep: KeepArgs,
     #[command(flatten)]
     noise: NoiseArgs,
+    #[command(flatten)]
+    part: PartArgs,
 }
 
 /// Sources of a page.
@@ -83,6 +86,7 @@ impl Inputs {
 }
 
 pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
+    let part = args.part.part()?;
     let inputs = Inputs::of(args)?;
     let outputs = [Some(args.out.as_path())];
     let others = [args.noise.file.as_deref(), inputs.calibration.as_deref()];
@@ -128,6 +132,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     }
     let file = inputs.calibration.as_deref().map(Path::display);
     let file = file.map(|path| path.to_string());
+    let sheet = part.map(|part| DataSheet::of(&calibration, noise.as_ref(), &part));
     let unit = UnitReport {
         diagnosis: found.as_ref().map(|found| &found.result),
         recordings: &recordings,
@@ -136,6 +141,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         verified: &verified,
         not_judged: &not_judged,
         noise: noise.as_ref(),
+        data_sheet: sheet.as_ref(),
     };
     let names: Vec<&str> = recordings.iter().map(|r| r.0.as_str()).collect();
     let made = Made {

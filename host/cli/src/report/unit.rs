@@ -9,11 +9,13 @@ pub(super) mod trace;
 use maud::{Markup, html};
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::Verification;
+use mimu::data_sheet::DataSheet;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu_recording::error::Result;
 
+use super::data_sheet;
 use super::diagnosis::Sections;
 use super::page::{Made, judged, page};
 use super::verify;
@@ -34,6 +36,8 @@ pub struct UnitReport<'a> {
     pub not_judged: &'a [String],
     /// Noise at rest.
     pub noise: Option<&'a NoiseFile>,
+    /// The unit against the data sheet of its part.
+    pub data_sheet: Option<&'a DataSheet>,
 }
 
 /// The page of a unit.
@@ -71,6 +75,10 @@ pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
         h2 id="calibration" { "Calibration" }
         @if let Some(file) = unit.calibration_file { p { "From " code { (file) } "." } }
         (model::section(calibration))
+        @if let Some(sheet) = unit.data_sheet {
+            h2 id="data-sheet" { "Against the data sheet" }
+            (data_sheet::section(sheet))
+        }
         @if let Some(found) = found {
             h2 id="effects" { "Effects and residuals" }
             (found.sensors())
@@ -118,6 +126,7 @@ fn contents(unit: &UnitReport) -> Markup {
             @if unit.diagnosis.is_some() || !unit.verified.is_empty() { (entry("errors", "Error before and after")) }
             @if unit.calibration.temperature.is_some() { (entry("temperature", "Over temperature")) }
             (entry("calibration", "Calibration"))
+            @if unit.data_sheet.is_some() { (entry("data-sheet", "Against the data sheet")) }
             @if unit.diagnosis.is_some() {
                 (entry("effects", "Effects and residuals"))
                 (entry("recordings", "Recordings"))

@@ -10,4 +10,4 @@ pub mod next_experiment;
 pub mod sessions;
 
 /// Program and version that a result is from.
-const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));
+pub(crate) const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));

@@ -1,0 +1,114 @@
+//! `mimu noise`: arguments and execution.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use mimu::calibration::Calibration;
+use mimu::in_use::{Against, Trajectory, noise_in_use};
+use mimu::noise::noise_file::NoiseFile;
+use mimu::prepared::Prepared;
+use mimu_export::worst_axis::{NoiseOptions, WalkOptions};
+use mimu_export::{Format, Sources, driver, kalibr};
+use mimu_recording::error::Result;
+use mimu_recording::result_file::stage;
+use mimu_recording::{MANIFEST_FILE, Recording};
+
+use crate::arguments::{JsonArgs, StillArgs, StrictArgs};
+use crate::output::{check_outputs, print, progress};
+use crate::reading::{LogArgs, folder};
+use crate::report;
+use crate::status::Status;
+
+#[derive(Args)]
+pub(crate) struct NoiseInUseArgs {
+    /// Recording in motion, with rests before and after each motion, or with a trajectory; or a log that `mimu import` reads
+    recording: PathBuf,
+    /// Calibration of the unit, not made from this recording
+    #[arg(long, value_name = "FILE")]
+    calibration: PathBuf,
+    /// Noise file of the unit at rest (`mimu allan -o`)
+    #[arg(long, value_name = "FILE")]
+    noise: PathBuf,
+    /// Poses of the unit by another instrument: ground truth of EuRoC, or of TUM's benchmarks (time, position, quaternion x y z w)
+    ///
+    /// The times are of the same clock as those of the recording. The quaternion rotates from the unit to a frame whose z points up. Where the instrument sees
+    /// the unit, how it is mounted, and up to some 20 ms between the clocks are estimated.
+    #[arg(long, value_name = "FILE.csv")]
+    trajectory: Option<PathBuf>,
+    /// File to write: FILE.yaml for Kalibr and what reads its files; FILE.toml is a noise file, for `mimu export`
+    #[arg(short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    log: LogArgs,
+    #[command(flatten)]
+    still: StillArgs,
+    #[command(flatten)]
+    strict: StrictArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
+    let calibration = Calibration::read(&args.calibration)?;
+    let noise = NoiseFile::read(&args.noise)?;
+    let log = args.log.or_gravity(calibration.recording.gravity_mps2);
+    let directory = folder(&args.recording, &log)?;
+    let recording = Recording::open(&directory)?;
+    let manifest = directory.join(MANIFEST_FILE);
+    let mut inputs: Vec<&Path> = vec![
+        &manifest,
+        &recording.samples,
+        &args.recording,
+        &args.calibration,
+        &args.noise,
+    ];
+    inputs.extend(args.trajectory.as_deref());
+    check_outputs(&[args.output.as_deref(), args.json.file()], &inputs)?;
+    let bar = progress("dead reckoning");
+    let result = match &args.trajectory {
+        Some(path) => {
+            let trajectory = Trajectory::read(path)?;
+            let against = Against::Trajectory(&trajectory);
+            noise_in_use(&recording, &calibration, &noise, against, |s| bar.reach(s))
+        }
+        None => {
+            let prepared = Prepared::read(&recording, args.still.finding(), |s| bar.reach(0.3 * s))?;
+            let against = Against::Rests(&prepared);
+            let reach = |s: f64| bar.reach(0.3 + 0.7 * s);
+            noise_in_use(&recording, &calibration, &noise, against, reach)
+        }
+    };
+    bar.finish();
+    let result = result?;
+    let mut text = report::noise_in_use_text(&result);
+    let mut staged = Vec::new();
+    if let Some(path) = &args.output {
+        let content = match path.extension().is_some_and(|e| e == "toml") {
+            true => result.noise_file.to_toml().into_bytes(),
+            false => kalibr_file(&result.noise_file)?,
+        };
+        staged.push(stage(path, content)?);
+        text.push_str(&format!("noise: {}\n", path.display()));
+    }
+    print(&args.json, &text, &result, staged)?;
+    Ok(args.strict.status(&result.judgement))
+}
+
+/// Kalibr's file, as `mimu export kalibr` writes it.
+fn kalibr_file(noise: &NoiseFile) -> Result<Vec<u8>> {
+    let options = kalibr::Options {
+        rostopic: "/imu0".into(),
+        result: false,
+        noise: NoiseOptions {
+            update_rate: None,
+            walks: WalkOptions::default(),
+        },
+        driver: driver::Options::default(),
+    };
+    let from = Sources {
+        calibration: None,
+        biases: None,
+        noise: Some(noise),
+    };
+    Ok(Format::Kalibr(options).export(&from)?.content)
+}

@@ -1,0 +1,84 @@
+//! Noise in use as text.
+
+use std::fmt::Write as _;
+
+use mimu::in_use::{Nees, NoiseInUse};
+use mimu::quantity::{Sensor, significant};
+
+use crate::report::table::{Cell, Table};
+use crate::report::text::{warn, wrap};
+
+/// Result of `mimu noise`.
+pub fn noise_in_use_text(result: &NoiseInUse) -> String {
+    let mut out = format!("judgement: {}\n", result.judgement);
+    let vibration = result.vibration_rms_mps2.map(|rms| {
+        format!(", vibration above 10 Hz {} m/s² rms", significant(rms))
+    });
+    let _ = writeln!(
+        out,
+        "{} segments of {} s, {} deg of turn{}, against {}{}\n",
+        result.segments,
+        significant(result.segment_s),
+        significant(result.turn_rad.to_degrees()),
+        vibration.unwrap_or_default(),
+        match result.reference {
+            "rests" => "rests before and after",
+            _ => "a trajectory",
+        },
+        match result.segments_left_out {
+            0 => String::new(),
+            n => format!("; {n} left out"),
+        }
+    );
+    out += &densities(result).text("");
+    let _ = writeln!(out);
+    out += &consistency(result).text("");
+    let _ = writeln!(out);
+    for sentence in &result.sentences {
+        wrap(&mut out, "", sentence);
+    }
+    warn(&mut out, result.warnings.iter());
+    out
+}
+
+fn densities(result: &NoiseInUse) -> Table {
+    let mut table = Table::new("Noise that explains the errors in motion, with 95 % intervals", "density")
+        .numbers(["in use", "Allan's", "factor"])
+        .words("unit");
+    for density in &result.densities {
+        let name = match (density.sensor, density.term) {
+            (Sensor::Gyro, "white") => "gyroscope_noise_density",
+            (Sensor::Gyro, _) => "gyroscope_random_walk",
+            (Sensor::Accel, "white") => "accelerometer_noise_density",
+            (Sensor::Accel, _) => "accelerometer_random_walk",
+        };
+        let (si, ends) = (density.value, density.interval);
+        let factor = match (density.factor, density.factor_interval) {
+            (Some(si), Some(ends)) => Cell::Between { si, ends },
+            _ => Cell::known(None, 1.0),
+        };
+        let figures = [Cell::Between { si, ends }, Cell::known(density.allan, 1.0), factor];
+        let row = std::iter::once(Cell::from(name)).chain(figures);
+        table.row(row.chain([Cell::from(density.unit)]));
+    }
+    table
+}
+
+fn consistency(result: &NoiseInUse) -> Table {
+    let mut table = Table::new(
+        "Squared errors of held-out segments over what a filter believes; 1 is right",
+        "filter with",
+    )
+    .numbers(["NEES", "by chance from", "to"]);
+    let rows: [(&str, &Nees); 3] = [
+        ("Allan's noise alone", &result.nees.allan),
+        ("and the calibration's uncertainty", &result.nees.with_calibration),
+        ("the noise in use", &result.nees.in_use),
+    ];
+    for (name, nees) in rows {
+        let figures = [nees.value, nees.by_chance[0], nees.by_chance[1]];
+        let row = std::iter::once(Cell::from(name));
+        table.row(row.chain(figures.map(|v| Cell::known(Some(v), 1.0))));
+    }
+    table
+}

@@ -1,0 +1,204 @@
+//! Dead reckoning over a segment, with the derivatives of its result by the state of the session and the covariance that each source of noise
+//! gives it.
+//!
+//! The errors obey `φ' = R δω`, `v' = φ × R f + R δf`, `p' = v` (Savage, Strapdown Analytics, 12; frame of navigation, estimate minus truth), which
+//! is linear. So the covariance of the result is a sum over the sources of noise, each times its Gramian, and the Gramians are accumulated once. The
+//! likelihood of any densities then needs no sample.
+
+use nalgebra::{Matrix3, Rotation3, SMatrix, Vector3};
+
+use super::state::{By, Readings, STATES};
+use crate::quantity::{PerSensor, Sensor};
+
+/// Attitude, velocity, position, and the position at the middle of the segment.
+const ERRORS: usize = 12;
+/// Time over which readings are added up before covariances follow, s: the force turns by 0.1 rad in it at 10 rad/s.
+const COARSE_S: f64 = 0.008;
+
+/// Sources of noise within a segment, each with a Gramian of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    /// White noise of both sensors as the noise file has it.
+    Known,
+    /// White noise of density 1 on every axis.
+    White(Sensor),
+    /// White noise whose variance is the mean square of the acceleration above 10 Hz.
+    Shaken(Sensor),
+}
+
+/// All of them, in the order of [`DeadReckoning::gramians`].
+pub(super) const SOURCES: [Source; 5] = [
+    Source::Known,
+    Source::White(Sensor::Gyro),
+    Source::White(Sensor::Accel),
+    Source::Shaken(Sensor::Gyro),
+    Source::Shaken(Sensor::Accel),
+];
+
+pub(super) type Errors = SMatrix<f64, ERRORS, ERRORS>;
+type ErrorsBy = SMatrix<f64, ERRORS, STATES>;
+
+/// Attitude, velocity and position since the beginning of a segment.
+#[derive(Debug, Clone)]
+pub(super) struct DeadReckoning {
+    /// Body to navigation.
+    pub rotation: Matrix3<f64>,
+    pub velocity: Vector3<f64>,
+    pub position: Vector3<f64>,
+    /// Position at the call of [`Self::mark`].
+    pub marked: Vector3<f64>,
+    pub duration_s: f64,
+    /// Angle that the unit has turned on its way, rad.
+    pub turned: f64,
+    /// Integral of the square of the acceleration above 10 Hz, m²/s³.
+    pub vibration: f64,
+    /// Derivatives of attitude, velocity, position and marked position by the state.
+    pub by: ErrorsBy,
+    /// Covariances of the same, by [`SOURCES`].
+    pub gramians: [Errors; 5],
+    gravity: f64,
+    densities: PerSensor<Vector3<f64>>,
+    open: Open,
+}
+
+/// What has been added up since covariances last followed.
+#[derive(Debug, Clone)]
+struct Open {
+    duration_s: f64,
+    force: Vector3<f64>,
+    vibration: f64,
+    by: PerSensor<By>,
+    known: PerSensor<Matrix3<f64>>,
+}
+
+impl Open {
+    fn new() -> Self {
+        Self {
+            duration_s: 0.0,
+            force: Vector3::zeros(),
+            vibration: 0.0,
+            by: PerSensor::both(By::zeros()),
+            known: PerSensor::both(Matrix3::zeros()),
+        }
+    }
+}
+
+impl DeadReckoning {
+    /// Begins at the attitude `rotation`, at rest. `densities` are the squares of N of the axes.
+    pub fn new(
+        rotation: Matrix3<f64>,
+        gravity: f64,
+        densities: PerSensor<Vector3<f64>>,
+    ) -> Self {
+        Self {
+            rotation,
+            velocity: Vector3::zeros(),
+            position: Vector3::zeros(),
+            marked: Vector3::zeros(),
+            duration_s: 0.0,
+            turned: 0.0,
+            vibration: 0.0,
+            by: ErrorsBy::zeros(),
+            gramians: [Errors::zeros(); 5],
+            gravity,
+            densities,
+            open: Open::new(),
+        }
+    }
+
+    /// Follows `readings`, the means over their time.
+    pub fn follow(&mut self, readings: &Readings) {
+        let dt = readings.duration_s;
+        let half = Rotation3::from_scaled_axis(readings.rate * (0.5 * dt)).into_inner();
+        let middle = self.rotation * half;
+        let force = middle * readings.force;
+        let acceleration = force - Vector3::z() * self.gravity;
+        self.position += (self.velocity + acceleration * (0.5 * dt)) * dt;
+        self.velocity += acceleration * dt;
+        self.rotation = middle * half;
+        self.duration_s += dt;
+        self.turned += readings.rate.norm() * dt;
+        self.vibration += readings.vibration * dt;
+        let open = &mut self.open;
+        open.duration_s += dt;
+        open.force += force * dt;
+        open.vibration += readings.vibration * dt;
+        for sensor in Sensor::BOTH {
+            readings.add_errors(&mut open.by[sensor], sensor, &middle, dt);
+            let density = Matrix3::from_diagonal(&self.densities[sensor]);
+            open.known[sensor] += middle * density * middle.transpose() * dt;
+        }
+        if self.open.duration_s >= COARSE_S {
+            self.close();
+        }
+    }
+
+    /// Keeps the position, and its errors, of this instant.
+    pub fn mark(&mut self) {
+        self.close();
+        self.marked = self.position;
+        for row in 0..3 {
+            let kept = self.by.row(6 + row).into_owned();
+            self.by.set_row(9 + row, &kept);
+        }
+        for gramian in &mut self.gramians {
+            for row in 0..3 {
+                let kept = gramian.row(6 + row).into_owned();
+                gramian.set_row(9 + row, &kept);
+            }
+            for column in 0..3 {
+                let kept = gramian.column(6 + column).into_owned();
+                gramian.set_column(9 + column, &kept);
+            }
+        }
+    }
+
+    /// Lets derivatives and covariances follow to the present instant.
+    pub fn close(&mut self) {
+        let open = std::mem::replace(&mut self.open, Open::new());
+        let dt = open.duration_s;
+        if dt <= 0.0 {
+            return;
+        }
+        let cross = open.force.cross_matrix();
+        let turned = open.by.gyro;
+        let attitude = self.by.fixed_rows::<3>(0) + turned * 0.5;
+        let velocity = -cross * attitude + open.by.accel;
+        let moved = (self.by.fixed_rows::<3>(3) + velocity * 0.5) * dt;
+        for (row, more) in [(0, &turned), (3, &velocity), (6, &moved)] {
+            let mut rows = self.by.fixed_rows_mut::<3>(row);
+            rows += more;
+        }
+        for (source, gramian) in SOURCES.iter().zip(&mut self.gramians) {
+            transported(gramian, &cross, dt);
+            let white = |own: bool, amount: f64| Matrix3::identity() * if own { amount } else { 0.0 };
+            let [gyro, accel] = match source {
+                Source::Known => [open.known.gyro, open.known.accel],
+                Source::White(s) => Sensor::BOTH.map(|own| white(own == *s, dt)),
+                Source::Shaken(s) => Sensor::BOTH.map(|own| white(own == *s, open.vibration)),
+            };
+            for (row, more) in [(0, gyro), (3, accel)] {
+                let mut block = gramian.fixed_view_mut::<3, 3>(row, row);
+                block += more;
+            }
+        }
+    }
+}
+
+/// `A P Aᵀ` for the errors that a force with the integral of `cross` moves in `dt`.
+fn transported(gramian: &mut Errors, cross: &Matrix3<f64>, dt: f64) {
+    let mut rows = *gramian;
+    let by_attitude = cross * gramian.fixed_rows::<3>(0);
+    let velocity = gramian.fixed_rows::<3>(3).into_owned();
+    let mut own = rows.fixed_rows_mut::<3>(3);
+    own -= by_attitude;
+    let mut own = rows.fixed_rows_mut::<3>(6);
+    own += velocity * dt - by_attitude * (0.5 * dt);
+    let by_attitude = rows.fixed_columns::<3>(0) * cross.transpose();
+    let velocity = rows.fixed_columns::<3>(3).into_owned();
+    *gramian = rows;
+    let mut own = gramian.fixed_columns_mut::<3>(3);
+    own -= by_attitude;
+    let mut own = gramian.fixed_columns_mut::<3>(6);
+    own += velocity * dt - by_attitude * (0.5 * dt);
+}

@@ -1,0 +1,354 @@
+//! Noise in use: the densities that explain the errors of dead reckoning in motion, and what they come from.
+//!
+//! | module | contents |
+//! |---|---|
+//! | `walk`, `dead_reckoning`, `state` | one pass over the samples: the errors of each segment, and what they depend on |
+//! | `rests`, `trajectory`, `trajectory_file`, `closure` | the errors against a reference: rests before and after, or a trajectory |
+//! | `allan_noise`, `component` | what is known of the noise, and the variances that the errors may have beyond it |
+//! | `likelihood`, `search` | a filter over the segments, and the most likely variances |
+//! | `attribution`, `judged` | causes, and the errors of segments that were held out |
+
+mod allan_noise;
+mod attribution;
+mod closure;
+mod component;
+mod dead_reckoning;
+mod judged;
+mod likelihood;
+mod noise_file;
+mod rests;
+mod search;
+mod state;
+mod trajectory;
+mod trajectory_file;
+mod walk;
+
+pub use component::Cause;
+pub use trajectory_file::Trajectory;
+pub use walk::VIBRATION_HZ;
+
+use nalgebra::{DMatrix, Matrix3};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::calibration::Calibration;
+use crate::judgement::Judgement;
+use crate::noise::noise_file::NoiseFile;
+use crate::prepared::Prepared;
+use crate::quantity::{PerSensor, Sensor};
+use crate::warning::Warning;
+use allan_noise::{AllanNoise, allan_walk};
+use closure::Closure;
+use component::{FILTER, REFERENCE_COUNT};
+use likelihood::{Model, Session};
+use mimu_allan::model::Term;
+use mimu_recording::Recording;
+use mimu_recording::error::{Error, Result};
+use search::{Fitted, Search};
+
+/// Fewer segments show no variance.
+const FEWEST_SEGMENTS: usize = 6;
+
+/// What the errors are measured against.
+#[derive(Debug, Clone, Copy)]
+pub enum Against<'a> {
+    /// Rests before and after each motion: the recording with its dwells.
+    Rests(&'a Prepared),
+    /// Poses by another instrument.
+    Trajectory(&'a Trajectory),
+}
+
+/// A density that a filter takes: for rates rad/s/√Hz and rad/s²/√Hz, for forces m/s²/√Hz and m/s³/√Hz.
+#[derive(Debug, Clone, Serialize)]
+pub struct Density {
+    /// Sensor.
+    pub sensor: Sensor,
+    /// `white` or `walk`.
+    pub term: &'static str,
+    /// Of the worst axis.
+    pub value: f64,
+    /// Ends of its 95 % interval; the lower one is at least what the noise file has.
+    pub interval: [f64; 2],
+    /// Unit of both.
+    pub unit: &'static str,
+    /// The same by the noise file; null where it shows none.
+    pub allan: Option<f64>,
+    /// Value over Allan's.
+    pub factor: Option<f64>,
+    /// Its 95 % interval.
+    pub factor_interval: Option<[f64; 2]>,
+}
+
+/// Normalised error squared of held-out segments, for each degree of freedom: 1 if the errors are as large as a filter believes.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Nees {
+    /// Mean.
+    pub value: f64,
+    /// Between these it is in 95 of 100 recordings, if the model is right: chi-square.
+    pub by_chance: [f64; 2],
+    /// Degrees of freedom.
+    pub dof: usize,
+}
+
+/// The same by three models.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Consistency {
+    /// Allan's noise alone, in a filter that estimates the biases.
+    pub allan: Nees,
+    /// The same, with the uncertainty of the calibration.
+    pub with_calibration: Nees,
+    /// The densities of this result, fitted to the other segments.
+    pub in_use: Nees,
+}
+
+/// A cause of errors beyond Allan's noise.
+#[derive(Debug, Clone, Serialize)]
+pub struct CauseFound {
+    /// Sensor that errs; null for the reference.
+    pub sensor: Option<Sensor>,
+    /// Cause.
+    pub cause: Cause,
+    /// Standard deviation, in the unit of the cause.
+    pub size: f64,
+    /// Unit of [`Self::size`].
+    pub unit: &'static str,
+    /// Twice the rise of the log-likelihood when it was added.
+    pub deviance: f64,
+    /// Its share of the errors of its sensor beyond Allan's noise, from 0 to 1.
+    pub share: f64,
+}
+
+/// Noise in use: `mimu-noise-in-use/1`.
+#[derive(Debug, Clone, Serialize)]
+pub struct NoiseInUse {
+    /// `mimu-noise-in-use/1`.
+    pub format: &'static str,
+    /// Program and version.
+    pub tool: &'static str,
+    /// Unit under test.
+    pub device: String,
+    /// The judgement: whether the errors of held-out segments are as large as the densities say.
+    pub judgement: Judgement,
+    /// `rests` or `trajectory`.
+    pub reference: &'static str,
+    /// Segments used.
+    pub segments: usize,
+    /// Segments without a reference at both ends, with missing samples, or too long.
+    pub segments_left_out: usize,
+    /// Mean length of a segment, s.
+    pub segment_s: f64,
+    /// Mean turn in a segment, rad.
+    pub turn_rad: f64,
+    /// Rms of the acceleration above 10 Hz, m/s²; null at less than 40 samples a second.
+    pub vibration_rms_mps2: Option<f64>,
+    /// The four numbers that a filter wants.
+    pub densities: Vec<Density>,
+    /// Errors over what a filter believes.
+    pub nees: Consistency,
+    /// Causes that the segments show, by share.
+    pub causes: Vec<CauseFound>,
+    /// Share of the uncertainty of the calibration in the errors beyond Allan's noise, for gyro and accelerometer.
+    pub share_of_calibration: PerSensor<f64>,
+    /// For each sensor whose noise is inflated, one sentence that says why.
+    pub sentences: Vec<String>,
+    /// What a person should know.
+    pub warnings: Vec<Warning>,
+    /// Noise with these densities, for the exports.
+    #[serde(skip)]
+    pub noise_file: NoiseFile,
+}
+
+/// The densities that explain the errors of dead reckoning on `recording`, calibrated by `calibration`; `noise` is the unit's at rest.
+///
+/// # Errors
+/// The calibration or the noise belongs to other readings; a sensor is missing; fewer than six segments have a reference at both ends.
+pub fn noise_in_use(
+    recording: &Recording,
+    calibration: &Calibration,
+    noise: &NoiseFile,
+    against: Against,
+    progress: impl Fn(f64),
+) -> Result<NoiseInUse> {
+    let place = recording.samples.display().to_string();
+    for sensor in Sensor::BOTH {
+        if calibration.inverse(sensor).is_none() {
+            let problem = format!("the calibration has no {sensor}");
+            let remedy = "dead reckoning needs both sensors: calibrate both";
+            return Err(Error::new(place, problem, remedy));
+        }
+    }
+    let allan = AllanNoise::of(noise)?;
+    let (reference, (closures, refused), has_positions) = match against {
+        Against::Rests(prepared) => {
+            let all = rests::closures(recording, prepared, calibration, &allan, progress)?;
+            ("rests", all, false)
+        }
+        Against::Trajectory(poses) => {
+            let all = trajectory::closures(recording, poses, calibration, &allan, progress)?;
+            ("trajectory", all, poses.has_positions)
+        }
+    };
+    let session = session(closures, calibration, &allan, reference, has_positions);
+    let moving = session.moving();
+    if moving.len() < FEWEST_SEGMENTS {
+        let problem = format!(
+            "{} segments have a reference at both ends, and at least {FEWEST_SEGMENTS} are needed",
+            moving.len()
+        );
+        let remedy = match reference {
+            "rests" => "hold the unit still before and after each motion, or give a trajectory",
+            _ => "check that the times of recording and trajectory are of one clock",
+        };
+        return Err(Error::new(place, problem, remedy));
+    }
+    Ok(found(&session, calibration, noise, &allan, refused, recording, reference))
+}
+
+fn session(
+    closures: Vec<Closure>,
+    calibration: &Calibration,
+    allan: &AllanNoise,
+    reference: &str,
+    has_positions: bool,
+) -> Session {
+    let mut covariance = DMatrix::zeros(24, 24);
+    for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
+        if let Some(own) = calibration.covariance(sensor) {
+            covariance.view_mut((12 * k, 12 * k), (12, 12)).copy_from(&own);
+        }
+    }
+    let times: Vec<f64> = closures.iter().map(|c| c.at_s).collect();
+    let apart_s = match times[..] {
+        [first, .., last] => (last - first) / (times.len() - 1) as f64,
+        _ => 1.0,
+    };
+    Session {
+        components: component::all(allan.mean_white(), has_positions),
+        walks: allan.walks(apart_s.max(1e-3)),
+        calibration: covariance,
+        matrices: PerSensor::from_fn(|s| {
+            calibration
+                .inverse(s)
+                .map_or_else(Matrix3::identity, |c| c.matrix)
+        }),
+        mounted: reference == "trajectory",
+        closures,
+    }
+}
+
+/// Components that a filter has, and the reference's.
+const OF_FILTER: std::ops::Range<usize> = 0..FILTER + REFERENCE_COUNT;
+
+impl Session {
+    /// Indices of the segments in motion.
+    pub(self) fn moving(&self) -> Vec<usize> {
+        let all = self.closures.iter().enumerate();
+        all.filter(|(_, c)| c.moves).map(|(i, _)| i).collect()
+    }
+
+    /// Allan's noise alone, or with the uncertainty of the calibration.
+    pub(self) fn known(&self, calibration: bool) -> Model {
+        Model {
+            values: vec![0.0; self.components.len()],
+            calibration,
+        }
+    }
+
+    /// The most likely densities of a filter, by the segments that `counts` accepts.
+    pub(self) fn filter_densities(&self, counts: impl Fn(usize) -> bool + Sync) -> Fitted {
+        let search = Search { session: self, counts };
+        let free: Vec<usize> = OF_FILTER.collect();
+        search.maximise(search.fitted(self.known(false)), &free)
+    }
+}
+
+fn found(
+    session: &Session,
+    calibration: &Calibration,
+    noise: &NoiseFile,
+    allan: &AllanNoise,
+    refused: usize,
+    recording: &Recording,
+    reference: &'static str,
+) -> NoiseInUse {
+    let fitted = session.filter_densities(|_| true);
+    let search = Search { session, counts: |_| true };
+    let free: Vec<usize> = OF_FILTER.collect();
+    let ranges: Vec<[f64; 2]> = (0..FILTER)
+        .into_par_iter()
+        .map(|k| search.range(&fitted, k, &free))
+        .collect();
+    let attributed = attribution::of(session);
+    let densities = densities(session, &fitted.model, &ranges, noise, allan);
+    let nees = judged::consistency(session);
+    let moving: Vec<&Closure> = session.closures.iter().filter(|c| c.moves).collect();
+    let mean = |of: &dyn Fn(&Closure) -> f64| {
+        moving.iter().map(|c| of(c)).sum::<f64>() / moving.len() as f64
+    };
+    let total_s: f64 = moving.iter().map(|c| c.duration_s).sum();
+    let shaken: f64 = moving.iter().map(|c| c.vibration * c.duration_s).sum();
+    let fast = recording.manifest.sample_rate_hz >= 4.0 * VIBRATION_HZ;
+    let judgement = judged::judgement(session, &nees, recording, calibration);
+    let sentences = attribution::sentences(&densities, &attributed);
+    let warnings = calibration.other_unit(&recording.manifest).into_iter();
+    NoiseInUse {
+        format: "mimu-noise-in-use/1",
+        tool: crate::result::TOOL,
+        device: recording.manifest.device.clone(),
+        noise_file: noise_file::of(noise, session, &fitted.model, &ranges, &judgement),
+        judgement,
+        reference,
+        segments: moving.len(),
+        segments_left_out: refused,
+        segment_s: mean(&|c| c.duration_s),
+        turn_rad: mean(&|c| c.turned),
+        vibration_rms_mps2: fast.then(|| (shaken / total_s).sqrt()),
+        densities,
+        nees,
+        causes: attributed.causes,
+        share_of_calibration: attributed.share_of_calibration,
+        sentences,
+        warnings: warnings.collect(),
+    }
+}
+
+/// The four numbers, of the worst axes.
+fn densities(
+    session: &Session,
+    model: &Model,
+    ranges: &[[f64; 2]],
+    noise: &NoiseFile,
+    allan: &AllanNoise,
+) -> Vec<Density> {
+    let each = (0..FILTER).map(|k| {
+        let sensor = Sensor::BOTH[k % 2];
+        let is_white = k < 2;
+        let known = match is_white {
+            true => allan.squared()[sensor][allan.worst_axis(sensor, Term::N)],
+            false => session.walks[sensor].into_iter().fold(0.0, f64::max),
+        };
+        let of = |value: f64| (known + value * session.components[k].unit).sqrt();
+        let value = of(model.values[k]);
+        let interval = ranges[k].map(of);
+        let reference = match is_white {
+            true => Some(known.sqrt()),
+            false => allan_walk(noise, sensor).filter(|(_, shown)| *shown).map(|(k, _)| k),
+        };
+        Density {
+            sensor,
+            term: if is_white { "white" } else { "walk" },
+            value,
+            interval,
+            unit: match (sensor, is_white) {
+                (Sensor::Gyro, true) => "rad/s/sqrt(Hz)",
+                (Sensor::Gyro, false) => "rad/s^2/sqrt(Hz)",
+                (Sensor::Accel, true) => "m/s^2/sqrt(Hz)",
+                (Sensor::Accel, false) => "m/s^3/sqrt(Hz)",
+            },
+            allan: reference,
+            factor: reference.map(|r| value / r),
+            factor_interval: reference.map(|r| interval.map(|v| v / r)),
+        }
+    });
+    each.collect()
+}

@@ -1,0 +1,65 @@
+//! The noise file of a unit in use, for the exports.
+
+use super::likelihood::{Model, Session};
+use crate::judgement::Judgement;
+use crate::noise::noise_file::{FileCoefficient, NoiseChannel, NoiseFile};
+use crate::quantity::{AXES, Sensor};
+use mimu_allan::model::Term;
+
+/// Half-width of a 95 % interval in standard deviations.
+const SIGMAS: f64 = 1.96;
+
+/// The noise at rest with what motion adds to every axis.
+pub(super) fn of(
+    at_rest: &NoiseFile,
+    session: &Session,
+    model: &Model,
+    ranges: &[[f64; 2]],
+    judgement: &Judgement,
+) -> NoiseFile {
+    let mut file = at_rest.clone();
+    file.judgement = Some(judgement.clone());
+    file.confidence = 0.95;
+    for channel in &mut file.channel {
+        let Some((sensor, axis)) = place(channel) else { continue };
+        // In the unit of calibrated readings already, as the densities are.
+        let n = channel.get(Term::N).map_or(0.0, |c| c.value.powi(2));
+        let walk = session.walks[sensor][axis];
+        let with = |known: f64, k: usize| {
+            let of = |value: f64| (known + value * session.components[k].unit).sqrt();
+            let [lower, upper] = ranges[k].map(of);
+            (of(model.values[k]), lower, upper)
+        };
+        let unit = |term: Term| {
+            let own = channel.get(term).map(|c| c.unit.clone());
+            own.unwrap_or_else(|_| match term {
+                Term::K => format!("{}/s/sqrt(Hz)", sensor.unit()),
+                _ => format!("{}/sqrt(Hz)", sensor.unit()),
+            })
+        };
+        let coefficient = |(value, lower, upper): (f64, f64, f64), term| FileCoefficient {
+            value,
+            sigma: (upper - lower) / (2.0 * SIGMAS),
+            lower,
+            upper,
+            unit: unit(term),
+        };
+        let white = coefficient(with(n, sensor as usize), Term::N);
+        let bias = with(walk, 2 + sensor as usize);
+        let walked = (bias.0 > 0.0).then(|| coefficient(bias, Term::K));
+        (channel.n, channel.n_reason) = (Some(white), None);
+        (channel.k_reason, channel.k_at_most) = match &walked {
+            Some(_) => (None, None),
+            None => (Some("motion shows none".into()), Some(bias.2)),
+        };
+        channel.k = walked;
+    }
+    file
+}
+
+fn place(channel: &NoiseChannel) -> Option<(Sensor, usize)> {
+    let (sensor, axis) = channel.name.split_once('_')?;
+    let sensor = Sensor::BOTH.into_iter().find(|s| s.to_string() == sensor)?;
+    let axis = AXES.iter().position(|a| *a == axis)?;
+    Some((sensor, axis))
+}

@@ -1,0 +1,212 @@
+//! One pass over the samples of a recording: means over its rests, dead reckoning over its segments.
+
+use nalgebra::Vector3;
+
+use super::dead_reckoning::DeadReckoning;
+use super::state::Readings;
+use crate::calibration::Calibration;
+use crate::calibration::apply::Compensated;
+use crate::quantity::{PerSensor, Sensor};
+use crate::signal::increment::is_bridged;
+use crate::triad::Forward;
+use mimu_recording::error::Result;
+use mimu_recording::{Batch, Recording};
+
+/// Corner of the filter above which acceleration counts as vibration, Hz. A hand moves a unit below it.
+pub const VIBRATION_HZ: f64 = 10.0;
+
+/// A segment to dead reckon, and the instant within it to mark.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Span {
+    pub start_s: f64,
+    pub mark_s: Option<f64>,
+    pub end_s: f64,
+}
+
+/// A segment as it was reckoned; `None` if samples were missing in it.
+pub(super) type Reckoned = Option<DeadReckoning>;
+
+/// Means over the rests, and the segments.
+pub(super) struct Walked {
+    pub rests: Vec<Readings>,
+    pub spans: Vec<Reckoned>,
+    /// Readings at the beginning and at the end of each segment.
+    pub ends: Vec<[Readings; 2]>,
+}
+
+/// A Butterworth high pass of second order for each axis: what is above [`VIBRATION_HZ`].
+struct HighPass {
+    b: [f64; 3],
+    a: [f64; 2],
+    held: [Vector3<f64>; 4],
+    begun: bool,
+}
+
+impl HighPass {
+    /// For samples at `rate_hz`; at less than four times the corner nothing passes.
+    fn new(rate_hz: f64) -> Self {
+        let k = (std::f64::consts::PI * VIBRATION_HZ / rate_hz).min(1.0).tan();
+        let norm = 1.0 / (1.0 + std::f64::consts::SQRT_2 * k + k * k);
+        let passes = rate_hz >= 4.0 * VIBRATION_HZ;
+        let gain = if passes { norm } else { 0.0 };
+        Self {
+            b: [gain, -2.0 * gain, gain],
+            a: [
+                2.0 * (k * k - 1.0) * norm,
+                (1.0 - std::f64::consts::SQRT_2 * k + k * k) * norm,
+            ],
+            held: [Vector3::zeros(); 4],
+            begun: false,
+        }
+    }
+
+    fn take(&mut self, x: Vector3<f64>) -> Vector3<f64> {
+        if !self.begun {
+            (self.held[0], self.held[1], self.begun) = (x, x, true);
+        }
+        let [x1, x2, y1, y2] = self.held;
+        let y = x * self.b[0] + x1 * self.b[1] + x2 * self.b[2] - y1 * self.a[0] - y2 * self.a[1];
+        self.held = [x, x1, y, y1];
+        y
+    }
+}
+
+/// Walks over `recording`, calibrated. `rests` and `spans` are in order of time; `begin` begins a segment, by its index and the means of the rests
+/// before it.
+pub(super) fn walk(
+    recording: &Recording,
+    calibration: &Calibration,
+    rests: &[[f64; 2]],
+    spans: &[Span],
+    mut begin: impl FnMut(usize, &[Readings]) -> DeadReckoning,
+    progress: impl Fn(f64),
+) -> Result<Walked> {
+    let forward = PerSensor::from_fn(|s| calibration.inverse(s).and_then(|c| Forward::of(&c)));
+    let period_s = 1.0 / recording.manifest.sample_rate_hz;
+    let mut high = HighPass::new(recording.manifest.sample_rate_hz);
+    let mut walked = Walked {
+        rests: vec![Readings::default(); rests.len()],
+        spans: vec![None; spans.len()],
+        ends: vec![[Readings::default(); 2]; spans.len()],
+    };
+    let (mut rest, mut span, mut started) = (0, 0, false);
+    let mut open: Reckoned = None;
+    let mut before: Option<(f64, Readings)> = None;
+    let mut compensated = Compensated::new(recording, calibration, |share| progress(0.5 * share))?;
+    let mut step = |t: f64, now: Readings| {
+        let Some((t0, last)) = before.replace((t, now)) else {
+            return;
+        };
+        let dt = t - t0;
+        let missing = dt > 1.5 * period_s && !is_bridged(dt, period_s);
+        let mean = Readings {
+            duration_s: dt,
+            rate: (last.rate + now.rate) * 0.5,
+            force: (last.force + now.force) * 0.5,
+            raw: PerSensor::from_fn(|s| (last.raw[s] + now.raw[s]) * 0.5),
+            vibration: 0.5 * (last.vibration + now.vibration),
+        };
+        while rest < rests.len() && rests[rest][1] <= t0 {
+            rest += 1;
+        }
+        if let Some([from, to]) = rests.get(rest)
+            && t0 >= *from
+            && t <= *to
+        {
+            add(&mut walked.rests[rest], &mean);
+        }
+        let mut from = t0;
+        while let Some(own) = spans.get(span) {
+            if t <= own.start_s {
+                break;
+            }
+            if !started {
+                started = true;
+                let through = rests.partition_point(|r| r[1] <= own.start_s + 1e-9);
+                open = Some(begin(span, &walked.rests[..through]));
+                walked.ends[span][0] = mean;
+                from = from.max(own.start_s);
+            }
+            let to = t.min(own.end_s);
+            if missing {
+                open = None;
+            }
+            if let Some(reckoned) = &mut open {
+                let mut go = |from: f64, to: f64| {
+                    if to > from {
+                        reckoned.follow(&Readings { duration_s: to - from, ..mean });
+                    }
+                };
+                match own.mark_s.filter(|m| (from..to).contains(m)) {
+                    Some(mark) => {
+                        go(from, mark);
+                        reckoned.mark();
+                        reckoned.follow(&Readings { duration_s: to - mark, ..mean });
+                    }
+                    None => go(from, to),
+                }
+            }
+            if t < own.end_s {
+                break;
+            }
+            if let Some(reckoned) = &mut open {
+                reckoned.close();
+            }
+            walked.ends[span][1] = mean;
+            walked.spans[span] = open.take();
+            (span, started, from) = (span + 1, false, to);
+        }
+    };
+    compensated.for_each(
+        |share| progress(0.5 + 0.5 * share),
+        |_, clean| {
+            for row in 0..clean.len() {
+                if let Some(mut now) = readings(clean, row, &forward) {
+                    now.vibration = high.take(now.force).norm_squared();
+                    step(clean.t_s[row], now);
+                }
+            }
+            Ok(())
+        },
+    )?;
+    for mean in &mut walked.rests {
+        let t = mean.duration_s;
+        if t > 0.0 {
+            mean.rate /= t;
+            mean.force /= t;
+            mean.vibration /= t;
+            mean.raw = PerSensor::from_fn(|s| mean.raw[s] / t);
+        }
+    }
+    Ok(walked)
+}
+
+/// Adds `mean`, times its duration, to `sum`.
+fn add(sum: &mut Readings, mean: &Readings) {
+    let dt = mean.duration_s;
+    sum.duration_s += dt;
+    sum.rate += mean.rate * dt;
+    sum.force += mean.force * dt;
+    sum.vibration += mean.vibration * dt;
+    sum.raw = PerSensor::from_fn(|s| sum.raw[s] + mean.raw[s] * dt);
+}
+
+/// The sample of `row`; `None` if an axis has no reading.
+fn readings(clean: &Batch, row: usize, forward: &PerSensor<Option<Forward>>) -> Option<Readings> {
+    let of = |s: Sensor| {
+        let from = s.channels().start;
+        Vector3::from_fn(|i, _| clean.raw[from + i][row])
+    };
+    let (rate, force) = (of(Sensor::Gyro), of(Sensor::Accel));
+    let whole = rate.iter().chain(force.iter()).all(|v| v.is_finite());
+    whole.then(|| Readings {
+        duration_s: 0.0,
+        rate,
+        force,
+        raw: PerSensor::from_fn(|s| {
+            let clean = if s == Sensor::Gyro { rate } else { force };
+            forward[s].map_or(clean, |f| f.apply(&clean))
+        }),
+        vibration: 0.0,
+    })
+}
