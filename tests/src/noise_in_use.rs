@@ -82,15 +82,28 @@ pub fn noise(file: &RigFile, seed: u64) -> NoiseFile {
     let mut text = String::from(
         "format = \"mimu-noise/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 200.0\nduration_s = 10800.0\nconfidence = 0.95\n",
     );
-    for (k, sensor) in [&truth.unit.gyro, &truth.unit.accel].into_iter().enumerate() {
+    for (k, sensor) in [&truth.unit.gyro, &truth.unit.accel]
+        .into_iter()
+        .enumerate()
+    {
         let unit = ["rad/s", "m/s^2"][k];
         for (axis, own) in ["x", "y", "z"].into_iter().zip(&sensor.axes) {
             let name = ["gyro", "accel"][k];
-            let _ = writeln!(text, "[[channel]]\nname = \"{name}_{axis}\"\nunit = \"{unit}\"\nsamples = 1080000");
+            let _ = writeln!(
+                text,
+                "[[channel]]\nname = \"{name}_{axis}\"\nunit = \"{unit}\"\nsamples = 1080000"
+            );
             let noise = &own.noise;
-            for (key, value) in [("n", noise.white), ("b", noise.instability), ("k", noise.walk)] {
+            for (key, value) in [
+                ("n", noise.white),
+                ("b", noise.instability),
+                ("k", noise.walk),
+            ] {
                 if value > 0.0 {
-                    let _ = writeln!(text, "{key} = {{ value = {value:e}, sigma = 0.0, lower = {value:e}, upper = {value:e}, unit = \"{unit}\" }}");
+                    let _ = writeln!(
+                        text,
+                        "{key} = {{ value = {value:e}, sigma = 0.0, lower = {value:e}, upper = {value:e}, unit = \"{unit}\" }}"
+                    );
                 }
             }
         }
@@ -132,13 +145,24 @@ pub fn case(wrong: Wrong, poses: usize, seed: u64) -> mimu_recording::error::Res
         let models = [&file.unit.gyro_affine, &file.unit.accel_affine];
         let models = models.map(|m| m.as_ref().expect("stated"));
         set(&mut calibration, Sensor::Gyro, models[0], &error);
-        set(&mut calibration, Sensor::Accel, models[1], &Matrix3::zeros());
+        set(
+            &mut calibration,
+            Sensor::Accel,
+            models[1],
+            &Matrix3::zeros(),
+        );
     }
     let folder = bench::written(&plan(poses), &file, seed + 1000);
     let recording = Recording::open(&folder.path().join("recording"))?;
     let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ())?;
     let noise = noise(&file, seed);
-    noise_in_use(&recording, &calibration, &noise, Against::Rests(&prepared), |_| ())
+    noise_in_use(
+        &recording,
+        &calibration,
+        &noise,
+        Against::Rests(&prepared),
+        |_| (),
+    )
 }
 
 /// A row of a table: factors with their intervals, consistency, and the first cause of each sensor.
@@ -157,7 +181,16 @@ pub fn row(wrong: Wrong, seed: u64, found: &NoiseInUse) -> String {
     let causes: Vec<String> = found
         .causes
         .iter()
-        .map(|c| format!("{:?} {:?} {:.2e} ({:.0} %, deviance {:.0})", c.sensor.map(|s| s.to_string()).unwrap_or_default(), c.cause, c.size, 100.0 * c.share, c.deviance))
+        .map(|c| {
+            format!(
+                "{:?} {:?} {:.2e} ({:.0} %, deviance {:.0})",
+                c.sensor.map(|s| s.to_string()).unwrap_or_default(),
+                c.cause,
+                c.size,
+                100.0 * c.share,
+                c.deviance
+            )
+        })
         .collect();
     let _ = write!(out, " {} |", causes.join("; "));
     out

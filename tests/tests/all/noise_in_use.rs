@@ -29,21 +29,30 @@ fn cases(wrong: Wrong, poses: usize, seeds: std::ops::Range<u64>) -> Vec<(u64, N
 fn not_inflated(all: &[(u64, NoiseInUse)]) -> (usize, usize) {
     let ends = all.iter().flat_map(|(_, found)| &found.densities);
     let ends: Vec<[f64; 2]> = ends.filter_map(|d| d.factor_interval).collect();
-    (ends.iter().filter(|i| i[0] <= 1.0 + 1e-9).count(), ends.len())
+    (
+        ends.iter().filter(|i| i[0] <= 1.0 + 1e-9).count(),
+        ends.len(),
+    )
 }
 
 fn first_of_gyro(found: &NoiseInUse) -> Option<Cause> {
     let causes = found.causes.iter();
-    causes.filter(|c| c.sensor == Some(Sensor::Gyro)).map(|c| c.cause).next()
+    causes
+        .filter(|c| c.sensor == Some(Sensor::Gyro))
+        .map(|c| c.cause)
+        .next()
 }
 
 #[test]
+#[ignore = "nightly: two sessions by hand, a minute"]
 fn nothing_is_inflated_where_nothing_is_wrong_and_a_scale_error_is_called_one() {
     let all = cases(Wrong::Nothing, 24, 0..1);
     let (inside, count) = not_inflated(&all);
     assert_eq!(inside, count);
     let all = cases(Wrong::Scale, 24, 0..1);
-    let [(_, found)] = &all[..] else { panic!("refused") };
+    let [(_, found)] = &all[..] else {
+        panic!("refused")
+    };
     assert!(found.densities[0].factor_interval.unwrap()[0] > 1.5);
     assert!(found.nees.allan.value > 3.0);
     assert_eq!(first_of_gyro(found), Some(Cause::Scale));
@@ -62,8 +71,13 @@ fn table_of_causes() {
     ] {
         let all = cases(wrong, 40, 0..20);
         let (inside, count) = not_inflated(&all);
-        let right = all.iter().filter(|(_, f)| first_of_gyro(f) == cause).count();
-        let consistent = all.iter().filter(|(_, f)| (0.8..=1.25).contains(&f.nees.in_use.value));
+        let right = all
+            .iter()
+            .filter(|(_, f)| first_of_gyro(f) == cause)
+            .count();
+        let consistent = all
+            .iter()
+            .filter(|(_, f)| (0.8..=1.25).contains(&f.nees.in_use.value));
         println!(
             "{wrong:?}: factor 1 inside {inside} of {count}; cause right {right} of {}; NEES in use 0.8 to 1.25 in {}",
             all.len(),

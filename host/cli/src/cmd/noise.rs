@@ -35,6 +35,15 @@ pub(crate) struct NoiseInUseArgs {
     /// the unit, how it is mounted, and up to some 20 ms between the clocks are estimated.
     #[arg(long, value_name = "FILE.csv")]
     trajectory: Option<PathBuf>,
+    /// Time of the trajectory at which the recording's t_s is 0, s: `mimu import` prints what stamps are counted from
+    #[arg(
+        long,
+        value_name = "S",
+        requires = "trajectory",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    trajectory_zero: f64,
     /// File to write: FILE.yaml for Kalibr and what reads its files; FILE.toml is a noise file, for `mimu export`
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -67,12 +76,13 @@ pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
     let bar = progress("dead reckoning");
     let result = match &args.trajectory {
         Some(path) => {
-            let trajectory = Trajectory::read(path)?;
+            let trajectory = Trajectory::read(path)?.counted_from(args.trajectory_zero);
             let against = Against::Trajectory(&trajectory);
             noise_in_use(&recording, &calibration, &noise, against, |s| bar.reach(s))
         }
         None => {
-            let prepared = Prepared::read(&recording, args.still.finding(), |s| bar.reach(0.3 * s))?;
+            let prepared =
+                Prepared::read(&recording, args.still.finding(), |s| bar.reach(0.3 * s))?;
             let against = Against::Rests(&prepared);
             let reach = |s: f64| bar.reach(0.3 + 0.7 * s);
             noise_in_use(&recording, &calibration, &noise, against, reach)

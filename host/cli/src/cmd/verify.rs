@@ -9,7 +9,9 @@ use mimu::data_sheet::DataSheet;
 use mimu::noise::noise_file::NoiseFile;
 use mimu_recording::error::Result;
 
-use crate::arguments::{JsonArgs, NoiseArgs, PartArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs};
+use crate::arguments::{
+    JsonArgs, NoiseArgs, PartArgs, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs,
+};
 use crate::output::print;
 use crate::reading::{LogArgs, read_samples_or_means};
 use crate::report;
@@ -55,7 +57,12 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
     )?;
     let prepared = args.whole.apply(args.noise.apply(prepared)?)?;
     let result = verify(&prepared, &calibration)?;
-    let noise = args.noise.file.as_deref().map(NoiseFile::read).transpose()?;
+    let noise = args
+        .noise
+        .file
+        .as_deref()
+        .map(NoiseFile::read)
+        .transpose()?;
     let sheet = part.map(|part| DataSheet::of(&calibration, noise.as_ref(), &part));
     let mut text = report::verify_text(&result, args.verbose.verbose);
     text.extend(sheet.as_ref().map(data_sheet_text));

@@ -22,7 +22,10 @@ pub(crate) struct WithDataSheet<'a, T: Serialize> {
 
 /// The section as text.
 pub(crate) fn data_sheet_text(sheet: &DataSheet) -> String {
-    let mut out = format!("\nagainst the data sheet: {} ({})\n", sheet.part, sheet.source);
+    let mut out = format!(
+        "\nagainst the data sheet: {} ({})\n",
+        sheet.part, sheet.source
+    );
     if !sheet.rows.is_empty() {
         out += &table(sheet).text("");
     }
@@ -61,9 +64,18 @@ fn table(sheet: &DataSheet) -> Table {
         .words("result")
         .on_page("where the data sheet has it");
     for row in &sheet.rows {
-        let name = format!("{} {}, {}", row.sensor, row.axis, row.property.name(row.sensor));
+        let name = format!(
+            "{} {}, {}",
+            row.sensor,
+            row.axis,
+            row.property.name(row.sensor)
+        );
         let measured = match row.half_width {
-            Some(half) => Cell::Interval { si: row.value, half, factor: 1.0 },
+            Some(half) => Cell::Interval {
+                si: row.value,
+                half,
+                factor: 1.0,
+            },
             None => Cell::number(row.value, 1.0),
         };
         let typical = if row.typical { " (typ)" } else { "" };

@@ -11,9 +11,9 @@ use crate::report::text::{warn, wrap};
 /// Result of `mimu noise`.
 pub fn noise_in_use_text(result: &NoiseInUse) -> String {
     let mut out = format!("judgement: {}\n", result.judgement);
-    let vibration = result.vibration_rms_mps2.map(|rms| {
-        format!(", vibration above 10 Hz {} m/s² rms", significant(rms))
-    });
+    let vibration = result
+        .vibration_rms_mps2
+        .map(|rms| format!(", vibration above 10 Hz {} m/s² rms", significant(rms)));
     let _ = writeln!(
         out,
         "{} segments of {} s, {} deg of turn{}, against {}{}\n",
@@ -42,24 +42,30 @@ pub fn noise_in_use_text(result: &NoiseInUse) -> String {
 }
 
 fn densities(result: &NoiseInUse) -> Table {
-    let mut table = Table::new("Noise that explains the errors in motion, with 95 % intervals", "density")
-        .numbers(["in use", "Allan's", "factor"])
-        .words("unit");
+    let mut table = Table::new(
+        "Noise that explains the errors in motion, with 95 % intervals",
+        "density",
+    )
+    .numbers(["in use", "Allan's", "factor"]);
     for density in &result.densities {
         let name = match (density.sensor, density.term) {
-            (Sensor::Gyro, "white") => "gyroscope_noise_density",
-            (Sensor::Gyro, _) => "gyroscope_random_walk",
-            (Sensor::Accel, "white") => "accelerometer_noise_density",
-            (Sensor::Accel, _) => "accelerometer_random_walk",
+            (Sensor::Gyro, "white") => "gyro N, rad/s/√Hz",
+            (Sensor::Gyro, _) => "gyro K, rad/s²/√Hz",
+            (Sensor::Accel, "white") => "accel N, m/s²/√Hz",
+            (Sensor::Accel, _) => "accel K, m/s³/√Hz",
         };
         let (si, ends) = (density.value, density.interval);
         let factor = match (density.factor, density.factor_interval) {
             (Some(si), Some(ends)) => Cell::Between { si, ends },
             _ => Cell::known(None, 1.0),
         };
-        let figures = [Cell::Between { si, ends }, Cell::known(density.allan, 1.0), factor];
+        let figures = [
+            Cell::Between { si, ends },
+            Cell::known(density.allan, 1.0),
+            factor,
+        ];
         let row = std::iter::once(Cell::from(name)).chain(figures);
-        table.row(row.chain([Cell::from(density.unit)]));
+        table.row(row);
     }
     table
 }
@@ -72,7 +78,10 @@ fn consistency(result: &NoiseInUse) -> Table {
     .numbers(["NEES", "by chance from", "to"]);
     let rows: [(&str, &Nees); 3] = [
         ("Allan's noise alone", &result.nees.allan),
-        ("and the calibration's uncertainty", &result.nees.with_calibration),
+        (
+            "and the calibration's uncertainty",
+            &result.nees.with_calibration,
+        ),
         ("the noise in use", &result.nees.in_use),
     ];
     for (name, nees) in rows {

@@ -88,7 +88,14 @@ impl<'a> Unit<'a> {
             Property::Offset => Ok(self.with_interval(|model| {
                 let forward = Forward::of(model)?;
                 let si = forward.bias[axis] / forward.matrix.row(axis).norm();
-                Some(of_sheet(self.sensor, si) * if self.sensor == Sensor::Accel { 1e3 } else { 1.0 })
+                Some(
+                    of_sheet(self.sensor, si)
+                        * if self.sensor == Sensor::Accel {
+                            1e3
+                        } else {
+                            1.0
+                        },
+                )
             })),
             Property::CrossAxis => Ok(self.cross_axis(axis)),
             Property::Nonlinearity => self.nonlinearity(axis),
@@ -136,7 +143,9 @@ impl<'a> Unit<'a> {
         }
         match found {
             true => Ok((sum, known.then(|| self.sigmas * variance.sqrt()))),
-            false => Err("mimu diagnose has found none; poses and turns do not reach full scale".into()),
+            false => {
+                Err("mimu diagnose has found none; poses and turns do not reach full scale".into())
+            }
         }
     }
 
@@ -147,10 +156,16 @@ impl<'a> Unit<'a> {
         let name = format!("{}_{}", self.sensor, AXES[axis]);
         let channels = noise.channel.iter().filter(|c| c.name == name);
         let of_sheet = |si: f64| {
-            let micro = if self.sensor == Sensor::Accel { 1e6 } else { 1.0 };
+            let micro = if self.sensor == Sensor::Accel {
+                1e6
+            } else {
+                1.0
+            };
             ONE_SIDED * micro * of_sheet(self.sensor, si)
         };
-        for channel in channels.filter(|c| c.model_in(self.sensor.unit()).is_ok() && c.unit == self.sensor.unit()) {
+        for channel in channels
+            .filter(|c| c.model_in(self.sensor.unit()).is_ok() && c.unit == self.sensor.unit())
+        {
             let n = channel.get(Term::N).map_err(str::to_owned)?;
             let half = 0.5 * (n.upper - n.lower);
             return Ok((of_sheet(n.value), Some(of_sheet(half))));

@@ -91,7 +91,9 @@ impl DataSheet {
     pub fn of(calibration: &Calibration, noise: Option<&NoiseFile>, part: &Part) -> Self {
         let (mut rows, mut missing) = (Vec::new(), Vec::new());
         for sensor in Sensor::BOTH {
-            let Some(own) = part.sensor(sensor) else { continue };
+            let Some(own) = part.sensor(sensor) else {
+                continue;
+            };
             let Some(unit) = measured::Unit::of(calibration, noise, sensor, own) else {
                 missing.push(format!("{sensor}: the calibration does not have it"));
                 continue;
@@ -155,11 +157,19 @@ mod tests {
             assert!(!part.source.is_empty());
             for sensor in Sensor::BOTH {
                 let own = part.sensor(sensor).unwrap();
-                assert!(own.limits.iter().all(|l| l.source.contains(char::is_numeric)), "{name}");
+                assert!(
+                    own.limits
+                        .iter()
+                        .all(|l| l.source.contains(char::is_numeric)),
+                    "{name}"
+                );
                 // A range of twice the size has half the counts.
                 for [full_scale, counts] in &own.ranges {
                     let [first, per] = own.ranges[0];
-                    assert!((full_scale * counts / (first * per) - 1.0).abs() < 0.01, "{name}");
+                    assert!(
+                        (full_scale * counts / (first * per) - 1.0).abs() < 0.01,
+                        "{name}"
+                    );
                 }
             }
         }

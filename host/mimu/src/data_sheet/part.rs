@@ -145,7 +145,11 @@ impl Part {
         }
         let names: Vec<&str> = SHIPPED.iter().map(|(known, _)| *known).collect();
         let remedy = format!("use one of {}, or a file NAME.toml", names.join(", "));
-        Err(Error::new("--part", format!("no part is called {name}"), remedy))
+        Err(Error::new(
+            "--part",
+            format!("no part is called {name}"),
+            remedy,
+        ))
     }
 
     /// Parses and checks the text of a file; `place` is its path.
@@ -156,7 +160,10 @@ impl Part {
         check_kind(text, place, "mimu-part")?;
         let part: Self = parse_toml(text, place, None)?;
         if part.format != FORMAT {
-            let problem = format!("format is {:?}, and this program reads {FORMAT:?}", part.format);
+            let problem = format!(
+                "format is {:?}, and this program reads {FORMAT:?}",
+                part.format
+            );
             let remedy = "use the version of mimu that it was written for";
             return Err(Error::new(place, problem, remedy));
         }
@@ -165,7 +172,10 @@ impl Part {
                 let unit = limit.quantity.unit(sensor);
                 if limit.unit != unit || !(limit.at_most > 0.0) {
                     let name = limit.quantity.name(sensor);
-                    let problem = format!("{} {}, not a positive number in {unit}", limit.at_most, limit.unit);
+                    let problem = format!(
+                        "{} {}, not a positive number in {unit}",
+                        limit.at_most, limit.unit
+                    );
                     let place = format!("{place}, {name} of the {sensor}");
                     return Err(Error::new(place, problem, format!("write it in {unit}")));
                 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::noise::noise_file::{NoiseChannel, NoiseFile};
+use crate::noise::noise_file::NoiseFile;
 use crate::quantity::{AXES, PerSensor, Sensor};
 use mimu_allan::model::Term;
 use mimu_recording::error::{Error, Result};
@@ -75,13 +75,3 @@ impl AllanNoise {
         }
     }
 }
-
-/// Largest random walk of the axes of `sensor` that Allan shows, SI; or else the largest upper end, and `false`.
-pub(super) fn allan_walk(file: &NoiseFile, sensor: Sensor) -> Option<(f64, bool)> {
-    let channels: Vec<&NoiseChannel> = file.of(sensor);
-    let shown = channels.iter().filter_map(|c| c.get(Term::K).ok());
-    let shown = shown.map(|k| k.value).reduce(f64::max);
-    let at_most = channels.iter().filter_map(|c| c.k_at_most).reduce(f64::max);
-    shown.map(|k| (k, true)).or(at_most.map(|k| (k, false)))
-}
-

@@ -15,6 +15,8 @@ use crate::readable::STANDARD_GRAVITY;
 const RISE: f64 = 3.0;
 /// Causes that are looked for, one after the other.
 const MOST: usize = 8;
+/// Candidates that are fitted together with those found before.
+const CLOSE: usize = 3;
 /// Below this factor nothing is inflated.
 const INFLATED: f64 = 1.1;
 
@@ -26,15 +28,22 @@ pub(super) struct Attributed {
 
 /// The causes that the segments of `session` show, beside Allan's noise and the uncertainty of the calibration: forward selection.
 pub(super) fn of(session: &Session) -> Attributed {
-    let search = Search { session, counts: |_| true };
+    let search = Search {
+        session,
+        counts: |_| true,
+    };
     let mut best = search.fitted(session.known(true));
     let mut included: Vec<(usize, f64)> = Vec::new();
     while included.len() < MOST {
         let free: Vec<usize> = included.iter().map(|(k, _)| *k).collect();
         let candidates = (0..session.components.len()).filter(|k| !free.contains(k));
         let candidates: Vec<usize> = candidates.collect();
-        let tried = candidates.into_par_iter().map(|k| {
-            let along = search.along(best.clone(), k, false);
+        let tried = candidates.into_par_iter();
+        let tried = tried.map(|k| (k, search.along(best.clone(), k, false)));
+        let mut tried: Vec<(usize, Fitted)> = tried.collect();
+        tried.sort_by(|a, b| b.1.log_likelihood.total_cmp(&a.1.log_likelihood));
+        // With the others fitted anew, one that was close behind may be better.
+        let tried = tried.into_par_iter().take(CLOSE).map(|(k, along)| {
             let mut with = free.clone();
             with.push(k);
             (k, search.maximise(along, &with))
@@ -54,7 +63,9 @@ pub(super) fn of(session: &Session) -> Attributed {
 fn attributed(session: &Session, best: &Fitted, included: &[(usize, f64)]) -> Attributed {
     let known = session.known(true);
     let [gyro, accel] = Sensor::BOTH.map(|s| share_of_calibration(session, &known, s));
-    let powers = included.iter().map(|(k, _)| power(session, &known, best, *k));
+    let powers = included
+        .iter()
+        .map(|(k, _)| power(session, &known, best, *k));
     let powers: Vec<f64> = powers.collect();
     let of_sensor = |sensor: Option<Sensor>| {
         let own = included.iter().zip(&powers);
@@ -101,12 +112,17 @@ fn attributed(session: &Session, best: &Fitted, included: &[(usize, f64)]) -> At
 /// Errors that component `k` adds, as a sum of squares over those of Allan's noise.
 fn power(session: &Session, known: &Model, best: &Fitted, k: usize) -> f64 {
     let value = best.model.values[k];
-    weighted(session, known, |closure| session.unlearned(closure, k) * value)
+    weighted(session, known, |closure| {
+        session.unlearned(closure, k) * value
+    })
 }
 
 fn share_of_calibration(session: &Session, known: &Model, sensor: Sensor) -> f64 {
     let own = super::state::matrix(sensor);
-    let p = session.calibration.view((own.start, own.start), (9, 9)).into_owned();
+    let p = session
+        .calibration
+        .view((own.start, own.start), (9, 9))
+        .into_owned();
     weighted(session, known, |closure| {
         let by = closure.by.columns(own.start, 9);
         by * &p * by.transpose()
@@ -184,11 +200,10 @@ impl CauseFound {
 /// For each sensor, why its noise has to be inflated, or that it has not.
 pub(super) fn sentences(densities: &[Density], found: &Attributed) -> Vec<String> {
     let each = Sensor::BOTH.into_iter().map(|sensor| {
-        let own = densities.iter().filter(|d| d.sensor == sensor);
-        let inflated = own.filter(|d| {
-            d.factor.is_some_and(|f| f > INFLATED) && d.factor_interval.is_some_and(|i| i[0] > 1.0)
-        });
-        let inflated: Vec<String> = inflated
+        let own = || densities.iter().filter(|d| d.sensor == sensor);
+        let large = own().filter(|d| d.factor.is_some_and(|f| f > INFLATED));
+        let certain = large.clone().any(|d| d.factor_interval.is_some_and(|i| i[0] > 1.0));
+        let inflated: Vec<String> = large
             .map(|d| {
                 let name = if d.term == "white" { "noise density" } else { "bias random walk" };
                 format!("{name} {} times Allan's", significant(d.factor.unwrap_or(1.0)))
@@ -198,6 +213,10 @@ pub(super) fn sentences(densities: &[Density], found: &Attributed) -> Vec<String
         let calibration = found.share_of_calibration[sensor];
         let first = causes.first().filter(|c| c.share >= calibration);
         match (inflated.is_empty(), first) {
+            (false, _) if !certain => format!(
+                "{sensor}: {}, or nothing to inflate: the reference may err by as much, or the segments are too few",
+                inflated.join(", ")
+            ),
             (true, _) => format!("{sensor}: nothing to inflate; Allan's noise explains the errors in motion"),
             (false, Some(cause)) => format!(
                 "{sensor}: {}: {} ({:.0} % of the errors beyond Allan's noise)",

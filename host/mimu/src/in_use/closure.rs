@@ -128,7 +128,9 @@ pub(super) fn scales(by: &DMatrix<f64>, sensor: Sensor, c: &Matrix3<f64>) -> DMa
     let from = state::matrix(sensor).start;
     DMatrix::from_fn(by.nrows(), 9, |row, element| {
         let (i, j) = (element / 3, element % 3);
-        (0..3).map(|k| by[(row, from + 3 * i + k)] * c[(j, k)]).sum()
+        (0..3)
+            .map(|k| by[(row, from + 3 * i + k)] * c[(j, k)])
+            .sum()
     })
 }
 

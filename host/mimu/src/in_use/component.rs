@@ -80,21 +80,43 @@ pub(super) fn all(white: [f64; 2], has_positions: bool) -> Vec<Component> {
         let n2 = white[sensor as usize];
         [
             of(Cause::Scale, sensor, Kind::Matrix(sensor), SCALE),
-            of(Cause::Motion, sensor, Kind::Share(Share::Turned(sensor)), SCALE),
+            of(
+                Cause::Motion,
+                sensor,
+                Kind::Share(Share::Turned(sensor)),
+                SCALE,
+            ),
             of(
                 Cause::Rectification,
                 sensor,
                 Kind::Session(state::rectification(sensor)),
                 RECTIFICATION[sensor as usize],
             ),
-            of(Cause::Vibration, sensor, Kind::Share(Share::Shaken(sensor)), n2),
+            of(
+                Cause::Vibration,
+                sensor,
+                Kind::Share(Share::Shaken(sensor)),
+                n2,
+            ),
         ]
     };
     let white_of = |sensor: Sensor| {
-        of(Cause::White, sensor, Kind::Share(Share::White(sensor)), white[sensor as usize])
+        of(
+            Cause::White,
+            sensor,
+            Kind::Share(Share::White(sensor)),
+            white[sensor as usize],
+        )
     };
     // White noise of a hundred seconds moves the bias as far as this in a second.
-    let walk_of = |sensor: Sensor| of(Cause::Walk, sensor, Kind::Walk(sensor), 1e-4 * white[sensor as usize]);
+    let walk_of = |sensor: Sensor| {
+        of(
+            Cause::Walk,
+            sensor,
+            Kind::Walk(sensor),
+            1e-4 * white[sensor as usize],
+        )
+    };
     let reference = |share, unit| Component {
         cause: Cause::Reference,
         sensor: None,

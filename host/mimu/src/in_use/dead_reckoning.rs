@@ -85,11 +85,7 @@ impl Open {
 
 impl DeadReckoning {
     /// Begins at the attitude `rotation`, at rest. `densities` are the squares of N of the axes.
-    pub fn new(
-        rotation: Matrix3<f64>,
-        gravity: f64,
-        densities: PerSensor<Vector3<f64>>,
-    ) -> Self {
+    pub fn new(rotation: Matrix3<f64>, gravity: f64, densities: PerSensor<Vector3<f64>>) -> Self {
         Self {
             rotation,
             velocity: Vector3::zeros(),
@@ -171,7 +167,8 @@ impl DeadReckoning {
         }
         for (source, gramian) in SOURCES.iter().zip(&mut self.gramians) {
             transported(gramian, &cross, dt);
-            let white = |own: bool, amount: f64| Matrix3::identity() * if own { amount } else { 0.0 };
+            let white =
+                |own: bool, amount: f64| Matrix3::identity() * if own { amount } else { 0.0 };
             let [gyro, accel] = match source {
                 Source::Known => [open.known.gyro, open.known.accel],
                 Source::White(s) => Sensor::BOTH.map(|own| white(own == *s, dt)),
@@ -201,4 +198,57 @@ fn transported(gramian: &mut Errors, cross: &Matrix3<f64>, dt: f64) {
     own -= by_attitude;
     let mut own = gramian.fixed_columns_mut::<3>(6);
     own += velocity * dt - by_attitude * (0.5 * dt);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::state;
+    use super::*;
+
+    const G: f64 = 9.81;
+
+    /// Ten seconds level and at rest.
+    fn at_rest() -> DeadReckoning {
+        let densities = PerSensor::both(Vector3::repeat(0.0));
+        let mut reckoned = DeadReckoning::new(Matrix3::identity(), G, densities);
+        let readings = Readings {
+            duration_s: 0.005,
+            force: Vector3::z() * G,
+            ..Readings::default()
+        };
+        for _ in 0..2000 {
+            reckoned.follow(&readings);
+        }
+        reckoned.close();
+        reckoned
+    }
+
+    #[test]
+    fn white_noise_makes_random_walks_of_the_textbook() {
+        let reckoned = at_rest();
+        let t = reckoned.duration_s;
+        let of = |source: usize, row: usize| reckoned.gramians[source][(row, row)];
+        // Titterton and Weston, 12.5: attitude N² t, velocity N² t and position N² t³/3; by the gyro through gravity g² N² t³/3 and g² N² t⁵/20.
+        for (found, expected) in [
+            (of(1, 0), t),
+            (of(2, 3), t),
+            (of(2, 6), t.powi(3) / 3.0),
+            (of(1, 3), G * G * t.powi(3) / 3.0),
+            (of(1, 6), G * G * t.powi(5) / 20.0),
+            (of(1, 5), 0.0),
+        ] {
+            assert!((found - expected).abs() < 1e-4 * (1.0 + expected), "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_bias_of_the_gyro_moves_a_resting_unit_by_a_sixth_of_g_t_cubed() {
+        let reckoned = at_rest();
+        let t = reckoned.duration_s;
+        let y = state::offset(Sensor::Gyro).start + 1;
+        assert!((reckoned.by[(1, y)] - t).abs() < 1e-9);
+        // The body believes that it turns about y: up leans to x.
+        assert!((reckoned.by[(3, y)] - G * t * t / 2.0).abs() < 1e-2);
+        assert!((reckoned.by[(6, y)] - G * t.powi(3) / 6.0).abs() < 1e-1);
+    }
 }

@@ -31,8 +31,12 @@ pub(super) fn consistency(session: &Session) -> Consistency {
         let fitted = session.filter_densities(|index| half_of(index) != Some(half));
         // The reference errs alike for all: only the unit is judged.
         let mut reference = session.known(false).values;
-        reference[FILTER..OF_FILTER.end].copy_from_slice(&fitted.model.values[FILTER..OF_FILTER.end]);
-        let of = |calibration| Model { values: reference.clone(), calibration };
+        reference[FILTER..OF_FILTER.end]
+            .copy_from_slice(&fitted.model.values[FILTER..OF_FILTER.end]);
+        let of = |calibration| Model {
+            values: reference.clone(),
+            calibration,
+        };
         for (sum, model) in sums.iter_mut().zip([of(false), of(true), fitted.model]) {
             let innovations = session.innovations(&model).unwrap_or_default();
             let held = |own: &&Innovation| half_of(own.segment) == Some(half);
@@ -42,7 +46,11 @@ pub(super) fn consistency(session: &Session) -> Consistency {
         }
     }
     let [allan, with_calibration, in_use] = sums.map(|(squared, dof)| Nees::of(squared, dof));
-    Consistency { allan, with_calibration, in_use }
+    Consistency {
+        allan,
+        with_calibration,
+        in_use,
+    }
 }
 
 impl Nees {
@@ -75,7 +83,11 @@ pub(super) fn judgement(
 ) -> Judgement {
     let own = &recording.manifest.sources;
     let own = own.iter().map(|s| &s.sha256);
-    let in_sample = calibration.recording.sha256.iter().any(|s| own.clone().any(|o| o == s));
+    let in_sample = calibration
+        .recording
+        .sha256
+        .iter()
+        .any(|s| own.clone().any(|o| o == s));
     let Nees { value, dof, .. } = nees.in_use;
     if in_sample {
         let reason = "the calibration was made from this recording, whose errors it hides: give another one of the unit";

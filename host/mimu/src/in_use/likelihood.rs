@@ -7,8 +7,10 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3};
 
 use super::closure::{Closure, SHARES, scales};
 use super::component::{Component, Kind};
-use super::state::{CLOCK, GRAVITY, LEVER, MOUNTING, STATES, offset};
+use super::rests::EARTH;
+use super::state::{CLOCK, G_SENSITIVITY, GRAVITY, LEVER, MOUNTING, STATES, offset};
 use crate::quantity::{PerSensor, Sensor};
+use crate::readable::STANDARD_GRAVITY;
 
 /// Standard deviations of what a filter knows nothing of: biases (rad/s, m/s²), and how a reference is mounted (m, rad, m/s², s).
 const BIAS: [f64; 2] = [0.05, 0.5];
@@ -26,6 +28,8 @@ pub(super) struct Session {
     pub matrices: PerSensor<Matrix3<f64>>,
     /// Whether a trajectory is the reference.
     pub mounted: bool,
+    /// Whether the latitude is known, and the Earth's rate about the vertical with it.
+    pub earth_is_known: bool,
 }
 
 /// A model of the errors.
@@ -65,7 +69,11 @@ impl Session {
     pub fn innovations(&self, model: &Model) -> Option<Vec<Innovation>> {
         let mut all = Vec::new();
         self.filter(model, &|_| true, |segment, squared, _, count| {
-            all.push(Innovation { segment, squared, count });
+            all.push(Innovation {
+                segment,
+                squared,
+                count,
+            });
         })?;
         all.retain(|own| self.closures[own.segment].moves);
         Some(all)
@@ -78,7 +86,10 @@ impl Session {
         counts: &impl Fn(usize) -> bool,
         mut each: impl FnMut(usize, f64, f64, usize),
     ) -> Option<()> {
-        let Prior { states, covariance: mut p } = self.prior(model);
+        let Prior {
+            states,
+            covariance: mut p,
+        } = self.prior(model);
         let mut x = DVector::zeros(states.len());
         let walks = self.walks_of(model, &states);
         let mut before_s = self.closures.first()?.at_s;
@@ -96,7 +107,13 @@ impl Session {
             let root = Cholesky::new(s)?;
             let innovation = &closure.residual - &by * &x;
             let white = root.solve(&innovation);
-            let log_det = 2.0 * root.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+            let log_det = 2.0
+                * root
+                    .l_dirty()
+                    .diagonal()
+                    .iter()
+                    .map(|d| d.ln())
+                    .sum::<f64>();
             each(index, innovation.dot(&white), log_det, innovation.len());
             let gain = root.solve(&(&by * &p));
             x += gain.transpose() * &innovation;
@@ -170,6 +187,12 @@ impl Session {
         for sensor in Sensor::BOTH {
             for k in offset(sensor) {
                 all[(k, k)] += BIAS[sensor as usize].powi(2);
+            }
+        }
+        if !self.earth_is_known && !self.mounted {
+            // The Earth turns about the vertical, as if the gyro sensed gravity.
+            for k in G_SENSITIVITY {
+                all[(k, k)] += (EARTH / STANDARD_GRAVITY).powi(2) / 3.0;
             }
         }
         if self.mounted {

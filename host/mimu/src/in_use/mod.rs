@@ -37,7 +37,7 @@ use crate::noise::noise_file::NoiseFile;
 use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
 use crate::warning::Warning;
-use allan_noise::{AllanNoise, allan_walk};
+use allan_noise::AllanNoise;
 use closure::Closure;
 use component::{FILTER, REFERENCE_COUNT};
 use likelihood::{Model, Session};
@@ -71,7 +71,7 @@ pub struct Density {
     pub interval: [f64; 2],
     /// Unit of both.
     pub unit: &'static str,
-    /// The same by the noise file; null where it shows none.
+    /// The same by the noise file, with flicker noise as the walk of its Allan variance; null where it shows none.
     pub allan: Option<f64>,
     /// Value over Allan's.
     pub factor: Option<f64>,
@@ -188,7 +188,11 @@ pub fn noise_in_use(
             ("trajectory", all, poses.has_positions)
         }
     };
-    let session = session(closures, calibration, &allan, reference, has_positions);
+    let latitude = recording.manifest.latitude_deg;
+    let session = Session {
+        earth_is_known: latitude.is_some(),
+        ..session(closures, calibration, &allan, reference, has_positions)
+    };
     let moving = session.moving();
     if moving.len() < FEWEST_SEGMENTS {
         let problem = format!(
@@ -197,11 +201,21 @@ pub fn noise_in_use(
         );
         let remedy = match reference {
             "rests" => "hold the unit still before and after each motion, or give a trajectory",
-            _ => "check that the times of recording and trajectory are of one clock",
+            _ => {
+                "give the time of the trajectory at which the recording begins to count, --trajectory-zero: mimu import prints it"
+            }
         };
         return Err(Error::new(place, problem, remedy));
     }
-    Ok(found(&session, calibration, noise, &allan, refused, recording, reference))
+    Ok(found(
+        &session,
+        calibration,
+        noise,
+        &allan,
+        refused,
+        recording,
+        reference,
+    ))
 }
 
 fn session(
@@ -214,7 +228,9 @@ fn session(
     let mut covariance = DMatrix::zeros(24, 24);
     for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
         if let Some(own) = calibration.covariance(sensor) {
-            covariance.view_mut((12 * k, 12 * k), (12, 12)).copy_from(&own);
+            covariance
+                .view_mut((12 * k, 12 * k), (12, 12))
+                .copy_from(&own);
         }
     }
     let times: Vec<f64> = closures.iter().map(|c| c.at_s).collect();
@@ -232,6 +248,7 @@ fn session(
                 .map_or_else(Matrix3::identity, |c| c.matrix)
         }),
         mounted: reference == "trajectory",
+        earth_is_known: false,
         closures,
     }
 }
@@ -256,7 +273,10 @@ impl Session {
 
     /// The most likely densities of a filter, by the segments that `counts` accepts.
     pub(self) fn filter_densities(&self, counts: impl Fn(usize) -> bool + Sync) -> Fitted {
-        let search = Search { session: self, counts };
+        let search = Search {
+            session: self,
+            counts,
+        };
         let free: Vec<usize> = OF_FILTER.collect();
         search.maximise(search.fitted(self.known(false)), &free)
     }
@@ -272,14 +292,17 @@ fn found(
     reference: &'static str,
 ) -> NoiseInUse {
     let fitted = session.filter_densities(|_| true);
-    let search = Search { session, counts: |_| true };
+    let search = Search {
+        session,
+        counts: |_| true,
+    };
     let free: Vec<usize> = OF_FILTER.collect();
     let ranges: Vec<[f64; 2]> = (0..FILTER)
         .into_par_iter()
         .map(|k| search.range(&fitted, k, &free))
         .collect();
     let attributed = attribution::of(session);
-    let densities = densities(session, &fitted.model, &ranges, noise, allan);
+    let densities = densities(session, &fitted.model, &ranges, allan);
     let nees = judged::consistency(session);
     let moving: Vec<&Closure> = session.closures.iter().filter(|c| c.moves).collect();
     let mean = |of: &dyn Fn(&Closure) -> f64| {
@@ -317,7 +340,6 @@ fn densities(
     session: &Session,
     model: &Model,
     ranges: &[[f64; 2]],
-    noise: &NoiseFile,
     allan: &AllanNoise,
 ) -> Vec<Density> {
     let each = (0..FILTER).map(|k| {
@@ -330,10 +352,7 @@ fn densities(
         let of = |value: f64| (known + value * session.components[k].unit).sqrt();
         let value = of(model.values[k]);
         let interval = ranges[k].map(of);
-        let reference = match is_white {
-            true => Some(known.sqrt()),
-            false => allan_walk(noise, sensor).filter(|(_, shown)| *shown).map(|(k, _)| k),
-        };
+        let reference = (known > 0.0).then(|| known.sqrt());
         Density {
             sensor,
             term: if is_white { "white" } else { "walk" },

@@ -21,7 +21,9 @@ pub(super) fn of(
     file.judgement = Some(judgement.clone());
     file.confidence = 0.95;
     for channel in &mut file.channel {
-        let Some((sensor, axis)) = place(channel) else { continue };
+        let Some((sensor, axis)) = place(channel) else {
+            continue;
+        };
         // In the unit of calibrated readings already, as the densities are.
         let n = channel.get(Term::N).map_or(0.0, |c| c.value.powi(2));
         let walk = session.walks[sensor][axis];

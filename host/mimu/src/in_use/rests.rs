@@ -18,7 +18,7 @@ const SHORTEST_REST_S: f64 = 0.3;
 /// Shortest and longest segment, s. Over a longer one consumer gyros lose the attitude by degrees, and the linearisation with it.
 const SEGMENT_S: [f64; 2] = [0.2, 120.0];
 /// Rate of the Earth, rad/s. Its direction is not known, so a third of its square is on each axis.
-const EARTH: f64 = 7.292e-5;
+pub(super) const EARTH: f64 = 7.292e-5;
 
 /// The closures of a recording: its rests, and the segments between them, in order of time; and the number of segments that could not be used.
 pub(super) fn closures(
@@ -58,11 +58,13 @@ pub(super) fn closures(
         spans: reckoned,
         ..
     } = walked;
+    let latitude = prepared.manifest.latitude_deg;
+    let vertical = latitude.map_or(0.0, |deg| EARTH * deg.to_radians().sin());
     let mut closures = Vec::new();
     let mut refused = 0;
     for (k, mean) in means.iter().enumerate() {
         if mean.duration_s > 0.0 {
-            closures.push(at_rest(mean, rests[k], noise));
+            closures.push(at_rest(mean, rests[k], noise, vertical));
         }
         let Some(after) = means.get(k + 1) else { break };
         match &reckoned[k] {
@@ -95,7 +97,12 @@ fn mean_of(sum: &Readings, duration_s: f64) -> Readings {
 fn begun(rest: &Readings, gravity: f64, noise: &AllanNoise) -> DeadReckoning {
     let up = Vector3::z();
     let rotation = Rotation3::rotation_between(&rest.force, &up)
-        .unwrap_or_else(|| Rotation3::from_axis_angle(&UnitVector3::new_unchecked(Vector3::x()), std::f64::consts::PI))
+        .unwrap_or_else(|| {
+            Rotation3::from_axis_angle(
+                &UnitVector3::new_unchecked(Vector3::x()),
+                std::f64::consts::PI,
+            )
+        })
         .into_inner();
     let mut reckoned = DeadReckoning::new(rotation, gravity, noise.squared());
     let tilt = -up.cross_matrix() / gravity;
@@ -125,7 +132,9 @@ fn at_end(
     let up = (rotation * after.force).normalize();
     let residual = DVector::from_iterator(
         5,
-        [up.x, up.y].into_iter().chain(reckoned.velocity.iter().copied()),
+        [up.x, up.y]
+            .into_iter()
+            .chain(reckoned.velocity.iter().copied()),
     );
     let mut of = DMatrix::zeros(5, 12);
     // An attitude error φ moves what points up by φ x up.
@@ -159,22 +168,27 @@ fn at_end(
     }
 }
 
-/// The rate in a rest, which is zero but for the Earth's.
-fn at_rest(rest: &Readings, [from, to]: [f64; 2], noise: &AllanNoise) -> Closure {
+/// The rate in a rest, which is zero but for the Earth's; `vertical` is that about the vertical, rad/s.
+fn at_rest(rest: &Readings, [from, to]: [f64; 2], noise: &AllanNoise, vertical: f64) -> Closure {
     let t = rest.duration_s;
     let mut by = By::zeros();
     rest.add_errors(&mut by, Sensor::Gyro, &Matrix3::identity(), 1.0);
+    let error = rest.rate - rest.force.normalize() * vertical;
     let one = DMatrix::<f64>::identity(3, 3);
     let none = DMatrix::zeros(3, 3);
     let density = noise.squared().gyro;
     let known = DMatrix::from_fn(3, 3, |i, j| {
-        if i == j { density[i] / t + EARTH * EARTH / 3.0 } else { 0.0 }
+        if i == j {
+            density[i] / t + EARTH * EARTH / 3.0
+        } else {
+            0.0
+        }
     });
     Closure {
         at_s: 0.5 * (from + to),
         duration_s: t,
         moves: false,
-        residual: DVector::from_column_slice(rest.rate.as_slice()),
+        residual: DVector::from_column_slice(error.as_slice()),
         by: DMatrix::from_column_slice(3, STATES, by.as_slice()),
         known,
         shares: vec![

@@ -5,12 +5,13 @@ use super::likelihood::{Model, Session};
 /// Logarithms of a value between which it is searched, in its unit.
 const RANGE: [f64; 2] = [-9.0, 18.0];
 /// Coordinates are searched in turn until a round gains less than this in log-likelihood.
-const GAIN: f64 = 0.005;
-const ROUNDS: usize = 12;
+const GAIN: f64 = 0.01;
+const ROUNDS: usize = 10;
 /// Half of the 95 % quantile of chi-square of one degree of freedom.
 const HALF_DEVIANCE: f64 = 1.920_729;
-/// Half-width of a local search of a logarithm.
-const LOCAL: f64 = 1.5;
+/// Steps of a search over the whole range, and the step of a local one.
+const COARSE: u32 = 12;
+const LOCAL: f64 = 0.5;
 
 /// A model with its log-likelihood.
 #[derive(Debug, Clone)]
@@ -34,7 +35,10 @@ impl<F: Fn(usize) -> bool + Sync> Search<'_, F> {
     /// The likelihood of `model` as it is.
     pub fn fitted(&self, model: Model) -> Fitted {
         let log_likelihood = self.at(&model);
-        Fitted { model, log_likelihood }
+        Fitted {
+            model,
+            log_likelihood,
+        }
     }
 
     /// The most likely values of `free`, from those of `start`.
@@ -55,12 +59,12 @@ impl<F: Fn(usize) -> bool + Sync> Search<'_, F> {
     /// The same, searched only near `start`.
     fn maximise_near(&self, start: Fitted, free: &[usize]) -> Fitted {
         let mut best = start;
-        for _ in 0..ROUNDS {
+        for _ in 0..4 {
             let before = best.log_likelihood;
             for &k in free {
                 best = self.along(best, k, true);
             }
-            if best.log_likelihood - before < 0.05 {
+            if best.log_likelihood - before < 0.1 {
                 break;
             }
         }
@@ -76,7 +80,10 @@ impl<F: Fn(usize) -> bool + Sync> Search<'_, F> {
             model.values[k] = value;
             let log_likelihood = self.at(&model);
             if log_likelihood > best.log_likelihood {
-                best = Fitted { model, log_likelihood };
+                best = Fitted {
+                    model,
+                    log_likelihood,
+                };
             }
             log_likelihood
         };
@@ -117,7 +124,7 @@ fn edge(outside: f64, inside: f64, likely: impl Fn(f64) -> bool) -> f64 {
         }
         (inner, step) = (next, step * 2.0);
     };
-    for _ in 0..6 {
+    for _ in 0..4 {
         let middle = 0.5 * (inner + outer);
         match likely(middle.exp()) {
             true => inner = middle,
@@ -127,34 +134,44 @@ fn edge(outside: f64, inside: f64, likely: impl Fn(f64) -> bool) -> f64 {
     (0.5 * (inner + outer)).exp()
 }
 
-/// Looks for the largest of `of` over logarithms: coarsely over [`RANGE`], or about `near`, then by golden sections about the best.
+/// Looks for the largest of `of` over logarithms: coarsely over [`RANGE`], then by parabolas about the best, or only about `near`.
+///
+/// A likelihood is nearly a parabola of the logarithm of a variance, so golden sections would need four times as many evaluations.
 fn look_for_best(of: &mut impl FnMut(f64) -> f64, near: Option<f64>) {
-    let ([from, to], coarse) = match near {
-        Some(near) => ([near - LOCAL, near + LOCAL], 2),
-        None => (RANGE, 12),
-    };
-    let step = (to - from) / f64::from(coarse);
-    let mut best = (from, f64::NEG_INFINITY);
-    for k in 0..=coarse {
-        let x = from + step * f64::from(k);
+    if let Some(near) = near {
+        let at = of(near.exp());
+        vertex(of, (near, at), LOCAL);
+        return;
+    }
+    let step = (RANGE[1] - RANGE[0]) / f64::from(COARSE);
+    let mut best = (RANGE[0], f64::NEG_INFINITY);
+    for k in 0..=COARSE {
+        let x = RANGE[0] + step * f64::from(k);
         let y = of(x.exp());
         if y > best.1 {
             best = (x, y);
         }
     }
-    const GOLDEN: f64 = 0.618_034;
-    let (mut a, mut b) = (best.0 - step, best.0 + step);
-    let (mut c, mut d) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
-    let (mut at_c, mut at_d) = (of(c.exp()), of(d.exp()));
-    while b - a > 0.05 {
-        if at_c > at_d {
-            (b, d, at_d) = (d, c, at_c);
-            c = b - GOLDEN * (b - a);
-            at_c = of(c.exp());
-        } else {
-            (a, c, at_c) = (c, d, at_d);
-            d = a + GOLDEN * (b - a);
-            at_d = of(d.exp());
-        }
-    }
+    let closer = vertex(of, best, 0.5 * step);
+    vertex(of, closer, 0.2 * step);
+}
+
+/// The best of `at`, two points `step` beside it, and the vertex of the parabola through them, at most two steps away.
+fn vertex(of: &mut impl FnMut(f64) -> f64, at: (f64, f64), step: f64) -> (f64, f64) {
+    let (x, y) = at;
+    let (below, above) = (of((x - step).exp()), of((x + step).exp()));
+    let bend = below + above - 2.0 * y;
+    let along = match bend < 0.0 {
+        true => (0.5 * (below - above) / bend).clamp(-2.0, 2.0),
+        false => (above - below).signum() * 2.0,
+    };
+    let top = x + along * step;
+    let all = [
+        at,
+        (x - step, below),
+        (x + step, above),
+        (top, of(top.exp())),
+    ];
+    let better = |a: (f64, f64), b: (f64, f64)| if b.1 > a.1 { b } else { a };
+    all.into_iter().fold(at, better)
 }

@@ -63,13 +63,7 @@ pub(super) struct Readings {
 
 impl Readings {
     /// Adds the errors that this causes in what `sensor` measures, rotated by `rotation` and times `weight`.
-    pub fn add_errors(
-        &self,
-        by: &mut By,
-        sensor: Sensor,
-        rotation: &Matrix3<f64>,
-        weight: f64,
-    ) {
+    pub fn add_errors(&self, by: &mut By, sensor: Sensor, rotation: &Matrix3<f64>, weight: f64) {
         let (c, raw) = (matrix(sensor).start, self.raw[sensor]);
         let scaled = rotation * weight;
         for row in 0..3 {

@@ -77,7 +77,11 @@ fn segments(poses: &[Pose]) -> Vec<[Pose; 3]> {
     let near = |t: f64| {
         let after = poses.partition_point(|p| p.t_s < t).min(poses.len() - 1);
         let before = after.saturating_sub(1);
-        if t - poses[before].t_s < poses[after].t_s - t { before } else { after }
+        if t - poses[before].t_s < poses[after].t_s - t {
+            before
+        } else {
+            after
+        }
     };
     while at + 1 < poses.len() {
         let length = lengths.next().unwrap_or(&LENGTHS_S[0]);
@@ -111,7 +115,9 @@ fn at_end(
     let first = by_first_attitude(reckoned, gravity, marked_s);
     // How the reference is mounted, and its clock, turn the first attitude ...
     let mut mount = DMatrix::zeros(3, STATES);
-    mount.columns_mut(MOUNTING.start, 3).copy_from(&rotations[0]);
+    mount
+        .columns_mut(MOUNTING.start, 3)
+        .copy_from(&rotations[0]);
     mount.set_column(CLOCK, &(rotations[0] * ends[0].rate));
     let by_first = &first * &mount;
     // ... and gravity is not where the frame of the reference has it.

@@ -45,7 +45,9 @@ struct HighPass {
 impl HighPass {
     /// For samples at `rate_hz`; at less than four times the corner nothing passes.
     fn new(rate_hz: f64) -> Self {
-        let k = (std::f64::consts::PI * VIBRATION_HZ / rate_hz).min(1.0).tan();
+        let k = (std::f64::consts::PI * VIBRATION_HZ / rate_hz)
+            .min(1.0)
+            .tan();
         let norm = 1.0 / (1.0 + std::f64::consts::SQRT_2 * k + k * k);
         let passes = rate_hz >= 4.0 * VIBRATION_HZ;
         let gain = if passes { norm } else { 0.0 };
@@ -134,14 +136,20 @@ pub(super) fn walk(
             if let Some(reckoned) = &mut open {
                 let mut go = |from: f64, to: f64| {
                     if to > from {
-                        reckoned.follow(&Readings { duration_s: to - from, ..mean });
+                        reckoned.follow(&Readings {
+                            duration_s: to - from,
+                            ..mean
+                        });
                     }
                 };
                 match own.mark_s.filter(|m| (from..to).contains(m)) {
                     Some(mark) => {
                         go(from, mark);
                         reckoned.mark();
-                        reckoned.follow(&Readings { duration_s: to - mark, ..mean });
+                        reckoned.follow(&Readings {
+                            duration_s: to - mark,
+                            ..mean
+                        });
                     }
                     None => go(from, to),
                 }
