@@ -237,7 +237,10 @@ mod tests {
             (of(1, 6), G * G * t.powi(5) / 20.0),
             (of(1, 5), 0.0),
         ] {
-            assert!((found - expected).abs() < 1e-4 * (1.0 + expected), "{found} {expected}");
+            assert!(
+                (found - expected).abs() < 1e-4 * (1.0 + expected),
+                "{found} {expected}"
+            );
         }
     }
 

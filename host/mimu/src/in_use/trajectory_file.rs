@@ -191,9 +191,9 @@ mod tests {
     #[test]
     fn ground_truth_of_euroc_and_of_tum_is_the_same_trajectory() {
         let euroc = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]\n".to_owned()
-            + &rows(|k| format!("140371527326214{k:02}00000,0.5,2.1,{k},0.8,0.6,0,0,9"));
+            + &rows(|k| format!("14037152732{k:02}000000,0.5,2.1,{k},0.8,0.6,0,0,9"));
         let tum = "# timestamp tx ty tz qx qy qz qw\n".to_owned()
-            + &rows(|k| format!("1403715273.26214{k:02} 0.5 2.1 {k} 0.6 0 0 0.8"));
+            + &rows(|k| format!("1403715273.2{k:02} 0.5 2.1 {k} 0.6 0 0 0.8"));
         let [a, b] = [euroc, tum].map(|text| Trajectory::parse(&text, "truth").unwrap());
         assert!(a.has_positions && b.has_positions);
         for (a, b) in a.poses.iter().zip(&b.poses) {
@@ -202,13 +202,16 @@ mod tests {
             assert!((a.position - b.position).norm() < 1e-9);
         }
         let near = a.counted_from(1_403_715_273.0).poses[0].t_s;
-        assert!((near - 0.262_14).abs() < 1e-4, "{near}");
+        assert!((near - 0.2).abs() < 1e-4, "{near}");
     }
 
     #[test]
     fn a_row_that_is_no_pose_is_named() {
         let text = rows(|k| format!("{k} 0 0 0 0 0 0 {}", if k == 7 { 3 } else { 1 }));
         let refused = Trajectory::parse(&text, "truth").unwrap_err().to_string();
-        assert!(refused.contains("row 8") && refused.contains("magnitude 3"), "{refused}");
+        assert!(
+            refused.contains("row 8") && refused.contains("magnitude 3"),
+            "{refused}"
+        );
     }
 }
