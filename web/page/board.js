@@ -11,7 +11,7 @@ import * as session from "./session.js";
 /** Field that sets an argument of `mimu wizard`. */
 const FIELDS = {
   "--gravity": "board-gravity", "--latitude": "board-latitude", "--baud": "baud", "--text": "line-columns", "--raw-unit": "board-unit",
-  "--device": "board-name", "--fixture": "board-fixture", "--dwell": "board-dwell",
+  "--device": "board-name", "--fixture": "board-fixture", "--dwell": "board-dwell", "--whole-turns": "board-turns",
 };
 
 /** Roles of the numbers in a line, as in `--text`. */
@@ -137,8 +137,11 @@ function wizardArguments() {
   const args = ["wizard", "-o", FOLDER, "--port", "USB", "--text", columnNames()];
   args.push("--baud", number("baud"), "--raw-unit", $("board-unit").value, "--device", $("board-name").value.trim());
   args.push("--fixture", $("board-fixture").value, "--dwell", number("board-dwell"));
+  const more = cut($("more-wizard").value);
+  // With a number or a placement, they are given among the other arguments.
+  if ($("board-turns").checked && !more.some((arg) => arg.startsWith("--whole-turns"))) args.push("--whole-turns");
   for (const name of ["gravity", "latitude"]) if (number(`board-${name}`)) args.push(`--${name}=${number(`board-${name}`)}`);
-  return [...args, ...cut($("more-wizard").value)];
+  return [...args, ...more];
 }
 
 async function begin() {
@@ -263,9 +266,12 @@ export async function loadJournal(file) {
     await program().ask("unpack", { name: FOLDER, files: own });
     const [, names, unit] = /^(.*) in (\S+)$/.exec(begun.asked.text);
     board.asked = { columns: names.split(",") };
-    const { gravity_mps2: gravity, latitude_deg: latitude, fixture, dwell_s: dwell } = begun.asked;
+    const { gravity_mps2: gravity, latitude_deg: latitude, fixture, dwell_s: dwell, whole_turns: whole } = begun.asked;
     const fields = { "board-name": begun.unit_id, "board-unit": unit, "board-gravity": gravity, "board-latitude": latitude ?? "", "board-fixture": fixture, "board-dwell": dwell };
     for (const [id, value] of Object.entries(fields)) $(id).value = value;
+    $("board-turns").checked = Boolean(whole);
+    // What the checkbox does not say.
+    if (whole && (whole.turns || whole.placement_deg !== 1)) $("more-wizard").value = `--whole-turns${whole.turns ? `=${whole.turns}` : ""} --placement ${whole.placement_deg}`;
     board.goesOn = true;
     const dwells = entries.filter(({ entry }) => entry === "dwell").length - entries.filter(({ entry }) => entry === "redo").length;
     const finished = entries.at(-1)?.entry === "done";

@@ -54,16 +54,40 @@ const events = {
     shown.step = null;
     $("prompt").textContent = WAITING[phase] ?? "";
     $("state").textContent = "";
+    $("turns").hidden = true;
     poses();
   },
   step({ step, words, done, planned }) {
     shown.step = { ...step, words };
+    buttons(false);
     $("prompt").textContent = capital(words);
     $("pose").replaceChildren(made("p", { className: "dim", textContent: "wanted" }), pose(step.up, words));
     say(words);
     $("session-bar").value = done / planned;
     $("count").textContent = `pose ${done + 1} of ${planned}`;
     poses();
+  },
+  spin({ step, words, done, planned }) {
+    shown.step = { ...step, words };
+    // First the rest, then the turns.
+    shown.spin = words.split("; then ");
+    $("prompt").textContent = capital(shown.spin[0]);
+    buttons(true);
+    $("pose").replaceChildren(made("p", { className: "dim", textContent: "at rest, this side up" }), pose(step.up, words));
+    say(shown.spin[0]);
+    $("session-bar").value = done / planned;
+    $("count").textContent = `whole turns ${done + 1} of ${planned}`;
+    poses();
+  },
+  turned({ turns }) {
+    if (turns) return say(`${turns}`);
+    $("prompt").textContent = capital(shown.spin[1]);
+    say(shown.spin[1]);
+  },
+  spun: () => beep(),
+  "spin-lost"({ why }) {
+    $("prompt").textContent = capital(shown.spin[0]);
+    say(`These turns cannot be used: ${why}. Again: ${shown.spin[0]}`);
   },
   dwell() {
     beep();
@@ -72,6 +96,12 @@ const events = {
   redo: () => poses(),
   progress: ({ progress }) => aims(progress),
 };
+
+/** Names what the buttons do to a dwell, or to whole turns. */
+function buttons(spins) {
+  $("redo").textContent = spins ? "Begin these turns anew" : "Repeat the last dwell";
+  $("skip").textContent = spins ? "These turns later" : "This pose later";
+}
 
 /** Says `words`, if the person wants it: hands and eyes are at the unit. */
 function say(words) {
@@ -133,10 +163,17 @@ export function stand({ units: [unit], phase, step }) {
     shown.off = words;
     $("held").replaceChildren(...(off ? [made("p", { className: "dim", textContent: `now, ${words}` }), pose(unit.up, "the present pose")] : []));
   }
+  const spin = unit.spin;
+  const turning = spin?.turns ?? null;
+  $("turns").hidden = turning === null;
+  if (turning !== null) {
+    $("turns-now").textContent = turning.toFixed(1);
+    $("turns-of").textContent = `of ${spin.asked} turns about ${spin.axis.slice(1)}`;
+  }
   const running = unit.left_s !== null && step;
   $("dwell-bar").value = running ? Math.min(1, Math.max(0, 1 - unit.left_s / step.dwell_s)) : 0;
   if (running) $("state").textContent = `Keep it still: ${unit.left_s.toFixed(1)} s`;
-  else if (unit.waiting) $("state").textContent = `Waiting: ${unit.waiting}`;
+  else if (unit.waiting) $("state").textContent = turning === null ? `Waiting: ${unit.waiting}` : `${capital(unit.waiting)}.`;
   else if (step) $("state").textContent = `Turn it so, and let it rest for ${digits(step.dwell_s)} s.`;
   else if (phase === "warm-up") $("state").textContent = "It is being listened to at rest.";
   const at = now();

@@ -96,18 +96,29 @@ pub(crate) struct WholeTurnArgs {
     placement: Option<f64>,
 }
 
+/// What the two options state of whole turns, if there are any.
+pub(crate) fn whole_turns(
+    turns: Option<Option<u32>>,
+    placement: Option<f64>,
+) -> Result<Option<WholeTurns>> {
+    let Some(turns) = turns else {
+        return Ok(None);
+    };
+    let default = WholeTurns::default();
+    let stated = WholeTurns {
+        placement_deg: placement.unwrap_or(default.placement_deg),
+        turns,
+    };
+    stated.check("whole turns")?;
+    Ok(Some(stated))
+}
+
 impl WholeTurnArgs {
     /// `prepared`, with what is stated of its whole turns.
     pub(crate) fn apply(&self, mut prepared: Prepared) -> Result<Prepared> {
-        let Some(turns) = self.turns else {
+        let Some(stated) = whole_turns(self.turns, self.placement)? else {
             return Ok(prepared);
         };
-        let default = WholeTurns::default();
-        let stated = WholeTurns {
-            placement_deg: self.placement.unwrap_or(default.placement_deg),
-            turns,
-        };
-        stated.check("whole turns")?;
         if prepared.manifest.reference != Reference::Gravity {
             return Err(Error::new(
                 &prepared.place,

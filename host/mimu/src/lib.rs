@@ -104,6 +104,8 @@ pub mod sessions;
 #[doc(hidden)]
 pub mod signal;
 #[doc(hidden)]
+pub mod spun;
+#[doc(hidden)]
 pub mod survey;
 mod toml_layout;
 #[doc(hidden)]

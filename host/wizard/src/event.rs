@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 
 use crate::folder::Part;
 use crate::refit::Progress;
+use crate::spin::{Spin, SpinState};
 use crate::verdict::Judged;
 use crate::waiting::{Interruption, Waiting};
 use mimu_equipment::step::Step;
@@ -56,6 +57,48 @@ pub enum Event {
         step: Step,
         /// The dwell in words.
         words: String,
+    },
+    /// The next whole turns were requested.
+    Spin {
+        /// The recording.
+        part: Part,
+        /// Whole turns completed so far.
+        done: usize,
+        /// Whole turns in all, each about one axis and one way.
+        planned: usize,
+        /// The requested turns.
+        spin: Spin,
+        /// The rest before them.
+        step: Step,
+        /// What to do, in words.
+        words: String,
+    },
+    /// A turn is complete; the number is 0 when the unit has rested and is to be turned.
+    Turned {
+        /// Name of the unit.
+        unit: String,
+        /// The axis with its sign: `+z`.
+        axis: String,
+        /// Turns so far.
+        turns: u32,
+    },
+    /// Whole turns are complete, and the unit is put back.
+    Spun {
+        /// Name of the unit.
+        unit: String,
+        /// The recording.
+        part: Part,
+        /// The axis with its sign.
+        axis: String,
+        /// Their number, as the gyro shows it.
+        turns: u32,
+    },
+    /// Whole turns cannot be used, and are asked for again.
+    SpinLost {
+        /// Name of the unit.
+        unit: String,
+        /// The reason.
+        why: String,
     },
     /// A unit waits.
     Waiting {
@@ -157,10 +200,14 @@ impl Event {
             | Self::Interrupted { unit, .. }
             | Self::Verified { unit, .. }
             | Self::Stored { unit, .. }
-            | Self::Diagnosed { unit, .. } => Some(unit),
+            | Self::Diagnosed { unit, .. }
+            | Self::Turned { unit, .. }
+            | Self::Spun { unit, .. }
+            | Self::SpinLost { unit, .. } => Some(unit),
             Self::Resumed { .. }
             | Self::Phase { .. }
             | Self::Step { .. }
+            | Self::Spin { .. }
             | Self::Redo { .. }
             | Self::Note { .. }
             | Self::Question { .. } => None,
@@ -178,6 +225,8 @@ pub enum Phase {
     WarmUp,
     /// Dwells for the calibration.
     Calibration,
+    /// Whole turns for the calibration.
+    WholeTurns,
     /// Dwells for the verification.
     Verification,
     /// Storing the calibration on the device.
@@ -205,6 +254,7 @@ impl fmt::Display for Phase {
             Self::Start => "start",
             Self::WarmUp => "warm-up",
             Self::Calibration => "calibration",
+            Self::WholeTurns => "whole turns",
             Self::Verification => "verification",
             Self::Store => "store",
             Self::Diagnosis => "diagnosis",
@@ -254,6 +304,8 @@ pub struct UnitState {
     pub waiting: Option<Waiting>,
     /// Remaining time of the dwell, s.
     pub left_s: Option<f64>,
+    /// The whole turns that are asked for, and how far they are.
+    pub spin: Option<SpinState>,
 }
 
 /// State of the session.

@@ -25,6 +25,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::bank::ByDevice;
 use crate::procedure::SessionConfig;
+use crate::spin::Spin;
 use mimu_equipment::step::Step;
 
 /// A recording of the session.
@@ -73,6 +74,15 @@ pub enum Entry {
         bytes: u64,
         /// Mean temperature, °C, if known.
         temp_c: Option<f64>,
+    },
+    /// Whole turns were made, and the unit was put back.
+    Spin {
+        /// The recording.
+        part: Part,
+        /// Number of the dwell in which they ended.
+        number: i32,
+        /// Their axis and number as the gyro shows them.
+        spin: Spin,
     },
     /// A running dwell was discarded.
     Discarded {
@@ -248,6 +258,15 @@ impl Folder {
             }
         }
         all
+    }
+
+    /// The whole turns of a recording.
+    pub fn spins(&self, of: Part) -> Vec<Spin> {
+        let spins = self.entries.iter().filter_map(|entry| match entry {
+            Entry::Spin { part, spin, .. } if *part == of => Some(*spin),
+            _ => None,
+        });
+        spins.collect()
     }
 
     /// The last valid dwell of any recording.

@@ -14,6 +14,7 @@
 //! | [`turn`] | a session pauses when it has to wait, and its caller resumes it |
 //! | [`waiting`] | reasons why no dwell runs |
 //! | [`watch`] | detects from the samples whether the unit is at rest, its pose and its rate |
+//! | [`spin`] | whole turns that are asked for |
 //! | [`refit`] | the calibration so far, each parameter with its target |
 //! | [`folder`] | the journal and the recordings, from which a killed session resumes |
 //! | [`unit_session`] | one of the units, with its accepted and discarded dwells |
@@ -39,6 +40,7 @@ pub mod relay;
 pub mod resumed;
 pub mod session;
 pub mod source;
+pub mod spin;
 pub mod station;
 pub mod store;
 pub mod text;

@@ -5,7 +5,7 @@ use mimu::plan::design::next_pose::Had;
 use mimu::plan::design::reach::{Fixture as Reached, Rates, Reach};
 use mimu::plan::design::tour::randomised;
 use mimu::quantity::normal_gravity;
-use mimu_recording::Reference;
+use mimu_recording::{Reference, WholeTurns};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -86,6 +86,9 @@ pub struct SessionConfig {
     /// Misalignment of the unit on the table: half-width of the 95 % interval of each angle, degrees.
     #[serde(default)]
     pub mounting_deg: f64,
+    /// Whole turns by hand after the poses, if the session has them: how many, and how well the unit is put back.
+    #[serde(default)]
+    pub whole_turns: Option<WholeTurns>,
     /// Whether the device's own Kalman filters give the calibration; on a table only.
     #[serde(default)]
     pub by_device: bool,
@@ -430,6 +433,7 @@ mod tests {
             most_drift_c: 5.0,
             targets: Targets::default(),
             mounting_deg: 0.0,
+            whole_turns: None,
             by_device: false,
         }
     }

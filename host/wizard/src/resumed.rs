@@ -7,7 +7,7 @@ use mimu_recording::error::{Argument, Error, Result};
 use crate::procedure::SessionConfig;
 
 /// Settings that determined the recorded dwells. With other values these dwells would be wrong.
-fn kept(config: &SessionConfig) -> [(Argument, &'static str, String); 7] {
+fn kept(config: &SessionConfig) -> [(Argument, &'static str, String); 8] {
     let or_none = |given: Option<String>| given.unwrap_or_else(|| "none".into());
     let by = if config.by_device { "device" } else { "pc" };
     [
@@ -37,6 +37,16 @@ fn kept(config: &SessionConfig) -> [(Argument, &'static str, String); 7] {
             Argument::TextColumns,
             "line of the board",
             or_none(config.text.clone()),
+        ),
+        (
+            Argument::WholeTurns,
+            "whole turns",
+            or_none(config.whole_turns.map(|whole| {
+                let turns = whole
+                    .turns
+                    .map_or_else(String::new, |n| format!("{n} of each, "));
+                format!("{turns}put back within {} degrees", whole.placement_deg)
+            })),
         ),
     ]
 }
@@ -104,6 +114,7 @@ mod tests {
             most_drift_c: 5.0,
             targets: Targets::default(),
             mounting_deg: 0.02,
+            whole_turns: None,
             by_device: false,
         }
     }

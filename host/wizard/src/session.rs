@@ -230,6 +230,11 @@ impl OpenSession<'_> {
         let words = format!("{} dwells are planned", steps.len());
         wizard.begin_phase(Phase::Calibration, words);
         or_cancelled!(wizard.dwells(Part::Calibration, &steps).await);
+        if wizard.config.whole_turns.is_some() {
+            let words = "about each axis, both ways; they give the gyro's scale factors";
+            wizard.begin_phase(Phase::WholeTurns, words.into());
+        }
+        or_cancelled!(wizard.whole_turns(Part::Calibration).await);
         self.finish()?;
         let fits = self.fits()?;
         let wizard = &mut self.wizard;
@@ -237,6 +242,7 @@ impl OpenSession<'_> {
         let words = format!("{} poses that the fit has not used", steps.len());
         wizard.begin_phase(Phase::Verification, words);
         or_cancelled!(wizard.dwells(Part::Verification, &steps).await);
+        or_cancelled!(wizard.whole_turns(Part::Verification).await);
         self.finish()?;
         self.wizard
             .begin_phase(Phase::Store, "storing the verified calibration".into());

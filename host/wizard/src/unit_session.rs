@@ -2,11 +2,13 @@
 
 mod conditions;
 mod rows;
+mod spins;
 
 use mimu::fit::Fit;
 use mimu::quantity::Sensor;
 use mimu::signal::increment::is_bridged;
 use mimu::signal::stillness::GUARD_S;
+use mimu::triad::Triad;
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Columns, Manifest, Recorded};
@@ -14,6 +16,7 @@ use nalgebra::Vector3;
 
 use self::conditions::{Tilts, Turns, motion_limits, rate_limit_dps};
 use self::rows::{cut, known, shorten};
+use self::spins::Spinning;
 use crate::axes;
 use crate::bank::DeviceBanks;
 use crate::clock::{ClockRate, REPORTED_SHARE};
@@ -34,6 +37,8 @@ const BEFORE_S: f64 = 0.5;
 const BEGUN_S: f64 = 0.5;
 /// Samples kept between two dwells, s: a turn takes seconds.
 const KEPT_S: f64 = 120.0;
+/// The same for whole turns, s: with rests in between, somebody may take minutes.
+const KEPT_SPIN_S: f64 = 900.0;
 
 /// Largest half-width, in multiples of its target, with which the calibration is used to find up: 20 mrad.
 const KNOWN: f64 = 20.0;
@@ -96,6 +101,10 @@ pub struct UnitSession {
     nominal: Option<[Affine<f64>; 2]>,
     /// Whether it is the calibration so far.
     calibrated: bool,
+    /// Gyro and accelerometer by the last fit.
+    fitted: Option<[Triad; 2]>,
+    /// The whole turns that are asked for.
+    spin: Option<Spinning>,
     /// Turns by the gyro and by the accelerometer, for their units.
     tilts: Tilts,
     pending: Batch,
@@ -131,6 +140,8 @@ impl UnitSession {
             watch: Watch::new(unit.rate_hz, config.fixture != Fixture::Table),
             nominal: unit.nominal,
             calibrated: false,
+            fitted: None,
+            spin: None,
             tilts: Tilts::default(),
             state: UnitState {
                 unit: unit.name.clone(),
@@ -180,6 +191,7 @@ impl UnitSession {
         );
         manifest.latitude_deg = config.latitude_deg;
         manifest.power_on_s = self.power_on_s;
+        manifest.whole_turns = config.whole_turns.filter(|_| part != Part::Confirmation);
         if unit.is_device {
             manifest.recorded = Some(Recorded {
                 tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
@@ -235,6 +247,8 @@ impl UnitSession {
             match news {
                 StationEvent::Samples(chunk) => {
                     self.keep(&chunk);
+                    self.count_turns(&chunk);
+                    self.tell_turns(tell);
                     if let Some(seen) = self.watch.take(&chunk) {
                         self.seen = Some(seen);
                         self.stand(&seen, round.config, round.step);
@@ -295,6 +309,7 @@ impl UnitSession {
     fn interrupted(&mut self, why: Interruption, tell: &mut Vec<Event>) -> Result<()> {
         let waiting = Waiting::Interrupted(why.clone());
         self.discard(&waiting, tell)?;
+        self.interrupt_spin(tell);
         self.watch.interrupted();
         self.state.waiting = Some(waiting);
         self.folder.add(Entry::Interrupted {
@@ -340,8 +355,13 @@ impl UnitSession {
             }
         }
         // A turn does not take minutes: a longer pause becomes a gap.
-        if self.dwell.is_none() && rows.len() as f64 > 2.0 * KEPT_S * rate_hz {
-            cut(rows, rows.len() - (KEPT_S * rate_hz) as usize);
+        let kept_s = if self.spin.is_some() {
+            KEPT_SPIN_S
+        } else {
+            KEPT_S
+        };
+        if self.dwell.is_none() && rows.len() as f64 > 2.0 * kept_s * rate_hz {
+            cut(rows, rows.len() - (kept_s * rate_hz) as usize);
         }
     }
 
@@ -401,7 +421,10 @@ impl UnitSession {
             None if wanted.rate_dps == 0.0 && self.check_unit(seen, config).is_err() => {
                 return self.check_unit(seen, config);
             }
-            None => self.pose(&up, round, &wanted, running.is_none()),
+            None => match &self.spin {
+                Some(spin) => self.spin_pose(spin, &up, round, &wanted),
+                None => self.pose(&up, round, &wanted, running.is_none()),
+            },
         };
         let found = found.and_then(|step| match self.turns_otherwise(seen, &step) {
             Some(why) => Err(why),
@@ -410,10 +433,11 @@ impl UnitSession {
         match (found, self.dwell) {
             (Err(why), _) => {
                 self.discard(&why, tell)?;
+                let why = self.while_turning(why);
                 if self.state.waiting.as_ref() != Some(&why) {
                     // Changes of its numbers are shown in the state only.
                     let told = self.state.waiting.as_ref();
-                    if !told.is_some_and(|told| told.is_like(&why)) {
+                    if !why.is_expected() && !told.is_some_and(|told| told.is_like(&why)) {
                         tell.push(Event::Waiting {
                             unit: self.name(),
                             why: why.clone(),
@@ -443,7 +467,10 @@ impl UnitSession {
                 let left = (to + guard).saturating_sub(seen.tick);
                 self.state.left_s = Some(left as f64 / rate_hz);
                 if left == 0 {
-                    self.accept(dwell, to, seen, round, tell)?;
+                    match self.spin.is_some() {
+                        true => self.rested(dwell, to, seen, round, tell)?,
+                        false => self.accept(dwell, to, seen, round, tell)?,
+                    }
                 }
             }
         }
@@ -474,7 +501,7 @@ impl UnitSession {
         }
         let rate_hz = self.station.unit.rate_hz;
         let lasted = self.next.unwrap_or(dwell.from).saturating_sub(dwell.from);
-        if lasted as f64 > (BEFORE_S + BEGUN_S) * rate_hz {
+        if lasted as f64 > (BEFORE_S + BEGUN_S) * rate_hz && !self.is_turned() {
             self.folder.add(Entry::Discarded {
                 step: dwell.step,
                 why: why.to_string(),
@@ -536,7 +563,7 @@ impl UnitSession {
             step: dwell.step,
             asked: round
                 .step
-                .filter(|_| self.moved && round.any_order)
+                .filter(|_| self.moved && round.any_order && self.spin.is_none())
                 .map(|s| s.up),
             from_s,
             rows,
@@ -544,7 +571,7 @@ impl UnitSession {
             temp_c: seen.temp_c.is_finite().then_some(seen.temp_c),
         })?;
         self.number += 1;
-        (self.dwell, self.done, self.state.left_s) = (None, true, None);
+        (self.dwell, self.done, self.state.left_s) = (None, self.spin.is_none(), None);
         tell.push(Event::Dwell {
             unit: self.name(),
             part: self.part,
@@ -554,7 +581,7 @@ impl UnitSession {
         });
         let missing = std::mem::take(&mut self.turn_missing);
         let clipped = std::mem::take(&mut self.turn_clipped);
-        if config.fixture != Fixture::Table && number > 0 {
+        if config.fixture != Fixture::Table && number > 0 && self.spin.is_none() {
             self.count_turn(missing, tell)?;
             self.tell_clipped(clipped, tell);
         }
@@ -622,6 +649,9 @@ impl UnitSession {
             self.hopeless = Some(error.clone());
         }
         let fitted = fitted.ok()?;
+        if let [Some(gyro), Some(accel)] = Sensor::BOTH.map(|s| fitted.sensor(s)) {
+            self.fitted = Some([gyro, accel].map(|s| s.estimated.triad.clone()));
+        }
         // A calibration that is uncertain by degrees does not find up better than a data sheet.
         let known = self
             .progress

@@ -1,7 +1,7 @@
 //! Judges whether a calibration is as accurate as predicted, by dwells that were not used for it.
 
 use mimu::calibration::Calibration;
-use mimu::calibration::verify::{SensorVerification, verify};
+use mimu::calibration::verify::{SensorVerification, WholeTurnsOfAxis, verify};
 use mimu::fit::Fit;
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
@@ -105,6 +105,19 @@ impl SensorJudged {
     }
 }
 
+/// Why the user has to agree before a calibration that reads whole turns so is stored.
+fn rough_turns(turned: &WholeTurnsOfAxis) -> Option<String> {
+    let (error, half) = (turned.error_deg_per_turn, turned.half_width_deg_per_turn);
+    (error.abs() > ROUGH.0 * half).then(|| {
+        format!(
+            "gyro: 360 deg about {} are read as {:.2} deg, where the unit was put back to {:.2}",
+            turned.axis,
+            360.0 + error,
+            half
+        )
+    })
+}
+
 /// Figures of a calibration from the verification.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judged {
@@ -112,6 +125,9 @@ pub struct Judged {
     pub judgement: Judgement,
     /// Figures of each sensor.
     pub sensors: Vec<SensorJudged>,
+    /// What the gyro reads for whole turns that the fit has not used.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub whole_turns: Vec<WholeTurnsOfAxis>,
     /// Why it must not be stored.
     pub broken: Vec<String>,
     /// Warnings for the user.
@@ -126,11 +142,9 @@ impl Judged {
 
     /// Why the user has to agree before it is stored, if so.
     pub fn rough(&self) -> Option<String> {
-        let rough: Vec<String> = self
-            .sensors
-            .iter()
-            .filter_map(SensorJudged::rough)
-            .collect();
+        let of_sensors = self.sensors.iter().filter_map(SensorJudged::rough);
+        let of_turns = self.whole_turns.iter().filter_map(rough_turns);
+        let rough: Vec<String> = of_sensors.chain(of_turns).collect();
         (!rough.is_empty()).then(|| rough.join(", "))
     }
 
@@ -181,6 +195,7 @@ fn judged(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> R
     Ok(Judged {
         judgement: judgement(calibration.judgement.clone(), found.judgement, &broken),
         sensors,
+        whole_turns: found.whole_turns,
         broken,
         warnings: found.warnings,
     })
@@ -224,6 +239,7 @@ mod tests {
             judgement: Judgement::new(JudgementKind::Good, "a test"),
             broken: sensors.iter().filter_map(SensorJudged::broken).collect(),
             sensors,
+            whole_turns: Vec::new(),
             warnings: Vec::new(),
         }
     }

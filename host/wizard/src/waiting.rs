@@ -38,9 +38,22 @@ pub enum Waiting {
     WrongPose(Vector3<f64>, f64),
     /// The direction up was recorded before: this direction, and the requested one.
     RepeatedPose(Vector3<f64>, Vector3<f64>),
+    /// It rests where whole turns begin.
+    ToSpin,
+    /// It is turned, as was asked for.
+    Spinning,
+    /// It rests before its whole turns are complete: turns so far, and those asked for.
+    TurnsMissing(f64, u32),
+    /// It lies so far from where its whole turns began, degrees.
+    NotPutBack(f64),
 }
 
 impl Waiting {
+    /// Whether it is what was asked for, and needs no words.
+    pub fn is_expected(&self) -> bool {
+        matches!(self, Self::ToSpin | Self::Spinning)
+    }
+
     /// Whether `other` is the same reason with other numbers; it is then reported only once.
     pub fn is_like(&self, other: &Self) -> bool {
         // In hands a unit alternates between the two several times a second.
@@ -93,6 +106,20 @@ impl fmt::Display for Waiting {
                 f,
                 "wrong pose: {}, {off_deg:.0} degrees from the requested one",
                 words(up)
+            ),
+            Self::ToSpin => f.write_str("it rests: turn it now"),
+            Self::Spinning => f.write_str("turn it, then put it back against the edge"),
+            Self::TurnsMissing(turns, asked) => write!(
+                f,
+                "{turns:.1} turns so far, and {asked} are wanted: turn it {} more the same way, then put it back against the edge",
+                match f64::from(*asked) - turns {
+                    missing if missing < 1.5 => "once".into(),
+                    missing => format!("{missing:.0} times"),
+                }
+            ),
+            Self::NotPutBack(off_deg) => write!(
+                f,
+                "it lies {off_deg:.0} degrees from where it lay: put it back against the edge as it was"
             ),
             Self::RepeatedPose(up, wanted) => write!(
                 f,

@@ -1,5 +1,7 @@
 //! A session from the greeting to the last dwell: chooses the next dwell, and records which units have completed it.
 
+mod spins;
+
 use std::time::{Duration, Instant};
 
 use mimu_recording::error::{Error, Result};
@@ -138,7 +140,10 @@ impl<'a> Wizard<'a> {
     }
 
     fn had(&self, unit: &UnitSession) -> usize {
-        unit.folder.dwells(self.phase.part()).len()
+        match unit.spins() {
+            true => unit.folder.spins(self.phase.part()).len(),
+            false => unit.folder.dwells(self.phase.part()).len(),
+        }
     }
 
     /// Waits until all units send samples and, if requested, have warmed up.

@@ -14,7 +14,7 @@ use mimu::recording_problem::OfRecording;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
-use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs};
+use crate::arguments::{KeepArgs, NoiseArgs, PartArgs, StillArgs, WholeTurnArgs};
 use crate::output::{now, progress, show};
 use crate::reading::{LogArgs, read};
 use crate::report::refused;
@@ -45,6 +45,8 @@ pub struct ReportArgs {
     noise: NoiseArgs,
     #[command(flatten)]
     part: PartArgs,
+    #[command(flatten)]
+    whole: WholeTurnArgs,
 }
 
 /// Sources of a page.
@@ -92,7 +94,8 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let others = [args.noise.file.as_deref(), inputs.calibration.as_deref()];
     let open = |path: &PathBuf| -> Result<(String, Prepared)> {
         let prepared = read(path, &args.log, args.still.finding(), &outputs, &others)?;
-        let prepared = args.keep.apply(args.noise.apply(prepared)?);
+        let prepared = args.whole.apply(args.noise.apply(prepared)?)?;
+        let prepared = args.keep.apply(prepared);
         Ok((path.display().to_string(), prepared))
     };
     let recordings: Vec<_> = inputs.recordings.iter().map(open).collect::<Result<_>>()?;
@@ -130,6 +133,19 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
             Err(why) => not_judged.push(format!("{name}: {why}")),
         }
     }
+    let mut whole_turns = Vec::new();
+    for (name, prepared) in &recordings {
+        // Only for its whole turns: a recording does not judge what was made from it.
+        let turned = prepared
+            .manifest
+            .whole_turns
+            .map(|_| verify(prepared, &calibration));
+        let turned = turned.and_then(Result::ok).map(|v| v.whole_turns);
+        whole_turns.extend(turned.map(|turned| (name.clone(), args.calibration.is_none(), turned)));
+    }
+    let others = verified.iter();
+    whole_turns.extend(others.map(|(name, v)| (name.clone(), false, v.whole_turns.clone())));
+    whole_turns.retain(|(.., turned)| !turned.is_empty());
     let file = inputs.calibration.as_deref().map(Path::display);
     let file = file.map(|path| path.to_string());
     let sheet = part.map(|part| DataSheet::of(&calibration, noise.as_ref(), &part));
@@ -139,6 +155,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         calibration: &calibration,
         calibration_file: file.as_deref(),
         verified: &verified,
+        whole_turns: &whole_turns,
         not_judged: &not_judged,
         noise: noise.as_ref(),
         data_sheet: sheet.as_ref(),

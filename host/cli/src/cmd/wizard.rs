@@ -23,7 +23,7 @@ use mimu_wizard::session::{Outcome, UnitSpec, run as carry_out};
 use mimu_wizard::text::Text;
 use mimu_wizard::text_line::Columns;
 
-use crate::arguments::JsonArgs;
+use crate::arguments::{JsonArgs, whole_turns};
 use crate::cmd::design::number;
 use crate::output::now;
 use crate::report::{self, Made};
@@ -75,6 +75,8 @@ pub(crate) struct WizardArgs {
     /// How well the unit's axes are aligned with the table's, degrees: 95 % of each angle; no dwell shows it, so the intervals include it
     #[arg(long, value_name = "DEG", default_value_t = 0.02, value_parser = |t: &str| number(t, 0.0, 10.0))]
     mounting: f64,
+    #[command(flatten)]
+    whole: SpinArgs,
     /// Whose estimate becomes the calibration; the other one is compared with it
     #[arg(long, value_enum, default_value = "pc")]
     by: By,
@@ -102,6 +104,18 @@ pub(crate) struct WizardArgs {
     plain: bool,
     #[command(flatten)]
     json: JsonArgs,
+}
+
+/// Options for whole turns.
+#[derive(Args)]
+struct SpinArgs {
+    /// By hand: after the poses, whole turns about each axis, both ways, N of each (10); they give the gyro's scale factors. With a number, the
+    /// recording states it
+    #[arg(long = "whole-turns", value_name = "N", num_args = 0..=1, require_equals = true)]
+    turns: Option<Option<u32>>,
+    /// With --whole-turns: how well the unit is put back, degrees, half-width of the 95 % interval of its heading [default: 1]
+    #[arg(long, value_name = "DEG", requires = "turns")]
+    placement: Option<f64>,
 }
 
 /// Options for a board of another maker, which writes its readings as lines of text.
@@ -228,6 +242,12 @@ impl WizardArgs {
             let remedy = "use --fixture table with a mimu device, or leave --by device out";
             return Err(Error::new("--by device", problem, remedy));
         }
+        let whole_turns = whole_turns(self.whole.turns, self.whole.placement)?;
+        if whole_turns.is_some() && (fixture == Fixture::Table || !self.drivers.is_empty()) {
+            let problem = "whole turns are turned by hand, with gravity as the reference";
+            let remedy = "leave --whole-turns out, or use --fixture hands or cube without a driver";
+            return Err(Error::new("--whole-turns", problem, remedy));
+        }
         let mut gravity = self.gravity.or(self.latitude.map(normal_gravity));
         let mut latitude_deg = self.latitude;
         let steps = match &self.plan {
@@ -278,6 +298,7 @@ impl WizardArgs {
             most_drift_c: self.drift,
             targets: self.targets()?,
             mounting_deg: self.mounting,
+            whole_turns,
             by_device: self.by == By::Device,
         })
     }

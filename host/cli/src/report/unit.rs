@@ -8,7 +8,7 @@ pub(super) mod trace;
 
 use maud::{Markup, html};
 use mimu::calibration::Calibration;
-use mimu::calibration::verify::Verification;
+use mimu::calibration::verify::{Verification, WholeTurnsOfAxis};
 use mimu::data_sheet::DataSheet;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
@@ -32,6 +32,8 @@ pub struct UnitReport<'a> {
     pub calibration_file: Option<&'a str>,
     /// Verifications by recordings that the calibration was not made from, with their names.
     pub verified: &'a [(String, Verification)],
+    /// What the gyro reads for whole turns, by recording: its name, whether the calibration was made from it, and the axes.
+    pub whole_turns: &'a [(String, bool, Vec<WholeTurnsOfAxis>)],
     /// Recordings that could not be used for a verification, with the reason.
     pub not_judged: &'a [String],
     /// Noise at rest.
@@ -65,6 +67,7 @@ pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
             h2 id="errors" { "Error before and after" }
             @if let Some(found) = found { (found.errors()) }
             @if !unit.verified.is_empty() { (verify::errors(unit.verified, true).html()) }
+            @if !unit.whole_turns.is_empty() { (verify::whole_turns_table(unit.whole_turns).html()) }
             @for why in unit.not_judged { p { "Not judged: " (why) "." } }
             @if let Some(found) = found { (found.leftover()) }
         }

@@ -55,22 +55,63 @@ pub fn verify_text(verification: &Verification, verbose: bool) -> String {
 }
 
 /// `360 deg about x read as 360.4 ± 0.1 deg (356.1 uncalibrated): 40 turns, put back 4 times`.
-fn whole_turns(turned: &WholeTurnsOfAxis) -> String {
+pub(super) fn whole_turns(turned: &WholeTurnsOfAxis) -> String {
     let WholeTurnsOfAxis {
         axis,
         times,
         turns,
         error_deg_per_turn: error,
         half_width_deg_per_turn: half,
-        uncalibrated_deg_per_turn: before,
+        ..
     } = turned;
-    let before = before.map(|before| format!(" ({:.2} uncalibrated)", 360.0 + before));
+    let how = match turned.uncalibrated_deg_per_turn {
+        Some(_) => "uncalibrated",
+        None => "with one scale factor for all axes",
+    };
+    let before = turned.before_deg_per_turn();
+    let before = before.map(|before| format!(" ({:.2} {how})", 360.0 + before));
     format!(
         "360 deg about {axis} read as {} deg{}: {turns} turns, put back {}",
         plus_minus(360.0 + error, *half),
         before.unwrap_or_default(),
         plural(*times as u64, "time")
     )
+}
+
+/// What the gyro reads for whole turns, by recording and axis; `used`: whether the calibration was made from the recording.
+pub(super) fn whole_turns_table(all: &[(String, bool, Vec<WholeTurnsOfAxis>)]) -> Table {
+    let each = || all.iter().flat_map(|(_, _, turned)| turned);
+    let as_came = each().any(|turned| turned.uncalibrated_deg_per_turn.is_some());
+    let before = match as_came {
+        true => "uncalibrated",
+        false => "one scale factor for all axes",
+    };
+    let mut table = Table::new(
+        "Degrees that the gyro reads for one turn of 360 degrees, by whole turns after which the unit was put back; 95 % intervals by how well it was put back",
+        "axis",
+    )
+    .numbers([before, "calibrated", "turns", "put back"])
+    .words("used by the fit")
+    .on_page("recording");
+    for (name, used, turned) in all {
+        for of in turned {
+            let before = of.before_deg_per_turn().map(|error| 360.0 + error);
+            table.row([
+                of.axis.into(),
+                Cell::known(before, 1.0),
+                Cell::Interval {
+                    si: 360.0 + of.error_deg_per_turn,
+                    half: of.half_width_deg_per_turn,
+                    factor: 1.0,
+                },
+                Cell::Count(u64::from(of.turns)),
+                Cell::Count(of.times as u64),
+                Cell::from(if *used { "yes" } else { "no" }),
+                Cell::Code(name.clone()),
+            ]);
+        }
+    }
+    table
 }
 
 /// Errors on recordings that the calibration was not made from, by recording and sensor; `named`: with the names of the recordings.

@@ -10,6 +10,7 @@ use mimu_wizard::session::{Outcome, UnitOutcome};
 use mimu_wizard::verdict::{Judged, SensorJudged};
 
 use crate::hint;
+use crate::report::verify::whole_turns;
 
 /// An event as lines of text; none for events that only programs need.
 pub fn wizard_lines(event: &Event) -> Vec<String> {
@@ -36,6 +37,23 @@ pub fn wizard_lines(event: &Event) -> Vec<String> {
             words,
             ..
         } => vec![format!("[{}/{planned}] {words}", done + 1)],
+        Event::Spin {
+            done,
+            planned,
+            words,
+            ..
+        } => vec![format!("[whole turns {}/{planned}] {words}", done + 1)],
+        Event::Turned { axis, turns, .. } => vec![match turns {
+            0 => "    it has rested: turn it now".into(),
+            turns => format!("    {} about {axis}", plural(u64::from(*turns), "turn")),
+        }],
+        Event::Spun { axis, turns, .. } => vec![format!(
+            "    done: {} about {axis}, and it lies where it lay",
+            plural(u64::from(*turns), "turn")
+        )],
+        Event::SpinLost { why, .. } => vec![format!(
+            "    these turns cannot be used: {why}; put it against the edge, let it rest, and turn it again"
+        )],
         Event::Waiting { why, .. } => vec![format!("    waiting: {}", hint::of_waiting(why))],
         Event::Dwell { part, number, .. } => match part {
             Part::Calibration => Vec::new(),
@@ -103,6 +121,8 @@ pub(crate) fn progress_line(progress: &Progress) -> String {
 fn judged_lines(judged: &Judged) -> Vec<String> {
     let mut lines = vec![format!("judgement: {}", judged.judgement)];
     lines.extend(judged.sensors.iter().map(judged_line));
+    let turned = judged.whole_turns.iter().map(whole_turns);
+    lines.extend(turned.map(|turned| format!("gyro  {turned}")));
     lines.extend(
         judged
             .broken

@@ -79,7 +79,7 @@ impl View for Lines {
         for line in report::wizard_lines(event) {
             self.say(&format!("{whose}{line}"));
         }
-        if let Event::Step { step, .. } = event
+        if let Event::Step { step, .. } | Event::Spin { step, .. } = event
             && self.sketches
         {
             for line in sketch(&step.up()) {

@@ -174,10 +174,12 @@ fn draw_step(frame: &mut Frame, area: Rect, standing: &SessionState) {
             wrapped(words, wide)
         }
         Some(step) => {
-            let mut words = step.words();
-            if step.rate_dps == 0.0 {
-                words.push_str(", at rest");
-            }
+            let spin = standing.units.first().and_then(|unit| unit.spin.as_ref());
+            let words = match (spin, step.rate_dps) {
+                (Some(spin), _) => spin.words(),
+                (None, 0.0) => format!("{}, at rest", step.words()),
+                (None, _) => step.words(),
+            };
             let mut lines = wrapped(&words, wide);
             lines.truncate(usize::from(UNIT - 2) - 7);
             lines.extend(sketch(&step.up()));

@@ -70,6 +70,17 @@ pub struct Data<'a> {
     pub gravity: f64,
 }
 
+/// How turns end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Ended {
+    /// Where they began.
+    Whole,
+    /// So far from there, rad: the larger of heading and tilt.
+    Off(f64),
+    /// The heading is too uncertain to tell; the tilt, rad.
+    Open(f64),
+}
+
 /// The whole turns found among the turns, and what is wrong with others.
 pub struct Found {
     /// Those that are used.
@@ -130,30 +141,44 @@ impl Stated {
         let joined = turns.windows(2).all(|w| w[0].to == w[1].from);
         let parts = turns.iter().map(|turn| Path::of(&[*turn], gyro));
         let about_one_axis = parts.clone().all(|p| p.axis.dot(&path.axis) >= SAME_AXIS);
-        let tilt = first.before.angle(&last.after);
         if !joined || path.turns() < FEWEST || turns.len() > 1 && !about_one_axis {
             return None;
         }
-        let error = ClosureError::at(turns, gyro, self.vertical[0])?;
-        let (sigma, off) = (sigma(&path, &error.block.by(0)), error.block.residual[0]);
+        let ended = self.ended(turns, gyro, &|by| sigma(&path, by))?;
         let [from, to] = [first.steps[0], last.steps[1]];
-        let limit = PUT_BACK * self.placement;
-        if sigma > OPEN {
-            let turns = path.turns();
-            let open = Warning::WholeTurnsOpen { from, to, turns };
-            return (tilt < limit).then_some(Err(open));
-        }
-        let put_back = tilt < limit && off.abs() < limit + 3.0 * sigma;
-        match put_back {
-            true => Some(Ok(Closure { turns: range, path })),
+        match ended {
+            Ended::Whole => Some(Ok(Closure { turns: range, path })),
+            Ended::Open(tilt) => {
+                let turns = path.turns();
+                let open = Warning::WholeTurnsOpen { from, to, turns };
+                (tilt < PUT_BACK * self.placement).then_some(Err(open))
+            }
             // A turn of less than one and a half from pose to pose is no mistake.
-            false => (path.turns() > 1.5).then_some(Err(Warning::NotPutBack {
+            Ended::Off(off) => (path.turns() > 1.5).then_some(Err(Warning::NotPutBack {
                 from,
                 to,
                 turns: path.turns(),
-                off: off.abs().max(tilt),
+                off,
             })),
         }
+    }
+
+    /// How far from where they began neighbouring `turns` have ended. `sigma` is the uncertainty of a heading, rad, by its derivatives by the gyro.
+    pub(crate) fn ended(
+        &self,
+        turns: &[Turn],
+        gyro: &Affine<f64>,
+        sigma: &dyn Fn(&ByTriad) -> f64,
+    ) -> Option<Ended> {
+        let tilt = turns.first()?.before.angle(&turns.last()?.after);
+        let error = ClosureError::at(turns, gyro, self.vertical[0])?;
+        let (sigma, off) = (sigma(&error.block.by(0)), error.block.residual[0].abs());
+        let limit = PUT_BACK * self.placement;
+        Some(match tilt < limit && off < limit + 3.0 * sigma {
+            _ if sigma > OPEN => Ended::Open(tilt),
+            true => Ended::Whole,
+            false => Ended::Off(off.max(tilt)),
+        })
     }
 
     /// A warning if the number of turns is not the stated one.

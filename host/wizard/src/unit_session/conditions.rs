@@ -52,7 +52,7 @@ impl UnitSession {
         if seen.saturated {
             return Some(Waiting::Faulty(Finding::of_all(0, Fault::AtEnd)));
         }
-        if seen.exchanged && !self.station.unit.is_device {
+        if seen.exchanged && !self.station.unit.is_device && !self.spins() {
             return Some(Waiting::Faulty(Finding::of_all(0, Fault::Exchanged)));
         }
         let limits = motion_limits(step.rate_dps);

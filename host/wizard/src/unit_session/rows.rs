@@ -1,5 +1,7 @@
 //! Rows of a recording between two dwells, and the known inputs of a dwell.
 
+use std::ops::Range;
+
 use mimu_recording::Batch;
 
 use crate::procedure::SessionConfig;
@@ -11,6 +13,18 @@ pub(super) fn known(step: &Step, config: &SessionConfig) -> [f64; 6] {
     let rate = up * step.rate_dps;
     let force = up * config.gravity_mps2;
     [rate.x, rate.y, rate.z, force.x, force.y, force.z]
+}
+
+/// A copy of some rows, without known inputs.
+pub(super) fn part(rows: &Batch, range: Range<usize>) -> Batch {
+    let mut out = Batch::default();
+    out.t_s.extend(&rows.t_s[range.clone()]);
+    out.step.extend(&rows.step[range.clone()]);
+    out.temp_c.extend(&rows.temp_c[range.clone()]);
+    for c in 0..6 {
+        out.raw[c].extend(&rows.raw[c][range.clone()]);
+    }
+    out
 }
 
 /// Removes the first rows.

@@ -92,6 +92,7 @@ fn unit(name: &str) -> UnitState {
         clipped: 0,
         waiting: None,
         left_s: Some(1.4),
+        spin: None,
     }
 }
 

@@ -41,6 +41,13 @@ pub(super) fn draw_unit(frame: &mut Frame, area: Rect, unit: &UnitState, standin
         None => Line::raw(format!("rate   {is:+.1} deg/s")),
     });
     lines.push(rate.unwrap_or_else(|| Line::raw("rate   unknown yet")));
+    if let Some(spin) = &unit.spin {
+        let turns = spin
+            .turns
+            .map_or_else(|| "to rest first".into(), |t| format!("{t:.1}"));
+        let words = format!("turns  {turns} of {} about {}", spin.asked, spin.axis);
+        lines.push(Line::raw(words).bold());
+    }
     lines.push(temperature_line(unit, standing.phase == Phase::WarmUp));
     lines.push(Line::raw(format!(
         "samples {}, {} lost",

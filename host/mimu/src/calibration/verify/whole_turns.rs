@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::calibration::Calibration;
+use crate::calibration::verify::nominal;
 use crate::estimate::whole_turns::Stated;
 use crate::observation::closure::{Closure, ClosureError};
 use crate::observation::turn::{Path, Turn};
@@ -33,9 +34,20 @@ pub struct WholeTurnsOfAxis {
     /// The same error of the readings as they came, with the rate at rest subtracted; absent if they are not in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncalibrated_deg_per_turn: Option<f64>,
+    /// The same error with one scale factor for all axes, the mean of the calibration's, and with the rate at rest subtracted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub one_for_all_deg_per_turn: Option<f64>,
 }
 
-/// What was read for one axis, in sum: times, turns, errors (rad), their variance, and errors of the readings as they came.
+impl WholeTurnsOfAxis {
+    /// The error without the calibration of this axis: of the readings as they came, or with one scale factor for all axes.
+    pub fn before_deg_per_turn(&self) -> Option<f64> {
+        self.uncalibrated_deg_per_turn
+            .or(self.one_for_all_deg_per_turn)
+    }
+}
+
+/// What was read for one axis, in sum: times, turns, errors (rad), their variance, and errors of the readings as they came and with one scale factor.
 #[derive(Default, Clone, Copy)]
 struct Sum {
     times: usize,
@@ -43,6 +55,7 @@ struct Sum {
     error: f64,
     variance: f64,
     uncalibrated: f64,
+    one_for_all: f64,
 }
 
 /// The whole turns of `prepared` by its gyro's `calibration`, and what could not be used. Empty unless whole turns are stated.
@@ -73,6 +86,10 @@ pub(super) fn verify(
         offset: -at_rest,
         ..Affine::identity()
     });
+    let one_for_all = nominal(&gyro).map(|one| Affine {
+        offset: -one.matrix * at_rest,
+        ..one
+    });
     let c2 = gyro.matrix.norm_squared() / 3.0;
     let mut sums = [Sum::default(); 4];
     let variances = found.closures.variances(&turns, c2);
@@ -88,6 +105,7 @@ pub(super) fn verify(
         sum.error += error;
         sum.variance += variance;
         sum.uncalibrated += as_came.as_ref().and_then(read).unwrap_or(f64::NAN);
+        sum.one_for_all += one_for_all.as_ref().and_then(read).unwrap_or(f64::NAN);
     }
     let names = AXES.into_iter().chain(["other"]);
     let each = names.zip(sums).filter(|(_, sum)| sum.times > 0);
@@ -100,6 +118,7 @@ pub(super) fn verify(
             error_deg_per_turn: per_turn(sum.error),
             half_width_deg_per_turn: per_turn(1.96 * sum.variance.sqrt()),
             uncalibrated_deg_per_turn: as_came.map(|_| per_turn(sum.uncalibrated)),
+            one_for_all_deg_per_turn: one_for_all.map(|_| per_turn(sum.one_for_all)),
         }
     });
     (each.collect(), found.warnings)
