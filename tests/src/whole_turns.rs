@@ -12,48 +12,68 @@ use crate::by_hand::{Grade, unit};
 
 /// What a person does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Session {
-    /// As many poses as fit into the time of poses and whole turns.
-    ManyPoses,
-    /// Ten poses, then ten turns each way about each axis on a table top, which are not stated to be whole: only gravity closes them.
-    Unstated,
-    /// The same, stated.
-    PosesAndTurns,
-    /// The whole turns alone.
-    Turns,
+pub struct Session {
+    /// Poses, with turns between them.
+    pub poses: u32,
+    /// Turns each way about each axis, on a table top; 0 for none.
+    pub turns: u32,
+    /// Whether these are stated to be whole. If not, only gravity closes them.
+    pub stated: bool,
 }
 
 impl Session {
-    /// All.
-    pub const ALL: [Self; 4] = [
-        Self::Unstated,
-        Self::PosesAndTurns,
-        Self::Turns,
-        Self::ManyPoses,
-    ];
+    /// Ten poses, then ten turns each way about each axis, which are not stated to be whole.
+    pub const UNSTATED: Self = Self {
+        poses: 10,
+        turns: 10,
+        stated: false,
+    };
+    /// The same, stated.
+    pub const POSES_AND_TURNS: Self = Self {
+        stated: true,
+        ..Self::UNSTATED
+    };
+    /// The whole turns alone.
+    pub const TURNS: Self = Self {
+        poses: 0,
+        ..Self::POSES_AND_TURNS
+    };
 
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ManyPoses => "50 poses",
-            Self::Unstated => "10 poses, 6 x 10 turns, not stated",
-            Self::PosesAndTurns => "10 poses, 6 x 10 turns",
-            Self::Turns => "6 x 10 turns",
+    /// Poses alone.
+    pub const fn of_poses(poses: u32) -> Self {
+        Self {
+            poses,
+            turns: 0,
+            stated: false,
         }
     }
 
-    /// The plan for the bench. `turns` of each whole turn, the sign of every second reversed.
-    pub fn plan(self, turns: u32) -> String {
-        let mut plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 200.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\nlead_in_s = 5.0\n".to_owned();
-        let poses = match self {
-            Self::Unstated | Self::PosesAndTurns => 10,
-            Self::ManyPoses => 50,
-            Self::Turns => 0,
+    /// In words.
+    pub fn name(self) -> String {
+        let poses = match self.poses {
+            0 => String::new(),
+            poses => format!("{poses} poses"),
         };
-        if poses > 0 {
-            plan += &format!("[[step]]\nposes = {poses}\ndwell_s = 2.5\n");
+        let turns = match (self.turns, self.stated) {
+            (0, _) => String::new(),
+            (turns, true) => format!("6 x {turns} turns"),
+            (turns, false) => format!("6 x {turns} turns, not stated"),
+        };
+        [poses, turns]
+            .into_iter()
+            .filter(|w| !w.is_empty())
+            .collect::<Vec<_>>()
+            .join(", ")
+    }
+
+    /// The plan for the bench.
+    pub fn plan(self) -> String {
+        let mut plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 200.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\nlead_in_s = 5.0\n".to_owned();
+        if self.poses > 0 {
+            plan += &format!("[[step]]\nposes = {}\ndwell_s = 2.5\n", self.poses);
         }
-        if matches!(self, Self::Unstated | Self::PosesAndTurns | Self::Turns) {
+        let turns = self.turns;
+        if turns > 0 {
             for up in ["[1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0]", "[0.0, 0.0, 1.0]"] {
                 plan += &format!("[[step]]\nup = {up}\ndwell_s = 2.0\n");
                 for sign in ["", "-"] {
@@ -116,10 +136,9 @@ pub fn scales(fit: &Fit, file: &RigFile, seed: u64, plan: &str) -> Scales {
 /// Those of the fit.
 pub fn case(grade: Grade, session: Session, seed: u64) -> Result<Scales> {
     let file = unit(&[], grade, seed);
-    let plan = session.plan(10);
-    let whole = matches!(session, Session::PosesAndTurns | Session::Turns);
-    let stated = whole.then(|| WholeTurns {
-        turns: (session == Session::Turns).then_some(10),
+    let plan = session.plan();
+    let stated = session.stated.then(|| WholeTurns {
+        turns: (session.poses == 0).then_some(session.turns),
         ..WholeTurns::default()
     });
     let fitted = fit(recorded(&file, &plan, seed, stated), Options::IN_SAMPLE)?;

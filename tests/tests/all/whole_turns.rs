@@ -56,8 +56,8 @@ const HEAD: &str = "| grade | session | min | fitted | scale error, median % | h
 #[test]
 fn whole_turns_make_the_scale_factors_of_the_same_recording_more_certain() {
     println!("{HEAD}");
-    let (without, _) = row(Grade::Consumer, Session::Unstated, 0..12);
-    let (with, inside) = row(Grade::Consumer, Session::PosesAndTurns, 0..12);
+    let (without, _) = row(Grade::Consumer, Session::UNSTATED, 0..12);
+    let (with, inside) = row(Grade::Consumer, Session::POSES_AND_TURNS, 0..12);
     assert!(with < 0.0003, "{with}");
     assert!(with < 0.8 * without, "{with} {without}");
     assert!(inside > 0.9, "{inside}");
@@ -65,19 +65,34 @@ fn whole_turns_make_the_scale_factors_of_the_same_recording_more_certain() {
 
 #[test]
 fn whole_turns_alone_give_the_scale_factors() {
-    let (turns, inside) = row(Grade::Consumer, Session::Turns, 0..12);
+    let (turns, inside) = row(Grade::Consumer, Session::TURNS, 0..12);
     assert!(turns < 0.001, "{turns}");
     assert!(inside > 0.9, "{inside}");
 }
 
 #[test]
-#[ignore = "minutes; prints the table of docs/whole-turns.md"]
+#[ignore = "half an hour; prints what each minute buys"]
 fn what_whole_turns_buy() {
+    let with = |turns| Session {
+        turns,
+        ..Session::POSES_AND_TURNS
+    };
+    let sessions = [
+        Session::of_poses(10),
+        Session::of_poses(20),
+        Session::of_poses(50),
+        Session::UNSTATED,
+        with(2),
+        with(5),
+        with(10),
+        with(20),
+        Session::TURNS,
+    ];
     println!("{HEAD}");
     for grade in [Grade::Consumer, Grade::Tactical, Grade::Analog] {
-        for session in Session::ALL {
+        for session in sessions {
             // Nobody knows the zero of an accelerometer in volts before poses show it.
-            if grade != Grade::Analog || session != Session::Turns {
+            if grade != Grade::Analog || session.poses > 0 {
                 row(grade, session, 0..100);
             }
         }
@@ -87,8 +102,8 @@ fn what_whole_turns_buy() {
 #[test]
 fn a_miscounted_turn_is_named_and_does_no_harm() {
     let file = unit(&[], Grade::Consumer, 3);
-    let plan = Session::PosesAndTurns
-        .plan(10)
+    let plan = Session::POSES_AND_TURNS
+        .plan()
         .replacen("whole_turns = 10", "whole_turns = 9", 1);
     let stated = WholeTurns {
         turns: Some(10),
@@ -109,7 +124,7 @@ fn a_miscounted_turn_is_named_and_does_no_harm() {
 #[test]
 fn a_unit_that_is_not_put_back_is_named_and_left_out() {
     let file = unit(&[], Grade::Consumer, 4);
-    let right = Session::PosesAndTurns.plan(10);
+    let right = Session::POSES_AND_TURNS.plan();
     // 4 degrees off, which only the other turns tell, and 40.
     for off in ["whole_turns = 10.011", "whole_turns = 10.11"] {
         let plan = right.replacen("whole_turns = 10", off, 1);
@@ -137,7 +152,7 @@ fn headings_that_scatter_more_than_stated_widen_the_intervals() {
     let inside = (20..40).into_par_iter().map(|seed| {
         let mut file = unit(&[], Grade::Consumer, seed);
         file.hands.put_back_deg = 2.0;
-        let plan = Session::PosesAndTurns.plan(10);
+        let plan = Session::POSES_AND_TURNS.plan();
         let stated = Some(WholeTurns::default());
         let fitted = fit(recorded(&file, &plan, seed, stated), Options::IN_SAMPLE).unwrap();
         scales(&fitted, &file, seed, &plan).inside
@@ -152,7 +167,7 @@ fn clipped_turns_are_refused_with_the_rate_not_to_exceed() {
     let mut file = unit(&[], Grade::Consumer, 5);
     // Twice as fast as the range of ±250 deg/s allows.
     file.hands.whole_turn_s = [1.0, 1.2];
-    let plan = Session::PosesAndTurns.plan(10);
+    let plan = Session::POSES_AND_TURNS.plan();
     let fitted = fit(
         recorded(&file, &plan, 5, Some(WholeTurns::default())),
         Options::IN_SAMPLE,
@@ -178,7 +193,7 @@ fn a_session_of_turns_verifies_a_calibration_in_degrees_for_each_turn() {
     let file = unit(&[], Grade::Consumer, 6);
     let made = recorded(
         &file,
-        &Session::PosesAndTurns.plan(10),
+        &Session::POSES_AND_TURNS.plan(),
         6,
         Some(WholeTurns::default()),
     );
@@ -186,7 +201,11 @@ fn a_session_of_turns_verifies_a_calibration_in_degrees_for_each_turn() {
     let calibration = Calibration::of(&fitted, &[], "2026-01-02T03:04:05Z").unwrap();
     let other = recorded(
         &file,
-        &Session::PosesAndTurns.plan(5),
+        &Session {
+            turns: 5,
+            ..Session::POSES_AND_TURNS
+        }
+        .plan(),
         7,
         Some(WholeTurns::default()),
     );
@@ -202,4 +221,46 @@ fn a_session_of_turns_verifies_a_calibration_in_degrees_for_each_turn() {
         assert!(axis.half_width_deg_per_turn < 0.2, "{axis:?}");
     }
     assert!(found.sensors[Sensor::Gyro].is_some());
+}
+
+/// Twelve minutes of spins that are put back to a twentieth of a degree, all in one direction, so that the turn of the Earth does not cancel; the recording
+/// states this latitude.
+fn through_twelve_minutes(seed: u64, latitude_deg: Option<f64>) -> mimu_tests::whole_turns::Scales {
+    let mut file = unit(&[], Grade::Tactical, seed);
+    file.hands.put_back_deg = 0.05;
+    let spins = Session {
+        turns: 40,
+        ..Session::POSES_AND_TURNS
+    };
+    let plan = spins
+        .plan()
+        .replace("whole_turns = -40", "whole_turns = 40");
+    let stated = WholeTurns {
+        placement_deg: 0.1,
+        turns: None,
+    };
+    let mut made = recorded(&file, &plan, seed, Some(stated));
+    made.manifest.latitude_deg = latitude_deg;
+    let fitted = fit(made, Options::IN_SAMPLE).unwrap();
+    scales(&fitted, &file, seed, &plan)
+}
+
+#[test]
+#[ignore = "minutes: eighteen recordings of twelve minutes"]
+fn the_earth_turns_on_below_long_spins_and_is_no_error_of_the_gyro() {
+    let ratios = |latitude_deg| -> Vec<f64> {
+        let all = (0..6_u64).into_par_iter().map(|seed| {
+            let found = through_twelve_minutes(seed, latitude_deg);
+            [0, 1, 2].map(|k| found.errors[k].abs() / found.half_widths[k])
+        });
+        all.collect::<Vec<_>>().concat()
+    };
+    let inside = |of: &[f64]| of.iter().filter(|r| **r <= 1.0).count();
+    let known = ratios(Some(48.0));
+    let unknown = ratios(None);
+    // As if it turned the other way.
+    let wrong = ratios(Some(-48.0));
+    println!("known {known:.2?}\nunknown {unknown:.2?}\nwrong {wrong:.2?}");
+    assert!(inside(&known) >= 15 && inside(&unknown) >= 15);
+    assert!(median(wrong) > 2.0 * median(known));
 }
