@@ -84,6 +84,8 @@ pub fn sensors() -> &'static [Sensor] {
             include_str!("catalog/mma7260qt.toml"),
             include_str!("catalog/mpu6050_gyro.toml"),
             include_str!("catalog/mpu6050_accel.toml"),
+            include_str!("catalog/icm42688p_gyro.toml"),
+            include_str!("catalog/icm42688p_accel.toml"),
             include_str!("catalog/msg7100d_300.toml"),
             include_str!("catalog/msg7100d_3600.toml"),
             include_str!("catalog/msa6000d_50.toml"),

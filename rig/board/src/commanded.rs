@@ -36,6 +36,15 @@ pub struct Commanded {
     thread: Option<JoinHandle<Result<f64, String>>>,
 }
 
+/// The bench's place, with the unit at rest, z up.
+fn place(fixture: &str) -> Result<Plan, String> {
+    let text = format!(
+        "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 1000.0\ncarrier = \"{fixture}\"\n\
+         latitude_deg = {LATITUDE_DEG}\ngravity_mps2 = {GRAVITY}\nlead_in_s = 1.0\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 1.0\n"
+    );
+    Plan::parse(Source::new("place", text))
+}
+
 impl Commanded {
     /// Switches it on. `fixture`: `table` or `hands`.
     ///
@@ -48,14 +57,28 @@ impl Commanded {
         unit_id: [u8; 12],
         folder: &Path,
     ) -> Result<Self, String> {
-        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        let place = format!(
-            "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 1000.0\ncarrier = \"{fixture}\"\n\
-             latitude_deg = {LATITUDE_DEG}\ngravity_mps2 = {GRAVITY}\nlead_in_s = 1.0\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 1.0\n"
-        );
-        let plan = Plan::parse(Source::new("place", &place))?;
-        let front = Front::commanded(&plan, truth, seed)?;
+        let front = Front::commanded(&place(fixture)?, truth, seed)?;
         let board = Board::numbered(image, front, unit_id)?;
+        Self::serve(board, seed, folder)
+    }
+
+    /// The same with the Matek H743 and its digital sensor; `crystal` as in [`Board::digital`].
+    ///
+    /// Errors: as [`Commanded::start`].
+    pub fn matek(
+        image: &Image,
+        fixture: &str,
+        truth: &RigTruth,
+        (seed, crystal): (u64, f64),
+        unit_id: [u8; 12],
+        folder: &Path,
+    ) -> Result<Self, String> {
+        let front = Front::commanded_digital(&place(fixture)?, truth, seed, crystal)?;
+        Self::serve(Board::matek(image, front, unit_id)?, seed, folder)
+    }
+
+    fn serve(board: Board, seed: u64, folder: &Path) -> Result<Self, String> {
+        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         let mut served = Served::new(board, Pace::Fast, Some(&folder.join("flash")))?;
         let address = served.listen("127.0.0.1:0", seed)?;
         served.link(&folder.join("port"))?;

@@ -1,6 +1,7 @@
-//! The bench in front of the converter: voltages at its pins at any time of the virtual clock.
+//! The bench in front of the converter, or of a digital sensor: voltages at the pins, or what the sensor senses, at any time of the virtual clock.
 
 use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use mimu_rig::command::{Command, Commanded, Position};
 use mimu_rig::filter::LowPass;
@@ -13,6 +14,7 @@ use mimu_rig::rig_file::RigTruth;
 use mimu_rig::table::Table;
 use mimu_rig::unit::Unit;
 
+use crate::inertial::{Feed, Sensed};
 use crate::schematic::{Drives, Filters, Volts};
 
 /// Steps of the physics per second: one per conversion of a firmware that scans ten inputs twice a millisecond. Faster conversions are interpolated
@@ -34,9 +36,23 @@ const RANGES: [f64; 4] = [1.0, 0.75, 0.375, 0.25];
 pub enum Front {
     /// Fixed voltages that a test sets, without noise.
     Still(Volts),
-    /// A unit that is moved through a plan, or by commands.
-    Bench(Box<Bench>),
+    /// A unit that is moved through a plan, or by commands. A digital sensor shares it with the bench's commands.
+    Bench(Arc<Mutex<Bench>>),
 }
+
+/// Where the sensors' outputs go.
+#[derive(Clone, Copy)]
+enum Output {
+    /// To the converter's pins.
+    Analog,
+    /// Nowhere: the sensor is digital, and senses with the unit's errors. The board's crystal relative to its nominal frequency: the bench keeps the
+    /// crystal's time.
+    Digital { crystal: f64 },
+}
+
+/// Counts of an ICM-42688-P per deg/s and per g: what the unit's outputs, with its errors, are converted with.
+const PER_DPS: f64 = 131.072;
+const PER_G: f64 = 8192.0;
 
 impl Front {
     /// A unit of known truth moved through a plan, which begins when the board is first switched on. After the end of the plan its last state
@@ -44,17 +60,24 @@ impl Front {
     ///
     /// Errors: the plan exceeds the table's abilities, or a sensor is not analog.
     pub fn bench(plan: &Plan, truth: &RigTruth, seed: u64) -> Result<Self, String> {
-        Self::carried(
-            plan,
-            truth,
-            |at| {
-                Ok(Carried::Plan(match at.carrier {
-                    CarriedBy::Table => Box::new(Table::new(at, &truth.table)?),
-                    CarriedBy::Hands => Box::new(Hands::new(at, &truth.hands, seed)?),
-                }))
-            },
-            seed,
-        )
+        Self::planned(plan, truth, seed, Output::Analog)
+    }
+
+    /// The same with a digital sensor, an ICM-42688-P, for [`Board::matek`](crate::running::Board::matek). `crystal` as there.
+    ///
+    /// Errors: the plan exceeds the table's abilities, or a sensor is not digital.
+    pub fn digital(plan: &Plan, truth: &RigTruth, seed: u64, crystal: f64) -> Result<Self, String> {
+        Self::planned(plan, truth, seed, Output::Digital { crystal })
+    }
+
+    fn planned(plan: &Plan, truth: &RigTruth, seed: u64, output: Output) -> Result<Self, String> {
+        let carrier = |at: &Plan| {
+            Ok(Carried::Plan(match at.carrier {
+                CarriedBy::Table => Box::new(Table::new(at, &truth.table)?),
+                CarriedBy::Hands => Box::new(Hands::new(at, &truth.hands, seed)?),
+            }))
+        };
+        Self::carried(plan, truth, carrier, seed, output)
     }
 
     /// A unit of known truth that is moved by [`Front::command`]. The plan provides carrier, place, lead-in, chamber and first pose; its steps are
@@ -62,17 +85,34 @@ impl Front {
     ///
     /// Errors: the table cannot reach the first pose, or a sensor is not analog.
     pub fn commanded(plan: &Plan, truth: &RigTruth, seed: u64) -> Result<Self, String> {
-        Self::carried(
-            plan,
-            truth,
-            |at| {
-                Ok(Carried::Commands(match at.carrier {
-                    CarriedBy::Table => Box::new(Table::commanded(at, &truth.table)?),
-                    CarriedBy::Hands => Box::new(Hands::commanded(at, &truth.hands, seed)?),
-                }))
-            },
-            seed,
-        )
+        Self::by_commands(plan, truth, seed, Output::Analog)
+    }
+
+    /// The same with a digital sensor, as [`Front::digital`].
+    ///
+    /// Errors: the table cannot reach the first pose, or a sensor is not digital.
+    pub fn commanded_digital(
+        plan: &Plan,
+        truth: &RigTruth,
+        seed: u64,
+        crystal: f64,
+    ) -> Result<Self, String> {
+        Self::by_commands(plan, truth, seed, Output::Digital { crystal })
+    }
+
+    fn by_commands(
+        plan: &Plan,
+        truth: &RigTruth,
+        seed: u64,
+        output: Output,
+    ) -> Result<Self, String> {
+        let carrier = |at: &Plan| {
+            Ok(Carried::Commands(match at.carrier {
+                CarriedBy::Table => Box::new(Table::commanded(at, &truth.table)?),
+                CarriedBy::Hands => Box::new(Hands::commanded(at, &truth.hands, seed)?),
+            }))
+        };
+        Self::carried(plan, truth, carrier, seed, output)
     }
 
     fn carried(
@@ -80,12 +120,21 @@ impl Front {
         truth: &RigTruth,
         carrier: impl FnOnce(&Plan) -> Result<Carried, String>,
         seed: u64,
+        output: Output,
     ) -> Result<Self, String> {
         for (kind, triad) in [("gyro", &truth.unit.gyro), ("accel", &truth.unit.accel)] {
-            if !triad.analog {
-                return Err(format!(
-                    "rig: `unit.{kind}` is a digital part, but the board's pins are analog; name a part with output in volts"
-                ));
+            match output {
+                Output::Analog if !triad.analog => {
+                    return Err(format!(
+                        "rig: `unit.{kind}` is a digital part, but the board's pins are analog; name a part with output in volts"
+                    ));
+                }
+                Output::Digital { .. } if triad.analog => {
+                    return Err(format!(
+                        "rig: `unit.{kind}` is an analog part, but the board's sensor is digital; name ICM-42688-P-{kind}"
+                    ));
+                }
+                _ => {}
             }
         }
         let mut at = plan.clone();
@@ -99,7 +148,7 @@ impl Front {
         let motion = carrier.at(0.0).motion;
         let pins = unit.step(&motion, plan.chamber_c(0.0));
         let first = filters.step(&pins);
-        Ok(Self::Bench(Box::new(Bench {
+        Ok(Self::Bench(Arc::new(Mutex::new(Bench {
             plan: at,
             carrier,
             motion,
@@ -116,12 +165,50 @@ impl Front {
             noise_v: truth.converter.noise_codes * pins.converter_reference_v
                 / f64::from(truth.converter.bits).exp2(),
             stream: Random::new(seed, "converter noise"),
-        })))
+            output,
+            pins,
+        }))))
+    }
+
+    fn unit(&self) -> Option<MutexGuard<'_, Bench>> {
+        match self {
+            Self::Still(_) => None,
+            // A thread that panicked with it has ended the test already.
+            Self::Bench(bench) => Some(bench.lock().unwrap_or_else(PoisonError::into_inner)),
+        }
+    }
+
+    fn required(&self) -> Result<MutexGuard<'_, Bench>, String> {
+        self.unit().ok_or_else(|| NO_UNIT.into())
+    }
+
+    /// What the digital sensor of the unit senses, for [`Inertial`](crate::inertial).
+    ///
+    /// Errors: there is no unit with a digital sensor.
+    pub(crate) fn feed(&self) -> Result<Feed, String> {
+        match self {
+            Self::Bench(bench) if self.crystal().is_some() => {
+                let bench = bench.clone();
+                Ok(Box::new(move |ns| {
+                    let mut bench = bench.lock().unwrap_or_else(PoisonError::into_inner);
+                    bench.sensed(ns)
+                }))
+            }
+            _ => Err("the unit at the bench has no digital sensor".into()),
+        }
+    }
+
+    /// The crystal of a board with a digital sensor, relative to its nominal frequency.
+    pub(crate) fn crystal(&self) -> Option<f64> {
+        match self.unit()?.output {
+            Output::Analog => None,
+            Output::Digital { crystal } => Some(crystal),
+        }
     }
 
     /// The same, with the plan beginning at a time, ns, that is not yet past.
-    pub fn begun_at(mut self, ns: u64) -> Self {
-        if let Self::Bench(bench) = &mut self {
+    pub fn begun_at(self, ns: u64) -> Self {
+        if let Some(mut bench) = self.unit() {
             bench.began_ns = ns;
         }
         self
@@ -129,51 +216,49 @@ impl Front {
 
     /// Sets what the microcontroller drives from now on.
     pub fn drive(&mut self, drives: Drives) {
-        if let Self::Bench(bench) = self {
+        if let Some(mut bench) = self.unit() {
             bench.drives = drives;
         }
     }
 
     /// What holds the unit, if there is one.
     pub fn carried_by(&self) -> Option<CarriedBy> {
-        match self {
-            Self::Still(_) => None,
-            Self::Bench(bench) => Some(bench.plan.carrier),
-        }
+        self.unit().map(|bench| bench.plan.carrier)
     }
 
     /// Gives a command to the table or the person, from a time on, ns.
     ///
     /// Errors: it cannot do this, or it carries out a plan; a one-line message names the alternative.
     pub fn command(&mut self, ns: u64, command: Command) -> Result<(), String> {
-        let t_s = self.advanced(ns);
-        self.taking_commands()?.command(t_s, command)
+        let mut bench = self.required()?;
+        let t_s = bench.advanced(ns);
+        bench.taking_commands()?.command(t_s, command)
     }
 
     /// Whether it is still moving by command at a time, ns.
     ///
     /// Errors: it carries out a plan.
     pub fn busy(&mut self, ns: u64) -> Result<bool, String> {
-        let t_s = self.advanced(ns);
-        Ok(self.taking_commands()?.busy(t_s))
+        let mut bench = self.required()?;
+        let t_s = bench.advanced(ns);
+        Ok(bench.taking_commands()?.busy(t_s))
     }
 
     /// Its commanded position at a time, ns.
     ///
     /// Errors: it carries out a plan.
     pub fn position(&mut self, ns: u64) -> Result<Position, String> {
-        let t_s = self.advanced(ns);
-        Ok(self.taking_commands()?.position(t_s))
+        let mut bench = self.required()?;
+        let t_s = bench.advanced(ns);
+        Ok(bench.taking_commands()?.position(t_s))
     }
 
     /// Brings the chamber to a temperature (°C) from a time (ns) on: at a steady rate (K/s), or at once.
     ///
     /// Errors: there is no chamber.
     pub fn set_chamber(&mut self, ns: u64, to_c: f64, rate: Option<f64>) -> Result<(), String> {
-        let t_s = self.advanced(ns);
-        let Self::Bench(bench) = self else {
-            return Err(NO_UNIT.into());
-        };
+        let mut bench = self.required()?;
+        let t_s = bench.advanced(ns);
         let from_c = bench.plan.chamber_c(t_s);
         let ramp_s = rate.map_or(0.0, |rate| (to_c - from_c).abs() / rate);
         bench.plan.chamber = match ramp_s > 0.0 {
@@ -187,50 +272,24 @@ impl Front {
     ///
     /// Errors: there is no chamber.
     pub fn chamber_c(&mut self, ns: u64) -> Result<f64, String> {
-        let t_s = self.advanced(ns);
-        match self {
-            Self::Still(_) => Err(NO_UNIT.into()),
-            Self::Bench(bench) => Ok(bench.plan.chamber_c(t_s)),
-        }
+        let mut bench = self.required()?;
+        let t_s = bench.advanced(ns);
+        Ok(bench.plan.chamber_c(t_s))
     }
 
     /// The true motion of the unit at a time, ns, or up to 50 µs after it.
     ///
     /// Errors: there is no unit.
     pub fn motion(&mut self, ns: u64) -> Result<Motion, String> {
-        self.advanced(ns);
-        match self {
-            Self::Still(_) => Err(NO_UNIT.into()),
-            Self::Bench(bench) => Ok(bench.motion),
-        }
+        let mut bench = self.required()?;
+        bench.advanced(ns);
+        Ok(bench.motion)
     }
 
     /// Advances the unit to a time, ns, when no voltages are needed.
     pub fn advance(&mut self, ns: u64) {
-        self.advanced(ns);
-    }
-
-    /// Advances to a time, ns, and returns the time of the last step, s since the plan or the lead-in began: computed steps cannot be changed any
-    /// more.
-    fn advanced(&mut self, ns: u64) -> f64 {
-        match self {
-            Self::Still(_) => 0.0,
-            Self::Bench(bench) => {
-                bench.advance(ns.saturating_sub(bench.began_ns));
-                bench.t_s()
-            }
-        }
-    }
-
-    fn taking_commands(&mut self) -> Result<&mut (dyn Commanded + Send + 'static), String> {
-        match self {
-            Self::Still(_) => Err(NO_UNIT.into()),
-            Self::Bench(bench) => match &mut bench.carrier {
-                Carried::Plan(_) => Err(
-                    "the unit follows a plan; start the bench with --control to command it".into(),
-                ),
-                Carried::Commands(carrier) => Ok(&mut **carrier),
-            },
+        if let Some(mut bench) = self.unit() {
+            bench.advanced(ns);
         }
     }
 
@@ -238,7 +297,13 @@ impl Front {
     pub fn at(&mut self, ns: u64) -> Volts {
         match self {
             Self::Still(volts) => *volts,
-            Self::Bench(bench) => bench.at(ns),
+            Self::Bench(bench) => {
+                let mut bench = bench.lock().unwrap_or_else(PoisonError::into_inner);
+                match bench.output {
+                    Output::Analog => bench.at(ns),
+                    Output::Digital { .. } => Volts::GROUND,
+                }
+            }
         }
     }
 }
@@ -247,7 +312,10 @@ impl fmt::Debug for Front {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Still(volts) => f.debug_tuple("Still").field(volts).finish(),
-            Self::Bench(bench) => f.debug_tuple("Bench").field(&bench.steps).finish(),
+            Self::Bench(_) => {
+                let steps = self.unit().map(|bench| bench.steps);
+                f.debug_tuple("Bench").field(&steps).finish()
+            }
         }
     }
 }
@@ -292,6 +360,9 @@ pub struct Bench {
     accel_supply_v: f64,
     noise_v: f64,
     stream: Random,
+    output: Output,
+    /// The unit's outputs at the step number `steps`.
+    pins: Pins,
 }
 
 impl Bench {
@@ -312,6 +383,36 @@ impl Bench {
         }
     }
 
+    /// Advances to a time, ns, and returns the time of the last step, s since the plan or the lead-in began: computed steps cannot be changed any
+    /// more.
+    fn advanced(&mut self, ns: u64) -> f64 {
+        let ns = match self.output {
+            Output::Analog => ns,
+            Output::Digital { crystal } => (ns as f64 * crystal) as u64,
+        };
+        self.advance(ns.saturating_sub(self.began_ns));
+        self.t_s()
+    }
+
+    fn taking_commands(&mut self) -> Result<&mut (dyn Commanded + Send + 'static), String> {
+        match &mut self.carrier {
+            Carried::Plan(_) => {
+                Err("the unit follows a plan; start the bench with --control to command it".into())
+            }
+            Carried::Commands(carrier) => Ok(&mut **carrier),
+        }
+    }
+
+    /// What the digital sensor senses at a time, ns by the crystal, or up to 50 µs after it.
+    fn sensed(&mut self, ns: u64) -> Sensed {
+        self.advance(ns.saturating_sub(self.began_ns));
+        Sensed {
+            rate_dps: self.pins.gyro_v.map(|counts| counts / PER_DPS),
+            force_g: self.pins.accel_v.map(|counts| counts / PER_G),
+            die_c: self.pins.temp_c,
+        }
+    }
+
     /// Time of the last step, s.
     fn t_s(&self) -> f64 {
         self.steps as f64 / STEPS_PER_S as f64
@@ -324,6 +425,10 @@ impl Bench {
             let t_s = self.t_s();
             self.motion = self.carrier.at(t_s).motion;
             let mut pins = self.unit.step(&self.motion, self.plan.chamber_c(t_s));
+            if matches!(self.output, Output::Digital { .. }) {
+                self.pins = pins;
+                continue;
+            }
             self.deflect(&mut pins);
             self.before = std::mem::replace(&mut self.after, self.filters.step(&pins));
         }

@@ -30,9 +30,18 @@ pub struct Sizes {
 /// Location of the image from `cargo build -p mimu-firmware --profile image --target thumbv7em-none-eabihf`: in the target directory that
 /// `CARGO_TARGET_DIR` names, or in `target` here.
 pub fn release_image() -> PathBuf {
+    built("mimu-firmware")
+}
+
+/// The same of the image for the Matek H743, which `make images` puts beside it.
+pub fn digital_release_image() -> PathBuf {
+    built("mimu-firmware-matek-h743")
+}
+
+fn built(name: &str) -> PathBuf {
     let target =
         std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
-    target.join("thumbv7em-none-eabihf/image/mimu-firmware")
+    target.join("thumbv7em-none-eabihf/image").join(name)
 }
 
 impl Image {

@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use mimu_rig::rig_file::{Parts, RigFile};
 use rigless::chip::Timeline;
 use rigless::chip::icm42688p::Icm42688p;
 use rigless::chip::spi::Peer;
@@ -13,6 +14,14 @@ use rigless::snapshot::Store;
 use rigless::soc::stm32h743::peripherals::gpio::Pin;
 use rigless::soc::stm32h743::peripherals::spi::Select;
 use rigless::time::{EventId, VirtualNanos};
+
+/// The rig with an ICM-42688-P where it names no parts.
+pub fn with_digital_parts(mut rig: RigFile) -> RigFile {
+    let part = |name: &str| Some(Parts::One(name.into()));
+    rig.unit.gyro = rig.unit.gyro.or(part("ICM-42688-P-gyro"));
+    rig.unit.accel = rig.unit.accel.or(part("ICM-42688-P-accel"));
+    rig
+}
 
 /// Number of its interface among SPI1 to SPI6.
 pub(crate) const INTERFACE: usize = 0;

@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use clap::{Parser, Subcommand};
 use mimu_board::front::Front;
-use mimu_board::image::{Image, release_image};
+use mimu_board::image::{Image, digital_release_image, release_image};
+use mimu_board::inertial::with_digital_parts;
 use mimu_board::running::Board;
 use mimu_board::serve::{self, Served};
 use mimu_rig::located::Source;
@@ -38,7 +39,13 @@ enum Command {
 #[derive(clap::Args)]
 #[command(after_help = KEYS)]
 struct Serve {
-    /// Firmware, an ELF file [default: the release image in the target directory]
+    /// The board.
+    #[arg(long, default_value = "nucleo")]
+    board: BoardKind,
+    /// Frequency of the crystal of a Matek over its nominal one: to it, the sensor's clock is off by the inverse.
+    #[arg(long, value_name = "RATIO", default_value_t = 1.0, value_parser = crystal)]
+    crystal: f64,
+    /// Firmware, an ELF file [default: the board's release image in the target directory]
     #[arg(long, value_name = "ELF")]
     image: Option<PathBuf>,
     /// Parameters of the unit, the table and the person; all are optional.
@@ -82,6 +89,14 @@ enum Pace {
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
+enum BoardKind {
+    /// NUCLEO-H743ZI2 with analog sensors.
+    Nucleo,
+    /// Matek H743 with an ICM-42688-P.
+    Matek,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
 enum Carrier {
     /// A turntable.
     Table,
@@ -113,6 +128,12 @@ fn unit_id(text: &str) -> Result<[u8; 12], String> {
     Ok(id)
 }
 
+/// Parses the ratio of a crystal.
+fn crystal(text: &str) -> Result<f64, String> {
+    let ratio = text.parse().ok().filter(|r| (0.9..=1.1).contains(r));
+    ratio.ok_or_else(|| format!("{text:?} is not a ratio from 0.9 to 1.1"))
+}
+
 /// The seed as a unit id.
 fn seeded(seed: u64) -> [u8; 12] {
     let mut id = [0; 12];
@@ -142,14 +163,31 @@ impl Serve {
             Some(path) => RigFile::read(path)?,
             None => RigFile::default(),
         };
-        let truth = RigTruth::resolve(&rig, self.seed)?;
-        let image = Image::read(&self.image.unwrap_or_else(release_image))?;
-        let front = match self.control {
-            Some(_) => Front::commanded(&plan, &truth, self.seed)?,
-            None => Front::bench(&plan, &truth, self.seed)?,
+        let rig = match self.board {
+            BoardKind::Nucleo => rig,
+            BoardKind::Matek => with_digital_parts(rig),
         };
+        let truth = RigTruth::resolve(&rig, self.seed)?;
         let unit_id = self.unit_id.unwrap_or_else(|| seeded(self.seed));
-        let board = Board::numbered(&image, front, unit_id)?;
+        let (seed, crystal, commands) = (self.seed, self.crystal, self.control.is_some());
+        let board = match self.board {
+            BoardKind::Nucleo => {
+                let image = Image::read(&self.image.unwrap_or_else(release_image))?;
+                let front = match commands {
+                    true => Front::commanded(&plan, &truth, seed)?,
+                    false => Front::bench(&plan, &truth, seed)?,
+                };
+                Board::numbered(&image, front, unit_id)?
+            }
+            BoardKind::Matek => {
+                let image = Image::read(&self.image.unwrap_or_else(digital_release_image))?;
+                let front = match commands {
+                    true => Front::commanded_digital(&plan, &truth, seed, crystal)?,
+                    false => Front::digital(&plan, &truth, seed, crystal)?,
+                };
+                Board::matek(&image, front, unit_id)?
+            }
+        };
         let pace = match self.pace {
             Pace::Wall => serve::Pace::Wall,
             Pace::Fast => serve::Pace::Fast,

@@ -56,6 +56,7 @@ pub struct Board {
     thread: Option<JoinHandle<Result<(), String>>>,
     line: Line,
     state: BoardState,
+    digital: bool,
 }
 
 impl Board {
@@ -89,6 +90,16 @@ impl Board {
         Self::wired(image, front, Some(sensor), Wiring::matek(crystal), unit_id)
     }
 
+    /// The Matek H743 with the unit of [`Front::digital`] or [`Front::commanded_digital`]: its sensor senses what the unit does, with the unit's
+    /// errors.
+    ///
+    /// Errors: as [`Board::new`], and a front without a digital sensor.
+    pub fn matek(image: &Image, front: Front, unit_id: [u8; 12]) -> Result<Self, String> {
+        let crystal = front.crystal().unwrap_or(1.0);
+        let sensor = Inertial::new(front.feed()?, crystal);
+        Self::wired(image, front, Some(sensor), Wiring::matek(crystal), unit_id)
+    }
+
     fn wired(
         image: &Image,
         front: Front,
@@ -96,6 +107,7 @@ impl Board {
         wiring: Wiring,
         unit_id: [u8; 12],
     ) -> Result<Self, String> {
+        let digital = sensor.is_some();
         let line = Line::default();
         let machine = Machine::new(front, sensor, wiring, FarEnd(line.clone()), unit_id)
             .map_err(|e| e.to_string())?;
@@ -126,6 +138,7 @@ impl Board {
                 ns: 0,
                 instructions: 0,
             },
+            digital,
         };
         board.wait()?;
         Ok(board)
@@ -165,6 +178,11 @@ impl Board {
         });
         let _ = self.orders.send(Order::Do(task));
         answer.recv().map_err(|_| self.ended())
+    }
+
+    /// Whether its sensor is digital.
+    pub fn is_digital(&self) -> bool {
+        self.digital
     }
 
     /// Its current state.

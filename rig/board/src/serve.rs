@@ -31,6 +31,9 @@ pub enum Pace {
 /// Longest virtual time until a firmware sends its first byte, ms.
 const START_MS: u32 = 2000;
 
+/// Virtual time until a digital board streams, ns: it first measures the rate of its sensor.
+const MEASURING_NS: u64 = 800_000_000;
+
 /// Virtual time between two polls of the terminal, ns: the longest delay of a request.
 const SLICE_NS: u64 = 1_000_000;
 
@@ -128,7 +131,7 @@ impl Served {
         })
     }
 
-    /// Runs the board until its firmware has sent something, like a board that was plugged in before its port is opened. Executing this takes seconds
+    /// Runs the board until its firmware has sent something and measures, like a board that was plugged in before its port is opened. Executing this takes seconds
     /// on a busy machine; otherwise the program that opens the port would wait for its answer that long.
     ///
     /// Errors: the emulator gave up.
@@ -141,6 +144,10 @@ impl Served {
                 break;
             }
             spoken |= !quiet;
+        }
+        if self.board.is_digital() {
+            self.board.run_for(MEASURING_NS)?;
+            self.board.receive();
         }
         self.began = Instant::now();
         self.first_ns = self.board.state().ns;
