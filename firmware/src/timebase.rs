@@ -57,7 +57,9 @@ impl Timebase {
         self.time_us = expected_us + level.min(1.0) * off_us;
         let band_us = LARGEST_ERROR * self.nominal_us;
         let period_us = self.period_us + slope * off_us / step.max(1.0);
-        self.period_us = period_us.clamp(self.nominal_us - band_us, self.nominal_us + band_us);
+        // Not `clamp`, whose panic prints both ends: formatting of floating-point numbers is an eighth of the image.
+        let (least_us, most_us) = (self.nominal_us - band_us, self.nominal_us + band_us);
+        self.period_us = period_us.max(least_us).min(most_us);
     }
 
     /// The line continued after a gap: sample `number` was the newest when it was polled at `now_us`. The rate is still known, the phase is

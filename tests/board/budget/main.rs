@@ -8,10 +8,11 @@ use std::process::ExitCode;
 
 use mimu_board::front::Front;
 use mimu_board::image::Image;
+use mimu_board::inertial::Sensed;
 use mimu_board::running::Board;
 use mimu_board::schematic::Volts;
 use mimu_board_tests::conversation::{Answer, Conversation};
-use mimu_board_tests::{MS, STARTED, built, image, still};
+use mimu_board_tests::{MS, STARTED, built, digital_image, image, still};
 use mimu_core::effects::DeviceEffect;
 use mimu_core::wire::{EFFECTS, Request};
 
@@ -80,7 +81,30 @@ fn figures() -> Result<BTreeMap<String, f64>, String> {
     if next().is_ok() {
         return Err("tests/counted runs more than is expected".into());
     }
-    let mut device = Conversation::new(still(Volts::GROUND));
+    let each = per_ms(Conversation::new(still(Volts::GROUND)))?;
+    figures.insert("sample_instructions".into(), each);
+    for (name, cycles) in CYCLES {
+        figures.insert(name.into(), 100.0 * each * cycles / CYCLES_PER_MS);
+    }
+    let sizes = image().sizes();
+    figures.insert("flash_bytes".into(), sizes.flash as f64);
+    figures.insert("ram_bytes".into(), sizes.ram as f64);
+    let feed = Box::new(|_| Sensed {
+        rate_dps: [1.0; 3],
+        force_g: [0.5; 3],
+        die_c: 30.0,
+    });
+    let digital = Board::digital(&digital_image(), feed, 1.0, [0; 12])?;
+    let each = per_ms(Conversation::new(digital))?;
+    figures.insert("matek_sample_instructions".into(), each);
+    let sizes = digital_image().sizes();
+    figures.insert("matek_flash_bytes".into(), sizes.flash as f64);
+    figures.insert("matek_ram_bytes".into(), sizes.ram as f64);
+    Ok(figures)
+}
+
+/// Instructions in a millisecond while raw readings are streamed.
+fn per_ms(mut device: Conversation) -> Result<f64, String> {
     device.greeting();
     device.run_for(STARTED);
     let stream = device.ask(Request::Stream {
@@ -90,18 +114,12 @@ fn figures() -> Result<BTreeMap<String, f64>, String> {
     if stream != Answer::Done {
         return Err(format!("the stream of raw readings: {stream:?}"));
     }
+    // A digital sensor's first sample comes half a second after its start.
+    device.run_for(1000 * MS);
     let began = device.board.state();
     let ms = 1000;
     let ended = device.board.run_for(ms * MS)?;
-    let each = (ended.instructions - began.instructions) as f64 / ms as f64;
-    figures.insert("sample_instructions".into(), each);
-    for (name, cycles) in CYCLES {
-        figures.insert(name.into(), 100.0 * each * cycles / CYCLES_PER_MS);
-    }
-    let sizes = image().sizes();
-    figures.insert("flash_bytes".into(), sizes.flash as f64);
-    figures.insert("ram_bytes".into(), sizes.ram as f64);
-    Ok(figures)
+    Ok((ended.instructions - began.instructions) as f64 / ms as f64)
 }
 
 /// Instructions between each pair of marks, minus those of the empty pair.
