@@ -53,6 +53,11 @@ impl<T: RealField + Copy, const ROOM: usize> State<T, ROOM> {
         &self.model.model
     }
 
+    /// The sample rate from now on, Hz: that of a digital sensor drifts with its temperature.
+    pub fn at_rate(&mut self, sample_rate_hz: T) {
+        self.effects.at_rate(sample_rate_hz);
+    }
+
     /// See [`effects::State::long_after_power_on`].
     pub fn long_after_power_on(self) -> Self {
         Self {

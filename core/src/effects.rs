@@ -109,6 +109,11 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
         }
     }
 
+    /// The sample rate from now on, Hz.
+    pub fn at_rate(&mut self, sample_rate_hz: T) {
+        self.sample_rate_hz = sample_rate_hz;
+    }
+
     /// For a stream whose power-on is unknown: decays count as over, and effects that grow with time count from the beginning of the
     /// stream. If a warm-up were counted from there, a wrong correction of its full size would be added.
     pub fn long_after_power_on(self) -> Self {

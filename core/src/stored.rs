@@ -8,9 +8,9 @@
 //! | 2     | version of this layout, [`VERSION`]                                                               |
 //! | 2     | length of everything                                                                              |
 //! | 1, 1  | number of nodes (1 to [`NODES`]), of effects                                                      |
-//! | 1     | thermometer that temperatures are of: 0, the mean of the gyros' TEMP pins; there is no other yet  |
+//! | 1     | thermometer that temperatures are of: 0, the board's; there is no other yet                       |
 //! | 1     | bits: 0, the range is known; 1, the lags are known                                                |
-//! | 60    | [`Origin`], zero where it is unknown: number of the unit, 12; when it was made, UTC seconds since 1970, 8; SHA-256 of the samples that it was made from, 32; when its offsets were trimmed, UTC seconds since 1970, 8 |
+//! | 88    | [`Origin`], zero where it is unknown: number of the unit, 12; when it was made, UTC seconds since 1970, 8; SHA-256 of the samples that it was made from, 32; when its offsets were trimmed, UTC seconds since 1970, 8; unit of the raw readings (1 V, 2 count), 1, and three zeros; for gyro and accelerometer the range (rad/s, m/s²), 4, and [`Setting::id`], 8 |
 //! | 144   | [`Directions`] of the gyro, D and R, then of the accelerometer: those of C that the effects were found with |
 //! | 8, 8  | range of the dies' temperatures, °C, and lags of the dies of gyro and accelerometer behind the thermometer, s; zero where they are not known |
 //! | 196   | each node: temperature of the dies, °C; C and o (rad/s) of the gyro; C and o (m/s²) of the accelerometer; the derivatives of these 24 numbers, per kelvin |
@@ -31,7 +31,7 @@
 //!
 //! [`Affine::check`]: crate::compensation::Affine::check
 //!
-//! Raw is volts at the sensor, as in [`RawBatch`](crate::wire::RawBatch). The noise of biases and the sigmas of the parameters are left
+//! Raw is volts at the sensor or counts, as in [`RawBatch`](crate::wire::RawBatch). The noise of biases and the sigmas of the parameters are left
 //! out, because the device does not use them.
 
 mod bytes;
@@ -45,6 +45,7 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use crate::PerSensor;
+use crate::Sensor;
 use crate::compensator::Compensator;
 use crate::die::DieLag;
 use crate::effects::{self, DeviceEffect, Directions, Effects};
@@ -53,11 +54,11 @@ use bytes::{Reader, Writer};
 
 pub use bytes::TooLong;
 pub use curves::Curves;
-pub use origin::Origin;
+pub use origin::{Origin, RawUnit, Setting};
 pub use trim::trim;
 
 /// Version of the layout: the only one that is read.
-pub const VERSION: u16 = 6;
+pub const VERSION: u16 = 7;
 /// Most temperature nodes.
 pub const NODES: usize = 16;
 /// Most effects of a triad that run with every sample, and as many that do not.
@@ -79,6 +80,16 @@ const HASH: Crc<u64, NoTable> = Crc::<u64, NoTable>::new(&CRC_64_XZ);
 /// CRC-32.
 pub fn hash(bytes: &[u8]) -> u64 {
     HASH.checksum(bytes)
+}
+
+/// [`hash`] over several pieces, each behind its length.
+fn hash_of(pieces: &[&[u8]]) -> u64 {
+    let mut digest = HASH.digest();
+    for piece in pieces {
+        digest.update(&(piece.len() as u64).to_le_bytes());
+        digest.update(piece);
+    }
+    digest.finalize()
 }
 
 /// A calibration in use.
@@ -134,6 +145,11 @@ pub enum StoredError {
     Temperature,
     /// Bits of the header are set that this build does not know.
     Header,
+    /// The sensors of a triad were set otherwise, or its readings had another unit, when it was made.
+    Setting {
+        /// Which.
+        sensor: Sensor,
+    },
 }
 
 impl core::fmt::Display for StoredError {
@@ -158,6 +174,10 @@ impl core::fmt::Display for StoredError {
                 f.write_str("the temperature range, a lag or the thermometer is impossible")
             }
             Self::Header => f.write_str("the header has bits of a later version"),
+            Self::Setting { sensor } => write!(
+                f,
+                "it was made with the {sensor} at another range, filter or unit than it has now"
+            ),
         }
     }
 }
@@ -239,7 +259,7 @@ pub fn read(
     }
     let mut from = Reader(body.get(LENGTH_AT + 2..).ok_or(StoredError::Length)?);
     let [nodes, effects, thermometer, known] = from.bytes().ok_or(StoredError::Length)?;
-    let origin = Origin::read(&mut from).ok_or(StoredError::Length)?;
+    let origin = Origin::read(&mut from)?;
     let both = PerSensor::from_fn(|_| directions(&mut from)).transpose();
     let both = both.ok_or(StoredError::Length)?;
     let head = curves::Head {

@@ -9,12 +9,11 @@ use mimu_core::Sensor;
 use mimu_core::stored::{self, MAX_LENGTH, NODES, ROOM, Stored};
 use mimu_core::wire::{
     CHUNK, Call, Capabilities, Counters, Decoder, Greeting, MAGIC, Message, PROTOCOL, Prior,
-    Refusal, Reply, Request, StoredInfo, effects_of_this_build, flags,
+    Refusal, Reply, Request, StoredInfo, TestTable, Triad, effects_of_this_build, flags,
 };
 
 use crate::bank::Bank;
 use crate::board;
-use crate::design_parameters::SAMPLE_HZ;
 use crate::flash::{self, Flash};
 use crate::front_end::FrontEnd;
 use crate::link::{FrameSender, Input, send};
@@ -22,7 +21,7 @@ use crate::pipeline::{Pipeline, Shared, Streams};
 use crate::restart::Before;
 use crate::sampling::Tally;
 use crate::slots::Slots;
-use crate::source::Source;
+use crate::source::{Source, usable};
 use crate::upload::Upload;
 
 /// Everything that a request may need.
@@ -111,12 +110,15 @@ impl Commands<'_> {
 
     async fn answer(&mut self, call: &Call<'_>, received: &mut Received) {
         let id = call.id;
-        let mut part = [0; CHUNK];
+        let (mut part, mut table) = ([0; CHUNK], TestTable::new());
         let outcome = match call.request {
             Request::Hello => return self.greet(id).await,
             Request::Download { offset, length } => self.download(offset, length, &mut part).await,
             Request::UploadCommit => self.commit().await.map(|()| Reply::Done),
-            Request::SelfTest => self.self_test.run(self.pipeline).await.map(Reply::SelfTest),
+            Request::SelfTest => {
+                let run = self.self_test.run(self.pipeline, &mut table).await;
+                run.map(|()| Reply::SelfTest(table.result()))
+            }
             Request::Counters => Ok(Reply::Counters(self.counters(received))),
             Request::ResetCounters => {
                 self.reset_counters(received);
@@ -222,7 +224,7 @@ impl Commands<'_> {
     #[inline(never)]
     fn use_stored(&mut self) -> Result<(), Refusal> {
         let bytes = self.upload.bytes();
-        let stored = stored::decode(bytes).map_err(Refusal::NotUsable)?;
+        let stored = usable(bytes).map_err(Refusal::NotUsable)?;
         self.stored = Some(info(bytes.len() as u32, stored::hash(bytes), &stored));
         self.pipeline.lock(|p| p.borrow_mut().calibrate(stored));
         Ok(())
@@ -254,6 +256,11 @@ impl Commands<'_> {
             true => Capabilities::USB,
             false => Capabilities(0),
         };
+        let measured_hz = self.pipeline.lock(|p| p.borrow().rate_hz());
+        let triads = board::Source::TRIADS.map(|triad| Triad {
+            rate_hz: measured_hz.unwrap_or(triad.rate_hz),
+            ..triad
+        });
         let greeting = Greeting {
             magic: MAGIC,
             protocol: PROTOCOL,
@@ -264,23 +271,18 @@ impl Commands<'_> {
                 .and(Capabilities::TERMS)
                 .and(Capabilities::KALMAN)
                 .and(board::CAPABILITIES)
-                .and(Capabilities::CURVES)
-                .and(Capabilities::TWO_LAGS)
                 .and(usb),
             effects: effects_of_this_build(),
             effects_room: ROOM as u8,
             nodes_room: NODES as u8,
             stored_room: MAX_LENGTH as u32,
-            sample_rate_hz: SAMPLE_HZ,
-            channels: "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
-            raw_unit: board::Source::TRIADS.gyro.unit,
+            triads,
+            thermometers: board::Source::PLACES,
             start: self.before.start(),
             starts: self.before.starts(),
             stored: self.stored,
             slots: self.slots.state(),
             powered_for_ms: self.powered_for_ms,
-            triads: board::Source::TRIADS,
-            thermometers: board::Source::PLACES,
         };
         send(&mut self.replies, &Message::Greeting { id, greeting }).await;
     }

@@ -35,8 +35,9 @@ pub const FULL_SCALE: u32 = u16::MAX as u32;
 /// A sum at the end of the range.
 pub const SUM_FULL_SCALE: u32 = SCANS as u32 * FULL_SCALE;
 
-/// Bits of a sum.
-const SUM_BITS: u8 = (SUM_FULL_SCALE.ilog2() + 1) as u8;
+/// Bits of a sum with a sign.
+const SUM_BITS: u8 = (SUM_FULL_SCALE.ilog2() + 2) as u8;
+const _: () = assert!(SUM_BITS <= 24, "a sum is sent in three bytes");
 
 /// Volts at the accelerometer per unit of its sum, 25.2 µV. With the nominal reference, because it is ratiometric.
 pub const ACCEL_VOLTS: f32 = REFERENCE_V / SUM_FULL_SCALE as f32;
@@ -162,7 +163,6 @@ const SAMPLE_US: u64 = 1_000_000 / SAMPLE_HZ as u64;
 
 /// A sample of the converter as the pipeline takes it.
 pub fn scan(number: u32, channels: &Channels<u32>) -> Scan<SlowSums> {
-    // At most 2^17 with two conversions a sample.
     let signed = |sums: [u32; 3]| sums.map(|sum| sum as i32);
     Scan {
         number,
@@ -206,8 +206,6 @@ impl Source for Analog {
     };
 
     const PLACES: &'static str = "gyro_x,gyro_y,gyro_z";
-
-    const COUNTS: bool = false;
 
     fn new(kept: &FrontEnd) -> Self {
         kept.pins_c.map_or(Self::NEW, Self::of_pins)

@@ -143,6 +143,10 @@ pub const SELF_TEST_ACCEL_V: f32 = 0.6;
 /// (not specified in the data sheet). An axis that should sense two thirds of gravity but senses none changes it by 0.153 V.
 pub const SELF_TEST_ACCEL_TOLERANCE_V: f32 = 0.15;
 
+/// Least change between the ranges that proves that an axis of the accelerometer responds, V: two fifths of gravity, more than nulls can
+/// differ by.
+pub const SELF_TEST_ACCEL_SEEN_V: f32 = 0.24;
+
 /// Largest relative deviation of the supply of converter and accelerometer from [`REFERENCE_V`](crate::board::REFERENCE_V): the regulator
 /// is within 2 %, and the internal reference within 1 % with its factory calibration, 3 % without.
 pub const SUPPLY_TOLERANCE: f32 = 0.05;

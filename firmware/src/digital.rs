@@ -68,8 +68,6 @@ impl<C: Part> Source for Digital<C> {
 
     const PLACES: &'static str = "die";
 
-    const COUNTS: bool = true;
-
     fn new(_: &FrontEnd) -> Self {
         Self {
             part: PhantomData,

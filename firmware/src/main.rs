@@ -24,7 +24,7 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::zerocopy_channel::Channel;
 use embassy_time::{Duration, Instant, Ticker};
 use heapless::Vec;
-use mimu_core::stored::{self, MAX_LENGTH};
+use mimu_core::stored::MAX_LENGTH;
 use mimu_core::wire::{Message, StoredInfo, flags};
 use mimu_firmware::board::{self, Board};
 use mimu_firmware::commands::{Commands, info};
@@ -38,6 +38,7 @@ use mimu_firmware::pipeline::{Pipeline, Shared};
 use mimu_firmware::restart::{self, Before};
 use mimu_firmware::sampling::{self, QUEUE, TALLY};
 use mimu_firmware::slots::Slots;
+use mimu_firmware::source::usable;
 use mimu_firmware::upload::Upload;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -188,7 +189,7 @@ fn pipeline(
     let pipeline = PIPELINE.init_with(|| Mutex::new(RefCell::new(Pipeline::new(kept))));
     pipeline.lock(|p| p.borrow_mut().powered_for(powered_for_ms));
     let info = in_use.and_then(|(length, hash)| {
-        let stored = stored::decode(bytes).ok()?;
+        let stored = usable(bytes).ok()?;
         let info = info(length, hash, &stored);
         pipeline.lock(|p| p.borrow_mut().calibrate(stored));
         Some(info)

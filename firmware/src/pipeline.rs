@@ -16,8 +16,8 @@ use mimu_core::compensation::Sample;
 use mimu_core::stored::Stored;
 use mimu_core::table::Place;
 use mimu_core::wire::{
-    BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, CountBatch, Event, Message, RAW_BYTES,
-    RawBatch, flags, reading,
+    BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, Event, Message, RAW_BYTES, RawBatch,
+    flags, reading,
 };
 use nalgebra::Vector3;
 
@@ -67,9 +67,6 @@ struct Batch<Slow> {
     dies_c: (f32, Option<f32>),
     /// Raw units per unit of the integers.
     scale: PerSensor<f32>,
-    /// Time of the first sample, µs, and time between samples, ns.
-    tick_us: u64,
-    period_ns: u32,
     temps_c: Vec<f32, THERMOMETERS>,
     raw: Vec<[u8; RAW_BYTES], BATCH>,
     compensated: Vec<[u8; COMPENSATED_BYTES], BATCH>,
@@ -106,6 +103,8 @@ impl<S: Source> Pipeline<S> {
                 streams: Streams::default(),
                 head: BatchHead {
                     first: 0,
+                    tick_us: 0,
+                    period_ns: 0,
                     samples_lost: 0,
                     batches_dropped: 0,
                     temp_c: 0.0,
@@ -114,8 +113,6 @@ impl<S: Source> Pipeline<S> {
                 closed: false,
                 dies_c: (0.0, None),
                 scale: PerSensor::both(0.0),
-                tick_us: 0,
-                period_ns: 0,
                 temps_c: Vec::new(),
                 raw: Vec::new(),
                 compensated: Vec::new(),
@@ -129,6 +126,12 @@ impl<S: Source> Pipeline<S> {
             measurement: None,
             banks: PerSensor::both(None),
         }
+    }
+
+    /// Samples per second by the crystal; `None` before the first batch.
+    pub fn rate_hz(&self) -> Option<f32> {
+        let head = &self.batch.head;
+        (head.period_ns > 0).then_some(head.rate_hz() as f32)
     }
 
     /// Sets the time since power-on at sample 0, ms (default 0; `None`: unknown). Call it before [`Self::calibrate`].
@@ -235,7 +238,7 @@ impl<S: Source> Pipeline<S> {
         }
         batch.head.flags |= self.held_flags;
         // There is always room, because a full batch ends below.
-        let _ = batch.raw.push(CountBatch::pack(&scan.counts));
+        let _ = batch.raw.push(RawBatch::pack(&scan.counts));
         // Even without a stream, because the effects need every sample; the load is then always the same.
         if let Some(calibrated) = &mut self.calibrated {
             let sample = calibrated.apply(&raw);
@@ -272,7 +275,6 @@ impl<S: Source> Pipeline<S> {
     }
 
     fn begin_batch(&mut self, scan: &Scan<S::Slow>) {
-        let number = scan.number;
         if !self.source.begun() {
             self.source.update(&scan.slow, 1);
         }
@@ -283,18 +285,19 @@ impl<S: Source> Pipeline<S> {
         batch.streams = self.streams;
         batch.compensated.clear();
         batch.scale = self.source.scale();
-        (batch.tick_us, batch.period_ns) = (scan.tick_us, scan.period_ns);
         batch.temps_c = self.source.temperatures_c();
         batch.slow = S::Slow::default();
         batch.head = BatchHead {
-            first: number,
+            first: scan.number,
+            tick_us: scan.tick_us,
+            period_ns: scan.period_ns,
             samples_lost: self.losses.samples,
             batches_dropped: self.losses.batches,
             temp_c,
             flags: self.source.flags(),
         };
         if let Some(calibrated) = &mut self.calibrated {
-            if calibrated.follow(number, thermometer_c) != Place::Inside {
+            if calibrated.follow(&batch.head, thermometer_c) != Place::Inside {
                 batch.head.flags |= flags::OUTSIDE_NODES;
             }
             batch.dies_c = calibrated.dies_c(temp_c);
@@ -313,7 +316,12 @@ impl<S: Source> Pipeline<S> {
         let (streams, head) = (batch.streams, batch.head);
         let (mut dropped, mut temperatures) = (0, [0; 4 * THERMOMETERS]);
         if streams.raw {
-            let event = raw_event::<S>(batch, &mut temperatures);
+            let event = Event::Raw(RawBatch {
+                head,
+                scale: batch.scale,
+                temperatures: temperature_bytes(&batch.temps_c, &mut temperatures),
+                samples: batch.raw.as_flattened(),
+            });
             dropped += u32::from(!send(&Message::Event(event)));
         }
         if streams.compensated {
@@ -333,34 +341,13 @@ impl<S: Source> Pipeline<S> {
     }
 }
 
-/// The raw samples of a batch; `temperatures` gets the bytes of their temperatures.
-fn raw_event<'a, S: Source>(
-    batch: &'a Batch<S::Slow>,
-    temperatures: &'a mut [u8; 4 * THERMOMETERS],
-) -> Event<'a> {
-    let (head, samples) = (batch.head, batch.raw.as_flattened());
-    if !S::COUNTS {
-        let temp_c = |i: usize| batch.temps_c.get(i).copied().unwrap_or_default();
-        return Event::Raw(RawBatch {
-            head,
-            gyro_volts: batch.scale.gyro,
-            accel_volts: batch.scale.accel,
-            gyro_temps_c: core::array::from_fn(temp_c),
-            samples,
-        });
-    }
-    let (places, _) = temperatures.as_chunks_mut::<4>();
-    for (bytes, temp_c) in places.iter_mut().zip(&batch.temps_c) {
+/// The bytes of the temperatures of a batch, in `room`.
+fn temperature_bytes<'a>(temps_c: &[f32], room: &'a mut [u8; 4 * THERMOMETERS]) -> &'a [u8] {
+    let (places, _) = room.as_chunks_mut::<4>();
+    for (bytes, temp_c) in places.iter_mut().zip(temps_c) {
         *bytes = temp_c.to_le_bytes();
     }
-    Event::Counts(CountBatch {
-        head,
-        tick_us: batch.tick_us,
-        period_ns: batch.period_ns,
-        scale: batch.scale,
-        temperatures: &temperatures[..4 * batch.temps_c.len()],
-        samples,
-    })
+    &room[..4 * temps_c.len().min(THERMOMETERS)]
 }
 
 #[cfg(all(test, not(feature = "matek-h743")))]

@@ -16,11 +16,12 @@
 
 use embedded_storage_async::nor_flash::NorFlash;
 use heapless::Vec;
-use mimu_core::stored::{self, MAX_LENGTH, hash};
+use mimu_core::stored::{MAX_LENGTH, hash};
 use mimu_core::wire::Slot;
 
 use crate::design_parameters::FLASH_WORD as WORD;
 use crate::front_end::{FRONT_END_WORDS, FrontEnd};
+use crate::source::usable;
 
 const MAGIC: [u8; 4] = *b"slt2";
 
@@ -257,7 +258,7 @@ impl<F: NorFlash> Slots<F> {
             return (state, None);
         };
         let whole = self.read_all(slot, front.length, buffer).await && hash(buffer) == front.hash;
-        let state = match whole.then(|| stored::decode(buffer)) {
+        let state = match whole.then(|| usable(buffer)) {
             None => Slot::Damaged,
             Some(Err(refused)) => Slot::NotUsable(refused),
             Some(Ok(_)) => Slot::Whole {

@@ -12,8 +12,10 @@ use core::ops::AddAssign;
 use heapless::Vec;
 use mimu_core::PerSensor;
 use mimu_core::compensation::Sample;
+use mimu_core::stored::{self, Stored, StoredError};
 use mimu_core::wire::Triad;
 
+use crate::board;
 use crate::front_end::FrontEnd;
 
 /// Most thermometers of a source.
@@ -37,6 +39,14 @@ pub struct Scan<Slow> {
     pub slow: Slow,
 }
 
+/// The calibration in `bytes`, if it is one for the sensors of [`board::Source`] as they are set: with another range or filter the same
+/// motion makes other readings.
+pub fn usable(bytes: &[u8]) -> Result<Stored, StoredError> {
+    let stored = stored::decode(bytes)?;
+    stored.origin.check_sensors(&board::Source::TRIADS)?;
+    Ok(stored)
+}
+
 /// Why a source had to begin anew. Samples were lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
@@ -54,14 +64,11 @@ pub trait Source {
     /// Slow quantities of a scan; the pipeline adds up those of a batch.
     type Slow: Copy + Default + AddAssign;
 
-    /// The triads by their data sheets. The rate is the nominal one.
+    /// The triads by their data sheets. The rate is the nominal one; the greeting has the measured one.
     const TRIADS: PerSensor<Triad<'static>>;
 
     /// Places of the thermometers, separated by commas.
     const PLACES: &'static str;
-
-    /// Whether the raw stream has signed counts with the crystal's time, or the sums of a converter whose clock is the crystal's.
-    const COUNTS: bool;
 
     /// Before the first scan, with what was stored with the calibration in use.
     fn new(kept: &FrontEnd) -> Self;

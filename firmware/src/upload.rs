@@ -1,8 +1,10 @@
 //! An upload in progress.
 
 use heapless::Vec;
-use mimu_core::stored::{self, MAX_LENGTH, hash};
+use mimu_core::stored::{MAX_LENGTH, hash};
 use mimu_core::wire::{CHUNK, Refusal};
+
+use crate::source::usable;
 
 /// The announced upload.
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +82,7 @@ impl<'a> Upload<'a> {
         if found != announced.hash {
             return Err(Refusal::WrongHash { found });
         }
-        let stored = stored::decode(bytes).map_err(Refusal::NotUsable)?;
+        let stored = usable(bytes).map_err(Refusal::NotUsable)?;
         match stored.origin.unit_id {
             Some(other) if other != *unit_id && !announced.other_unit => {
                 Err(Refusal::OtherUnit { unit_id: other })
@@ -104,16 +106,18 @@ impl<'a> Upload<'a> {
 mod tests {
     use super::*;
     use mimu_core::PerSensor;
+    use mimu_core::Sensor;
     use mimu_core::compensation::{Affine, Compensation};
-    use mimu_core::stored::{Curves, Origin};
+    use mimu_core::stored::{self, Curves, Origin, RawUnit, Setting, StoredError};
     use mimu_core::table::Node;
+    use mimu_core::wire::Triad;
     use nalgebra::{Matrix3, Vector3};
 
     const UNIT: [u8; 12] = *b"unit-number1";
     const OTHER: [u8; 12] = *b"unit-number2";
 
-    #[test]
-    fn a_calibration_of_another_unit_is_refused_unless_the_upload_insists() {
+    /// What the device says to a calibration with this origin.
+    fn checked(origin: Origin, other_unit: bool) -> Result<(), Refusal> {
         let affine = Affine {
             matrix: Matrix3::identity(),
             offset: Vector3::zeros(),
@@ -124,6 +128,22 @@ mod tests {
         };
         let nodes = [Node::constant(25.0, model)];
         let curves = Curves::of(&nodes);
+        let mut bytes = [0; MAX_LENGTH];
+        let matrices = PerSensor::both(&affine.matrix);
+        let length = stored::encode(&origin, matrices, &curves, &[], &mut bytes).unwrap();
+        let bytes = &bytes[..length];
+        let mut received = Vec::new();
+        let mut upload = Upload::new(&mut received);
+        let begun = upload.begin(length as u32, hash(bytes), other_unit);
+        assert_eq!(begun, Ok(()));
+        for (k, part) in bytes.chunks(CHUNK).enumerate() {
+            upload.chunk((k * CHUNK) as u32, part).unwrap();
+        }
+        upload.check(&UNIT)
+    }
+
+    #[test]
+    fn a_calibration_of_another_unit_is_refused_unless_the_upload_insists() {
         let refused = Err(Refusal::OtherUnit { unit_id: OTHER });
         for (unit_id, other_unit, expected) in [
             (None, false, Ok(())),
@@ -135,19 +155,58 @@ mod tests {
                 unit_id,
                 ..Origin::UNKNOWN
             };
-            let mut bytes = [0; MAX_LENGTH];
-            let matrices = PerSensor::both(&affine.matrix);
-            let length = stored::encode(&origin, matrices, &curves, &[], &mut bytes).unwrap();
-            let bytes = &bytes[..length];
-            let mut received = Vec::new();
-            let mut upload = Upload::new(&mut received);
-            let begun = upload.begin(length as u32, hash(bytes), other_unit);
-            assert_eq!(begun, Ok(()));
-            for (k, part) in bytes.chunks(CHUNK).enumerate() {
-                upload.chunk((k * CHUNK) as u32, part).unwrap();
-            }
-            assert_eq!(upload.check(&UNIT), expected);
+            assert_eq!(checked(origin, other_unit), expected);
         }
+    }
+
+    #[test]
+    fn a_calibration_of_another_range_filter_or_unit_is_refused_always() {
+        let own = <crate::board::Source as crate::source::Source>::TRIADS;
+        let other_unit = match own.gyro.unit {
+            "V" => RawUnit::Count,
+            _ => RawUnit::Volt,
+        };
+        let of = |accel: Triad<'_>| Origin {
+            settings: Some(PerSensor {
+                gyro: Setting::of(&own.gyro),
+                accel: Setting::of(&accel),
+            }),
+            raw_unit: RawUnit::named(own.gyro.unit),
+            ..Origin::UNKNOWN
+        };
+        assert_eq!(checked(of(own.accel), false), Ok(()));
+        let refused = |sensor| Err(Refusal::NotUsable(StoredError::Setting { sensor }));
+        let range = 0.5 * own.accel.range;
+        let accel = refused(Sensor::Accel);
+        assert_eq!(checked(of(Triad { range, ..own.accel }), true), accel);
+        let filter = "another";
+        assert_eq!(
+            checked(
+                of(Triad {
+                    filter,
+                    ..own.accel
+                }),
+                true
+            ),
+            accel
+        );
+        // The rate is measured, and no setting.
+        let rate_hz = 0.97 * own.accel.rate_hz;
+        assert_eq!(
+            checked(
+                of(Triad {
+                    rate_hz,
+                    ..own.accel
+                }),
+                false
+            ),
+            Ok(())
+        );
+        let origin = Origin {
+            raw_unit: Some(other_unit),
+            ..Origin::UNKNOWN
+        };
+        assert_eq!(checked(origin, true), refused(Sensor::Gyro));
     }
 
     #[test]

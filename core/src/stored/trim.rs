@@ -1,13 +1,13 @@
 //! Trim: new offsets for a stored calibration; everything else is kept.
 
 use super::bytes::Reader;
-use super::{CHECK, CRC, HEADER, StoredError, curves, decode};
+use super::{CHECK, CRC, HEADER, StoredError, curves, decode, origin};
 use crate::PerSensor;
 
 /// Position of the time of the trim.
-const TRIMMED_AT: usize = HEADER + 52;
+const TRIMMED_AT: usize = HEADER + origin::TRIMMED_AT;
 /// Position of the first node: after the origin, the directions and the fields before the nodes.
-const NODES_AT: usize = HEADER + 60 + 144 + curves::BEFORE_NODES;
+const NODES_AT: usize = HEADER + origin::LENGTH + 144 + curves::BEFORE_NODES;
 const NODE: usize = 196;
 /// Positions of o of the gyro and o of the accelerometer in a node.
 const OFFSETS_AT: PerSensor<usize> = PerSensor {

@@ -11,10 +11,10 @@ use crate::effects::REFERENCE_C;
 /// Largest number of samples in a batch. A batch is shorter before a missing sample, because its samples are consecutive, and before the
 /// first sample of a new calibration.
 ///
-/// Twenty samples mean 20 ms of delay; the 46 bytes of overhead are then 11 % of a raw frame.
+/// Twenty samples mean 20 ms of delay; the overhead is then 13 % of a raw frame.
 pub const BATCH: usize = 20;
 
-/// Bytes of a raw sample: six sums of three bytes.
+/// Bytes of a raw sample: six integers of three bytes.
 pub const RAW_BYTES: usize = 18;
 
 /// Bytes of a compensated sample: six `f32`.
@@ -33,10 +33,10 @@ pub mod flags {
     pub const SATURATED: u16 = 1 << 3;
     /// The gyros' reference is out of its range (its pin is open), so its nominal voltage is used.
     pub const NO_REFERENCE: u16 = 1 << 4;
-    /// TEMP pins of gyro x, y, z. A pin that is out of range, disagrees with the others, has jumped faster than a die can, or is stuck
-    /// while the others change is left out of [`BatchHead::temp_c`](super::BatchHead::temp_c).
+    /// The first three thermometers of the greeting. One that is out of range, disagrees with the others, has jumped faster than a die can, or
+    /// is stuck while the others change is left out of [`BatchHead::temp_c`](super::BatchHead::temp_c).
     pub const TEMPERATURE_LEFT_OUT: [u16; 3] = [1 << 5, 1 << 6, 1 << 7];
-    /// No TEMP pin is usable, so the last good temperature is used; before there was one, 25 °C.
+    /// No thermometer is usable, so the last good temperature is used; before there was one, 25 °C.
     pub const NO_TEMPERATURE: u16 = 1 << 8;
     /// The time since power-on is unknown: decays after power-on count as over.
     pub const POWER_ON_UNKNOWN: u16 = 1 << 9;
@@ -46,27 +46,25 @@ pub mod flags {
     pub const OWN_FACTORS: u16 = 1 << 11;
 }
 
-/// Bytes of a sample of signed counts: six of three bytes.
-pub const COUNT_BYTES: usize = 18;
-
-/// Signed readings of x, y, z of a digital sensor: at most 24 bits.
+/// Integers of x, y, z as the board has them, at most 24 bits with their sign: counts of a digital sensor, or sums of a converter's codes over
+/// the scans of a sample, because a mean would lose resolution.
 pub type Counts = PerSensor<[i32; 3]>;
-
-/// Sums of the converter's codes of x, y, z over the scans of a sample; a mean would lose resolution.
-pub type Sums = PerSensor<[u32; 3]>;
 
 /// Fields that apply to all samples of a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BatchHead {
-    /// Number of the first sample: milliseconds since sampling began. The others follow one by one; a gap between batches is a gap
-    /// in time.
+    /// Number of the first sample since sampling began. The others follow one by one; a gap between batches is a gap in time.
     pub first: u32,
+    /// Time of the first sample by the board's crystal, µs since sampling began.
+    pub tick_us: u64,
+    /// True time between samples by the crystal, ns: a digital sensor samples by a clock of its own.
+    pub period_ns: u32,
     /// Samples that the device has lost so far, for any reason: sampling restarted, or processing was late.
     pub samples_lost: u32,
     /// Batches lost so far because the line was too slow.
     pub batches_dropped: u32,
-    /// Temperature, °C. In a raw batch it is that of the thermometer: the filtered mean of the gyros' usable TEMP pins. In a compensated
-    /// batch it is that of the gyros' dies, which compensation uses: the same after the calibration's lag.
+    /// Temperature, °C. In a raw batch it is that of the thermometer: the filtered mean of those that are usable. In a compensated batch it is
+    /// that of the gyros' dies, which compensation uses: the same after the calibration's lag.
     pub temp_c: f32,
     /// [`flags`].
     pub flags: u16,
@@ -78,6 +76,33 @@ impl BatchHead {
         let none = self.flags & flags::NO_TEMPERATURE != 0 && self.temp_c == REFERENCE_C as f32;
         (!none).then_some(self.temp_c)
     }
+
+    /// Samples per second by the crystal.
+    pub fn rate_hz(&self) -> f64 {
+        1e9 / f64::from(self.period_ns)
+    }
+
+    /// Time from `us` to the first sample, s: what slow effects follow with. In single precision and by this division everywhere, because the
+    /// operation decides the last digit.
+    pub fn since_s(&self, us: u64) -> f32 {
+        self.tick_us.wrapping_sub(us) as f32 / 1e6
+    }
+
+    /// Time of one of its samples by the crystal, s since sampling began.
+    pub fn time_s(&self, number: u32) -> f64 {
+        let k = u64::from(number.wrapping_sub(self.first));
+        let since_ns = k.saturating_mul(u64::from(self.period_ns));
+        self.tick_us.saturating_mul(1000).saturating_add(since_ns) as f64 / 1e9
+    }
+
+    /// Times of the samples by the crystal, ns since sampling began, in order.
+    pub fn times_ns(&self) -> impl Iterator<Item = u64> + use<> {
+        let (tick_us, period_ns) = (self.tick_us, u64::from(self.period_ns));
+        (0_u64..).map(move |k| {
+            let first = tick_us.saturating_mul(1000);
+            first.saturating_add(k.saturating_mul(period_ns))
+        })
+    }
 }
 
 /// Raw readings.
@@ -85,29 +110,11 @@ impl BatchHead {
 pub struct RawBatch<'a> {
     /// What holds for all of them.
     pub head: BatchHead,
-    /// Volts at a gyro per unit of its sum. It follows the filtered reading of the gyros' reference, which removes the drift of the
-    /// converter's reference. Reading in V = sum * this, in `f32`, as the device compensates it.
-    pub gyro_volts: f32,
-    /// Volts at the accelerometer per unit of its sum.
-    pub accel_volts: f32,
-    /// Filtered temperatures of the TEMP pins of gyro x, y, z, °C, including pins that are left out.
-    pub gyro_temps_c: [f32; 3],
-    /// [`Sums`]: gyro x, y, z, accel x, y, z, each three bytes, little end first; sample after sample.
-    pub samples: &'a [u8],
-}
-
-/// Raw readings of a digital sensor, which samples by a clock of its own. Since protocol 2.3.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct CountBatch<'a> {
-    /// What holds for all of them.
-    pub head: BatchHead,
-    /// Time of the first sample by the device's crystal, µs since sampling began.
-    pub tick_us: u64,
-    /// True time between the samples by the crystal, ns.
-    pub period_ns: u32,
-    /// Raw units of [`Triad::unit`](super::Triad::unit) per count. Reading = count * this, in `f32`, as the device compensates it.
+    /// Raw units of [`Triad::unit`](super::Triad::unit) per unit of the integers. Reading = integer * this, in `f32`, as the device
+    /// compensates it. That of analog gyros follows the filtered reading of their reference, which removes the drift of the converter's.
     pub scale: PerSensor<f32>,
-    /// Temperatures of the thermometers of the greeting in their order, °C, each an `f32`, little end first.
+    /// Filtered temperatures of the greeting's thermometers in their order, °C, including those that are left out: each an `f32`, little end
+    /// first.
     pub temperatures: &'a [u8],
     /// [`Counts`]: gyro x, y, z, accel x, y, z, each three bytes, two's complement, little end first; sample after sample.
     pub samples: &'a [u8],
@@ -120,75 +127,35 @@ pub struct CompensatedBatch<'a> {
     pub head: BatchHead,
     /// Gyro x, y, z, rad/s, accel x, y, z, m/s², each an `f32`, little end first; sample after sample.
     pub samples: &'a [u8],
-    /// Temperature of the accelerometer's die, °C, if the calibration has a separate lag for it; `None` if it is that of the gyros. Since
-    /// protocol 2.2.
+    /// Temperature of the accelerometer's die, °C, if the calibration has a separate lag for it; `None` if it is that of the gyros.
     #[serde(with = "extensible::last")]
     pub accel_die_c: Option<f32>,
 }
 
 impl<'a> RawBatch<'a> {
-    /// The bytes of a sample, from its sums; those above 2²⁴ are cut off.
-    pub fn pack(sums: &Sums) -> [u8; RAW_BYTES] {
+    /// The bytes of a sample; bits beyond 24 are cut off.
+    pub fn pack(counts: &Counts) -> [u8; RAW_BYTES] {
         let mut bytes = [0; RAW_BYTES];
-        let sums = sums.gyro.iter().chain(&sums.accel);
-        for (bytes, sum) in bytes.as_chunks_mut::<3>().0.iter_mut().zip(sums) {
-            for (byte, of) in bytes.iter_mut().zip(sum.to_le_bytes()) {
+        let counts = counts.gyro.iter().chain(&counts.accel);
+        for (bytes, count) in bytes.as_chunks_mut::<3>().0.iter_mut().zip(counts) {
+            // Two's complement: the lower three bytes are those of the shorter number.
+            for (byte, of) in bytes.iter_mut().zip(count.to_le_bytes()) {
                 *byte = of;
             }
         }
         bytes
     }
 
-    /// Whether the length of [`Self::samples`] is one that a device sends.
+    /// Whether the lengths are those that a device sends.
     pub fn is_whole(&self) -> bool {
         self.samples.len().is_multiple_of(RAW_BYTES)
             && (1..=BATCH).contains(&(self.samples.len() / RAW_BYTES))
-    }
-
-    /// Numbers and sums of the samples, in order.
-    pub fn sums(&self) -> impl Iterator<Item = (u32, Sums)> + 'a {
-        numbers(self.head.first).zip(sums(self.samples))
-    }
-
-    /// Numbers and readings of the samples, V, in order; identical to the readings that the device compensates, to the last bit.
-    pub fn volts(&self) -> impl Iterator<Item = (u32, Sample<f32>)> + 'a {
-        let (gyro, accel) = (self.gyro_volts, self.accel_volts);
-        self.sums()
-            .map(move |(number, sums)| (number, volts(&sums, gyro, accel)))
-    }
-}
-
-impl<'a> CountBatch<'a> {
-    /// The bytes of a sample; bits beyond 24 are cut off.
-    pub fn pack(counts: &Counts) -> [u8; COUNT_BYTES] {
-        // Two's complement: the lower three bytes are those of the unsigned number.
-        let unsigned = |counts: [i32; 3]| counts.map(|count| count as u32);
-        RawBatch::pack(&Sums {
-            gyro: unsigned(counts.gyro),
-            accel: unsigned(counts.accel),
-        })
-    }
-
-    /// Whether the lengths are those that a device sends.
-    pub fn is_whole(&self) -> bool {
-        self.samples.len().is_multiple_of(COUNT_BYTES)
-            && (1..=BATCH).contains(&(self.samples.len() / COUNT_BYTES))
             && self.temperatures.len().is_multiple_of(4)
     }
 
-    /// Numbers and counts of the samples, in order.
+    /// Numbers and integers of the samples, in order.
     pub fn counts(&self) -> impl Iterator<Item = (u32, Counts)> + 'a {
-        // The sign is the highest of 24 bits.
-        let signed = |sums: [u32; 3]| sums.map(|sum| ((sum << 8) as i32) >> 8);
-        numbers(self.head.first)
-            .zip(sums(self.samples))
-            .map(move |(number, sums)| {
-                let counts = Counts {
-                    gyro: signed(sums.gyro),
-                    accel: signed(sums.accel),
-                };
-                (number, counts)
-            })
+        numbers(self.head.first).zip(counts(self.samples))
     }
 
     /// Numbers and readings of the samples in raw units, in order; identical to the readings that the device compensates, to the last bit.
@@ -198,12 +165,6 @@ impl<'a> CountBatch<'a> {
             .map(move |(number, counts)| (number, reading(&counts, &scale)))
     }
 
-    /// Times of the samples by the crystal, s since sampling began, in order.
-    pub fn times_s(&self) -> impl Iterator<Item = f64> + 'a {
-        let (tick_us, period_ns) = (self.tick_us, u64::from(self.period_ns));
-        (0_u64..).map(move |k| tick_us as f64 * 1e-6 + (k * period_ns) as f64 * 1e-9)
-    }
-
     /// Temperatures of the thermometers, °C.
     pub fn temperatures_c(&self) -> impl Iterator<Item = f32> + 'a {
         let (bytes, _) = self.temperatures.as_chunks::<4>();
@@ -211,23 +172,13 @@ impl<'a> CountBatch<'a> {
     }
 }
 
-/// Reading of a sample in raw units; see [`CountBatch::scale`].
+/// Reading of a sample in raw units; see [`RawBatch::scale`].
 #[inline]
 pub fn reading(counts: &Counts, scale: &PerSensor<f32>) -> Sample<f32> {
     let of = |counts: [i32; 3], scale: f32| Vector3::from(counts).map(|count| count as f32) * scale;
     Sample {
         gyro: of(counts.gyro, scale.gyro),
         accel: of(counts.accel, scale.accel),
-    }
-}
-
-/// Reading of a sample, V, from its sums and the volts per unit; see [`RawBatch`].
-#[inline]
-pub fn volts(sums: &Sums, gyro_volts: f32, accel_volts: f32) -> Sample<f32> {
-    let volts = |sums: [u32; 3], step: f32| Vector3::from(sums).map(|sum| sum as f32) * step;
-    Sample {
-        gyro: volts(sums.gyro, gyro_volts),
-        accel: volts(sums.accel, accel_volts),
     }
 }
 
@@ -280,24 +231,24 @@ impl<'a> CompensatedBatch<'a> {
     }
 }
 
-/// Six numbers of three bytes, sample after sample.
-fn sums(samples: &[u8]) -> impl Iterator<Item = Sums> {
+/// Six signed numbers of three bytes, sample after sample.
+fn counts(samples: &[u8]) -> impl Iterator<Item = Counts> {
     samples.as_chunks::<RAW_BYTES>().0.iter().map(|bytes| {
-        let mut sums = [0; 6];
-        for (sum, bytes) in sums.iter_mut().zip(bytes.as_chunks::<3>().0) {
-            for byte in bytes.iter().rev() {
-                *sum = *sum << 8 | u32::from(*byte);
-            }
+        let mut counts = [0_i32; 6];
+        for (count, bytes) in counts.iter_mut().zip(bytes.as_chunks::<3>().0) {
+            let [low, middle, high] = *bytes;
+            // The sign is the highest of 24 bits.
+            *count = i32::from_le_bytes([0, low, middle, high]) >> 8;
         }
-        let [gx, gy, gz, ax, ay, az] = sums;
-        Sums {
+        let [gx, gy, gz, ax, ay, az] = counts;
+        Counts {
             gyro: [gx, gy, gz],
             accel: [ax, ay, az],
         }
     })
 }
 
-/// Sample numbers from the first on; after 49 days they wrap to 0.
+/// Sample numbers from the first on; after 49 days of 1 kHz they wrap to 0.
 fn numbers(first: u32) -> impl Iterator<Item = u32> {
     (0..).map(move |k| first.wrapping_add(k))
 }

@@ -10,7 +10,7 @@ use super::greeting::MAGIC;
 use super::message::{Call, Event, Message, Refusal, Reply};
 
 /// Most bytes of a message. The longest is a compensated batch, some bytes shorter.
-pub const MAX_PAYLOAD: usize = 512;
+pub const MAX_PAYLOAD: usize = 528;
 
 const CHECK: usize = 4;
 

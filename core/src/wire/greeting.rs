@@ -1,4 +1,4 @@
-//! Identity of the device. The layout of version 2 never changes; later versions append fields. A field that the device does not send is
+//! Identity of the device. The layout of version 3 never changes; later versions append fields. A field that the device does not send is
 //! read as zero (none or unknown); one that this build does not know is ignored.
 
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use crate::stored;
 pub const MAGIC: [u8; 4] = *b"mimu";
 
 /// The protocol of this build.
-pub const PROTOCOL: Version = Version { major: 2, minor: 3 };
+pub const PROTOCOL: Version = Version { major: 3, minor: 0 };
 
 /// Version of a protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -46,12 +46,11 @@ pub struct Greeting<'a> {
     pub nodes_room: u8,
     /// Most bytes of a stored calibration.
     pub stored_room: u32,
-    /// Samples per second.
-    pub sample_rate_hz: u32,
-    /// Channels of a sample in their order, separated by commas.
-    pub channels: &'a str,
-    /// Unit of a raw reading.
-    pub raw_unit: &'a str,
+    /// The sensors. All three axes of both triads are one sample.
+    #[serde(borrow)]
+    pub triads: PerSensor<Triad<'a>>,
+    /// Places of the thermometers in the order of their temperatures, separated by commas.
+    pub thermometers: &'a str,
     /// Reset cause.
     #[serde(borrow, with = "extensible")]
     pub start: Start<'a>,
@@ -64,11 +63,6 @@ pub struct Greeting<'a> {
     pub slots: [Slot; 2],
     /// Time since power-on at the start of sampling, ms; `None` if unknown.
     pub powered_for_ms: Option<u32>,
-    /// The sensors. Since protocol 2.3.
-    #[serde(borrow)]
-    pub triads: PerSensor<Triad<'a>>,
-    /// Places of the thermometers in the order of their temperatures, separated by commas. Since protocol 2.3.
-    pub thermometers: &'a str,
 }
 
 /// A triad of sensors: what its readings are, by the data sheet.
@@ -107,10 +101,6 @@ impl Capabilities {
     pub const SELF_TEST: Self = Self(1 << 3);
     /// Is connected by its own USB and not by a serial line.
     pub const USB: Self = Self(1 << 4);
-    /// Stores temperature nodes with derivatives, range and lag: layout 5 of [`stored`].
-    pub const CURVES: Self = Self(1 << 5);
-    /// And a lag for each triad: layout 6.
-    pub const TWO_LAGS: Self = Self(1 << 6);
 
     /// Whether all of `those` are among them.
     pub const fn contains(self, those: Self) -> bool {

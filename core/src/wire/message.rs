@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::batch::{CompensatedBatch, CountBatch, RawBatch};
+use super::batch::{CompensatedBatch, RawBatch};
 use super::greeting::Greeting;
+use super::self_test::SelfTest;
 use crate::Sensor;
 
 /// Most bytes of a stored calibration in one message, either way.
@@ -71,7 +72,7 @@ pub enum Request<'a> {
     KalmanStart {
         /// Of the sensors.
         sensor: Sensor,
-        /// Variances of single readings of the sensors x, y, z, V².
+        /// Variances of single readings of the sensors x, y, z, raw units squared.
         noise: [f32; 3],
         /// The prior.
         prior: Prior,
@@ -140,7 +141,7 @@ pub enum Reply<'a> {
     /// The counters.
     Counters(Counters),
     /// Results of the self-test.
-    SelfTest(SelfTest),
+    SelfTest(#[serde(borrow)] SelfTest<'a>),
     /// Part of the stored calibration.
     Stored {
         /// Of the first byte.
@@ -163,8 +164,6 @@ pub enum Event<'a> {
     Compensated(#[serde(borrow)] CompensatedBatch<'a>),
     /// A running bank, five times a second.
     Kalman(KalmanState),
-    /// Raw readings of a digital sensor, instead of [`Event::Raw`]. Since protocol 2.3.
-    Counts(#[serde(borrow)] CountBatch<'a>),
 }
 
 /// Why a call was not done.
@@ -226,7 +225,7 @@ pub enum Prior {
     },
     /// Independent parameters.
     Known {
-        /// `[b, P1, P2, P3]` of the sensors x, y, z: V, and V per rad/s or per m/s².
+        /// `[b, P1, P2, P3]` of the sensors x, y, z: raw units, and raw units per rad/s or per m/s².
         mean: [[f32; 4]; 3],
         /// Their variances, the units squared.
         variance: [[f32; 4]; 3],
@@ -253,49 +252,10 @@ pub struct KalmanState {
 /// Estimate of one sensor: forward model, SI to raw.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct KalmanAxis {
-    /// `[b, P1, P2, P3]`: V, and V per rad/s or per m/s².
+    /// `[b, P1, P2, P3]`: raw units, and raw units per rad/s or per m/s².
     pub mean: [f32; 4],
     /// Upper triangle of their covariance, by rows: 00 01 02 03 11 12 13 22 23 33.
     pub covariance: [f32; 10],
-}
-
-/// Responses of the sensors to their self-test inputs, and their supplies. Later versions append fields, as to [`Greeting`].
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct SelfTest {
-    /// Change of the gyros' outputs by ST1, V at the gyro.
-    pub gyro_st1_v: [f32; 3],
-    /// The same by ST2.
-    pub gyro_st2_v: [f32; 3],
-    /// Outputs of the accelerometer at its finest range, V.
-    pub accel_fine_v: [f32; 3],
-    /// The same at its coarsest.
-    pub accel_coarse_v: [f32; 3],
-    /// Temperatures by the TEMP pins of gyro x, y, z, °C.
-    pub gyro_temps_c: [f32; 3],
-    /// Reference of the gyros, V at the gyro.
-    pub reference_v: f32,
-    /// Supply of the converter and of the accelerometer, V, by the microcontroller's internal reference.
-    pub supply_v: f32,
-    /// Bits of [`checks`].
-    pub passed: u16,
-}
-
-/// Bits of [`SelfTest::passed`].
-pub mod checks {
-    /// Gyro x, y, z responded to both inputs as in its data sheet.
-    pub const GYRO: [u16; 3] = [1, 1 << 1, 1 << 2];
-    /// Accelerometer x, y, z followed its range about a null that its data sheet allows.
-    pub const ACCEL: [u16; 3] = [1 << 3, 1 << 4, 1 << 5];
-    /// The three axes of the accelerometer together sense gravity.
-    pub const GRAVITY: u16 = 1 << 6;
-    /// The TEMP pin of gyro x, y, z is in its range and agrees with the others.
-    pub const TEMPERATURE: [u16; 3] = [1 << 7, 1 << 8, 1 << 9];
-    /// The gyros' reference is within its data sheet's range.
-    pub const REFERENCE: u16 = 1 << 10;
-    /// The supply of the converter is within its regulator's range.
-    pub const SUPPLY: u16 = 1 << 11;
-    /// All of them.
-    pub const ALL: u16 = (1 << 12) - 1;
 }
 
 /// Counters of the device since its start, or since [`Request::ResetCounters`]. Later versions append fields, as to [`Greeting`].

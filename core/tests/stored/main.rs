@@ -5,7 +5,8 @@ mod table;
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{self, DeviceEffect, Variable};
 use mimu_core::stored::{
-    Curves, MAX_LENGTH, NODES, Origin, ROOM, StoredError, decode, encode, hash, read, trim,
+    Curves, MAX_LENGTH, NODES, Origin, ROOM, RawUnit, Setting, StoredError, decode, encode, hash,
+    read, trim,
 };
 use mimu_core::table::Node;
 use mimu_core::{PerSensor, Sensor};
@@ -112,6 +113,17 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         samples_sha256: Some([0xab; 32]),
         // A day later.
         trimmed_s: Some(0x6957_0a80),
+        raw_unit: Some(RawUnit::Count),
+        settings: Some(PerSensor {
+            gyro: Setting {
+                range: 0.5,
+                id: 0x0102,
+            },
+            accel: Setting {
+                range: -2.0,
+                id: 0x1122_3344_5566_7788,
+            },
+        }),
     };
     let length = encode(
         &origin,
@@ -125,7 +137,7 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     )
     .unwrap();
     let all = &all[..length];
-    let mut expected = b"mimc\x06\x00".to_vec();
+    let mut expected = b"mimc\x07\x00".to_vec();
     expected.extend((all.len() as u16).to_le_bytes());
     // One node, two effects, the TEMP pins; range and lags are known.
     expected.extend([1, 2, 0, 3]);
@@ -133,6 +145,11 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     expected.extend([0x00, 0xb9, 0x55, 0x69, 0, 0, 0, 0]);
     expected.extend([0xab; 32]);
     expected.extend([0x80, 0x0a, 0x57, 0x69, 0, 0, 0, 0]);
+    expected.extend([2, 0, 0, 0]);
+    expected.extend([0, 0, 0, 0x3f, 0x02, 0x01, 0, 0, 0, 0, 0, 0]);
+    expected.extend([
+        0, 0, 0, 0xc0, 0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11,
+    ]);
     // D by rows, and R: for right angles, one is the transpose of the other.
     for rows in [
         [[0, 1, 0], [-1, 0, 0], [0, 0, 1]],
@@ -346,7 +363,7 @@ fn bits_of_a_later_version_and_lags_that_nothing_follows_are_refused() {
 #[test]
 fn what_is_not_known_of_an_origin_is_zero() {
     let unknown = bytes(&[node(25.0, &regular())], &[]);
-    assert_eq!(unknown[12..72], [0; 60]);
+    assert_eq!(unknown[12..100], [0; 88]);
     assert_eq!(decode(&unknown).unwrap().origin, Origin::UNKNOWN);
 }
 

@@ -3,9 +3,9 @@
 use mimu_core::PerSensor;
 use mimu_core::effects::DeviceEffect;
 use mimu_core::wire::{
-    BATCH, BatchHead, COMPENSATED_BYTES, COUNT_BYTES, Call, Compatibility, CompensatedBatch,
-    CountBatch, Decoder, EFFECTS, Event, Greeting, MAGIC, MAX_FRAME, MAX_PAYLOAD, Message,
-    PROTOCOL, RAW_BYTES, RawBatch, Request, Version, compatibility, effects_of_this_build, encode,
+    BATCH, BatchHead, COMPENSATED_BYTES, Call, Compatibility, CompensatedBatch, Decoder, EFFECTS,
+    Event, Greeting, MAGIC, MAX_FRAME, MAX_PAYLOAD, Message, PROTOCOL, RAW_BYTES, RawBatch,
+    Request, Version, compatibility, effects_of_this_build, encode,
 };
 use proptest::prelude::*;
 
@@ -50,6 +50,9 @@ const CRC_OF_01_00: u32 = 0x58c2_23be;
 fn head() -> BatchHead {
     BatchHead {
         first: u32::MAX,
+        // A year.
+        tick_us: 31_536_000_000_000,
+        period_ns: u32::MAX,
         samples_lost: u32::MAX,
         batches_dropped: u32::MAX,
         temp_c: 25.0,
@@ -63,20 +66,9 @@ fn full_batches_fit() {
     let raw = [255; BATCH * RAW_BYTES];
     let raw = frame(&Message::Event(Event::Raw(RawBatch {
         head: head(),
-        gyro_volts: 1.0,
-        accel_volts: 1.0,
-        gyro_temps_c: [1.0; 3],
-        samples: &raw,
-    })));
-    let counts = [255; BATCH * COUNT_BYTES];
-    let counts = frame(&Message::Event(Event::Counts(CountBatch {
-        head: head(),
-        // A year.
-        tick_us: 31_536_000_000_000,
-        period_ns: u32::MAX,
         scale: PerSensor::both(1.0),
         temperatures: &[255; 12],
-        samples: &counts,
+        samples: &raw,
     })));
     let compensated = [255; BATCH * COMPENSATED_BYTES];
     let compensated = frame(&Message::Event(Event::Compensated(CompensatedBatch {
@@ -86,9 +78,8 @@ fn full_batches_fit() {
     })));
     let frames_a_second = 1000 / BATCH;
     assert!(raw.len() * frames_a_second <= 24_000, "{}", raw.len());
-    assert!(counts.len() <= MAX_FRAME, "{}", counts.len());
     assert!(compensated.len() <= MAX_FRAME, "{}", compensated.len());
-    let all = [raw.len(), counts.len(), compensated.len()];
+    let all = [raw.len(), compensated.len()];
     println!("{all:?} bytes");
     let (payloads, garbled) = decode(&compensated);
     assert_eq!((payloads.len(), garbled), (1, 0));

@@ -1,45 +1,49 @@
-//! Frames of version 2.0 as a device sends them, byte by byte. A separate program made them from the specifications of postcard, COBS and CRC-32.
+//! Frames of version 3.0 as a device sends them, byte by byte. A separate program made them from the specifications of postcard, COBS and CRC-32.
 //! They never change: a device in the field meets programs older and newer than its firmware.
 
 // Fields that are not written out belong to later versions.
 #![allow(clippy::needless_update)]
 
+use mimu_core::PerSensor;
 use mimu_core::wire::{
     Capabilities, Compatibility, Counters, Decoder, EFFECTS, Event, Greeting, MAGIC, Message,
-    Refusal, Reply, SelfTest, Slot, Start, StoredInfo, Version, compatibility,
+    Refusal, Reply, SelfTest, Slot, Start, StoredInfo, TestRow, Triad, Verdict, Version,
+    compatibility,
 };
 
 /// A device's greeting.
-const GREETING: &str = "000107076d696d7502650d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
-     0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015601 \
-     250301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca0602010501059a3c25b400";
-/// The same from a device that does not yet send its slots, the last field.
-const GREETING_SHORTER: &str = "000107076d696d7502650d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
-     0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015601 \
-     250301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca066b8fe73f00";
-/// The same with the fields up to 2.3, empty, and additional bytes at the end.
-const GREETING_LONGER: &str = "000107076d696d7502650d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
-     0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015601 \
-     250301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca0602010501010101010101010101010101010101010101 \
-     0101010101010101010101010101010101010101010101010b2a0474657874f0559abc00";
+const GREETING: &str = "000107076d696d75033f0d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
+     03081080200841445852533330300156120103a840010320400103903e01167a4405343020487a094d4d4137323630515401561201036c \
+     410103d43f0103a03d01217a4407312e36206b487a146779726f5f782c6779726f5f792c6779726f5f7a01250301b802ef9bafcdf8acd1 \
+     910101020102030405060708090a0b0c80f2d6ca06020105010105396834a200";
+/// The same from a device that does not send the last fields: its slots and the time since power-on.
+const GREETING_SHORTER: &str = "000107076d696d75033f0d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
+     03081080200841445852533330300156120103a840010320400103903e01167a4405343020487a094d4d4137323630515401561201036c \
+     410103d43f0103a03d01217a4407312e36206b487a146779726f5f782c6779726f5f792c6779726f5f7a01250301b802ef9bafcdf8acd1 \
+     910101020102030405060708090a0b0c80f2d6ca0601b6adff00";
+/// The same with additional bytes at the end.
+const GREETING_LONGER: &str = "000107076d696d75033f0d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
+     03081080200841445852533330300156120103a840010320400103903e01167a4405343020487a094d4d4137323630515401561201036c \
+     410103d43f0103a03d01217a4407312e36206b487a146779726f5f782c6779726f5f792c6779726f5f7a01250301b802ef9bafcdf8acd1 \
+     910101020102030405060708090a0b0c80f2d6ca0602010501010b2a0474657874f9d538d700";
 /// The same with a start reason of a later version, number 19, with five bytes.
-const UNKNOWN_START: &str = "000107076d696d7502900d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
-     0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015607 \
-     130568656c6c6f0301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca0602010501050e29b3db00";
+const UNKNOWN_START: &str = "000107076d696d75033f0d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
+     03081080200841445852533330300156120103a840010320400103903e01167a4405343020487a094d4d4137323630515401561201036c \
+     410103d43f0103a03d014c7a4407312e36206b487a146779726f5f782c6779726f5f792c6779726f5f7a07130568656c6c6f0301b802ef \
+     9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca0602010501010572147c9500";
+/// All counters.
 const COUNTERS: &str = "001d010701bbd024fccf24fbcf240102030405060708090a9c036be31a2d00";
 /// Without the last field.
 const COUNTERS_SHORTER: &str = "001b010701bbd024fccf24fbcf240102030405060708090a24e942de00";
 /// With two additional fields.
 const COUNTERS_LONGER: &str =
     "0020010701bbd024fccf24fbcf240102030405060708090a9c030580019dcebd7900";
-const SELF_TEST: &str = "0034010702713d8abe713d8abe713d8abe713d8a3e713d8a3e713d8a3e3333d33f3333d33fcdcc1c403333d33f3333d33fcd \
-     ccec3f0103cc410103d2410103c641010d204033335340ff1fc61d8cf300";
-/// Without the fields after the accelerometer's fine range.
-const SELF_TEST_SHORTER: &str =
-    "002c010702713d8abe713d8abe713d8abe713d8a3e713d8a3e713d8a3e3333d33f3333d33fcdcc1c400bcd240100";
+/// A self-test of three rows.
+const SELF_TEST: &str = "00110107024e0b6779726f20782c20535431010580be0156010102bf010102be0f0d616363656c20782c206e756c6c0105d03f01560103 \
+     c03f010be03f0206737570706c79010540400156010348400108604001bac1dc3e00";
 /// With an additional field.
-const SELF_TEST_LONGER: &str = "0034010702713d8abe713d8abe713d8abe713d8a3e713d8a3e713d8a3e3333d33f3333d33fcdcc1c403333d33f3333d33fcd \
-     ccec3f0103cc410103d2410103c641010f204033335340ff1f0101b5fc63d100";
+const SELF_TEST_LONGER: &str = "00110107024e0b6779726f20782c20535431010580be0156010102bf010102be0f0d616363656c20782c206e756c6c0105d03f01560103 \
+     c03f010be03f0206737570706c7901054040015601034840010a6040010101e0998cdd00";
 /// With a reason of a later version, number 99, with three bytes.
 const UNKNOWN_REFUSAL: &str = "000b0207630102035add44cd00";
 
@@ -66,7 +70,7 @@ fn read<T>(hex: &str, look: impl Fn(&Message<'_>) -> T) -> T {
 fn greeting() -> Greeting<'static> {
     Greeting {
         magic: MAGIC,
-        protocol: Version { major: 2, minor: 0 },
+        protocol: Version { major: 3, minor: 0 },
         firmware: "0.1.0-1a2b3c4",
         board: "NUCLEO-H743ZI2",
         unit_id: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12],
@@ -78,9 +82,29 @@ fn greeting() -> Greeting<'static> {
         effects_room: 8,
         nodes_room: 16,
         stored_room: 4096,
-        sample_rate_hz: 1000,
-        channels: "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
-        raw_unit: "V",
+        triads: PerSensor {
+            gyro: Triad {
+                part: "ADXRS300",
+                unit: "V",
+                bits: 18,
+                range: 5.25,
+                null: 2.5,
+                per_si: 0.28125,
+                rate_hz: 1000.0,
+                filter: "40 Hz",
+            },
+            accel: Triad {
+                part: "MMA7260QT",
+                unit: "V",
+                bits: 18,
+                range: 14.75,
+                null: 1.65625,
+                per_si: 0.078125,
+                rate_hz: 1000.0,
+                filter: "1.6 kHz",
+            },
+        },
+        thermometers: "gyro_x,gyro_y,gyro_z",
         start: Start::PowerOn,
         starts: 3,
         stored: Some(StoredInfo {
@@ -114,14 +138,14 @@ fn greets(hex: &str, expected: &Greeting<'_>) {
 }
 
 #[test]
-fn a_greeting_of_2_0_is_read_for_ever() {
+fn a_greeting_of_3_0_is_read_for_ever() {
     greets(GREETING, &greeting());
     // Today's greeting begins with the same bytes.
     let message = Message::Greeting {
         id: 7,
         greeting: greeting(),
     };
-    let mut room = [0; 512];
+    let mut room = [0; 528];
     let sent = postcard::to_slice(&message, &mut room).unwrap();
     let mut decoder = Decoder::new();
     let frame = bytes(GREETING);
@@ -158,7 +182,7 @@ fn a_reason_to_start_that_is_not_known_hides_nothing_behind_it() {
 }
 
 #[test]
-fn counters_of_2_0_are_read_for_ever_and_whatever_their_length() {
+fn counters_of_3_0_are_read_for_ever_and_whatever_their_length() {
     let whole = Counters {
         uptime_ms: 600_123,
         samples: 600_060,
@@ -200,35 +224,35 @@ fn counters_of_2_0_are_read_for_ever_and_whatever_their_length() {
 }
 
 #[test]
-fn a_self_test_of_2_0_is_read_for_ever_and_whatever_its_length() {
-    let whole = SelfTest {
-        gyro_st1_v: [-0.27; 3],
-        gyro_st2_v: [0.27; 3],
-        accel_fine_v: [1.65, 1.65, 2.45],
-        accel_coarse_v: [1.65, 1.65, 1.85],
-        gyro_temps_c: [25.5, 26.25, 24.75],
-        reference_v: 2.5,
-        supply_v: 3.3,
-        passed: 0xfff,
-        ..SelfTest::default()
+fn a_self_test_of_3_0_is_read_for_ever_and_whatever_its_length() {
+    let row = |name, value, limits, verdict| TestRow {
+        name,
+        value,
+        unit: "V",
+        limits,
+        verdict,
     };
-    let shorter = SelfTest {
-        gyro_st1_v: whole.gyro_st1_v,
-        gyro_st2_v: whole.gyro_st2_v,
-        accel_fine_v: whole.accel_fine_v,
-        ..SelfTest::default()
-    };
-    for (hex, expected) in [
-        (SELF_TEST, whole),
-        (SELF_TEST_LONGER, whole),
-        (SELF_TEST_SHORTER, shorter),
-    ] {
-        let id = 7;
-        let reply = Reply::SelfTest(expected);
+    let expected = [
+        row("gyro x, ST1", -0.25, [-0.5, -0.125], Verdict::Passed),
+        row("accel x, null", 1.625, [1.5, 1.75], Verdict::NotShown),
+        row("supply", 3.0, [3.125, 3.5], Verdict::Failed),
+    ];
+    for hex in [SELF_TEST, SELF_TEST_LONGER] {
         read(hex, |message| {
-            assert_eq!(*message, Message::Reply { id, reply })
+            let Message::Reply {
+                id: 7,
+                reply: Reply::SelfTest(test),
+            } = message
+            else {
+                panic!("{message:?}");
+            };
+            assert!(test.is_whole());
+            assert_eq!(test.rows().collect::<Vec<_>>(), expected);
         });
     }
+    // Rows that are cut off are not all of a table.
+    let cut = SelfTest { rows: &[3, b'a'] };
+    assert_eq!((cut.rows().count(), cut.is_whole()), (0, false));
 }
 
 #[test]
@@ -238,12 +262,13 @@ fn a_refusal_for_an_unknown_reason_is_a_refusal() {
     read(UNKNOWN_REFUSAL, |message| assert_eq!(*message, expected));
 }
 
-/// A device of protocol 2.1 ends a compensated batch with its samples, and a later one may append.
+/// A compensated batch may end with its samples, and a later version may append.
 #[test]
 fn a_compensated_batch_is_read_whatever_follows_its_samples() {
     let sample = [0x40_u8; 24];
     let before = [
-        &[3, 1, 5, 0, 0][..],
+        // First sample 5 at 3 µs, every 4 ns; none lost.
+        &[3, 1, 5, 3, 4, 0, 0][..],
         &25.0_f32.to_le_bytes(),
         &[0, 24],
         &sample,

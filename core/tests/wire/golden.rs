@@ -3,9 +3,9 @@
 
 use mimu_core::stored;
 use mimu_core::wire::{
-    BatchHead, Call, Capabilities, CompensatedBatch, CountBatch, Counters, Counts, Event, Frame,
-    Greeting, KalmanAxis, KalmanState, MAGIC, Message, Prior, RawBatch, Refusal, Reply, Request,
-    SelfTest, Slot, Start, StoredInfo, Sums, Triad, Version, checks, flags,
+    BatchHead, Call, Capabilities, CompensatedBatch, Counters, Counts, Event, Frame, Greeting,
+    KalmanAxis, KalmanState, MAGIC, Message, Prior, RawBatch, Refusal, Reply, Request, Slot, Start,
+    StoredInfo, TestRow, TestTable, Triad, Version, flags,
 };
 use mimu_core::{PerSensor, Sensor};
 use serde::{Deserialize, Serialize};
@@ -26,7 +26,7 @@ fn frozen<'a, T>(message: T, bytes: &'a [u8])
 where
     T: Serialize + Deserialize<'a> + PartialEq + std::fmt::Debug,
 {
-    let mut room = [0; 512];
+    let mut room = [0; 528];
     let written = postcard::to_slice(&message, &mut room).unwrap();
     assert_eq!(written, bytes, "{message:?}");
     let (read, rest) = postcard::take_from_bytes::<T>(bytes).unwrap();
@@ -38,7 +38,7 @@ where
 fn request(request: Request<'_>, text: &str) {
     // 300 is 2 * 128 + 44: ac 02.
     let bytes = hex(&format!("ac02 {text}"));
-    let mut room = [0; 512];
+    let mut room = [0; 528];
     let call = Call { id: 300, request };
     assert_eq!(postcard::to_slice(&call, &mut room).unwrap(), bytes);
     assert_eq!(postcard::from_bytes::<Call<'_>>(&bytes).unwrap(), call);
@@ -117,7 +117,7 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
         id: 1,
         greeting: Greeting {
             magic: MAGIC,
-            protocol: Version { major: 2, minor: 1 },
+            protocol: Version { major: 3, minor: 1 },
             firmware: "0.1.0",
             board: "B",
             unit_id: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12],
@@ -126,14 +126,6 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
             effects_room: 8,
             nodes_room: 16,
             stored_room: 4096,
-            sample_rate_hz: 1000,
-            channels: "x,y",
-            raw_unit: "V",
-            start,
-            starts: 3,
-            stored,
-            slots,
-            powered_for_ms: Some(300),
             triads: PerSensor {
                 gyro: Triad {
                     part: "G",
@@ -148,6 +140,11 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
                 accel: Triad::default(),
             },
             thermometers: "die",
+            start,
+            starts: 3,
+            stored,
+            slots,
+            powered_for_ms: Some(300),
         },
     }
 }
@@ -156,9 +153,9 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
 const SENSORS: &str = "01 47 05 636f756e74 13 0000003f 000000c0 0000803f 00007a44 01 46 \
                        00 00 00 00000000 00000000 00000000 00000000 00 03 646965";
 
-/// A greeting up to `start`. 0xfffff in groups of seven bits is 7f 7f 3f; 4096 is 32 * 128.
-const BEFORE: &str = "00 01 6d696d75 02 01 05 302e312e30 01 42 0102030405060708090a0b0c \
-                      1f ffff3f 08 10 8020 e807 03 782c79 01 56";
+/// A greeting up to the sensors. 0xfffff in groups of seven bits is 7f 7f 3f; 4096 is 32 * 128.
+const BEFORE: &str = "00 01 6d696d75 03 01 05 302e312e30 01 42 0102030405060708090a0b0c \
+                      1f ffff3f 08 10 8020";
 
 #[test]
 fn greetings() {
@@ -179,7 +176,7 @@ fn greetings() {
         (Start::Other, "01 06"),
     ] {
         let bytes = hex(&format!(
-            "{BEFORE} {bytes} 03 00 0100 0100 01 ac02 {SENSORS}"
+            "{BEFORE} {SENSORS} {bytes} 03 00 0100 0100 01 ac02"
         ));
         frozen(greeting(start, None, none), &bytes);
     }
@@ -199,7 +196,7 @@ fn greetings() {
         (Slot::NotUsable(stored::StoredError::Check), "02 04 03"),
     ] {
         let bytes = hex(&format!(
-            "{BEFORE} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00 01 ac02 {SENSORS}",
+            "{BEFORE} {SENSORS} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00 01 ac02",
             "ab".repeat(12)
         ));
         frozen(
@@ -233,23 +230,15 @@ fn replies() {
         reply(Reply::Counters(counters)),
         &hex("01 02 01 01 02 03 04 05 06 07 08 09 0a 0b 0c 0d ac02"),
     );
-    let self_test = SelfTest {
-        gyro_st1_v: [1.0; 3],
-        gyro_st2_v: [-2.0; 3],
-        accel_fine_v: [0.5; 3],
-        accel_coarse_v: [0.0; 3],
-        gyro_temps_c: [1.0; 3],
-        reference_v: -2.0,
-        supply_v: 0.5,
-        passed: checks::GRAVITY | checks::SUPPLY,
-    };
-    let [one, minus, half] = ["0000803f", "000000c0", "0000003f"].map(|f| f.repeat(3));
+    let mut table = TestTable::new();
+    let within = TestRow::within("G", 0.5, "V", [-2.0, 1.0]);
+    assert!(table.push(&within));
+    assert!(table.push(&TestRow::within("A", f32::NAN, "", [0.0; 2])));
     frozen(
-        reply(Reply::SelfTest(self_test)),
-        &hex(&format!(
-            "01 02 02 {one} {minus} {half} {} {one} 000000c0 0000003f c010",
-            "00".repeat(12)
-        )),
+        reply(Reply::SelfTest(table.result())),
+        &hex(
+            "01 02 02 21 01 47 0000003f 01 56 000000c0 0000803f 00 01 41 0000c07f 00 00000000 00000000 01",
+        ),
     );
     frozen(
         reply(Reply::Stored {
@@ -347,23 +336,29 @@ fn refusals() {
 fn events() {
     let head = BatchHead {
         first: 300,
+        tick_us: 300_000,
+        period_ns: 1_000_000,
         samples_lost: 1,
         batches_dropped: 128,
         temp_c: 0.5,
         flags: flags::SELF_TEST | flags::POWER_ON_UNKNOWN,
     };
     let samples = &[1, 2, 3][..];
+    // 300000 in groups of seven bits is e0 a7 12, a million c0 84 3d.
+    const HEAD: &str = "ac02 e0a712 c0843d 01 8001 0000003f 8204";
     frozen(
         Message::Event(Event::Raw(RawBatch {
             head,
-            gyro_volts: 1.0,
-            accel_volts: -2.0,
-            gyro_temps_c: [0.5, 1.0, -2.0],
+            scale: PerSensor {
+                gyro: 1.0,
+                accel: -2.0,
+            },
+            temperatures: &[0, 0, 0, 0x3f],
             samples,
         })),
-        &hex(
-            "03 00 ac02 01 8001 0000003f 8204 0000803f 000000c0 0000003f 0000803f 000000c0 03 010203",
-        ),
+        &hex(&format!(
+            "03 00 {HEAD} 0000803f 000000c0 04 0000003f 03 010203"
+        )),
     );
     // The last field is omitted if it is empty.
     let compensated = Message::Event(Event::Compensated(CompensatedBatch {
@@ -371,8 +366,8 @@ fn events() {
         samples,
         accel_die_c: None,
     }));
-    let bytes = hex("03 01 ac02 01 8001 0000003f 8204 03 010203");
-    let mut room = [0; 512];
+    let bytes = hex(&format!("03 01 {HEAD} 03 010203"));
+    let mut room = [0; 528];
     assert_eq!(postcard::to_slice(&compensated, &mut room).unwrap(), bytes);
     assert_eq!(Frame(&bytes).message(), Some(compensated));
     frozen(
@@ -381,24 +376,7 @@ fn events() {
             samples,
             accel_die_c: Some(-2.0),
         })),
-        &hex("03 01 ac02 01 8001 0000003f 8204 03 010203 01 000000c0"),
-    );
-    frozen(
-        Message::Event(Event::Counts(CountBatch {
-            head,
-            tick_us: 300_000,
-            period_ns: 1_000_000,
-            scale: PerSensor {
-                gyro: 1.0,
-                accel: -2.0,
-            },
-            temperatures: &[0, 0, 0, 0x3f],
-            samples,
-        })),
-        // 300000 in groups of seven bits is e0 a7 12, a million c0 84 3d.
-        &hex(
-            "03 03 ac02 01 8001 0000003f 8204 e0a712 c0843d 0000803f 000000c0 04 0000003f 03 010203",
-        ),
+        &hex(&format!("03 01 {HEAD} 03 010203 01 000000c0")),
     );
     frozen(
         Message::Event(Event::Kalman(kalman())),
@@ -408,68 +386,51 @@ fn events() {
 
 #[test]
 fn samples_of_a_batch() {
-    // 131070 = 2 * 65535 is 01fffe, 200000 is 030d40.
-    let sums = Sums {
-        gyro: [131_070, 0, 1],
-        accel: [256, 65_536, 200_000],
+    // 131070 = 2 * 65535 is 01fffe; -1 is ffffff, the most negative number of 24 bits 800000.
+    let counts = Counts {
+        gyro: [-1, 0x7f_ffff, -0x80_0000],
+        accel: [-300_000, 131_070, 1],
     };
-    let sevens = Sums {
+    let sevens = Counts {
         gyro: [7; 3],
         accel: [7; 3],
     };
-    let bytes = RawBatch::pack(&sums);
+    let bytes = RawBatch::pack(&counts);
     assert_eq!(
         bytes.to_vec(),
-        hex("feff01 000000 010000 000100 000001 400d03")
+        hex("ffffff ffff7f 000080 206cfb feff01 010000")
     );
     let two = [bytes, RawBatch::pack(&sevens)].concat();
     let batch = RawBatch {
         head: BatchHead {
             first: u32::MAX,
+            tick_us: 5_000_000,
+            period_ns: 1_030_000,
             samples_lost: 0,
             batches_dropped: 0,
             temp_c: 25.0,
             flags: 0,
         },
-        gyro_volts: 0.25,
-        accel_volts: 0.5,
-        gyro_temps_c: [25.0; 3],
+        scale: PerSensor {
+            gyro: 0.25,
+            accel: 0.5,
+        },
+        temperatures: &[0, 0, 0, 0x3f],
         samples: &two,
     };
     assert!(batch.is_whole());
-    let read: Vec<_> = batch.sums().collect();
-    assert_eq!(read, [(u32::MAX, sums), (0, sevens)]);
-    let (number, volts) = batch.volts().nth(1).unwrap();
-    assert_eq!((number, volts.gyro.y, volts.accel.z), (0, 1.75, 3.5));
-
-    // -1 is ffffff, the most negative number of 24 bits 800000.
-    let counts = Counts {
-        gyro: [-1, 0x7f_ffff, -0x80_0000],
-        accel: [-300_000, 0, 1],
-    };
-    let bytes = CountBatch::pack(&counts);
-    assert_eq!(
-        bytes.to_vec(),
-        hex("ffffff ffff7f 000080 206cfb 000000 010000")
-    );
-    let of_counts = CountBatch {
-        head: batch.head,
-        tick_us: 5_000_000,
-        period_ns: 1_030_000,
-        scale: PerSensor {
-            gyro: 1.0,
-            accel: 0.5,
-        },
-        temperatures: &[],
-        samples: &[bytes, bytes].concat(),
-    };
-    assert!(of_counts.is_whole());
-    let read: Vec<_> = of_counts.counts().collect();
-    assert_eq!(read, [(u32::MAX, counts), (0, counts)]);
-    let (_, reading) = of_counts.readings().next().unwrap();
-    assert_eq!((reading.gyro.x, reading.accel.x), (-1.0, -150_000.0));
-    let times: Vec<f64> = of_counts.times_s().take(2).collect();
-    assert!((times[0] - 5.0).abs() < 1e-12 && (times[1] - 5.00103).abs() < 1e-12);
+    let read: Vec<_> = batch.counts().collect();
+    assert_eq!(read, [(u32::MAX, counts), (0, sevens)]);
+    let (number, reading) = batch.readings().nth(1).unwrap();
+    assert_eq!((number, reading.gyro.y, reading.accel.z), (0, 1.75, 3.5));
+    assert_eq!(batch.readings().next().unwrap().1.accel.x, -150_000.0);
+    assert_eq!(batch.temperatures_c().collect::<Vec<_>>(), [0.5]);
+    let times: Vec<u64> = batch.head.times_ns().take(2).collect();
+    assert_eq!(times, [5_000_000_000, 5_001_030_000]);
+    assert_eq!(batch.head.since_s(4_980_000), 0.02);
+    assert!((batch.head.rate_hz() - 970.873_786_4).abs() < 1e-6);
+    // Power-on was before sampling began.
+    assert_eq!(batch.head.since_s(0_u64.wrapping_sub(1_000_000)), 6.0);
 
     let bytes = CompensatedBatch::pack(&mimu_core::compensation::Sample {
         gyro: [1.0, -2.0, 0.5].into(),

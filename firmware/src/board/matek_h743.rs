@@ -49,7 +49,7 @@ mod parts {
     use embassy_stm32::{bind_interrupts, dma};
     #[cfg(not(feature = "usb"))]
     use embassy_stm32::{mode::Async, usart};
-    use mimu_core::wire::{self, Refusal};
+    use mimu_core::wire::{Refusal, TestTable};
 
     use super::*;
     use crate::board::clocks;
@@ -99,7 +99,7 @@ mod parts {
 
     impl SelfTest {
         /// Refused.
-        pub async fn run(&mut self, _: &Shared<Source>) -> Result<wire::SelfTest, Refusal> {
+        pub async fn run(&mut self, _: &Shared<Source>, _: &mut TestTable) -> Result<(), Refusal> {
             Err(Refusal::Unknown)
         }
     }

@@ -6,6 +6,7 @@ use mimu_core::compensator::{Compensator, State};
 use mimu_core::single;
 use mimu_core::stored::{NODES, ROOM, Stored};
 use mimu_core::table::Place;
+use mimu_core::wire::BatchHead;
 
 use crate::design_parameters::SAMPLE_HZ;
 
@@ -13,8 +14,8 @@ use crate::design_parameters::SAMPLE_HZ;
 pub(super) struct Calibrated {
     compensator: Compensator<f32, NODES, ROOM>,
     state: State<f32, ROOM>,
-    /// Number of the sample of the last `follow`; it counts the time since power-on.
-    followed: u32,
+    /// Time of the last `follow`, µs, as in [`BatchHead::tick_us`]; time since power-on is counted from it.
+    followed_us: u64,
 }
 
 impl Calibrated {
@@ -29,8 +30,8 @@ impl Calibrated {
         Self {
             compensator,
             state,
-            // One number is one millisecond. Time since power-on counts from sample 0, whenever the calibration arrives.
-            followed: 0_u32.wrapping_sub(powered_for_ms),
+            // Time since power-on counts from the beginning of sampling, whenever the calibration arrives.
+            followed_us: 0_u64.wrapping_sub(u64::from(powered_for_ms) * 1000),
         }
     }
 
@@ -55,11 +56,11 @@ impl Calibrated {
         (dies_c.gyro, apart.then_some(dies_c.accel))
     }
 
-    /// Follows temperature and time to the beginning of a batch.
-    pub fn follow(&mut self, number: u32, thermometer_c: Option<f32>) -> Place {
-        let passed = number.wrapping_sub(self.followed);
-        self.followed = number;
-        let dt_s = passed as f32 / SAMPLE_HZ as f32;
+    /// Follows temperature and the crystal's time to the beginning of a batch, and uses its sample rate.
+    pub fn follow(&mut self, head: &BatchHead, thermometer_c: Option<f32>) -> Place {
+        let dt_s = head.since_s(self.followed_us);
+        self.followed_us = head.tick_us;
+        self.state.at_rate(head.rate_hz() as f32);
         self.compensator
             .follow(&mut self.state, dt_s, thermometer_c)
     }

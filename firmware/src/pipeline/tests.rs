@@ -8,7 +8,7 @@ use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::DeviceEffect;
 use mimu_core::stored::{self, Curves};
 use mimu_core::table::Node;
-use mimu_core::wire::{Prior, Sums};
+use mimu_core::wire::{Counts, Prior};
 use nalgebra::Matrix3;
 
 mod exchange;
@@ -21,7 +21,7 @@ use crate::convert::{Analog, NOMINAL_REFERENCE, scan};
 /// What was sent, as far as the tests ask.
 #[derive(Debug, PartialEq)]
 enum Sent {
-    Raw(BatchHead, f32, Vec<(u32, Sums)>),
+    Raw(BatchHead, f32, Vec<(u32, Counts)>),
     Compensated(BatchHead, Vec<(u32, Sample<f32>)>, PerSensor<f32>),
     Kalman(u32),
 }
@@ -30,7 +30,7 @@ fn keep(message: &Message<'_>) -> Sent {
     match message {
         Message::Event(Event::Raw(batch)) => {
             assert!(batch.is_whole());
-            Sent::Raw(batch.head, batch.gyro_volts, batch.sums().collect())
+            Sent::Raw(batch.head, batch.scale.gyro, batch.counts().collect())
         }
         Message::Event(Event::Compensated(batch)) => {
             assert!(batch.is_whole());
@@ -137,8 +137,8 @@ fn nothing_is_sent_unasked_and_what_is_asked_begins_with_a_batch() {
     assert_eq!((head.first, head.flags, samples.len()), (40, 0, BATCH));
     for (k, (number, six)) in samples.iter().enumerate() {
         let of = sums(40 + k as u32);
-        assert_eq!((*number, six.gyro), (40 + k as u32, of.gyro));
-        assert_eq!(six.accel, of.accel);
+        let of = [of.gyro, of.accel].map(|sums| sums.map(|sum| sum as i32));
+        assert_eq!((*number, [six.gyro, six.accel]), (40 + k as u32, of));
     }
     assert!((head.temp_c - 25.0).abs() < 1e-3);
     assert!((volts * NOMINAL_REFERENCE - 2.5).abs() < 1e-4);

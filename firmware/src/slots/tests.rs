@@ -9,6 +9,7 @@ use embedded_storage_async::nor_flash::{
     ErrorType, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 use mimu_core::compensation::{Affine, Compensation};
+use mimu_core::stored;
 use mimu_core::table::Node;
 use nalgebra::{Matrix3, Vector3};
 

@@ -85,10 +85,8 @@ pub fn check(
         let remedy = format!("upload it first: `mimu device upload {place}`");
         return Err(Error::device(session.port(), problem, remedy));
     }
-    let rate_hz = session.who().sample_rate_hz;
-    let mut host_reference =
-        HostReference::new(calibration, &image, rate_hz, powered_for_ms, place)?;
-    let wanted = (duration.as_secs_f64() * f64::from(session.who().sample_rate_hz)) as u64;
+    let mut host_reference = HostReference::new(calibration, &image, powered_for_ms, place)?;
+    let wanted = (duration.as_secs_f64() * session.who().sample_rate_hz) as u64;
     let mut found = Checked {
         samples: 0,
         unpaired: 0,

@@ -6,10 +6,11 @@ use mimu_core::stored;
 use mimu_core::table::Node;
 use serde::Serialize;
 
-use super::identity::Hash;
+use super::identity::{Hash, Identity};
 use super::origin;
 use mimu::calibration::{Calibration, DeviceCalibration};
 use mimu::quantity::{PerSensor, Sensor};
+use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
 
 /// A stored calibration, number by number: the result of `mimu device download`.
@@ -35,8 +36,8 @@ pub struct Contents {
     pub formula: &'static str,
     /// `raw to SI`.
     pub direction: &'static str,
-    /// Unit of u at the sensors.
-    pub raw_unit: &'static str,
+    /// Unit of u at the sensors, if given.
+    pub raw_unit: Option<&'static str>,
     /// Frame of x.
     pub frame: &'static str,
     /// Temperatures of the dies that the calibration covers, °C, if known.
@@ -68,11 +69,11 @@ pub struct NodeContents {
     pub accel_slope: Inverse,
 }
 
-/// `x = C u + o` of a triad, raw to SI, u in V at the sensors, x in the body frame.
+/// `x = C u + o` of a triad, raw to SI, x in the body frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(non_snake_case)]
 pub struct Inverse {
-    /// By rows, [`Self::unit`] per V.
+    /// By rows, [`Self::unit`] per raw unit.
     pub C: [[f32; 3]; 3],
     /// In [`Self::unit`].
     pub o: [f32; 3],
@@ -101,7 +102,7 @@ pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::StoredErr
         trimmed: origin.trimmed_s.and_then(origin::date),
         formula: "x = C u + o",
         direction: "raw to SI",
-        raw_unit: "V",
+        raw_unit: origin.raw_unit.map(stored::RawUnit::name),
         frame: "body",
         range_c: stored.compensator.table.range_c(),
         lag_s,
@@ -112,11 +113,17 @@ pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::StoredErr
     })
 }
 
-/// The calibration file of `bytes` that [`contents`] has read, for the unit named `device`; `place` names their origin in errors.
+/// The calibration file of `bytes` that [`contents`] has read, for the unit named `device`; `place` names their origin in errors. `who`: the device
+/// that stores them; it names the sensors, and the raw unit if the bytes do not.
 ///
 /// # Errors
 /// Bytes that the device would refuse.
-pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibration> {
+pub fn calibration(
+    bytes: &[u8],
+    who: Option<&Identity>,
+    device: &str,
+    place: &str,
+) -> Result<Calibration> {
     let (mut nodes, mut effects) = (Vec::new(), Vec::new());
     let stored = stored::read(
         bytes,
@@ -131,6 +138,13 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
     let stored = DeviceCalibration {
         device: device.to_owned(),
         unit_id: origin.unit_id.as_ref().map(origin::digits),
+        // The device uses no calibration of other settings than its own.
+        sensors: origin.settings.and(who).map(Identity::settings),
+        raw_unit: match origin.raw_unit {
+            Some(stored::RawUnit::Volt) => RawUnit::Volt,
+            Some(stored::RawUnit::Count) => RawUnit::Count,
+            None => who.map_or(Ok(RawUnit::Volt), |who| who.raw_unit(place))?,
+        },
         created: origin.created_s.and_then(origin::date),
         trimmed: origin.trimmed_s.and_then(origin::date),
         sha256: origin.samples_sha256.as_ref().map(origin::digits),

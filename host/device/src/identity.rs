@@ -4,13 +4,18 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
+use mimu_core::compensation::Affine;
 use mimu_core::wire::{
-    Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, Version,
+    Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, Triad, Version,
     compatibility,
 };
+use nalgebra::{Matrix3, Vector3};
 
 use super::origin;
+use super::record::shortest;
+use mimu::quantity::PerSensor;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{RawUnit, SensorSetting, SensorSettings};
 
 /// An owned copy of a [`Greeting`]: the result of `mimu device info`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -30,12 +35,14 @@ pub struct Identity {
     pub effects: Vec<&'static str>,
     /// Largest calibration that it stores.
     pub room: Room,
-    /// Samples per second.
-    pub sample_rate_hz: u32,
-    /// Channels of a sample, in order.
-    pub channels: Vec<String>,
+    /// Samples per second by the board's crystal.
+    pub sample_rate_hz: f64,
     /// Unit of a raw reading.
     pub raw_unit: String,
+    /// The sensors.
+    pub sensors: PerSensor<TriadInfo>,
+    /// Places of the thermometers, in the order of their temperatures.
+    pub thermometers: Vec<String>,
     /// The last reset cause.
     pub start: Started,
     /// Starts since the last power failure, including this one.
@@ -48,6 +55,58 @@ pub struct Identity {
     pub powered_for_ms: Option<u32>,
     /// A sentence if the device is older or newer but compatible.
     pub warnings: Vec<String>,
+}
+
+/// A triad of sensors: what its readings are, by the board.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TriadInfo {
+    /// Name of the part.
+    pub part: String,
+    /// Unit of a raw reading.
+    pub unit: String,
+    /// Bits of a reading, with its sign.
+    pub bits: u8,
+    /// Largest input, rad/s or m/s².
+    pub range: f64,
+    /// Raw reading without an input.
+    pub null: f64,
+    /// Nominal scale factor: raw units per rad/s or per m/s².
+    pub per_si: f64,
+    /// Filters and rate as they are set.
+    pub filter: String,
+}
+
+impl From<&Triad<'_>> for TriadInfo {
+    fn from(triad: &Triad<'_>) -> Self {
+        Self {
+            part: triad.part.into(),
+            unit: triad.unit.into(),
+            bits: triad.bits,
+            range: shortest(triad.range),
+            null: shortest(triad.null),
+            per_si: shortest(triad.per_si),
+            filter: triad.filter.into(),
+        }
+    }
+}
+
+impl TriadInfo {
+    /// Inverse model by the data sheet, raw to SI.
+    pub fn nominal(&self) -> Affine<f64> {
+        Affine {
+            matrix: Matrix3::identity() / self.per_si,
+            offset: Vector3::repeat(-self.null / self.per_si),
+        }
+    }
+
+    fn setting(&self) -> SensorSetting {
+        SensorSetting {
+            part: self.part.clone(),
+            bits: self.bits,
+            range: self.range,
+            filter: self.filter.clone(),
+        }
+    }
 }
 
 /// Largest calibration that a device stores.
@@ -178,9 +237,14 @@ impl From<&Greeting<'_>> for Identity {
                 nodes: greeting.nodes_room,
                 bytes: greeting.stored_room,
             },
-            sample_rate_hz: greeting.sample_rate_hz,
-            channels: greeting.channels.split(',').map(str::to_owned).collect(),
-            raw_unit: greeting.raw_unit.into(),
+            sample_rate_hz: shortest(greeting.triads.gyro.rate_hz),
+            raw_unit: greeting.triads.gyro.unit.into(),
+            sensors: greeting.triads.as_ref().map(TriadInfo::from),
+            thermometers: greeting
+                .thermometers
+                .split_terminator(',')
+                .map(str::to_owned)
+                .collect(),
             start: greeting.start.into(),
             starts: greeting.starts,
             stored: greeting.stored.map(|held| StoredCalibration {
@@ -206,6 +270,38 @@ impl From<&Greeting<'_>> for Identity {
 }
 
 impl Identity {
+    /// Unit of the raw readings. Both triads have the same.
+    ///
+    /// # Errors
+    /// A unit that this program does not know, or two; `place` names the device.
+    pub fn raw_unit(&self, place: &str) -> Result<RawUnit> {
+        let PerSensor { gyro, accel } = &self.sensors;
+        match (gyro.unit.as_str(), accel.unit.as_str()) {
+            ("V", "V") => Ok(RawUnit::Volt),
+            ("count", "count") => Ok(RawUnit::Count),
+            (gyro, accel) => Err(Error::device(
+                place,
+                format!(
+                    "its gyro is in {gyro:?} and its accelerometer in {accel:?}, but a recording is in V or in counts"
+                ),
+                "update mimu on this computer",
+            )),
+        }
+    }
+
+    /// The sensors as they are set: what a calibration belongs to.
+    pub fn settings(&self) -> SensorSettings {
+        SensorSettings {
+            gyro: self.sensors.gyro.setting(),
+            accel: self.sensors.accel.setting(),
+        }
+    }
+
+    /// Inverse models of gyro and accelerometer by the data sheets, raw to SI, for a board without a calibration.
+    pub fn nominal(&self) -> [Affine<f64>; 2] {
+        [self.sensors.gyro.nominal(), self.sensors.accel.nominal()]
+    }
+
     /// Names of the optional functions.
     pub fn capability_names(&self) -> Vec<&'static str> {
         names(self.capabilities).collect()

@@ -33,7 +33,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// The image of a calibration; `place` is its file. Refuses raw readings in other units than volts, which the device measures; a calibration of
+    /// The image of a calibration; `place` is its file. Refuses raw readings in other units than V and counts, which devices have; a calibration of
     /// one triad alone; and effects that the device cannot remove.
     pub fn new(calibration: &Calibration, place: &str) -> Result<Self> {
         let model = Compensation {
@@ -122,7 +122,7 @@ impl Image {
         }
     }
 
-    /// Refuses effects and sizes that the device cannot use, by name, before anything is sent.
+    /// Refuses readings and settings other than the device's, and effects and sizes that it cannot use, by name, before anything is sent.
     pub fn check_device(
         &self,
         calibration: &Calibration,
@@ -133,18 +133,18 @@ impl Image {
             let remedy = "flash newer firmware, or diagnose without it";
             Err(Error::new(at, problem, remedy))
         };
-        if who.raw_unit != "V" {
-            let unit = &who.raw_unit;
-            let problem = format!("it is for raw readings in V, but the device's are in {unit}");
-            return refuse(place.into(), problem);
+        let of_device = |problem: String| {
+            let remedy = "calibrate from a recording of the device (`mimu record`)";
+            Err(Error::new(place, problem, remedy))
+        };
+        let (ours, unit) = (calibration.recording.raw_unit, who.raw_unit(place)?);
+        if ours != unit {
+            let problem =
+                format!("it is for raw readings in {ours}, but the device's are in {unit}");
+            return of_device(problem);
         }
-        let layout = Capabilities::CURVES.and(Capabilities::TWO_LAGS);
-        if !who.capabilities.contains(layout) {
-            let problem = format!(
-                "the device (firmware {}) stores calibrations of an earlier layout, without a lag for each triad or without curves",
-                who.firmware
-            );
-            return refuse(place.into(), problem);
+        if let Some(problem) = calibration.other_setting(Some(&who.settings())) {
+            return of_device(problem);
         }
         for id in &self.effects {
             let at = || format!("{place}, [[effect]] {id}");
@@ -220,18 +220,18 @@ fn nodes(
     nodes.collect()
 }
 
-/// Inverse model of a triad, from raw readings in V.
+/// Inverse model of a triad.
 fn model(calibration: &Calibration, sensor: Sensor, place: &str) -> Result<Affine<f32>> {
     let at = || format!("{place}, [{sensor}]");
     let Some(table) = calibration.table(sensor) else {
         let problem = "it is missing, and the device needs both sensors";
         return Err(Error::new(at(), problem, "calibrate both sensors"));
     };
-    if table.raw_unit != RawUnit::Volt {
+    if table.raw_unit == RawUnit::Si {
         return Err(Error::new(
             at(),
             format!(
-                "raw_unit is \"{}\", but the device measures V",
+                "raw_unit is \"{}\", but a device measures V or counts",
                 table.raw_unit
             ),
             "calibrate from a recording of the device (`mimu record`)",

@@ -18,8 +18,8 @@ use mimu_recording::error::{Error, Result};
 pub const SHORTEST: Duration = Duration::from_secs(1);
 /// Samples that give the noise if it is not given: a second.
 const NOISE_SAMPLES: usize = 1000;
-/// Smallest variance of a reading, V²: rounding to 25 µV, the quantisation step of the converter's sums.
-const LEAST_VARIANCE: f64 = 25e-6 * 25e-6 / 12.0;
+/// Smallest variance of a reading, steps of its integer squared: that of rounding.
+const LEAST_VARIANCE: f64 = 1.0 / 12.0;
 
 /// Inputs and settings of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +30,7 @@ pub struct KalmanPlan {
     pub inputs: Vec<[f32; 3]>,
     /// Duration of each input.
     pub each: Duration,
-    /// Variances of single readings of the sensors x, y, z, V². `None`: estimated from a second of readings before the first input.
+    /// Variances of single readings of the sensors x, y, z, raw units squared. `None`: estimated from a second of readings before the first input.
     pub noise: Option<[f32; 3]>,
 }
 
@@ -45,7 +45,7 @@ impl KalmanPlan {
     }
 }
 
-/// Estimate of one sensor: `[b, P1, P2, P3]`, V and V per rad/s or per m/s².
+/// Estimate of one sensor: `[b, P1, P2, P3]`, raw units, and raw units per rad/s or per m/s².
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AxisEstimate {
     /// Means.
@@ -64,11 +64,11 @@ pub struct KalmanRun {
     /// `SI to raw`.
     pub direction: &'static str,
     /// Units of the states.
-    pub units: [&'static str; STATES],
+    pub units: [String; STATES],
     /// Unit of the inputs.
     pub input_unit: &'static str,
-    /// Variances used, V².
-    pub noise_v2: [f32; 3],
+    /// Variances used, raw units squared.
+    pub noise_variance: [f32; 3],
     /// Inputs in order.
     pub inputs: Vec<Applied>,
     /// Samples that at least one filter of the device rejected.
@@ -158,9 +158,11 @@ struct BankRun<'a> {
     plan: &'a KalmanPlan,
     /// Samples under each input.
     wanted: usize,
-    /// Variances of single readings, once they are known, V².
+    /// Variances of single readings, once they are known, raw units squared.
     noise: Option<[f32; 3]>,
     samples: BTreeMap<u32, Sample<f32>>,
+    /// Raw units of a step of the triad's integers.
+    step: f64,
     reports: Vec<KalmanState>,
     /// When the last samples came.
     last: Instant,
@@ -169,7 +171,7 @@ struct BankRun<'a> {
 impl<'a> BankRun<'a> {
     fn new(session: &'a mut Session, plan: &'a KalmanPlan) -> Self {
         session.forget_events();
-        let rate_hz = f64::from(session.who().sample_rate_hz);
+        let rate_hz = session.who().sample_rate_hz;
         // Counts samples, that is the device's time.
         let wanted = (plan.each.max(SHORTEST).as_secs_f64() * rate_hz) as usize;
         Self {
@@ -178,6 +180,7 @@ impl<'a> BankRun<'a> {
             wanted,
             noise: plan.noise,
             samples: BTreeMap::new(),
+            step: 0.0,
             reports: Vec::new(),
             last: Instant::now(),
         }
@@ -200,8 +203,10 @@ impl<'a> BankRun<'a> {
         if self.noise.is_none() {
             self.listen_until(NOISE_SAMPLES)?;
         }
-        let samples = &self.samples;
-        let noise = *self.noise.get_or_insert_with(|| variances(samples, sensor));
+        let (samples, step) = (&self.samples, self.step);
+        let noise = *self
+            .noise
+            .get_or_insert_with(|| variances(samples, sensor, step));
         let span = self.plan.span();
         let start = Request::KalmanStart {
             sensor,
@@ -248,6 +253,8 @@ impl<'a> BankRun<'a> {
     fn listen(&mut self) -> Result<()> {
         match self.session.stream_event(self.last, "raw stream")? {
             Some(Event::Raw(batch)) => {
+                let scale = batch.scale.unwrap_or_default();
+                self.step = f64::from(scale[self.plan.sensor]);
                 let numbers = (0..).map(|k| batch.head.first.wrapping_add(k));
                 self.samples.extend(numbers.zip(batch.values));
                 self.last = Instant::now();
@@ -285,10 +292,12 @@ impl<'a> BankRun<'a> {
         let host = replay(port, plan, &noise, &inputs, &self.samples)?;
         let device = estimates(last);
         let distance_sigma = distances(&device, &host);
-        let (scale, input_unit) = match plan.sensor {
-            Sensor::Gyro => ("V/(rad/s)", "rad/s"),
-            Sensor::Accel => ("V/(m/s²)", "m/s²"),
+        let raw = &self.session.who().raw_unit;
+        let input_unit = match plan.sensor {
+            Sensor::Gyro => "rad/s",
+            Sensor::Accel => "m/s²",
         };
+        let scale = || format!("{raw}/({input_unit})");
         let converging = |report: &KalmanState| Converging {
             updates: report.updates,
             axes: estimates(report),
@@ -297,9 +306,9 @@ impl<'a> BankRun<'a> {
             triad: plan.sensor,
             parameters: ["b", "P1", "P2", "P3"],
             direction: "SI to raw",
-            units: ["V", scale, scale, scale],
+            units: [raw.clone(), scale(), scale(), scale()],
             input_unit,
-            noise_v2: noise,
+            noise_variance: noise,
             inputs,
             rejected: last.rejected,
             device,
@@ -375,15 +384,16 @@ fn replay(
     }))
 }
 
-/// Variances of single readings from the differences of neighbours, V²: noise slower than a sample does not count.
-fn variances(samples: &BTreeMap<u32, Sample<f32>>, sensor: Sensor) -> [f32; 3] {
+/// Variances of single readings from the differences of neighbours, raw units squared: noise slower than a sample does not count. `step` is that of
+/// the integers, raw units.
+fn variances(samples: &BTreeMap<u32, Sample<f32>>, sensor: Sensor, step: f64) -> [f32; 3] {
     let readings: Vec<_> = samples.values().map(|s| s[sensor].map(f64::from)).collect();
     let squares: Vector3<f64> = readings
         .windows(2)
         .map(|pair| (pair[1] - pair[0]).map(|d| 0.5 * d * d))
         .sum();
     let count = readings.len().saturating_sub(1).max(1) as f64;
-    std::array::from_fn(|i| (squares[i] / count).max(LEAST_VARIANCE) as f32)
+    std::array::from_fn(|i| (squares[i] / count).max(LEAST_VARIANCE * step * step) as f32)
 }
 
 fn estimates(state: &KalmanState) -> [AxisEstimate; 3] {

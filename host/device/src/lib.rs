@@ -6,7 +6,6 @@
 //! | `received`        | decodes bytes into messages, and counts garbled ones                     |
 //! | `line`, `session` | calls, each repeated until it is answered or refused                     |
 //! | `identity`        | the greeting: the device's identity, and whether it is compatible        |
-//! | `nominal`         | the sensors by their data sheets                                         |
 //! | `image`           | a calibration file as the device stores it                               |
 //! | `origin`          | the unit, the date and the recording of a calibration                    |
 //! | `upload`          | sends a calibration and reads it back                                    |
@@ -27,7 +26,6 @@ mod identity;
 mod image;
 mod kalman;
 mod line;
-mod nominal;
 mod origin;
 mod port;
 mod received;
@@ -42,15 +40,14 @@ mod upload;
 pub use check::{Checked, Difference, check, rounding, ulps};
 pub use contents::{Contents, Inverse, NodeContents, calibration, contents};
 pub use flagged::Flagged;
-pub use identity::{Hash, Identity, Room, Started, StoredCalibration, unit_name};
+pub use identity::{Hash, Identity, Room, Started, StoredCalibration, TriadInfo, unit_name};
 pub use image::Image;
 pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
-pub use nominal::nominal;
 pub use port::{BAUD, Port, Ports, SerialPair, ports, serial_pair};
 pub use received::{Answer, Event, LineCount, Received, Receiver, Samples};
 pub use result::{Counted, DeviceResult};
-pub use self_test::{Passed, SelfTested, self_test};
+pub use self_test::{SelfTested, TestResult, Verdict, self_test};
 pub use session::{Session, refused};
-pub use stream::{Moments, Stream, Streamed, stream};
+pub use stream::{Moments, Stream, Streamed, Thermometer, stream};
 pub use trim::{Pose, SHORTEST_TRIM_S, Trimmed, TrimmedTriad, trim};
 pub use upload::{Uploaded, download, outside_now, upload};

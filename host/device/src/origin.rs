@@ -1,8 +1,10 @@
-//! Unit, time and recording of a calibration, as the file and the device write them.
+//! Unit, sensors, time and recording of a calibration, as the file and the device write them.
 
 use jiff::Timestamp;
 use mimu::calibration::Calibration;
-use mimu_core::stored::Origin;
+use mimu_core::stored::{Origin, RawUnit, Setting};
+use mimu_core::wire::Triad;
+use mimu_recording::SensorSetting;
 
 /// Origin of a calibration file; `place` is its path. If the unit's number is missing, a sentence is added to `warnings`.
 pub(super) fn of(calibration: &Calibration, place: &str, warnings: &mut Vec<String>) -> Origin {
@@ -16,12 +18,37 @@ pub(super) fn of(calibration: &Calibration, place: &str, warnings: &mut Vec<Stri
         let time: Timestamp = date.as_deref()?.parse().ok()?;
         u64::try_from(time.as_second()).ok()
     };
+    let raw_unit = RawUnit::named(&calibration.recording.raw_unit.to_string());
     Origin {
         unit_id,
         created_s: seconds(&calibration.created),
         samples_sha256: calibration.recording.sha256.as_deref().and_then(bytes),
         trimmed_s: seconds(&calibration.trimmed),
+        raw_unit,
+        settings: settings(calibration, raw_unit),
     }
+}
+
+/// The settings of the sensors of a calibration file.
+fn settings(
+    calibration: &Calibration,
+    raw_unit: Option<RawUnit>,
+) -> Option<mimu_core::PerSensor<Setting>> {
+    let (sensors, unit) = calibration.sensors.as_ref().zip(raw_unit)?;
+    let of = |of: &SensorSetting| {
+        Setting::of(&Triad {
+            part: &of.part,
+            unit: unit.name(),
+            bits: of.bits,
+            range: of.range as f32,
+            filter: &of.filter,
+            ..Triad::default()
+        })
+    };
+    Some(mimu_core::PerSensor {
+        gyro: of(&sensors.gyro),
+        accel: of(&sensors.accel),
+    })
 }
 
 /// Decodes N pairs of hexadecimal digits. `None` if they are no such digits, or all zero, which means unknown.

@@ -3,11 +3,12 @@
 use mimu_core::compensation::Sample;
 use mimu_core::wire::{
     BatchHead, Counters, Decoder, Event as WireEvent, Frame, KalmanState, Message, Refusal, Reply,
-    SelfTest, Version,
+    Version,
 };
 use serde::Serialize;
 
 use super::identity::{Identity, beginning};
+use super::self_test::TestResult;
 
 /// Answer to a call.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +20,7 @@ pub enum Answer {
     /// The device's counters.
     Counters(Counters),
     /// Results of the self-test.
-    SelfTest(SelfTest),
+    SelfTest(Vec<TestResult>),
     /// Part of the stored calibration.
     Stored {
         /// Offset of the first byte.
@@ -35,13 +36,15 @@ pub enum Answer {
     Refused(Refusal),
 }
 
-/// Consecutive samples: V at the sensors, or rad/s and m/s² in the body frame.
+/// Consecutive samples: raw readings, or rad/s and m/s² in the body frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Samples {
     /// Number of the first sample, flags and temperature, common to all samples.
     pub head: BatchHead,
-    /// Temperatures by the TEMP pins of gyro x, y, z, °C; for raw readings only.
-    pub gyro_temps_c: Option<[f32; 3]>,
+    /// Temperatures of the thermometers in the order of the greeting, °C; for raw readings only.
+    pub temperatures_c: Vec<f32>,
+    /// Raw units per unit of the integers, for raw readings only: the size of a step.
+    pub scale: Option<mimu_core::PerSensor<f32>>,
     /// Temperatures of the dies, °C; for compensated samples only.
     pub dies_c: Option<mimu_core::PerSensor<f32>>,
     /// Consecutive samples. The first has the number [`BatchHead::first`].
@@ -53,7 +56,7 @@ pub struct Samples {
 pub enum Event {
     /// The device has just started.
     Started(Box<Identity>),
-    /// Raw readings, V.
+    /// Raw readings, in the unit of the greeting.
     Raw(Samples),
     /// Compensated samples, SI.
     Compensated(Samples),
@@ -154,19 +157,21 @@ fn understood(frame: &Frame<'_>) -> Option<Received> {
             Received::Answer(id, Answer::Greeting(Box::new(Identity::from(&greeting))))
         }
         Message::Refused { id, refusal } => Received::Answer(id, Answer::Refused(refusal)),
-        Message::Reply { id, reply } => Received::Answer(id, answer(reply)),
+        Message::Reply { id, reply } => Received::Answer(id, answer(reply)?),
         Message::Event(WireEvent::Raw(batch)) if batch.is_whole() => {
             Received::Event(Event::Raw(Samples {
                 head: batch.head,
-                gyro_temps_c: Some(batch.gyro_temps_c),
+                temperatures_c: batch.temperatures_c().collect(),
+                scale: Some(batch.scale),
                 dies_c: None,
-                values: batch.volts().map(|(_, sample)| sample).collect(),
+                values: batch.readings().map(|(_, sample)| sample).collect(),
             }))
         }
         Message::Event(WireEvent::Compensated(batch)) if batch.is_whole() => {
             Received::Event(Event::Compensated(Samples {
                 head: batch.head,
-                gyro_temps_c: None,
+                temperatures_c: Vec::new(),
+                scale: None,
                 dies_c: Some(batch.dies_c()),
                 values: batch.values().map(|(_, sample)| sample).collect(),
             }))
@@ -176,11 +181,14 @@ fn understood(frame: &Frame<'_>) -> Option<Received> {
     })
 }
 
-fn answer(reply: Reply<'_>) -> Answer {
-    match reply {
+fn answer(reply: Reply<'_>) -> Option<Answer> {
+    Some(match reply {
         Reply::Done => Answer::Done,
         Reply::Counters(counters) => Answer::Counters(counters),
-        Reply::SelfTest(result) => Answer::SelfTest(result),
+        Reply::SelfTest(test) if test.is_whole() => {
+            Answer::SelfTest(test.rows().map(TestResult::from).collect())
+        }
+        Reply::SelfTest(_) => return None,
         Reply::Stored {
             offset,
             length,
@@ -191,5 +199,5 @@ fn answer(reply: Reply<'_>) -> Answer {
             bytes: bytes.to_vec(),
         },
         Reply::Kalman(state) => Answer::Kalman(Box::new(state)),
-    }
+    })
 }

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::flagged::Flagged;
 use super::received::{Event, LineCount};
+use super::record::shortest;
 use super::session::Session;
 use mimu_recording::error::Result;
 
@@ -15,7 +16,7 @@ use mimu_recording::error::Result;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stream {
-    /// Raw readings, V at the sensors.
+    /// Raw readings, in the unit of the greeting.
     Raw,
     /// Compensated on the device, rad/s and m/s² in the body frame.
     Compensated,
@@ -34,8 +35,10 @@ pub struct Streamed {
     pub first: Option<u32>,
     /// The last temperature, °C.
     pub temp_c: f64,
-    /// Last temperatures by the TEMP pins of gyro x, y, z, °C; for the raw stream only.
-    pub gyro_temps_c: Option<[f32; 3]>,
+    /// Samples per second by the board's crystal, from the last batch.
+    pub rate_hz: f64,
+    /// The last readings of the thermometers; for the raw stream only.
+    pub thermometers: Vec<Thermometer>,
     /// Faults that the device flags.
     #[serde(flatten)]
     pub flagged: Flagged,
@@ -47,11 +50,20 @@ pub struct Streamed {
     pub line: LineCount,
 }
 
+/// Reading of a thermometer.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Thermometer {
+    /// Its place.
+    pub place: String,
+    /// Its temperature, °C.
+    pub temp_c: f64,
+}
+
 /// Mean and standard deviation of the samples of a triad, x, y, z.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Moments {
     /// Unit of mean and standard deviation.
-    pub unit: &'static str,
+    pub unit: String,
     /// Means.
     pub mean: [f64; 3],
     /// Standard deviations.
@@ -59,13 +71,14 @@ pub struct Moments {
 }
 
 impl Streamed {
-    pub(super) fn new(stream: Stream) -> Self {
+    /// Before the first sample; `raw_unit` is that of the raw stream.
+    pub(super) fn new(stream: Stream, raw_unit: &str) -> Self {
         let units = match stream {
-            Stream::Raw => ["V", "V"],
+            Stream::Raw => [raw_unit, raw_unit],
             Stream::Compensated => ["rad/s", "m/s^2"],
         };
         let [gyro, accel] = units.map(|unit| Moments {
-            unit,
+            unit: unit.to_owned(),
             mean: [0.0; 3],
             deviation: [0.0; 3],
         });
@@ -75,7 +88,8 @@ impl Streamed {
             missing: 0,
             first: None,
             temp_c: 0.0,
-            gyro_temps_c: None,
+            rate_hz: f64::NAN,
+            thermometers: Vec::new(),
             flagged: Flagged::default(),
             gyro,
             accel,
@@ -92,9 +106,9 @@ pub fn stream(
     mut stop: impl FnMut() -> bool,
     mut take: impl FnMut(&BatchHead, u32, &Sample<f32>) -> Result<()>,
 ) -> Result<Streamed> {
-    let rate_hz = f64::from(session.who().sample_rate_hz);
-    let wanted = duration.map(|d| (d.as_secs_f64() * rate_hz).round() as u64);
-    let mut found = Streamed::new(which);
+    let who = session.who().clone();
+    let wanted = duration.map(|d| (d.as_secs_f64() * who.sample_rate_hz).round() as u64);
+    let mut found = Streamed::new(which, &who.raw_unit);
     let mut expected: Option<u32> = None;
     let mut last = Instant::now();
     let before = session.count();
@@ -111,7 +125,15 @@ pub fn stream(
         };
         last = Instant::now();
         found.temp_c = f64::from(batch.head.temp_c);
-        found.gyro_temps_c = batch.gyro_temps_c;
+        found.rate_hz = batch.head.rate_hz();
+        let readings = who.thermometers.iter().zip(&batch.temperatures_c);
+        found.thermometers.clear();
+        found
+            .thermometers
+            .extend(readings.map(|(place, temp_c)| Thermometer {
+                place: place.clone(),
+                temp_c: shortest(*temp_c),
+            }));
         for (k, sample) in (0..).zip(&batch.values) {
             let number = batch.head.first.wrapping_add(k);
             let lost = number.wrapping_sub(expected.unwrap_or(number));

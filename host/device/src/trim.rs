@@ -198,7 +198,7 @@ fn refuse(session: &Session, refused: &StoredError) -> Error {
 
 /// Averages the compensated output of a unit at rest.
 fn average(session: &mut Session, duration: Duration, progress: impl Fn(f64)) -> Result<Average> {
-    let rate_hz = f64::from(session.who().sample_rate_hz);
+    let rate_hz = session.who().sample_rate_hz;
     let stretch = (STRETCH_S * rate_hz).round() as u64;
     let wanted = duration.as_secs_f64() * rate_hz;
     let (mut means, mut sum, mut count, mut taken) = (Vec::new(), zero(), 0, 0_u64);
@@ -279,7 +279,7 @@ mod tests {
     fn average(means: impl Iterator<Item = (Vector3<f64>, Vector3<f64>)>) -> Average {
         Average {
             means: means.map(|(gyro, accel)| Sample { gyro, accel }).collect(),
-            summary: Streamed::new(Stream::Compensated),
+            summary: Streamed::new(Stream::Compensated, "V"),
         }
     }
 

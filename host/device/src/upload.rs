@@ -85,6 +85,12 @@ pub fn upload(
         ));
     }
     progress(1.0);
+    let mut warnings = image.warnings.clone();
+    if image.origin.settings.is_none() {
+        warnings.push(
+            "the calibration does not contain the range and the filter of its sensors, so they may have been set otherwise; fit a recording of `mimu record`".into(),
+        );
+    }
     Ok(Uploaded {
         hash: image.hash,
         bytes: image.bytes.len(),
@@ -95,7 +101,7 @@ pub fn upload(
         unit_id: image.origin.unit_id.as_ref().map(origin::digits),
         node_temp_c: image.node_temp_c.clone(),
         effects: image.effects.clone(),
-        warnings: image.warnings.clone(),
+        warnings,
     })
 }
 

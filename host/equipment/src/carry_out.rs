@@ -83,7 +83,7 @@ pub fn carry_out(
         procedure,
         equipment: Some(Equipment::start(equipped)?),
         sequence: Sequence::new(procedure, has_table, chamber),
-        checked: has_table.then(Checked::default),
+        checked: has_table.then(|| Checked::new(session.who().nominal())),
         cut_short: None,
         not_at_rest: Vec::new(),
     });

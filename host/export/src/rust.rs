@@ -23,7 +23,7 @@ use crate::{Export, Sources, heading};
 /// Text of the module.
 ///
 /// # Errors
-/// The errors of [`Image::new`]: a triad is missing, readings are not in volts, or an effect cannot be removed on a device.
+/// The errors of [`Image::new`]: a triad is missing, readings are in SI, or an effect cannot be removed on a device.
 pub fn export(from: &Sources) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let image = Image::new(calibration, place)?;

@@ -34,12 +34,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::fitted::FittedEffect;
 use crate::judgement::Judgement;
-use crate::quantity::Sensor;
+use crate::quantity::{Sensor, significant};
 use crate::triad::Covariance;
 use crate::warning::Warning;
 use mimu_recording::error::Result;
 use mimu_recording::{
-    Manifest, RawUnit, Reference, UNNAMED, are_two_units, check_kind, parse_toml, read_text,
+    Manifest, RawUnit, Reference, SensorSettings, UNNAMED, are_two_units, check_kind, parse_toml,
+    read_text,
 };
 
 /// Version of the layout of a calibration at one temperature.
@@ -105,6 +106,10 @@ pub struct Calibration {
     /// The judgement of the result that it comes from; a device does not store it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub judgement: Option<Judgement>,
+    /// The sensors as they were set, if `mimu record` recorded it: it is for no other range or filter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<sensors_schema::Sensors>"))]
+    pub sensors: Option<SensorSettings>,
     /// The recording that it was made from.
     pub recording: Origin,
     /// How it was made, if from several sessions.
@@ -125,6 +130,36 @@ pub struct Calibration {
     /// Errors that the affine models lack.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     effects: Vec<FittedEffect>,
+}
+
+/// What the schema says of [`SensorSettings`].
+#[cfg(feature = "schema")]
+mod sensors_schema {
+    /// The sensors of a unit as they were set.
+    #[derive(schemars::JsonSchema)]
+    #[schemars(deny_unknown_fields)]
+    #[expect(dead_code, reason = "for the schema only")]
+    pub struct Sensors {
+        /// The gyros.
+        gyro: Sensor,
+        /// The accelerometers.
+        accel: Sensor,
+    }
+
+    /// The sensors of a triad as they were set.
+    #[derive(schemars::JsonSchema)]
+    #[schemars(deny_unknown_fields)]
+    #[expect(dead_code, reason = "for the schema only")]
+    pub struct Sensor {
+        /// Name of the part.
+        part: String,
+        /// Bits of a reading, with its sign.
+        bits: u8,
+        /// Largest input, rad/s or m/s².
+        range: f64,
+        /// Filters and rate.
+        filter: String,
+    }
 }
 
 /// The recording that a calibration was made from.
@@ -365,6 +400,41 @@ impl Calibration {
                 recording: theirs,
             }),
         }
+    }
+
+    /// The sensor that was set otherwise when the calibration was made, in words: `its gyro had a range of 17.45 rad/s`. `None` if none was, or if
+    /// one of the two is unknown.
+    pub fn other_setting(&self, now: Option<&SensorSettings>) -> Option<String> {
+        let (ours, now) = self.sensors.as_ref().zip(now)?;
+        let pairs = [
+            (Sensor::Gyro, &ours.gyro, &now.gyro),
+            (Sensor::Accel, &ours.accel, &now.accel),
+        ];
+        pairs.into_iter().find_map(|(sensor, ours, now)| {
+            let unit = sensor.unit().replace("^2", "²");
+            let differs = |what: &str, a: String, b: String| {
+                format!("it was made with the {sensor} at {what} {a}, but it is {b} now")
+            };
+            if ours.part != now.part {
+                let problem = "it was made with another part as the";
+                return Some(format!(
+                    "{problem} {sensor}: {}, not {}",
+                    ours.part, now.part
+                ));
+            }
+            if ours.range != now.range {
+                let of = |range: f64| format!("{} {unit}", significant(range));
+                return Some(differs("a range of", of(ours.range), of(now.range)));
+            }
+            if ours.bits != now.bits {
+                let [a, b] = [ours.bits, now.bits].map(|bits| format!("{bits} bits"));
+                return Some(differs("a reading of", a, b));
+            }
+            (ours.filter != now.filter).then(|| {
+                let [a, b] = [ours, now].map(|of| format!("{:?}", of.filter));
+                differs("the filter", a, b)
+            })
+        })
     }
 
     /// A note if only a person knows that it belongs to the unit of the recording, because one of the two names no unit.

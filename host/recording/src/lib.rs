@@ -66,7 +66,7 @@ pub use manifest::{
 };
 pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
-pub use recorded::{Recorded, Restart};
+pub use recorded::{Recorded, Restart, SensorSetting, SensorSettings};
 pub use separator::Separator;
 pub use toml_file::{check_kind, parse_toml, read_text};
 pub use turntable::{Turntable, TurntableRate, rate_error};

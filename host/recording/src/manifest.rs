@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::recorded::Recorded;
+use super::recorded::{Recorded, SensorSettings};
 use super::turntable::Turntable;
 use crate::error::{Argument, Error, Result};
 use crate::toml_file::{check_kind, parse_toml, read_text};
@@ -261,6 +261,11 @@ impl Manifest {
     pub fn unit_id(&self) -> Option<&str> {
         let recorded = self.recorded.as_ref()?;
         Some(recorded.unit_id.as_str()).filter(|id| id.bytes().any(|digit| digit != b'0'))
+    }
+
+    /// The sensors as they were set, if the recording has them.
+    pub fn sensors(&self) -> Option<&SensorSettings> {
+        self.recorded.as_ref()?.sensors.as_ref()
     }
 
     /// Whether an import computed the sample rate from the time stamps, and nobody gave it.

@@ -17,12 +17,39 @@ pub struct Recorded {
     /// Why the device had started, if it was not by a power-on: its clock began then, and the time of the power-on is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<String>,
+    /// Its sensors as they were set.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensors: Option<SensorSettings>,
     /// Samples missing between the first and the last, except at restarts. Each gap is a longer interval of `t_s`.
     #[serde(default)]
     pub missing: u64,
     /// Restarts of the device: its counter began anew, and only the PC's clock shows how long each took.
     #[serde(default, rename = "restart", skip_serializing_if = "Vec::is_empty")]
     pub restarts: Vec<Restart>,
+}
+
+/// The sensors of a unit as they were set. A calibration belongs to them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorSettings {
+    /// The gyros.
+    pub gyro: SensorSetting,
+    /// The accelerometers.
+    pub accel: SensorSetting,
+}
+
+/// The sensors of a triad as they were set.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorSetting {
+    /// Name of the part.
+    pub part: String,
+    /// Bits of a reading, with its sign.
+    pub bits: u8,
+    /// Largest input, rad/s or m/s².
+    pub range: f64,
+    /// Filters and rate.
+    pub filter: String,
 }
 
 /// A restart of the device within a recording.

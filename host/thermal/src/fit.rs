@@ -393,6 +393,7 @@ impl ThermalFit {
         let unit = CurvesOfUnit {
             device: first.device.clone(),
             unit_id: first.unit_id.clone(),
+            sensors: first.sensors.clone(),
             sha256: first.sha256.clone(),
             raw_unit: first.raw_unit,
             reference: first.reference,

@@ -7,7 +7,7 @@ use mimu::signal::blocks::{Block, Condensed};
 use mimu::signal::dwell::Dwell;
 use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{RawUnit, Reference, SensorSettings};
 use nalgebra::Vector3;
 
 use crate::bias_jumps::{self, BiasJump};
@@ -47,6 +47,8 @@ pub struct Session {
     pub device: String,
     /// Its number, if it is known.
     pub unit_id: Option<String>,
+    /// Its sensors as they were set, if they are known.
+    pub sensors: Option<SensorSettings>,
     /// Unit of the readings.
     pub raw_unit: RawUnit,
     /// What is known of the input.
@@ -131,6 +133,7 @@ impl Session {
             place: prepared.place.clone(),
             device: manifest.device.clone(),
             unit_id: manifest.unit_id().map(str::to_owned),
+            sensors: manifest.sensors().cloned(),
             raw_unit: manifest.raw_unit,
             reference: manifest.reference,
             gravity_mps2: manifest.gravity_mps2,

@@ -39,6 +39,16 @@ pub fn check_alike(sessions: &[Session]) -> Result<()> {
             let remedy = "fit the recordings of each unit separately";
             return Err(Error::new(&other.place, problem, remedy));
         }
+        if let (Some(a), Some(b)) = (&first.sensors, &other.sensors)
+            && a != b
+        {
+            let problem = format!(
+                "its sensors had another range or filter than those of {}",
+                first.place
+            );
+            let remedy = "fit recordings with one setting together";
+            return Err(Error::new(&other.place, problem, remedy));
+        }
         if first.raw_unit != other.raw_unit || first.reference != other.reference {
             let problem = format!(
                 "its readings are in {} with reference {:?}, but those of {} are in {} with reference {:?}",

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use mimu::signal::increment::pause_periods;
 use mimu_core::wire::{Request, flags};
 use mimu_device::record::shortest;
-use mimu_device::{Event, Identity, Samples, Session, Started};
+use mimu_device::{Event, Identity, Samples, Session, Started, Stream, stream};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
 
@@ -13,6 +13,11 @@ use crate::source::{Chunk, Source, SourceEvent, Unit};
 
 /// Silence after which the device is asked to greet and stream again.
 const SILENCE: Duration = Duration::from_secs(2);
+/// Change of the sample rate within a [`LOOK`] below which it is used.
+const SETTLED: f64 = 20e-6;
+/// Time between two looks at the sample rate, and most of them.
+const LOOK: Duration = Duration::from_secs(1);
+const LOOKS: u32 = 8;
 
 /// The raw stream of a device.
 #[derive(Debug)]
@@ -38,11 +43,8 @@ const RAW: Request<'_> = Request::Stream {
 impl DeviceSource {
     /// Opens the port, or the only one where a device answers. `next`: the first tick that it may use.
     pub fn open(port: Option<&str>, next: u64) -> Result<Self> {
-        Ok(Self::of(Session::open(port)?, next))
-    }
-
-    /// The source of an open session.
-    pub fn of(session: Session, next: u64) -> Self {
+        let mut session = Session::open(port)?;
+        let rate_hz = settled_rate_hz(&mut session)?;
         let who = session.who();
         let mut told = vec![format!(
             "{}, firmware {}, unit {}",
@@ -57,14 +59,15 @@ impl DeviceSource {
         let unit = Unit {
             id: who.unit_id.clone(),
             name: mimu_device::unit_name(&who.unit_id),
-            raw_unit: RawUnit::Volt,
-            rate_hz: f64::from(who.sample_rate_hz),
-            nominal: Some(mimu_device::nominal()),
+            raw_unit: who.raw_unit(session.port())?,
+            sensors: Some(who.settings()),
+            rate_hz,
+            nominal: Some(who.nominal()),
             told,
             is_device: true,
             start: unless_power_on(&who.start),
         };
-        Self {
+        Ok(Self {
             powered_for_s: powered_for_s(who),
             session,
             unit,
@@ -73,7 +76,7 @@ impl DeviceSource {
             zero: 0,
             next,
             anew: true,
-        }
+        })
     }
 
     fn take(&mut self, samples: &Samples) -> Result<SourceEvent> {
@@ -117,6 +120,24 @@ impl DeviceSource {
                 .map(|s| self.zero as f64 / self.unit.rate_hz - s),
         }))
     }
+}
+
+/// The sample rate by the board's crystal, Hz. A digital sensor has a clock of its own, whose rate the board knows to 0.1 % at its first sample and to
+/// 20 ppm some seconds later; the session counts its time with it.
+fn settled_rate_hz(session: &mut Session) -> Result<f64> {
+    let raw_unit = session.who().raw_unit(session.port())?;
+    let mut rate_hz = session.who().sample_rate_hz;
+    if raw_unit != RawUnit::Count {
+        return Ok(rate_hz);
+    }
+    for _ in 0..LOOKS {
+        let seen = stream(session, Stream::Raw, Some(LOOK), || false, |_, _, _| Ok(()))?;
+        let before_hz = std::mem::replace(&mut rate_hz, seen.rate_hz);
+        if (rate_hz / before_hz - 1.0).abs() < SETTLED {
+            break;
+        }
+    }
+    Ok(rate_hz)
 }
 
 fn powered_for_s(who: &Identity) -> Option<f64> {

@@ -2,8 +2,8 @@
 
 use mimu_core::compensation::Affine;
 use mimu_device::Session;
-use mimu_recording::RawUnit;
 use mimu_recording::error::Result;
+use mimu_recording::{RawUnit, SensorSettings};
 
 use crate::clock::ClockRate;
 
@@ -16,6 +16,8 @@ pub struct Unit {
     pub name: String,
     /// Unit of its raw readings.
     pub raw_unit: RawUnit,
+    /// Its sensors as they are set, if it says so.
+    pub sensors: Option<SensorSettings>,
     /// Sample rate, Hz.
     pub rate_hz: f64,
     /// Model of gyro and accelerometer from the data sheets, raw to SI; accurate enough to find which side is up. `None`: estimated from gravity.

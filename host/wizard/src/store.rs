@@ -3,7 +3,10 @@
 use std::time::{Duration, Instant};
 
 use mimu::calibration::Calibration;
-use mimu_device::{Image, Session, Started, Stream, check, download, self_test, stream, upload};
+use mimu_core::wire::Capabilities;
+use mimu_device::{
+    Image, Session, Started, Stream, Verdict, check, download, self_test, stream, upload,
+};
 use mimu_recording::error::{Error, Result};
 
 use crate::event::{Event, Question};
@@ -24,7 +27,7 @@ const GLANCE: Duration = Duration::from_millis(50);
 fn powered(session: &mut Session) -> Result<Option<f64>> {
     let who = session.hello()?;
     let before_ms = who.powered_for_ms.filter(|_| who.start == Started::PowerOn);
-    let rate_hz = f64::from(who.sample_rate_hz);
+    let rate_hz = who.sample_rate_hz;
     let seen = stream(
         session,
         Stream::Raw,
@@ -64,9 +67,12 @@ impl Wizard<'_> {
             {
                 continue;
             }
-            let tested = unit.station.with(self_test)?;
-            let failed = tested.passed.all().into_iter().filter(|s| !s.1);
-            let failed: Vec<&str> = failed.map(|s| s.0).collect();
+            let tested = unit.station.with(|session| {
+                let able = session.who().capabilities.contains(Capabilities::SELF_TEST);
+                able.then(|| self_test(session)).transpose()
+            })?;
+            let Some(tested) = tested else { continue };
+            let failed = tested.named(Verdict::Failed);
             let words = match (failed.is_empty(), &tested.moved) {
                 (true, _) => "all sensors respond as in their data sheets".to_string(),
                 (false, None) => format!("not as in the data sheets: {}", failed.join(", ")),

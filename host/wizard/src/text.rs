@@ -72,6 +72,7 @@ impl TextBoard {
             id: name.clone(),
             name,
             raw_unit: text.raw_unit,
+            sensors: None,
             rate_hz: rate_hz.unwrap_or(f64::NAN),
             nominal: (text.raw_unit == RawUnit::Si)
                 .then(|| [Affine::identity(), Affine::identity()]),

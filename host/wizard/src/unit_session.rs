@@ -196,6 +196,7 @@ impl UnitSession {
             manifest.recorded = Some(Recorded {
                 tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
                 unit_id: unit.id.clone(),
+                sensors: unit.sensors.clone(),
                 start: unit.start.clone().filter(|_| self.power_on_s.is_none()),
                 ..Recorded::default()
             });

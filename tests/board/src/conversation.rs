@@ -1,9 +1,10 @@
 //! The host's end of the serial line, for tests: calls and received messages, in virtual time.
 
 use mimu_board::running::Board;
+use mimu_core::compensation::Sample as SiSample;
 use mimu_core::wire::{
     BatchHead, CHUNK, Call, Counts, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request,
-    SelfTest, Sums, encode,
+    Verdict, encode,
 };
 
 use crate::MS;
@@ -28,23 +29,25 @@ pub enum Answer {
         start: String,
     },
     /// Result of the self-test.
-    SelfTest(SelfTest),
+    SelfTest(Vec<Tested>),
     /// Any other reply, as text.
     Other(String),
 }
 
-/// A received sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sample {
-    /// Milliseconds since sampling began.
-    pub number: u32,
-    /// Sums of codes.
-    pub sums: Sums,
+/// A row of the self-test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tested {
+    /// What was tested.
+    pub name: String,
+    /// What was measured.
+    pub value: f32,
+    /// Whether it passes.
+    pub verdict: Verdict,
 }
 
-/// A received sample of a digital sensor.
+/// A received sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reading {
+pub struct Sample {
     /// Number since sampling began.
     pub number: u32,
     /// Time by the crystal since sampling began, s.
@@ -66,11 +69,11 @@ pub struct Conversation {
     answers: Vec<(u16, Answer)>,
     /// Samples of the raw stream since they were last taken.
     pub samples: Vec<Sample>,
-    /// The same of a digital sensor.
-    pub readings: Vec<Reading>,
+    /// The same of the compensated stream, by number: rad/s and m/s².
+    pub compensated: Vec<(u32, SiSample<f32>)>,
     /// Samples and batches that the device has lost, according to the last batch.
     pub lost: (u32, u32),
-    /// Head of the last raw batch, and the temperatures of its thermometers, °C: of the TEMP pins, or first that of a digital sensor's die.
+    /// Head of the last raw batch, and the temperatures of its first three thermometers, °C.
     pub last: Option<(BatchHead, [f32; 3])>,
     /// Every received byte, if a test has put a list here.
     pub kept: Option<Vec<u8>>,
@@ -85,7 +88,7 @@ impl Conversation {
             next_id: 0,
             answers: Vec::new(),
             samples: Vec::new(),
-            readings: Vec::new(),
+            compensated: Vec::new(),
             lost: (0, 0),
             last: None,
             kept: None,
@@ -125,7 +128,15 @@ impl Conversation {
                         Reply::Stored { length, bytes, .. } => {
                             Answer::Stored(length, bytes.to_vec())
                         }
-                        Reply::SelfTest(result) => Answer::SelfTest(result),
+                        Reply::SelfTest(test) => {
+                            assert!(test.is_whole());
+                            let rows = test.rows().map(|row| Tested {
+                                name: row.name.to_owned(),
+                                value: row.value,
+                                verdict: row.verdict,
+                            });
+                            Answer::SelfTest(rows.collect())
+                        }
                         other => Answer::Other(format!("{other:?}")),
                     };
                     self.answers.push((id, answer));
@@ -134,12 +145,6 @@ impl Conversation {
                     self.answers.push((id, Answer::Refused(refusal)));
                 }
                 Message::Event(Event::Raw(batch)) => {
-                    self.lost = (batch.head.samples_lost, batch.head.batches_dropped);
-                    self.last = Some((batch.head, batch.gyro_temps_c));
-                    let sample = |(number, sums)| Sample { number, sums };
-                    self.samples.extend(batch.sums().map(sample));
-                }
-                Message::Event(Event::Counts(batch)) => {
                     assert!(batch.is_whole(), "{batch:?}");
                     self.lost = (batch.head.samples_lost, batch.head.batches_dropped);
                     let mut temps_c = [f32::NAN; 3];
@@ -147,15 +152,19 @@ impl Conversation {
                         *to = temp_c;
                     }
                     self.last = Some((batch.head, temps_c));
-                    let of = batch.counts().zip(batch.times_s());
-                    self.readings
-                        .extend(of.map(|((number, counts), t_s)| Reading {
+                    let of = batch.counts().zip(batch.head.times_ns());
+                    self.samples
+                        .extend(of.map(|((number, counts), t_ns)| Sample {
                             number,
-                            t_s,
+                            t_s: t_ns as f64 * 1e-9,
                             counts,
-                            period_ns: batch.period_ns,
+                            period_ns: batch.head.period_ns,
                             flags: batch.head.flags,
                         }));
+                }
+                Message::Event(Event::Compensated(batch)) => {
+                    assert!(batch.is_whole(), "{batch:?}");
+                    self.compensated.extend(batch.values());
                 }
                 Message::Event(_) => {}
             }

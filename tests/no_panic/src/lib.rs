@@ -13,8 +13,8 @@ use mimu_core::single;
 use mimu_core::stored::{self, Curves, NODES, Origin, ROOM, Stored, TooLong};
 use mimu_core::table::{self, Node, Table};
 use mimu_core::wire::{
-    Call, CompensatedBatch, CountBatch, Decoder, EncodeError, MAX_FRAME, Message, RawBatch, Sums,
-    effects_of_this_build, encode, volts,
+    Call, CompensatedBatch, Counts, Decoder, EncodeError, MAX_FRAME, Message, RawBatch, SelfTest,
+    TestRow, TestTable, Triad, effects_of_this_build, encode, reading,
 };
 use mimu_core::{PerSensor, Sensor};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
@@ -226,27 +226,40 @@ pub fn wire_received(decoder: &mut Decoder, byte: u8) -> Option<Message<'_>> {
 
 /// [`RawBatch`] as a host reads it.
 #[inline(never)]
-pub fn wire_raw(batch: &RawBatch<'_>, take: &mut dyn FnMut(u32, Sums, Sample<f32>)) {
+pub fn wire_raw(
+    batch: &RawBatch<'_>,
+    take: &mut dyn FnMut(u32, [u8; 18], Sample<f32>, u64, Option<f32>),
+) {
     if batch.is_whole() {
-        for ((number, sums), (_, sample)) in batch.sums().zip(batch.volts()) {
-            take(number, sums, sample);
+        let temp_c = batch.temperatures_c().next();
+        let of = batch.counts().zip(batch.readings());
+        for (((number, counts), (_, reading)), t_ns) in of.zip(batch.head.times_ns()) {
+            take(number, RawBatch::pack(&counts), reading, t_ns, temp_c);
         }
     }
 }
 
-/// [`CountBatch`] as a host reads it, and its samples as a device packs them.
+/// [`SelfTest`] as a host reads it, and its rows as a device writes them.
 #[inline(never)]
-pub fn wire_counts(
-    batch: &CountBatch<'_>,
-    take: &mut dyn FnMut(u32, [u8; 18], Sample<f32>, f64, Option<f32>),
-) {
-    if batch.is_whole() {
-        let temp_c = batch.temperatures_c().next();
-        let of = batch.counts().zip(batch.readings()).zip(batch.times_s());
-        for (((number, counts), (_, reading)), t_s) in of {
-            take(number, CountBatch::pack(&counts), reading, t_s, temp_c);
+pub fn wire_self_test<'a>(test: &SelfTest<'a>, take: &mut dyn FnMut(&TestRow<'a>)) -> bool {
+    let mut table = TestTable::new();
+    for row in test.rows() {
+        take(&row);
+        let again = TestRow::within(row.name, row.value, row.unit, row.limits);
+        if !table.push(&again) {
+            return false;
         }
     }
+    test.is_whole() && table.result().is_whole()
+}
+
+/// [`Origin::check_sensors`].
+#[inline(never)]
+pub fn stored_sensors(
+    origin: &Origin,
+    triads: &PerSensor<Triad<'_>>,
+) -> Result<(), stored::StoredError> {
+    origin.check_sensors(triads)
 }
 
 /// [`CompensatedBatch`] as a host reads it.
@@ -279,6 +292,7 @@ pub fn compensator_follow(
     table::Place,
 ) {
     let mut state = before.state(1000.0).long_after_power_on();
+    state.at_rate(1030.0);
     before.follow(&mut state, dt_s, thermometer_c);
     now.take_over(before, &mut state);
     state.gap();
@@ -300,17 +314,16 @@ pub fn readme_program(
     readme::calibrate(calibration, 1000.0, samples.iter().copied(), out)
 }
 
-/// The device's work for every sample: sums to volts, the whole calibration at the temperature of the batch, bytes of both streams.
+/// The device's work for every sample: integers to raw units, the whole calibration at the temperature of the batch, bytes of both streams.
 #[inline(never)]
 pub fn sample_path(
-    sums: &Sums,
-    scale: [f32; 2],
+    counts: &Counts,
+    scale: &PerSensor<f32>,
     compensator: &Compensator<f32, NODES, ROOM>,
     state: &mut compensator::State<f32, ROOM>,
 ) -> ([u8; 18], [u8; 24]) {
-    let [gyro, accel] = scale;
-    let sample = single::apply(compensator, state, &volts(sums, gyro, accel));
-    (RawBatch::pack(sums), CompensatedBatch::pack(&sample))
+    let sample = single::apply(compensator, state, &reading(counts, scale));
+    (RawBatch::pack(counts), CompensatedBatch::pack(&sample))
 }
 
 /// The same without effects: the compensation alone, whose instructions are counted.

@@ -12,7 +12,7 @@ use std::time::Duration;
 use crate::report;
 use clap::{Args, Subcommand, ValueEnum};
 use mimu_core::wire::Request;
-use mimu_device::{Answer, Counted, DeviceResult, Session, Stream, self_test, stream};
+use mimu_device::{Answer, Counted, DeviceResult, Session, Stream, Verdict, self_test, stream};
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Error, Result};
 use signal_hook::consts::TERM_SIGNALS;
@@ -163,7 +163,6 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     };
     let mut session = open(&args.port)?;
     let stop = interruption()?;
-    let rate_hz = f64::from(session.who().sample_rate_hz);
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
     // If JSON goes to standard output, it contains only the summary and no samples.
     let rows = !args.json.is_standard_output();
@@ -180,7 +179,7 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
         ended,
         |head, number, sample| {
             if rows && !closed {
-                let t_s = f64::from(number) / rate_hz;
+                let t_s = head.time_s(number);
                 let (g, a) = (&sample.gyro, &sample.accel);
                 let row = writeln!(
                     out,
@@ -217,9 +216,7 @@ fn run_self_test(args: &PlainArgs) -> Result<()> {
     let port = session.port();
     let result = DeviceResult::new("self-test", port, found);
     print(&args.json, &report::self_test_text(&result), &result, None)?;
-    let sensors = result.found.passed.all().into_iter();
-    let failed: Vec<&str> = sensors.filter(|s| !s.1).map(|s| s.0).collect();
-    let failed = failed.join(", ");
+    let failed = result.found.named(Verdict::Failed).join("; ");
     match &result.found.moved {
         _ if failed.is_empty() => Ok(()),
         Some(moved) => Err(Error::new(

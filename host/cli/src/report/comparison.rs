@@ -82,7 +82,7 @@ pub fn kalman_text(result: &DeviceResult<KalmanRun>) -> String {
         "              device          sigma            PC   difference / sigma"
     );
     for (i, axis) in AXES.iter().enumerate() {
-        for (k, (name, unit)) in run.parameters.iter().zip(run.units).enumerate() {
+        for (k, (name, unit)) in run.parameters.iter().zip(&run.units).enumerate() {
             line!(
                 out,
                 "{axis} {name:<3} {:>14.7} {:>14} {:>13.7}   {:>10}   {unit}",

@@ -3,11 +3,12 @@
 use std::fmt::Write as _;
 
 use super::text::warn;
-use mimu::quantity::{AXES, significant};
+use mimu::quantity::{AXES, Sensor, significant};
+use mimu::readable::STANDARD_GRAVITY;
 use mimu_core::wire::Counters;
 use mimu_device::record::RecordSummary;
 use mimu_device::{
-    Contents, Counted, DeviceResult, Identity, LineCount, SelfTested, Streamed, Uploaded,
+    Contents, Counted, DeviceResult, Identity, LineCount, SelfTested, Streamed, Uploaded, Verdict,
 };
 
 /// Writes a line to a string, which cannot fail.
@@ -41,11 +42,21 @@ pub fn info_text(result: &DeviceResult<&Identity>) -> String {
     line!(out, "power-on      {powered}");
     line!(
         out,
-        "samples       {} Hz, {} in {}",
+        "samples       {} Hz, 6 channels in {}",
         who.sample_rate_hz,
-        who.channels.join(", "),
         who.raw_unit
     );
+    for (sensor, triad) in who.sensors.iter() {
+        let (range, unit) = sensor_range(sensor, triad.range);
+        line!(
+            out,
+            "{sensor:<13} {}, range {range} {unit}, {} bits, filter {}",
+            triad.part,
+            triad.bits,
+            triad.filter
+        );
+    }
+    line!(out, "thermometers  {}", who.thermometers.join(", "));
     match &who.stored {
         None => {
             line!(out, "calibration   none");
@@ -84,6 +95,16 @@ pub fn info_text(result: &DeviceResult<&Identity>) -> String {
     line!(out, "removes       {}", who.effects.join(", "));
     warn(&mut out, who.warnings.iter());
     out
+}
+
+/// A range in the unit of data sheets.
+fn sensor_range(sensor: Sensor, range: f64) -> (String, &'static str) {
+    let (value, unit) = match sensor {
+        Sensor::Gyro => (range.to_degrees(), "deg/s"),
+        Sensor::Accel => (range / STANDARD_GRAVITY, "g"),
+    };
+    // Single precision of SI is no digit of a data sheet.
+    (format!("{}", (value * 1e3).round() / 1e3), unit)
 }
 
 fn starts(count: u32) -> String {
@@ -145,7 +166,7 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
         "{}, {}: u in {} at the sensors, x in rad/s and m/s², {} frame",
         found.formula,
         found.direction,
-        found.raw_unit,
+        found.raw_unit.unwrap_or("the device's raw unit"),
         found.frame
     );
     if let Some(at) = &found.trimmed {
@@ -227,30 +248,27 @@ pub fn self_test_text(result: &DeviceResult<SelfTested>) -> String {
     let found = &result.found;
     let mut out = String::new();
     line!(out, "{}: self-test", result.port);
-    let word = |ok: bool| if ok { "passed" } else { "FAILED" };
-    for (k, (name, passed)) in found.passed.all().into_iter().enumerate() {
-        let i = k % 3;
-        let detail = match k {
-            0..3 => format!(
-                "ST1 {:+.3} V, ST2 {:+.3} V",
-                found.gyro_st1_v[i], found.gyro_st2_v[i]
-            ),
-            3..6 => format!(
-                "finest range {:.3} V, coarsest {:.3} V",
-                found.accel_fine_v[i], found.accel_coarse_v[i]
-            ),
-            6 => "judged from all three axes together".into(),
-            7..10 => format!("{:.2} °C", found.gyro_temps_c[(k - 7) % 3]),
-            10 => format!("{:.3} V", found.reference_v),
-            _ => format!("{:.3} V", found.supply_v),
+    for row in &found.results {
+        let word = match row.verdict {
+            Verdict::Passed => "passed",
+            Verdict::Failed => "FAILED",
+            Verdict::NotShown => "not shown",
         };
-        line!(out, "{name:<13}   {}   {detail}", word(passed));
-    }
-    if !found.accel_not_shown.is_empty() {
+        let [least, most] = row.limits;
         line!(
             out,
-            "not shown in this pose: accel {} is perpendicular to gravity, where a stuck axis reads the same; test again with this axis up",
-            found.accel_not_shown.join(", ")
+            "{:<14}  {word:<9}  {:>8.3} {}, limits {least:.3} to {most:.3}",
+            row.name,
+            row.value,
+            row.unit
+        );
+    }
+    let not_shown = found.named(Verdict::NotShown);
+    if !not_shown.is_empty() {
+        line!(
+            out,
+            "not shown in this pose: {}; the axis is perpendicular to gravity, where a stuck one reads the same; test again with it up",
+            not_shown.join("; ")
         );
     }
     if let Some(moved) = &found.moved {
@@ -327,12 +345,16 @@ pub fn stream_text(result: &DeviceResult<Streamed>) -> String {
                 "{sensor:<5} {axis}  mean {:>13.6}  deviation {:>9} {}",
                 moments.mean[i],
                 significant(moments.deviation[i]),
-                printed(moments.unit)
+                printed(&moments.unit)
             );
         }
     }
-    if let Some([x, y, z]) = found.gyro_temps_c {
-        line!(out, "gyros x, y, z at {x:.2}, {y:.2}, {z:.2} °C");
+    if !found.thermometers.is_empty() {
+        let all = found.thermometers.iter();
+        let all: Vec<String> = all
+            .map(|t| format!("{} {:.2} °C", t.place, t.temp_c))
+            .collect();
+        line!(out, "thermometers: {}", all.join(", "));
     }
     line_text(&mut out, &found.line);
     warn(&mut out, found.flagged.warnings().iter());

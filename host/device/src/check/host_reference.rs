@@ -22,13 +22,12 @@ struct Running<T: RealField> {
 
 /// The PC's compensation twice: in single precision as on the device, and in double precision from the file.
 pub(super) struct HostReference {
-    rate_hz: u32,
     single: Running<f32>,
     double: Running<f64>,
     on_curves: bool,
     dies: Option<PerSensor<die::State<f32>>>,
-    /// Number of the first sample of the previous batch. Time since power-on is counted from it, as on the device.
-    followed: u32,
+    /// Time of the first sample of the previous batch, µs. Time since power-on is counted from it, as on the device.
+    followed_us: u64,
     /// Number of the sample that comes next.
     next: Option<u32>,
 }
@@ -37,7 +36,6 @@ impl HostReference {
     pub fn new(
         calibration: &Calibration,
         image: &Image,
-        rate_hz: u32,
         powered_for_ms: Option<u32>,
         place: &str,
     ) -> Result<Self> {
@@ -61,20 +59,19 @@ impl HostReference {
         let on_curves = curves.is_some();
         let effects = calibration.core_effects()?;
         let of_file = compensator(calibration, models, curves, effects);
-        let mut single = Running::new(stored.compensator, rate_hz as f32);
-        let mut double = Running::new(of_file, f64::from(rate_hz));
+        let mut single = Running::new(stored.compensator);
+        let mut double = Running::new(of_file);
         if powered_for_ms.is_none() {
             single.state = single.state.long_after_power_on();
             double.state = double.state.long_after_power_on();
         }
-        let before = u64::from(powered_for_ms.unwrap_or_default()) * u64::from(rate_hz) / 1000;
+        let before_us = u64::from(powered_for_ms.unwrap_or_default()) * 1000;
         Ok(Self {
-            rate_hz,
             single,
             double,
             on_curves,
             dies: None,
-            followed: 0_u32.wrapping_sub(before as u32),
+            followed_us: 0_u64.wrapping_sub(before_us),
             next: None,
         })
     }
@@ -117,7 +114,7 @@ impl HostReference {
         first: bool,
         found: &mut Checked,
     ) {
-        let dt_s = head.first.wrapping_sub(self.followed) as f32 / self.rate_hz as f32;
+        let dt_s = head.since_s(self.followed_us);
         if first {
             self.dies = None;
         }
@@ -150,15 +147,17 @@ impl HostReference {
 
     /// Advances time and temperature, with the temperatures of the dies that the device used.
     fn follow(&mut self, head: &BatchHead, dies_c: PerSensor<f32>) {
-        let passed = head.first.wrapping_sub(self.followed);
-        self.followed = head.first;
+        let passed_us = head.tick_us.wrapping_sub(self.followed_us);
+        // Divides as the firmware does: the operation decides the last digit.
+        let dt_s = head.since_s(self.followed_us);
+        self.followed_us = head.tick_us;
         let thermometer_c = head.thermometer_c();
         let Running { compensator, state } = &mut self.single;
-        // Divides as the firmware does: the operation decides the last digit.
-        let dt_s = passed as f32 / self.rate_hz as f32;
+        state.at_rate(head.rate_hz() as f32);
         compensator.follow_at(state, dt_s, thermometer_c, Some(dies_c));
         let Running { compensator, state } = &mut self.double;
-        let dt_s = f64::from(passed) / f64::from(self.rate_hz);
+        let dt_s = passed_us as f64 / 1e6;
+        state.at_rate(head.rate_hz());
         let dies_c = Some(dies_c.map(f64::from));
         compensator.follow_at(state, dt_s, thermometer_c.map(f64::from), dies_c);
     }
@@ -177,9 +176,10 @@ impl HostReference {
 }
 
 impl<T: RealField + Copy> Running<T> {
-    fn new(compensator: Compensator<T, NODES, ROOM>, rate_hz: T) -> Self {
+    /// The sample rate comes with the first batch.
+    fn new(compensator: Compensator<T, NODES, ROOM>) -> Self {
         Self {
-            state: compensator.state(rate_hz),
+            state: compensator.state(T::one()),
             compensator,
         }
     }

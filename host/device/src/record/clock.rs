@@ -1,21 +1,33 @@
-//! Converts the device's sample numbers into ticks that never decrease.
+//! Places the device's samples in the time of the recording, which never decreases.
 
 use std::time::Duration;
 
 use mimu::signal::increment::pause_periods;
+use mimu_core::wire::BatchHead;
 
 use crate::identity::Started;
 
-/// Counts ticks of one sample period since the device began to sample. Ticks have 64 bits: the device's numbers wrap after 49 days, and start again
-/// from 0 after a restart.
-#[derive(Debug)]
+/// Times of samples, ns since the device began to sample, by its crystal. After a restart the device's time starts again from 0, and its numbers wrap
+/// after 49 days.
+#[derive(Debug, Default)]
 pub(super) struct Clock {
-    rate_hz: f64,
-    /// Tick and number of the next sample, if none is lost.
-    next: Option<(u64, u32)>,
+    /// What comes next, if no sample is lost.
+    next: Option<Next>,
+    /// What the device's time lacks since its last restart, ns.
+    before_ns: u64,
     restarted: Option<Option<Started>>,
     /// The line was lost and is back; the value is the reset cause that the device reports.
     reconnected: Option<Started>,
+    /// Sum of the periods of all samples, ns, and their number.
+    periods_ns: f64,
+    samples: u64,
+}
+
+/// The next sample, if none is lost.
+#[derive(Debug, Clone, Copy)]
+struct Next {
+    ns: u64,
+    number: u32,
 }
 
 /// Silence allowed before the first batch after a reconnection, in addition to the time without a line, s.
@@ -26,8 +38,8 @@ const DRIFT: f64 = 0.01;
 /// Position of a received batch.
 #[derive(Debug, PartialEq)]
 pub(super) struct Arrival {
-    /// Tick of its first sample.
-    pub tick: u64,
+    /// Time of its first sample, ns.
+    pub ns: u64,
     /// Samples missing before it.
     pub missing: u64,
     /// Set if it is the first batch after a restart; the reset cause, if the device reported it.
@@ -35,15 +47,6 @@ pub(super) struct Arrival {
 }
 
 impl Clock {
-    pub fn new(rate_hz: u32) -> Self {
-        Self {
-            rate_hz: f64::from(rate_hz),
-            next: None,
-            restarted: None,
-            reconnected: None,
-        }
-    }
-
     /// The device has sent a greeting: its numbers start again.
     pub fn restarted(&mut self, start: Option<Started>) {
         // A greeting before the first sample interrupts nothing.
@@ -57,74 +60,79 @@ impl Clock {
         self.reconnected = Some(start);
     }
 
-    /// Whether a device that begins a batch with this number has restarted while the line was lost. If it continued, its number is ahead by
-    /// the elapsed time; if it restarted, its number is at most the elapsed time.
-    fn began_anew(&self, number: u32, ahead: u32, silence: Duration) -> bool {
-        let away = silence.as_secs_f64() * self.rate_hz;
-        let room = DRIFT * away + DELAY_S * self.rate_hz;
-        f64::from(number) <= away + room && (f64::from(ahead) - away).abs() > room
-    }
-
-    /// Places a batch that begins with this number, received `silence` after the previous one.
-    pub fn arrive(&mut self, number: u32, silence: Duration) -> Arrival {
-        let Some((next, expected)) = self.next else {
-            self.next = Some((u64::from(number), number));
-            let tick = u64::from(number);
+    /// Places a batch that was received `silence` after the previous one.
+    pub fn arrive(&mut self, head: &BatchHead, silence: Duration) -> Arrival {
+        let device_ns = head.tick_us.saturating_mul(1000);
+        let Some(next) = self.next else {
             return Arrival {
-                tick,
+                ns: device_ns,
                 missing: 0,
                 restart: None,
             };
         };
-        let ahead = number.wrapping_sub(expected);
+        let ahead = head.first.wrapping_sub(next.number);
         let back = ahead > u32::MAX / 2;
         let reconnected = self.reconnected.take();
-        let anew = reconnected.is_some() && self.began_anew(number, ahead, silence);
+        let anew = reconnected.is_some() && began_anew(head, ahead, silence);
         let restart = match self.restarted.take() {
             None if back || anew => Some(reconnected),
             told => told,
         };
-        let (tick, missing) = match restart {
+        if restart.is_some() {
             // Only the PC's clock knows how long the restart took: at least so long that no turn is integrated across it.
-            Some(_) => (
-                next + ((silence.as_secs_f64() * self.rate_hz) as u64)
-                    .max(pause_periods(self.rate_hz)),
-                0,
-            ),
-            None => (next + u64::from(ahead), u64::from(ahead)),
-        };
-        self.next = Some((tick, number));
+            let rate_hz = head.rate_hz();
+            let away_s = silence
+                .as_secs_f64()
+                .max(pause_periods(rate_hz) as f64 / rate_hz);
+            let ns = next.ns + (away_s * 1e9) as u64;
+            self.before_ns = ns.saturating_sub(device_ns);
+        }
         Arrival {
-            tick,
-            missing,
+            // The crystal's time of a sample that the device estimates anew with each batch may differ by microseconds: never by a period.
+            ns: (self.before_ns + device_ns)
+                .max(next.ns.saturating_sub(u64::from(head.period_ns) / 2)),
+            missing: match restart {
+                Some(_) => 0,
+                None => u64::from(ahead),
+            },
             restart,
         }
     }
 
-    /// Advances by the samples of the batch.
-    pub fn passed(&mut self, samples: usize) {
-        if let Some((tick, number)) = &mut self.next {
-            *tick += samples as u64;
-            *number = number.wrapping_add(samples as u32);
-        }
+    /// Advances by the samples of the batch, which were placed at `ns`.
+    pub fn passed(&mut self, head: &BatchHead, ns: u64, samples: usize) {
+        let count = samples as u64;
+        self.samples += count;
+        self.periods_ns += f64::from(head.period_ns) * count as f64;
+        self.next = Some(Next {
+            ns: ns + count * u64::from(head.period_ns),
+            number: head.first.wrapping_add(samples as u32),
+        });
     }
 
-    /// Tick of the next sample.
-    pub fn next(&self) -> u64 {
-        self.next.map_or(0, |(tick, _)| tick)
+    /// Time of the next sample, ns.
+    pub fn next_ns(&self) -> u64 {
+        self.next.map_or(0, |next| next.ns)
     }
 
-    /// Duration of so many ticks.
-    pub fn length(&self, ticks: u64) -> Duration {
-        let rate_hz = (self.rate_hz as u128).max(1);
-        let nanoseconds = u128::from(ticks) * 1_000_000_000 / rate_hz;
-        Duration::from_nanos(u64::try_from(nanoseconds).unwrap_or(u64::MAX))
+    /// Samples per second by the device's crystal; `None` before the first.
+    pub fn rate_hz(&self) -> Option<f64> {
+        (self.samples > 0).then(|| 1e9 * self.samples as f64 / self.periods_ns)
     }
+}
 
-    /// Time of a tick, s: the nearest floating-point number to n/rate.
-    pub fn seconds(&self, tick: u64) -> f64 {
-        tick as f64 / self.rate_hz
-    }
+/// Whether a device that begins this batch has restarted while the line was lost. If it continued, its number is ahead by the elapsed time; if it
+/// restarted, its number is at most the elapsed time.
+fn began_anew(head: &BatchHead, ahead: u32, silence: Duration) -> bool {
+    let rate_hz = head.rate_hz();
+    let away = silence.as_secs_f64() * rate_hz;
+    let room = DRIFT * away + DELAY_S * rate_hz;
+    f64::from(head.first) <= away + room && (f64::from(ahead) - away).abs() > room
+}
+
+/// Time in seconds: for a board whose samples are whole milliseconds apart, the nearest floating-point number.
+pub(super) fn seconds(ns: u64) -> f64 {
+    ns as f64 / 1e9
 }
 
 #[cfg(test)]
@@ -132,41 +140,63 @@ mod tests {
     use super::*;
 
     const AT_ONCE: Duration = Duration::ZERO;
+    const MS: u64 = 1_000_000;
+
+    /// A batch of a board that samples every millisecond; its time did not wrap.
+    fn head(number: u64) -> BatchHead {
+        BatchHead {
+            first: number as u32,
+            tick_us: 1000 * number,
+            period_ns: MS as u32,
+            samples_lost: 0,
+            batches_dropped: 0,
+            temp_c: 25.0,
+            flags: 0,
+        }
+    }
+
+    /// Receives a batch of so many samples; time of its first, ms, missing samples, restart.
+    fn receive(
+        clock: &mut Clock,
+        number: u64,
+        samples: usize,
+        silence: Duration,
+    ) -> (u64, u64, Option<Option<Started>>) {
+        let head = head(number);
+        let arrival = clock.arrive(&head, silence);
+        clock.passed(&head, arrival.ns, samples);
+        assert_eq!(arrival.ns % MS, 0);
+        (arrival.ns / MS, arrival.missing, arrival.restart)
+    }
 
     #[test]
     fn a_missing_batch_is_a_gap_and_moves_nothing_after_it() {
-        let mut clock = Clock::new(1000);
-        assert_eq!(clock.arrive(500, AT_ONCE).tick, 500);
-        clock.passed(20);
-        assert_eq!(clock.arrive(520, AT_ONCE).missing, 0);
-        clock.passed(20);
-        let arrival = clock.arrive(580, AT_ONCE);
-        assert_eq!(
-            (arrival.tick, arrival.missing, arrival.restart),
-            (580, 40, None)
-        );
-        assert_eq!(clock.seconds(580), 0.58);
+        let mut clock = Clock::default();
+        assert_eq!(receive(&mut clock, 500, 20, AT_ONCE), (500, 0, None));
+        assert_eq!(receive(&mut clock, 520, 20, AT_ONCE), (520, 0, None));
+        assert_eq!(receive(&mut clock, 580, 20, AT_ONCE), (580, 40, None));
+        assert_eq!(seconds(580 * MS), 0.58);
+        assert_eq!(clock.rate_hz(), Some(1000.0));
     }
 
     #[test]
     fn numbers_that_begin_anew_after_49_days_go_on() {
-        let mut clock = Clock::new(1000);
-        clock.arrive(u32::MAX - 9, AT_ONCE);
-        clock.passed(20);
-        let arrival = clock.arrive(10, AT_ONCE);
-        assert_eq!((arrival.tick, arrival.missing), ((1 << 32) + 10, 0));
+        let mut clock = Clock::default();
+        let last = u64::from(u32::MAX) - 9;
+        receive(&mut clock, last, 20, AT_ONCE);
+        let after = (1 << 32) + 10;
+        assert_eq!(receive(&mut clock, after, 20, AT_ONCE), (after, 0, None));
     }
 
     #[test]
     fn after_a_lost_line_the_device_s_own_clock_counts_unless_it_began_anew() {
         let away = Duration::from_secs(20);
-        let arrival = |recorded: u32, number: u32| {
-            let mut clock = Clock::new(1000);
-            clock.arrive(0, AT_ONCE);
-            clock.passed(recorded as usize);
+        let arrival = |recorded: usize, number: u64| {
+            let mut clock = Clock::default();
+            receive(&mut clock, 0, recorded, AT_ONCE);
             clock.reconnected(Started::PowerOn);
-            let arrival = clock.arrive(number, away);
-            (arrival.tick, arrival.missing, arrival.restart.is_some())
+            let (ms, missing, restart) = receive(&mut clock, number, 20, away);
+            (ms, missing, restart.is_some())
         };
         // The device continued for 20 s, 20.1 s by its own clock.
         assert_eq!(arrival(5_000, 25_100), (25_100, 20_100, false));
@@ -179,17 +209,36 @@ mod tests {
 
     #[test]
     fn a_restart_is_a_gap_of_the_time_that_passed_here() {
-        let mut clock = Clock::new(1000);
-        clock.arrive(5000, AT_ONCE);
-        clock.passed(20);
+        let mut clock = Clock::default();
+        receive(&mut clock, 5000, 20, AT_ONCE);
         clock.restarted(Some(Started::Watchdog));
-        let arrival = clock.arrive(40, Duration::from_millis(700));
-        assert_eq!(arrival.tick, 5720);
-        assert_eq!(arrival.restart, Some(Some(Started::Watchdog)));
-        clock.passed(20);
-        assert_eq!(clock.arrive(60, AT_ONCE).tick, 5740);
+        let away = Duration::from_millis(700);
+        let arrival = receive(&mut clock, 40, 20, away);
+        assert_eq!(arrival, (5720, 0, Some(Some(Started::Watchdog))));
+        assert_eq!(receive(&mut clock, 60, 20, AT_ONCE).0, 5740);
         // The greeting was lost, but the lower number shows the restart.
-        let arrival = clock.arrive(20, AT_ONCE);
-        assert_eq!((arrival.restart, arrival.missing), (Some(None), 0));
+        let arrival = receive(&mut clock, 20, 20, AT_ONCE);
+        assert_eq!((arrival.1, arrival.2), (0, Some(None)));
+    }
+
+    #[test]
+    fn a_sensor_with_a_clock_of_its_own_is_placed_by_the_crystal() {
+        let mut clock = Clock::default();
+        let batch = |number: u32, tick_us| BatchHead {
+            first: number,
+            tick_us,
+            period_ns: 1_030_000,
+            ..head(0)
+        };
+        let first = batch(0, 5_000_000);
+        let at = clock.arrive(&first, AT_ONCE);
+        assert_eq!(at.ns, 5_000_000_000);
+        clock.passed(&first, at.ns, 20);
+        // Twenty periods later, and a microsecond by a new estimate of the line.
+        let second = batch(20, 5_020_599);
+        let at = clock.arrive(&second, AT_ONCE);
+        assert_eq!((at.ns, at.missing), (5_020_599_000, 0));
+        clock.passed(&second, at.ns, 20);
+        assert!((clock.rate_hz().unwrap() - 1e3 / 1.03).abs() < 1e-9);
     }
 }

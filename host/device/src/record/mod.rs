@@ -1,7 +1,7 @@
 //! Recording a device: its raw stream into a directory that can be read at any time.
 //!
-//! Times are the device's own: sample n of its 1 kHz is at n/1000 s since it began to sample. A missing sample is therefore a gap in `t_s`, and does
-//! not move later ones. The same holds for the time without a line when a cable is pulled.
+//! Times are the device's own, by its crystal, since it began to sample. A missing sample is therefore a gap in `t_s`, and does not move later ones.
+//! The same holds for the time without a line when a cable is pulled. The rate of a sensor with a clock of its own is the mean over the recording.
 
 mod clock;
 mod known;
@@ -149,18 +149,8 @@ pub fn record(
     finishing: impl Fn(f64),
 ) -> Result<RecordSummary> {
     let who = session.who().clone();
-    if who.raw_unit != "V" {
-        let problem = format!(
-            "its raw readings are in {}, but a recording is in V",
-            who.raw_unit
-        );
-        return Err(Error::new(
-            session.port(),
-            problem,
-            "update mimu on this computer",
-        ));
-    }
-    let mut manifest = manifest(&who, options, known.as_ref());
+    let raw_unit = who.raw_unit(session.port())?;
+    let mut manifest = manifest(&who, raw_unit, options, known.as_ref());
     let mut run = Run::begin(session, options, known, &manifest)?;
     let ended = run.receive(session, options, &mut look);
     run.state.ended = true;
@@ -201,13 +191,18 @@ pub fn record(
 }
 
 /// The manifest, as far as it is known before the first sample.
-fn manifest(who: &Identity, options: &RecordOptions, known: Option<&Known>) -> Manifest {
+fn manifest(
+    who: &Identity,
+    raw_unit: RawUnit,
+    options: &RecordOptions,
+    known: Option<&Known>,
+) -> Manifest {
     let device = options.device.clone();
     let mut manifest = Manifest::new(
         device.unwrap_or_else(|| unit_name(&who.unit_id)),
-        f64::from(who.sample_rate_hz),
+        who.sample_rate_hz,
         options.gravity_mps2,
-        RawUnit::Volt,
+        raw_unit,
         match options.table {
             true => Reference::Table,
             false => Reference::Gravity,
@@ -226,6 +221,7 @@ fn manifest(who: &Identity, options: &RecordOptions, known: Option<&Known>) -> M
         firmware: who.firmware.clone(),
         board: who.board.clone(),
         unit_id: who.unit_id.clone(),
+        sensors: Some(who.settings()),
         start: (!by_power).then(|| who.start.to_string()),
         ..Recorded::default()
     });

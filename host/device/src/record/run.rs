@@ -7,7 +7,7 @@ use mimu_core::wire::Request;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Columns, Growing, Manifest, Restart, SampleFormat};
 
-use super::clock::Clock;
+use super::clock::{Clock, seconds};
 use super::known::Known;
 use super::line;
 use super::reading::shortest;
@@ -27,8 +27,8 @@ pub(super) struct Run {
     pub steps: Steps,
     pub known: Option<Known>,
     pub state: RecordingState,
-    /// Tick of the first sample.
-    pub begun: Option<u64>,
+    /// Time of the first sample, ns.
+    pub begun_ns: Option<u64>,
     /// When the last samples came.
     pub heard: Instant,
     /// When the device was last asked to stream again.
@@ -64,11 +64,11 @@ impl Run {
         };
         Ok(Self {
             growing: Growing::create(&options.directory, columns, manifest)?,
-            clock: Clock::new(who.sample_rate_hz),
+            clock: Clock::default(),
             steps: options.steps.clone(),
             known,
             state: RecordingState::default(),
-            begun: None,
+            begun_ns: None,
             heard: Instant::now(),
             asked: Instant::now(),
             unit_id: who.unit_id.clone(),
@@ -86,9 +86,7 @@ impl Run {
         look: &mut impl FnMut(&RecordingState) -> UserRequest,
     ) -> Result<()> {
         session.begin_stream(RAW)?;
-        let rate_hz = f64::from(session.who().sample_rate_hz);
-        let end = self.steps.end().into_iter().chain(options.duration).min();
-        let wanted = end.map(|d| (d.as_secs_f64() * rate_hz).round() as u64);
+        let wanted = self.steps.end().into_iter().chain(options.duration).min();
         loop {
             match self.hear(session, options.reconnect, wanted) {
                 Ok(true) => return Ok(()),
@@ -136,7 +134,7 @@ impl Run {
         &mut self,
         session: &mut Session,
         patience: Duration,
-        wanted: Option<u64>,
+        wanted: Option<Duration>,
     ) -> Result<bool> {
         match session.event()? {
             Some(Event::Raw(batch)) => {
@@ -240,7 +238,8 @@ impl Run {
             manifest.turn_steps = known.turns();
             self.state.warnings.extend(known.unused());
         }
-        let rate_hz = manifest.sample_rate_hz;
+        let rate_hz = self.clock.rate_hz().unwrap_or(manifest.sample_rate_hz);
+        manifest.sample_rate_hz = rate_hz;
         let turning = self.known.as_mut().filter(|known| known.has_turns());
         let mut complete =
             turning.map(|known| move |batch: &mut Batch| known.complete(batch, rate_hz));
@@ -249,50 +248,59 @@ impl Run {
         Ok(self.state)
     }
 
-    fn is_done(&self, wanted: Option<u64>) -> bool {
-        let next = self.clock.next();
-        wanted.is_some_and(|wanted| self.begun.is_some_and(|begun| next - begun >= wanted))
+    /// Time from the first sample, by the device.
+    fn since_begun(&self, ns: u64) -> Duration {
+        Duration::from_nanos(ns.saturating_sub(self.begun_ns.unwrap_or(ns)))
     }
 
-    fn take(&mut self, port: &str, samples: &Samples, wanted: Option<u64>) -> Result<()> {
+    fn is_done(&self, wanted: Option<Duration>) -> bool {
+        let passed = self.since_begun(self.clock.next_ns());
+        wanted.is_some_and(|wanted| passed >= wanted)
+    }
+
+    fn take(&mut self, port: &str, samples: &Samples, wanted: Option<Duration>) -> Result<()> {
         let silence = self.heard.elapsed();
         self.heard = Instant::now();
         self.state.waiting = false;
-        let arrival = self.clock.arrive(samples.head.first, silence);
-        let first = arrival.tick;
-        let begun = *self.begun.get_or_insert(first);
+        let head = &samples.head;
+        let arrival = self.clock.arrive(head, silence);
+        let first_ns = arrival.ns;
+        self.begun_ns.get_or_insert(first_ns);
         if arrival.missing > 0 {
             self.state.missing += arrival.missing;
             self.state.gaps += 1;
         }
         if (arrival.missing > 0 || arrival.restart.is_some())
-            && let Some(step) = self.steps.at(self.clock.length(first - begun))
+            && let Some(step) = self.steps.at(self.since_begun(first_ns))
         {
             // A turn with a gap has an unknown angle.
             self.drop_step(Some(step).filter(|step| self.is_turn(*step)));
         }
         if let Some(start) = arrival.restart {
             if self.one_power_on && lost_power(&start) {
-                let at_s = self.clock.seconds(first);
+                let at_s = seconds(first_ns);
                 return Err(cut_short(port, start, at_s));
             }
             self.state.restarts.push(Restart {
-                t_s: self.clock.seconds(first),
+                t_s: seconds(first_ns),
                 start: start.map_or("its greeting was lost".into(), |s: Started| s.to_string()),
             });
         }
-        let room = wanted.map_or(u64::MAX, |wanted| (begun + wanted).saturating_sub(first));
-        let count = samples
-            .values
-            .len()
-            .min(usize::try_from(room).unwrap_or(usize::MAX));
+        let period_ns = u64::from(head.period_ns);
+        let times_ns = (0..).map(|k| first_ns + k * period_ns);
+        let within = |ns: &u64| wanted.is_none_or(|wanted| self.since_begun(*ns) < wanted);
+        let count = times_ns
+            .clone()
+            .take(samples.values.len())
+            .take_while(within)
+            .count();
         let mut batch = Batch {
             first_row: self.growing.rows(),
             ..Batch::default()
         };
-        for (tick, sample) in (first..).zip(&samples.values[..count]) {
-            batch.t_s.push(self.clock.seconds(tick));
-            if let Some(step) = self.steps.at(self.clock.length(tick - begun)) {
+        for (ns, sample) in times_ns.zip(&samples.values[..count]) {
+            batch.t_s.push(seconds(ns));
+            if let Some(step) = self.steps.at(self.since_begun(ns)) {
                 batch.step.push(step);
                 if let Some(known) = &mut self.known {
                     let input = known.next(step);
@@ -319,7 +327,7 @@ impl Run {
                 column.push(shortest(*value));
             }
         }
-        self.clock.passed(samples.values.len());
+        self.clock.passed(head, first_ns, samples.values.len());
         if count == 0 {
             return Ok(());
         }
@@ -329,8 +337,8 @@ impl Run {
         state.samples += count as u64;
         state.temp_c = shortest(samples.head.temp_c);
         state.flagged.count(samples.head.flags, count as u64);
-        state.first_s.get_or_insert(self.clock.seconds(first));
-        state.last_s = Some(self.clock.seconds(first + count as u64 - 1));
+        state.first_s.get_or_insert(seconds(first_ns));
+        state.last_s = batch.t_s.last().copied();
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 //! known inputs wrong.
 
 use mimu::plan::Planned;
-use mimu_device::nominal;
+use mimu_core::compensation::Affine;
 use mimu_device::record::RecordingState;
 use mimu_recording::error::Error;
 use nalgebra::Vector3;
@@ -19,8 +19,10 @@ const RATE_DPS: f64 = 2.0;
 const WINDOW_S: f64 = 1.0;
 
 /// Readings of the running dwell, converted by the data sheet.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Checked {
+    /// Inverse models of gyro and accelerometer by the data sheet.
+    nominal: [Affine<f64>; 2],
     dwell: Option<usize>,
     since_s: f64,
     /// Number of samples at the last update.
@@ -32,6 +34,19 @@ pub(super) struct Checked {
 }
 
 impl Checked {
+    /// Before the first reading.
+    pub fn new(nominal: [Affine<f64>; 2]) -> Self {
+        Self {
+            nominal,
+            dwell: None,
+            since_s: 0.0,
+            samples: 0,
+            sum: [0.0; 6],
+            batches: 0.0,
+            at_rest: None,
+        }
+    }
+
     /// Adds the last readings; `running` is the running dwell. Returns a dwell that does not match the plan, and the reason.
     pub fn look(
         &mut self,
@@ -65,7 +80,7 @@ impl Checked {
     fn judge(&mut self, dwell: &Planned, mean: [f64; 6]) -> Option<Error> {
         let up = Vector3::from(dwell.up.filter(|_| dwell.turn.is_none())?);
         let [gyro, accel] = [0, 3].map(|at| Vector3::new(mean[at], mean[at + 1], mean[at + 2]));
-        let [by_gyro, by_accel] = nominal();
+        let [by_gyro, by_accel] = self.nominal;
         let force = by_accel.matrix * accel + by_accel.offset;
         if force.angle(&up).to_degrees() > SAME_POSE_DEG {
             let (is, planned) = (words(&force.normalize()), words(&up));

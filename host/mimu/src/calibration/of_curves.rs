@@ -6,7 +6,7 @@ use crate::judgement::Judgement;
 use crate::quantity::{Figure, PerSensor, Sensor, rounded};
 use crate::triad::Triad;
 use mimu_recording::error::Result;
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{RawUnit, Reference, SensorSettings};
 
 /// A triad at the temperature of one node, with the error figures of its curves.
 #[derive(Debug, Clone)]
@@ -34,6 +34,8 @@ pub struct CurvesOfUnit {
     pub device: String,
     /// Its own number, if it is known.
     pub unit_id: Option<String>,
+    /// Its sensors as they were set, if they are known.
+    pub sensors: Option<SensorSettings>,
     /// SHA-256 of the samples of the first recording.
     pub sha256: String,
     /// Unit of the readings.
@@ -90,6 +92,7 @@ impl Calibration {
             sessions: Vec::new(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             judgement: Some(unit.judgement),
+            sensors: unit.sensors.clone(),
             recording: Origin {
                 sha256: Some(unit.sha256.clone()).filter(|s| !s.is_empty()),
                 reference: Some(unit.reference),

@@ -13,23 +13,27 @@ use super::{
 use crate::effects::fitted::FittedEffect;
 use crate::quantity::{PerSensor, Sensor};
 use crate::triad::{Angles, Triad};
-use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{RawUnit, SensorSettings};
 
-/// The part of a calibration that a device stores, raw in V: unrounded numbers of single precision.
+/// The part of a calibration that a device stores: unrounded numbers of single precision.
 #[derive(Debug, Clone)]
 pub struct DeviceCalibration {
     /// Name of the unit.
     pub device: String,
     /// As in [`Calibration::unit_id`].
     pub unit_id: Option<String>,
+    /// As in [`Calibration::sensors`].
+    pub sensors: Option<SensorSettings>,
+    /// Unit of the raw readings.
+    pub raw_unit: RawUnit,
     /// As in [`Calibration::created`].
     pub created: Option<String>,
     /// As in [`Calibration::trimmed`].
     pub trimmed: Option<String>,
     /// As in [`Origin::sha256`].
     pub sha256: Option<String>,
-    /// Temperature nodes, the coldest first: rad/s and m/s² from V.
+    /// Temperature nodes, the coldest first: rad/s and m/s² from raw units.
     pub nodes: Vec<Node<f32>>,
     /// As in [`OverTemperature::range_c`]; for one node, as in [`Origin::temp_range_c`].
     pub range_c: Option<[f32; 2]>,
@@ -56,7 +60,8 @@ impl Calibration {
                 format!("it stores the effect \"{effect}\", which this program does not know");
             Error::new(place, problem, "update mimu on this computer")
         };
-        let triad = |model, sensor| triad_table(model, sensor).ok_or_else(singular);
+        let triad =
+            |model, sensor| triad_table(model, sensor, stored.raw_unit).ok_or_else(singular);
         let temperature = over_temperature(stored);
         let range_c = stored.range_c.map(|range| range.map(f64::from));
         let calibration = Self {
@@ -69,10 +74,11 @@ impl Calibration {
             sessions: Vec::new(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             judgement: None,
+            sensors: stored.sensors.clone(),
             recording: Origin {
                 sha256: stored.sha256.clone(),
                 reference: None,
-                raw_unit: RawUnit::Volt,
+                raw_unit: stored.raw_unit,
                 gravity_mps2: None,
                 temp_c: Some(f64::from(node.temp_c)),
                 temp_range_c: range_c.filter(|_| temperature.is_none()),
@@ -122,7 +128,7 @@ fn over_temperature(stored: &DeviceCalibration) -> Option<OverTemperature> {
 }
 
 /// `None` if the matrix is singular.
-fn triad_table(model: &Affine<f32>, sensor: Sensor) -> Option<TriadTable> {
+fn triad_table(model: &Affine<f32>, sensor: Sensor, raw_unit: RawUnit) -> Option<TriadTable> {
     let inverse = Affine {
         matrix: model.matrix.map(f64::from),
         offset: model.offset.map(f64::from),
@@ -133,7 +139,7 @@ fn triad_table(model: &Affine<f32>, sensor: Sensor) -> Option<TriadTable> {
     Some(TriadTable {
         formula: FORMULA.into(),
         direction: INVERSE_DIRECTION.into(),
-        raw_unit: RawUnit::Volt,
+        raw_unit,
         unit: sensor.unit().into(),
         frame: "body".into(),
         C: rows(&matrix),

@@ -46,6 +46,7 @@ impl Calibration {
             sessions: Vec::new(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             judgement: Some(Judgement::of_fit(fit)),
+            sensors: manifest.sensors().cloned(),
             recording: Origin {
                 sha256: Some(fit.prepared.condensed.sha256.clone()),
                 reference: Some(manifest.reference),

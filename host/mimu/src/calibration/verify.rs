@@ -292,6 +292,10 @@ pub(crate) fn check_unit(
             "import it in the other unit, or use the calibration of this unit",
         ));
     }
+    if let Some(problem) = calibration.other_setting(manifest.sensors()) {
+        let remedy = "use the calibration of this range and filter, or record again with those of the calibration";
+        return Err(Error::new(place, problem, remedy));
+    }
     let other = calibration.other_unit(manifest);
     Ok(other.or_else(|| calibration.unnamed_unit(manifest)))
 }

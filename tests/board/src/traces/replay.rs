@@ -53,7 +53,7 @@ pub fn replay(trace: &Trace) -> Result<Replayed, String> {
         same_bytes(&message, &trace.wire[bytes]).map_err(|e| format!("byte {i}: {e}"))?;
         match message {
             Message::Event(Event::Raw(batch)) => {
-                let samples: Vec<_> = batch.volts().collect();
+                let samples: Vec<_> = batch.readings().collect();
                 found.raw += samples.len();
                 all.extend(samples.iter().copied());
                 raw = Some((batch.head, samples.into_iter().map(|(_, s)| s).collect()));
@@ -152,10 +152,13 @@ impl HostReference {
         let begins = head.first % BATCH as u32;
         let mut at = self.slow_at.map_or(begins, |last| last + BATCH as u32);
         loop {
-            let passed = self
-                .slow_at
-                .map_or(self.powered_for_ms + at, |before| at - before);
-            let (dt_s, thermometer_c) = (passed as f32 / 1000.0, head.thermometer_c());
+            let before_us = match self.slow_at {
+                Some(before) => 1000 * u64::from(before),
+                None => 0_u64.wrapping_sub(1000 * u64::from(self.powered_for_ms)),
+            };
+            let tick_us = 1000 * u64::from(at);
+            let dt_s = BatchHead { tick_us, ..*head }.since_s(before_us);
+            let thermometer_c = head.thermometer_c();
             let compensator = &self.stored.compensator;
             compensator.follow_at(&mut self.state, dt_s, thermometer_c, Some(dies_c));
             self.slow_at = Some(at);

@@ -3,11 +3,22 @@
 //! The accelerometer's z axis is a clock: 4 g/s, so each sample says when it was taken by the board's crystal, to 30 µs and the 100 µs within which
 //! the bench brings the sensor up to date. Nothing of the firmware takes part in this evaluation.
 
+use std::collections::BTreeMap;
+
 use mimu_board::inertial::{Feed, Sensed};
 use mimu_board::running::Board;
-use mimu_board_tests::conversation::{Answer, Conversation, Reading};
+use mimu_board_tests::conversation::{Answer, Conversation, Sample};
 use mimu_board_tests::{MS, digital_image};
-use mimu_core::wire::{Request, flags};
+use mimu_core::compensation::{Affine, Compensation, Sample as SiSample};
+use mimu_core::effects::DeviceEffect;
+use mimu_core::single;
+use mimu_core::stored::{
+    Curves, MAX_LENGTH, Origin, RawUnit, Setting, StoredError, decode, encode,
+};
+use mimu_core::table::Node;
+use mimu_core::wire::{BatchHead, Refusal, Request, flags, reading};
+use mimu_core::{PerSensor, Sensor};
+use nalgebra::{Matrix3, Vector3};
 
 /// The clock on the z axis, g/s, and its first value, g.
 const CLOCK: [f64; 2] = [4.0, -15.5];
@@ -55,14 +66,14 @@ fn streaming(feed: Feed, crystal: f64) -> Conversation {
 }
 
 /// When a sample was taken, s after the power came, within the round of the clock that `near_s` is in.
-fn taken_s(reading: &Reading, near_s: f64) -> f64 {
+fn taken_s(reading: &Sample, near_s: f64) -> f64 {
     let within = (f64::from(reading.counts.accel[2]) / PER_G - CLOCK[1]) / CLOCK[0];
     let round = ((near_s - within) / ROUND_S).round();
     within + round * ROUND_S
 }
 
 /// Checks that numbers differ as the samples that the sensor made, one every `period_s`; returns how many are missing.
-fn missing(readings: &[Reading], period_s: f64) -> u32 {
+fn missing(readings: &[Sample], period_s: f64) -> u32 {
     let mut missing = 0;
     let mut at_s = taken_s(&readings[0], readings[0].t_s);
     for pair in readings.windows(2) {
@@ -80,15 +91,15 @@ fn every_sample_is_what_the_sensor_sensed_when_the_device_says_that_it_was_taken
     for crystal in [0.97, 1.004, 1.03] {
         let mut device = streaming(feed(), crystal);
         device.run_for(9_000 * MS);
-        let readings = &device.readings;
+        let readings = &device.samples;
         assert!(readings.len() > 8_000, "{}", readings.len());
         assert_eq!((device.lost, device.garbled()), ((0, 0), 0));
         // The sensor's millisecond is virtual time; the crystal counts `crystal` ms meanwhile.
         assert_eq!(missing(readings, 1e-3 * crystal), 0);
 
         // The device's time begins when sampling does, some milliseconds after the power came.
-        let off_s = |r: &Reading| r.t_s - taken_s(r, r.t_s);
-        let settled: Vec<&Reading> = readings.iter().filter(|r| r.t_s > 4.0).collect();
+        let off_s = |r: &Sample| r.t_s - taken_s(r, r.t_s);
+        let settled: Vec<&Sample> = readings.iter().filter(|r| r.t_s > 4.0).collect();
         let offs: Vec<f64> = settled.iter().map(|r| off_s(r)).collect();
         let mean = offs.iter().sum::<f64>() / offs.len() as f64;
         let worst = offs
@@ -154,7 +165,7 @@ fn samples_that_a_starved_reader_loses_are_counted_and_no_others() {
         device.run_for(starved_ms * MS);
         device.board.hold(false).unwrap();
         device.run_for(1_000 * MS);
-        let lost = missing(&device.readings, 1e-3 * crystal);
+        let lost = missing(&device.samples, 1e-3 * crystal);
         assert_eq!(device.lost, (lost, 0), "{starved_ms}");
         // The FIFO keeps 101 packets; the poll before and the one after it add one each.
         let expected = starved_ms as i64 - 101;
@@ -177,8 +188,8 @@ fn a_rate_beyond_the_range_is_flagged_as_saturated() {
     let mut device = streaming(Box::new(over), 1.0);
     device.run_for(3_500 * MS);
     let of = |flagged: bool| {
-        let is = |r: &&Reading| (r.flags & flags::SATURATED != 0) == flagged;
-        device.readings.iter().filter(is).count()
+        let is = |r: &&Sample| (r.flags & flags::SATURATED != 0) == flagged;
+        device.samples.iter().filter(is).count()
     };
     // One batch or two.
     assert!((20..=40).contains(&of(true)), "{}", of(true));
@@ -193,19 +204,116 @@ fn after_the_supply_comes_back_the_sensor_is_set_up_again() {
     device.run_for(50 * MS);
     device.board.restore_supply().unwrap();
     device.greeting();
-    device.readings.clear();
+    device.samples.clear();
     let raw = Request::Stream {
         raw: true,
         compensated: false,
     };
     assert_eq!(device.ask(raw), Answer::Done);
     device.run_for(1_500 * MS);
-    assert!(device.readings.len() > 800, "{}", device.readings.len());
+    assert!(device.samples.len() > 800, "{}", device.samples.len());
     assert_eq!(device.lost, (0, 0));
     assert!(
         device
-            .readings
+            .samples
             .windows(2)
             .all(|p| p[1].number == p[0].number + 1)
     );
+}
+
+/// A calibration of counts at one temperature, as the device stores it: the inverse of a unit within the data sheet's limits.
+fn calibration(effects: &[DeviceEffect<f32>], settings: Option<PerSensor<Setting>>) -> Vec<u8> {
+    let affine = |per_si: f32, shear: f32, bias: f32| {
+        let matrix = Matrix3::new(1.0, shear, 0.0, -shear, 1.01, 0.02, 0.0, 0.01, 0.99) / per_si;
+        let offset = -(matrix * Vector3::new(bias, -0.5 * bias, 0.25 * bias));
+        Affine { matrix, offset }
+    };
+    let model = Compensation {
+        gyro: affine(7510.0, 0.01, 60.0),
+        accel: affine(835.35, -0.02, 120.0),
+    };
+    let origin = Origin {
+        raw_unit: Some(RawUnit::Count),
+        settings,
+        ..Origin::UNKNOWN
+    };
+    let matrices = model.as_ref().map(|model| &model.matrix);
+    let nodes = [Node::constant(25.0, model)];
+    let mut bytes = [0; MAX_LENGTH];
+    let length = encode(&origin, matrices, &Curves::of(&nodes), effects, &mut bytes).unwrap();
+    bytes[..length].to_vec()
+}
+
+#[test]
+fn the_compensated_stream_is_that_of_the_counts_and_of_the_crystal_s_rate() {
+    // The size effect takes the angular acceleration, a difference times the sample rate.
+    let size = DeviceEffect::named("accel_size_effect", &[0.01; 9], None).unwrap();
+    for (effects, crystal) in [(&[][..], 1.0), (&[size][..], 1.03)] {
+        let bytes = calibration(effects, None);
+        let mut device = streaming(feed(), crystal);
+        device.upload(&bytes);
+        assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
+        device.run_for(1_000 * MS);
+        device.samples.clear();
+        let both = Request::Stream {
+            raw: true,
+            compensated: true,
+        };
+        assert_eq!(device.ask(both), Answer::Done);
+        device.run_for(2_000 * MS);
+        let stored = decode(&bytes).unwrap();
+        let model = stored.compensator.table.state().model;
+        let mut state = stored.compensator.state(1000.0);
+        let mut compared = 0;
+        let raw: BTreeMap<u32, Sample> = device.samples.iter().map(|s| (s.number, *s)).collect();
+        for (number, si) in &device.compensated {
+            let Some(raw) = raw.get(number) else { continue };
+            let read = reading(&raw.counts, &PerSensor::both(1.0));
+            // Written out in double precision.
+            let exact = |affine: &Affine<f32>, u: &Vector3<f32>| {
+                affine.matrix.map(f64::from) * u.map(f64::from) + affine.offset.map(f64::from)
+            };
+            let (rate, force) = (
+                exact(&model.gyro, &read.gyro),
+                exact(&model.accel, &read.accel),
+            );
+            let off = (si.gyro.map(f64::from) - rate).amax();
+            assert!(off < 1e-4, "{number}: {off}");
+            if effects.is_empty() {
+                let off = (si.accel.map(f64::from) - force).amax();
+                assert!(off < 1e-3, "{number}: {off}");
+            }
+            let head = BatchHead {
+                first: *number,
+                tick_us: 0,
+                period_ns: raw.period_ns,
+                samples_lost: 0,
+                batches_dropped: 0,
+                temp_c: 25.0,
+                flags: 0,
+            };
+            state.at_rate(head.rate_hz() as f32);
+            compared += 1;
+            let here = single::apply(&stored.compensator, &mut state, &read);
+            let bits = |of: &SiSample<f32>| [of.gyro, of.accel].map(|v| v.map(f32::to_bits));
+            // A few samples settle what each correction takes from the one before.
+            assert!(
+                compared < 16 || bits(&here) == bits(si),
+                "{number}: {here:?} {si:?}"
+            );
+        }
+        assert!(compared > 1_500, "{compared}");
+        println!("crystal {crystal}: {compared} samples equal to the last bit");
+    }
+}
+
+#[test]
+fn a_calibration_of_other_settings_is_refused_and_the_old_one_stays() {
+    let mut device = streaming(feed(), 1.0);
+    let other = Setting { range: 78.5, id: 1 };
+    device.upload(&calibration(&[], Some(PerSensor::both(other))));
+    let sensor = Sensor::Gyro;
+    let refusal = Refusal::NotUsable(StoredError::Setting { sensor });
+    assert_eq!(device.ask(Request::UploadCommit), Answer::Refused(refusal));
+    assert_eq!(device.download(), None);
 }

@@ -25,7 +25,7 @@ fn a_last_bit_that_changes_is_noticed() {
     for name in ["by-hand", "effects"] {
         let mut trace = Trace::read(name);
         // C of the gyro in the first node: after the header, the origin, the directions of both triads, range and lags, and the temperature.
-        let at = 12 + 60 + 2 * 72 + 16 + 4;
+        let at = 12 + 88 + 2 * 72 + 16 + 4;
         trace.calibration[at] ^= 1;
         let end = trace.calibration.len() - 4;
         let crc = crc(&trace.calibration[..end]);

@@ -41,9 +41,9 @@ pub struct KalmanArgs {
     /// Duration of each input; on a terminal each begins with Enter
     #[arg(long = "for", value_name = "TIME", default_value = "5s", value_parser = duration)]
     each: Duration,
-    /// Variances of single readings of the sensors x, y, z, V² [default: from a second before the first input]
+    /// Variances of single readings of the sensors x, y, z, raw units squared [default: from a second before the first input]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple)]
-    noise_v2: Option<[f32; 3]>,
+    noise_variance: Option<[f32; 3]>,
     #[command(flatten)]
     port: PortArgs,
     #[command(flatten)]
@@ -105,7 +105,7 @@ pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
         sensor,
         inputs,
         each: args.each,
-        noise: args.noise_v2,
+        noise: args.noise_variance,
     };
     let mut session = open(&args.port)?;
     let asks = std::io::stdin().is_terminal();

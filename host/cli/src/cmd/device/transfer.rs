@@ -99,7 +99,7 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
     if let Some(path) = &args.output {
         let unit = contents.unit_id.as_ref().unwrap_or(&session.who().unit_id);
         let device = args.device.clone().unwrap_or_else(|| unit_name(unit));
-        let file = calibration(&bytes, &device, port)?;
+        let file = calibration(&bytes, Some(session.who()), &device, port)?;
         files.push(stage(path, file.to_toml())?);
     }
     if let Some(path) = &args.bytes {

@@ -1,7 +1,7 @@
 //! Uploads, downloads, tests and comparisons.
 
 use mimu_core::stored;
-use mimu_core::wire::{EFFECTS, Refusal, checks, flags};
+use mimu_core::wire::{EFFECTS, Refusal, flags};
 
 use super::calibration::{EFFECTS as ALL_EFFECTS, forward};
 use super::peer::{Peer, Script};
@@ -126,7 +126,7 @@ fn what_the_device_cannot_use_is_named_before_anything_is_sent() {
     .refused(&["accel_scale_quadratic", "cannot remove it", "9.8.7"]);
     let counts = place.calibration("count", "");
     mimu(&place, &["device", "upload", &counts, "--port", &peer.path])
-        .refused(&["raw_unit", "count"]);
+        .refused(&["raw readings in count", "device's are in V"]);
     assert_eq!(peer.count("UploadBegin"), 0);
     assert_eq!(peer.count("UploadChunk"), 0);
 }
@@ -167,34 +167,38 @@ fn counters_and_self_test_are_told() {
     assert_eq!(mimu(&place, &counters).json()["counters"]["late"], 17);
     assert_eq!(peer.count("ResetCounters"), 1);
     let test = ["device", "self-test", "--port", &peer.path, "--json", "-"];
-    assert_eq!(mimu(&place, &test).json()["passed"]["gyro_z"], true);
+    let first = &mimu(&place, &test).json()["results"][0];
+    assert_eq!(
+        (&first["name"], &first["verdict"]),
+        (&"gyro z, ST1".into(), &"passed".into())
+    );
+    assert_eq!(first["value"], -0.27);
     let failing = Peer::new(Script {
-        self_test_passed: checks::ALL & !checks::GYRO[2],
+        self_test_fails: &["gyro z, ST2"],
         ..Script::default()
     });
     mimu(&place, &["device", "self-test", "--port", &failing.path])
-        .refused(&["self-test failed", "gyro z"]);
+        .refused(&["self-test failed", "gyro z, ST2"]);
 }
 
 #[test]
 fn a_self_test_names_what_failed_and_what_the_pose_did_not_show() {
     let place = Place::new();
     let peer = Peer::new(Script {
-        self_test_passed: checks::ALL & !(checks::TEMPERATURE[1] | checks::SUPPLY),
+        self_test_fails: &["temperature y", "supply"],
         ..Script::default()
     });
     let run = mimu(&place, &["device", "self-test", "--port", &peer.path]);
     for line in [
-        "gyro z          passed   ST1 -0.270 V, ST2 +0.270 V",
-        "accel z         passed   finest range 2.450 V, coarsest 1.850 V",
-        "gravity         passed",
-        "temperature y   FAILED   26.00 °C",
-        "supply          FAILED   3.300 V",
-        "not shown in this pose: accel x, y",
+        "gyro z, ST1     passed       -0.270 V, limits -0.450 to -0.150",
+        "accel x, null   not shown     1.650 V",
+        "temperature y   FAILED       26.000 °C",
+        "supply          FAILED        3.300 V",
+        "not shown in this pose: accel x, null",
     ] {
         assert!(run.stdout.contains(line), "{line}: {}", run.stdout);
     }
-    run.refused(&["self-test failed: temperature y, supply"]);
+    run.refused(&["self-test failed: temperature y; supply"]);
 }
 
 #[test]
@@ -229,8 +233,8 @@ fn samples_that_carry_a_flag_are_counted_and_told() {
     assert_eq!(told["temperature_left_out"], serde_json::json!([0, 500, 0]));
     assert_eq!(told["power_on_unknown"], 500);
     assert_eq!(
-        told["gyro_temps_c"],
-        serde_json::json!([31.25, 31.25, 31.25])
+        told["thermometers"][1],
+        serde_json::json!({ "place": "gyro_y", "temp_c": 31.25 })
     );
     drop(peer);
     let peer = Peer::new(script());

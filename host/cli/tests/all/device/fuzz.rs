@@ -30,6 +30,8 @@ fn frame(message: &Message<'_>) -> Vec<u8> {
 fn frames() -> Vec<Vec<u8>> {
     let head = BatchHead {
         first: u32::MAX - 3,
+        tick_us: u64::MAX,
+        period_ns: u32::MAX,
         samples_lost: 0,
         batches_dropped: 0,
         temp_c: f32::NAN,
@@ -37,12 +39,11 @@ fn frames() -> Vec<Vec<u8>> {
     };
     let samples: Vec<u8> = (0..20 * RAW_BYTES).map(|i| i as u8).collect();
     let batch = |samples| {
-        let (gyro_volts, accel_volts) = (f32::INFINITY, 1e-5);
+        let (gyro, accel) = (f32::INFINITY, 1e-5);
         frame(&Message::Event(WireEvent::Raw(RawBatch {
             head,
-            gyro_volts,
-            accel_volts,
-            gyro_temps_c: [f32::NAN, f32::INFINITY, 0.0],
+            scale: PerSensor { gyro, accel },
+            temperatures: &[255; 12],
             samples,
         })))
     };

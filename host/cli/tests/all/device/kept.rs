@@ -202,16 +202,3 @@ fn a_device_at_a_temperature_that_the_calibration_is_not_for_is_reported() {
     assert_eq!(upload(&range(temp_c + 6.0)), 1);
     assert_eq!(upload(&range(temp_c - 8.0)), 1);
 }
-
-#[test]
-fn a_device_that_stores_no_curves_is_refused_before_anything_is_sent() {
-    let place = Place::new();
-    let peer = Peer::new(Script {
-        curves: false,
-        ..Script::default()
-    });
-    let file = of_unit(&place, &unit());
-    let refused = device(&place, &peer, &["upload", &file]);
-    refused.refused(&["9.8.7", "flash newer firmware"]);
-    assert_eq!(peer.count("UploadBegin"), 0);
-}

@@ -7,6 +7,7 @@ mod calibration;
 mod conversation;
 mod fuzz;
 mod kept;
+mod matek;
 mod peer;
 mod ports;
 mod recording;

@@ -11,8 +11,9 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use mimu_core::PerSensor;
 use mimu_core::wire::{
-    Decoder, MAGIC, MAX_FRAME, Message, PROTOCOL, Refusal, Reply, Start, Version, checks,
+    Decoder, MAGIC, MAX_FRAME, Message, PROTOCOL, Refusal, Reply, Start, Triad, Version,
     effects_of_this_build, encode,
 };
 
@@ -21,14 +22,36 @@ use samples::{Calibrated, Running};
 
 pub const GYRO_VOLTS: f32 = 4.2e-5;
 pub const ACCEL_VOLTS: f32 = 2.518e-5;
+/// The sensors of an analog board.
+pub const GYRO: Triad<'static> = Triad {
+    part: "ADXRS300",
+    unit: "V",
+    bits: 18,
+    range: 5.235_988,
+    null: 2.5,
+    per_si: 0.286_478_9,
+    rate_hz: 1000.0,
+    filter: "40 Hz",
+};
+pub const ACCEL: Triad<'static> = Triad {
+    part: "MMA7260QT",
+    unit: "V",
+    bits: 18,
+    range: 14.709_975,
+    null: 1.65,
+    per_si: 0.081_577_3,
+    rate_hz: 1000.0,
+    filter: "1.6 kHz",
+};
+
 pub const TEMP_C: f32 = 31.25;
 pub const UNIT_ID: [u8; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0xab];
 
-/// Sums of codes of sample n: about 2.5 and 1.65 V, with pseudo-noise.
-pub fn sums(n: u32) -> [u32; 6] {
+/// Integers of sample n, sums of codes: about 2.5 and 1.65 V, with pseudo-noise.
+pub fn sums(n: u32) -> [i32; 6] {
     std::array::from_fn(|i| {
         let mixed = (n ^ 0x9e37_79b9_u32.wrapping_mul(i as u32 + 1)).wrapping_mul(0x85eb_ca6b);
-        let noise = (mixed >> 13) % 64;
+        let noise = ((mixed >> 13) % 64) as i32;
         [59_000, 60_000, 61_000, 65_000, 66_000, 70_000][i] + noise
     })
 }
@@ -70,8 +93,12 @@ pub struct Script {
     pub protocol: Version,
     pub magic: [u8; 4],
     pub effects: u32,
-    /// Whether it stores derivatives over temperature.
-    pub curves: bool,
+    /// Its sensors.
+    pub triads: PerSensor<Triad<'static>>,
+    /// Raw units per unit of its integers.
+    pub scale: PerSensor<f32>,
+    /// Time between samples by its crystal, ns.
+    pub period_ns: u32,
     pub stored: Option<Vec<u8>>,
     /// One answer in so many is lost, and one is garbled; 0 for none.
     pub losing: u32,
@@ -84,7 +111,8 @@ pub struct Script {
     pub speed: f64,
     /// Added to the compensated gyro x, rad/s: a computing error of the device.
     pub bent: f32,
-    pub self_test_passed: u16,
+    /// Names of the rows of its self-test that fail.
+    pub self_test_fails: &'static [&'static str],
     /// Cause of its start.
     pub start: Start<'static>,
     /// Name of the port, if it is not the terminal's: a constant name while terminals change.
@@ -102,7 +130,15 @@ impl Default for Script {
             protocol: PROTOCOL,
             magic: MAGIC,
             effects: effects_of_this_build(),
-            curves: true,
+            triads: PerSensor {
+                gyro: GYRO,
+                accel: ACCEL,
+            },
+            scale: PerSensor {
+                gyro: GYRO_VOLTS,
+                accel: ACCEL_VOLTS,
+            },
+            period_ns: 1_000_000,
             stored: None,
             losing: 0,
             refuse_commit: None,
@@ -110,7 +146,7 @@ impl Default for Script {
             acts: Vec::new(),
             speed: 1.0,
             bent: 0.0,
-            self_test_passed: checks::ALL,
+            self_test_fails: &[],
             powered_for_ms: Some(0),
             flags: 0,
             start: Start::Panic {

@@ -11,7 +11,7 @@ const CREATED: &str = "2026-01-01T00:00:00Z";
 /// The file fetched from a device that stores this calibration.
 fn fetched(calibration_file: &Calibration) -> (Image, Calibration) {
     let image = Image::new(calibration_file, "cal.toml").unwrap();
-    let kept = calibration(&image.bytes, &calibration_file.device, "port").unwrap();
+    let kept = calibration(&image.bytes, None, &calibration_file.device, "port").unwrap();
     let text = kept.to_toml();
     (image, Calibration::parse(&text, "kept.toml").unwrap())
 }

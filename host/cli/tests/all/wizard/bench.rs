@@ -5,7 +5,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use mimu_board::commanded::Commanded;
-use mimu_board::image::{Image, release_image};
+use mimu_board::image::{Image, digital_release_image, release_image};
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::table::TableTruth;
 use serde_json::Value;
@@ -24,7 +24,15 @@ pub fn in_repository(path: &str) -> PathBuf {
 }
 
 pub fn image() -> Image {
-    let path = release_image();
+    read(release_image())
+}
+
+/// That of the Matek H743.
+pub fn digital_image() -> Image {
+    read(digital_release_image())
+}
+
+fn read(path: PathBuf) -> Image {
     let path = match path.is_absolute() {
         true => path,
         false => in_repository(&path.display().to_string()),

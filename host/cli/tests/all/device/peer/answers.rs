@@ -6,7 +6,7 @@ use mimu_core::kalman::Bank;
 use mimu_core::stored::{self, MAX_LENGTH, ROOM};
 use mimu_core::wire::{
     Call, Capabilities, Counters, Greeting, KalmanAxis, KalmanState, Message, Prior, Refusal,
-    Reply, Request, SelfTest, Slot, StoredInfo,
+    Reply, Request, Slot, StoredInfo, TestRow, TestTable, Verdict,
 };
 use nalgebra::Vector3;
 
@@ -43,24 +43,18 @@ impl Device {
             capabilities: Capabilities::TEMPERATURE_NODES
                 .and(Capabilities::TERMS)
                 .and(Capabilities::KALMAN)
-                .and(Capabilities::SELF_TEST)
-                .and(match self.script.curves {
-                    true => Capabilities::CURVES.and(Capabilities::TWO_LAGS),
-                    false => Capabilities(0),
-                }),
+                .and(Capabilities::SELF_TEST),
             effects: self.script.effects,
             effects_room: ROOM as u8,
             nodes_room: 16,
             stored_room: MAX_LENGTH as u32,
-            sample_rate_hz: 1000,
-            channels: "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
-            raw_unit: "V",
+            triads: self.script.triads,
+            thermometers: "gyro_x,gyro_y,gyro_z",
             start: self.script.start,
             starts: 3,
             stored,
             slots: [first, Slot::Empty],
             powered_for_ms: self.script.powered_for_ms,
-            ..Greeting::default()
         };
         let message = Message::Greeting { id, greeting };
         match id {
@@ -99,7 +93,9 @@ impl Device {
             return self.restart();
         }
         let held = self.seen.lock().unwrap().stored.clone();
+        let table = self.self_test();
         let reply = match call.request {
+            Request::SelfTest => Ok(Reply::SelfTest(table.result())),
             Request::Download { offset, length } => match &held {
                 None => Err(Refusal::NoCalibration),
                 Some(bytes) => {
@@ -118,6 +114,28 @@ impl Device {
             Ok(reply) => self.send(&Message::Reply { id, reply }),
             Err(refusal) => self.send(&Message::Refused { id, refusal }),
         }
+    }
+
+    /// Some rows of an analog board's self-test.
+    fn self_test(&self) -> TestTable {
+        let mut table = TestTable::new();
+        for (name, value, unit, limits) in [
+            ("gyro z, ST1", -0.27, "V", [-0.45, -0.15]),
+            ("gyro z, ST2", 0.27, "V", [0.15, 0.45]),
+            ("accel x, null", 1.65, "V", [1.43, 1.87]),
+            ("accel z, null", 1.65, "V", [1.43, 1.87]),
+            ("temperature y", 26.0, "\u{b0}C", [-55.0, 100.0]),
+            ("supply", 3.3, "V", [3.135, 3.465]),
+        ] {
+            let row = TestRow::within(name, value, unit, limits);
+            let verdict = match name {
+                _ if self.script.self_test_fails.contains(&name) => Verdict::Failed,
+                "accel x, null" => Verdict::NotShown,
+                _ => row.verdict,
+            };
+            assert!(table.push(&TestRow { verdict, ..row }));
+        }
+        table
     }
 
     pub(super) fn does(
@@ -139,18 +157,6 @@ impl Device {
                     samples: self.next,
                     late: 17,
                     ..Counters::default()
-                }));
-            }
-            Request::SelfTest => {
-                return Ok(Reply::SelfTest(SelfTest {
-                    gyro_st1_v: [-0.27; 3],
-                    gyro_st2_v: [0.27; 3],
-                    accel_fine_v: [1.65, 1.65, 2.45],
-                    accel_coarse_v: [1.65, 1.65, 1.85],
-                    gyro_temps_c: [25.0, 26.0, 27.0],
-                    reference_v: 2.5,
-                    supply_v: 3.3,
-                    passed: self.script.self_test_passed,
                 }));
             }
             Request::UploadBegin {
@@ -188,6 +194,8 @@ impl Device {
                     return Err(Refusal::WrongHash { found });
                 }
                 let stored = stored::decode(&received).map_err(Refusal::NotUsable)?;
+                let sensors = stored.origin.check_sensors(&self.script.triads);
+                sensors.map_err(Refusal::NotUsable)?;
                 let other = stored.origin.unit_id.filter(|id| *id != UNIT_ID);
                 if let (Some(unit_id), false) = (other, self.insists) {
                     return Err(Refusal::OtherUnit { unit_id });

@@ -7,16 +7,17 @@ use mimu_core::effects;
 use mimu_core::kalman::Bank;
 use mimu_core::stored::{self, ROOM, Stored};
 use mimu_core::wire::{
-    BATCH, BatchHead, CompensatedBatch, Event, KalmanState, Message, RawBatch, Sums, flags, volts,
+    BATCH, BatchHead, CompensatedBatch, Counts, Event, KalmanState, Message, RawBatch, flags,
+    reading,
 };
 use nalgebra::Vector3;
 
-use super::{ACCEL_VOLTS, Act, Device, GYRO_VOLTS, TEMP_C, sums};
+use super::{Act, Device, TEMP_C, sums};
 
 pub(super) struct Calibrated {
     pub(super) stored: Stored,
     pub(super) effects: effects::State<f32, ROOM>,
-    pub(super) followed: u32,
+    pub(super) followed_us: u64,
 }
 
 pub(super) struct Running {
@@ -69,6 +70,8 @@ impl Device {
     pub(super) fn batch(&mut self, first: u32, act: Option<Act>) {
         let head = BatchHead {
             first,
+            tick_us: u64::from(first) * u64::from(self.script.period_ns) / 1000,
+            period_ns: self.script.period_ns,
             samples_lost: self.lost,
             batches_dropped: self.dropped,
             temp_c: TEMP_C,
@@ -82,7 +85,7 @@ impl Device {
         // As the firmware, it uses no calibration of another layout.
         let held = held.and_then(|bytes| stored::decode(&bytes).ok());
         if let (None, Some(stored)) = (&self.calibrated, held) {
-            let effects = effects::State::new(1000.0);
+            let effects = effects::State::new(head.rate_hz() as f32);
             let (effects, powered_for_ms) = match self.script.powered_for_ms {
                 Some(ms) => (effects, ms),
                 None => (effects.long_after_power_on(), 0),
@@ -90,7 +93,7 @@ impl Device {
             self.calibrated = Some(Calibrated {
                 stored,
                 effects,
-                followed: 0_u32.wrapping_sub(powered_for_ms),
+                followed_us: 0_u64.wrapping_sub(u64::from(powered_for_ms) * 1000),
             });
         }
         let (mut raw, mut compensated) = (Vec::new(), Vec::new());
@@ -102,20 +105,20 @@ impl Device {
                 .table
                 .follow(&mut state, mimu_core::PerSensor::both(TEMP_C));
             if let Some(all) = &c.stored.compensator.effects {
-                let dt_s = first.wrapping_sub(c.followed) as f32 / 1000.0;
+                let dt_s = head.tick_us.wrapping_sub(c.followed_us) as f32 / 1e6;
                 all.slow(&mut c.effects, dt_s, TEMP_C);
-                c.followed = first;
+                c.followed_us = head.tick_us;
             }
             model = Some(state.model);
         }
         for n in first..first + BATCH as u32 {
             let [gx, gy, gz, ax, ay, az] = sums(n);
-            let sums = Sums {
+            let counts = Counts {
                 gyro: [gx, gy, gz],
                 accel: [ax, ay, az],
             };
-            raw.extend_from_slice(&RawBatch::pack(&sums));
-            let reading = volts(&sums, GYRO_VOLTS, ACCEL_VOLTS);
+            raw.extend_from_slice(&RawBatch::pack(&counts));
+            let reading = reading(&counts, &self.script.scale);
             if let (Some(c), Some(model)) = (&mut self.calibrated, &model) {
                 let mut sample = model.apply(&reading);
                 if let Some(all) = &c.stored.compensator.effects {
@@ -140,11 +143,11 @@ impl Device {
         }
         let garble = act == Some(Act::Garble);
         if self.streams.0 {
+            let temperatures = [TEMP_C.to_le_bytes(); 3].concat();
             let batch = RawBatch {
                 head,
-                gyro_volts: GYRO_VOLTS,
-                accel_volts: ACCEL_VOLTS,
-                gyro_temps_c: [TEMP_C; 3],
+                scale: self.script.scale,
+                temperatures: &temperatures,
                 samples: &raw,
             };
             self.frame(&Message::Event(Event::Raw(batch)), garble);
