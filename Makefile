@@ -130,16 +130,18 @@ nightly: toolchain blind clumsy fuzz web-tests ## what takes hours: more seeds, 
 	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/tests/run.sh -m nightly
 
 # Directory of the demo's recordings and page.
-DEMO ?= target/demo-$(SEED)
+DEMO ?= target/demo-$(if $(filter nucleo,$(BOARD)),,$(BOARD)-)$(SEED)
 SEED ?= 1
-demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is another unit with another effect
+BOARD ?= nucleo
+demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is another unit with another effect, BOARD=matek one with a digital sensor
 	@echo "The firmware, the emulated board and the command are compiled first: some minutes the first time (five on two idle cores)."
+	@if [ $(BOARD) = matek ]; then $(MATEK) && cp $(IMAGES)/mimu-firmware $(IMAGES)/mimu-firmware-matek-h743; fi
 	@$(FIRMWARE)
 	@if [ -e $(BUILT) ] && [ -z "$$(find core host rig tests -name '*.rs' -newer $(BUILT) -print -quit)" ]; \
 	then $(CARGO) build --locked $(ON_PC) --lib --tests; \
 	else $(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bin mimu --bin demo; fi
 	@rm -rf $(DEMO)
-	@target/debug/demo $(SEED) $(DEMO)
+	@target/debug/demo $(SEED) $(DEMO) $(BOARD)
 
 faults: toolchain ## a session of the wizard with faults caused on purpose
 	@$(FIRMWARE) -q
@@ -172,7 +174,9 @@ bench: toolchain ## rates and peak memory on four hours at 1 kHz, and of a diagn
 count: ## lines of each crate, public items, long functions, files that an addition touches
 	@python3 tests/count.py
 
-budget: toolchain ## instructions, load and memory of the firmware, counted on the emulated board
+budget: toolchain ## instructions, load and memory of the firmware, counted on both emulated boards
+	$(MATEK)
+	cp $(IMAGES)/mimu-firmware $(IMAGES)/mimu-firmware-matek-h743
 	$(FIRMWARE)
 	$(COUNTED)
 	$(CARGO) run --locked -p mimu-board-tests --bin budget

@@ -1,6 +1,6 @@
 //! `make demo`: a unit with an undeclared effect on the emulated board, and the wizard that calibrates it.
 //!
-//! `demo SEED FOLDER`: another seed is another unit and another effect. The image, the serial line, the turntable's protocol and the command are the
+//! `demo SEED FOLDER [nucleo|matek]`: another seed is another unit and another effect. The image, the serial line, the turntable's protocol and the command are the
 //! real ones; only the hardware is simulated. The folder is kept for inspection.
 
 use std::path::Path;
@@ -8,8 +8,9 @@ use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
 
 use mimu_board::commanded::Commanded;
-use mimu_rig::rig_file::RigTruth;
-use mimu_tests::blind::{is_listed, unit};
+use mimu_board::inertial::with_digital_parts;
+use mimu_rig::rig_file::{RigFile, RigTruth};
+use mimu_tests::blind::{is_listed, unit, with_effects};
 use serde_json::Value;
 
 /// Possible effects of the unit: those that a table at one temperature can show, and three that the diagnosis does not know.
@@ -28,9 +29,15 @@ const EFFECTS: [&str; 9] = [
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let seed = arguments.first().map_or(Ok(1), |a| a.parse());
-    let done = match (seed, arguments.get(1)) {
-        (Ok(seed), Some(folder)) => demo(seed, Path::new(folder)),
-        _ => Err("usage: demo SEED FOLDER".into()),
+    let board = arguments.get(2).map_or("nucleo", String::as_str);
+    let digital = match board {
+        "nucleo" => Some(false),
+        "matek" => Some(true),
+        _ => None,
+    };
+    let done = match (seed, arguments.get(1), digital) {
+        (Ok(seed), Some(folder), Some(digital)) => demo(seed, Path::new(folder), digital),
+        _ => Err("usage: demo SEED FOLDER [nucleo|matek]".into()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -41,10 +48,16 @@ fn main() -> ExitCode {
     }
 }
 
-fn demo(seed: u64, folder: &Path) -> Result<(), String> {
+/// Crystal of the Matek relative to its nominal frequency: to it, the sensor's clock is 1 % fast.
+const CRYSTAL: f64 = 0.99;
+
+fn demo(seed: u64, folder: &Path, digital: bool) -> Result<(), String> {
     let began = Instant::now();
     let effect = EFFECTS[(seed as usize + EFFECTS.len() - 1) % EFFECTS.len()];
-    let mut file = unit(&[effect], seed);
+    let mut file = match digital {
+        true => with_effects(with_digital_parts(RigFile::default()), &[effect], seed),
+        false => unit(&[effect], seed),
+    };
     // It has been on for long: no warm-up.
     file.thermal.on_before_s = Some(f64::INFINITY);
     // A quick table, of the kind sold for sensors of this size: the time that it saves between dwells makes them longer.
@@ -55,10 +68,18 @@ fn demo(seed: u64, folder: &Path) -> Result<(), String> {
     println!(
         "A unit with unknown errors (seed {seed}) is on a turntable; the firmware's image runs on an emulated board."
     );
-    let image = mimu_board_tests::image();
     let mut unit_id = [0; 12];
     unit_id[4..].copy_from_slice(&seed.to_be_bytes());
-    let board = Commanded::start(&image, "table", &truth, seed, unit_id, folder)?;
+    let board = match digital {
+        true => {
+            let image = mimu_board_tests::digital_image();
+            Commanded::matek(&image, "table", &truth, (seed, CRYSTAL), unit_id, folder)?
+        }
+        false => {
+            let image = mimu_board_tests::image();
+            Commanded::start(&image, "table", &truth, seed, unit_id, folder)?
+        }
+    };
     let driver = folder.join("turntable.toml");
     let text = include_str!("turntable.toml").replace("HOST:PORT", &board.address().to_string());
     std::fs::write(&driver, text).map_err(|e| format!("the driver file: {e}"))?;

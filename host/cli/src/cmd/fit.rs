@@ -20,8 +20,8 @@ use mimu_recording::result_file::stage;
 use serde::Serialize;
 
 use crate::arguments::{
-    JsonArgs, KeepArgs, NoiseArgs, PartArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs, WholeTurnArgs,
-    WritingArgs,
+    JsonArgs, KeepArgs, NoiseArgs, PartArgs, SensorArg, StillArgs, StrictArgs, VerboseArgs,
+    WholeTurnArgs, WritingArgs,
 };
 use crate::output::{now, print};
 use crate::reading::{LogArgs, read_samples_or_means};
@@ -212,14 +212,16 @@ fn several(args: &FitArgs) -> Result<Status> {
 }
 
 /// The calibration that `made` gives against the data sheet of the `--part`.
-fn data_sheet(
-    args: &FitArgs,
-    made: impl Fn() -> Result<Calibration>,
-) -> Result<Option<DataSheet>> {
+fn data_sheet(args: &FitArgs, made: impl Fn() -> Result<Calibration>) -> Result<Option<DataSheet>> {
     let Some(part) = args.part.part()? else {
         return Ok(None);
     };
-    let noise = args.noise.file.as_deref().map(NoiseFile::read).transpose()?;
+    let noise = args
+        .noise
+        .file
+        .as_deref()
+        .map(NoiseFile::read)
+        .transpose()?;
     Ok(Some(DataSheet::of(&made()?, noise.as_ref(), &part)))
 }
 
