@@ -163,14 +163,15 @@ impl<'a> Unit<'a> {
             };
             ONE_SIDED * micro * of_sheet(self.sensor, si)
         };
-        for channel in channels
-            .filter(|c| c.model_in(self.sensor.unit()).is_ok() && c.unit == self.sensor.unit())
-        {
-            let n = channel.get(Term::N).map_err(str::to_owned)?;
-            let half = 0.5 * (n.upper - n.lower);
-            return Ok((of_sheet(n.value), Some(of_sheet(half))));
-        }
-        Err("the noise file is not of calibrated readings: mimu allan --calibration".into())
+        let mut calibrated = channels.filter(|c| c.unit == self.sensor.unit());
+        let Some(channel) = calibrated.next() else {
+            return Err(
+                "the noise file is not of calibrated readings: mimu allan --calibration".into(),
+            );
+        };
+        let n = channel.get(Term::N).map_err(str::to_owned)?;
+        let half = 0.5 * (n.upper - n.lower);
+        Ok((of_sheet(n.value), Some(of_sheet(half))))
     }
 
     /// A function of the calibration with half of its 95 % interval, by its derivatives.
