@@ -213,7 +213,8 @@ pub(super) fn sentences(densities: &[Density], found: &Attributed) -> Vec<String
         let calibration = found.share_of_calibration[sensor];
         let first = causes.first().filter(|c| c.share >= calibration);
         match (inflated.is_empty(), first) {
-            (false, _) if !certain => format!(
+            // A cause that is found decides, whatever end the interval has.
+            (false, None) if !certain => format!(
                 "{sensor}: {}, or nothing to inflate: the reference may err by as much, or the segments are too few",
                 inflated.join(", ")
             ),

@@ -7,7 +7,6 @@ use super::likelihood::{Innovation, Model, Session};
 use super::{Consistency, Nees, OF_FILTER};
 use crate::calibration::Calibration;
 use crate::judgement::{Judgement, JudgementKind};
-use mimu_recording::Recording;
 
 /// The first segments of a session show the biases, and are not judged.
 const NOT_JUDGED: usize = 3;
@@ -74,20 +73,14 @@ impl Nees {
     }
 }
 
-/// Whether the densities may be used.
+/// Whether the densities may be used. `sha256`: of the samples.
 pub(super) fn judgement(
     session: &Session,
     nees: &Consistency,
-    recording: &Recording,
+    sha256: &str,
     calibration: &Calibration,
 ) -> Judgement {
-    let own = &recording.manifest.sources;
-    let own = own.iter().map(|s| &s.sha256);
-    let in_sample = calibration
-        .recording
-        .sha256
-        .iter()
-        .any(|s| own.clone().any(|o| o == s));
+    let in_sample = calibration.recording.sha256.as_deref() == Some(sha256);
     let Nees { value, dof, .. } = nees.in_use;
     if in_sample {
         let reason = "the calibration was made from this recording, whose errors it hides: give another one of the unit";

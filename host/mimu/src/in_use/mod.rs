@@ -178,6 +178,10 @@ pub fn noise_in_use(
         }
     }
     let allan = AllanNoise::of(noise)?;
+    let sha256 = match against {
+        Against::Rests(prepared) => prepared.condensed.sha256.clone(),
+        Against::Trajectory(_) => recording.for_each_batch(|_| (), |_| Ok(()))?.sha256,
+    };
     let (reference, (closures, refused), has_positions) = match against {
         Against::Rests(prepared) => {
             let all = rests::closures(recording, prepared, calibration, &allan, progress)?;
@@ -215,6 +219,7 @@ pub fn noise_in_use(
         refused,
         recording,
         reference,
+        &sha256,
     ))
 }
 
@@ -239,7 +244,7 @@ fn session(
         _ => 1.0,
     };
     Session {
-        components: component::all(allan.mean_white(), has_positions),
+        components: component::all(allan.mean_white(), has_positions, reference == "rests"),
         walks: allan.walks(apart_s.max(1e-3)),
         calibration: covariance,
         matrices: PerSensor::from_fn(|s| {
@@ -290,6 +295,7 @@ fn found(
     refused: usize,
     recording: &Recording,
     reference: &'static str,
+    sha256: &str,
 ) -> NoiseInUse {
     let fitted = session.filter_densities(|_| true);
     let search = Search {
@@ -311,7 +317,7 @@ fn found(
     let total_s: f64 = moving.iter().map(|c| c.duration_s).sum();
     let shaken: f64 = moving.iter().map(|c| c.vibration * c.duration_s).sum();
     let fast = recording.manifest.sample_rate_hz >= 4.0 * VIBRATION_HZ;
-    let judgement = judged::judgement(session, &nees, recording, calibration);
+    let judgement = judged::judgement(session, &nees, sha256, calibration);
     let sentences = attribution::sentences(&densities, &attributed);
     let warnings = calibration.other_unit(&recording.manifest).into_iter();
     NoiseInUse {

@@ -77,7 +77,7 @@ impl<F: Fn(usize) -> bool + Sync> Search<'_, F> {
         let near = (near && now > 0.0).then(|| now.ln());
         let mut try_value = |value: f64| {
             let mut model = best.model.clone();
-            model.values[k] = value;
+            model.values[k] = value.min(self.session.components[k].most);
             let log_likelihood = self.at(&model);
             if log_likelihood > best.log_likelihood {
                 best = Fitted {
