@@ -40,10 +40,10 @@ impl Prepared {
     ///
     /// # Errors
     /// The turn cannot be used, for example because readings of it are at the end of a range.
-    pub fn spun(&self, gyro: &Triad, accel: &Affine<f64>) -> Result<Option<Spun>, Warning> {
+    pub fn spun(&self, gyro: &Triad, accel: &Affine<f64>) -> Result<Option<Spun>, Box<Warning>> {
         let (turns, mut refused) = self.turns(accel);
         let (Some(stated), Some(turn)) = (self.whole_turns(), turns.last()) else {
-            return refused.pop().map_or(Ok(None), Err);
+            return refused.pop().map_or(Ok(None), |why| Err(Box::new(why)));
         };
         let path = Path::of(&[*turn], &gyro.inverse);
         let sigma = |by: &ByTriad| gyro.variance(by).sqrt();

@@ -211,16 +211,13 @@ pub fn noise_in_use(
         };
         return Err(Error::new(place, problem, remedy));
     }
-    Ok(found(
-        &session,
-        calibration,
-        noise,
-        &allan,
-        refused,
+    let judged = Judged {
         recording,
+        sha256,
         reference,
-        &sha256,
-    ))
+        left_out: refused,
+    };
+    Ok(found(&session, calibration, noise, &allan, &judged))
 }
 
 fn session(
@@ -287,15 +284,23 @@ impl Session {
     }
 }
 
+/// What the errors were found on.
+struct Judged<'a> {
+    recording: &'a Recording,
+    /// Of its samples.
+    sha256: String,
+    /// `rests` or `trajectory`.
+    reference: &'static str,
+    /// Segments left out.
+    left_out: usize,
+}
+
 fn found(
     session: &Session,
     calibration: &Calibration,
     noise: &NoiseFile,
     allan: &AllanNoise,
-    refused: usize,
-    recording: &Recording,
-    reference: &'static str,
-    sha256: &str,
+    judged: &Judged,
 ) -> NoiseInUse {
     let fitted = session.filter_densities(|_| true);
     let search = Search {
@@ -316,19 +321,20 @@ fn found(
     };
     let total_s: f64 = moving.iter().map(|c| c.duration_s).sum();
     let shaken: f64 = moving.iter().map(|c| c.vibration * c.duration_s).sum();
-    let fast = recording.manifest.sample_rate_hz >= 4.0 * VIBRATION_HZ;
-    let judgement = judged::judgement(session, &nees, sha256, calibration);
+    let manifest = &judged.recording.manifest;
+    let fast = manifest.sample_rate_hz >= 4.0 * VIBRATION_HZ;
+    let judgement = judged::judgement(session, &nees, &judged.sha256, calibration);
     let sentences = attribution::sentences(&densities, &attributed);
-    let warnings = calibration.other_unit(&recording.manifest).into_iter();
+    let warnings = calibration.other_unit(manifest).into_iter();
     NoiseInUse {
         format: "mimu-noise-in-use/1",
         tool: crate::result::TOOL,
-        device: recording.manifest.device.clone(),
+        device: manifest.device.clone(),
         noise_file: noise_file::of(noise, session, &fitted.model, &ranges, &judgement),
         judgement,
-        reference,
+        reference: judged.reference,
         segments: moving.len(),
-        segments_left_out: refused,
+        segments_left_out: judged.left_out,
         segment_s: mean(&|c| c.duration_s),
         turn_rad: mean(&|c| c.turned),
         vibration_rms_mps2: fast.then(|| (shaken / total_s).sqrt()),

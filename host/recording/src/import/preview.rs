@@ -82,8 +82,9 @@ fn table_or_labelled(
     most: usize,
 ) -> Option<Preview> {
     let table = of_lines(lines, separator, most);
-    let is_table =
-        |t: &Preview| !t.names.is_empty() || !t.rows.iter().flatten().any(begins_with_label);
+    let is_table = |t: &Preview| {
+        !t.names.is_empty() || !t.rows.iter().flatten().any(|cell| begins_with_label(cell))
+    };
     if separator.is_some() || table.as_ref().is_some_and(is_table) {
         return table;
     }
@@ -91,7 +92,7 @@ fn table_or_labelled(
 }
 
 /// Whether a label and more stand in the cell, as in `acc: 1`. A time of day does not begin with a letter.
-fn begins_with_label(cell: &String) -> bool {
+fn begins_with_label(cell: &str) -> bool {
     let cell = cell.trim();
     let rest = cell.trim_start_matches(char::is_alphanumeric);
     cell.starts_with(char::is_alphabetic) && rest.starts_with([':', '='])

@@ -44,7 +44,12 @@ fn a_calibration_of_another_unit_is_refused_unless_somebody_insists() {
 
     let own = of_unit(&place, &unit());
     let stored = device(&place, &peer, &["upload", &own, "--json", "-"]).json();
-    assert_eq!(stored["warnings"], serde_json::json!([]));
+    let warnings = stored["warnings"].as_array().unwrap();
+    let [only] = &warnings[..] else {
+        panic!("{warnings:?}")
+    };
+    let only = only.as_str().unwrap();
+    assert!(only.contains("does not contain the range"), "{only}");
     let shown = device(&place, &peer, &["info"]).stdout;
     assert!(shown.contains("of this unit, made 2026"), "{shown}");
 }
@@ -167,7 +172,7 @@ fn curves_that_are_fetched_and_stored_again_are_the_same_to_the_last_byte() {
     let sent = device(&place, &peer, &["upload", &file, "--json", "-"]).json();
     assert_eq!(sent["node_temp_c"], serde_json::json!([-10.0, 24.0, 60.0]));
     let held = peer.seen.lock().unwrap().stored.clone().unwrap();
-    assert_eq!(held[4], 6, "layout");
+    assert_eq!(held[4], 7, "layout");
     let fetched = ["download", "-o", "back.toml", "--json", "-"];
     let fetched = device(&place, &peer, &fetched).json();
     assert_eq!(fetched["range_c"], serde_json::json!([-9.5, 59.0]));
@@ -192,7 +197,8 @@ fn a_device_at_a_temperature_that_the_calibration_is_not_for_is_reported() {
         let range = format!("temp_c = 26.5\ntemp_range_c = {range}");
         std::fs::write(&file, text.replace("temp_c = 26.5", &range)).unwrap();
         let sent = device(&place, &peer, &["upload", &file, "--json", "-"]).json();
-        sent["warnings"].as_array().unwrap().len()
+        // A calibration that was written by hand also lacks the settings of its sensors.
+        sent["warnings"].as_array().unwrap().len() - 1
     };
     let seen = device(&place, &peer, &["stream", "--for", "100ms", "--json", "-"]).json();
     let temp_c = seen["temp_c"].as_f64().unwrap();

@@ -100,7 +100,7 @@ fn counts_go_the_whole_way_and_a_calibration_of_another_range_is_refused() {
             "halved.toml",
             "count",
             sensors(&info, 0.5 * range, filter),
-            &["accel", "a range of", "78.4"][..],
+            &["accel", "a range of", "78.5"][..],
         ),
         (
             "filter.toml",

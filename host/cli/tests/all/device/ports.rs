@@ -134,19 +134,14 @@ fn a_device_that_started_for_a_reason_of_a_later_version_is_talked_to_all_the_sa
     // The variant, after the length of the field: 5, for a fault with two numbers of one byte each.
     let at = later.windows(4).position(|w| w == [3, 5, 7, 9]).unwrap();
     later[at + 1] = 42;
-    // Also without the slots and what follows them, like a device that does not yet send them: their four bytes, twenty of each triad without names,
-    // and one of the thermometers.
-    let shorter = &later[..later.len() - 4 - 2 * 20 - 1];
-    for payload in [&later[..], shorter] {
-        let mut heard = Vec::new();
-        let mut receiver = Receiver::default();
-        receiver.take(&framed(payload), |message| heard.push(message));
-        let [Received::Answer(3, Answer::Greeting(who))] = &heard[..] else {
-            panic!("{heard:?}");
-        };
-        assert_eq!((&who.start, who.starts), (&Started::NotKnown, 5));
-        assert!(who.warnings.is_empty(), "{:?}", who.warnings);
-    }
+    let mut heard = Vec::new();
+    let mut receiver = Receiver::default();
+    receiver.take(&framed(&later), |message| heard.push(message));
+    let [Received::Answer(3, Answer::Greeting(who))] = &heard[..] else {
+        panic!("{heard:?}");
+    };
+    assert_eq!((&who.start, who.starts), (&Started::NotKnown, 5));
+    assert!(who.warnings.is_empty(), "{:?}", who.warnings);
 }
 
 /// The message in the frame that the device would send.
