@@ -334,7 +334,7 @@ pub fn of_model(sessions: usize, ratio: f64, runs: u64) -> [f64; 3] {
             dof: 3.0,
             variance: (ratio * ratio).max(0.01),
         };
-        let priors = vec![prior; N];
+        let priors = [prior; N];
         let design = Design::constant(N, sessions, &[], (&[], 0.0));
         let few = (sessions <= 2).then_some(&priors[..]);
         let found = fit_between(&all, &design, &kinds, few).expect("determined");
