@@ -11,6 +11,7 @@
 //! | [`die`]          | temperature of the dies from that of the thermometer              |
 //! | [`compensator`]  | all of these in their order: raw readings and a temperature in, SI out |
 //! | [`single`]       | what runs with every sample, in single precision                   |
+//! | [`triad`]        | what the readings of a triad are: unit, range, scale, filter       |
 //! | [`stored`]       | all of this as bytes, for the device to keep                       |
 //! | [`wire`]         | messages between device and host, and their frames                 |
 //!
@@ -32,6 +33,7 @@ mod sensor;
 pub mod single;
 pub mod stored;
 pub mod table;
+pub mod triad;
 pub mod wire;
 
 pub use nalgebra::RealField;

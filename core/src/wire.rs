@@ -29,6 +29,7 @@ mod greeting;
 mod message;
 mod self_test;
 
+pub use crate::triad::Triad;
 pub use batch::{
     BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, Counts, RAW_BYTES, RawBatch, flags,
     reading,
@@ -36,7 +37,7 @@ pub use batch::{
 pub use frame::{Decoder, EncodeError, Frame, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use greeting::{
     Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, StoredInfo,
-    Triad, Version, compatibility, effects_of_this_build,
+    Version, compatibility, effects_of_this_build,
 };
 pub use message::{
     CHUNK, Call, Counters, Event, KalmanAxis, KalmanState, Message, Prior, Refusal, Reply, Request,

@@ -3,7 +3,7 @@
 use super::bytes::{Reader, TooLong, Writer};
 use super::{StoredError, hash_of};
 use crate::PerSensor;
-use crate::wire::Triad;
+use crate::triad::Triad;
 
 /// Bytes of an [`Origin`].
 pub(super) const LENGTH: usize = 88;

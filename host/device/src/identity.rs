@@ -12,7 +12,7 @@ use mimu_core::wire::{
 use nalgebra::{Matrix3, Vector3};
 
 use super::origin;
-use super::record::shortest;
+use super::reading::shortest;
 use mimu::quantity::PerSensor;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, SensorSetting, SensorSettings};

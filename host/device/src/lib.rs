@@ -15,6 +15,7 @@
 //! | `flagged`         | counts samples that carry a flag                                         |
 //! | `stream`          | receives samples                                                         |
 //! | `check`           | compares the device's compensation with the PC's, sample by sample       |
+//! | `reading`         | single-precision readings as short decimal numbers                       |
 //! | [`record`]        | records the raw stream                                                   |
 //! | `result`          | a command's result with port and command, as written in JSON             |
 //! | `kalman`          | compares the device's Kalman bank with the PC's on the same samples      |
@@ -28,6 +29,7 @@ mod kalman;
 mod line;
 mod origin;
 mod port;
+mod reading;
 mod received;
 pub mod record;
 mod result;

@@ -9,8 +9,8 @@ use mimu::quantity::{AXES, PerSensor};
 use mimu_core::wire::{self, Request, TestRow};
 use serde::Serialize;
 
+use super::reading::shortest;
 use super::received::Answer;
-use super::record::shortest;
 use super::session::Session;
 use super::stream::{Moments, Stream, Streamed, stream};
 use mimu_recording::error::Result;

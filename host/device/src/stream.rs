@@ -7,8 +7,8 @@ use mimu_core::wire::{BatchHead, Request};
 use serde::Serialize;
 
 use super::flagged::Flagged;
+use super::reading::shortest;
 use super::received::{Event, LineCount};
-use super::record::shortest;
 use super::session::Session;
 use mimu_recording::error::Result;
 

@@ -24,32 +24,10 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::bank::ByDevice;
+pub use crate::part::Part;
 use crate::procedure::SessionConfig;
 use crate::spin::Spin;
 use mimu_equipment::step::Step;
-
-/// A recording of the session.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Part {
-    /// For the calibration.
-    Calibration,
-    /// For the verification.
-    Verification,
-    /// For the verification of the calibration with effects.
-    Confirmation,
-}
-
-impl Part {
-    /// Name of the recording's directory.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Calibration => "calibration",
-            Self::Verification => "verification",
-            Self::Confirmation => "confirmation",
-        }
-    }
-}
 
 /// A line of the journal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

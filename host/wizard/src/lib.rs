@@ -16,6 +16,7 @@
 //! | [`watch`] | detects from the samples whether the unit is at rest, its pose and its rate |
 //! | [`spin`] | whole turns that are asked for |
 //! | [`refit`] | the calibration so far, each parameter with its target |
+//! | [`part`] | the recordings of a session |
 //! | [`folder`] | the journal and the recordings, from which a killed session resumes |
 //! | [`unit_session`] | one of the units, with its accepted and discarded dwells |
 //! | [`axes`] | checks that the axes match their names |
@@ -33,6 +34,7 @@ pub mod clock;
 pub mod device;
 pub mod event;
 pub mod folder;
+pub mod part;
 pub mod procedure;
 pub mod refit;
 pub mod regular;

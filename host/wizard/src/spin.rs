@@ -5,7 +5,7 @@ use mimu_equipment::step::Step;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::folder::Part;
+use crate::part::Part;
 
 /// Turns of each, unless another number is stated: they take half a minute, and put back to a degree they show a scale factor to 0.03 %.
 pub const TURNS: u32 = 10;

@@ -58,7 +58,12 @@ impl Turn {
         random: &mut Random,
     ) -> Turn {
         let from = last.map_or(attitude(up, 0.0), |last| {
-            last.from * Rotation::about(last.axis, last.angle)
+            let put_back = last.from * Rotation::about(last.axis, last.angle);
+            // A turn that stopped half-way goes on from there.
+            match last.whole {
+                Some((axis, angle)) => put_back * Rotation::about(axis, angle),
+                None => put_back,
+            }
         });
         let aim = match step.heading {
             Some(heading) => attitude(up, heading),

@@ -185,7 +185,7 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[unit]\n\ngyro = \"ADXRS301\"",
-            "4: no sensor has the name \"ADXRS301\"; known are: ADXRS300, MPU6050-gyro, MSG7100D-300, MSG7100D-3600",
+            "4: no sensor has the name \"ADXRS301\"; known are: ADXRS300, MPU6050-gyro, ICM-42688-P-gyro, MSG7100D-300, MSG7100D-3600",
         ),
         (
             "[unit]\ngyro = [\"ADXRS300\", \"ADXRS300\", \"MPU6050-gyro\"]",

@@ -236,7 +236,7 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
 /// A drift of data-sheet size would not be seen in three minutes; these units drift slightly more.
 #[test]
 fn what_describes_a_weak_drift_by_hand_is_named_with_the_drift() {
-    weak_drift(8..10);
+    weak_drift(17..19);
 }
 
 #[test]

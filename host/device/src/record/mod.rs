@@ -7,7 +7,6 @@ mod clock;
 mod known;
 mod line;
 mod procedure;
-mod reading;
 mod run;
 mod steps;
 
@@ -18,9 +17,9 @@ use mimu_core::wire::Request;
 
 use serde::{Serialize, Serializer};
 
+pub use crate::reading::shortest;
 pub use known::Known;
 pub use procedure::Procedure;
-pub use reading::shortest;
 pub use steps::Steps;
 
 use crate::flagged::Flagged;

@@ -10,10 +10,10 @@ use mimu_recording::{Batch, Columns, Growing, Manifest, Restart, SampleFormat};
 use super::clock::{Clock, seconds};
 use super::known::Known;
 use super::line;
-use super::reading::shortest;
 use super::steps::Steps;
 use super::{RecordOptions, RecordingState, UserRequest};
 use crate::identity::Started;
+use crate::reading::shortest;
 use crate::received::{Event, Samples};
 use crate::session::Session;
 
