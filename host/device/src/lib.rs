@@ -11,6 +11,7 @@
 //! | `upload`          | sends a calibration and reads it back                                    |
 //! | `contents`        | contents of stored calibrations                                          |
 //! | `trim`            | corrects the offsets of the stored calibration while the unit is at rest |
+//! | `test_result`     | a row of the self-test                                                   |
 //! | `self_test`       | the self-test, and whether the unit was at rest during it                |
 //! | `flagged`         | counts samples that carry a flag                                         |
 //! | `stream`          | receives samples                                                         |
@@ -36,6 +37,7 @@ mod result;
 mod self_test;
 mod session;
 mod stream;
+mod test_result;
 mod trim;
 mod upload;
 
@@ -48,8 +50,9 @@ pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORT
 pub use port::{BAUD, Port, Ports, SerialPair, ports, serial_pair};
 pub use received::{Answer, Event, LineCount, Received, Receiver, Samples};
 pub use result::{Counted, DeviceResult};
-pub use self_test::{SelfTested, TestResult, Verdict, self_test};
+pub use self_test::{SelfTested, self_test};
 pub use session::{Session, refused};
 pub use stream::{Moments, Stream, Streamed, Thermometer, stream};
+pub use test_result::{TestResult, Verdict};
 pub use trim::{Pose, SHORTEST_TRIM_S, Trimmed, TrimmedTriad, trim};
 pub use upload::{Uploaded, download, outside_now, upload};

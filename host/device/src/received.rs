@@ -8,7 +8,7 @@ use mimu_core::wire::{
 use serde::Serialize;
 
 use super::identity::{Identity, beginning};
-use super::self_test::TestResult;
+use super::test_result::TestResult;
 
 /// Answer to a call.
 #[derive(Debug, Clone, PartialEq)]
