@@ -6,7 +6,7 @@
 //! | [`between`] | the random-effects model of the parameters of a triad |
 //! | [`mixture`] | its intervals |
 //! | [`contradiction`] | sessions that do not belong to the others, steps and drifts |
-//! | [`together`] | biases that move together |
+//! | `together` | biases that move together |
 
 pub mod between;
 pub mod class;
