@@ -86,11 +86,18 @@ impl Bench {
     }
 
     /// Ends it. Checks that nothing was lost on the line, and that no rule of the part's manual was broken.
-    pub fn end(mut self) {
+    pub fn end(self) {
+        self.end_but_for(&[]);
+    }
+
+    /// The same, but for rules whose text contains one of these.
+    pub fn end_but_for(mut self, allowed: &[&str]) {
         self.end.store(true, Ordering::Relaxed);
         let mut served = self.thread.take().unwrap().join().unwrap();
         assert_eq!(served.traffic().lost, 0);
-        assert_eq!(served.board().findings().unwrap().broken, [""; 0]);
+        let mut broken = served.board().findings().unwrap().broken;
+        broken.retain(|rule| !allowed.iter().any(|text| rule.contains(text)));
+        assert_eq!(broken, [""; 0]);
         assert_eq!(served.board().restarts().unwrap(), []);
     }
 }
