@@ -17,12 +17,17 @@ use crate::board;
 use crate::flash::{self, Flash};
 use crate::front_end::FrontEnd;
 use crate::link::{FrameSender, Input, send};
+use crate::liveness::Progress;
 use crate::pipeline::{Pipeline, Shared, Streams};
+use crate::protection::{banks_swapped, brown_out_level, may_store};
 use crate::restart::Before;
 use crate::sampling::Tally;
 use crate::slots::Slots;
 use crate::source::{Source, usable};
 use crate::upload::Upload;
+
+/// Requests whose answer was begun, and answers that are ready to be sent.
+pub static ANSWERED: Progress = Progress::new();
 
 /// Everything that a request may need.
 pub struct Commands<'a> {
@@ -111,8 +116,13 @@ impl Commands<'_> {
     async fn answer(&mut self, call: &Call<'_>, received: &mut Received) {
         let id = call.id;
         let (mut part, mut table) = ([0; CHUNK], TestTable::new());
+        // Not the answer's transmission: a host that reads nothing at a USB port is no fault of the device.
+        ANSWERED.begin();
         let outcome = match call.request {
-            Request::Hello => return self.greet(id).await,
+            Request::Hello => {
+                ANSWERED.complete();
+                return self.greet(id).await;
+            }
             Request::Download { offset, length } => self.download(offset, length, &mut part).await,
             Request::UploadCommit => self.commit().await.map(|()| Reply::Done),
             Request::SelfTest => {
@@ -126,6 +136,7 @@ impl Commands<'_> {
             }
             request => self.at_once(request),
         };
+        ANSWERED.complete();
         match outcome {
             Ok(reply) => send(&mut self.replies, &Message::Reply { id, reply }).await,
             Err(refusal) => {
@@ -197,6 +208,7 @@ impl Commands<'_> {
 
     async fn commit(&mut self) -> Result<(), Refusal> {
         self.upload.check(&uid())?;
+        may_store()?;
         let bytes = self.upload.bytes();
         let kept = &mut self.front_end;
         (self.pipeline).lock(|p| p.borrow().source().keep(kept));
@@ -207,7 +219,8 @@ impl Commands<'_> {
         storing(true);
         let kept = self.slots.store(bytes, &self.front_end).await;
         storing(false);
-        kept.map_err(|_| Refusal::FlashFailed)?;
+        // A supply that has begun to fail since then is the reason.
+        kept.map_err(|_| may_store().err().unwrap_or(Refusal::FlashFailed))?;
         let unusable = self.slots.younger_unusable();
         self.pipeline.lock(|p| {
             let mut p = p.borrow_mut();
@@ -283,6 +296,8 @@ impl Commands<'_> {
             stored: self.stored,
             slots: self.slots.state(),
             powered_for_ms: self.powered_for_ms,
+            brown_out_level: Some(brown_out_level()),
+            banks_swapped: banks_swapped(),
         };
         send(&mut self.replies, &Message::Greeting { id, greeting }).await;
     }

@@ -161,12 +161,12 @@ impl AddAssign for SlowSums {
 /// Time between samples, µs. The converter's clock is the crystal's, so this is exact.
 const SAMPLE_US: u64 = 1_000_000 / SAMPLE_HZ as u64;
 
-/// A sample of the converter as the pipeline takes it.
-pub fn scan(number: u32, channels: &Channels<u32>) -> Scan<SlowSums> {
+/// A sample of the converter as the pipeline takes it. `number` does not wrap, so that time goes on after 49.7 days, when the number in the stream wraps.
+pub fn scan(number: u64, channels: &Channels<u32>) -> Scan<SlowSums> {
     let signed = |sums: [u32; 3]| sums.map(|sum| sum as i32);
     Scan {
-        number,
-        tick_us: u64::from(number) * SAMPLE_US,
+        number: number as u32,
+        tick_us: number * SAMPLE_US,
         period_ns: SAMPLE_US as u32 * 1000,
         counts: Counts {
             gyro: signed(channels.gyro),

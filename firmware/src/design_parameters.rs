@@ -183,6 +183,18 @@ pub const WATCHDOG_US: u32 = 2_000_000;
 /// How often the watchdog is fed, ms.
 pub const WATCHDOG_FEED_MS: u64 = 250;
 
+/// The transmitter is stuck if a frame waits and none is sent for this long, ms. The longest frame takes 5 ms.
+pub const TRANSMITTER_MS: u64 = 1_000;
+
+/// The commands are stuck if a request is not answered for this long, ms. Storing a calibration takes longest: 4 s for the erase by the data sheet, and
+/// 10 ms for each of 300 words where the flash is slow. The host waits for 15 s.
+pub const COMMAND_MS: u64 = 20_000;
+
+/// This time in rounds of the watchdog's task.
+pub const fn rounds(ms: u64) -> u32 {
+    (ms / WATCHDOG_FEED_MS) as u32
+}
+
 // ---- Sampling ----------------------------------------------------------------------------------
 
 /// Samples per second.

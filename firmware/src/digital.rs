@@ -3,6 +3,8 @@
 //! The sensor samples by its own clock and keeps its packets, so a poll that comes late loses nothing until the FIFO is full. Which samples
 //! were lost then, the stamps say; how long a sample is, the [`Timebase`].
 
+pub mod self_test;
+
 use core::marker::PhantomData;
 use core::ops::AddAssign;
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};

@@ -22,6 +22,7 @@ use embedded_storage_async::nor_flash::{
 
 use crate::board::CALIBRATION_SECTORS;
 use crate::design_parameters::FLASH_WORD as WORD;
+use crate::protection::may_store;
 
 /// Size of a sector, the unit of erasing, bytes.
 const SECTOR: usize = 128 * 1024;
@@ -58,6 +59,8 @@ pub enum Error {
     Uncorrectable,
     /// An operation does not end, or an earlier one has not ended.
     Stalled,
+    /// The supply is failing, or the banks are swapped: nothing was begun.
+    Unprotected,
 }
 
 impl NorFlashError for Error {
@@ -135,6 +138,7 @@ impl NorFlash for Flash {
             return Err(Error::Range);
         }
         idle()?;
+        protected()?;
         let _unlocked = Unlocked::new();
         for sector in &CALIBRATION_SECTORS[from / SECTOR..to / SECTOR] {
             let bank = pac::FLASH.bank(1);
@@ -165,6 +169,7 @@ impl NorFlash for Flash {
         let _unlocked = Unlocked::new();
         let bank = pac::FLASH.bank(1);
         for (k, word) in bytes.as_chunks::<WORD>().0.iter().enumerate() {
+            protected()?;
             bank.cr().modify(|w| w.set_pg(true));
             let start = START + offset + k * WORD;
             for (k, part) in word.as_chunks::<4>().0.iter().enumerate() {
@@ -235,6 +240,11 @@ fn idle() -> Result<(), Error> {
         true => Err(Error::Stalled),
         false => Ok(()),
     }
+}
+
+/// Refuses to begin an operation that the supply may not let end.
+fn protected() -> Result<(), Error> {
+    may_store().map_err(|_| Error::Unprotected)
 }
 
 /// Waits until the queue is empty, polling every `pause_us`, for at most `most_us`. The limit is needed because sampling continues and

@@ -25,6 +25,8 @@
 //! | `commands`            | requests of the host, and the answers                            |
 //! | [`self_test`]         | responses of the sensors to their test inputs, compared with their data sheets |
 //! | `supply`              | the supply, by the part's internal reference                     |
+//! | `protection`          | detector of a low supply, option bytes, guard below the stack    |
+//! | [`liveness`]          | whether a task that serves the host makes progress               |
 //! | `restart`             | reset cause, and the record that a panic leaves                  |
 //!
 //! Those with links compile for the PC as well and are tested there.
@@ -48,7 +50,10 @@ pub mod icm42688p;
 pub(crate) mod lag;
 #[cfg(target_os = "none")]
 pub mod link;
+pub mod liveness;
 pub mod pipeline;
+#[cfg(target_os = "none")]
+pub mod protection;
 #[cfg(target_os = "none")]
 pub mod restart;
 #[cfg(target_os = "none")]

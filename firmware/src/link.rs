@@ -5,6 +5,8 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::zerocopy_channel::{Receiver, Sender};
 use mimu_core::wire::{MAX_FRAME, Message, encode};
 
+use crate::liveness::Progress;
+
 #[cfg(not(feature = "usb"))]
 mod serial;
 #[cfg(feature = "usb")]
@@ -39,6 +41,9 @@ impl Outgoing {
     }
 }
 
+/// Frames that were queued, and frames that were sent.
+pub static TRANSMITTED: Progress = Progress::new();
+
 /// Input of the queue of frames.
 pub type FrameSender = Sender<'static, NoopRawMutex, Outgoing>;
 /// Output of the queue of frames.
@@ -47,6 +52,7 @@ pub type FrameReceiver = Receiver<'static, NoopRawMutex, Outgoing>;
 /// Sends a message, and waits for room.
 pub async fn send(frames: &mut FrameSender, message: &Message<'_>) {
     frames.send().await.fill(message);
+    TRANSMITTED.begin();
     frames.send_done();
 }
 
@@ -56,6 +62,7 @@ pub fn try_send(frames: &mut FrameSender, message: &Message<'_>) -> bool {
         return false;
     };
     frame.fill(message);
+    TRANSMITTED.begin();
     frames.send_done();
     true
 }
@@ -73,6 +80,7 @@ pub async fn transmit(mut output: Output, mut replies: FrameReceiver, mut events
                 false
             }
         };
+        TRANSMITTED.complete();
         match from_replies {
             true => replies.receive_done(),
             false => events.receive_done(),

@@ -27,13 +27,14 @@ use heapless::Vec;
 use mimu_core::stored::MAX_LENGTH;
 use mimu_core::wire::{Message, StoredInfo, flags};
 use mimu_firmware::board::{self, Board};
-use mimu_firmware::commands::{Commands, info};
+use mimu_firmware::commands::{ANSWERED, Commands, info};
 use mimu_firmware::design_parameters as design;
 use mimu_firmware::flash::Flash;
 use mimu_firmware::front_end::FrontEnd;
 use mimu_firmware::link::{
-    self, FrameReceiver, FrameSender, Input, Outgoing, Output, transmit, try_send,
+    self, FrameReceiver, FrameSender, Input, Outgoing, Output, TRANSMITTED, transmit, try_send,
 };
+use mimu_firmware::liveness::Overseer;
 use mimu_firmware::pipeline::{Pipeline, Shared};
 use mimu_firmware::restart::{self, Before};
 use mimu_firmware::sampling::{self, QUEUE, TALLY};
@@ -142,7 +143,8 @@ fn powered_for_ms(before: &Before) -> Option<u32> {
     Some(so_far.saturating_add(uptime_ms))
 }
 
-/// Feeds the watchdog as long as samples come and are processed, keeps the time since power-on, and logs.
+/// Feeds the watchdog as long as samples come and are processed, keeps the time since power-on, and logs. Panics if transmitter or commands make no
+/// progress: the restart then tells the line, which the watchdog cannot.
 async fn watch(
     mut watchdog: IndependentWatchdog<'static, IWDG1>,
     pipeline: &Shared<board::Source>,
@@ -150,8 +152,13 @@ async fn watch(
 ) -> ! {
     let mut due = Ticker::every(Duration::from_millis(design::WATCHDOG_FEED_MS));
     let (mut last, mut rounds) = (0, 0);
+    let mut transmitter = Overseer::new(design::rounds(design::TRANSMITTER_MS));
+    let mut commands = Overseer::new(design::rounds(design::COMMAND_MS));
     loop {
         due.next().await;
+        // A USB host that does not read stops the transmitter, and is no fault of the device.
+        assert!(cfg!(feature = "usb") || !transmitter.is_stuck(&TRANSMITTED));
+        assert!(!commands.is_stuck(&ANSWERED));
         // Only samples count: a converter without samples is restarted again and again, which is not progress. A full queue means that
         // nobody empties it.
         let samples = TALLY.samples.load(Ordering::Relaxed);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::signal::dwell::Keep;
-use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
+use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
 use mimu_recording::error::Result;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -62,8 +62,8 @@ impl Preparation {
         })
     }
 
-    pub(crate) fn finding(&self) -> Finding {
-        Finding {
+    pub(crate) fn search(&self) -> DwellSearch {
+        DwellSearch {
             still_factor: self.still_factor,
             steps: self.steps,
         }

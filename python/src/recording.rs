@@ -63,7 +63,7 @@ impl Source {
     /// The recording, prepared for estimation.
     pub(crate) fn prepared(&self, by: &Preparation) -> Result<Prepared> {
         let prepared = match self {
-            Self::Samples(recording) => Prepared::read(recording, by.finding(), |_| {})?,
+            Self::Samples(recording) => Prepared::read(recording, by.search(), |_| {})?,
             Self::Means(means) => Prepared::of_means(means)?,
         };
         by.complete(prepared)

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 
 use mimu::calibration::Calibration;
 use mimu::prepared::Prepared;
-use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
+use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::look::{Guess, Units, guess};
 use mimu_recording::{ColumnList, Preset, Preview, Recording, preview};
@@ -180,11 +180,11 @@ fn view(recording: &Path, calibration: Option<&PathBuf>) -> Result<View> {
     let calibration = calibration
         .map(|path| Calibration::read(path))
         .transpose()?;
-    let finding = Finding {
+    let search = DwellSearch {
         still_factor: STILL_FACTOR,
         steps: Steps::AsRecorded,
     };
-    let prepared = Prepared::read(&Recording::open(recording)?, finding, |_| {})?;
+    let prepared = Prepared::read(&Recording::open(recording)?, search, |_| {})?;
     Ok(View {
         trace: mimu_cli::report::trace_figure(&prepared),
         poses: poses::of(&prepared, calibration.as_ref()),

@@ -13,7 +13,7 @@ use crate::triad::Triad;
 pub const MAGIC: [u8; 4] = *b"mimu";
 
 /// The protocol of this build.
-pub const PROTOCOL: Version = Version { major: 3, minor: 0 };
+pub const PROTOCOL: Version = Version { major: 3, minor: 1 };
 
 /// Version of a protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -64,6 +64,10 @@ pub struct Greeting<'a> {
     pub slots: [Slot; 2],
     /// Time since power-on at the start of sampling, ms; `None` if unknown.
     pub powered_for_ms: Option<u32>,
+    /// Supply below which the microcontroller is reset, by its option bytes: 0 (the lowest that it has) to 3; `None` if unknown. From 3.1 on.
+    pub brown_out_level: Option<u8>,
+    /// Whether the banks of its flash have exchanged their addresses, so that it cannot store. From 3.1 on.
+    pub banks_swapped: bool,
 }
 
 /// Bits of [`Greeting::capabilities`].

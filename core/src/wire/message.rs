@@ -210,6 +210,10 @@ pub enum Refusal {
         /// Which.
         unit_id: [u8; 12],
     },
+    /// The supply is too low to write the flash safely; nothing was begun.
+    SupplyLow,
+    /// The banks of the flash have exchanged their addresses (option byte SWAP_BANK_OPT), so the place for calibrations holds something else.
+    BanksSwapped,
     /// A reason that this build does not know; never sent.
     #[serde(skip)]
     NotKnown,

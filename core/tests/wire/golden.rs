@@ -145,6 +145,8 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
             stored,
             slots,
             powered_for_ms: Some(300),
+            brown_out_level: Some(2),
+            banks_swapped: true,
         },
     }
 }
@@ -176,7 +178,7 @@ fn greetings() {
         (Start::Other, "01 06"),
     ] {
         let bytes = hex(&format!(
-            "{BEFORE} {SENSORS} {bytes} 03 00 0100 0100 01 ac02"
+            "{BEFORE} {SENSORS} {bytes} 03 00 0100 0100 01 ac02 01 02 01"
         ));
         frozen(greeting(start, None, none), &bytes);
     }
@@ -196,7 +198,7 @@ fn greetings() {
         (Slot::NotUsable(stored::StoredError::Check), "02 04 03"),
     ] {
         let bytes = hex(&format!(
-            "{BEFORE} {SENSORS} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00 01 ac02",
+            "{BEFORE} {SENSORS} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00 01 ac02 01 02 01",
             "ab".repeat(12)
         ));
         frozen(
@@ -326,6 +328,8 @@ fn refusals() {
             },
             "0c abababababababababababab",
         ),
+        (Refusal::SupplyLow, "0d"),
+        (Refusal::BanksSwapped, "0e"),
     ] {
         let bytes = hex(&format!("02 03 {bytes}"));
         frozen(Message::Refused { id: 3, refusal }, &bytes);

@@ -82,7 +82,7 @@ pub struct Sample {
     /// Milliseconds from the first start to the beginning of this sample, for 49 days. Consecutive
     /// within a stream. Across a fault it advances by the elapsed time, rounded up: a gap in the numbers equals the gap in time to within
     /// one sample.
-    pub number: u32,
+    pub number: u64,
     /// Sums of the conversions of each channel.
     pub sums: Channels<u32>,
 }
@@ -95,7 +95,7 @@ pub struct Converter {
     ring: &'static mut [u16; RING],
     factors: Option<Factors>,
     first_start: Option<Instant>,
-    next_number: u32,
+    next_number: u64,
 }
 
 impl Converter {
@@ -167,7 +167,7 @@ impl Converter {
         // emulator, where its initialisation seems to raise the flag of the first.) A stream that starts on such a reading ends at once as
         // late, and the next one is right.
         let elapsed = started.saturating_duration_since(*self.first_start.get_or_insert(started));
-        let number = elapsed.as_ticks().div_ceil(PERIOD.as_ticks()) as u32;
+        let number = elapsed.as_ticks().div_ceil(PERIOD.as_ticks());
         self.next_number = self.next_number.max(number);
         Stream {
             ring,
@@ -198,7 +198,7 @@ pub struct Stream<'a> {
     ring: ReadableRingBuffer<'a, u16>,
     started: Instant,
     samples: u64,
-    next_number: &'a mut u32,
+    next_number: &'a mut u64,
     fault: Option<Fault>,
 }
 
@@ -215,7 +215,7 @@ impl Stream<'_> {
         match self.read().await {
             Ok(sums) => {
                 let number = *self.next_number;
-                *self.next_number = number.wrapping_add(1);
+                *self.next_number = number + 1;
                 self.samples += 1;
                 Ok(Sample { number, sums })
             }

@@ -84,6 +84,7 @@ mod start {
 
     use super::*;
     use crate::design_parameters::WATCHDOG_US;
+    use crate::protection;
 
     /// Starts the watchdog and the clocks. Call it once, first. `mode`: whether a crystal or a clock is at the oscillator's pins.
     pub fn begin(mode: HseMode) -> Peripherals {
@@ -94,6 +95,7 @@ mod start {
             // Without it, each instruction that is not in the prefetch buffer waits for the flash. The data cache stays off: all memory
             // here is AXI RAM, which DMA accesses without the cache, so every buffer would have to be invalidated.
             core.SCB.enable_icache();
+            protection::begin(&core.MPU);
         }
         let p = embassy_stm32::init(tree(mode));
         // It was on for [`tree`] only.

@@ -20,8 +20,8 @@ pub const BAUD: u32 = 1_000_000;
 /// The two sectors of `memory.x` as sectors of bank 2.
 pub const CALIBRATION_SECTORS: [u8; 2] = [6, 7];
 
-/// What the sensors can do beyond measuring. The message of a self-test has no place for the results of a digital sensor.
-pub const CAPABILITIES: Capabilities = Capabilities(0);
+/// What the sensors can do beyond measuring.
+pub const CAPABILITIES: Capabilities = Capabilities::SELF_TEST;
 
 /// Clock of the sensor's line, Hz: an eighth of the SPI's 100 MHz, below the sensor's 24 MHz (DS-000347, 3.3). A packet of 20 bytes takes
 /// 13 µs.
@@ -33,7 +33,9 @@ pub type Source = crate::digital::Digital<Icm42688p<()>>;
 #[cfg(all(target_os = "none", feature = "usb"))]
 pub use parts::UsbPins;
 #[cfg(target_os = "none")]
-pub use parts::{Acquisition, Board, Irqs, SelfTest, Sensors};
+pub use parts::{Acquisition, Board, Irqs, Sensors};
+#[cfg(target_os = "none")]
+pub use crate::digital::self_test::SelfTest;
 
 /// The parts of the board, for the target only.
 #[cfg(target_os = "none")]
@@ -49,13 +51,11 @@ mod parts {
     use embassy_stm32::{bind_interrupts, dma};
     #[cfg(not(feature = "usb"))]
     use embassy_stm32::{mode::Async, usart};
-    use mimu_core::wire::{Refusal, TestTable};
 
     use super::*;
     use crate::board::clocks;
     use crate::digital::{Controls, Polled};
     use crate::front_end::FrontEnd;
-    use crate::pipeline::Shared;
     use crate::spi::Line;
 
     bind_interrupts!(
@@ -94,16 +94,6 @@ mod parts {
         }
     }
 
-    /// See [`CAPABILITIES`].
-    pub struct SelfTest;
-
-    impl SelfTest {
-        /// Refused.
-        pub async fn run(&mut self, _: &Shared<Source>, _: &mut TestTable) -> Result<(), Refusal> {
-            Err(Refusal::Unknown)
-        }
-    }
-
     /// USB of the part, at the board's connector.
     #[cfg(feature = "usb")]
     pub struct UsbPins {
@@ -119,7 +109,7 @@ mod parts {
     pub struct Board {
         /// The inertial sensor.
         pub sensors: Sensors,
-        /// Nothing.
+        /// Its self-test.
         pub self_test: SelfTest,
         /// To the host: UART7, the telemetry port TX7 and RX7, with [`BAUD`], 8 data bits, no parity, 1 stop bit.
         #[cfg(not(feature = "usb"))]
@@ -145,7 +135,7 @@ mod parts {
             let select = Output::new(p.PC15, Level::High, Speed::VeryHigh);
             Self {
                 sensors: Sensors(Line::new(bus, select)),
-                self_test: SelfTest,
+                self_test: SelfTest(&CONTROLS),
                 #[cfg(not(feature = "usb"))]
                 line: {
                     let mut config = usart::Config::default();

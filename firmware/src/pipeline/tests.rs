@@ -55,7 +55,7 @@ fn sums(number: u32) -> Channels<u32> {
 fn run(pipeline: &mut Pipeline<Analog>, numbers: impl IntoIterator<Item = u32>) -> Vec<Sent> {
     let mut all = Vec::new();
     for number in numbers {
-        pipeline.take(&scan(number, &sums(number)), &mut |message| {
+        pipeline.take(&scan(number.into(), &sums(number)), &mut |message| {
             all.push(keep(message));
             true
         });
@@ -169,7 +169,7 @@ fn batches_without_room_are_counted_and_the_next_says_so() {
     pipeline.calibrate(calibration(&[]));
     pipeline.stream(both());
     for number in 0..40 {
-        pipeline.take(&scan(number, &sums(number)), &mut |_| false);
+        pipeline.take(&scan(number.into(), &sums(number)), &mut |_| false);
     }
     assert_eq!(pipeline.losses().batches, 4);
     let sent = run(&mut pipeline, 40..60);
@@ -217,7 +217,7 @@ fn heads(
     for number in numbers {
         let mut sums = sums(number);
         change(number, &mut sums);
-        pipeline.take(&scan(number, &sums), &mut |message| {
+        pipeline.take(&scan(number.into(), &sums), &mut |message| {
             match keep(message) {
                 Sent::Raw(head, ..) | Sent::Compensated(head, ..) => heads.push(head),
                 Sent::Kalman(_) => {}
@@ -328,6 +328,42 @@ fn a_warm_up_goes_by_the_time_since_power_on_and_is_over_where_that_is_unknown()
         assert!((gone - 0.5 * share).abs() < 1e-3, "{ms}: {gone}");
     }
     assert_eq!(left(None), (flags::POWER_ON_UNKNOWN, 0.0));
+}
+
+/// Numbers of samples wrap after 49.7 days of 1 kHz; the time since power-on does not.
+#[test]
+fn a_first_calibration_after_49_days_does_not_see_the_unit_just_switched_on() {
+    const WRAP: u64 = 1 << 32;
+    let warm_up = DeviceEffect::named("gyro_warm_up", &[0.5; 3], Some(100.0)).unwrap();
+    let first = |begin: u64, effects: &[DeviceEffect<f32>]| {
+        let mut pipeline = Pipeline::<Analog>::new(&FrontEnd::default());
+        pipeline.calibrate(calibration(effects));
+        pipeline.stream(both());
+        let mut all = Vec::new();
+        for number in begin..begin + 40 {
+            pipeline.take(&scan(number, &sums(number as u32)), &mut |message| {
+                all.push(keep(message));
+                true
+            });
+        }
+        let seen = all.into_iter().filter_map(|sent| match sent {
+            Sent::Compensated(head, samples, _) => Some((head, samples[0].1.gyro.x)),
+            _ => None,
+        });
+        seen.collect::<Vec<_>>()
+    };
+    let warm = [core::slice::from_ref(&warm_up), &[]];
+    // Just after the wrap, and across it.
+    for begin in [WRAP + 5, WRAP - 20] {
+        let [with, without] = warm.map(|effects| first(begin, effects));
+        assert_eq!(with, without);
+        for (k, (head, _)) in with.iter().enumerate() {
+            let number = begin + 20 * k as u64;
+            assert_eq!((head.first, head.tick_us), (number as u32, number * 1000));
+        }
+    }
+    let [with, without] = warm.map(|effects| first(0, effects));
+    assert!((without[0].1 - with[0].1 - 0.5).abs() < 1e-3);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::Keep;
-use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
+use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Reference, WholeTurns};
 
@@ -34,13 +34,13 @@ pub(crate) enum StepsArg {
 }
 
 impl StillArgs {
-    pub(crate) fn finding(&self) -> Finding {
+    pub(crate) fn search(&self) -> DwellSearch {
         let steps = match self.steps {
             None => Steps::AsRecorded,
             Some(StepsArg::Given) => Steps::Given,
             Some(StepsArg::Found) => Steps::Found,
         };
-        Finding {
+        DwellSearch {
             still_factor: self.factor,
             steps,
         }

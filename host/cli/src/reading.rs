@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
 use mimu::prepared::Prepared;
-use mimu::signal::stillness::Finding;
+use mimu::signal::stillness::DwellSearch;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{MANIFEST_FILE, PoseMeans, Recording};
 use tempfile::TempDir;
@@ -104,7 +104,7 @@ pub(crate) fn remove_logs() {
 pub(crate) fn read_samples_or_means(
     directory: &Path,
     log: &LogArgs,
-    finding: Finding,
+    search: DwellSearch,
     outputs: &[Option<&Path>],
     others: &[Option<&Path>],
 ) -> Result<Prepared> {
@@ -112,7 +112,7 @@ pub(crate) fn read_samples_or_means(
     let directory = &folder(given, log)?;
     let Some(means) = PoseMeans::file(directory) else {
         let others: Vec<Option<&Path>> = others.iter().copied().chain([Some(given)]).collect();
-        return read(directory, log, finding, outputs, &others);
+        return read(directory, log, search, outputs, &others);
     };
     let manifest = directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &means];
@@ -125,7 +125,7 @@ pub(crate) fn read_samples_or_means(
 pub(crate) fn read(
     directory: &Path,
     log: &LogArgs,
-    finding: Finding,
+    search: DwellSearch,
     outputs: &[Option<&Path>],
     others: &[Option<&Path>],
 ) -> Result<Prepared> {
@@ -137,7 +137,7 @@ pub(crate) fn read(
     inputs.extend(others.iter().flatten());
     check_outputs(outputs, &inputs)?;
     let bar = progress("reading");
-    let prepared = Prepared::read(&recording, finding, |share| bar.reach(share));
+    let prepared = Prepared::read(&recording, search, |share| bar.reach(share));
     bar.finish();
     prepared
 }

@@ -53,7 +53,11 @@ pub struct Identity {
     pub slots: [String; 2],
     /// Time since power-on at the start of sampling, ms; `None` if the device does not know it.
     pub powered_for_ms: Option<u32>,
-    /// A sentence if the device is older or newer but compatible.
+    /// Level of the brown-out reset, 0 to 3, by the microcontroller's option bytes; `None` if the device does not tell.
+    pub brown_out_level: Option<u8>,
+    /// Whether the banks of its flash are swapped, so that it stores nothing.
+    pub banks_swapped: bool,
+    /// Sentences: if the device is older or newer but compatible, on the places of its calibrations, if it cannot store.
     pub warnings: Vec<String>,
 }
 
@@ -261,9 +265,12 @@ impl From<&Greeting<'_>> for Identity {
             }),
             slots: greeting.slots.each_ref().map(slot),
             powered_for_ms: greeting.powered_for_ms,
+            brown_out_level: greeting.brown_out_level,
+            banks_swapped: greeting.banks_swapped,
             warnings: version_warning(greeting.protocol)
                 .into_iter()
                 .chain(slot_warnings(&greeting.slots))
+                .chain(greeting.banks_swapped.then(|| SWAPPED.to_owned()))
                 .collect(),
         }
     }
@@ -324,6 +331,9 @@ fn names(of: Capabilities) -> impl Iterator<Item = &'static str> {
     .filter(move |(bit, _)| of.contains(*bit))
     .map(|(_, name)| name)
 }
+
+/// Warning about an option byte.
+const SWAPPED: &str = "the banks of the microcontroller's flash are swapped (option byte SWAP_BANK_OPT): it stores no calibration until a debugger clears it";
 
 fn version_warning(device: Version) -> Option<String> {
     let versions = versions(device);

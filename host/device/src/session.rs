@@ -278,6 +278,14 @@ pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
             "its flash failed to write or read it; the previous calibration is still in use".into(),
             "upload again; if that fails too, the flash is worn out",
         ),
+        Refusal::SupplyLow => (
+            "its supply is below 2.85 V, and might fail while the flash is written; the previous calibration is still in use".into(),
+            "check the supply: USB cable, regulator, battery",
+        ),
+        Refusal::BanksSwapped => (
+            "the banks of its flash are swapped, so that it would erase something else".into(),
+            "clear the option byte SWAP_BANK_OPT with a debugger",
+        ),
         Refusal::NoBank => (
             "no Kalman bank of this triad is running: the device has restarted, or the bank was ended".into(),
             "run it again",

@@ -16,7 +16,7 @@
 //! Calibrate a recording from arrays, and apply the calibration to a reading:
 //!
 //! ```
-//! use mimu::{Angles, Finding, Manifest, Options, Prepared, RawUnit, Reference, Samples, Sensor, fit};
+//! use mimu::{Angles, DwellSearch, Manifest, Options, Prepared, RawUnit, Reference, Samples, Sensor, fit};
 //!
 //! // An accelerometer of 300 mV/g with a bias of 1.65 V, held for two seconds in each of twelve poses, 100 samples a second.
 //! let g = 9.80665;
@@ -38,7 +38,7 @@
 //! let manifest = Manifest::new("my unit", 100.0, g, RawUnit::Volt, Reference::Gravity);
 //! let options = Options::default();
 //!
-//! let prepared = Prepared::of(manifest, &samples, Finding::default())?; // its dwells are found
+//! let prepared = Prepared::of(manifest, &samples, DwellSearch::default())?; // its dwells are found
 //! assert_eq!(prepared.dwells.list.len(), 12);
 //! let fitted = fit(prepared, options)?;
 //! let accel = fitted.sensor(Sensor::Accel).unwrap();
@@ -139,7 +139,7 @@ pub use plan::design::reach::Fixture;
 pub use plan::design::schemes::Scheme;
 pub use prepared::Prepared;
 pub use quantity::Sensor;
-pub use signal::stillness::Finding;
+pub use signal::stillness::DwellSearch;
 pub use survey::{Options as AllanOptions, Part, Survey, survey as allan};
 pub use triad::{Angles, Estimate, Forward, Physical, Triad};
 pub use warning::Warning;

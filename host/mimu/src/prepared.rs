@@ -21,7 +21,7 @@ use crate::signal::course::Course;
 use crate::signal::dwell::{Dwell, Dwells, Fault, LeftOut};
 use crate::signal::dwells_of_files;
 use crate::signal::rails::refuse_dead_channels;
-use crate::signal::stillness::{Finding, Steps};
+use crate::signal::stillness::{DwellSearch, Steps};
 use crate::signal::unit_in_si;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
@@ -52,21 +52,21 @@ impl Prepared {
     /// Reads `recording` and finds its dwells. `progress` receives the share that is read.
     pub fn read(
         recording: &Recording,
-        finding: impl Into<Finding>,
+        search: impl Into<DwellSearch>,
         progress: impl Fn(f64),
     ) -> Result<Self> {
         let manifest = recording.manifest.clone();
         let integrate = manifest.reference == Reference::Gravity;
         let condensed = Condensed::read(recording, integrate, progress)?;
         let place = recording.samples.display().to_string();
-        Self::of_condensed(manifest, condensed, finding.into(), place)
+        Self::of_condensed(manifest, condensed, search.into(), place)
     }
 
-    /// Finds the dwells of `samples` in memory. `finding`: a number alone is the factor of stillness, such as
+    /// Finds the dwells of `samples` in memory. `search`: a number alone is the factor of stillness, such as
     /// [`crate::signal::stillness::STILL_FACTOR`].
     ///
     /// Errors: those of a recording on disk; columns of different lengths; no samples.
-    pub fn of(manifest: Manifest, samples: &Batch, finding: impl Into<Finding>) -> Result<Self> {
+    pub fn of(manifest: Manifest, samples: &Batch, search: impl Into<DwellSearch>) -> Result<Self> {
         manifest.check("manifest in memory")?;
         if samples.is_empty() {
             let remedy = "give as many readings as times: t_s and raw have one row for each sample";
@@ -75,13 +75,13 @@ impl Prepared {
         let integrate = manifest.reference == Reference::Gravity;
         let condensed = Condensed::of(samples, manifest.sample_rate_hz, integrate)?;
         let place = manifest.device.clone();
-        Self::of_condensed(manifest, condensed, finding.into(), place)
+        Self::of_condensed(manifest, condensed, search.into(), place)
     }
 
     fn of_condensed(
         mut manifest: Manifest,
         mut condensed: Condensed,
-        finding: Finding,
+        search: DwellSearch,
         place: String,
     ) -> Result<Self> {
         for block in &mut condensed.blocks {
@@ -89,7 +89,7 @@ impl Prepared {
                 block.step = -1;
             }
         }
-        let still_factor = finding.still_factor;
+        let still_factor = search.still_factor;
         if !(1.0..f64::INFINITY).contains(&still_factor) {
             return Err(Error::new(
                 "still_factor",
@@ -103,8 +103,8 @@ impl Prepared {
         }
         refuse_dead_channels(&condensed, &place)?;
         let on_turntable = manifest.reference == Reference::TurntableRate;
-        if manifest.is_joined() && on_turntable && finding.steps == Steps::AsRecorded {
-            dwells_of_files::number(&mut condensed, &mut manifest, finding.still_factor)
+        if manifest.is_joined() && on_turntable && search.steps == Steps::AsRecorded {
+            dwells_of_files::number(&mut condensed, &mut manifest, search.still_factor)
                 .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
         }
         if let (Some(power), Some(first)) = (manifest.power_on_s, condensed.blocks.first())
@@ -122,7 +122,7 @@ impl Prepared {
         if let Some(BiasRemoval::HighPass(filter)) = &bias_removal {
             condensed = filter.undo(condensed);
         }
-        let mut dwells = Dwells::find(&condensed, &manifest, finding)
+        let mut dwells = Dwells::find(&condensed, &manifest, search)
             .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
         let at = manifest.latitude_deg;
         let gravity = at.and_then(|at| Warning::of_gravity(manifest.gravity_mps2, at));

@@ -13,6 +13,10 @@ pub enum Fault {
     Undefined,
     /// A branch to another instruction, within 16 MiB.
     Jump(u64),
+    /// Pushes registers for ever (`PUSH {r0-r7}`, A7.7.101, and a branch back to it).
+    Push,
+    /// Returns 1 at once: as the first instruction of a task's `poll`, `Pending`. The task waits for ever.
+    Pending,
 }
 
 /// The replaced code, for [`Board::heal`].
@@ -29,6 +33,9 @@ impl Fault {
             // B, encoding T2 (A7.7.12): the distance counts from four bytes after the instruction.
             Self::Hang => vec![0xe7fe],
             Self::Undefined => vec![0xde00],
+            Self::Push => vec![0xb4ff, 0xe7fd],
+            // MOVS r0, #1; BX lr.
+            Self::Pending => vec![0x2001, 0x4770],
             // Encoding T4. The two uppermost bits of the distance are stored as whether they equal the sign.
             Self::Jump(target) => {
                 let distance = target.wrapping_sub(address + 4) as u32;

@@ -9,7 +9,7 @@ use mimu_rig::random::Random;
 use rigless::device::{Device, DeviceContext, RegisterFile};
 use rigless::soc::Width;
 use rigless::soc::stm32h743::generated::flash::Register;
-use rigless::soc::stm32h743::peripherals::flash::Flash;
+use rigless::soc::stm32h743::peripherals::flash::{Flash, OptionBytes};
 use rigless::time::EventId;
 
 /// First address of the flash memory.
@@ -29,6 +29,10 @@ pub const WORD: u64 = 32;
 const PROGRAM_NS: [u64; 4] = [290_000, 180_000, 130_000, 100_000];
 const SECTOR_ERASE_NS: [u64; 4] = [2_000_000_000, 1_800_000_000, 1_100_000_000, 1_000_000_000];
 const BANK_ERASE_NS: [u64; 4] = [13_000_000_000, 8_000_000_000, 6_000_000_000, 5_000_000_000];
+
+// Fields of FLASH_OPTSR (RM0433 4.9.8): brown-out level, and the exchange of the banks' addresses.
+const BOR_LEV: u64 = 3 << 2;
+const SWAP_BANK_OPT: u64 = 1 << 31;
 
 // Fields of FLASH_CR1 and FLASH_CR2 (RM0433 4.9.4), alike in both.
 const CR_PG: u64 = 1 << 1;
@@ -119,6 +123,17 @@ impl Watched {
             landed: Vec::new(),
             stuck: false,
         }
+    }
+
+    /// Sets the option bytes as docs/device/board.md asks a person to: brown-out level 3. `swapped`: the banks exchange their addresses from the next
+    /// reset on. The emulator shows the bit only, so a test can see whether the program heeds it.
+    pub(crate) fn set_options(&mut self, swapped: bool, registers: &mut RegisterFile) {
+        let mut options = OptionBytes::FACTORY;
+        options.optsr |= BOR_LEV;
+        if swapped {
+            options.optsr |= SWAP_BANK_OPT;
+        }
+        self.flash.keep_options(options, registers);
     }
 
     /// After a system reset: operations in flight are lost, the option bytes stay. `registers` are reset already.

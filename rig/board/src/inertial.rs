@@ -49,6 +49,70 @@ pub struct Sensed {
     pub die_c: f64,
 }
 
+// Registers of the self-test (DS-000347, 14.60, 15.6 to 15.8, 16.4 to 16.6), which the emulator's chip stores without an effect.
+const DEVICE_CONFIG: u8 = 0x11;
+const REG_BANK_SEL: u8 = 0x76;
+const SELF_TEST_CONFIG: u8 = 0x70;
+/// Bank and first register of the factory's responses: gyro, accelerometer.
+const FACTORY: [(u8, u8); 2] = [(1, 0x5f), (2, 0x3b)];
+
+/// The factory's codes of the axes x, y, z, and the responses that they stand for: 2620 counts of 250 dps and of 2 g, and 1 % more for each code above
+/// 1, as the maker's own driver has it.
+const CODES: [[u8; 3]; 2] = [[134, 150, 141], [120, 110, 128]];
+
+/// Response of an axis by its code, dps and g.
+fn response(code: u8) -> [f64; 2] {
+    let counts = 2620.0 * 1.01_f64.powi(i32::from(code) - 1);
+    [250.0, 2.0].map(|range| counts * range / 32_768.0)
+}
+
+/// The self-test of the chip, by the transfers that reach it.
+#[derive(Debug, Default)]
+struct SelfTest {
+    bank: u8,
+    /// Address byte of the present transfer, and bytes since.
+    address: Option<u8>,
+    /// What deflects: bits 0 to 2 gyro x, y, z, bits 3 to 5 accelerometer x, y, z.
+    deflects: u8,
+}
+
+impl SelfTest {
+    /// A byte of a transfer. Returns what the chip answers in place of the emulator's.
+    fn byte(&mut self, sent: u8) -> Option<u8> {
+        let Some(address) = self.address else {
+            self.address = Some(sent);
+            return None;
+        };
+        let (reads, register) = (address & 0x80 != 0, address & 0x7f);
+        // A burst goes on with the next register.
+        self.address = Some((address & 0x80) | (register + 1) & 0x7f);
+        if reads {
+            let of = |(k, (bank, first)): (usize, (u8, u8))| {
+                let axis = usize::from(register.checked_sub(first)?);
+                (bank == self.bank).then(|| CODES[k].get(axis).copied())?
+            };
+            return FACTORY.into_iter().enumerate().find_map(of);
+        }
+        match (register, self.bank) {
+            (REG_BANK_SEL, _) => self.bank = sent & 7,
+            (SELF_TEST_CONFIG, 0) => self.deflects = sent,
+            // A reset by software.
+            (DEVICE_CONFIG, 0) if sent & 1 != 0 => self.deflects = 0,
+            _ => {}
+        }
+        None
+    }
+
+    /// Adds the deflections.
+    fn deflect(&self, sensed: &mut Sensed) {
+        for axis in 0..3 {
+            let on = |k: usize| f64::from(self.deflects >> (3 * k + axis) & 1);
+            sensed.rate_dps[axis] += on(0) * response(CODES[0][axis])[0];
+            sensed.force_g[axis] += on(1) * response(CODES[1][axis])[1];
+        }
+    }
+}
+
 /// What is sensed at a time, ns by the board's crystal. Times do not decrease.
 pub type Feed = Box<dyn FnMut(u64) -> Sensed + Send>;
 
@@ -59,6 +123,7 @@ pub(crate) struct Inertial {
     /// The board's crystal relative to its nominal frequency: virtual time is the chip's, and the bench's is the crystal's.
     crystal: f64,
     selected: bool,
+    self_test: SelfTest,
     /// The next update of the grid.
     due: Option<EventId>,
 }
@@ -76,6 +141,7 @@ impl Inertial {
             feed,
             crystal,
             selected: false,
+            self_test: SelfTest::default(),
             due: None,
         }
     }
@@ -83,17 +149,20 @@ impl Inertial {
     /// The supply is back: the registers are as after power-on.
     pub(crate) fn power_on(&mut self) {
         self.chip = Icm42688p::new();
+        self.self_test = SelfTest::default();
         self.selected = false;
         self.due = None;
     }
 
     /// Gives the chip what it senses now.
     fn sense(&mut self, now: VirtualNanos) {
+        let mut sensed = (self.feed)((now.0 as f64 * self.crystal) as u64);
+        self.self_test.deflect(&mut sensed);
         let Sensed {
             rate_dps,
             force_g,
             die_c,
-        } = (self.feed)((now.0 as f64 * self.crystal) as u64);
+        } = sensed;
         let [x, y, z] = rate_dps.map(|dps| (dps * 1e3).round() as i32);
         self.chip.set_rate(x, y, z);
         let [x, y, z] = force_g.map(|g| (g * 1e6).round() as i32);
@@ -113,6 +182,7 @@ impl Store for Inertial {}
 impl Peer for Inertial {
     fn select(&mut self, context: &mut Timeline<'_, '_>) {
         self.selected = true;
+        self.self_test.address = None;
         if self.due.is_none() {
             self.schedule(context);
         }
@@ -125,7 +195,8 @@ impl Peer for Inertial {
     }
 
     fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
-        self.chip.transfer(mosi, bits, context)
+        let answer = self.chip.transfer(mosi, bits, context);
+        self.self_test.byte(mosi as u8).map_or(answer, u32::from)
     }
 
     fn on_event(&mut self, event: EventId, context: &mut Timeline<'_, '_>) {

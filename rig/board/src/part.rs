@@ -125,6 +125,7 @@ impl Part {
             watchdog: Watchdog::new(),
             slots,
         };
+        part.set_options(false);
         part.check()?;
         Ok(part)
     }
@@ -132,6 +133,18 @@ impl Part {
     /// The serial port, to garble its line.
     pub(crate) fn serial(&mut self) -> &mut Usart {
         serial_port(&mut self.mcu, &self.wiring)
+    }
+
+    /// See [`Watched::set_options`].
+    pub(crate) fn set_options(&mut self, swapped: bool) {
+        let slot = self.slots.flash;
+        let registers = self.mcu.bus_mut().slot_mut(slot).registers_mut();
+        self.flash.set_options(swapped, registers);
+    }
+
+    /// Sets the supply, mV. The part goes on at any voltage: its brown-out reset is not modelled.
+    pub(crate) fn set_supply(&mut self, mv: u32) {
+        self.mcu.set_supply(mv);
     }
 
     /// Cuts or restores the supply when the run continues from this stop.

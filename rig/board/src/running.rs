@@ -274,6 +274,16 @@ impl Board {
         self.with(|s| s.session.board_mut().part.flash.stuck = true)
     }
 
+    /// Sets the supply, mV; it begins with 3300.
+    pub fn set_supply(&mut self, mv: u32) -> Result<(), String> {
+        self.with(move |s| s.session.board_mut().part.set_supply(mv))
+    }
+
+    /// Sets the option byte that exchanges the addresses of the flash banks, for the next reset. The memory itself stays as it is.
+    pub fn swap_banks(&mut self, swapped: bool) -> Result<(), String> {
+        self.with(move |s| s.session.board_mut().part.set_options(swapped))
+    }
+
     /// Holds the core, or lets it go: time and peripherals go on, and no instruction is executed.
     pub fn hold(&mut self, held: bool) -> Result<(), String> {
         self.with(move |s| s.host.hold(held))

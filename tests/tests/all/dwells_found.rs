@@ -4,7 +4,7 @@ use std::path::Path;
 
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
+use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
 use mimu_recording::error::Result;
 use mimu_recording::{ImportOptions, RawUnit, Recording, Reference, Turntable, import};
 use mimu_rig::random::Random;
@@ -42,11 +42,11 @@ fn line(name: &str, prepared: Result<Prepared>) {
 }
 
 fn found(recording: Result<Recording>, steps: Steps) -> Result<Prepared> {
-    let finding = Finding {
+    let search = DwellSearch {
         steps,
         ..STILL_FACTOR.into()
     };
-    Prepared::read(&recording?, finding, |_| ())
+    Prepared::read(&recording?, search, |_| ())
 }
 
 /// The dwells of foreign files, one list of columns for each; `change` sets what else an import needs.

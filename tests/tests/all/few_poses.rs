@@ -6,7 +6,7 @@ use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::Keep;
-use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
+use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
 use mimu::warning::Warning;
 use mimu_recording::error::Error;
 use mimu_recording::{Batch, Manifest, RawUnit, Reference};
@@ -399,11 +399,11 @@ fn turning_through_gravity() -> (Manifest, Batch) {
 #[test]
 fn a_dwell_that_turns_through_gravity_without_a_known_force_is_no_noise() {
     let (manifest, batch) = turning_through_gravity();
-    let finding = Finding {
+    let search = DwellSearch {
         still_factor: STILL_FACTOR,
         steps: Steps::Given,
     };
-    let prepared = Prepared::of(manifest, &batch, finding).expect("readable");
+    let prepared = Prepared::of(manifest, &batch, search).expect("readable");
     let options = Options {
         only: Some(Sensor::Accel),
         ..Options::default()
@@ -419,7 +419,7 @@ fn a_dwell_that_turns_through_gravity_without_a_known_force_is_no_noise() {
             *step = -1;
         }
     }
-    let turns_only = Prepared::of(manifest, &batch, finding).expect("readable");
+    let turns_only = Prepared::of(manifest, &batch, search).expect("readable");
     assert!(!turns_only.noise.is_known(Sensor::Accel) && turns_only.noise.is_known(Sensor::Gyro));
 }
 

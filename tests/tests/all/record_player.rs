@@ -72,7 +72,7 @@ fn dwells_that_nobody_numbered_are_found_and_given_their_rates() {
     let mut recording = Recording::open(&folder.path().join("recording")).expect("a recording");
     recording.manifest.reference = Reference::TurntableRate;
     recording.manifest.turntable = Some(turntable("200,270", 0.001));
-    let found = mimu::signal::stillness::Finding {
+    let found = mimu::signal::stillness::DwellSearch {
         steps: mimu::signal::stillness::Steps::Found,
         ..STILL_FACTOR.into()
     };

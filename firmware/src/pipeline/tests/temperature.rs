@@ -33,7 +33,7 @@ fn compensation_follows_the_dies_of_each_triad_and_the_raw_stream_the_thermomete
         for number in 0..65_000 {
             let mut sums = sums(number);
             at_temperature(&mut sums, at(number));
-            pipeline.take(&scan(number, &sums), &mut |message| {
+            pipeline.take(&scan(number.into(), &sums), &mut |message| {
                 match keep(message) {
                     Sent::Raw(head, ..) => thermometer = f64::from(head.temp_c),
                     Sent::Compensated(head, samples, dies_c) => {
@@ -83,7 +83,7 @@ fn samples_outside_the_range_are_flagged_from_the_first_degree_on() {
         let mut sums = sums(number);
         // From 25 to 60 °C, beyond the 50 of the range and up to the last node.
         at_temperature(&mut sums, 25.0 + 0.5 * f64::from(number) / 1000.0);
-        pipeline.take(&scan(number, &sums), &mut |message| {
+        pipeline.take(&scan(number.into(), &sums), &mut |message| {
             if let Sent::Compensated(head, ..) = keep(message) {
                 let outside = head.flags & flags::OUTSIDE_NODES != 0;
                 assert_eq!(outside, head.temp_c > 50.0, "{}", head.temp_c);
@@ -108,7 +108,7 @@ fn without_a_thermometer_the_last_good_temperature_is_used_and_flagged() {
             // All three are open.
             sums.temperature = [0; 3];
         }
-        pipeline.take(&scan(number, &sums), &mut |message| {
+        pipeline.take(&scan(number.into(), &sums), &mut |message| {
             if let Sent::Compensated(head, ..) = keep(message) {
                 last = Some(head);
             }
@@ -129,7 +129,7 @@ fn without_a_thermometer_the_last_good_temperature_is_used_and_flagged() {
             true => sums.temperature = [0; 3],
             false => at_temperature(&mut sums, 45.0),
         }
-        pipeline.take(&scan(number, &sums), &mut |message| {
+        pipeline.take(&scan(number.into(), &sums), &mut |message| {
             if let Sent::Compensated(head, ..) = keep(message) {
                 heads.push(head);
             }

@@ -83,7 +83,7 @@ pub fn run(args: &DiagnoseArgs, command_line: &str) -> Result<Status> {
     ];
     let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
     let open = |path: &PathBuf| {
-        let prepared = read(path, &args.log, args.still.finding(), &outputs, &inputs)?;
+        let prepared = read(path, &args.log, args.still.search(), &outputs, &inputs)?;
         args.whole
             .apply(args.keep.apply(args.noise.apply(prepared)?))
     };

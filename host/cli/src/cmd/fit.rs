@@ -139,8 +139,8 @@ fn options(args: &FitArgs) -> Options {
 fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
     let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref()];
-    let finding = args.still.finding();
-    let prepared = read_samples_or_means(recording, &args.log, finding, &outputs, &inputs)?;
+    let search = args.still.search();
+    let prepared = read_samples_or_means(recording, &args.log, search, &outputs, &inputs)?;
     args.writing.check(args.output.as_deref())?;
     let prepared = args.keep.apply(args.noise.apply(prepared)?);
     let prepared = args.whole.apply(prepared)?;

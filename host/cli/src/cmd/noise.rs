@@ -81,8 +81,7 @@ pub(crate) fn run(args: &NoiseInUseArgs) -> Result<Status> {
             noise_in_use(&recording, &calibration, &noise, against, |s| bar.reach(s))
         }
         None => {
-            let prepared =
-                Prepared::read(&recording, args.still.finding(), |s| bar.reach(0.3 * s))?;
+            let prepared = Prepared::read(&recording, args.still.search(), |s| bar.reach(0.3 * s))?;
             let against = Against::Rests(&prepared);
             let reach = |s: f64| bar.reach(0.3 + 0.7 * s);
             noise_in_use(&recording, &calibration, &noise, against, reach)

@@ -93,7 +93,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let outputs = [Some(args.out.as_path())];
     let others = [args.noise.file.as_deref(), inputs.calibration.as_deref()];
     let open = |path: &PathBuf| -> Result<(String, Prepared)> {
-        let prepared = read(path, &args.log, args.still.finding(), &outputs, &others)?;
+        let prepared = read(path, &args.log, args.still.search(), &outputs, &others)?;
         let prepared = args.whole.apply(args.noise.apply(prepared)?)?;
         let prepared = args.keep.apply(prepared);
         Ok((path.display().to_string(), prepared))

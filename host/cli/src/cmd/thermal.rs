@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use mimu::calibration::Calibration;
-use mimu::signal::stillness::{Finding, Steps};
+use mimu::signal::stillness::{DwellSearch, Steps};
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 use mimu_thermal::base;
@@ -180,17 +180,17 @@ fn run_fit(args: &FitArgs, command_line: &str) -> Result<Status> {
     ];
     let beside = [args.base.as_deref(), args.noise.file.as_deref()];
     let base = args.base.as_deref().map(Calibration::read).transpose()?;
-    let session = |directory: &PathBuf, finding: Finding| {
-        let prepared = read(directory, &args.log, finding, &outputs, &beside)?;
+    let session = |directory: &PathBuf, search: DwellSearch| {
+        let prepared = read(directory, &args.log, search, &outputs, &beside)?;
         Session::of(&args.noise.apply(prepared)?)
     };
     let all = |list: &[PathBuf]| -> Result<Vec<Session>> {
         let each = list.iter();
-        let mut finding = args.still.finding();
+        let mut search = args.still.search();
         if args.at_rest {
-            finding.steps = Steps::AtRest;
+            search.steps = Steps::AtRest;
         }
-        each.map(|d| session(d, finding)).collect()
+        each.map(|d| session(d, search)).collect()
     };
     let (sessions, verify) = (all(&args.recordings)?, all(&args.verify)?);
     args.writing.check(args.output.as_deref())?;

@@ -51,7 +51,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<Status> {
     let prepared = read_samples_or_means(
         &args.recording,
         &log,
-        args.still.finding(),
+        args.still.search(),
         &outputs,
         &[Some(&args.calibration), args.noise.file.as_deref()],
     )?;

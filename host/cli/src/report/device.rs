@@ -40,6 +40,9 @@ pub fn info_text(result: &DeviceResult<&Identity>) -> String {
         None => "unknown: a reset has lost it".into(),
     };
     line!(out, "power-on      {powered}");
+    if let Some(level) = who.brown_out_level {
+        line!(out, "brown-out     {}", brown_out(level));
+    }
     line!(
         out,
         "samples       {} Hz, 6 channels in {}",
@@ -95,6 +98,21 @@ pub fn info_text(result: &DeviceResult<&Identity>) -> String {
     line!(out, "removes       {}", who.effects.join(", "));
     warn(&mut out, who.warnings.iter());
     out
+}
+
+/// What a level of the brown-out reset means (DS12110, table 15: falling thresholds).
+fn brown_out(level: u8) -> String {
+    let volts = ["1.62", "2.1", "2.4", "2.7"];
+    let reset = volts
+        .get(usize::from(level))
+        .map_or_else(String::new, |v| format!(", reset below {v} V"));
+    let remark = match level {
+        0..=2 => {
+            "; set level 3 with a debugger, so that a failing supply does not tear what is being stored"
+        }
+        _ => "",
+    };
+    format!("level {level}{reset}{remark}")
 }
 
 /// A range in the unit of data sheets.

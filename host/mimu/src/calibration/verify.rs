@@ -91,10 +91,10 @@ pub struct Verification {
 /// Judges `calibration`, raw to SI, by a recording that it was not made from: rms errors in SI and what explains them.
 ///
 /// ```no_run
-/// use mimu::{Calibration, Finding, JudgementKind, Prepared, Recording, Sensor, verify};
+/// use mimu::{Calibration, DwellSearch, JudgementKind, Prepared, Recording, Sensor, verify};
 ///
 /// let recording = Recording::open("another-day".as_ref())?;
-/// let prepared = Prepared::read(&recording, Finding::default(), |_| ())?;
+/// let prepared = Prepared::read(&recording, DwellSearch::default(), |_| ())?;
 /// let found = verify(&prepared, &Calibration::read("cal.toml".as_ref())?)?;
 /// if let Some(accel) = &found.sensors[Sensor::Accel] {
 ///     println!("{} m/s² where noise explains {}", accel.rms, accel.noise_floor);

@@ -549,10 +549,10 @@ impl Found<'_> {
 /// Finds the physical effects behind what a calibration leaves, with their coefficients in SI.
 ///
 /// ```no_run
-/// use mimu::{Finding, Options, Prepared, Recording, Recordings, Verdict, diagnose};
+/// use mimu::{DwellSearch, Options, Prepared, Recording, Recordings, Verdict, diagnose};
 ///
 /// let recording = Recording::open("by-hand".as_ref())?;
-/// let prepared = Prepared::read(&recording, Finding::default(), |_| ())?;
+/// let prepared = Prepared::read(&recording, DwellSearch::default(), |_| ())?;
 /// let found = diagnose(Recordings::from(prepared), Options::default())?;
 /// if found.verdict == Verdict::Explained {
 ///     for effect in &found.effects {

@@ -73,6 +73,101 @@ impl HighPass {
     }
 }
 
+/// Sums over the rests and segments, sample by sample.
+struct Walk<'a, B> {
+    rests: &'a [[f64; 2]],
+    spans: &'a [Span],
+    period_s: f64,
+    begin: B,
+    before: Option<(f64, Readings)>,
+    rest: usize,
+    span: usize,
+    started: bool,
+    open: Reckoned,
+    walked: Walked,
+}
+
+impl<B: FnMut(usize, &[Readings]) -> DeadReckoning> Walk<'_, B> {
+    /// Takes the sample `now` at `t`.
+    fn take(&mut self, t: f64, now: Readings) {
+        let Some((t0, last)) = self.before.replace((t, now)) else {
+            return;
+        };
+        let mean = last.mean_with(&now, t - t0);
+        self.rest_through(t0, t, &mean);
+        self.follow_through(t0, t, &mean);
+    }
+
+    /// Adds what lies within a rest.
+    fn rest_through(&mut self, t0: f64, t: f64, mean: &Readings) {
+        while self.rests.get(self.rest).is_some_and(|r| r[1] <= t0) {
+            self.rest += 1;
+        }
+        if let Some([from, to]) = self.rests.get(self.rest)
+            && t0 >= *from
+            && t <= *to
+        {
+            add(&mut self.walked.rests[self.rest], mean);
+        }
+    }
+
+    /// Follows the segments from `t0` to `t`, which may lie in several of them.
+    fn follow_through(&mut self, t0: f64, t: f64, mean: &Readings) {
+        let dt = t - t0;
+        let missing = dt > 1.5 * self.period_s && !is_bridged(dt, self.period_s);
+        let mut from = t0;
+        while let Some(own) = self.spans.get(self.span) {
+            if t <= own.start_s {
+                break;
+            }
+            if !self.started {
+                self.started = true;
+                let through = self.rests.partition_point(|r| r[1] <= own.start_s + 1e-9);
+                self.open = Some((self.begin)(self.span, &self.walked.rests[..through]));
+                self.walked.ends[self.span][0] = *mean;
+                from = from.max(own.start_s);
+            }
+            let to = t.min(own.end_s);
+            if missing {
+                self.open = None;
+            }
+            if let Some(reckoned) = &mut self.open {
+                follow(reckoned, own, [from, to], mean);
+            }
+            if t < own.end_s {
+                break;
+            }
+            if let Some(reckoned) = &mut self.open {
+                reckoned.close();
+            }
+            self.walked.ends[self.span][1] = *mean;
+            self.walked.spans[self.span] = self.open.take();
+            (self.span, self.started, from) = (self.span + 1, false, to);
+        }
+    }
+}
+
+/// Reckons `own` on with `mean` from the one instant to the other, and marks it between them.
+fn follow(reckoned: &mut DeadReckoning, own: &Span, [from, to]: [f64; 2], mean: &Readings) {
+    let go = |reckoned: &mut DeadReckoning, duration_s: f64| {
+        reckoned.follow(&Readings {
+            duration_s,
+            ..*mean
+        });
+    };
+    match own.mark_s.filter(|m| (from..to).contains(m)) {
+        Some(mark) => {
+            if mark > from {
+                go(reckoned, mark - from);
+            }
+            reckoned.mark();
+            go(reckoned, to - mark);
+        }
+        None if to > from => go(reckoned, to - from),
+        None => {}
+    }
+}
+
 /// Walks over `recording`, calibrated. `rests` and `spans` are in order of time; `begin` begins a segment, by its index and the means of the rests
 /// before it.
 pub(super) fn walk(
@@ -80,103 +175,41 @@ pub(super) fn walk(
     calibration: &Calibration,
     rests: &[[f64; 2]],
     spans: &[Span],
-    mut begin: impl FnMut(usize, &[Readings]) -> DeadReckoning,
+    begin: impl FnMut(usize, &[Readings]) -> DeadReckoning,
     progress: impl Fn(f64),
 ) -> Result<Walked> {
     let forward = PerSensor::from_fn(|s| calibration.inverse(s).and_then(|c| Forward::of(&c)));
-    let period_s = 1.0 / recording.manifest.sample_rate_hz;
     let mut high = HighPass::new(recording.manifest.sample_rate_hz);
-    let mut walked = Walked {
-        rests: vec![Readings::default(); rests.len()],
-        spans: vec![None; spans.len()],
-        ends: vec![[Readings::default(); 2]; spans.len()],
+    let mut walk = Walk {
+        rests,
+        spans,
+        period_s: 1.0 / recording.manifest.sample_rate_hz,
+        begin,
+        before: None,
+        rest: 0,
+        span: 0,
+        started: false,
+        open: None,
+        walked: Walked {
+            rests: vec![Readings::default(); rests.len()],
+            spans: vec![None; spans.len()],
+            ends: vec![[Readings::default(); 2]; spans.len()],
+        },
     };
-    let (mut rest, mut span, mut started) = (0, 0, false);
-    let mut open: Reckoned = None;
-    let mut before: Option<(f64, Readings)> = None;
     let mut compensated = Compensated::new(recording, calibration, |share| progress(0.5 * share))?;
-    let mut step = |t: f64, now: Readings| {
-        let Some((t0, last)) = before.replace((t, now)) else {
-            return;
-        };
-        let dt = t - t0;
-        let missing = dt > 1.5 * period_s && !is_bridged(dt, period_s);
-        let mean = Readings {
-            duration_s: dt,
-            rate: (last.rate + now.rate) * 0.5,
-            force: (last.force + now.force) * 0.5,
-            raw: PerSensor::from_fn(|s| (last.raw[s] + now.raw[s]) * 0.5),
-            vibration: 0.5 * (last.vibration + now.vibration),
-        };
-        while rest < rests.len() && rests[rest][1] <= t0 {
-            rest += 1;
-        }
-        if let Some([from, to]) = rests.get(rest)
-            && t0 >= *from
-            && t <= *to
-        {
-            add(&mut walked.rests[rest], &mean);
-        }
-        let mut from = t0;
-        while let Some(own) = spans.get(span) {
-            if t <= own.start_s {
-                break;
-            }
-            if !started {
-                started = true;
-                let through = rests.partition_point(|r| r[1] <= own.start_s + 1e-9);
-                open = Some(begin(span, &walked.rests[..through]));
-                walked.ends[span][0] = mean;
-                from = from.max(own.start_s);
-            }
-            let to = t.min(own.end_s);
-            if missing {
-                open = None;
-            }
-            if let Some(reckoned) = &mut open {
-                let mut go = |from: f64, to: f64| {
-                    if to > from {
-                        reckoned.follow(&Readings {
-                            duration_s: to - from,
-                            ..mean
-                        });
-                    }
-                };
-                match own.mark_s.filter(|m| (from..to).contains(m)) {
-                    Some(mark) => {
-                        go(from, mark);
-                        reckoned.mark();
-                        reckoned.follow(&Readings {
-                            duration_s: to - mark,
-                            ..mean
-                        });
-                    }
-                    None => go(from, to),
-                }
-            }
-            if t < own.end_s {
-                break;
-            }
-            if let Some(reckoned) = &mut open {
-                reckoned.close();
-            }
-            walked.ends[span][1] = mean;
-            walked.spans[span] = open.take();
-            (span, started, from) = (span + 1, false, to);
-        }
-    };
     compensated.for_each(
         |share| progress(0.5 + 0.5 * share),
         |_, clean| {
             for row in 0..clean.len() {
                 if let Some(mut now) = readings(clean, row, &forward) {
                     now.vibration = high.take(now.force).norm_squared();
-                    step(clean.t_s[row], now);
+                    walk.take(clean.t_s[row], now);
                 }
             }
             Ok(())
         },
     )?;
+    let mut walked = walk.walked;
     for mean in &mut walked.rests {
         let t = mean.duration_s;
         if t > 0.0 {
@@ -187,6 +220,19 @@ pub(super) fn walk(
         }
     }
     Ok(walked)
+}
+
+impl Readings {
+    /// The mean of two samples that are `duration_s` apart.
+    fn mean_with(&self, next: &Self, duration_s: f64) -> Self {
+        Self {
+            duration_s,
+            rate: (self.rate + next.rate) * 0.5,
+            force: (self.force + next.force) * 0.5,
+            raw: PerSensor::from_fn(|s| (self.raw[s] + next.raw[s]) * 0.5),
+            vibration: 0.5 * (self.vibration + next.vibration),
+        }
+    }
 }
 
 /// Adds `mean`, times its duration, to `sum`.

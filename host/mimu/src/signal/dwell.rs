@@ -15,7 +15,7 @@ use crate::signal::rails::{self, longest_run_by_chance};
 use crate::signal::ramp::ramps;
 use crate::signal::rest::{self, Rest};
 use crate::signal::slow_turns::{self, Reading};
-use crate::signal::stillness::{self, Detection, Finding, Steps, reference_spans};
+use crate::signal::stillness::{self, Detection, DwellSearch, Steps, reference_spans};
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Manifest, Reference, health};
@@ -182,22 +182,22 @@ impl Dwells {
     pub fn find(
         condensed: &Condensed,
         manifest: &Manifest,
-        finding: impl Into<Finding>,
+        search: impl Into<DwellSearch>,
     ) -> Result<Self> {
-        let finding = finding.into();
+        let search = search.into();
         let mut warnings = Vec::new();
         let mut longest_run = [0, 1, 2, 3, 4, 5]
             .map(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
         let rails = rails::find(condensed, manifest, &mut warnings);
-        let given = are_given(condensed, finding)?;
-        let at_rest = finding.steps == Steps::AtRest;
+        let given = are_given(condensed, search)?;
+        let at_rest = search.steps == Steps::AtRest;
         let by_hand = manifest.reference == Reference::Gravity;
         let segments = if given {
             Segments::from(by_step(condensed))
         } else if at_rest {
             Segments::from(vec![(None, 0..condensed.blocks.len())])
         } else {
-            Segments::still(condensed, manifest, finding, &mut warnings)?
+            Segments::still(condensed, manifest, search, &mut warnings)?
         };
         let mut list = segments.dwells(condensed, manifest, &rails);
         if list.is_empty() {
@@ -208,7 +208,7 @@ impl Dwells {
                 *longest = f64::INFINITY;
             }
         }
-        let judged = given && finding.steps != Steps::Given;
+        let judged = given && search.steps != Steps::Given;
         let too_fast = match manifest.reference {
             Reference::Table => find_moving(&mut list, condensed),
             Reference::Gravity | Reference::TurntableRate => vec![[false; 2]; list.len()],
@@ -258,8 +258,8 @@ impl Dwells {
 }
 
 /// Whether the `step` column gives the dwells.
-fn are_given(condensed: &Condensed, finding: Finding) -> Result<bool> {
-    match finding.steps {
+fn are_given(condensed: &Condensed, search: DwellSearch) -> Result<bool> {
+    match search.steps {
         Steps::Given if !condensed.has_steps => {
             let problem = "the dwells were requested from the column step, and the recording has no such column";
             let error = Error::new("dwells", problem, "let mimu find the dwells");
@@ -292,10 +292,10 @@ impl Segments {
     fn still(
         condensed: &Condensed,
         manifest: &Manifest,
-        finding: Finding,
+        search: DwellSearch,
         warnings: &mut Vec<Warning>,
     ) -> Result<Self> {
-        let found = stillness::find(condensed, manifest, finding.still_factor)?;
+        let found = stillness::find(condensed, manifest, search.still_factor)?;
         let (mut ranges, detection) = (found.ranges, found.detection);
         let ends = match manifest.reference {
             Reference::Gravity => Some(rest::AT_ENDS),

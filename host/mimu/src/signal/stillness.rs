@@ -50,21 +50,21 @@ pub enum Steps {
 
 /// How the dwells are to be found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Finding {
+pub struct DwellSearch {
     /// See [`STILL_FACTOR`].
     pub still_factor: f64,
     /// Where they are taken from.
     pub steps: Steps,
 }
 
-impl Default for Finding {
+impl Default for DwellSearch {
     /// By [`STILL_FACTOR`].
     fn default() -> Self {
         STILL_FACTOR.into()
     }
 }
 
-impl From<f64> for Finding {
+impl From<f64> for DwellSearch {
     fn from(still_factor: f64) -> Self {
         Self {
             still_factor,

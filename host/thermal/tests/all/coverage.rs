@@ -1,7 +1,7 @@
 //! Recordings at rest of a unit whose biases drift far: which part of them is used, and what the report says about the rest.
 
 use mimu::prepared::Prepared;
-use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
+use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
 use mimu::{Manifest, RawUnit, Reference, Samples};
 use mimu_thermal::fit::{FitVerdict, ThermalFit, fit};
 use mimu_thermal::result::ThermalResult;
@@ -83,11 +83,11 @@ impl Desk {
 
     fn fitted(&self, seed: u64, steps: Steps) -> Result<ThermalFit, mimu::Error> {
         let (manifest, samples) = self.record(seed);
-        let finding = Finding {
+        let search = DwellSearch {
             still_factor: STILL_FACTOR,
             steps,
         };
-        let session = Session::of(&Prepared::of(manifest, &samples, finding)?)?;
+        let session = Session::of(&Prepared::of(manifest, &samples, search)?)?;
         fit(vec![session], &[], JOINT)
     }
 }

@@ -16,7 +16,7 @@ use mimu_core::stored::{
     Curves, MAX_LENGTH, Origin, RawUnit, Setting, StoredError, decode, encode,
 };
 use mimu_core::table::Node;
-use mimu_core::wire::{BatchHead, Refusal, Request, flags, reading};
+use mimu_core::wire::{BatchHead, Refusal, Request, Verdict, flags, reading};
 use mimu_core::{PerSensor, Sensor};
 use nalgebra::{Matrix3, Vector3};
 
@@ -84,6 +84,34 @@ fn missing(readings: &[Sample], period_s: f64) -> u32 {
         at_s = next_s;
     }
     missing
+}
+
+#[test]
+fn the_self_test_sees_each_axis_answer_as_the_factory_measured() {
+    // Both ranges have room for the deflection.
+    let still = |_| Sensed {
+        rate_dps: [0.5, -1.0, 0.25],
+        force_g: [0.1, -0.2, 0.97],
+        die_c: 25.0,
+    };
+    let mut device = streaming(Box::new(still), 1.0);
+    device.run_for(1_000 * MS);
+    let Answer::SelfTest(rows) = device.ask(Request::SelfTest) else {
+        panic!("no result");
+    };
+    assert_eq!(rows.len(), 9);
+    for row in &rows {
+        assert_eq!(row.verdict, Verdict::Passed, "{row:?}");
+        if row.name.ends_with("response") {
+            assert!((row.value - 1.0).abs() < 0.005, "{row:?}");
+        }
+    }
+    // Afterwards nothing is deflected.
+    device.samples.clear();
+    device.run_for(500 * MS);
+    let last = device.samples.last().unwrap().counts;
+    assert!((f64::from(last.accel[2]) / PER_G - 0.97).abs() < 0.001);
+    assert!((f64::from(last.gyro[1]) / PER_DPS + 1.0).abs() < 0.05);
 }
 
 #[test]

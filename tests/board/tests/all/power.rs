@@ -413,6 +413,52 @@ fn a_bit_that_flips_in_the_stored_calibration_is_noticed() {
     assert_eq!(found, Some(hash), "the flips were taken back");
 }
 
+#[test]
+fn a_failing_supply_is_no_time_to_store_and_the_old_calibration_stays() {
+    let (old, new) = (calibration(7, 3.5), calibration(16, 3.6));
+    let mut device = with_old(&old);
+    device.upload(&new);
+    device.board.set_supply(2_800).unwrap();
+    let before = device.board.store().unwrap();
+    let low = Answer::Refused(Refusal::SupplyLow);
+    assert_eq!(device.ask(Request::UploadCommit), low);
+    assert!(
+        device.board.store().unwrap() == before,
+        "something was written"
+    );
+    // It fails while the sector is erased: no word is programmed after that.
+    device.board.set_supply(3_300).unwrap();
+    let id = device.send(Request::UploadCommit);
+    device.run_for(500 * MS);
+    device.board.set_supply(2_800).unwrap();
+    let answer = std::iter::repeat_with(|| {
+        device.run_for(100 * MS);
+        device.answer(id)
+    });
+    assert_eq!(answer.take(50).find_map(|answer| answer), Some(low));
+    assert_eq!(device.download().as_ref(), Some(&old));
+    device.board.set_supply(3_300).unwrap();
+    assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
+    assert_eq!(device.download(), Some(new));
+}
+
+#[test]
+fn with_swapped_banks_nothing_is_erased() {
+    let old = calibration(7, 3.5);
+    let mut device = with_old(&old);
+    device.board.swap_banks(true).unwrap();
+    device.board.reset_by_pin(1).unwrap();
+    device.greeting();
+    device.upload(&calibration(16, 3.6));
+    let before = device.board.store().unwrap();
+    let swapped = Answer::Refused(Refusal::BanksSwapped);
+    assert_eq!(device.ask(Request::UploadCommit), swapped);
+    assert!(
+        device.board.store().unwrap() == before,
+        "something was written"
+    );
+}
+
 /// During the erase of a sector samples continue and feed the watchdog, so only a time limit can end it.
 #[test]
 fn flash_that_hangs_is_reported_and_the_old_calibration_stays_in_use() {

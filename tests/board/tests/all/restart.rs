@@ -6,7 +6,7 @@ use mimu_board::fault::Fault;
 use mimu_board::running::Board;
 use mimu_board::schematic::Volts;
 use mimu_board_tests::{MS, STARTED, image, still};
-use mimu_core::wire::{Decoder, Greeting, Message, Start};
+use mimu_core::wire::{Call, Decoder, Greeting, MAX_FRAME, Message, Request, Start, encode};
 
 /// The start as reported in a greeting.
 #[derive(Debug)]
@@ -206,6 +206,47 @@ fn a_panic_restarts_the_device_which_tells_the_line() {
     board.reset_by_pin(1).unwrap();
     let greeted = greeting(&mut board);
     assert_eq!(greeted.told(), ("ResetPin", 3));
+}
+
+/// The guard below the stack: the fault is told, and the static memory below it is as it was.
+#[test]
+fn a_stack_that_overflows_is_a_fault_of_its_own_and_clobbers_nothing() {
+    let mut board = sampling();
+    let (ms, cause, greeted) = restarted(&mut board, task("process"), Fault::Push);
+    // 480 KiB at 32 bytes for two instructions take less than a millisecond.
+    assert!(ms <= 3 && cause == "Core", "{cause} after {ms} ms");
+    assert_eq!(greeted.starts, 2);
+    let place = greeted.start.strip_prefix("fault ").expect("a fault");
+    let (_, cfsr) = place.split_once(" 0x").unwrap();
+    let cfsr = u32::from_str_radix(cfsr, 16).unwrap();
+    // DACCVIOL or MSTKERR (ARMv7-M B3.2.15).
+    assert!(cfsr & 0x12 != 0, "{place}");
+    // The record of the time since power-on lies at the upper end of static memory.
+    assert!(greeted.powered_for_ms.is_some());
+}
+
+/// A transmitter whose interrupt never comes: samples go on and feed the watchdog.
+#[test]
+fn a_mute_transmitter_and_commands_that_wait_for_ever_restart_the_device() {
+    let mut board = sampling();
+    board.send(&call(Request::Stream {
+        raw: true,
+        compensated: false,
+    }));
+    board.run_for(100 * MS).unwrap();
+    let (ms, cause, greeted) = restarted(&mut board, task("output"), Fault::Pending);
+    assert!(
+        (1000..1600).contains(&ms) && cause == "Core",
+        "{cause} after {ms} ms"
+    );
+    assert!(greeted.start.contains("main.rs"), "{}", greeted.start);
+}
+
+/// A call as the host sends it.
+fn call(request: Request<'_>) -> Vec<u8> {
+    let mut frame = [0; MAX_FRAME];
+    let length = encode(&Call { id: 7, request }, &mut frame).unwrap();
+    frame[..length].to_vec()
 }
 
 /// Number of restarts; checks that the watchdog caused each.
