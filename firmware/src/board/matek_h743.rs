@@ -30,12 +30,12 @@ pub const SENSOR_HZ: u32 = 12_500_000;
 /// What the integers of [`Acquisition`] mean.
 pub type Source = crate::digital::Digital<Icm42688p<()>>;
 
+#[cfg(target_os = "none")]
+pub use crate::digital::self_test::SelfTest;
 #[cfg(all(target_os = "none", feature = "usb"))]
 pub use parts::UsbPins;
 #[cfg(target_os = "none")]
 pub use parts::{Acquisition, Board, Irqs, Sensors};
-#[cfg(target_os = "none")]
-pub use crate::digital::self_test::SelfTest;
 
 /// The parts of the board, for the target only.
 #[cfg(target_os = "none")]

@@ -47,7 +47,12 @@ pub fn judge(of: &Measured, triads: &PerSensor<Triad<'_>>, table: &mut TestTable
         // There is room for all rows, which a test shows.
         table.push(&row(gyro, response, "dps", factory, WITHOUT_FACTORY.gyro));
         let limits = [-GYRO_OFFSET_DPS, GYRO_OFFSET_DPS];
-        table.push(&TestRow::within(offset, dps(rest.gyro[axis]), "dps", limits));
+        table.push(&TestRow::within(
+            offset,
+            dps(rest.gyro[axis]),
+            "dps",
+            limits,
+        ));
         let response = g(on.accel[axis] - rest.accel[axis]);
         let factory = of.factory.accel[axis];
         table.push(&row(accel, response, "g", factory, WITHOUT_FACTORY.accel));

@@ -24,7 +24,7 @@ fn compensated(
             open if open.is_nan() => sums.temperature = [0; 3],
             temp_c => at_temperature(&mut sums, temp_c),
         }
-        pipeline.take(&scan(number, &sums), &mut |message| {
+        pipeline.take(&scan(number.into(), &sums), &mut |message| {
             if let Sent::Compensated(head, samples, _) = keep(message) {
                 all.extend(
                     samples

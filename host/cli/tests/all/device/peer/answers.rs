@@ -55,6 +55,8 @@ impl Device {
             stored,
             slots: [first, Slot::Empty],
             powered_for_ms: self.script.powered_for_ms,
+            brown_out_level: Some(3),
+            banks_swapped: false,
         };
         let message = Message::Greeting { id, greeting };
         match id {
