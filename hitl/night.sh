@@ -44,7 +44,7 @@ ask() {
 
 cycle() { power off; sleep 2; power on; sleep 1; }
 
-step "option bytes: a failing supply resets the microcontroller at 2.7 V, and the banks are not swapped"
+step "option bytes: a failing supply resets the microcontroller at 2.6 V, and the banks are not swapped"
 ask info device info
 holds "$work/info.json" "r['brown_out_level'] == 3 and not r['banks_swapped']"
 # If it does not hold:  STM32_Programmer_CLI -c port=SWD -ob BOR_LEV=3 SWAP_BANK=0

@@ -3,7 +3,7 @@
 //! # Option bytes are read, not written
 //!
 //! Two of them matter. A brown-out level of 0 lets the part run down to 1.62 V, where a write that is in progress leaves a torn word; level 3 resets it
-//! at 2.7 V. With swapped banks the program runs from bank 2, and an erase of the calibration sectors would hit bank 1. The firmware tells both in its
+//! at 2.6 V. With swapped banks the program runs from bank 2, and an erase of the calibration sectors would hit bank 1. The firmware tells both in its
 //! greeting and refuses to store with swapped banks. It does not set them: a supply that fails while option bytes are programmed is the very case that
 //! the level is for, and a debugger sets them once, with a supply that a person watches (docs/device/board.md).
 
@@ -11,8 +11,8 @@ use cortex_m::peripheral::MPU;
 use embassy_stm32::pac;
 use mimu_core::wire::Refusal;
 
-/// Level of the detector: PLS 6, 2.85 V falling (DS12110, table 116). The regulators give 3.3 V within 2 %; below 2.85 V the supply is failing, and 2.7
-/// V, where brown-out level 3 resets, are still to come.
+/// Level of the detector: PLS 6, 2.76 V falling, 2.86 V rising (DS12110, table 116). The regulators give 3.3 V within 2 %; below 2.76 V the supply is
+/// failing, and 2.6 V, where brown-out level 3 resets, are still to come.
 const LEVEL: u8 = 6;
 
 /// Size of the guard, bytes, a power of two. Most frames of functions here are below it, so that a stack that grows call by call does not step over it.
@@ -51,12 +51,12 @@ pub fn begin(mpu: &MPU) {
     cortex_m::asm::isb();
 }
 
-/// Whether the supply is below 2.85 V.
+/// Whether the supply has fallen below 2.76 V, and has not come back to 2.86 V.
 pub fn supply_is_low() -> bool {
     pac::PWR.csr1().read().pvdo()
 }
 
-/// Brown-out level, 0 (the part's lowest, 1.62 V) to 3 (2.7 V).
+/// Brown-out level, 0 (the part's lowest, 1.62 V) to 3 (2.6 V).
 pub fn brown_out_level() -> u8 {
     pac::FLASH.optsr_cur().read().bor_lev()
 }

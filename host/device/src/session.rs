@@ -279,7 +279,7 @@ pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
             "upload again; if that fails too, the flash is worn out",
         ),
         Refusal::SupplyLow => (
-            "its supply is below 2.85 V, and might fail while the flash is written; the previous calibration is still in use".into(),
+            "its supply is below 2.76 V, and might fail while the flash is written; the previous calibration is still in use".into(),
             "check the supply: USB cable, regulator, battery",
         ),
         Refusal::BanksSwapped => (

@@ -102,7 +102,7 @@ pub fn info_text(result: &DeviceResult<&Identity>) -> String {
 
 /// What a level of the brown-out reset means (DS12110, table 15: falling thresholds).
 fn brown_out(level: u8) -> String {
-    let volts = ["1.62", "2.1", "2.4", "2.7"];
+    let volts = ["1.62", "2.0", "2.3", "2.6"];
     let reset = volts
         .get(usize::from(level))
         .map_or_else(String::new, |v| format!(", reset below {v} V"));

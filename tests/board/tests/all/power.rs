@@ -418,7 +418,7 @@ fn a_failing_supply_is_no_time_to_store_and_the_old_calibration_stays() {
     let (old, new) = (calibration(7, 3.5), calibration(16, 3.6));
     let mut device = with_old(&old);
     device.upload(&new);
-    device.board.set_supply(2_800).unwrap();
+    device.board.set_supply(2_700).unwrap();
     let before = device.board.store().unwrap();
     let low = Answer::Refused(Refusal::SupplyLow);
     assert_eq!(device.ask(Request::UploadCommit), low);
@@ -430,7 +430,7 @@ fn a_failing_supply_is_no_time_to_store_and_the_old_calibration_stays() {
     device.board.set_supply(3_300).unwrap();
     let id = device.send(Request::UploadCommit);
     device.run_for(500 * MS);
-    device.board.set_supply(2_800).unwrap();
+    device.board.set_supply(2_700).unwrap();
     let answer = std::iter::repeat_with(|| {
         device.run_for(100 * MS);
         device.answer(id)
