@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use mimu_board::flash::Change;
-use mimu_board::running::STORE;
+use mimu_board::inertial::Sensed;
+use mimu_board::running::{Board, STORE};
 use mimu_board::schematic::Volts;
 use mimu_board::serve::{Pace, Served};
 use mimu_board_tests::conversation::{Answer, Conversation};
-use mimu_board_tests::{MS, still};
+use mimu_board_tests::{MS, digital_image, still};
 use mimu_core::PerSensor;
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::stored::{self, Curves};
@@ -43,9 +44,49 @@ fn calibration_of(origin: &stored::Origin, nodes: u32, scale: f32) -> Vec<u8> {
     bytes
 }
 
+/// A board whose supply is cut.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    Nucleo,
+    Matek,
+}
+
+impl Kind {
+    /// At rest.
+    fn board(self) -> Board {
+        let at_rest = |_| Sensed {
+            rate_dps: [0.0; 3],
+            force_g: [0.0, 0.0, 1.0],
+            die_c: 25.0,
+        };
+        match self {
+            Self::Nucleo => still(Volts::GROUND),
+            Self::Matek => {
+                Board::digital(&digital_image(), Box::new(at_rest), 1.0, [7; 12]).unwrap()
+            }
+        }
+    }
+
+    /// A calibration of its raw unit, distinct for each `scale`.
+    fn calibration(self, nodes: u32, scale: f32) -> Vec<u8> {
+        let origin = match self {
+            Self::Nucleo => stored::Origin::UNKNOWN,
+            Self::Matek => stored::Origin {
+                raw_unit: Some(stored::RawUnit::Count),
+                ..stored::Origin::UNKNOWN
+            },
+        };
+        calibration_of(&origin, nodes, scale)
+    }
+}
+
 /// A device with the old calibration, which it has confirmed.
 fn with_old(old: &[u8]) -> Conversation {
-    let mut device = Conversation::new(still(Volts::GROUND));
+    on_board_with_old(Kind::Nucleo, old)
+}
+
+fn on_board_with_old(kind: Kind, old: &[u8]) -> Conversation {
+    let mut device = Conversation::new(kind.board());
     device.greeting();
     device.upload(old);
     assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
@@ -64,8 +105,8 @@ struct Course {
 }
 
 /// Carries out upload and commit once.
-fn course(old: &[u8], new: &[u8]) -> Course {
-    let mut device = with_old(old);
+fn course(kind: Kind, old: &[u8], new: &[u8]) -> Course {
+    let mut device = on_board_with_old(kind, old);
     let began = device.board.state().ns;
     device.upload(new);
     let committed = device.board.state().ns;
@@ -161,24 +202,33 @@ fn a_served_board_starts_with_the_calibration_that_its_file_holds() {
 #[test]
 fn whenever_the_supply_is_cut_the_old_or_the_new_calibration_is_there_whole() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("supply-cuts.svg");
-    cut_at_instants(8, &path);
+    cut_at_instants(Kind::Nucleo, 8, &path);
+}
+
+/// The flash is the same, the program and its timing are not.
+#[test]
+fn the_same_on_the_board_with_a_digital_sensor() {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("supply-cuts-matek.svg");
+    cut_at_instants(Kind::Matek, 8, &path);
 }
 
 #[test]
-#[ignore = "nightly: 300 starts of the device; draws docs/device/supply-cuts.svg"]
+#[ignore = "nightly: 300 starts of each board; draws docs/device/supply-cuts.svg"]
 fn at_each_of_300_instants_the_old_or_the_new_calibration_is_there_whole() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/device/supply-cuts.svg");
-    cut_at_instants(300, &path);
+    cut_at_instants(Kind::Nucleo, 300, &path);
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("supply-cuts-matek.svg");
+    cut_at_instants(Kind::Matek, 300, &path);
 }
 
 /// Cuts the supply at `cuts` times. Half of them are during the programming of words, which takes a hundredth of the time.
-fn cut_at_instants(cuts: usize, drawn: &Path) {
-    let (old, new) = (calibration(7, 3.5), calibration(16, 3.6));
-    let course = course(&old, &new);
+fn cut_at_instants(kind: Kind, cuts: usize, drawn: &Path) {
+    let (old, new) = (kind.calibration(7, 3.5), kind.calibration(16, 3.6));
+    let course = course(kind, &old, &new);
     assert!(!course.words.is_empty());
 
     // The same run again. It is identical up to each cut, and the flash contents after a cut do not depend on later events.
-    let mut device = with_old(&old);
+    let mut device = on_board_with_old(kind, &old);
     assert_eq!(device.board.state().ns, course.began);
     device.upload(&new);
     assert_eq!(device.board.state().ns, course.committed);
@@ -198,7 +248,7 @@ fn cut_at_instants(cuts: usize, drawn: &Path) {
     assert_eq!(stores.len(), cuts);
 
     // Two boards, because most machines that run this have two cores.
-    let judge = |part: &[(u64, Vec<u8>)]| judge(&course, [&old, &new], part);
+    let judge = |part: &[(u64, Vec<u8>)]| judge(kind, &course, [&old, &new], part);
     let (first, second) = stores.split_at(stores.len() / 2);
     let outcomes = std::thread::scope(|scope| {
         let second = scope.spawn(|| judge(second));
@@ -213,9 +263,14 @@ fn cut_at_instants(cuts: usize, drawn: &Path) {
 /// # Panics
 ///
 /// If it has neither the old calibration nor the new one, or the wrong one of them.
-fn judge(course: &Course, [old, new]: [&[u8]; 2], stores: &[(u64, Vec<u8>)]) -> Vec<(u64, bool)> {
+fn judge(
+    kind: Kind,
+    course: &Course,
+    [old, new]: [&[u8]; 2],
+    stores: &[(u64, Vec<u8>)],
+) -> Vec<(u64, bool)> {
     let hashes = [old, new].map(stored::hash);
-    let mut device = Conversation::new(still(Volts::GROUND));
+    let mut device = Conversation::new(kind.board());
     device.greeting();
     let mut outcomes = Vec::new();
     let mut last: Option<&(u64, Vec<u8>)> = None;
