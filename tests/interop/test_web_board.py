@@ -166,7 +166,7 @@ def test_a_session_that_is_unplugged_goes_on_and_the_command_ends_it(usb, lines,
     board = web_board.Socket(lines)
     said = web_board.wizard(board.port, folder)
     board.close()
-    assert "the session goes on behind" in said and "in use" in said, said
+    assert "the session continues after" in said and "in use" in said, said
     assert dwells(folder)[: len(had)] == had
     web_board.assert_true(tomllib.loads((folder / "calibration.toml").read_text()))
 
@@ -188,7 +188,7 @@ def test_a_session_of_the_command_goes_on_in_the_page(usb, lines, tmp_path):
     usb.fill("#more-wizard", "--warm-up 0 --as-planned --trust-clock")
     connect(usb, lines, settings=False)
     begin(usb)
-    usb.locator("#log", has_text="the session goes on behind").wait_for(timeout=100_000)
+    usb.locator("#log", has_text="the session continues after").wait_for(timeout=100_000)
     finished(usb)
     ours = journal(usb, tmp_path / "page")
     assert dwells(ours)[: len(had)] == had
@@ -200,10 +200,10 @@ def test_a_session_that_was_stopped_goes_on_in_the_page(usb, lines, tmp_path):
     begin(usb, 1000)
     stopped_at(usb, 4)
     usb.click("#go-on")
-    usb.locator("#log", has_text="the session goes on behind").wait_for(timeout=100_000)
+    usb.locator("#log", has_text="the session continues after").wait_for(timeout=100_000)
     reaches(usb, 6)
     usb.click("#redo")
-    usb.locator("#log", has_text="is to be had again").wait_for(timeout=100_000)
+    usb.locator("#log", has_text="will be repeated").wait_for(timeout=100_000)
     stopped_at(usb, 7)
     found = [entry["entry"] for entry in entries(journal(usb, tmp_path / "page"))]
     assert found.count("redo") == 1 and found.count("dwell") >= 7
