@@ -6,6 +6,7 @@
 mod allan;
 pub mod allan_plot;
 mod apply;
+pub(crate) mod budget;
 mod compare;
 mod comparison;
 pub(crate) mod data_sheet;

@@ -9,6 +9,8 @@ mod earth;
 mod hold_out;
 mod known;
 mod lever_arm;
+mod reference_error;
+pub use reference_error::{Cause, Influence};
 mod of_temperature;
 mod off_level;
 mod outlying;
@@ -298,6 +300,7 @@ fn finish(
         static_rms,
         held_out,
         uncalibrated_rms: None,
+        influences: Vec::new(),
         warnings,
     }
 }

@@ -60,6 +60,7 @@ impl Prepared {
             keep: Keep::default(),
         };
         let prepared = Self {
+            reference_error: manifest.reference_error.clone(),
             manifest,
             condensed: condensed.into(),
             dwells,

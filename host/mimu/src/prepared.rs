@@ -25,7 +25,7 @@ use crate::signal::stillness::{DwellSearch, Steps};
 use crate::signal::unit_in_si;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Batch, Manifest, Recording, Reference};
+use mimu_recording::{Batch, Manifest, Recording, Reference, ReferenceError};
 
 /// A recording, condensed, with its dwells and their noise.
 #[derive(Debug, Clone)]
@@ -44,6 +44,8 @@ pub struct Prepared {
     pub bias_removal: Option<BiasRemoval>,
     /// See [`Prepared::beside_axis`].
     pub(crate) lever_arm_m: f64,
+    /// Errors of the reference.
+    pub(crate) reference_error: Option<ReferenceError>,
     /// The Earth's rate in the dwells on a table; `None` without a table or a gyro.
     pub earth_on_table: Option<Arc<EarthOnTable>>,
 }
@@ -136,6 +138,7 @@ impl Prepared {
             .extend(bias_removal.map(Warning::BiasRemoved));
         let noise = Noise::within(&dwells.list, &condensed, &dwells.rails);
         let prepared = Self {
+            reference_error: manifest.reference_error.clone(),
             manifest,
             condensed: Arc::new(condensed),
             dwells,
@@ -209,6 +212,17 @@ impl Prepared {
     /// allow for the centripetal force, and judge the accelerometer by the dwells at rest, if there are any.
     pub fn beside_axis(mut self, sigma_m: f64) -> Self {
         self.lever_arm_m = sigma_m;
+        self
+    }
+
+    /// Stated errors of the reference.
+    pub fn reference_error(&self) -> Option<&ReferenceError> {
+        self.reference_error.as_ref()
+    }
+
+    /// The reference errs by this much, in place of what the recording states. Least squares allows for it where inputs are known.
+    pub fn with_reference_error(mut self, error: ReferenceError) -> Self {
+        self.reference_error = Some(error);
         self
     }
 

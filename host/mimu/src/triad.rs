@@ -155,7 +155,7 @@ pub struct Triad {
     /// Covariance of P by rows, then b.
     pub forward_covariance: Covariance,
     /// The parts that add up to `forward_covariance`.
-    forward_parts: Vec<Part>,
+    pub(crate) forward_parts: Vec<Part>,
 }
 
 impl Triad {

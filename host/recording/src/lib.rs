@@ -32,6 +32,7 @@ mod parquet_writer;
 mod raw_channels;
 mod reader;
 mod recorded;
+mod reference_error;
 #[cfg(all(test, feature = "parquet"))]
 mod round_trip_tests;
 mod separator;
@@ -67,6 +68,7 @@ pub use manifest::{
 pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart, SensorSetting, SensorSettings};
+pub use reference_error::ReferenceError;
 pub use separator::Separator;
 pub use toml_file::{check_kind, parse_toml, read_text};
 pub use turntable::{Turntable, TurntableRate, rate_error};

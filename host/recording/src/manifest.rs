@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::recorded::{Recorded, SensorSettings};
+use super::reference_error::ReferenceError;
 use super::turntable::Turntable;
 use crate::error::{Argument, Error, Result};
 use crate::toml_file::{check_kind, parse_toml, read_text};
@@ -236,6 +237,9 @@ pub struct Manifest {
     /// The known rates, if the reference is the magnitude of the rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turntable: Option<Turntable>,
+    /// How well the reference is known, if that is stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_error: Option<ReferenceError>,
     /// Files from which it was imported.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Source>,
@@ -315,6 +319,7 @@ impl Manifest {
             rails: None,
             whole_turns: None,
             turntable: None,
+            reference_error: None,
             sources: Vec::new(),
         }
     }
@@ -383,6 +388,9 @@ impl Manifest {
                 return Err(Error::new(at("turntable"), problem, remedy).about(Argument::Reference));
             }
             (_, None) => {}
+        }
+        if let Some(error) = &self.reference_error {
+            error.check(&at("reference_error"))?;
         }
         if let Some(whole) = &self.whole_turns {
             whole.check(&at("whole_turns"))?;

@@ -25,6 +25,7 @@ mod real_mikoff;
 mod real_xsens;
 mod record_player;
 mod recording_problems;
+mod reference_error;
 mod sessions;
 mod several_recordings;
 mod signed_low_byte;

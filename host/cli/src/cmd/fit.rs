@@ -14,9 +14,9 @@ use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
 use mimu::sessions::class::PartClass;
 use mimu::sessions::{Sessions, fit_determined};
-use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
+use mimu_recording::{Reference, ReferenceError};
 use serde::Serialize;
 
 use crate::arguments::{
@@ -26,6 +26,7 @@ use crate::arguments::{
 use crate::output::{now, print};
 use crate::reading::{LogArgs, read_samples_or_means};
 use crate::report;
+use crate::report::budget::budget_text;
 use crate::report::data_sheet::{WithDataSheet, data_sheet_text};
 use crate::report::refused;
 use crate::status::Status;
@@ -49,6 +50,11 @@ pub(crate) struct FitArgs {
     /// Calibrate one sensor only, if the experiment does not determine the other
     #[arg(long, value_enum, value_name = "SENSOR")]
     only: Option<SensorArg>,
+    /// How well the true inputs are known, in place of what the recording states: tilt of a table, right angles, rate, gravity (docs/table.md)
+    ///
+    /// The errors enter the intervals, and a table shows their share of the variance of each parameter.
+    #[arg(long, value_name = "FILE")]
+    reference_error: Option<PathBuf>,
     #[command(flatten)]
     log: LogArgs,
     #[command(flatten)]
@@ -144,6 +150,11 @@ fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
     args.writing.check(args.output.as_deref())?;
     let prepared = args.keep.apply(args.noise.apply(prepared)?);
     let prepared = args.whole.apply(prepared)?;
+    let prepared = match &args.reference_error {
+        Some(file) => prepared.with_reference_error(ReferenceError::read(file)?),
+        None => prepared,
+    };
+    refuse_reference_error(&prepared, args.method)?;
     if args.method.is_some() && prepared.manifest.reference != Reference::Table {
         return Err(Error::new(
             recording.display(),
@@ -155,6 +166,23 @@ fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
         ));
     }
     Ok(prepared)
+}
+
+/// Errors of the reference are used by least squares with known inputs only.
+fn refuse_reference_error(prepared: &Prepared, method: Option<MethodArg>) -> Result<()> {
+    let by_means = matches!(
+        method,
+        None | Some(MethodArg::LeastSquares | MethodArg::Kalman)
+    );
+    let used = prepared.manifest.reference == Reference::Table && by_means;
+    if prepared.reference_error().is_none() || used {
+        return Ok(());
+    }
+    Err(Error::new(
+        &prepared.place,
+        "errors of the reference are stated, and this fit does not use them",
+        "they are for known inputs (reference = \"table\") and the methods least-squares and kalman",
+    ))
 }
 
 /// Fits a recording. After a refusal the user first needs the list of dwells; the error line comes last.
@@ -177,6 +205,7 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
     let fitted = fitted(args, prepared, fit)?;
     let result = FitResult::of(&fitted);
     let mut text = report::fit_text(&result, args.verbose.verbose);
+    text += &budget_text(&result);
     if args.dwells {
         text.push('\n');
         text.push_str(&report::dwell_table(&result.dwells));

@@ -129,6 +129,26 @@ pub fn least_squares(
     Ok(earth_shared::found(estimated, observations))
 }
 
+/// What multiplies the mean readings of sensor `axis` in [`least_squares`], with the `extra` variance that their scatter showed: `[b, P1, P2, P3]` by
+/// observations. `None` if the design is singular.
+pub(crate) fn gain(
+    observations: &[Observation],
+    axis: usize,
+    wander: Option<&[DMatrix<f64>; 3]>,
+    forward: &Matrix3<f64>,
+    extra: f64,
+) -> Option<DMatrix<f64>> {
+    let span = span(observations);
+    let design = design(observations, span);
+    let n = observations.len();
+    let covariance = errors(observations, axis, wander, forward).covariance();
+    let root = (covariance + DMatrix::identity(n, n) * extra).cholesky()?;
+    let weighted = root.solve(&design);
+    let mut gain = (design.tr_mul(&weighted)).try_inverse()? * weighted.transpose();
+    gain.rows_mut(1, 3).unscale_mut(span);
+    Some(gain)
+}
+
 /// One scalar measurement of a filter: `raw = b + P x + noise`.
 struct Measurement {
     input: Vector3<f64>,

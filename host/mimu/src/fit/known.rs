@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::hold_out::{Refits, Split, determined};
+use super::reference_error::{Influence, Influences};
 use super::sensor::{Residual, SensorFit, typical};
 use super::{Method, Options, finish, lever_arm, refuse_wrong_gravity, uncalibrated};
 use crate::estimate::{
@@ -86,7 +87,9 @@ struct Known<'a> {
     within: Vec<Observation>,
     /// The observations with the variance that the force of a lever arm adds.
     weighed: Vec<Observation>,
-    /// Covariances of the means of each axis by causes that dwells share: wander of the bias, and the lever arm.
+    /// Errors of the reference, if they are stated.
+    reference: Option<Influences>,
+    /// Covariances of the means of each axis by causes that dwells share: wander of the bias, the lever arm, and errors of the reference.
     shared: Option<[DMatrix<f64>; 3]>,
     /// Whether the accelerometer is beside the axis.
     off_axis: bool,
@@ -105,6 +108,7 @@ impl<'a> Known<'a> {
             weighed: observations.clone(),
             shared: prepared.noise.wander(sensor, dwells),
             off_axis: sensor == Sensor::Accel && prepared.lever_arm_m > 0.0,
+            reference: None,
             prepared,
             options,
             sensor,
@@ -115,13 +119,37 @@ impl<'a> Known<'a> {
         {
             let forward = first.triad.forward.matrix;
             let lever = lever_arm::covariance(dwells, &forward, prepared.lever_arm_m);
-            known.weighed = lever_arm::widened(&known.observations, &lever);
-            known.shared = Some(match known.shared {
-                Some(wander) => [0, 1, 2].map(|k| &wander[k] + &lever[k]),
-                None => lever,
-            });
+            known.share(lever);
+        }
+        if let Some(error) = &prepared.reference_error
+            && let Ok(first) = known.estimate(&known.weighed, &known.within)
+        {
+            let forward = first.triad.forward.matrix;
+            let influences = Influences::of(dwells, sensor, error, forward);
+            known.share(influences.covariance());
+            known.reference = Some(influences);
         }
         known
+    }
+
+    /// Adds the covariance of an error that dwells share.
+    fn share(&mut self, covariance: [DMatrix<f64>; 3]) {
+        self.weighed = lever_arm::widened(&self.weighed, &covariance);
+        self.shared = Some(match &self.shared {
+            Some(others) => [0, 1, 2].map(|k| &others[k] + &covariance[k]),
+            None => covariance,
+        });
+    }
+
+    /// What each error of the reference adds to the covariance, if least squares over dwell means was used. The parts of `estimated` are separated.
+    fn influences(&self, estimated: &mut Estimated) -> Vec<Influence> {
+        let by_means = self.options.method == Method::LeastSquares && self.within.is_empty();
+        match (&self.reference, &self.shared) {
+            (Some(reference), Some(shared)) if by_means => reference
+                .separate(estimated, &self.weighed, shared)
+                .unwrap_or_default(),
+            _ => Vec::new(),
+        }
     }
 
     fn estimate(
@@ -169,7 +197,8 @@ impl<'a> Known<'a> {
     }
 
     /// The fit with its errors, in sample and held out.
-    fn judged(&self, estimated: Estimated) -> Result<SensorFit> {
+    fn judged(&self, mut estimated: Estimated) -> Result<SensorFit> {
+        let influences = self.influences(&mut estimated);
         let (prepared, sensor) = (self.prepared, self.sensor);
         let means = self.observations.iter().map(|o| (o, 1.0));
         let within_used = match self.options.method {
@@ -233,6 +262,7 @@ impl<'a> Known<'a> {
             None,
             held_out.into(),
         );
+        fit.influences = influences;
         fit.uncalibrated_rms = uncalibrated::inputs(prepared, all.iter().map(|(o, _)| *o));
         Ok(fit)
     }

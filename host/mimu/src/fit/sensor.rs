@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::hold_out::HoldOut;
+use super::reference_error::Influence;
 use crate::estimate::Estimated;
 use crate::quantity::{Figure, Sensor};
 use crate::warning::Warning;
@@ -41,6 +42,8 @@ pub struct SensorFit {
     pub held_out: HoldOut,
     /// [`Self::rms`] without a calibration, if the readings are in SI.
     pub uncalibrated_rms: Option<f64>,
+    /// What the stated errors of the reference add to the covariance. Empty without any.
+    pub influences: Vec<Influence>,
     /// What a person should know.
     pub warnings: Vec<Warning>,
 }

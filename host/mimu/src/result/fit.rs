@@ -6,6 +6,7 @@ use mimu_recording::{RawUnit, Reference};
 use serde::Serialize;
 
 use super::TOOL;
+use super::budget::{BudgetRow, budget};
 use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
 use crate::judgement::Judgement;
@@ -133,6 +134,9 @@ pub struct SensorFitResult {
     /// `C_xx` to `o_z` (raw to SI, `x = C u + o`), then as physical quantities: `scale_`, `bias_`, `misalignment_` of x, y, z and
     /// `non_orthogonality_` of yz, zy, zx. Without `o_` and `bias_` of a gyro whose bias the firmware removes.
     pub parameters: Vec<Parameter>,
+    /// What their variances consist of, if errors of the reference are stated; absent otherwise.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub budget: Vec<BudgetRow>,
     /// Root mean square of the residuals, in [`Self::unit`].
     pub rms: f64,
     /// The same of those that were held out; null if none were.
@@ -353,6 +357,7 @@ impl SensorFitResult {
         Self {
             estimator: fit.estimator(found.sensor),
             parameters: Parameter::list(fit, found),
+            budget: budget(found, fit.prepared.manifest.raw_unit),
             rms: found.rms(),
             held_out_rms: found.held_out_rms(),
             noise_floor: found.noise_floor(),

@@ -3,6 +3,7 @@
 //! SI throughout; NaN and infinity are null in JSON.
 
 pub mod allan;
+pub mod budget;
 pub mod design;
 pub mod diagnosis;
 pub mod fit;
