@@ -41,8 +41,8 @@ impl Cause {
             Self::Gravity => "gravity",
             Self::Rate => "rate",
             Self::Mounting => "mounting",
-            Self::Level => "level of a pose",
-            Self::Tilt => "tilt of the base",
+            Self::Level => "level",
+            Self::Tilt => "tilt",
             Self::Orthogonality => "orthogonality",
         }
     }
