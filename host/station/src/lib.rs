@@ -1,0 +1,35 @@
+//! The test of a unit on a line of production: ten seconds at rest, against limits.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`gather`] | samples at rest: from a recording, or from a unit at a port |
+//! | [`scale`] | readings in SI: by a calibration, a range, or the board |
+//! | [`rest`] | whether the unit was at rest; the means and their noise |
+//! | [`bits`] | bits of the codes that never change, and runs of equal readings |
+//! | [`noise`] | rms and density of the noise |
+//! | [`rate`] | sample rate and lost samples, by the time stamps |
+//! | [`quantity`], [`side`] | names and units of the quantities; sides of a unit |
+//! | [`quantities`] | everything that is measured in one rest |
+//! | [`faces`] | offsets and sensitivities from three sides up |
+//! | [`measured`] | one measured quantity: value, unit, uncertainty |
+//! | [`own_limit`], [`limits`] | the file of limits, and limits of data sheets |
+//! | [`decision`] | the decision about a value near its limit (JCGM 106) |
+//! | [`document`] | the result, `mimu-measurements/1` |
+//! | [`golden`] | the unit that tells whether the station still measures what it measured before |
+
+pub mod bits;
+pub mod decision;
+pub mod document;
+pub mod faces;
+pub mod gather;
+pub mod golden;
+pub mod limits;
+pub mod measured;
+pub mod noise;
+pub mod own_limit;
+pub mod quantities;
+pub mod quantity;
+pub mod rate;
+pub mod rest;
+pub mod scale;
+pub mod side;

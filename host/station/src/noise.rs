@@ -1,0 +1,137 @@
+//! Noise of a channel at rest: rms and density.
+
+use mimu_allan::spectrum::white_band;
+
+/// A figure with its standard uncertainty.
+pub type WithSigma = (f64, f64);
+
+/// A data sheet's density is one-sided, N two-sided.
+const ONE_SIDED: f64 = std::f64::consts::SQRT_2;
+/// Correlations are summed to this share of the record.
+const LONGEST_LAG: usize = 10;
+/// And to at most this many samples.
+const MOST_LAGS: usize = 500;
+
+/// Root mean square of `readings` about their straight line, with its standard uncertainty.
+///
+/// Filtered noise has fewer independent samples than readings: the variance of a variance is `2 σ⁴ (1 + 2 Σ ρ²) / n` with the autocorrelations ρ (Bartlett
+/// 1946). What n readings show of ρ² by chance, 1/n, is taken off.
+pub fn rms(readings: &[f64]) -> WithSigma {
+    let rest = about_line(readings);
+    let n = rest.len() as f64;
+    let power = rest.iter().map(|v| v * v).sum::<f64>();
+    if power <= 0.0 {
+        return (0.0, 0.0);
+    }
+    let lags = (rest.len() / LONGEST_LAG).min(MOST_LAGS);
+    let square = |lag: usize| {
+        let products = rest.iter().zip(&rest[lag..]);
+        let rho = products.map(|(a, b)| a * b).sum::<f64>() / power;
+        rho * rho - 1.0 / n
+    };
+    let sum: f64 = (1..=lags).map(square).sum();
+    let rms = (power / (n - 2.0)).sqrt();
+    let factor = (1.0 + 2.0 * sum).max(1.0);
+    (rms, rms * (factor / (2.0 * n)).sqrt())
+}
+
+/// `readings` minus their straight line by least squares.
+fn about_line(readings: &[f64]) -> Vec<f64> {
+    let n = readings.len() as f64;
+    let middle = 0.5 * (n - 1.0);
+    let mean = readings.iter().map(|v| v - readings[0]).sum::<f64>() / n + readings[0];
+    let slope = (0..)
+        .zip(readings)
+        .map(|(k, v)| (f64::from(k) - middle) * (v - mean))
+        .sum::<f64>()
+        / (n * (n * n - 1.0) / 12.0);
+    let line = |k: i32| mean + slope * (f64::from(k) - middle);
+    (0..).zip(readings).map(|(k, v)| v - line(k)).collect()
+}
+
+/// White noise of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Density {
+    /// One-sided density, unit/√Hz, with its standard uncertainty.
+    pub value: WithSigma,
+    /// Band in which it was read, Hz.
+    pub band_hz: [f64; 2],
+}
+
+/// One-sided density of the white noise of `readings`, which are `dt_s` apart. `None` if the record is too short for a spectrum, or no band of it is
+/// white.
+pub fn density(readings: &[f64], dt_s: f64) -> Option<Density> {
+    let white = white_band(readings, dt_s, &[], 0.95)?;
+    let band_hz = white.band_hz?;
+    // The interval also contains what other models of the slow noise give.
+    let half = 0.5 * (white.interval[1] - white.interval[0]) / 1.96;
+    Some(Density {
+        value: (
+            ONE_SIDED * white.value,
+            ONE_SIDED * half.max(white.sigma),
+        ),
+        band_hz,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// White noise of standard deviation 1 by Marsaglia's xorshift and twelve uniform numbers.
+    fn white(n: usize, seed: u64) -> Vec<f64> {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        let mut uniform = || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let normal = |_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+        (0..n).map(normal).collect()
+    }
+
+    /// Share of `figures` within two of their standard uncertainties of `truth`.
+    fn within(figures: &[WithSigma], truth: f64) -> f64 {
+        let near = figures.iter().filter(|(v, s)| (v - truth).abs() < 2.0 * s);
+        near.count() as f64 / figures.len() as f64
+    }
+
+    #[test]
+    fn the_rms_of_filtered_noise_has_an_honest_uncertainty() {
+        // A first-order filter: variance (1 - a)/(1 + a) of that of the input.
+        let a: f64 = 0.9;
+        let truth = ((1.0 - a) / (1.0 + a)).sqrt();
+        let figures: Vec<WithSigma> = (1..=300)
+            .map(|seed| {
+                let mut state = 0.0;
+                let filtered = white(2200, seed).into_iter().map(|w| {
+                    state = a * state + (1.0 - a) * w;
+                    100.0 + state
+                });
+                rms(&filtered.skip(200).collect::<Vec<_>>())
+            })
+            .collect();
+        // 95.4 % of 300: a standard deviation is 1.2 %.
+        let share = within(&figures, truth);
+        assert!((0.91..=0.99).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn the_density_of_white_noise_is_that_of_its_variance() {
+        // Variance 1 at 1 kHz is 1/500 unit²/Hz, one-sided.
+        let truth = (1.0_f64 / 500.0).sqrt();
+        let figures: Vec<WithSigma> = (1..=100)
+            .filter_map(|seed| Some(density(&white(10_000, seed), 1e-3)?.value))
+            .collect();
+        assert!(figures.len() >= 98, "{}", figures.len());
+        let share = within(&figures, truth);
+        assert!(share >= 0.88, "{share}");
+    }
+
+    #[test]
+    fn a_dead_channel_has_no_noise() {
+        assert_eq!(rms(&[3.0; 500]), (0.0, 0.0));
+        assert!(density(&[3.0; 5000], 1e-3).is_none());
+    }
+}
