@@ -5,7 +5,7 @@ use clap::CommandFactory;
 use crate::Cli;
 
 /// Name of a subcommand, and its command lines.
-const EXAMPLES: [(&str, &[&str]); 17] = [
+const EXAMPLES: [(&str, &[&str]); 18] = [
     (
         "wizard",
         &[
@@ -102,6 +102,15 @@ const EXAMPLES: [(&str, &[&str]); 17] = [
         &[
             "mimu device info --port /dev/ttyACM0",
             "mimu device upload cal.toml --port /dev/ttyACM0",
+        ],
+    ),
+    (
+        "accept",
+        &[
+            "mimu accept at-rest --part icm42688p --range 16,2000",
+            "mimu accept --port /dev/ttyUSB0 --port /dev/ttyUSB1 --text --limits limits.toml --for 10s --latitude 48.1 -o results",
+            "mimu accept x-up.csv y-up.csv z-up.csv --faces --limits limits.toml --json unit.json",
+            "mimu accept --port /dev/ttyACM0 --limits limits.toml --golden golden.json --latitude 48.1",
         ],
     ),
     ("completions", &["mimu completions bash"]),

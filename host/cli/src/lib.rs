@@ -32,9 +32,9 @@ pub use output::now;
 use clap::{FromArgMatches, Parser, Subcommand};
 use status::Status;
 
-use cmd::{allan, apply, design, diagnose, fit, import, thermal, verify};
 #[cfg(not(target_family = "wasm"))]
-use cmd::{device, record, wizard};
+use cmd::{accept, device, record, wizard};
+use cmd::{allan, apply, design, diagnose, fit, import, thermal, verify};
 
 /// Calibration of inertial units: any gyro and accelerometer of three axes, digital or analog.
 ///
@@ -42,7 +42,7 @@ use cmd::{device, record, wizard};
 /// --text ax,ay,az,gx,gy,gz --latitude 48.1 -o session --port /dev/ttyUSB0. Every command prints the next one.
 ///
 /// Exit status 0: done; 1: the data were refused, and one line gives the fault, its place and the remedy; 2: wrong usage; 3: done, but --strict was
-/// given and the result is not judged good.
+/// given and the result is not judged good, or `mimu accept` rejects a unit.
 #[derive(Parser)]
 #[command(name = "mimu", version, max_term_width = 100)]
 struct Cli {
@@ -79,6 +79,9 @@ enum Command {
     Export(cmd::export::ExportArgs),
     /// Write one page with everything that is known of a unit: verdict, errors, calibration, effects, noise, recordings
     Report(cmd::report::ReportArgs),
+    #[cfg(not(target_family = "wasm"))]
+    /// Accept or reject units by ten seconds at rest, against limits: the test of a line of production
+    Accept(Box<accept::AcceptArgs>),
     #[cfg(not(target_family = "wasm"))]
     /// Record the raw stream of a device
     Record(record::RecordArgs),
@@ -122,6 +125,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Noise(args) => cmd::noise::run(&args),
         Command::Export(args) => cmd::export::run(&args).map(done),
         Command::Report(args) => cmd::report::run(&args, &typed).map(done),
+        #[cfg(not(target_family = "wasm"))]
+        Command::Accept(args) => accept::run(&args),
         #[cfg(not(target_family = "wasm"))]
         Command::Record(args) => record::run(&args).map(done),
         #[cfg(not(target_family = "wasm"))]

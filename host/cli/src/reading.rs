@@ -42,6 +42,18 @@ impl LogArgs {
         }
     }
 
+    /// Local gravity, m/s², if it is given.
+    #[cfg(not(target_family = "wasm"))]
+    pub(crate) fn gravity_mps2(&self) -> Option<f64> {
+        self.gravity
+    }
+
+    /// Latitude, degrees, if it is given.
+    #[cfg(not(target_family = "wasm"))]
+    pub(crate) fn latitude_deg(&self) -> Option<f64> {
+        self.latitude
+    }
+
     /// The options of `mimu import`.
     fn options(&self) -> Vec<OsString> {
         let numbers = [("--gravity", self.gravity), ("--latitude", self.latitude)];

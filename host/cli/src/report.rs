@@ -3,6 +3,8 @@
 //! JSON is the result itself, in SI ([`mimu::result`]). A view receives only the result, so that it cannot show anything that JSON lacks. Units and
 //! digits are those of [`mimu::readable`] and [`mimu::quantity`].
 
+#[cfg(not(target_family = "wasm"))]
+mod accept;
 mod allan;
 pub mod allan_plot;
 mod apply;
@@ -34,6 +36,8 @@ mod unit;
 mod verify;
 mod wizard;
 
+#[cfg(not(target_family = "wasm"))]
+pub use accept::{accept_line, accept_text};
 pub use allan::allan_text;
 pub use apply::apply_text;
 pub use compare::compare_text;

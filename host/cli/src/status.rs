@@ -7,6 +7,8 @@ pub(crate) enum Status {
     Done,
     /// Status 3: the result is written, `--strict` was given, and the judgement of the result is worse than `good`.
     NotGood,
+    /// Status 3: the result is written, and a unit is beyond its limits.
+    Rejected,
 }
 
 impl Status {
@@ -14,7 +16,7 @@ impl Status {
     pub(crate) fn code(self) -> u8 {
         match self {
             Self::Done => 0,
-            Self::NotGood => 3,
+            Self::NotGood | Self::Rejected => 3,
         }
     }
 }

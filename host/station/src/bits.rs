@@ -61,10 +61,7 @@ pub fn equal_run(readings: &[f64]) -> (usize, Option<f64>) {
     let mut shares: Vec<f64> = readings.chunks(BLOCK).map(equal).collect();
     shares.sort_by(f64::total_cmp);
     let share = shares.get(shares.len() / 2).copied().unwrap_or(1.0);
-    (
-        longest,
-        channel_run_by_chance(share, readings.len() as u64),
-    )
+    (longest, channel_run_by_chance(share, readings.len() as u64))
 }
 
 #[cfg(test)]
@@ -75,7 +72,9 @@ mod tests {
     fn noisy(level: f64, sigma: f64, seed: u64) -> Vec<i64> {
         let mut state = seed;
         let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         let code = |_| {
@@ -122,7 +121,11 @@ mod tests {
         let scaled: Vec<f64> = raw.iter().map(|c| *c as f64 / 16.4).collect();
         assert_eq!(codes(&scaled, Some(1.0 / 16.4)), Some(raw.clone()));
         assert_eq!(codes(&scaled, None), Some(raw));
-        let none: Vec<f64> = scaled.iter().enumerate().map(|(k, v)| v + (k as f64).sin()).collect();
+        let none: Vec<f64> = scaled
+            .iter()
+            .enumerate()
+            .map(|(k, v)| v + (k as f64).sin())
+            .collect();
         assert_eq!(codes(&none, Some(1.0 / 16.4)), None);
     }
 
@@ -133,6 +136,9 @@ mod tests {
         assert!((run as f64) < limit.unwrap(), "{run} {limit:?}");
         readings[500..800].fill(3.0);
         let (run, limit) = equal_run(&readings);
-        assert!(run >= 300 && (run as f64) > limit.unwrap(), "{run} {limit:?}");
+        assert!(
+            run >= 300 && (run as f64) > limit.unwrap(),
+            "{run} {limit:?}"
+        );
     }
 }

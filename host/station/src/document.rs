@@ -116,7 +116,13 @@ pub struct Document {
 
 impl Document {
     /// The result of a unit before anything is measured.
-    pub fn new(unit: &str, source: Vec<String>, time: &str, limits: &Limits, part: Option<&Part>) -> Self {
+    pub fn new(
+        unit: &str,
+        source: Vec<String>,
+        time: &str,
+        limits: &Limits,
+        part: Option<&Part>,
+    ) -> Self {
         Self {
             format: FORMAT,
             tool: TOOL,
@@ -201,7 +207,9 @@ pub fn judged(
     let (decision, all) = (limits.decision(), limits.of(found, part, scale));
     let judge = |measured: &Measured| {
         // The last one that is for it counts; one for this axis before one for all axes.
-        let fits = all.iter().filter(|limit| is_for(&limit.name, &measured.name));
+        let fits = all
+            .iter()
+            .filter(|limit| is_for(&limit.name, &measured.name));
         let of_file = |source: &str| source == limits.place;
         let limit = fits.max_by_key(|limit| (of_file(&limit.source), limit.name == measured.name));
         let (lower, upper) = limit.map_or((None, None), |limit| (limit.lower, limit.upper));

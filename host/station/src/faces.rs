@@ -70,7 +70,9 @@ pub fn by_faces(
         let by_noise = 100.0 * (face.variance[axis] + noise).sqrt() / g;
         let measured = Measured::new(name, 100.0 * (reading / g - 1.0), unit, by_noise);
         // The offset's error, the cosine of the angle about two axes, and gravity.
-        let type_b = (level / 2f64.sqrt()).hypot(level * level).hypot(sigma_g / g);
+        let type_b = (level / 2f64.sqrt())
+            .hypot(level * level)
+            .hypot(sigma_g / g);
         all.push(measured.with_common(100.0 * type_b));
     }
     Ok(all)
@@ -91,16 +93,18 @@ mod tests {
     fn sides_in_any_order_and_sign_give_offsets_and_sensitivities() {
         let g = 9.81;
         let (offset, scale) = ([0.05, -0.1, 0.2], [1.01, 0.99, 1.002]);
-        let read = |up: [f64; 3]| {
-            face(std::array::from_fn(|i| offset[i] + scale[i] * g * up[i]))
-        };
+        let read = |up: [f64; 3]| face(std::array::from_fn(|i| offset[i] + scale[i] * g * up[i]));
         let faces = [read([0., 0., -1.]), read([1., 0., 0.]), read([0., 1., 0.])];
         let found = by_faces(&faces, [g, 0.0], 0.1, "test").unwrap();
         for axis in 0..3 {
             let mg = offset[axis] / 9.80665e-3;
             assert!((found[axis].value - mg).abs() < 1e-6, "{:?}", found[axis]);
             let percent = 100.0 * (scale[axis] - 1.0);
-            assert!((found[3 + axis].value - percent).abs() < 1e-6, "{:?}", found[3 + axis]);
+            assert!(
+                (found[3 + axis].value - percent).abs() < 1e-6,
+                "{:?}",
+                found[3 + axis]
+            );
         }
         let twice = [read([0., 0., -1.]), read([0., 0., 1.]), read([0., 1., 0.])];
         assert!(by_faces(&twice, [g, 0.0], 0.1, "test").is_err());

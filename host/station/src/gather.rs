@@ -16,6 +16,17 @@ const RATE_OF_DEVICE: f64 = 2e-5;
 const SLOWER: f64 = 2.0;
 const PATIENCE: Duration = Duration::from_secs(10);
 
+/// A measurement of a unit at a port.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Take {
+    /// Its length, s.
+    pub seconds: f64,
+    /// Time left out before it, s: hands leave the unit, and lines are on their way.
+    pub skip_s: f64,
+    /// Local gravity, m/s², with its standard uncertainty.
+    pub gravity: [f64; 2],
+}
+
 /// What a unit sent, and what it is.
 #[derive(Debug, Clone)]
 pub struct Samples {
@@ -81,42 +92,51 @@ impl Samples {
         })
     }
 
-    /// `seconds` of samples of the unit at a port. `gravity`: m/s² with its standard uncertainty.
+    /// Samples of the unit at a port.
     ///
     /// # Errors
     /// The line is lost, the board restarts, or it takes far too long.
     pub fn of_source(
         source: &mut dyn Source,
         place: &str,
-        seconds: f64,
-        gravity: [f64; 2],
+        Take {
+            seconds,
+            skip_s,
+            gravity,
+        }: Take,
     ) -> Result<Self> {
         let unit = source.unit().clone();
         let mut batch = Batch::default();
         let (begun, mut first) = (Instant::now(), None);
-        let patience = PATIENCE + Duration::from_secs_f64(SLOWER * seconds);
+        let patience = PATIENCE + Duration::from_secs_f64(SLOWER * (seconds + skip_s));
+        let skip = (skip_s * unit.rate_hz).round() as u64;
         let wanted = (seconds * unit.rate_hz).round() as u64;
         loop {
             match source.next()? {
                 SourceEvent::Samples(chunk) if !chunk.self_test => {
-                    let first = *first.get_or_insert(chunk.tick);
-                    for (tick, row) in (chunk.tick - first..).zip(&chunk.values) {
-                        if tick >= wanted {
-                            break;
-                        }
+                    let first = *first.get_or_insert(chunk.tick + skip);
+                    for (tick, row) in (chunk.tick..).zip(&chunk.values) {
+                        // Before the measurement, or after it.
+                        let Some(tick) = tick.checked_sub(first).filter(|t| *t < wanted) else {
+                            continue;
+                        };
                         batch.t_s.push(tick as f64 / unit.rate_hz);
                         batch.temp_c.push(chunk.temp_c);
                         for (to, value) in batch.raw.iter_mut().zip(row) {
                             to.push(*value);
                         }
                     }
-                    if chunk.tick - first + chunk.values.len() as u64 >= wanted {
+                    if chunk.tick + chunk.values.len() as u64 >= first + wanted {
                         break;
                     }
                 }
                 SourceEvent::Restarted(why) => {
                     let problem = format!("the board restarted during the measurement: {why}");
-                    return Err(Error::device(place, problem, "check its supply, and measure again"));
+                    return Err(Error::device(
+                        place,
+                        problem,
+                        "check its supply, and measure again",
+                    ));
                 }
                 _ => {}
             }
@@ -126,13 +146,21 @@ impl Samples {
                     begun.elapsed().as_secs_f64(),
                     batch.len()
                 );
-                return Err(Error::device(place, problem, "check the cable, and measure again"));
+                return Err(Error::device(
+                    place,
+                    problem,
+                    "check the cable, and measure again",
+                ));
             }
         }
         if batch.temp_c.iter().all(|t| t.is_nan()) {
             batch.temp_c.clear();
         }
-        let share = if unit.is_device { RATE_OF_DEVICE } else { RATE_OF_LINES };
+        let share = if unit.is_device {
+            RATE_OF_DEVICE
+        } else {
+            RATE_OF_LINES
+        };
         Ok(Self {
             batch,
             unit: unit.name,

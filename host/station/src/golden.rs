@@ -128,7 +128,9 @@ impl Golden {
         }
         let judged: Vec<&Measured> = today.iter().filter(|m| is_judged(m)).collect();
         let all = judged.iter().filter_map(|measured| {
-            let own = reference.iter().filter_map(|s| s.values.get(&measured.name));
+            let own = reference
+                .iter()
+                .filter_map(|s| s.values.get(&measured.name));
             let own: Vec<&GoldenValue> = own.collect();
             (own.len() >= FEWEST).then(|| compared(measured, &own, judged.len()))
         });
@@ -155,7 +157,8 @@ impl Golden {
 
 /// Whether a quantity belongs to unit and station: the room's temperature does not, and counts have no scatter of their own.
 fn is_judged(measured: &Measured) -> bool {
-    measured.repeatability > 0.0 && Quantity::find(&measured.name) != Some(Quantity::Temperature)
+    measured.repeatability > 0.0
+        && Quantity::find(&measured.name) != Some(Quantity::Temperature)
         && Quantity::find(&measured.name) != Some(Quantity::LostSamples)
 }
 
@@ -165,8 +168,16 @@ fn is_judged(measured: &Measured) -> bool {
 fn compared(today: &Measured, reference: &[&GoldenValue], tests: usize) -> Moved {
     let n = reference.len() as f64;
     let mean = reference.iter().map(|v| v.value).sum::<f64>() / n;
-    let between = reference.iter().map(|v| (v.value - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    let within = reference.iter().map(|v| v.repeatability.powi(2)).sum::<f64>() / n;
+    let between = reference
+        .iter()
+        .map(|v| (v.value - mean).powi(2))
+        .sum::<f64>()
+        / (n - 1.0);
+    let within = reference
+        .iter()
+        .map(|v| v.repeatability.powi(2))
+        .sum::<f64>()
+        / n;
     let variance = between.max(within).max(today.repeatability.powi(2));
     let tail = 0.5 * FALSE_ALARM / tests.max(1) as f64;
     let t = StudentsT::new(0.0, 1.0, n - 1.0).map_or(f64::INFINITY, |t| t.inverse_cdf(1.0 - tail));
@@ -186,7 +197,9 @@ mod tests {
     fn normals(seed: u64) -> impl FnMut() -> f64 {
         let mut state = seed;
         let mut uniform = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
         };
         move || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()

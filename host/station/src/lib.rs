@@ -3,6 +3,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`gather`] | samples at rest: from a recording, or from a unit at a port |
+//! | [`boards`] | several boards at their ports, measured together |
 //! | [`scale`] | readings in SI: by a calibration, a range, or the board |
 //! | [`rest`] | whether the unit was at rest; the means and their noise |
 //! | [`bits`] | bits of the codes that never change, and runs of equal readings |
@@ -18,6 +19,7 @@
 //! | [`golden`] | the unit that tells whether the station still measures what it measured before |
 
 pub mod bits;
+pub mod boards;
 pub mod decision;
 pub mod document;
 pub mod faces;

@@ -100,18 +100,34 @@ impl Limits {
 
     fn check(&self) -> Result<()> {
         let wrong = |what: &str, problem: String, remedy: String| {
-            Err(Error::new(format!("{}, {what}", self.place), problem, remedy))
+            Err(Error::new(
+                format!("{}, {what}", self.place),
+                problem,
+                remedy,
+            ))
         };
         if self.format != FORMAT {
             let problem = format!("it is {:?}, and this program reads {FORMAT:?}", self.format);
-            return wrong("format", problem, "use the version of mimu that it was written for".into());
+            return wrong(
+                "format",
+                problem,
+                "use the version of mimu that it was written for".into(),
+            );
         }
         if let Some(up) = self.up.as_ref().filter(|up| direction(up).is_none()) {
-            return wrong("up", format!("{up:?} is no side"), "write +x, -x, +y, -y, +z or -z".into());
+            return wrong(
+                "up",
+                format!("{up:?} is no side"),
+                "write +x, -x, +y, -y, +z or -z".into(),
+            );
         }
         for (name, value) in [("k", self.k), ("typical_factor", self.typical_factor)] {
             if let Some(value) = value.filter(|v| !(0.0..=100.0).contains(v)) {
-                return wrong(name, format!("{value} is out of range"), "write a number from 0 to 100".into());
+                return wrong(
+                    name,
+                    format!("{value} is out of range"),
+                    "write a number from 0 to 100".into(),
+                );
             }
         }
         for (k, row) in (1..).zip(&self.rows) {
@@ -130,9 +146,16 @@ impl Limits {
             };
             if row.unit != unit {
                 let problem = format!("its unit is {:?}, and the quantity is in {unit}", row.unit);
-                return wrong(&what, problem, format!("convert the limits and write unit = {unit:?}"));
+                return wrong(
+                    &what,
+                    problem,
+                    format!("convert the limits and write unit = {unit:?}"),
+                );
             }
-            let order = [row.lower, row.upper].iter().flatten().all(|v| v.is_finite());
+            let order = [row.lower, row.upper]
+                .iter()
+                .flatten()
+                .all(|v| v.is_finite());
             let crossed = row.lower.zip(row.upper).is_some_and(|(l, u)| l > u);
             if !order || crossed || row.lower.or(row.upper).is_none() {
                 let problem = "it needs lower, upper or both, and lower below upper".into();
@@ -240,12 +263,7 @@ fn of_part(
 }
 
 /// Limits of the magnitude of gravity: what offsets and sensitivity of a data sheet allow together in this pose.
-fn gravity_of(
-    part: &Part,
-    force: &Vector3<f64>,
-    scale: &Scale,
-    typical: f64,
-) -> Option<OwnLimit> {
+fn gravity_of(part: &Part, force: &Vector3<f64>, scale: &Scale, typical: f64) -> Option<OwnLimit> {
     let own = part.sensor(Sensor::Accel)?;
     let full_scale = scale.full_scale[Sensor::Accel as usize];
     let allowed = |of: Property, axis: usize| {
@@ -266,7 +284,9 @@ fn gravity_of(
         name: Quantity::GravityError.name(None),
         lower: Some(-mg),
         upper: Some(mg),
-        source: format!("{}, offset and sensitivity together in this pose", part.name),
+        source: format!(
+            "{}, offset and sensitivity together in this pose",
+            part.name
+        ),
     })
 }
-

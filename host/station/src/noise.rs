@@ -66,10 +66,7 @@ pub fn density(readings: &[f64], dt_s: f64) -> Option<Density> {
     // The interval also contains what other models of the slow noise give.
     let half = 0.5 * (white.interval[1] - white.interval[0]) / 1.96;
     Some(Density {
-        value: (
-            ONE_SIDED * white.value,
-            ONE_SIDED * half.max(white.sigma),
-        ),
+        value: (ONE_SIDED * white.value, ONE_SIDED * half.max(white.sigma)),
         band_hz,
     })
 }

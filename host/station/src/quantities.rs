@@ -9,10 +9,10 @@ use nalgebra::Vector3;
 
 use crate::bits::{codes, equal_run, stuck_bits};
 use crate::gather::Samples;
-use crate::own_limit::OwnLimit;
-use crate::quantity::Quantity;
 use crate::measured::Measured;
 use crate::noise::{density, rms};
+use crate::own_limit::OwnLimit;
+use crate::quantity::Quantity;
 use crate::rate::Rate;
 use crate::rest::Rest;
 use crate::scale::{Scale, si_per_sheet};
@@ -51,7 +51,11 @@ pub fn measure(samples: &Samples, scale: &Scale, expected_up: Option<&str>) -> R
     let by_stamps = Rate::of(&samples.batch.t_s)
         .map_err(|e| e.map(|e| e.place = format!("{}, t_s", samples.place)))?;
     let rate = match samples.rate_hz {
-        Some([hz, sigma_hz]) => Rate { hz, sigma_hz, ..by_stamps },
+        Some([hz, sigma_hz]) => Rate {
+            hz,
+            sigma_hz,
+            ..by_stamps
+        },
         None => by_stamps,
     };
     let rest = Rest::of(samples, rate.hz, scale)?;
@@ -154,7 +158,12 @@ impl Quantities {
                 Some(found) => {
                     let factor = by[1] * sheet;
                     let (value, sigma) = found.value;
-                    self.add(of_density, Some((sensor, axis)), factor * value, factor * sigma);
+                    self.add(
+                        of_density,
+                        Some((sensor, axis)),
+                        factor * value,
+                        factor * sigma,
+                    );
                 }
                 None => self.missing(
                     of_density,
@@ -221,7 +230,11 @@ impl Quantities {
         }
         let n = known.len() as f64;
         let mean = known.iter().sum::<f64>() / n;
-        let sigma = if known.len() > 2 { rms(&known).0 / n.sqrt() } else { 0.0 };
+        let sigma = if known.len() > 2 {
+            rms(&known).0 / n.sqrt()
+        } else {
+            0.0
+        };
         self.add(Quantity::Temperature, None, mean, sigma);
     }
 

@@ -109,7 +109,9 @@ impl Quantity {
 
     /// The quantity of a name with or without an axis.
     pub fn find(name: &str) -> Option<Self> {
-        let is = |all: &&Self| all.without_axis() == name || without_axis(name) == Some(all.without_axis().into());
+        let is = |all: &&Self| {
+            all.without_axis() == name || without_axis(name) == Some(all.without_axis().into())
+        };
         Self::ALL.iter().find(is).copied()
     }
 }
@@ -118,7 +120,9 @@ impl Quantity {
 pub fn without_axis(name: &str) -> Option<String> {
     ["gyro", "accel"].iter().find_map(|sensor| {
         let of = name.strip_prefix(sensor)?.strip_prefix('_')?;
-        let of = AXES.iter().find_map(|axis| of.strip_prefix(axis)?.strip_prefix('_'))?;
+        let of = AXES
+            .iter()
+            .find_map(|axis| of.strip_prefix(axis)?.strip_prefix('_'))?;
         Some(format!("{sensor}_{of}"))
     })
 }

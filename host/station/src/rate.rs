@@ -60,7 +60,9 @@ fn line(points: &[[f64; 2]]) -> (f64, f64) {
     let squares = points.iter().map(|p| (p[0] - x).powi(2)).sum::<f64>();
     let products = points.iter().map(|p| (p[0] - x) * (p[1] - y));
     let slope = products.sum::<f64>() / squares;
-    let rest = points.iter().map(|p| (p[1] - y - slope * (p[0] - x)).powi(2));
+    let rest = points
+        .iter()
+        .map(|p| (p[1] - y - slope * (p[0] - x)).powi(2));
     let variance = rest.sum::<f64>() / (n - 2.0).max(1.0);
     (slope, (variance / squares).sqrt())
 }
@@ -80,7 +82,9 @@ mod tests {
 
     #[test]
     fn stamps_in_whole_milliseconds_give_the_rate() {
-        let t_s: Vec<f64> = (0..1040).map(|k| (f64::from(k) / 0.104).floor() / 1e3).collect();
+        let t_s: Vec<f64> = (0..1040)
+            .map(|k| (f64::from(k) / 0.104).floor() / 1e3)
+            .collect();
         let rate = Rate::of(&t_s).unwrap();
         assert!((rate.hz - 104.0).abs() < 3.0 * rate.sigma_hz, "{rate:?}");
         assert!(rate.sigma_hz < 0.01 && rate.lost == 0, "{rate:?}");

@@ -49,7 +49,8 @@ impl Rest {
         let lasts_s = n as f64 / rate_hz;
         if lasts_s < SHORTEST_S || n < FEWEST {
             let problem = format!("{n} samples in {lasts_s:.1} s are too few");
-            let remedy = format!("measure for {SHORTEST_S} s or more, and {FEWEST} samples or more");
+            let remedy =
+                format!("measure for {SHORTEST_S} s or more, and {FEWEST} samples or more");
             return Err(Error::undetermined(place, problem, remedy));
         }
         // Lost samples are measured elsewhere. Here they would only end the rest, so the times are regular.
@@ -69,7 +70,8 @@ impl Rest {
             let problem = format!("the unit moved during the measurement{when}");
             Error::undetermined(place, problem, "let it lie still, and measure again")
         };
-        let dwells = Dwells::find(&condensed, &manifest, finding).map_err(|_| moved(String::new()))?;
+        let dwells =
+            Dwells::find(&condensed, &manifest, finding).map_err(|_| moved(String::new()))?;
         let longest = dwells.list.iter().max_by_key(|d| d.rows);
         let dwell = longest.ok_or_else(|| moved(String::new()))?;
         if (dwell.rows as f64) < LEAST_SHARE * n as f64 {

@@ -94,10 +94,16 @@ impl Scale {
             by,
         };
         if let Some(calibration) = calibration {
-            return Ok(made(calibrated(samples, calibration)?, "calibration".into()));
+            return Ok(made(
+                calibrated(samples, calibration)?,
+                "calibration".into(),
+            ));
         }
         if samples.raw_unit == RawUnit::Si {
-            return Ok(made([diagonal(1.0), diagonal(1.0)], "readings in SI".into()));
+            return Ok(made(
+                [diagonal(1.0), diagonal(1.0)],
+                "readings in SI".into(),
+            ));
         }
         if let Some(models) = samples.nominal {
             return Ok(made(models, "the board's own figures".into()));
@@ -155,7 +161,12 @@ fn full_scale(samples: &Samples, ranges: Option<&Ranges>, sensor: Sensor) -> Opt
 }
 
 /// Counts for one deg/s or g in a range of `full_scale`.
-fn counts_per_sheet(samples: &Samples, part: Option<&Part>, sensor: Sensor, full_scale: f64) -> f64 {
+fn counts_per_sheet(
+    samples: &Samples,
+    part: Option<&Part>,
+    sensor: Sensor,
+    full_scale: f64,
+) -> f64 {
     let of_part = part.and_then(|part| part.sensor(sensor)).and_then(|own| {
         let near = |[range, _]: &&[f64; 2]| (range / full_scale - 1.0).abs() < 0.01;
         own.ranges.iter().find(near).map(|[_, counts]| *counts)

@@ -1,5 +1,7 @@
 //! The subcommands, one per file: each has a struct of arguments and a function `run`.
 
+#[cfg(not(target_family = "wasm"))]
+pub(crate) mod accept;
 pub(crate) mod allan;
 pub(crate) mod apply;
 pub(crate) mod compare;

@@ -120,7 +120,7 @@ struct SpinArgs {
 
 /// Options for a board of another maker, which writes its readings as lines of text.
 #[derive(Args)]
-struct TextArgs {
+pub(crate) struct TextArgs {
     /// The board writes lines of text. Names of the numbers of a line in their order: ax, ay, az, gx, gy, gz; t_us, t_ms or t_s (the
     /// board's clock); temp_c; `-` for one that is not needed. MotionCal's `Raw:` is recognised
     #[arg(long, value_name = "NAMES", num_args = 0..=1, default_missing_value = "ax,ay,az,gx,gy,gz")]
@@ -155,8 +155,14 @@ impl TextArgs {
         Some(format!("{names} in {}", self.raw_unit))
     }
 
+    /// Names of the numbers of a line, if the board writes lines.
+    #[cfg(not(target_family = "wasm"))]
+    pub(crate) fn names(&self) -> Option<&str> {
+        self.text.as_deref()
+    }
+
     /// The board at this port; `k` is its index if there are several.
-    fn board(&self, names: &str, port: &str, k: Option<usize>) -> Result<Text> {
+    pub(crate) fn board(&self, names: &str, port: &str, k: Option<usize>) -> Result<Text> {
         let numbered = |name: &String| k.map_or_else(|| name.clone(), |k| format!("{name}-{k}"));
         Ok(Text {
             port: port.to_owned(),

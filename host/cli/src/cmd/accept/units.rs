@@ -1,0 +1,223 @@
+//! Where the samples of units come from: recordings, or boards at their ports.
+
+use std::io::BufRead as _;
+use std::path::{Path, PathBuf};
+
+use mimu::quantity::normal_gravity;
+use mimu_recording::Recording;
+use mimu_recording::error::{Error, Result};
+use mimu_station::boards::Boards;
+use mimu_station::gather::{Samples, Take};
+use mimu_wizard::device::DeviceSource;
+use mimu_wizard::source::{Opener, Source as Line};
+use mimu_wizard::text_port::TextOpener;
+
+use super::{AcceptArgs, Source};
+use crate::output::progress;
+use crate::reading::folder;
+
+/// Length of a measurement at a port, s.
+const LENGTH_S: f64 = 10.0;
+/// Time left out after a person has put the unit down, s. Lines are half a second on their way.
+const HANDS_OFF_S: f64 = 1.0;
+/// Standard uncertainty of gravity by latitude, m/s²: 300 m of height, or an anomaly of 100 mGal.
+const BY_LATITUDE: f64 = 1e-3;
+/// The same where nothing is said of the place: 9.780 to 9.832 m/s², all equally likely.
+const ANYWHERE: [f64; 2] = [9.80665, 0.015];
+/// Sides of a measurement with three sides up.
+const FACES: usize = 3;
+
+/// Takes the samples of a unit.
+type Consume<'a> = dyn FnMut(&Source, Result<Vec<Samples>>) -> Result<()> + 'a;
+
+impl AcceptArgs {
+    /// Whether there are several units.
+    pub(super) fn several(&self) -> bool {
+        self.ports.len() > 1 || self.recordings.len() > if self.faces { FACES } else { 1 }
+    }
+
+    /// Local gravity with its standard uncertainty, if the person says anything of it.
+    fn gravity(&self) -> Option<[f64; 2]> {
+        let by_latitude = |at: f64| [normal_gravity(at), BY_LATITUDE];
+        let given = self.log.gravity_mps2().map(|g| [g, 0.0]);
+        given.or(self.log.latitude_deg().map(by_latitude))
+    }
+
+    /// Hands the samples of each unit to `consume`.
+    ///
+    /// # Errors
+    /// Neither a recording nor a port is given, or not three recordings for each unit with three sides; those of `consume`.
+    pub(super) fn for_each(
+        &self,
+        mut consume: impl FnMut(&Source, Result<Vec<Samples>>) -> Result<()>,
+    ) -> Result<()> {
+        if !self.recordings.is_empty() {
+            return self.of_recordings(&mut consume);
+        }
+        self.of_ports(&mut consume)
+    }
+
+    fn of_recordings(&self, consume: &mut Consume) -> Result<()> {
+        let each = if self.faces { FACES } else { 1 };
+        if !self.recordings.len().is_multiple_of(each) {
+            let problem = format!(
+                "{} recordings are given, and a unit has three sides",
+                self.recordings.len()
+            );
+            let remedy = "give three recordings of each unit, one after the other: with a side of x, of y and of z up";
+            return Err(Error::new("--faces", problem, remedy));
+        }
+        for paths in self.recordings.chunks(each) {
+            let samples: Result<Vec<Samples>> = paths.iter().map(|p| self.read(p)).collect();
+            let places: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
+            let source = Source {
+                unit: places[0].clone(),
+                places,
+            };
+            let samples = samples.and_then(|samples| one_unit(&source, samples));
+            consume(&source, samples)?;
+        }
+        Ok(())
+    }
+
+    fn read(&self, path: &Path) -> Result<Samples> {
+        let is_log = path.is_file();
+        let recording = Recording::open(&folder(path, &self.log)?)?;
+        let unknown = (is_log && self.gravity().is_none()).then_some(ANYWHERE);
+        let seconds = self.length.map(|length| length.as_secs_f64());
+        let gravity = self.gravity().or(unknown);
+        let mut samples = Samples::of_recording(&recording, seconds, gravity)?;
+        samples.place = path.display().to_string();
+        if samples.unit == mimu_recording::UNNAMED {
+            samples.unit.clone_from(&samples.place);
+        }
+        Ok(samples)
+    }
+
+    /// The ports with what opens them; without any, the only port at which a device greets.
+    fn openers(&self) -> Result<Vec<(String, Opener)>> {
+        let ports: Vec<Option<&String>> = match self.ports.as_slice() {
+            [] => vec![None],
+            ports => ports.iter().map(Some).collect(),
+        };
+        let several = ports.len() > 1;
+        let each = (1..).zip(ports).map(|(k, port)| {
+            let place = port.cloned().unwrap_or_else(|| "device".into());
+            let opener: Opener = match (self.text.names(), port) {
+                (Some(names), Some(port)) => {
+                    let board = self.text.board(names, port, several.then_some(k))?;
+                    let mut opener = TextOpener::new(board, None);
+                    Box::new(move |next| Ok(Box::new(opener.open(next)?) as Box<dyn Line>))
+                }
+                (Some(_), None) => {
+                    let problem = "a board that writes lines cannot be found by itself";
+                    return Err(Error::new("--text", problem, "name its port with --port"));
+                }
+                (None, port) => {
+                    let port = port.cloned();
+                    Box::new(move |next| {
+                        let source = DeviceSource::open(port.as_deref(), next)?;
+                        Ok(Box::new(source) as Box<dyn Line>)
+                    })
+                }
+            };
+            Ok((place, opener))
+        });
+        each.collect()
+    }
+
+    fn of_ports(&self, consume: &mut Consume) -> Result<()> {
+        let openers = self.openers()?;
+        let sources: Vec<Source> = openers
+            .iter()
+            .map(|(place, _)| Source {
+                unit: place.clone(),
+                places: vec![place.clone()],
+            })
+            .collect();
+        let gravity = self.gravity().unwrap_or_else(|| {
+            eprintln!("warning: the place is not given, so gravity may be 9.780 to 9.832 m/s²: give --gravity or --latitude");
+            ANYWHERE
+        });
+        let seconds = self.length.map_or(LENGTH_S, |length| length.as_secs_f64());
+        let mut boards = Boards::open(openers)?;
+        let sides = if self.faces { FACES } else { 1 };
+        let mut complete: Vec<Vec<Samples>> = sources.iter().map(|_| Vec::new()).collect();
+        let mut failed = Ok(());
+        for side in 0..sides {
+            let first = side == 0;
+            if self.faces {
+                wait_for_side(side)?;
+            }
+            let skip_s = if self.faces { HANDS_OFF_S } else { 0.0 };
+            let take = Take {
+                seconds,
+                skip_s,
+                gravity,
+            };
+            let bar = progress("measuring");
+            boards.take(take, |k, samples| {
+                bar.reach(0.5);
+                match samples {
+                    Ok(samples) => {
+                        complete[k].push(samples);
+                        if complete[k].len() == sides && failed.is_ok() {
+                            let samples = std::mem::take(&mut complete[k]);
+                            failed = consume(&sources[k], one_unit(&sources[k], samples));
+                        }
+                    }
+                    Err(error) if failed.is_ok() => failed = consume(&sources[k], Err(error)),
+                    Err(_) => {}
+                }
+            });
+            bar.finish();
+            if first && failed.is_err() {
+                break;
+            }
+        }
+        failed
+    }
+}
+
+/// The samples, if all are of one unit.
+fn one_unit(source: &Source, samples: Vec<Samples>) -> Result<Vec<Samples>> {
+    let other = samples.iter().find(|s| s.unit != samples[0].unit);
+    match other.filter(|_| {
+        source
+            .places
+            .iter()
+            .all(|p| !samples.iter().any(|s| s.unit == *p))
+    }) {
+        None => Ok(samples),
+        Some(other) => Err(Error::new(
+            &other.place,
+            format!(
+                "it is of the unit {}, and the first side is of {}",
+                other.unit, samples[0].unit
+            ),
+            "give three recordings of one unit",
+        )),
+    }
+}
+
+/// Asks for a side, and waits for Enter.
+fn wait_for_side(side: usize) -> Result<()> {
+    match side {
+        0 => eprintln!("put one side of every unit up, let go, and press Enter"),
+        _ => eprintln!(
+            "now put a side of another axis up, let go, and press Enter ({} of {FACES})",
+            side + 1
+        ),
+    }
+    let mut line = String::new();
+    let read = std::io::stdin().lock().read_line(&mut line);
+    match read {
+        Ok(1..) => Ok(()),
+        Ok(0) => Err(Error::new(
+            "standard input",
+            "it ended before all three sides were up",
+            "run it at a terminal, or give three recordings",
+        )),
+        Err(error) => Err(Error::io(&PathBuf::from("standard input"), &error)),
+    }
+}
