@@ -13,7 +13,7 @@ ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 
 MDBOOK := 0.5.4
 LOWEST := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
-PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device mimu-equipment mimu-export mimu-wizard mimu-cli
+PUBLISHED := mimu-core mimu-recording mimu-allan mimu mimu-thermal mimu-device mimu-equipment mimu-export mimu-wizard mimu-station mimu-cli
 
 # Written when all tests have been built. Their build has the programs of the demo too, with other features of the dependencies than a build of these
 # programs alone, which would compile everything again.
@@ -22,7 +22,7 @@ BUILT := $(or $(CARGO_TARGET_DIR),target)/debug/.tests-built
 # Stages of `make test`; each can be run alone, as in `make clippy`. Tests are linked before they run, so that both times are shown.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python
 
-.PHONY: help data test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example papers blind clumsy bench budget count device fuzz audit toolchain
+.PHONY: help data test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example station papers blind clumsy bench budget count device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
@@ -154,6 +154,10 @@ data: ## bring the public recordings, 27 MB, into $MIMU_DATA or ../shared/data, 
 example: toolchain ## import and fit a recording: the best real one available, or the small one in tests/
 	$(CARGO) build --locked --release --bin mimu
 	./tests/example.sh target/release/mimu
+
+station: toolchain ## a session of a station with simulated boards, as docs/station.md shows it
+	$(CARGO) build --locked --release --bin mimu --bin mimu-rig
+	./tests/station/session.sh target/release/mimu target/release/mimu-rig
 
 papers: toolchain ## compute every table and plot in docs/papers, and every table of the studies in docs/thermal (hours)
 	$(CARGO) run --locked --release -p mimu-tests --bin papers

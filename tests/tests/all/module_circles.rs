@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates, as folders from the root of the repository.
-const CRATES: [&str; 13] = [
+const CRATES: [&str; 14] = [
     "core",
     "firmware",
     "host/recording",
@@ -19,6 +19,7 @@ const CRATES: [&str; 13] = [
     "host/equipment",
     "host/export",
     "host/wizard",
+    "host/station",
     "host/cli",
     "rig",
     "rig/board",

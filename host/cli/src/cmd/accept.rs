@@ -39,6 +39,9 @@ pub(crate) struct AcceptArgs {
     ports: Vec<String>,
     #[command(flatten)]
     text: TextArgs,
+    /// Serial number of the unit; repeated, those of several, in the order of their recordings or ports [default: by recording, board or port]
+    #[arg(long = "unit", value_name = "NAME")]
+    units: Vec<String>,
     /// Length of the measurement [default: 10s at a port, all of a recording]
     #[arg(long = "for", value_name = "TIME", value_parser = duration)]
     length: Option<Duration>,
@@ -122,9 +125,9 @@ struct Station<'a> {
     time: String,
 }
 
-/// A unit before its measurement: its name if it is known, and where its samples are from.
+/// A unit before its measurement: its serial number if it is given, and where its samples are from.
 struct Source {
-    unit: String,
+    name: Option<String>,
     places: Vec<String>,
 }
 
@@ -163,7 +166,7 @@ impl<'a> Station<'a> {
     fn judge(&self, source: &Source, samples: Result<Vec<Samples>>) -> (Document, Option<Error>) {
         let unit = match &samples {
             Ok(samples) => &samples[0].unit,
-            Err(_) => &source.unit,
+            Err(_) => source.name.as_ref().unwrap_or(&source.places[0]),
         };
         let places = source.places.clone();
         let part = self.part.as_ref();

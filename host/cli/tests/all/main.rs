@@ -1,5 +1,6 @@
 //! The command, from its arguments to its exit status.
 
+mod accept;
 mod allan_command;
 mod bad_input;
 mod biases_at_rest;

@@ -4,8 +4,8 @@ use std::io::BufRead as _;
 use std::path::{Path, PathBuf};
 
 use mimu::quantity::normal_gravity;
-use mimu_recording::Recording;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{Recording, UNNAMED, are_two_units};
 use mimu_station::boards::Boards;
 use mimu_station::gather::{Samples, Take};
 use mimu_wizard::device::DeviceSource;
@@ -57,6 +57,19 @@ impl AcceptArgs {
         self.of_ports(&mut consume)
     }
 
+    /// Refuses names that are not as many as the units.
+    fn check_names(&self, units: usize) -> Result<()> {
+        if self.units.is_empty() || self.units.len() == units {
+            return Ok(());
+        }
+        let problem = format!(
+            "{} names are given, and there are {units} units",
+            self.units.len()
+        );
+        let remedy = "give one for each unit, in the order of the recordings or ports";
+        Err(Error::new("--unit", problem, remedy))
+    }
+
     fn of_recordings(&self, consume: &mut Consume) -> Result<()> {
         let each = if self.faces { FACES } else { 1 };
         if !self.recordings.len().is_multiple_of(each) {
@@ -67,13 +80,12 @@ impl AcceptArgs {
             let remedy = "give three recordings of each unit, one after the other: with a side of x, of y and of z up";
             return Err(Error::new("--faces", problem, remedy));
         }
-        for paths in self.recordings.chunks(each) {
+        self.check_names(self.recordings.len() / each)?;
+        for (k, paths) in self.recordings.chunks(each).enumerate() {
             let samples: Result<Vec<Samples>> = paths.iter().map(|p| self.read(p)).collect();
             let places: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
-            let source = Source {
-                unit: places[0].clone(),
-                places,
-            };
+            let name = self.units.get(k).cloned();
+            let source = Source { name, places };
             let samples = samples.and_then(|samples| one_unit(&source, samples));
             consume(&source, samples)?;
         }
@@ -88,9 +100,6 @@ impl AcceptArgs {
         let gravity = self.gravity().or(unknown);
         let mut samples = Samples::of_recording(&recording, seconds, gravity)?;
         samples.place = path.display().to_string();
-        if samples.unit == mimu_recording::UNNAMED {
-            samples.unit.clone_from(&samples.place);
-        }
         Ok(samples)
     }
 
@@ -130,11 +139,13 @@ impl AcceptArgs {
         let openers = self.openers()?;
         let sources: Vec<Source> = openers
             .iter()
-            .map(|(place, _)| Source {
-                unit: place.clone(),
+            .enumerate()
+            .map(|(k, (place, _))| Source {
+                name: self.units.get(k).cloned(),
                 places: vec![place.clone()],
             })
             .collect();
+        self.check_names(sources.len())?;
         let gravity = self.gravity().unwrap_or_else(|| {
             eprintln!("warning: the place is not given, so gravity may be 9.780 to 9.832 m/s²: give --gravity or --latitude");
             ANYWHERE
@@ -179,25 +190,24 @@ impl AcceptArgs {
     }
 }
 
-/// The samples, if all are of one unit.
-fn one_unit(source: &Source, samples: Vec<Samples>) -> Result<Vec<Samples>> {
-    let other = samples.iter().find(|s| s.unit != samples[0].unit);
-    match other.filter(|_| {
-        source
-            .places
-            .iter()
-            .all(|p| !samples.iter().any(|s| s.unit == *p))
-    }) {
-        None => Ok(samples),
-        Some(other) => Err(Error::new(
-            &other.place,
-            format!(
-                "it is of the unit {}, and the first side is of {}",
-                other.unit, samples[0].unit
-            ),
-            "give three recordings of one unit",
-        )),
+/// The samples under the name of their unit, if all are of one.
+fn one_unit(source: &Source, mut samples: Vec<Samples>) -> Result<Vec<Samples>> {
+    let first = samples[0].unit.clone();
+    if let Some(other) = samples.iter().find(|s| are_two_units(&first, &s.unit)) {
+        let problem = format!(
+            "it is of the unit {}, and the first side is of {first}",
+            other.unit
+        );
+        let remedy = "give three recordings of one unit";
+        return Err(Error::new(&other.place, problem, remedy));
     }
+    let name = match (&source.name, first.as_str()) {
+        (Some(name), _) => name,
+        (None, UNNAMED) => &source.places[0],
+        (None, _) => &first,
+    };
+    samples.iter_mut().for_each(|s| s.unit.clone_from(name));
+    Ok(samples)
 }
 
 /// Asks for a side, and waits for Enter.
