@@ -146,7 +146,7 @@ impl Document {
     /// With what was measured.
     ///
     /// # Errors
-    /// The file of limits names a quantity that was not measured: the unit can be neither accepted nor rejected.
+    /// Every limit is kept, but the file names a quantity that was not measured: the unit can be neither accepted nor rejected.
     pub fn judge(
         mut self,
         found: &Quantities,
@@ -160,6 +160,11 @@ impl Document {
         self.duration_s = Some(found.duration_s);
         self.not_measured.clone_from(&found.not_measured);
         self.measurements = judged(found, limits, part, scale);
+        self.verdict = verdict(&self.measurements);
+        // A unit that is beyond one limit has failed, whatever else was not measured.
+        if self.verdict == Verdict::Failed {
+            return Ok(self);
+        }
         let names: Vec<&str> = found.measured.iter().map(|m| m.name.as_str()).collect();
         if let Some(row) = limits.not_met(&names).first() {
             let reasons = found.not_measured.iter();
@@ -175,7 +180,6 @@ impl Document {
                 "measure longer, or with --faces for offsets and sensitivities of the accelerometer; or remove the row from the limits",
             ));
         }
-        self.verdict = verdict(&self.measurements);
         Ok(self)
     }
 

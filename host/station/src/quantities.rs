@@ -155,9 +155,8 @@ impl Quantities {
             let factor = by[0] * sheet;
             self.add(of_rms, Some((sensor, axis)), factor * value, factor * sigma);
             match density(readings, 1.0 / hz) {
-                Some(found) => {
+                Some((value, sigma)) => {
                     let factor = by[1] * sheet;
-                    let (value, sigma) = found.value;
                     self.add(
                         of_density,
                         Some((sensor, axis)),
@@ -168,7 +167,7 @@ impl Quantities {
                 None => self.missing(
                     of_density,
                     Some(axis),
-                    "the record is too short to show a band of white noise, or has none",
+                    "the record is too short, or its rate too low, for the band of 5 to 20 Hz",
                 ),
             }
         }

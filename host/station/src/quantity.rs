@@ -17,11 +17,11 @@ pub enum Quantity {
     AccelSensitivity,
     /// Rms of the gyro's noise.
     GyroNoise,
-    /// One-sided density of its white noise.
+    /// One-sided density of its noise from 5 to 20 Hz.
     GyroDensity,
     /// Rms of the accelerometer's noise.
     AccelNoise,
-    /// One-sided density of its white noise.
+    /// One-sided density of its noise from 5 to 20 Hz.
     AccelDensity,
     /// Bits that never change.
     GyroBits,

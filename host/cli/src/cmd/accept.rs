@@ -197,7 +197,8 @@ impl<'a> Station<'a> {
         Ok(document)
     }
 
-    /// What the rests of a unit show through a calibration or by its nominal scale; the first one is judged, the others give offsets and sensitivities.
+    /// What the rests of a unit show through a calibration or by its nominal scale. Of three, the one with the expected side up is judged, or else the first;
+    /// together they give offsets and sensitivities.
     fn quantities(
         &self,
         samples: &[Samples],
@@ -205,24 +206,29 @@ impl<'a> Station<'a> {
     ) -> Result<(Quantities, Scale)> {
         let (limits, part) = (&self.limits, self.part.as_ref());
         let scale = Scale::of(&samples[0], calibration, limits.ranges.as_ref(), part)?;
-        let mut found = measure(&samples[0], &scale, limits.up.as_deref())?;
-        if let [first, second, third] = samples {
-            let face = |of: &Quantities| {
-                let [force, variance] = of.force.ok_or_else(|| {
-                    let problem =
-                        "the unit has no accelerometer, whose offsets three sides would show";
-                    Error::new(&first.place, problem, "leave --faces out")
-                })?;
-                Ok::<_, Error>(Face { force, variance })
-            };
-            let others = [second, third].map(|s| measure(s, &scale, None));
-            let [second, third] = others;
-            let faces = [face(&found)?, face(&second?)?, face(&third?)?];
-            let level = self.args.level;
-            found
-                .measured
-                .extend(by_faces(&faces, first.gravity, level, &first.place)?);
+        let up = limits.up.as_deref();
+        let first = &samples[0];
+        if samples.len() == 1 {
+            return Ok((measure(first, &scale, up)?, scale));
         }
+        let sides = samples.iter().map(|s| measure(s, &scale, None));
+        let mut sides: Vec<Quantities> = sides.collect::<Result<_>>()?;
+        let faces = sides.iter().map(|of| {
+            let [force, variance] = of.force.ok_or_else(|| {
+                let problem = "the unit has no accelerometer, whose offsets three sides would show";
+                Error::new(&first.place, problem, "leave --faces out")
+            })?;
+            Ok(Face { force, variance })
+        });
+        let faces: Vec<Face> = faces.collect::<Result<_>>()?;
+        let [x, y, z] = faces.as_slice() else {
+            let problem = format!("{} sides were measured", faces.len());
+            return Err(Error::new(&first.place, problem, "measure three"));
+        };
+        let by_faces = by_faces(&[*x, *y, *z], first.gravity, self.args.level, &first.place)?;
+        let judged = sides.iter().position(|side| side.up.as_deref() == up);
+        let mut found = sides.swap_remove(judged.unwrap_or(0));
+        found.measured.extend(by_faces);
         Ok((found, scale))
     }
 

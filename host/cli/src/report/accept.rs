@@ -10,6 +10,8 @@ use super::text::wrap;
 
 /// Standard uncertainties of the interval beside a value.
 const SIGMAS: f64 = 2.0;
+/// A smaller interval, as a share of its value, is not written: nine more digits tell nobody anything.
+const LEAST_SHARE: f64 = 1e-7;
 /// Names in a line of one unit.
 const NAMED: usize = 3;
 
@@ -62,7 +64,7 @@ pub fn accept_text(document: &Document, all: bool) -> String {
         let _ = writeln!(
             out,
             "  and {} without limits (--verbose)",
-            plural(unlimited as u64, "quantity")
+            plural(unlimited as u64, "value")
         );
     }
     for missing in &document.not_measured {
@@ -78,10 +80,7 @@ fn problem_words(problem: &Problem) -> String {
 /// What a good unit's line says.
 fn summary(document: &Document) -> String {
     let limited = document.measurements.iter().filter(|m| m.passed.is_some());
-    let mut out = format!(
-        "{} within limits",
-        plural(limited.count() as u64, "quantity")
-    );
+    let mut out = format!("{} kept", plural(limited.count() as u64, "limit"));
     if document.verdict == Verdict::Failed {
         out = String::new();
     }
@@ -138,9 +137,10 @@ fn failure(m: &Measurement) -> String {
 }
 
 fn value(m: &Measurement) -> String {
-    match m.measured.sigma > 0.0 {
-        true => plus_minus(m.measured.value, SIGMAS * m.measured.sigma),
-        false => significant(m.measured.value),
+    let (value, half) = (m.measured.value, SIGMAS * m.measured.sigma);
+    match half > LEAST_SHARE * value.abs() {
+        true => plus_minus(value, half),
+        false => significant(value),
     }
 }
 

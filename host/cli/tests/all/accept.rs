@@ -179,7 +179,7 @@ fn several_units_have_a_line_and_a_file_each() {
     let lines: Vec<&str> = ran.out.lines().collect();
     assert_eq!(lines.len(), 3, "{}", ran.out);
     for (line, words) in lines.iter().zip([
-        ["unit-1", "passed", "within limits"],
+        ["unit-1", "passed", "limits kept"],
         ["unit-2", "FAILED", "gyro_z_offset"],
         ["turned", "not measured", "moved"],
     ]) {

@@ -117,7 +117,7 @@ impl GoldenArgs {
             Some([first, others @ ..]) => {
                 let more = match others.len() {
                     0 => String::new(),
-                    n => format!(", and {} more", plural(n as u64, "quantity")),
+                    n => format!(", and {} more", plural(n as u64, "value")),
                 };
                 return Err(Error::undetermined(
                     path.display(),

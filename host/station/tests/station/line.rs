@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use mimu_rig::random::Random;
 use mimu_station::document::Verdict;
 
-use super::bench::{GRAVITY, Unit, judged};
+use super::bench::{GRAVITY, Unit, judge, measured};
 
 /// Units of the line.
 const UNITS: u64 = 200;
@@ -74,8 +74,9 @@ fn few_good_units_are_rejected_and_by_the_guard_band_hardly_any_bad_one_is_accep
             None => {}
         }
         good_units += u32::from(good);
+        let measured = measured(&samples);
         for (k, (_, decision)) in rules.iter().enumerate() {
-            let document = judged(&samples, &limits(decision));
+            let document = judge(&samples, &measured, &limits(decision));
             not_measured += u32::from(document.verdict == Verdict::NotMeasured);
             let passed = document.verdict == Verdict::Passed;
             counts[k][0] += u32::from(good && !passed);

@@ -1,5 +1,6 @@
 //! Units of the bench at rest, as a station gets them.
 
+use mimu_recording::error::Error;
 use mimu_recording::{Batch, RawUnit};
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
@@ -158,9 +159,7 @@ impl Unit {
 
 /// What a station finds of `samples`.
 pub fn found(samples: &Samples) -> (Quantities, Scale) {
-    let scale = Scale::of(samples, None, Some(&RANGES), None).expect("the ranges are known");
-    let found = measure(samples, &scale, Some("+z")).expect("the unit lies still");
-    (found, scale)
+    measured(samples).expect("the unit lies still")
 }
 
 /// Value and standard uncertainties (whole, type A) of a quantity.
@@ -187,24 +186,31 @@ rows = [
 ]
 "#;
 
-/// The result of a unit by [`LIMITS`].
-pub fn judged(samples: &Samples, limits: &str) -> Document {
+/// What a station finds of `samples`, or why not.
+pub fn measured(samples: &Samples) -> Result<(Quantities, Scale), Error> {
+    let scale = Scale::of(samples, None, Some(&RANGES), None)?;
+    Ok((measure(samples, &scale, Some("+z"))?, scale))
+}
+
+/// The result of what was measured, by `limits`.
+pub fn judge(
+    samples: &Samples,
+    measured: &Result<(Quantities, Scale), Error>,
+    limits: &str,
+) -> Document {
     let limits = Limits::parse(limits, "limits.toml").expect("limits");
-    let scale = Scale::of(samples, None, Some(&RANGES), None).expect("the ranges are known");
-    let document = Document::new(
-        &samples.unit,
-        Vec::new(),
-        "2026-01-01T00:00:00Z",
-        &limits,
-        None,
-    );
-    measure(samples, &scale, limits.up.as_deref())
-        .and_then(|found| {
-            document
-                .clone()
-                .judge(&found, samples, &limits, None, &scale)
-        })
-        .unwrap_or_else(|error| document.refused(&error))
+    let time = "2026-01-01T00:00:00Z";
+    let document = Document::new(&samples.unit, Vec::new(), time, &limits, None);
+    let judged = match measured {
+        Ok((found, scale)) => document.clone().judge(found, samples, &limits, None, scale),
+        Err(error) => Err(error.clone()),
+    };
+    judged.unwrap_or_else(|error| document.refused(&error))
+}
+
+/// The result of a unit with its side z up, by `limits`.
+pub fn judged(samples: &Samples, limits: &str) -> Document {
+    judge(samples, &measured(samples), limits)
 }
 
 /// Names of the quantities beyond their limits.
