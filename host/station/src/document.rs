@@ -210,6 +210,7 @@ pub fn judged(
 ) -> Vec<Measurement> {
     let (decision, all) = (limits.decision(), limits.of(found, part, scale));
     let judge = |measured: &Measured| {
+        let measured = limits.wander.apply(measured.clone());
         // The last one that is for it counts; one for this axis before one for all axes.
         let fits = all
             .iter()
@@ -222,7 +223,7 @@ pub fn judged(
             lower,
             upper,
             limits_of: limit.map(|limit| limit.source.clone()),
-            measured: measured.clone(),
+            measured,
         }
     };
     found.measured.iter().map(judge).collect()

@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::decision::{Decision, Rule};
+use crate::measured::Measured;
 use crate::own_limit::OwnLimit;
 use crate::quantities::Quantities;
 use crate::quantity::{Quantity, without_axis};
@@ -42,6 +43,31 @@ pub struct LimitRow {
     pub unit: String,
 }
 
+/// How far offsets wander between two measurements of a unit, one standard deviation: flicker noise and temperature, which ten seconds do not show.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wander {
+    /// Of the gyro, deg/s.
+    #[serde(default)]
+    pub gyro_dps: f64,
+    /// Of the accelerometer, mg.
+    #[serde(default)]
+    pub accel_mg: f64,
+}
+
+impl Wander {
+    /// `measured` with this uncertainty, if it is an offset or contains one.
+    pub fn apply(&self, measured: Measured) -> Measured {
+        match Quantity::find(&measured.name) {
+            Some(Quantity::GyroOffset) => measured.with_common(self.gyro_dps),
+            Some(Quantity::AccelOffset | Quantity::GravityError) => {
+                measured.with_common(self.accel_mg)
+            }
+            _ => measured,
+        }
+    }
+}
+
 /// The file of a product's limits.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -69,6 +95,9 @@ pub struct Limits {
     /// Factor on limits that the data sheet calls typical.
     #[serde(default)]
     pub typical_factor: Option<f64>,
+    /// How far offsets wander between two measurements.
+    #[serde(default)]
+    pub wander: Wander,
     /// The limits.
     #[serde(default)]
     pub rows: Vec<LimitRow>,
@@ -129,6 +158,14 @@ impl Limits {
                     "write a number from 0 to 100".into(),
                 );
             }
+        }
+        let Wander { gyro_dps, accel_mg } = self.wander;
+        if ![gyro_dps, accel_mg].iter().all(|w| (0.0..1e3).contains(w)) {
+            return wrong(
+                "wander",
+                "it is out of range".into(),
+                "write gyro_dps and accel_mg, from 0 to 1000".into(),
+            );
         }
         for (k, row) in (1..).zip(&self.rows) {
             let what = format!("row {k}, {}", row.name);

@@ -12,7 +12,7 @@ const UNITS: u64 = 200;
 /// Limits: offsets in deg/s, gravity in mg, density of the gyro in deg/s/√Hz.
 const OFFSET: f64 = 1.0;
 const GRAVITY_MG: f64 = 25.0;
-const DENSITY: f64 = 0.006;
+const DENSITY: f64 = 0.0065;
 
 fn limits(decision: &str) -> String {
     let mut text = format!("format = \"mimu-limits/1\"\nup = \"+z\"\n{decision}\nrows = [\n");
@@ -33,9 +33,13 @@ fn limits(decision: &str) -> String {
 /// A unit of the line, and whether its true values keep the limits. One in ten has a fault of its digital side.
 fn unit(seed: u64) -> (Unit, Option<u64>, bool) {
     let mut random = Random::new(seed, "line");
+    // One in twelve is noisy, from the limit on.
+    let density = match seed % 12 == 5 {
+        true => DENSITY * (1.0 + 0.15 * random.normal().abs()),
+        false => 0.005 * (0.05 * random.normal()).exp(),
+    };
     let unit = Unit {
-        // About a limit, so that the decision near it counts.
-        density: [0.0055 * (0.09 * random.normal()).exp(), 250.0],
+        density: [density, 250.0],
         lost: if seed % 40 == 7 { 0.03 } else { 0.0 },
         ..Unit::drawn(seed)
     };
