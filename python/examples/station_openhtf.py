@@ -11,6 +11,7 @@ import sys
 from typing import Any
 
 import openhtf as htf
+from openhtf.util.units import UnitDescriptor
 
 
 def measure(*arguments: str) -> dict[str, Any]:
@@ -24,7 +25,8 @@ def phase_of(result: dict[str, Any]) -> htf.PhaseDescriptor:
     guard = result["decision"]["k"]
     declared = []
     for row in result["measurements"]:
-        measurement = htf.Measurement(row["name"]).with_units(row["unit"]).doc(f"standard uncertainty {row['sigma']:.3g}")
+        unit = UnitDescriptor(row["unit"], None, row["unit"])
+        measurement = htf.Measurement(row["name"]).with_units(unit).doc(f"standard uncertainty {row['sigma']:.3g}")
         if row["passed"] is not None:
             lower, upper = row["lower"], row["upper"]
             within = guard * row["sigma"]
@@ -32,13 +34,11 @@ def phase_of(result: dict[str, Any]) -> htf.PhaseDescriptor:
         declared.append(measurement)
 
     @htf.measures(*declared)
-    def at_rest(test: htf.TestApi) -> htf.PhaseResult | None:
+    def at_rest(test: htf.TestApi) -> None:
         for row in result["measurements"]:
             test.measurements[row["name"]] = row["value"]
-        if result["verdict"] == "not_measured":
-            test.logger.error("%(place)s: %(problem)s; %(remedy)s", result["problem"])
-            return htf.PhaseResult.STOP
-        return None
+        if result["problem"]:
+            raise RuntimeError("{place}: {problem}; {remedy}".format(**result["problem"]))
 
     return at_rest
 

@@ -11,6 +11,7 @@ mod matek;
 mod peer;
 mod ports;
 mod recording;
+mod station;
 mod temperature;
 pub(crate) mod terminal;
 mod thermal_record;
