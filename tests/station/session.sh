@@ -86,5 +86,23 @@ show accept golden-6 --limits limits.toml --golden golden.json
 show accept --port tcp://127.0.0.1:7701 --port tcp://127.0.0.1:7702 --port tcp://127.0.0.1:7703 --port tcp://127.0.0.1:7704 \
     --text t_us,ax,ay,az,gx,gy,gz,temp_c --unit A-1041 --unit A-1042 --unit A-1043 --unit A-1044 --for 10s --latitude 48.1 --limits limits.toml --golden golden.json -o results
 show accept x-up y-up z-up --faces --limits limits.toml --golden golden.json
+# A unit that comes back after a year: calibrated by hand then and now, and measured at rest now.
+root=$here/../..
+"$rig" record "$root/rig/plans/hands.toml" --rig "$root/rig/rigs/sessions.toml" --seed 31 -o then >/dev/null
+"$rig" record "$root/rig/plans/hands.toml" --rig "$root/rig/rigs/sessions.toml" --seed 32 -o now >/dev/null
+sed "s/^dwell_s.*/dwell_s = 20.0/" "$root/rig/plans/rest.toml" >rest.toml
+"$rig" record rest.toml --rig now.truth.toml --seed 33 -o at-rest >/dev/null
+"$mimu" fit then -o old.toml >/dev/null
+"$mimu" fit now -o new.toml >/dev/null
+cat >recalibration.toml <<'TOML'
+format = "mimu-limits/1"
+rows = [
+    { name = "gyro_offset", lower = -0.1, upper = 0.1, unit = "deg/s" },
+    { name = "gravity_error", lower = -2, upper = 2, unit = "mg" },
+]
+TOML
+printf '\n$ cat recalibration.toml\n'
+cat recalibration.toml
+show accept at-rest --calibration new.toml --as-found old.toml --limits recalibration.toml
 printf '\n$ ls results\n'
 ls results | sed 's/-20[0-9T-]*Z/-TIME/'

@@ -22,6 +22,8 @@ use crate::side::{direction, side_up};
 const EARTH: f64 = 7.292_115e-5;
 /// Standard uncertainty of a component of the Earth's rate in an unknown direction, over the rate.
 const COMPONENT: f64 = 0.577_350_269;
+/// Standard uncertainty of a thermometer in an inertial part, °C: data sheets state 1 to 5 °C at most.
+const THERMOMETER_C: f64 = 1.0;
 /// mg and µg for one g.
 const MILLI: f64 = 1e3;
 const MICRO: f64 = 1e6;
@@ -234,7 +236,9 @@ impl Quantities {
         } else {
             0.0
         };
-        self.add(Quantity::Temperature, None, mean, sigma);
+        let of = Quantity::Temperature;
+        let measured = Measured::new(of.name(None), mean, of.unit(), sigma);
+        self.measured.push(measured.with_common(THERMOMETER_C));
     }
 
     /// The rows of the board's own self-test, with the board's limits.

@@ -45,27 +45,27 @@ pub fn accept_text(document: &Document, all: bool) -> String {
     }
     wrap(&mut out, "  ", &document.decision.words());
     out.push('\n');
-    out += &table(&document.measurements, all).text("  ");
-    if let Some(found) = &document.as_found {
+    let shown = |m: &&Measurement| all || m.passed.is_some() && !is_plain_count(m);
+    let rows: Vec<&Measurement> = document.measurements.iter().filter(shown).collect();
+    out += &table(&rows, all).text("  ");
+    let hidden = document.measurements.len() - rows.len();
+    if hidden > 0 {
+        let hidden = plural(hidden as u64, "value");
         let _ = writeln!(
             out,
-            "\nas found, by {}: {}",
-            found.calibration,
-            found.verdict.name()
+            "  and {hidden} without limits, or counts within them (--verbose)"
         );
-        out += &table(&found.measurements, all).text("  ");
     }
-    let unlimited = document
-        .measurements
-        .iter()
-        .filter(|m| m.passed.is_none())
-        .count();
-    if unlimited > 0 && !all {
-        let _ = writeln!(
-            out,
-            "  and {} without limits (--verbose)",
-            plural(unlimited as u64, "value")
-        );
+    if let Some(found) = &document.as_found {
+        let verdict = found.verdict.name();
+        let _ = writeln!(out, "\nas found, by {}: {verdict}", found.calibration);
+        // A count is the same by every calibration.
+        let other = |m: &&Measurement| {
+            let same = |own: &Measurement| own.measured == m.measured && own.passed == m.passed;
+            m.passed.is_some() && !document.measurements.iter().any(same)
+        };
+        let rows: Vec<&Measurement> = found.measurements.iter().filter(other).collect();
+        out += &table(&rows, all).text("  ");
     }
     for missing in &document.not_measured {
         wrap(&mut out, "  not measured: ", missing);
@@ -138,13 +138,21 @@ fn failure(m: &Measurement) -> String {
 
 fn value(m: &Measurement) -> String {
     let (value, half) = (m.measured.value, SIGMAS * m.measured.sigma);
+    if half == 0.0 && value.fract() == 0.0 {
+        return format!("{value:.0}");
+    }
     match half > LEAST_SHARE * value.abs() {
         true => plus_minus(value, half),
         false => significant(value),
     }
 }
 
-fn table(measurements: &[Measurement], all: bool) -> Table {
+/// Whether it is a count that passes, such as of stuck bits: a summary leaves these out.
+fn is_plain_count(m: &Measurement) -> bool {
+    m.measured.sigma == 0.0 && m.passed == Some(true)
+}
+
+fn table(measurements: &[&Measurement], all: bool) -> Table {
     let heads = ["measured, ± 2 σ", "lower", "upper"];
     let mut table = Table::new("Measurements against their limits", "quantity")
         .numbers(heads)
@@ -153,7 +161,7 @@ fn table(measurements: &[Measurement], all: bool) -> Table {
     if all {
         table = table.words("limits of");
     }
-    for m in measurements.iter().filter(|m| all || m.passed.is_some()) {
+    for m in measurements {
         let limit = |limit: Option<f64>| limit.map_or(Cell::Empty, |v| Cell::number(v, 1.0));
         let mut cells = vec![
             Cell::from(m.measured.name.clone()),

@@ -9,17 +9,28 @@ use super::bench::{GRAVITY, Unit, judge, measured};
 
 /// Units of the line.
 const UNITS: u64 = 200;
-/// Limits: offsets in deg/s, gravity in mg, density of the gyro in deg/s/√Hz.
+/// Limits: offsets in deg/s, gravity in mg.
 const OFFSET: f64 = 1.0;
 const GRAVITY_MG: f64 = 25.0;
-const DENSITY: f64 = 0.0065;
 
-fn limits(decision: &str) -> String {
+/// The gyro's noise in a production, deg/s/√Hz.
+#[derive(Clone, Copy)]
+struct Production {
+    /// Largest density that is good.
+    limit: f64,
+    /// Median of the units, and their scatter as a share.
+    median: f64,
+    scatter: f64,
+    /// One unit in so many is noisy, from the limit on; 0 for none.
+    noisy: u64,
+}
+
+fn limits(decision: &str, density: f64) -> String {
     let mut text = format!("format = \"mimu-limits/1\"\nup = \"+z\"\n{decision}\nrows = [\n");
     for (name, lower, upper, unit) in [
         ("gyro_offset", Some(-OFFSET), OFFSET, "deg/s"),
         ("gravity_error", Some(-GRAVITY_MG), GRAVITY_MG, "mg"),
-        ("gyro_noise_density", None, DENSITY, "deg/s/√Hz"),
+        ("gyro_noise_density", None, density, "deg/s/√Hz"),
     ] {
         let lower = lower.map_or(String::new(), |l| format!("lower = {l:?}, "));
         let _ = writeln!(
@@ -30,13 +41,13 @@ fn limits(decision: &str) -> String {
     text + "]\n"
 }
 
-/// A unit of the line, and whether its true values keep the limits. One in ten has a fault of its digital side.
-fn unit(seed: u64) -> (Unit, Option<u64>, bool) {
+/// A unit of the line, which of its bits is stuck if one is, and whether its true values keep the limits. One in twenty has a stuck bit, one in forty loses
+/// samples.
+fn unit(seed: u64, of: Production) -> (Unit, Option<u64>, bool) {
     let mut random = Random::new(seed, "line");
-    // One in twelve is noisy, from the limit on.
-    let density = match seed % 12 == 5 {
-        true => DENSITY * (1.0 + 0.15 * random.normal().abs()),
-        false => 0.005 * (0.05 * random.normal()).exp(),
+    let density = match of.noisy > 0 && seed % of.noisy == 5 {
+        true => of.limit * (1.0 + 0.15 * random.normal().abs()),
+        false => of.median * (of.scatter * random.normal()).exp(),
     };
     let unit = Unit {
         density: [density, 250.0],
@@ -51,41 +62,44 @@ fn unit(seed: u64) -> (Unit, Option<u64>, bool) {
     let gravity = force.iter().map(|g| g * g).sum::<f64>().sqrt() - GRAVITY / 9.80665;
     let good = unit.gyro_offset_dps.iter().all(|o| o.abs() <= OFFSET)
         && (1e3 * gravity).abs() <= GRAVITY_MG
-        && unit.density[0] <= DENSITY
+        && density <= of.limit
         && unit.lost == 0.0
         && fault.is_none();
     (unit, fault, good)
 }
 
-#[test]
-fn few_good_units_are_rejected_and_by_the_guard_band_hardly_any_bad_one_is_accepted() {
+/// Good units that are rejected and bad ones that are accepted, by guarded and by simple acceptance; and the number of good ones.
+fn errors(of: Production) -> ([[u32; 2]; 2], u32) {
     let rules = [
         ("guarded acceptance, k = 2", "decision = \"guarded\""),
         ("simple acceptance", "decision = \"simple\""),
     ];
-    let mut counts = [[0u32; 2]; 2];
-    let (mut good_units, mut not_measured, mut missed_faults) = (0, 0, 0);
+    let (mut counts, mut good_units) = ([[0u32; 2]; 2], 0);
     for seed in 1..=UNITS {
-        let (unit, fault, good) = unit(seed);
+        let (unit, fault, good) = unit(seed, of);
         let mut samples = unit.samples(seed);
+        let mut force = |c: usize, code: fn(i64) -> i64| {
+            let readings = samples.batch.raw[c].iter_mut();
+            readings.for_each(|v| *v = code(*v as i64) as f64);
+        };
         match fault {
-            Some(0) => samples.batch.raw[4]
-                .iter_mut()
-                .for_each(|v| *v = (*v as i64 & !2) as f64),
-            Some(_) => samples.batch.raw[2]
-                .iter_mut()
-                .for_each(|v| *v = (*v as i64 | 1) as f64),
+            Some(0) => force(4, |v| v & !2),
+            Some(_) => force(2, |v| v | 1),
             None => {}
         }
         good_units += u32::from(good);
         let measured = measured(&samples);
         for (k, (_, decision)) in rules.iter().enumerate() {
-            let document = judge(&samples, &measured, &limits(decision));
-            not_measured += u32::from(document.verdict == Verdict::NotMeasured);
+            let document = judge(&samples, &measured, &limits(decision, of.limit));
+            assert_ne!(
+                document.verdict,
+                Verdict::NotMeasured,
+                "{seed}: {document:?}"
+            );
             let passed = document.verdict == Verdict::Passed;
+            assert!(!passed || fault.is_none() && unit.lost == 0.0, "{seed}");
             counts[k][0] += u32::from(good && !passed);
             counts[k][1] += u32::from(!good && passed);
-            missed_faults += u32::from(passed && (fault.is_some() || unit.lost > 0.0));
         }
     }
     let bad = UNITS as u32 - good_units;
@@ -94,16 +108,39 @@ fn few_good_units_are_rejected_and_by_the_guard_band_hardly_any_bad_one_is_accep
             "{name}: {rejects} of {good_units} good units rejected, {accepts} of {bad} bad units accepted"
         );
     }
-    assert_eq!((not_measured, missed_faults), (0, 0));
-    let [
-        [guarded_rejects, guarded_accepts],
-        [simple_rejects, simple_accepts],
-    ] = counts;
+    (counts, good_units)
+}
+
+#[test]
+fn few_good_units_are_rejected_and_by_the_guard_band_hardly_any_bad_one_is_accepted() {
+    let production = Production {
+        limit: 0.0065,
+        median: 0.005,
+        scatter: 0.05,
+        noisy: 12,
+    };
+    let ([guarded, simple], good) = errors(production);
     // A unit at a limit is accepted in 2.3 %; few are near it.
-    assert!(guarded_accepts <= 2, "{counts:?}");
+    assert!(guarded[1] <= 2 && 20 * guarded[0] <= good, "{guarded:?}");
     assert!(
-        guarded_rejects >= simple_rejects && simple_accepts >= guarded_accepts,
-        "{counts:?}"
+        simple[0] <= guarded[0] && simple[1] >= guarded[1],
+        "{simple:?}"
     );
-    assert!(simple_rejects * 10 <= good_units, "{counts:?}");
+}
+
+#[test]
+#[ignore = "nightly: a minute"]
+fn amid_the_production_a_limit_costs_units_by_the_guard_band() {
+    let production = Production {
+        limit: 0.006,
+        median: 0.0055,
+        scatter: 0.09,
+        noisy: 0,
+    };
+    let ([guarded, simple], _) = errors(production);
+    assert!(
+        guarded[1] <= 2 && simple[1] >= guarded[1],
+        "{guarded:?} {simple:?}"
+    );
+    assert!(guarded[0] > simple[0], "{guarded:?} {simple:?}");
 }
