@@ -13,14 +13,14 @@ cd "$out"
 unit() {
     name=$1 seed=$2 offset=$3 scale=$4 recording=$5
     shift 5
-    python3 - "$name" "$offset" "$scale" "$*" >"$recording.plan.toml" 3>"$recording.rig.toml" <<'PY'
+    python3 - "$name" "$offset" "$scale" "${DWELL:-20.0}" "$*" >"$recording.plan.toml" 3>"$recording.rig.toml" <<'PY'
 import math, os, sys
-name, offset, scale, sides = sys.argv[1:]
+name, offset, scale, dwell, sides = sys.argv[1:]
 gyro, accel = 65.5 * 180 / math.pi, 16384 / 9.80665 * float(scale)
 diagonal = lambda s: [[s if i == j else 0.0 for j in range(3)] for i in range(3)]
 print(f'format = "mimu-plan/1"\ndevice = "{name}"\nsample_rate_hz = 200.0\nsamples = "csv"\ncarrier = "table"\nsteps = false\nlatitude_deg = 48.1')
 for side in sides.split():
-    print(f"[[step]]\nup = [{side}]\ndwell_s = 20.0")
+    print(f"[[step]]\nup = [{side}]\ndwell_s = {dwell}")
 os.write(3, f"""format = "mimu-rig/1"
 [unit]
 gyro = "MPU6050-gyro"
@@ -52,7 +52,8 @@ for k in 1 2 3 4 5 6 7; do unit golden "$k" 0.40 1 "golden-$k" 0,0,1; done
 unit A-1041 11 0.35 1 A-1041 0,0,1
 unit A-1042 12 2.60 1 A-1042 0,0,1
 unit A-1043 13 -0.10 1 A-1043.good 0,0,1
-unit A-1044 14 0.20 1 A-1044 0,0,1 1,0,0
+# Somebody takes it away too early.
+DWELL=7.0 unit A-1044 14 0.20 1 A-1044 0,0,1 1,0,0
 unit A-1041 21 0.35 1 x-up 1,0,0
 unit A-1041 22 0.35 1 y-up 0,1,0
 unit A-1041 23 0.35 1 z-up 0,0,1

@@ -1,7 +1,8 @@
 //! Boards at their ports, measured together. Each has a thread that reads its port all the time, so that no old sample enters a measurement.
 
-use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use mimu_core::wire::Capabilities;
 use mimu_device::{TestResult, self_test};
@@ -9,6 +10,9 @@ use mimu_recording::error::{Error, Result};
 use mimu_wizard::source::{Opener, Source};
 
 use crate::gather::{Samples, Take};
+
+/// Time between two reports of progress.
+const TICK: Duration = Duration::from_millis(100);
 
 /// A board and its thread.
 struct Board {
@@ -48,20 +52,25 @@ impl Boards {
         Ok(Self { boards, answers })
     }
 
-    /// Measures all boards that still answer; `done` gets the index and the samples of each as soon as it is complete.
-    pub fn take(&mut self, take: Take, mut done: impl FnMut(usize, Result<Samples>)) {
+    /// Measures all boards that still answer; `done` gets the index and the samples of each as soon as it is complete, and `None` ten times a second
+    /// meanwhile.
+    pub fn take(&mut self, take: Take, mut done: impl FnMut(Option<(usize, Result<Samples>)>)) {
         let mut waiting = 0;
         for board in self.boards.iter_mut().filter(|board| board.alive) {
             board.alive = board.commands.send(take).is_ok();
             waiting += usize::from(board.alive);
         }
         // The channel is disconnected if every thread has ended; each has then told why.
-        while waiting > 0
-            && let Ok((k, samples)) = self.answers.recv()
-        {
-            self.boards[k].alive &= samples.is_ok();
-            waiting -= 1;
-            done(k, samples);
+        while waiting > 0 {
+            match self.answers.recv_timeout(TICK) {
+                Ok((k, samples)) => {
+                    self.boards[k].alive &= samples.is_ok();
+                    waiting -= 1;
+                    done(Some((k, samples)));
+                }
+                Err(RecvTimeoutError::Timeout) => done(None),
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
         }
     }
 }

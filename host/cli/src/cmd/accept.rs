@@ -244,7 +244,11 @@ impl<'a> Station<'a> {
             };
             let unit: String = document.unit.chars().map(plain).collect();
             let time = self.time.replace(':', "");
-            let path = folder.join(format!("{unit}-{time}.json"));
+            // The same unit may be measured twice by one command.
+            let numbered = (2..).map(|k| format!("{unit}-{time}-{k}.json"));
+            let names = std::iter::once(format!("{unit}-{time}.json")).chain(numbered);
+            let mut paths = names.map(|name| folder.join(name));
+            let path = paths.find(|path| !path.exists()).unwrap_or_default();
             let text = serde_json::to_string_pretty(document)
                 .map_err(|e| Error::new(path.display(), e, "report this error"))?;
             stage(&path, text + "\n")

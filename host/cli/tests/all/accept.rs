@@ -42,8 +42,14 @@ const BAD: Unit = Unit {
     accel_y_mg: 12.0,
 };
 
-/// What `unit` sends with these sides up, some seconds each.
+/// What `unit` sends with these sides up, so many seconds each.
 fn rows(unit: &Unit, sides: &[[f64; 3]], seconds: f64, seed: u64) -> Vec<Row> {
+    let sides: Vec<([f64; 3], f64)> = sides.iter().map(|side| (*side, seconds)).collect();
+    rows_of(unit, &sides, seed)
+}
+
+/// What `unit` sends with these sides up, each with its seconds.
+fn rows_of(unit: &Unit, sides: &[([f64; 3], f64)], seed: u64) -> Vec<Row> {
     let (gyro, accel) = (65.5f64.to_degrees(), 16384.0 / 9.80665);
     let rig = format!(
         "format = \"mimu-rig/1\"\n[unit]\ngyro = \"MPU6050-gyro\"\naccel = \"MPU6050-accel\"\n\
@@ -56,7 +62,7 @@ fn rows(unit: &Unit, sides: &[[f64; 3]], seconds: f64, seed: u64) -> Vec<Row> {
     let mut plan = format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = {RATE_HZ:?}\ncarrier = \"table\"\ngravity_mps2 = 9.80665\n"
     );
-    for side in sides {
+    for (side, seconds) in sides {
         let _ = write!(plan, "[[step]]\nup = {side:?}\ndwell_s = {seconds:?}\n");
     }
     let file = RigFile::parse(&Source::new("RIG.toml", rig)).unwrap();
@@ -363,4 +369,38 @@ fn a_shift_is_measured_only_if_the_golden_unit_has_not_moved() {
     let refused = accept("good", "");
     assert_eq!(refused.status, Some(1), "{}", refused.out);
     assert!(refused.err.contains("had moved"), "{}", refused.err);
+}
+
+#[test]
+fn a_board_is_turned_to_three_sides_when_the_station_asks() {
+    let folder = place();
+    // Three seconds of each side are used, from one second after Enter on.
+    let sides = [(UP, 11.0), ([-1.0, 0.0, 0.0], 9.0), ([0.0, 1.0, 0.0], 12.0)];
+    let board = board(rows_of(&GOOD, &sides, 41));
+    let arguments = format!(
+        "accept --port {board} --text t_us,ax,ay,az,gx,gy,gz --unit A-7 --faces --level 0.1 \
+         --limits limits.toml --for 3s --gravity 9.80665 --json -"
+    );
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
+    command
+        .current_dir(folder.path())
+        .args(arguments.split(' '));
+    command.stdin(Stdio::piped()).stdout(Stdio::piped());
+    let begun = Instant::now();
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut keyboard = child.stdin.take().unwrap();
+    for at in [0.0, 14.0, 24.0] {
+        let until = Duration::from_secs_f64(at);
+        std::thread::sleep(until.saturating_sub(begun.elapsed()));
+        writeln!(keyboard).unwrap();
+    }
+    let out = child.wait_with_output().unwrap();
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert_eq!(out.status.code(), Some(0), "{said}");
+    assert_eq!(said.matches("press Enter").count(), 3, "{said}");
+    let document: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(document["unit"], "A-7");
+    let row = measurement(&document, "accel_y_offset");
+    let [value, sigma] = ["value", "sigma"].map(|key| row[key].as_f64().unwrap());
+    assert!((value - 12.0).abs() < 2.0 * sigma && sigma < 2.0, "{row}");
 }

@@ -2,6 +2,7 @@
 
 use std::io::BufRead as _;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use mimu::quantity::normal_gravity;
 use mimu_recording::error::{Error, Result};
@@ -24,6 +25,8 @@ const HANDS_OFF_S: f64 = 1.0;
 const BY_LATITUDE: f64 = 1e-3;
 /// The same where nothing is said of the place: 9.780 to 9.832 m/s², all equally likely.
 const ANYWHERE: [f64; 2] = [9.80665, 0.015];
+/// Least share of the requested length that a recording has.
+const LEAST_SHARE: f64 = 0.95;
 /// Sides of a measurement with three sides up.
 const FACES: usize = 3;
 
@@ -100,6 +103,16 @@ impl AcceptArgs {
         let gravity = self.gravity().or(unknown);
         let mut samples = Samples::of_recording(&recording, seconds, gravity)?;
         samples.place = path.display().to_string();
+        let ends = samples.batch.t_s.first().zip(samples.batch.t_s.last());
+        let lasts_s = ends.map_or(0.0, |(first, last)| last - first);
+        if let Some(seconds) = seconds.filter(|s| lasts_s < LEAST_SHARE * s) {
+            let problem = format!("it lasts {lasts_s:.1} s, and --for asks for {seconds} s");
+            return Err(Error::undetermined(
+                &samples.place,
+                problem,
+                "record for longer",
+            ));
+        }
         Ok(samples)
     }
 
@@ -156,7 +169,6 @@ impl AcceptArgs {
         let mut complete: Vec<Vec<Samples>> = sources.iter().map(|_| Vec::new()).collect();
         let mut failed = Ok(());
         for side in 0..sides {
-            let first = side == 0;
             if self.faces {
                 wait_for_side(side)?;
             }
@@ -166,23 +178,28 @@ impl AcceptArgs {
                 skip_s,
                 gravity,
             };
-            let bar = progress("measuring");
-            boards.take(take, |k, samples| {
-                bar.reach(0.5);
-                match samples {
+            let (bar, begun) = (progress("measuring"), Instant::now());
+            boards.take(take, |answer| {
+                let Some((k, samples)) = answer else {
+                    return bar
+                        .reach((begun.elapsed().as_secs_f64() / (skip_s + seconds)).min(1.0));
+                };
+                let samples = match samples {
+                    Ok(samples) if complete[k].len() + 1 < sides => {
+                        return complete[k].push(samples);
+                    }
                     Ok(samples) => {
                         complete[k].push(samples);
-                        if complete[k].len() == sides && failed.is_ok() {
-                            let samples = std::mem::take(&mut complete[k]);
-                            failed = consume(&sources[k], one_unit(&sources[k], samples));
-                        }
+                        one_unit(&sources[k], std::mem::take(&mut complete[k]))
                     }
-                    Err(error) if failed.is_ok() => failed = consume(&sources[k], Err(error)),
-                    Err(_) => {}
+                    Err(error) => Err(error),
+                };
+                if failed.is_ok() {
+                    failed = consume(&sources[k], samples);
                 }
             });
             bar.finish();
-            if first && failed.is_err() {
+            if failed.is_err() {
                 break;
             }
         }
