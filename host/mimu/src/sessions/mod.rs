@@ -116,7 +116,7 @@ pub fn fit_determined(prepared: Prepared, options: Options) -> Result<Fit> {
 }
 
 /// Physical parameters and their covariance in a fit.
-type Physical = (SVector<f64, 12>, Covariance);
+pub type Physical = (SVector<f64, 12>, Covariance);
 
 impl Sessions {
     /// Combines fits of one unit, in the order in which the sessions took place. `class` gives the prior for one or two.
@@ -245,8 +245,8 @@ fn of_fits(fits: &[Fit], sensor: Sensor) -> Vec<Option<Physical>> {
     fits.iter().map(of).collect()
 }
 
-/// Parameters that the fits determine with an error. One without defines the frame.
-fn free(all: &[Option<Physical>]) -> Vec<usize> {
+/// Numbers of the parameters that all fits determine with an error. One without defines the frame.
+pub fn free(all: &[Option<Physical>]) -> Vec<usize> {
     let size = |values: &SVector<f64, 12>, i: usize| match i {
         0..3 | 9..12 => values[i % 3].abs(),
         _ => 1.0,

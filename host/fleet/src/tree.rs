@@ -1,0 +1,204 @@
+//! Finds the calibration files of a tree, and reads them.
+
+use std::path::{Path, PathBuf};
+
+use jiff::civil::Date;
+use mimu::calibration::Calibration;
+use mimu::data_sheet::{DataSheet, Part, Row};
+use mimu::Error;
+use mimu_recording::UNNAMED;
+use rayon::prelude::*;
+
+use crate::labels::{self, DATE, LabelTable, Labels, UNIT, slashes};
+use crate::measured::OfCalibration;
+
+/// One calibration of a unit.
+#[derive(Debug, Clone)]
+pub struct Measurement {
+    /// Path from the root of the tree.
+    pub file: String,
+    /// Unit: its label, else the number in the file, else its name there, else the name of the file.
+    pub unit: String,
+    /// Labels, without the unit.
+    pub labels: Labels,
+    /// Day of the label `date`, else of the file's creation.
+    pub day: Option<Date>,
+    /// Parameters.
+    pub of: OfCalibration,
+    /// Properties with limits, if a part is given.
+    pub properties: Vec<Row>,
+}
+
+/// A file that is left out, and why.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct LeftOut {
+    /// Path from the root of the tree.
+    pub file: String,
+    /// The reason, in words.
+    pub reason: String,
+}
+
+/// What a tree has.
+#[derive(Debug, Default)]
+pub struct Tree {
+    /// Measurements, in the order of their paths.
+    pub measurements: Vec<Measurement>,
+    /// Calibrations that cannot be used.
+    pub left_out: Vec<LeftOut>,
+    /// Number of TOML files that are no calibrations.
+    pub others: usize,
+    /// Measurements without a row in the table of labels.
+    pub unlabelled: usize,
+}
+
+/// How files are found and labelled.
+#[derive(Debug, Clone, Copy)]
+pub struct Search<'a> {
+    /// Names of folders without `=`, from the outermost.
+    pub folders: &'a [String],
+    /// Table of labels.
+    pub table: Option<&'a LabelTable>,
+    /// Part whose limits are compared.
+    pub part: Option<&'a Part>,
+}
+
+/// Deepest folder: a link to a folder above it has no end.
+const DEEPEST: usize = 32;
+
+impl Tree {
+    /// Reads all calibrations below the roots. A root may be a file. `progress` receives the share that is done.
+    ///
+    /// # Errors
+    /// A root cannot be read. Faults of files below it are in [`Self::left_out`].
+    pub fn read(roots: &[PathBuf], search: Search, progress: &(dyn Fn(f64) + Sync)) -> Result<Self, Error> {
+        let mut files = Vec::new();
+        let mut tree = Self::default();
+        for root in roots {
+            match root.is_file() {
+                true => files.push((root.clone(), root.file_name().map(PathBuf::from).unwrap_or_default())),
+                false => find(root, root, 0, &mut files, &mut tree.left_out).map_err(|e| Error::io(root, &e))?,
+            }
+        }
+        let count = files.len();
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let read: Vec<Read> = files
+            .par_iter()
+            .map(|(path, relative)| {
+                let read = read(path, relative, search);
+                let k = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                if k.is_multiple_of(64) {
+                    progress(k as f64 / count as f64);
+                }
+                read
+            })
+            .collect();
+        for one in read {
+            match one {
+                Read::Measurement(one, labelled) => {
+                    tree.unlabelled += usize::from(!labelled);
+                    tree.measurements.push(*one);
+                }
+                Read::LeftOut(one) => tree.left_out.push(one),
+                Read::Other => tree.others += 1,
+            }
+        }
+        Ok(tree)
+    }
+}
+
+enum Read {
+    /// A calibration, and whether the table of labels has it.
+    Measurement(Box<Measurement>, bool),
+    LeftOut(LeftOut),
+    Other,
+}
+
+/// Collects `*.toml` below `folder` with their paths from `root`. A folder that cannot be read is left out, unless it is the root.
+fn find(
+    root: &Path,
+    folder: &Path,
+    depth: usize,
+    files: &mut Vec<(PathBuf, PathBuf)>,
+    left_out: &mut Vec<LeftOut>,
+) -> std::io::Result<()> {
+    for path in labels::children(folder)? {
+        let relative = path.strip_prefix(root).unwrap_or(&path).to_path_buf();
+        if labels::is_hidden(&path) {
+            continue;
+        }
+        if path.is_dir() {
+            let within = match depth < DEEPEST {
+                true => find(root, &path, depth + 1, files, left_out),
+                false => Err(std::io::Error::other(format!("more than {DEEPEST} folders deep; is a link circular?"))),
+            };
+            if let Err(error) = within {
+                left_out.push(LeftOut {
+                    file: slashes(&relative),
+                    reason: error.to_string(),
+                });
+            }
+        } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+            files.push((path, relative));
+        }
+    }
+    Ok(())
+}
+
+/// Formats of this program's files that are no calibrations.
+fn is_other(text: &str) -> bool {
+    let format = text.lines().find_map(|line| line.trim_start().strip_prefix("format"));
+    let named = format.and_then(|rest| rest.trim_start().strip_prefix('='));
+    match named {
+        Some(name) => !name.trim_start().trim_start_matches(['"', '\'']).starts_with("mimu-calibration"),
+        // A calibration that was cut off before its format is a fault; another program's TOML is none of ours.
+        None => !text.contains("[gyro]") && !text.contains("[accel]"),
+    }
+}
+
+fn read(path: &Path, relative: &Path, search: Search) -> Read {
+    let left_out = |reason: String| {
+        Read::LeftOut(LeftOut {
+            file: slashes(relative),
+            reason,
+        })
+    };
+    let text = match mimu_recording::read_text(path) {
+        Ok(text) => text,
+        Err(error) => return left_out(error.to_string()),
+    };
+    if is_other(&text) {
+        return Read::Other;
+    }
+    let calibration = match Calibration::parse(&text, &slashes(relative)) {
+        Ok(calibration) => calibration,
+        Err(error) => return left_out(error.to_string()),
+    };
+    let of = match OfCalibration::of(&calibration) {
+        Ok(of) => of,
+        Err(reason) => return left_out(reason),
+    };
+    let mut labels = labels::of_folders(relative, search.folders);
+    let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let in_file = || {
+        let number = calibration.unit_id.clone();
+        let name = Some(calibration.device.clone()).filter(|name| name != UNNAMED && !name.is_empty());
+        number.or(name).unwrap_or_else(stem)
+    };
+    let mut unit = labels.remove(UNIT).unwrap_or_else(in_file);
+    let labelled = search.table.is_none_or(|table| table.add(&mut labels, relative, &unit));
+    if let Some(of_table) = labels.remove(UNIT) {
+        unit = of_table;
+    }
+    let created = calibration.created.as_deref().and_then(labels::day);
+    let day = labels.get(DATE).and_then(|text| labels::day(text)).or(created);
+    let properties = search.part.map(|part| DataSheet::of(&calibration, None, part).rows);
+    let measurement = Measurement {
+        file: slashes(relative),
+        unit,
+        labels,
+        day,
+        of,
+        properties: properties.unwrap_or_default(),
+    };
+    Read::Measurement(Box::new(measurement), labelled)
+}
