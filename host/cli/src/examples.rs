@@ -47,6 +47,14 @@ const EXAMPLES: [(&str, &[&str]); 18] = [
         ],
     ),
     (
+        "fleet",
+        &[
+            "mimu fleet calibrations -o fleet.html",
+            "mimu fleet calibrations --labels units.csv --limits icm42688p -o fleet.html",
+            "mimu fleet calibrations --folders line,batch --gage operator,fixture --json fleet.json",
+        ],
+    ),
+    (
         "diagnose",
         &[
             "mimu diagnose rec --verify another --noise noise.toml -o cal.toml",

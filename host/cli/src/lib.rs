@@ -65,6 +65,8 @@ enum Command {
     Apply(apply::ApplyArgs),
     /// Show what changed between calibrations of one unit by more than their intervals
     Compare(cmd::compare::CompareArgs),
+    /// Show what the calibrations of many units say together: population, units that do not belong, drift, Gage R&R, Cpk
+    Fleet(cmd::fleet::FleetArgs),
     /// Find the effect that causes the residual of a calibrated unit
     Diagnose(diagnose::DiagnoseArgs),
     /// Design an experiment: which attitudes and rates, how many, for how long
@@ -118,6 +120,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Verify(args) => verify::run(&args),
         Command::Apply(args) => apply::run(&args).map(done),
         Command::Compare(args) => cmd::compare::run(&args).map(done),
+        Command::Fleet(args) => cmd::fleet::run(&args, &typed).map(done),
         Command::Diagnose(args) => diagnose::run(&args, &typed),
         Command::Design(args) => design::run(&args).map(done),
         Command::Thermal(args) => thermal::run(&args, &typed),

@@ -16,6 +16,7 @@ mod design;
 mod device;
 mod diagnosis;
 mod fit;
+mod fleet;
 pub mod fragment;
 mod import;
 mod noise_in_use;
@@ -48,6 +49,7 @@ pub use device::{
 };
 pub use diagnosis::{Detail, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
+pub use fleet::{fleet_page, fleet_text};
 pub use import::import_text;
 pub use noise_in_use::noise_in_use_text;
 pub use page::Made;

@@ -128,7 +128,7 @@ impl Series<'_> {
         drift::chart(&days, self.sigma(of), self.limit)
     }
 
-    /// The chart of the difference of a level from the others of the same days.
+    /// The chart of the difference of a level from the others of the same days, about its median, or about its mean before the largest step if it changed.
     fn of_level(&self, members: &[usize], all: &[(f64, f64)], of: Of, centre: f64) -> Option<Chart> {
         let own = self.daily(members.iter().copied(), of, centre);
         let mut days = Vec::new();
@@ -145,7 +145,17 @@ impl Series<'_> {
         let mut means: Vec<f64> = days.iter().map(|d| d.mean).collect();
         let usual = robust::median(&mut means);
         days.iter_mut().for_each(|d| d.mean -= usual);
-        drift::chart(&days, self.sigma(of), self.limit)
+        let chart = drift::chart(&days, self.sigma(of), self.limit)?;
+        if chart.signal.is_none() {
+            return Some(chart);
+        }
+        // If it changed in the middle of its days, the median is neither that before nor that after.
+        let (step, before) = drift::step(&days)?;
+        days.iter_mut().for_each(|d| d.mean -= before);
+        let about_before = drift::chart(&days, self.sigma(of), self.limit)?;
+        let mut chart = if about_before.signal.is_some() { about_before } else { chart };
+        chart.since = Some(step);
+        Some(chart)
     }
 
     /// The level whose chart is farthest beyond its limits.

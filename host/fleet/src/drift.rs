@@ -56,6 +56,22 @@ pub fn limit(points: usize) -> f64 {
     Normal::standard().inverse_cdf(1.0 - 0.5 * FALSE_FINDING / points.max(1) as f64)
 }
 
+/// Fewest days on each side of a step.
+const BESIDE: usize = 4;
+
+/// The day, as a number, from which on the values differ most from those before, and the mean before.
+pub fn step(days: &[Day]) -> Option<(usize, f64)> {
+    let sum = |part: &[Day]| part.iter().fold((0.0, 0.0), |(n, s), d| (n + d.count, s + d.count * d.mean));
+    let splits = BESIDE..days.len().saturating_sub(BESIDE) + 1;
+    let each = splits.map(|k| {
+        let (before, after) = (sum(&days[..k]), sum(&days[k..]));
+        let difference = after.1 / after.0 - before.1 / before.0;
+        let size = difference.abs() / (1.0 / before.0 + 1.0 / after.0).sqrt();
+        (k, before.1 / before.0, size)
+    });
+    each.max_by(|a, b| a.2.total_cmp(&b.2)).map(|(k, before, _)| (k, before))
+}
+
 /// The chart of `days`, in their order, where single values have the standard deviation `sigma`. `None` for fewer than [`FEWEST`] days.
 pub fn chart(days: &[Day], sigma: f64, limit: f64) -> Option<Chart> {
     if days.len() < FEWEST || !(sigma > 0.0) {

@@ -22,11 +22,14 @@ pub const JOINTLY: usize = 5;
 pub const FEWEST: usize = 5;
 /// Share of a normal population that is used.
 const USED: f64 = 0.975;
-/// Rounds of leaving out units.
-const ROUNDS: usize = 10;
+/// Most rounds of leaving out units, and the share of units that changes in the last.
+const ROUNDS: usize = 40;
+const CHANGED: f64 = 1e-3;
 /// Rounds of expectation and maximisation while units are still being left out, and afterwards; and the relative change of variances that ends them.
 const EM_ROUNDS: [usize; 2] = [4, 100];
 const EM_CHANGE: f64 = 1e-4;
+/// Units of a block.
+const BLOCK: usize = 256;
 
 /// The population of a triad's parameters.
 #[derive(Debug, Clone)]
@@ -109,11 +112,11 @@ pub fn fit(estimates: &[Estimates], centre: Option<&DVector<f64>>) -> Option<Pop
     })
 }
 
-/// What cutting a normal population at its [`USED`] quantile takes from its covariance, as a factor to multiply it by: Croux, Haesbroeck (1999).
-fn consistency(n: usize) -> f64 {
+/// What cutting a normal population of `n` parameters beyond this share of it takes from its covariance, as a factor to multiply it by: Croux, Haesbroeck (1999).
+fn consistency(n: usize, share: f64) -> f64 {
     let n = n as f64;
-    let cut = ChiSquared::new(n).map_or(f64::NAN, |d| d.inverse_cdf(USED));
-    USED / ChiSquared::new(n + 2.0).map_or(f64::NAN, |d| d.cdf(cut))
+    let cut = ChiSquared::new(n).map_or(f64::NAN, |d| d.inverse_cdf(share));
+    share / ChiSquared::new(n + 2.0).map_or(f64::NAN, |d| d.cdf(cut))
 }
 
 impl Problem {
@@ -128,8 +131,11 @@ impl Problem {
         let inverse = total.clone().cholesky()?;
         let squares: Vec<Vec<f64>> = self.values.iter().map(|v| self.squares(&(v - &mean), &inverse)).collect();
         let mut used = self.nearest(&squares);
-        let errors = self.covariances.iter().fold(DMatrix::zeros(n, n), |sum, v| sum + v);
-        let errors = errors / self.values.len() as f64;
+        // Medians as in the first covariance: a few poor fits have hardly moved that.
+        let errors = DMatrix::from_fn(n, n, |i, j| {
+            let mut all: Vec<f64> = self.covariances.iter().map(|v| v[(i, j)]).collect();
+            robust::median(&mut all)
+        });
         let between = positive(total - errors);
         let mut state = State {
             mean,
@@ -142,34 +148,41 @@ impl Problem {
         for _ in 0..ROUNDS {
             state = self.estimated(&state, &used, EM_ROUNDS[0])?;
             let squares = self.all_squares(&state)?;
-            let cut = self.cut();
+            let cut = self.cut(used.iter().filter(|u| **u).count() as f64);
             let next: Vec<bool> = squares.iter().map(|each| each.iter().all(|s| *s <= cut)).collect();
             let count = next.iter().filter(|u| **u).count();
             // A population of few needs half of them.
-            if next == used || count < FEWEST.min(self.values.len() / 2 + 1) {
+            if count < FEWEST.min(self.values.len() / 2 + 1) {
                 break;
             }
+            let changed = next.iter().zip(&used).filter(|(a, b)| a != b).count();
             used = next;
+            if changed as f64 <= CHANGED * used.len() as f64 {
+                break;
+            }
         }
         Some((self.estimated(&state, &used, EM_ROUNDS[1])?, used))
     }
 
-    /// Largest square of a distance of units that are used. Alone, a parameter has its own.
-    fn cut(&self) -> f64 {
-        let (dof, count) = if self.jointly { (self.n(), 1) } else { (1, self.n()) };
-        // The share of units that is used does not depend on how many parameters are judged alone.
-        let share = USED.powf(1.0 / count as f64);
-        ChiSquared::new(dof as f64).map_or(f64::NAN, |d| d.inverse_cdf(share))
+    /// Largest square of a distance of units that are used, if mean and T are of `count` units. Alone, a parameter has its own.
+    fn cut(&self, count: f64) -> f64 {
+        match self.jointly {
+            true => quantile(1.0 - USED, self.n() as f64, count),
+            false => quantile(1.0 - self.share_alone(), 1.0, count),
+        }
+    }
+
+    /// Share of units that one of the parameters, judged alone, keeps; all together keep [`USED`].
+    fn share_alone(&self) -> f64 {
+        USED.powf(1.0 / self.n() as f64)
     }
 
     /// The factor of [`consistency`] for the cut.
     fn inflation(&self) -> f64 {
-        if self.jointly {
-            return consistency(self.n());
+        match self.jointly {
+            true => consistency(self.n(), USED),
+            false => consistency(1, self.share_alone()),
         }
-        let share = USED.powf(1.0 / self.n() as f64);
-        let third = ChiSquared::new(3.0).map_or(f64::NAN, |d| d.cdf(self.cut()));
-        share / third
     }
 
     /// Squares of the distance of a unit from the mean: jointly one, else one for each parameter.
@@ -201,7 +214,8 @@ impl Problem {
             (robust::median(&mut of) / middle).max(f64::MIN_POSITIVE)
         };
         let factors: Vec<f64> = (0..count).map(typical).collect();
-        let cut = self.cut();
+        // Medians of distances know scales about as well as half of the units would.
+        let cut = self.cut((0.5 * squares.len() as f64).max(self.n() as f64 + 2.0));
         squares.iter().map(|each| each.iter().zip(&factors).all(|(s, f)| s / f <= cut)).collect()
     }
 
@@ -230,14 +244,22 @@ impl Problem {
                 state.mean = &state.mean_covariance * right;
             }
             let t = &state.between;
-            let mut next = DMatrix::zeros(n, n);
-            for (i, w) in members.iter().zip(&weights) {
-                let gain = t * w;
-                let expected = &gain * (&self.values[*i] - &state.mean);
-                next.ger(inflation, &expected, &expected, 1.0);
-                next += t - &gain * t;
-            }
-            next /= count;
+            let mean = &state.mean;
+            // Sums of equal blocks in their order: the same on any number of threads.
+            let of_block = |(own, weights): (&[usize], &[DMatrix<f64>])| {
+                let mut sum = DMatrix::zeros(n, n);
+                for (i, w) in own.iter().zip(weights) {
+                    let gain = t * w;
+                    let expected = &gain * (&self.values[*i] - mean);
+                    sum.ger(inflation, &expected, &expected, 1.0);
+                    sum += t;
+                    sum.gemm(-1.0, &gain, t, 1.0);
+                }
+                sum
+            };
+            let blocks = members.par_chunks(BLOCK).zip(weights.par_chunks(BLOCK));
+            let blocks: Vec<DMatrix<f64>> = blocks.map(of_block).collect();
+            let mut next = blocks.iter().fold(DMatrix::zeros(n, n), |sum, b| sum + b) / count;
             if !self.jointly {
                 next = DMatrix::from_diagonal(&next.diagonal());
             }
@@ -301,6 +323,19 @@ fn beyond(square: f64, n: f64, count: f64) -> f64 {
         return StudentsT::new(0.0, 1.0, rest).map_or(1.0, |d| 2.0 * d.sf(scaled.sqrt()));
     }
     FisherSnedecor::new(n, rest).map_or(1.0, |d| d.sf(scaled))
+}
+
+/// The square of a distance that is exceeded with probability `p`: the inverse of [`beyond`].
+fn quantile(p: f64, n: f64, count: f64) -> f64 {
+    let rest = (count - n).max(1.0);
+    if rest > 1e4 {
+        return ChiSquared::new(n).map_or(f64::NAN, |d| d.inverse_cdf(1.0 - p));
+    }
+    let scaled = match n == 1.0 {
+        true => StudentsT::new(0.0, 1.0, rest).map_or(f64::NAN, |d| d.inverse_cdf(1.0 - 0.5 * p).powi(2)),
+        false => FisherSnedecor::new(n, rest).map_or(f64::NAN, |d| d.inverse_cdf(1.0 - p)),
+    };
+    scaled * n * (count * count - 1.0) / (rest * count)
 }
 
 /// The nearest matrix without negative variances.

@@ -1,6 +1,6 @@
 //! One triad of all calibrations: units, population, and what each measurement is compared with.
 
-use mimu::nalgebra::{DMatrix, DVector};
+use mimu::nalgebra::DMatrix;
 use mimu::quantity::Sensor;
 use mimu::sessions::between::Estimates;
 use mimu_recording::Reference;
@@ -65,12 +65,6 @@ impl Triad {
         // Medians of covariances need not be a covariance; their diagonal is.
         let fit = DMatrix::from_diagonal(&self.fit.diagonal());
         &self.population.covariance + fit + within.unwrap_or_else(|| DMatrix::zeros(n, n))
-    }
-
-    /// Values of a measurement minus the mean of the population.
-    pub fn from_mean(&self, measurement: usize) -> Option<DVector<f64>> {
-        let own = self.estimates[measurement].as_ref()?;
-        Some(&own.values - &self.population.mean)
     }
 
     /// As in the result.

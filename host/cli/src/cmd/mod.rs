@@ -12,6 +12,7 @@ pub(crate) mod device;
 pub(crate) mod diagnose;
 pub(crate) mod export;
 pub(crate) mod fit;
+pub(crate) mod fleet;
 pub(crate) mod import;
 pub(crate) mod man;
 pub(crate) mod noise;

@@ -1,0 +1,77 @@
+//! `mimu fleet`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mimu::data_sheet::Part;
+use mimu_fleet::labels::LabelTable;
+use mimu_fleet::tree::{Search, Tree};
+use mimu_fleet::{Options, fleet};
+use mimu_recording::error::Result;
+use mimu_recording::result_file::stage;
+
+use crate::arguments::{JsonArgs, VerboseArgs};
+use crate::output::{check_outputs, now, print, progress};
+use crate::report::{Made, fleet_page, fleet_text};
+
+#[derive(Args)]
+pub struct FleetArgs {
+    /// Folders with calibration files of units, at any depth; files too
+    ///
+    /// A folder `fixture=B` labels the files below it. Files with the same unit are repeated measurements. The unit is the label `unit`, or else the number or
+    /// name in the file, or else the name of the file; the day is the label `date`, or else that of the file's creation.
+    #[arg(required = true, value_name = "DIR")]
+    folders: Vec<PathBuf>,
+    /// Table of labels (CSV): its first column is `file` or `unit`, the others are labels such as operator, fixture, date, batch
+    #[arg(long, value_name = "TABLE.csv")]
+    labels: Option<PathBuf>,
+    /// Names of folders without `=`, from the outermost: `line,batch`; `-` skips one
+    #[arg(long = "folders", value_name = "NAMES", value_delimiter = ',')]
+    names: Vec<String>,
+    /// Labels that are factors of repeatability and reproducibility [default: operator, fixture, station, date]
+    #[arg(long, value_name = "LABELS", value_delimiter = ',')]
+    gage: Vec<String>,
+    /// Limits for Cpk and shares of tolerance: the data sheet of a part (icm42688p, mpu6050, lsm6dso, lsm6dsv16x, bmi088, bmi270), or a file of your own
+    /// (mimu-part/1)
+    #[arg(long, visible_alias = "part", value_name = "NAME|FILE.toml")]
+    limits: Option<String>,
+    /// Page to write
+    #[arg(short = 'o', long = "out", value_name = "FILE.html")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    verbose: VerboseArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+pub fn run(args: &FleetArgs, command_line: &str) -> Result<()> {
+    let part = args.limits.as_deref().map(Part::find).transpose()?;
+    let inputs: Vec<_> = args.labels.as_deref().into_iter().collect();
+    check_outputs(&[args.out.as_deref(), args.json.file()], &inputs)?;
+    let table = args.labels.as_deref().map(LabelTable::read).transpose()?;
+    let search = Search {
+        folders: &args.names,
+        table: table.as_ref(),
+        part: part.as_ref(),
+    };
+    let bar = progress("reading");
+    let tree = Tree::read(&args.folders, search, &|share| bar.reach(share));
+    bar.finish();
+    let options = Options {
+        factors: args.gage.clone(),
+    };
+    let result = fleet(tree?, part.as_ref(), &options)?;
+    let mut text = fleet_text(&result, args.verbose.verbose);
+    let mut page = None;
+    if let Some(out) = &args.out {
+        let names: Vec<String> = args.folders.iter().map(|f| f.display().to_string()).collect();
+        let made = Made {
+            recording: names.join(", "),
+            command: command_line.to_owned(),
+            created: now(),
+        };
+        page = Some(stage(out, fleet_page(&result, &made))?);
+        text += &format!("page: {}\n", out.display());
+    }
+    print(&args.json, &text, &result, page)
+}
