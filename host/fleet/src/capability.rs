@@ -55,7 +55,11 @@ type Key = (bool, &'static str, &'static str);
 pub type Collected = BTreeMap<Key, (Row, Vec<(f64, Option<f64>)>)>;
 
 fn key(row: &Row) -> Key {
-    (row.sensor == Sensor::Accel, row.property.name(row.sensor), row.axis)
+    (
+        row.sensor == Sensor::Accel,
+        row.property.name(row.sensor),
+        row.axis,
+    )
 }
 
 /// The means of each unit's measurements of each property; `units` has the measurements of each unit.
@@ -72,7 +76,10 @@ pub fn collect<'a>(units: impl Iterator<Item = Vec<&'a [Row]>>) -> Collected {
         for (key, (row, count, sum, squares)) in own {
             let half = (squares.sqrt() / count).abs();
             let value = (sum / count, Some(half).filter(|h| h.is_finite()));
-            all.entry(key).or_insert_with(|| (row.clone(), Vec::new())).1.push(value);
+            all.entry(key)
+                .or_insert_with(|| (row.clone(), Vec::new()))
+                .1
+                .push(value);
         }
     }
     all
@@ -85,26 +92,37 @@ fn is_two_sided(property: Property) -> bool {
 
 /// Indices of all properties.
 pub fn indices(all: &Collected) -> Vec<Capability> {
-    all.values().filter_map(|(row, values)| index(row, values)).collect()
+    all.values()
+        .filter_map(|(row, values)| index(row, values))
+        .collect()
 }
 
 fn index(row: &Row, values: &[(f64, Option<f64>)]) -> Option<Capability> {
     let two_sided = is_two_sided(row.property);
-    let values: Vec<(f64, Option<f64>)> = values.iter().filter(|v| v.0.is_finite()).map(|(v, h)| (if two_sided { *v } else { v.abs() }, *h)).collect();
+    let values: Vec<(f64, Option<f64>)> = values
+        .iter()
+        .filter(|v| v.0.is_finite())
+        .map(|(v, h)| (if two_sided { *v } else { v.abs() }, *h))
+        .collect();
     let count = values.len() as f64;
     if values.len() < FEWEST {
         return None;
     }
     let mean = values.iter().map(|v| v.0).sum::<f64>() / count;
     let variance = values.iter().map(|v| (v.0 - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    let halves: Option<f64> = values.iter().map(|v| v.1.map(|h| (h / NORMAL_95).powi(2))).sum();
+    let halves: Option<f64> = values
+        .iter()
+        .map(|v| v.1.map(|h| (h / NORMAL_95).powi(2)))
+        .sum();
     let room = match two_sided {
         true => row.at_most - mean.abs(),
         false => row.at_most - mean,
     };
     let index = |variance: f64| room / (3.0 * variance.sqrt());
     let cpk = index(variance);
-    let of_process = halves.map(|sum| variance - sum / count).filter(|v| *v > 0.0);
+    let of_process = halves
+        .map(|sum| variance - sum / count)
+        .filter(|v| *v > 0.0);
     Some(Capability {
         sensor: row.sensor,
         axis: row.axis,
@@ -117,7 +135,8 @@ fn index(row: &Row, values: &[(f64, Option<f64>)]) -> Option<Capability> {
         sigma: variance.sqrt(),
         cp: two_sided.then(|| row.at_most / (3.0 * variance.sqrt())),
         cpk,
-        cpk_half_width: NORMAL_95 * (1.0 / (9.0 * count) + cpk * cpk / (2.0 * (count - 1.0))).sqrt(),
+        cpk_half_width: NORMAL_95
+            * (1.0 / (9.0 * count) + cpk * cpk / (2.0 * (count - 1.0))).sqrt(),
         cpk_of_process: of_process.map(index),
         beyond: values.iter().filter(|v| v.0.abs() > row.at_most).count(),
     })

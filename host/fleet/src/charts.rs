@@ -37,55 +37,70 @@ struct Series<'a> {
 /// A parameter: numbers of triad and parameter.
 type Of = (usize, usize);
 
-/// The charts of all measurements but those of units that do not belong, and of labels that differ.
+/// A level that differs from the others since a day.
+struct Changed<'l> {
+    level: &'l String,
+    of: Of,
+    chart: Chart,
+    change: f64,
+}
+
+/// The charts of all measurements but those that are left out, and of labels that differ.
 pub fn charts(
     all: &[Measurement],
     triads: &[Triad],
     labels: &BTreeMap<String, Levels>,
     different: &[DifferentLevel],
-    is_stranger: &[bool],
+    is_left_out: &[bool],
 ) -> Charts {
     let mut days: Vec<Date> = all.iter().filter_map(|m| m.day).collect();
     days.sort_unstable();
     days.dedup();
     if days.len() < drift::FEWEST {
-        return Charts { changed: Vec::new(), drift: None };
+        return Charts {
+            changed: Vec::new(),
+            drift: None,
+        };
     }
     let day = |m: &Measurement| days.binary_search(&m.day?).ok();
-    let compared: Vec<(&String, &Levels)> = labels.iter().filter(|(_, l)| (2..=MOST_LEVELS).contains(&l.len())).collect();
+    let compared: Vec<(&String, &Levels)> = labels
+        .iter()
+        .filter(|(_, l)| (2..=MOST_LEVELS).contains(&l.len()))
+        .collect();
     let parameters: usize = triads.iter().map(Triad::n).sum();
     let count: usize = compared.iter().map(|(_, l)| l.len()).sum::<usize>() + 1;
     let mut series = Series {
         triads,
         day: all.iter().map(day).collect(),
-        excluded: is_stranger.to_vec(),
+        excluded: is_left_out.to_vec(),
         limit: drift::limit(parameters * count * days.len()),
         days,
     };
     let mut changed = Vec::new();
     for (label, levels) in compared {
-        while let Some((level, (t, i), chart)) = series.most_changed(levels) {
-            let since = chart.since.map(|k| chart.points[k].day);
-            for m in &levels[level] {
+        while let Some(found) = series.most_changed(levels) {
+            let since = found.chart.since.map(|k| found.chart.points[k].day);
+            for m in &levels[found.level] {
                 series.excluded[*m] |= all[*m].day >= since;
             }
             changed.push(ChangedLevel {
                 label: label.clone(),
-                level: level.clone(),
-                chart: series.result((t, i), &chart),
+                level: found.level.clone(),
+                chart: ChartOfParameter {
+                    change: Some(found.change),
+                    ..series.result(found.of, &found.chart)
+                },
             });
             if changed.len() > parameters * count {
                 break;
             }
         }
     }
-    for one in different {
-        for m in labels.get(&one.label).and_then(|l| l.get(&one.level)).into_iter().flatten() {
-            series.excluded[*m] = true;
-        }
-    }
+    series.leave_out_different(labels, different);
     let each = (0..triads.len()).flat_map(|t| (0..triads[t].n()).map(move |i| (t, i)));
-    let of_all: Vec<ChartOfParameter> = each.filter_map(|of| Some(series.result(of, &series.of_all(of)?))).collect();
+    let of_all: Vec<ChartOfParameter> = each
+        .filter_map(|of| Some(series.result(of, &series.of_all(of)?)))
+        .collect();
     let drift = (!of_all.is_empty()).then(|| Drift {
         lambda: drift::LAMBDA,
         limit: series.limit,
@@ -96,6 +111,28 @@ pub fn charts(
 }
 
 impl Series<'_> {
+    /// Leaves out levels that differ, if most measurements have other levels of the label: if all operators differ, none of them is the bad one.
+    fn leave_out_different(
+        &mut self,
+        labels: &BTreeMap<String, Levels>,
+        different: &[DifferentLevel],
+    ) {
+        for (label, levels) in labels {
+            let own = different.iter().filter(|d| d.label == *label);
+            let mut members: Vec<usize> = own
+                .filter_map(|d| levels.get(&d.level))
+                .flatten()
+                .copied()
+                .collect();
+            members.sort_unstable();
+            members.dedup();
+            let all: usize = levels.values().map(Vec::len).sum();
+            if 2 * members.len() < all {
+                members.into_iter().for_each(|m| self.excluded[m] = true);
+            }
+        }
+    }
+
     fn value(&self, m: usize, (t, i): Of) -> Option<f64> {
         let estimates = self.triads[t].estimates[m].as_ref();
         estimates.filter(|_| !self.excluded[m]).map(|e| e.values[i])
@@ -122,62 +159,83 @@ impl Series<'_> {
         let dated = (0..self.day.len()).filter(|m| self.day[*m].is_some());
         let mut values: Vec<f64> = dated.filter_map(|m| self.value(m, of)).collect();
         let centre = robust::median(&mut values);
-        let days = self.daily(0..self.day.len(), of, centre).into_iter().zip(&self.days);
+        let days = self
+            .daily(0..self.day.len(), of, centre)
+            .into_iter()
+            .zip(&self.days);
         let days = days.filter(|((count, _), _)| *count > 0.0);
-        let days: Vec<Day> = days.map(|((count, sum), day)| Day { day: *day, count, mean: sum / count }).collect();
+        let days: Vec<Day> = days
+            .map(|((count, sum), day)| Day {
+                day: *day,
+                count,
+                mean: sum / count,
+            })
+            .collect();
         drift::chart(&days, self.sigma(of), self.limit)
     }
 
-    /// The chart of the difference of a level from the others of the same days, about its median, or about its mean before the largest step if it changed.
-    fn of_level(&self, members: &[usize], all: &[(f64, f64)], of: Of, centre: f64) -> Option<Chart> {
+    /// Differences of a level from the others of the same days.
+    fn against_others(
+        &self,
+        members: &[usize],
+        all: &[(f64, f64)],
+        of: Of,
+        centre: f64,
+    ) -> Vec<Day> {
         let own = self.daily(members.iter().copied(), of, centre);
-        let mut days = Vec::new();
-        for ((day, own), all) in self.days.iter().zip(&own).zip(all) {
-            let others = (all.0 - own.0, all.1 - own.1);
-            if own.0 > 0.0 && others.0 > 0.0 {
-                days.push(Day {
+        let each = self
+            .days
+            .iter()
+            .zip(&own)
+            .zip(all)
+            .filter_map(|((day, own), all)| {
+                let others = (all.0 - own.0, all.1 - own.1);
+                (own.0 > 0.0 && others.0 > 0.0).then(|| Day {
                     day: *day,
                     count: 1.0 / (1.0 / own.0 + 1.0 / others.0),
                     mean: own.1 / own.0 - others.1 / others.0,
-                });
-            }
-        }
-        let mut means: Vec<f64> = days.iter().map(|d| d.mean).collect();
-        let usual = robust::median(&mut means);
-        days.iter_mut().for_each(|d| d.mean -= usual);
-        let chart = drift::chart(&days, self.sigma(of), self.limit)?;
-        if chart.signal.is_none() {
-            return Some(chart);
-        }
-        // If it changed in the middle of its days, the median is neither that before nor that after.
-        let (step, before) = drift::step(&days)?;
-        days.iter_mut().for_each(|d| d.mean -= before);
-        let about_before = drift::chart(&days, self.sigma(of), self.limit)?;
-        let mut chart = if about_before.signal.is_some() { about_before } else { chart };
-        chart.since = Some(step);
-        Some(chart)
+                })
+            });
+        each.collect()
     }
 
-    /// The level whose chart is farthest beyond its limits.
-    fn most_changed<'l>(&self, levels: &'l Levels) -> Option<(&'l String, Of, Chart)> {
-        let mut most: Option<(&String, Of, Chart, f64)> = None;
+    /// The level with the largest step against the others, if chance explains none so large; with its chart about the mean before.
+    fn most_changed<'l>(&self, levels: &'l Levels) -> Option<Changed<'l>> {
+        let mut most: Option<(Changed, f64)> = None;
         for t in 0..self.triads.len() {
             for i in 0..self.triads[t].n() {
                 let of = (t, i);
                 let centre = self.triads[t].population.mean[i];
                 let all = self.daily(levels.values().flatten().copied(), of, centre);
                 for (level, members) in levels {
-                    let Some(chart) = self.of_level(members, &all, of, centre).filter(|c| c.signal.is_some()) else {
+                    let mut days = self.against_others(members, &all, of, centre);
+                    let sigma = self.sigma(of);
+                    let Some(step) = drift::step(&days, sigma) else {
                         continue;
                     };
-                    let beyond = chart.points.iter().map(|p| p.average.abs() / p.limit).fold(0.0, f64::max);
-                    if most.as_ref().is_none_or(|m| beyond > m.3) {
-                        most = Some((level, of, chart, beyond));
+                    if step.size < most.as_ref().map_or(self.limit, |m| m.1) {
+                        continue;
                     }
+                    days.iter_mut().for_each(|d| d.mean -= step.before);
+                    let Some(chart) = drift::chart(&days, sigma, self.limit) else {
+                        continue;
+                    };
+                    let since = Some(step.first);
+                    let chart = Chart { since, ..chart };
+                    let change = step.after - step.before;
+                    most = Some((
+                        Changed {
+                            level,
+                            of,
+                            chart,
+                            change,
+                        },
+                        step.size,
+                    ));
                 }
             }
         }
-        most.map(|(level, of, chart, _)| (level, of, chart))
+        most.map(|m| m.0)
     }
 
     fn result(&self, (t, i): Of, chart: &Chart) -> ChartOfParameter {

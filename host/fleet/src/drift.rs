@@ -47,7 +47,7 @@ pub struct Chart {
     pub points: Vec<Point>,
     /// The first day beyond the limits, as a number in [`Self::points`].
     pub signal: Option<usize>,
-    /// The day after which the average did not return to the centre before the signal.
+    /// The day after which the average did not return to the centre before the signal; for a step the day of it.
     pub since: Option<usize>,
 }
 
@@ -59,17 +59,57 @@ pub fn limit(points: usize) -> f64 {
 /// Fewest days on each side of a step.
 const BESIDE: usize = 4;
 
-/// The day, as a number, from which on the values differ most from those before, and the mean before.
-pub fn step(days: &[Day]) -> Option<(usize, f64)> {
-    let sum = |part: &[Day]| part.iter().fold((0.0, 0.0), |(n, s), d| (n + d.count, s + d.count * d.mean));
-    let splits = BESIDE..days.len().saturating_sub(BESIDE) + 1;
-    let each = splits.map(|k| {
-        let (before, after) = (sum(&days[..k]), sum(&days[k..]));
-        let difference = after.1 / after.0 - before.1 / before.0;
-        let size = difference.abs() / (1.0 / before.0 + 1.0 / after.0).sqrt();
-        (k, before.1 / before.0, size)
+/// A step of the mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// The first day after it, as a number.
+    pub first: usize,
+    /// Mean before.
+    pub before: f64,
+    /// Mean after.
+    pub after: f64,
+    /// Their difference in its standard deviations.
+    pub size: f64,
+}
+
+/// The largest step, in standard deviations, of all days with [`BESIDE`] on both sides. Without a step [`limit`] of the number of days is exceeded in [`FALSE_FINDING`] of cases at most.
+pub fn step(days: &[Day], sigma: f64) -> Option<Step> {
+    let between = between_days(days, sigma);
+    let weight = |day: &Day| 1.0 / (sigma * sigma / day.count + between);
+    let sum = |part: &[Day]| {
+        part.iter().fold((0.0, 0.0), |(w, s), d| {
+            (w + weight(d), s + weight(d) * d.mean)
+        })
+    };
+    let all = sum(days);
+    let splits = BESIDE..(days.len() + 1).saturating_sub(BESIDE);
+    let mut before = sum(&days[..BESIDE.min(days.len())]);
+    let each = splits.map(|first| {
+        let after = (all.0 - before.0, all.1 - before.1);
+        let means = [before.1 / before.0, after.1 / after.0];
+        let step = Step {
+            first,
+            before: means[0],
+            after: means[1],
+            size: (means[1] - means[0]).abs() / (1.0 / before.0 + 1.0 / after.0).sqrt(),
+        };
+        before = (
+            before.0 + weight(&days[first]),
+            before.1 + weight(&days[first]) * days[first].mean,
+        );
+        step
     });
-    each.max_by(|a, b| a.2.total_cmp(&b.2)).map(|(k, before, _)| (k, before))
+    each.max_by(|a, b| a.size.total_cmp(&b.size))
+}
+
+/// Variance of days beyond the scatter of their values, by successive days.
+fn between_days(days: &[Day], sigma: f64) -> f64 {
+    let own = |day: &Day| sigma * sigma / day.count;
+    let pairs = days.windows(2).map(|w| {
+        let difference = w[1].mean - w[0].mean;
+        0.5 * (difference * difference - own(&w[0]) - own(&w[1]))
+    });
+    (pairs.sum::<f64>() / (days.len() as f64 - 1.0)).max(0.0)
 }
 
 /// The chart of `days`, in their order, where single values have the standard deviation `sigma`. `None` for fewer than [`FEWEST`] days.
@@ -78,12 +118,7 @@ pub fn chart(days: &[Day], sigma: f64, limit: f64) -> Option<Chart> {
         return None;
     }
     let own = |day: &Day| sigma * sigma / day.count;
-    let pairs = days.windows(2).map(|w| {
-        let difference = w[1].mean - w[0].mean;
-        0.5 * (difference * difference - own(&w[0]) - own(&w[1]))
-    });
-    let between = pairs.sum::<f64>() / (days.len() - 1) as f64;
-    let between = between.max(0.0);
+    let between = between_days(days, sigma);
     let (mut standard, mut points) = (0.0, Vec::with_capacity(days.len()));
     for (t, day) in days.iter().enumerate() {
         let scale = (own(day) + between).sqrt();
@@ -132,10 +167,32 @@ mod tests {
         let found = chart(&with, 2.0, limit(60)).unwrap();
         let signal = found.signal.unwrap();
         assert!((41..55).contains(&signal), "{signal}");
-        assert!((39..42).contains(&found.since.unwrap()), "{:?}", found.since);
+        assert!(
+            (39..42).contains(&found.since.unwrap()),
+            "{:?}",
+            found.since
+        );
         let without = chart(&days((0..60).map(|k| 0.7 * noise(k))), 2.0, limit(60)).unwrap();
         assert_eq!((without.signal, without.since), (None, None));
         assert!(chart(&with[..7], 2.0, 3.0).is_none());
+    }
+
+    #[test]
+    fn a_step_in_the_middle_has_the_size_of_a_test_of_two_means() {
+        let noise = |k: usize| if k.is_multiple_of(2) { 0.7 } else { -0.7 };
+        let found = step(
+            &days((0..40).map(|k| noise(k) + if k < 20 { 0.0 } else { 1.0 })),
+            2.0,
+        )
+        .unwrap();
+        assert_eq!(found.first, 20);
+        assert!((found.after - found.before - 1.0).abs() < 1e-9);
+        // Means of four values of the standard deviation 2 have one of 1; successive days differ by no more than 1.96, so nothing is added.
+        assert!(
+            (found.size - 1.0 / (2.0 / 20.0f64).sqrt()).abs() < 0.05,
+            "{}",
+            found.size
+        );
     }
 
     #[test]

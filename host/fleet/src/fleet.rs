@@ -33,18 +33,40 @@ pub fn fleet(mut tree: Tree, part: Option<&Part>, options: &Options) -> Result<F
     if units.len() < FEWEST {
         return Err(too_few(&tree, units.len()));
     }
-    let triads: Vec<Triad> = Sensor::BOTH.iter().filter_map(|s| Triad::of(*s, reference, all, &units)).collect();
+    let triads: Vec<Triad> = Sensor::BOTH
+        .iter()
+        .filter_map(|s| Triad::of(*s, reference, all, &units))
+        .collect();
     if triads.is_empty() {
         let problem = "no triad has five units with a regular covariance";
-        return Err(Error::new("the calibrations", problem, "fit the recordings again, with more poses"));
+        return Err(Error::new(
+            "the calibrations",
+            problem,
+            "fit the recordings again, with more poses",
+        ));
     }
     let strangers = strangers(all, &triads);
     let contradicting = contradicting(all, &triads);
     let levels = all_levels(all);
     let is_stranger = of_strangers(all, &strangers);
-    let different = different(&triads, &levels, &is_stranger);
-    let charts = charts::charts(all, &triads, &levels, &different, &is_stranger);
-    let rows = units.iter().map(|u| u.iter().map(|m| &all[*m].properties[..]).collect::<Vec<&[Row]>>());
+    // Further measurements of a unit are no further units.
+    let mut is_further = vec![false; all.len()];
+    units
+        .iter()
+        .flat_map(|u| &u[1..])
+        .for_each(|m| is_further[*m] = true);
+    let different = different(&triads, &levels, &is_stranger, &is_further);
+    let is_left_out: Vec<bool> = is_stranger
+        .iter()
+        .zip(&is_further)
+        .map(|(a, b)| *a || *b)
+        .collect();
+    let charts = charts::charts(all, &triads, &levels, &different, &is_left_out);
+    let rows = units.iter().map(|u| {
+        u.iter()
+            .map(|m| &all[*m].properties[..])
+            .collect::<Vec<&[Row]>>()
+    });
     let collected = capability::collect(rows);
     let gage = studies::study(all, &units, &triads, options);
     let mut days: Vec<_> = all.iter().filter_map(|m| m.day).collect();
@@ -59,8 +81,14 @@ pub fn fleet(mut tree: Tree, part: Option<&Part>, options: &Options) -> Result<F
         unlabelled: tree.unlabelled,
         raw_unit: setting.raw_unit,
         reference: setting.reference,
-        labels: levels.iter().map(|(name, of)| (name.clone(), of.len())).collect(),
-        days: days.first().zip(days.last()).map(|(a, b)| [a.to_string(), b.to_string()]),
+        labels: levels
+            .iter()
+            .map(|(name, of)| (name.clone(), of.len()))
+            .collect(),
+        days: days
+            .first()
+            .zip(days.last())
+            .map(|(a, b)| [a.to_string(), b.to_string()]),
         sensors: mimu::PerSensor::default(),
         strangers,
         contradicting,
@@ -82,7 +110,9 @@ pub fn fleet(mut tree: Tree, part: Option<&Part>, options: &Options) -> Result<F
 
 fn too_few(tree: &Tree, units: usize) -> Error {
     let first = tree.left_out.first();
-    let first = first.map_or_else(String::new, |l| format!(", the first of them {}: {}", l.file, l.reason));
+    let first = first.map_or_else(String::new, |l| {
+        format!(", the first of them {}: {}", l.file, l.reason)
+    });
     let problem = format!(
         "{units} comparable units, and a fleet needs {FEWEST}; {} calibrations were left out{first}",
         tree.left_out.len()
@@ -95,12 +125,23 @@ fn too_few(tree: &Tree, units: usize) -> Error {
 fn keep_comparable(tree: &mut Tree) -> (Setting, Option<Reference>) {
     let mut counts: HashMap<Setting, (usize, Option<Reference>)> = HashMap::new();
     for one in &tree.measurements {
-        counts.entry(one.of.setting.clone()).or_insert((0, one.of.reference)).0 += 1;
+        counts
+            .entry(one.of.setting.clone())
+            .or_insert((0, one.of.reference))
+            .0 += 1;
     }
-    let most = counts.into_iter().max_by(|a, b| a.1.0.cmp(&b.1.0).then(b.0.cmp(&a.0)));
+    let most = counts
+        .into_iter()
+        .max_by(|a, b| a.1.0.cmp(&b.1.0).then(b.0.cmp(&a.0)));
     let (most, (_, reference)) = most.unwrap_or_else(|| {
         let unknown = || "unknown".to_string();
-        (Setting { raw_unit: unknown(), reference: unknown() }, (0, None))
+        (
+            Setting {
+                raw_unit: unknown(),
+                reference: unknown(),
+            },
+            (0, None),
+        )
     });
     let measurements = std::mem::take(&mut tree.measurements);
     for one in measurements {
@@ -108,7 +149,12 @@ fn keep_comparable(tree: &mut Tree) -> (Setting, Option<Reference>) {
             tree.measurements.push(one);
             continue;
         }
-        let of = |s: &Setting| format!("readings in {} with reference \"{}\"", s.raw_unit, s.reference);
+        let of = |s: &Setting| {
+            format!(
+                "readings in {} with reference \"{}\"",
+                s.raw_unit, s.reference
+            )
+        };
         tree.left_out.push(LeftOut {
             reason: format!("{}, most others {}", of(&one.of.setting), of(&most)),
             file: one.file,
@@ -118,7 +164,14 @@ fn keep_comparable(tree: &mut Tree) -> (Setting, Option<Reference>) {
 }
 
 /// An entry of a unit, or of a calibration.
-fn stranger(all: &[Measurement], members: &[usize], triad: &Triad, distance: &Distance, p: f64, change: f64) -> Stranger {
+fn stranger(
+    all: &[Measurement],
+    members: &[usize],
+    triad: &Triad,
+    distance: &Distance,
+    p: f64,
+    change: f64,
+) -> Stranger {
     let first = &all[members[0]];
     Stranger {
         unit: first.unit.clone(),
@@ -145,7 +198,8 @@ fn strangers(all: &[Measurement], triads: &[Triad]) -> Vec<Stranger> {
             if p >= FALSE_FINDING {
                 continue;
             }
-            let change = triad.repeats.estimates[k].values[distance.most] - triad.population.mean[distance.most];
+            let change = triad.repeats.estimates[k].values[distance.most]
+                - triad.population.mean[distance.most];
             let one = stranger(all, members, triad, distance, p, change);
             let unit = all[members[0]].unit.as_str();
             match found.get(unit) {
@@ -160,7 +214,11 @@ fn strangers(all: &[Measurement], triads: &[Triad]) -> Vec<Stranger> {
 }
 
 fn sorted(mut all: Vec<Stranger>) -> Vec<Stranger> {
-    all.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.distance.total_cmp(&a.distance)).then(a.unit.cmp(&b.unit)));
+    all.sort_by(|a, b| {
+        a.p.total_cmp(&b.p)
+            .then(b.distance.total_cmp(&a.distance))
+            .then(a.unit.cmp(&b.unit))
+    });
     all
 }
 
@@ -168,14 +226,26 @@ fn sorted(mut all: Vec<Stranger>) -> Vec<Stranger> {
 fn contradicting(all: &[Measurement], triads: &[Triad]) -> Vec<Stranger> {
     let several = triads.len() as f64;
     let each = triads.iter().flat_map(|triad| {
-        triad.repeats.contradicting.iter().filter_map(move |(m, distance, p)| {
-            let p = (several * p).min(1.0);
-            let others = triad.repeats.units.iter().find(|u| u.contains(m))?;
-            let values = |m: &usize| triad.estimates[*m].as_ref().map(|e| e.values[distance.most]);
-            let rest: Vec<f64> = others.iter().filter(|o| *o != m).filter_map(values).collect();
-            let change = values(m)? - rest.iter().sum::<f64>() / rest.len() as f64;
-            (p < FALSE_FINDING).then(|| stranger(all, &[*m], triad, distance, p, change))
-        })
+        triad
+            .repeats
+            .contradicting
+            .iter()
+            .filter_map(move |(m, distance, p)| {
+                let p = (several * p).min(1.0);
+                let others = triad.repeats.units.iter().find(|u| u.contains(m))?;
+                let values = |m: &usize| {
+                    triad.estimates[*m]
+                        .as_ref()
+                        .map(|e| e.values[distance.most])
+                };
+                let rest: Vec<f64> = others
+                    .iter()
+                    .filter(|o| *o != m)
+                    .filter_map(values)
+                    .collect();
+                let change = values(m)? - rest.iter().sum::<f64>() / rest.len() as f64;
+                (p < FALSE_FINDING).then(|| stranger(all, &[*m], triad, distance, p, change))
+            })
     });
     let mut once: BTreeMap<String, Stranger> = BTreeMap::new();
     for one in each {
@@ -192,7 +262,12 @@ fn all_levels(all: &[Measurement]) -> BTreeMap<String, Levels> {
     let mut labels: BTreeMap<String, Levels> = BTreeMap::new();
     for (k, one) in all.iter().enumerate() {
         for (name, level) in one.labels.iter().filter(|(name, _)| *name != DATE) {
-            labels.entry(name.clone()).or_default().entry(level.clone()).or_default().push(k);
+            labels
+                .entry(name.clone())
+                .or_default()
+                .entry(level.clone())
+                .or_default()
+                .push(k);
         }
     }
     labels
@@ -200,25 +275,48 @@ fn all_levels(all: &[Measurement]) -> BTreeMap<String, Levels> {
 
 /// Whether each measurement is of a unit that does not belong.
 fn of_strangers(all: &[Measurement], strangers: &[Stranger]) -> Vec<bool> {
-    let names: std::collections::HashSet<&str> = strangers.iter().map(|s| s.unit.as_str()).collect();
-    all.iter().map(|m| names.contains(m.unit.as_str())).collect()
+    let names: std::collections::HashSet<&str> =
+        strangers.iter().map(|s| s.unit.as_str()).collect();
+    all.iter()
+        .map(|m| names.contains(m.unit.as_str()))
+        .collect()
 }
 
-fn different(triads: &[Triad], labels: &BTreeMap<String, Levels>, is_stranger: &[bool]) -> Vec<DifferentLevel> {
-    let tried = labels.values().map(|l| l.values().filter(|m| m.len() >= levels::FEWEST).count());
+/// Levels of labels that differ, by the first measurement of each unit.
+fn different(
+    triads: &[Triad],
+    labels: &BTreeMap<String, Levels>,
+    is_stranger: &[bool],
+    is_further: &[bool],
+) -> Vec<DifferentLevel> {
+    let tried = labels
+        .values()
+        .map(|l| l.values().filter(|m| m.len() >= levels::FEWEST).count());
     let tried = (tried.sum::<usize>() * triads.len()).max(1);
     let mut found: Vec<DifferentLevel> = Vec::new();
     for triad in triads {
         let has: Vec<bool> = triad.estimates.iter().map(Option::is_some).collect();
         let empty = mimu::nalgebra::DVector::zeros(triad.n());
-        let values = triad.estimates.iter().map(|e| e.as_ref().map_or(&empty, |e| &e.values));
+        let values = triad
+            .estimates
+            .iter()
+            .map(|e| e.as_ref().map_or(&empty, |e| &e.values));
         let units = Units {
             values: values.collect(),
             covariance: triad.of_one(),
         };
         for (label, levels) in labels {
-            let with = |members: &[usize]| -> Vec<usize> { members.iter().copied().filter(|m| has[*m]).collect() };
-            let own: Levels = levels.iter().map(|(name, m)| (name.clone(), with(m))).collect();
+            let with = |members: &[usize]| -> Vec<usize> {
+                members
+                    .iter()
+                    .copied()
+                    .filter(|m| has[*m] && !is_further[*m])
+                    .collect()
+            };
+            let own: Levels = levels
+                .iter()
+                .map(|(name, m)| (name.clone(), with(m)))
+                .collect();
             for one in levels::different(&units, &own, tried) {
                 found.push(DifferentLevel {
                     label: label.clone(),
@@ -235,6 +333,9 @@ fn different(triads: &[Triad], labels: &BTreeMap<String, Levels>, is_stranger: &
             }
         }
     }
-    found.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.sigmas.abs().total_cmp(&a.sigmas.abs())));
+    found.sort_by(|a, b| {
+        a.p.total_cmp(&b.p)
+            .then(b.sigmas.abs().total_cmp(&a.sigmas.abs()))
+    });
     found
 }

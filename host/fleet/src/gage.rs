@@ -59,7 +59,11 @@ impl Study {
     /// within a unit, and those that equal an earlier one, are left out.
     ///
     /// Returns the numbers of the measurements too. `None` if no unit is measured repeatedly.
-    pub fn of(units: &[Vec<usize>], factors: &[(String, Vec<Option<String>>)], most: usize) -> Option<(Self, Vec<usize>)> {
+    pub fn of(
+        units: &[Vec<usize>],
+        factors: &[(String, Vec<Option<String>>)],
+        most: usize,
+    ) -> Option<(Self, Vec<usize>)> {
         let repeated: Vec<&Vec<usize>> = units.iter().filter(|u| u.len() > 1).collect();
         let step = repeated.len().div_ceil(most.max(1)).max(1);
         let repeated: Vec<&Vec<usize>> = repeated.into_iter().step_by(step).collect();
@@ -67,7 +71,11 @@ impl Study {
         if repeated.len() < 2 {
             return None;
         }
-        let unit: Vec<usize> = repeated.iter().enumerate().flat_map(|(k, u)| vec![k; u.len()]).collect();
+        let unit: Vec<usize> = repeated
+            .iter()
+            .enumerate()
+            .flat_map(|(k, u)| vec![k; u.len()])
+            .collect();
         let mut used: Vec<(String, Vec<usize>)> = Vec::new();
         for (name, levels) in factors {
             let own: Option<Vec<&String>> = members.iter().map(|m| levels[*m].as_ref()).collect();
@@ -81,7 +89,10 @@ impl Study {
             // Two labels that say the same are one factor.
             let same = used.iter_mut().find(|(_, other)| {
                 let all = 0..own.len();
-                all.clone().all(|a| all.clone().all(|b| (own[a] == own[b]) == (other[a] == other[b])))
+                all.clone().all(|a| {
+                    all.clone()
+                        .all(|b| (own[a] == own[b]) == (other[a] == other[b]))
+                })
             });
             match same {
                 Some((other, _)) if varies => *other = format!("{other} = {name}"),
@@ -89,7 +100,10 @@ impl Study {
                 _ => {}
             }
         }
-        let study = Self { unit, factors: used };
+        let study = Self {
+            unit,
+            factors: used,
+        };
         Some((study, members))
     }
 
@@ -102,7 +116,11 @@ impl Study {
     fn cells(&self, factor: usize) -> Vec<usize> {
         let levels = &self.factors[factor].1;
         let count = levels.iter().max().map_or(0, |m| m + 1);
-        self.unit.iter().zip(levels).map(|(u, l)| u * count + l).collect()
+        self.unit
+            .iter()
+            .zip(levels)
+            .map(|(u, l)| u * count + l)
+            .collect()
     }
 
     /// Whether an interaction of the unit with the factor differs from repeatability: a cell with two measurements.
@@ -122,7 +140,9 @@ impl Study {
         if !(total > 0.0) {
             return None;
         }
-        let interactions: Vec<usize> = (0..self.factors.len()).filter(|f| self.has_interaction(*f)).collect();
+        let interactions: Vec<usize> = (0..self.factors.len())
+            .filter(|f| self.has_interaction(*f))
+            .collect();
         let model = Model {
             values: values.iter().map(|v| (v - mean) / total.sqrt()).collect(),
             study: self,
@@ -130,13 +150,26 @@ impl Study {
             rows: self.rows(),
         };
         let logs = model.maximise();
-        let variances: Vec<f64> = logs.iter().map(|l| if *l <= LOWEST { 0.0 } else { l.exp() * total }).collect();
+        let variances: Vec<f64> = logs
+            .iter()
+            .map(|l| if *l <= LOWEST { 0.0 } else { l.exp() * total })
+            .collect();
         let covariance = model.covariance(&logs);
-        let mut names = vec![("repeatability".to_string(), false), ("unit".to_string(), false)];
+        let mut names = vec![
+            ("repeatability".to_string(), false),
+            ("unit".to_string(), false),
+        ];
         names.extend(self.factors.iter().map(|f| (f.0.clone(), true)));
-        names.extend(interactions.iter().map(|f| (format!("unit × {}", self.factors[*f].0), true)));
+        names.extend(
+            interactions
+                .iter()
+                .map(|f| (format!("unit × {}", self.factors[*f].0), true)),
+        );
         let sigma = |of: &dyn Fn(usize) -> bool| {
-            let by = DVector::from_fn(variances.len(), |k, _| if of(k) { variances[k] } else { 0.0 });
+            let by = DVector::from_fn(
+                variances.len(),
+                |k, _| if of(k) { variances[k] } else { 0.0 },
+            );
             let variance = by.sum();
             // Derivatives of a sum of variances by their logarithms are the variances.
             interval(variance, by.dot(&(&covariance * &by)))
@@ -146,11 +179,15 @@ impl Study {
             reproducibility: sigma(&|k| k > 1),
             measurement: sigma(&|k| k != 1),
             units: sigma(&|k| k == 1),
-            components: names.into_iter().zip(&variances).map(|((name, is_reproducibility), variance)| Component {
-                name,
-                variance: *variance,
-                is_reproducibility,
-            }).collect(),
+            components: names
+                .into_iter()
+                .zip(&variances)
+                .map(|((name, is_reproducibility), variance)| Component {
+                    name,
+                    variance: *variance,
+                    is_reproducibility,
+                })
+                .collect(),
         };
         Some(gage)
     }
@@ -173,7 +210,11 @@ fn interval(variance: f64, of_estimate: f64) -> Sigma {
         return Sigma {
             value,
             lower: 0.0,
-            upper: if variance > 0.0 { f64::INFINITY } else { f64::NAN },
+            upper: if variance > 0.0 {
+                f64::INFINITY
+            } else {
+                f64::NAN
+            },
         };
     }
     let quantile = |p: f64| ChiSquared::new(dof).map_or(f64::NAN, |d| d.inverse_cdf(p));
@@ -204,8 +245,15 @@ impl Model<'_> {
     ///
     /// Blocks of units are inverted one by one; factors, which connect units, by the identity of Woodbury.
     fn deviance(&self, logs: &[f64]) -> f64 {
-        let variances: Vec<f64> = logs.iter().map(|l| if *l <= LOWEST { 0.0 } else { l.exp() }).collect();
-        let sizes = self.study.factors.iter().map(|f| f.1.iter().max().map_or(0, |m| m + 1));
+        let variances: Vec<f64> = logs
+            .iter()
+            .map(|l| if *l <= LOWEST { 0.0 } else { l.exp() })
+            .collect();
+        let sizes = self
+            .study
+            .factors
+            .iter()
+            .map(|f| f.1.iter().max().map_or(0, |m| m + 1));
         let q: usize = sizes.clone().sum();
         let first: Vec<usize> = sizes
             .scan(0, |sum, size| {
@@ -225,7 +273,8 @@ impl Model<'_> {
             // Each measurement has one column of each factor, the mean, and its value.
             let columns = |row: &usize| {
                 let factors = self.study.factors.iter().enumerate();
-                let own = factors.map(|(f, (_, levels))| (first[f] + levels[*row], variances[2 + f].sqrt()));
+                let own = factors
+                    .map(|(f, (_, levels))| (first[f] + levels[*row], variances[2 + f].sqrt()));
                 own.chain([(q, 1.0), (q + 1, self.values[*row])]).collect()
             };
             let columns: Vec<Vec<(usize, f64)>> = rows.iter().map(columns).collect();
@@ -276,7 +325,11 @@ impl Model<'_> {
             for k in 0..count {
                 self.along(&mut logs, k, step);
             }
-            let moved = logs.iter().zip(&start).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let moved = logs
+                .iter()
+                .zip(&start)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
             if before - self.deviance(&logs) < CHANGE && moved < 1e-3 {
                 break;
             }
@@ -292,9 +345,11 @@ impl Model<'_> {
             self.deviance(logs)
         };
         let present = logs[k].max(LOWEST + 1.0);
-        let [mut low, mut high] = [present - step, present + step].map(|l| l.clamp(LOWEST, HIGHEST));
+        let [mut low, mut high] =
+            [present - step, present + step].map(|l| l.clamp(LOWEST, HIGHEST));
         let golden = 0.5 * (5f64.sqrt() - 1.0);
-        let inner = |low: f64, high: f64| [high - golden * (high - low), low + golden * (high - low)];
+        let inner =
+            |low: f64, high: f64| [high - golden * (high - low), low + golden * (high - low)];
         let [mut a, mut b] = inner(low, high);
         let (mut of_a, mut of_b) = (at(a, logs), at(b, logs));
         while high - low > 2e-5 * step.max(0.05) {
@@ -311,7 +366,11 @@ impl Model<'_> {
         let best = 0.5 * (low + high);
         let (at_best, at_zero) = (at(best, logs), at(LOWEST, logs));
         // Repeatability is never zero: the inverse of a block would have no end.
-        logs[k] = if k > 0 && at_zero <= at_best + 1e-9 { LOWEST } else { best };
+        logs[k] = if k > 0 && at_zero <= at_best + 1e-9 {
+            LOWEST
+        } else {
+            best
+        };
     }
 
     /// Covariance of the logarithms: the inverse of the observed information. A variance that is zero has none.
@@ -354,19 +413,38 @@ mod tests {
 
     /// The example of the AIAG's Measurement Systems Analysis, 4th edition, table III-B 1: ten parts, three trials of each of three appraisers.
     const AIAG: [[f64; 10]; 9] = [
-        [0.29, -0.56, 1.34, 0.47, -0.80, 0.02, 0.59, -0.31, 2.26, -1.36],
-        [0.41, -0.68, 1.17, 0.50, -0.92, -0.11, 0.75, -0.20, 1.99, -1.25],
-        [0.64, -0.58, 1.27, 0.64, -0.84, -0.21, 0.66, -0.17, 2.01, -1.31],
-        [0.08, -0.47, 1.19, 0.01, -0.56, -0.20, 0.47, -0.63, 1.80, -1.68],
-        [0.25, -1.22, 0.94, 1.03, -1.20, 0.22, 0.55, 0.08, 2.12, -1.62],
-        [0.07, -0.68, 1.34, 0.20, -1.28, 0.06, 0.83, -0.34, 2.19, -1.50],
-        [0.04, -1.38, 0.88, 0.14, -1.46, -0.29, 0.02, -0.46, 1.77, -1.49],
-        [-0.11, -1.13, 1.09, 0.20, -1.07, -0.67, 0.01, -0.56, 1.45, -1.77],
-        [-0.15, -0.96, 0.67, 0.11, -1.45, -0.49, 0.21, -0.49, 1.87, -2.16],
+        [
+            0.29, -0.56, 1.34, 0.47, -0.80, 0.02, 0.59, -0.31, 2.26, -1.36,
+        ],
+        [
+            0.41, -0.68, 1.17, 0.50, -0.92, -0.11, 0.75, -0.20, 1.99, -1.25,
+        ],
+        [
+            0.64, -0.58, 1.27, 0.64, -0.84, -0.21, 0.66, -0.17, 2.01, -1.31,
+        ],
+        [
+            0.08, -0.47, 1.19, 0.01, -0.56, -0.20, 0.47, -0.63, 1.80, -1.68,
+        ],
+        [
+            0.25, -1.22, 0.94, 1.03, -1.20, 0.22, 0.55, 0.08, 2.12, -1.62,
+        ],
+        [
+            0.07, -0.68, 1.34, 0.20, -1.28, 0.06, 0.83, -0.34, 2.19, -1.50,
+        ],
+        [
+            0.04, -1.38, 0.88, 0.14, -1.46, -0.29, 0.02, -0.46, 1.77, -1.49,
+        ],
+        [
+            -0.11, -1.13, 1.09, 0.20, -1.07, -0.67, 0.01, -0.56, 1.45, -1.77,
+        ],
+        [
+            -0.15, -0.96, 0.67, 0.11, -1.45, -0.49, 0.21, -0.49, 1.87, -2.16,
+        ],
     ];
 
     fn aiag() -> (Vec<f64>, Vec<Vec<usize>>, Vec<Option<String>>) {
-        let (mut values, mut units, mut appraisers) = (Vec::new(), vec![Vec::new(); 10], Vec::new());
+        let (mut values, mut units, mut appraisers) =
+            (Vec::new(), vec![Vec::new(); 10], Vec::new());
         for (row, all) in AIAG.iter().enumerate() {
             for (part, value) in all.iter().enumerate() {
                 units[part].push(values.len());
@@ -380,22 +458,35 @@ mod tests {
     #[test]
     fn the_example_of_the_aiag_has_its_published_components() {
         let (values, units, appraisers) = aiag();
-        let factors = [("operator".to_string(), appraisers.clone()), ("again".to_string(), appraisers)];
+        let factors = [
+            ("operator".to_string(), appraisers.clone()),
+            ("again".to_string(), appraisers),
+        ];
         let (study, members) = Study::of(&units, &factors, 100).unwrap();
         assert_eq!(study.factors.len(), 1);
         assert_eq!(study.factors[0].0, "operator = again");
         let ordered: Vec<f64> = members.iter().map(|m| values[*m]).collect();
         let gage = study.fit(&ordered).unwrap();
         // Table A 4, with the interaction pooled: EV 0.199933, AV 0.226838, GRR 0.302373, PV 1.042327.
-        let near = |found: f64, published: f64| assert!((found - published).abs() < 2e-4, "{found} {published}");
+        let near = |found: f64, published: f64| {
+            assert!((found - published).abs() < 2e-4, "{found} {published}")
+        };
         near(gage.repeatability.value, 0.199_933);
         near(gage.reproducibility.value, 0.226_838);
         near(gage.measurement.value, 0.302_373);
         near(gage.units.value, 1.042_327);
         assert_eq!(gage.components[3].variance, 0.0, "{:?}", gage.components);
         // Error and interaction pooled have 78 degrees of freedom: 0.199933 times the roots of 78/chi-square.
-        assert!((gage.repeatability.lower / 0.173 - 1.0).abs() < 0.01, "{:?}", gage.repeatability);
-        assert!((gage.repeatability.upper / 0.2369 - 1.0).abs() < 0.01, "{:?}", gage.repeatability);
+        assert!(
+            (gage.repeatability.lower / 0.173 - 1.0).abs() < 0.01,
+            "{:?}",
+            gage.repeatability
+        );
+        assert!(
+            (gage.repeatability.upper / 0.2369 - 1.0).abs() < 0.01,
+            "{:?}",
+            gage.repeatability
+        );
     }
 
     #[test]
@@ -406,7 +497,10 @@ mod tests {
         assert!(study.factors.is_empty());
         let gage = study.fit(&[1.0, 1.2, 3.0, 3.2, 2.0, 2.2]).unwrap();
         // Pairs that differ by 0.2 have a variance of 0.02.
-        assert!((gage.repeatability.value - 0.02f64.sqrt()).abs() < 1e-4, "{gage:?}");
+        assert!(
+            (gage.repeatability.value - 0.02f64.sqrt()).abs() < 1e-4,
+            "{gage:?}"
+        );
         assert_eq!(gage.reproducibility.value, 0.0);
         // Means 1.1, 3.1 and 2.1 have a variance of 1, of which repeatability explains 0.01.
         assert!((gage.units.value - 0.99f64.sqrt()).abs() < 1e-3, "{gage:?}");

@@ -5,20 +5,35 @@ use mimu::{Judgement, JudgementKind};
 
 use crate::result::Fleet;
 
+/// Most reasons that are named.
+const MOST: usize = 4;
+
 /// `suspect` if something contradicts one population, `untested` if too few units could contradict it.
 pub fn judge(fleet: &Fleet) -> Judgement {
     let mut reasons = Vec::new();
     if !fleet.strangers.is_empty() {
         let count = plural(fleet.strangers.len() as u64, "unit");
-        let verb = if fleet.strangers.len() == 1 { "does" } else { "do" };
+        let verb = if fleet.strangers.len() == 1 {
+            "does"
+        } else {
+            "do"
+        };
         reasons.push(format!("{count} {verb} not belong to the population"));
     }
     if !fleet.contradicting.is_empty() {
         let count = plural(fleet.contradicting.len() as u64, "calibration");
-        let verb = if fleet.contradicting.len() == 1 { "contradicts" } else { "contradict" };
+        let verb = if fleet.contradicting.len() == 1 {
+            "contradicts"
+        } else {
+            "contradict"
+        };
         reasons.push(format!("{count} {verb} others of the same unit"));
     }
-    let mut levels: Vec<String> = fleet.different.iter().map(|d| format!("{} {} differs", d.label, d.level)).collect();
+    let mut levels: Vec<String> = fleet
+        .different
+        .iter()
+        .map(|d| format!("{} {} differs", d.label, d.level))
+        .collect();
     levels.sort();
     levels.dedup();
     reasons.extend(levels);
@@ -27,10 +42,22 @@ pub fn judge(fleet: &Fleet) -> Judgement {
         format!("{} {} changed on {since}", c.label, c.level)
     }));
     reasons.dedup();
-    let signals = fleet.drift.iter().flat_map(|d| &d.charts).filter(|c| c.signal.is_some());
+    let signals = fleet
+        .drift
+        .iter()
+        .flat_map(|d| &d.charts)
+        .filter(|c| c.signal.is_some());
     let count = signals.count();
     if count > 0 {
-        reasons.push(format!("production drifts in {}", plural(count as u64, "parameter")));
+        reasons.push(format!(
+            "production drifts in {}",
+            plural(count as u64, "parameter")
+        ));
+    }
+    let rest = reasons.len().saturating_sub(MOST);
+    if rest > 0 {
+        reasons.truncate(MOST);
+        reasons.push(format!("and {}", plural(rest as u64, "other finding")));
     }
     if !reasons.is_empty() {
         return Judgement::new(JudgementKind::Suspect, reasons.join("; "));
@@ -44,6 +71,12 @@ pub fn judge(fleet: &Fleet) -> Judgement {
                 plural(triad.parameters.len() as u64, "parameter")
             ),
         ),
-        None => Judgement::new(JudgementKind::Good, format!("{} are of one population", plural(fleet.units as u64, "unit"))),
+        None => Judgement::new(
+            JudgementKind::Good,
+            format!(
+                "{} are of one population",
+                plural(fleet.units as u64, "unit")
+            ),
+        ),
     }
 }

@@ -75,7 +75,12 @@ impl LabelTable {
             .trim(csv::Trim::All)
             .comment(Some(b'#'))
             .from_reader(text.as_bytes());
-        let header: Vec<String> = reader.headers().map_err(broken)?.iter().map(str::to_lowercase).collect();
+        let header: Vec<String> = reader
+            .headers()
+            .map_err(broken)?
+            .iter()
+            .map(str::to_lowercase)
+            .collect();
         let key = header.first().cloned().unwrap_or_default();
         if !KEYS.contains(&key.as_str()) {
             let problem = format!("the first column is {key:?}");
@@ -94,7 +99,11 @@ impl LabelTable {
             let name = record.get(0).unwrap_or_default().to_owned();
             if let Some((before, _)) = rows.insert(name.clone(), (row, labels)) {
                 let problem = format!("{key} {name:?} is in row {before} too");
-                return Err(Error::new(format!("{place}, row {row}"), problem, "name each once"));
+                return Err(Error::new(
+                    format!("{place}, row {row}"),
+                    problem,
+                    "name each once",
+                ));
             }
         }
         Ok(Self {
@@ -122,7 +131,10 @@ impl LabelTable {
 
 /// A path with slashes on every system.
 pub fn slashes(path: &Path) -> String {
-    let parts: Vec<_> = path.components().map(|c| c.as_os_str().to_string_lossy()).collect();
+    let parts: Vec<_> = path
+        .components()
+        .map(|c| c.as_os_str().to_string_lossy())
+        .collect();
     parts.join("/")
 }
 
@@ -137,7 +149,8 @@ pub fn day(text: &str) -> Option<Date> {
 
 /// Whether a path is in a folder that a program hides.
 pub(crate) fn is_hidden(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
+    path.file_name()
+        .is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }
 
 /// Paths that `root` contains, in order.
@@ -163,7 +176,11 @@ mod tests {
 
     #[test]
     fn a_table_adds_labels_and_names_the_row_of_a_fault() {
-        let table = LabelTable::parse("file,fixture,day\na/u1.toml,B,\n# a remark\nu2.toml,C,3\n", "t.csv").unwrap();
+        let table = LabelTable::parse(
+            "file,fixture,day\na/u1.toml,B,\n# a remark\nu2.toml,C,3\n",
+            "t.csv",
+        )
+        .unwrap();
         let mut labels = Labels::new();
         assert!(table.add(&mut labels, Path::new("a/u1.toml"), "u1"));
         assert_eq!(labels.get("fixture").unwrap(), "B");
@@ -171,7 +188,10 @@ mod tests {
         assert!(!table.add(&mut labels, Path::new("u9.toml"), "u9"));
         for (text, part) in [
             ("fixture\nB\n", "row 1: the first column is \"fixture\""),
-            ("unit,fixture\nu1,B\nu1,C\n", "row 3: unit \"u1\" is in row 2 too"),
+            (
+                "unit,fixture\nu1,B\nu1,C\n",
+                "row 3: unit \"u1\" is in row 2 too",
+            ),
             ("unit,fixture\nu1,B,C\n", "row 2"),
         ] {
             let error = LabelTable::parse(text, "t.csv").unwrap_err().to_string();

@@ -49,7 +49,8 @@ pub type Levels = std::collections::BTreeMap<String, Vec<usize>>;
 
 /// The levels that differ from the others; `tried` is the number of all comparisons.
 pub fn different(units: &Units, levels: &Levels, tried: usize) -> Vec<Different> {
-    let usable: Vec<(&String, &Vec<usize>)> = levels.iter().filter(|(_, m)| m.len() >= FEWEST).collect();
+    let usable: Vec<(&String, &Vec<usize>)> =
+        levels.iter().filter(|(_, m)| m.len() >= FEWEST).collect();
     if usable.len() < 2 {
         return Vec::new();
     }
@@ -102,7 +103,8 @@ fn among_many(medians: &[Estimates]) -> Vec<(usize, f64, DVector<f64>)> {
         return Vec::new();
     };
     let each = medians.iter().zip(&found.distances).enumerate();
-    each.map(|(k, (m, d))| (k, d.p, &m.values - &found.mean)).collect()
+    each.map(|(k, (m, d))| (k, d.p, &m.values - &found.mean))
+        .collect()
 }
 
 /// Each level against those that remain, the least probable first; it then no longer remains.
@@ -117,7 +119,10 @@ fn among_few(medians: &[Estimates], tried: usize) -> Vec<(usize, f64, DVector<f6
         });
         // Of two levels the one with fewer units is named: its median is less certain.
         let worst = |c: &Estimates| c.covariance.trace();
-        let least = each.min_by(|a, b| a.1.total_cmp(&b.1).then(worst(&medians[b.0]).total_cmp(&worst(&medians[a.0]))));
+        let least = each.min_by(|a, b| {
+            a.1.total_cmp(&b.1)
+                .then(worst(&medians[b.0]).total_cmp(&worst(&medians[a.0])))
+        });
         let Some(least) = least.filter(|l| l.1 * (tried as f64) < FALSE_FINDING) else {
             break;
         };
@@ -128,7 +133,10 @@ fn among_few(medians: &[Estimates], tried: usize) -> Vec<(usize, f64, DVector<f6
 }
 
 /// Probability of the difference of `one` from the weighted mean of `others`, and the difference.
-fn against<'a>(one: &Estimates, others: impl Iterator<Item = &'a Estimates>) -> Option<(f64, DVector<f64>)> {
+fn against<'a>(
+    one: &Estimates,
+    others: impl Iterator<Item = &'a Estimates>,
+) -> Option<(f64, DVector<f64>)> {
     let n = one.values.len();
     let unit = one.covariance.diagonal().map(f64::sqrt);
     let scaled = |c: &DMatrix<f64>| DMatrix::from_fn(n, n, |i, j| c[(i, j)] / (unit[i] * unit[j]));
@@ -140,7 +148,11 @@ fn against<'a>(one: &Estimates, others: impl Iterator<Item = &'a Estimates>) -> 
     }
     let covariance = normal.cholesky()?.inverse();
     let change = -(&covariance * right);
-    let square = change.dot(&(covariance + scaled(&one.covariance)).cholesky()?.solve(&change));
+    let square = change.dot(
+        &(covariance + scaled(&one.covariance))
+            .cholesky()?
+            .solve(&change),
+    );
     let p = ChiSquared::new(n as f64).map_or(1.0, |d| d.sf(square));
     Some((p, change.component_mul(&unit)))
 }

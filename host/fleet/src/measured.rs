@@ -63,7 +63,11 @@ impl OfCalibration {
             let (values, parts) = triad.physical_parts();
             let zero = Covariance::zeros();
             let covariance = parts.iter().fold(zero, |sum, p| sum + p.covariance);
-            if !values.iter().chain(covariance.iter()).all(|v| v.is_finite()) {
+            if !values
+                .iter()
+                .chain(covariance.iter())
+                .all(|v| v.is_finite())
+            {
                 return Err(format!("a number of its {sensor} is not finite"));
             }
             triads[sensor] = Some((values, covariance));
@@ -98,9 +102,15 @@ pub struct Basis {
 
 impl Basis {
     /// The basis of a triad in all calibrations. `None` if none has it.
-    pub fn of(sensor: Sensor, reference: Option<Reference>, all: &[Option<Physical>]) -> Option<Self> {
+    pub fn of(
+        sensor: Sensor,
+        reference: Option<Reference>,
+        all: &[Option<Physical>],
+    ) -> Option<Self> {
         let free = mimu::sessions::free(all).into_iter();
-        let free: Vec<usize> = free.filter(|k| !defines_frame(sensor, reference, *k)).collect();
+        let free: Vec<usize> = free
+            .filter(|k| !defines_frame(sensor, reference, *k))
+            .collect();
         let median = |axis: usize| {
             let mut values: Vec<f64> = all.iter().flatten().map(|(v, _)| v[axis]).collect();
             values.sort_by(f64::total_cmp);
@@ -108,7 +118,11 @@ impl Basis {
         };
         let scale = [median(0)?, median(1)?, median(2)?];
         let usable = !free.is_empty() && scale.iter().all(|s| *s != 0.0);
-        usable.then_some(Self { sensor, free, scale })
+        usable.then_some(Self {
+            sensor,
+            free,
+            scale,
+        })
     }
 
     /// Factor from the unit of the files to that of the fleet, for parameter `k` of the twelve.
@@ -125,7 +139,9 @@ impl Basis {
         let by = |i: usize| self.factor(self.free[i]);
         let relative = |k: usize| if k < 3 { 1.0 } else { 0.0 };
         Estimates {
-            values: DVector::from_fn(n, |i, _| values[self.free[i]] * by(i) - relative(self.free[i])),
+            values: DVector::from_fn(n, |i, _| {
+                values[self.free[i]] * by(i) - relative(self.free[i])
+            }),
             covariance: DMatrix::from_fn(n, n, |i, j| {
                 covariance[(self.free[i], self.free[j])] * by(i) * by(j)
             }),
@@ -149,7 +165,12 @@ impl Basis {
     /// Name for people: `gyro scale factor x`.
     pub fn name(&self, i: usize) -> String {
         let parameter = self.parameter(i);
-        format!("{} {} {}", self.sensor, parameter.0.words(), parameter.axis())
+        format!(
+            "{} {} {}",
+            self.sensor,
+            parameter.0.words(),
+            parameter.axis()
+        )
     }
 }
 

@@ -95,7 +95,10 @@ pub fn fit(estimates: &[Estimates], centre: Option<&DVector<f64>>) -> Option<Pop
     let by = |v: &DVector<f64>| v.component_div(&units);
     let problem = Problem {
         values: estimates.iter().map(|e| by(&e.values)).collect(),
-        covariances: estimates.iter().map(|e| DMatrix::from_fn(n, n, |i, j| e.covariance[(i, j)] / (units[i] * units[j]))).collect(),
+        covariances: estimates
+            .iter()
+            .map(|e| DMatrix::from_fn(n, n, |i, j| e.covariance[(i, j)] / (units[i] * units[j])))
+            .collect(),
         centre: centre.map(by),
         jointly: estimates.len() >= JOINTLY * n && n > 1,
     };
@@ -129,7 +132,11 @@ impl Problem {
         let n = self.n();
         let (mean, total) = robust::first(&self.values, self.centre.as_ref(), self.jointly);
         let inverse = total.clone().cholesky()?;
-        let squares: Vec<Vec<f64>> = self.values.iter().map(|v| self.squares(&(v - &mean), &inverse)).collect();
+        let squares: Vec<Vec<f64>> = self
+            .values
+            .iter()
+            .map(|v| self.squares(&(v - &mean), &inverse))
+            .collect();
         let mut used = self.nearest(&squares);
         // Medians as in the first covariance: a few poor fits have hardly moved that.
         let errors = DMatrix::from_fn(n, n, |i, j| {
@@ -149,7 +156,10 @@ impl Problem {
             state = self.estimated(&state, &used, EM_ROUNDS[0])?;
             let squares = self.all_squares(&state)?;
             let cut = self.cut(used.iter().filter(|u| **u).count() as f64);
-            let next: Vec<bool> = squares.iter().map(|each| each.iter().all(|s| *s <= cut)).collect();
+            let next: Vec<bool> = squares
+                .iter()
+                .map(|each| each.iter().all(|s| *s <= cut))
+                .collect();
             let count = next.iter().filter(|u| **u).count();
             // A population of few needs half of them.
             if count < FEWEST.min(self.values.len() / 2 + 1) {
@@ -191,7 +201,10 @@ impl Problem {
             return vec![from.dot(&factor.solve(from))];
         }
         let l = factor.l_dirty();
-        from.iter().enumerate().map(|(i, r)| r * r / l.row(i).columns(0, i + 1).norm_squared()).collect()
+        from.iter()
+            .enumerate()
+            .map(|(i, r)| r * r / l.row(i).columns(0, i + 1).norm_squared())
+            .collect()
     }
 
     /// Those of all units, each with its own covariance.
@@ -216,7 +229,10 @@ impl Problem {
         let factors: Vec<f64> = (0..count).map(typical).collect();
         // Medians of distances know scales about as well as half of the units would.
         let cut = self.cut((0.5 * squares.len() as f64).max(self.n() as f64 + 2.0));
-        squares.iter().map(|each| each.iter().zip(&factors).all(|(s, f)| s / f <= cut)).collect()
+        squares
+            .iter()
+            .map(|each| each.iter().zip(&factors).all(|(s, f)| s / f <= cut))
+            .collect()
     }
 
     /// Mean and T of the used units, from those of `before`.
@@ -225,7 +241,11 @@ impl Problem {
         let members: Vec<usize> = (0..used.len()).filter(|i| used[*i]).collect();
         let count = members.len() as f64;
         // For the mean that is estimated too, and for the cut.
-        let lost = if self.centre.is_some() { 1.0 } else { count / (count - 1.0).max(1.0) };
+        let lost = if self.centre.is_some() {
+            1.0
+        } else {
+            count / (count - 1.0).max(1.0)
+        };
         let inflation = lost * self.inflation();
         let mut state = before.clone();
         // Where T is zero, expectation and maximisation would leave it so.
@@ -236,10 +256,11 @@ impl Problem {
             let weights = self.weights(&state, &members)?;
             if self.centre.is_none() {
                 let zero = || (DMatrix::zeros(n, n), DVector::zeros(n));
-                let (normal, right) = members.iter().zip(&weights).fold(zero(), |(m, r), (i, w)| {
-                    let right = r + w * &self.values[*i];
-                    (m + w, right)
-                });
+                let (normal, right) =
+                    members.iter().zip(&weights).fold(zero(), |(m, r), (i, w)| {
+                        let right = r + w * &self.values[*i];
+                        (m + w, right)
+                    });
                 state.mean_covariance = normal.cholesky()?.inverse();
                 state.mean = &state.mean_covariance * right;
             }
@@ -277,13 +298,22 @@ impl Problem {
     fn weights(&self, state: &State, members: &[usize]) -> Option<Vec<DMatrix<f64>>> {
         members
             .par_iter()
-            .map(|i| Some((&state.between + &self.covariances[*i]).cholesky()?.inverse()))
+            .map(|i| {
+                Some(
+                    (&state.between + &self.covariances[*i])
+                        .cholesky()?
+                        .inverse(),
+                )
+            })
             .collect()
     }
 
     fn judged(&self, state: &State, used: &[bool]) -> Option<Vec<Distance>> {
         let n = self.n();
-        let count = used.iter().filter(|u| **u).count() as f64;
+        let left = used.iter().filter(|u| **u).count() as f64;
+        // Of few units those that are left out are the most distant ones, and the others look closer together than they are: each costs a degree of freedom more.
+        let count = (2.0 * left - used.len() as f64)
+            .max(n as f64 * f64::from(u8::from(self.jointly)) + 2.0);
         let each = self.values.par_iter().zip(&self.covariances);
         each.map(|(value, own)| {
             let total = &state.between + own;
@@ -332,7 +362,8 @@ fn quantile(p: f64, n: f64, count: f64) -> f64 {
         return ChiSquared::new(n).map_or(f64::NAN, |d| d.inverse_cdf(1.0 - p));
     }
     let scaled = match n == 1.0 {
-        true => StudentsT::new(0.0, 1.0, rest).map_or(f64::NAN, |d| d.inverse_cdf(1.0 - 0.5 * p).powi(2)),
+        true => StudentsT::new(0.0, 1.0, rest)
+            .map_or(f64::NAN, |d| d.inverse_cdf(1.0 - 0.5 * p).powi(2)),
         false => FisherSnedecor::new(n, rest).map_or(f64::NAN, |d| d.inverse_cdf(1.0 - p)),
     };
     scaled * n * (count * count - 1.0) / (rest * count)

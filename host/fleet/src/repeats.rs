@@ -29,7 +29,9 @@ impl Repeats {
     ///
     /// `None` if a covariance is singular.
     pub fn of(all: &[Option<Estimates>], units: &[Vec<usize>]) -> Option<Self> {
-        let with = |unit: &Vec<usize>| -> Vec<usize> { unit.iter().copied().filter(|m| all[*m].is_some()).collect() };
+        let with = |unit: &Vec<usize>| -> Vec<usize> {
+            unit.iter().copied().filter(|m| all[*m].is_some()).collect()
+        };
         let units: Vec<Vec<usize>> = units.iter().map(with).filter(|u| !u.is_empty()).collect();
         let (members, differences) = differences(all, &units);
         let n = all.iter().flatten().next()?.values.len();
@@ -48,8 +50,15 @@ impl Repeats {
         let estimate = |unit: &Vec<usize>| {
             let good: Vec<usize> = unit.iter().copied().filter(|m| !bad.contains(m)).collect();
             // Of two nobody knows which is wrong.
-            let used = if unit.len() < 3 || good.is_empty() { unit } else { &good };
-            together(used.iter().filter_map(|m| all[*m].as_ref()), within.as_ref())
+            let used = if unit.len() < 3 || good.is_empty() {
+                unit
+            } else {
+                &good
+            };
+            together(
+                used.iter().filter_map(|m| all[*m].as_ref()),
+                within.as_ref(),
+            )
         };
         let estimates = units.iter().map(estimate).collect::<Option<_>>()?;
         Some(Self {
@@ -88,7 +97,10 @@ fn differences(all: &[Option<Estimates>], units: &[Vec<usize>]) -> (Vec<usize>, 
 }
 
 /// What several measurements say together, each weighted by its uncertainty.
-fn together<'a>(all: impl Iterator<Item = &'a Estimates>, within: Option<&DMatrix<f64>>) -> Option<Estimates> {
+fn together<'a>(
+    all: impl Iterator<Item = &'a Estimates>,
+    within: Option<&DMatrix<f64>>,
+) -> Option<Estimates> {
     let all: Vec<&Estimates> = all.collect();
     let total = |e: &Estimates| match within {
         Some(within) => &e.covariance + within,
@@ -103,7 +115,12 @@ fn together<'a>(all: impl Iterator<Item = &'a Estimates>, within: Option<&DMatri
     let n = all.first()?.values.len();
     let (mut normal, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
     // Units of the largest error of each parameter keep the inverse regular.
-    let unit = DVector::from_fn(n, |i, _| all.iter().map(|e| total(e)[(i, i)]).fold(0.0, f64::max).sqrt());
+    let unit = DVector::from_fn(n, |i, _| {
+        all.iter()
+            .map(|e| total(e)[(i, i)])
+            .fold(0.0, f64::max)
+            .sqrt()
+    });
     for e in &all {
         let own = total(e);
         let own = DMatrix::from_fn(n, n, |i, j| own[(i, j)] / (unit[i] * unit[j]));

@@ -200,7 +200,7 @@ pub struct ChartOfParameter {
     pub signal: Option<String>,
     /// When the drift began, if there is one.
     pub since: Option<String>,
-    /// Largest distance of the average from the centre after the signal, with sign.
+    /// Largest distance of the average from the centre after the signal, with sign; of a label the step against the others.
     pub change: Option<f64>,
     /// Days.
     pub days: Vec<String>,

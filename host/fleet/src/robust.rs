@@ -35,20 +35,37 @@ pub fn location_and_scale(values: impl Iterator<Item = f64> + Clone) -> (f64, f6
 }
 
 /// A first location and covariance of `all`. With `jointly` correlations too; else coordinate by coordinate. `centre` is the location if it is known.
-pub fn first(all: &[DVector<f64>], centre: Option<&DVector<f64>>, jointly: bool) -> (DVector<f64>, DMatrix<f64>) {
+pub fn first(
+    all: &[DVector<f64>],
+    centre: Option<&DVector<f64>>,
+    jointly: bool,
+) -> (DVector<f64>, DMatrix<f64>) {
     let n = all[0].len();
-    let each: Vec<(f64, f64)> = (0..n).map(|i| location_and_scale(all.iter().map(|v| v[i]))).collect();
-    let location = centre.cloned().unwrap_or_else(|| DVector::from_fn(n, |i, _| each[i].0));
+    let each: Vec<(f64, f64)> = (0..n)
+        .map(|i| location_and_scale(all.iter().map(|v| v[i])))
+        .collect();
+    let location = centre
+        .cloned()
+        .unwrap_or_else(|| DVector::from_fn(n, |i, _| each[i].0));
     let scale = DVector::from_fn(n, |i, _| each[i].1.max(f64::MIN_POSITIVE.sqrt()));
     if !jointly {
-        return (location, DMatrix::from_diagonal(&scale.component_mul(&scale)));
+        return (
+            location,
+            DMatrix::from_diagonal(&scale.component_mul(&scale)),
+        );
     }
-    let standard: Vec<DVector<f64>> = all.iter().map(|v| (v - &location).component_div(&scale)).collect();
+    let standard: Vec<DVector<f64>> = all
+        .iter()
+        .map(|v| (v - &location).component_div(&scale))
+        .collect();
     let mut correlation = DMatrix::identity(n, n);
     for i in 0..n {
         for j in 0..i {
-            let [sum, difference] = [1.0, -1.0]
-                .map(|sign| location_and_scale(standard.iter().map(move |v| v[i] + sign * v[j])).1.powi(2));
+            let [sum, difference] = [1.0, -1.0].map(|sign| {
+                location_and_scale(standard.iter().map(move |v| v[i] + sign * v[j]))
+                    .1
+                    .powi(2)
+            });
             correlation[(i, j)] = 0.25 * (sum - difference);
             correlation[(j, i)] = correlation[(i, j)];
         }
@@ -56,7 +73,9 @@ pub fn first(all: &[DVector<f64>], centre: Option<&DVector<f64>>, jointly: bool)
     // It need not be positive definite; variances along its axes are estimated again.
     let axes = SymmetricEigen::new(correlation).eigenvectors;
     let turned: Vec<DVector<f64>> = standard.iter().map(|v| axes.tr_mul(v)).collect();
-    let along: Vec<(f64, f64)> = (0..n).map(|i| location_and_scale(turned.iter().map(|v| v[i]))).collect();
+    let along: Vec<(f64, f64)> = (0..n)
+        .map(|i| location_and_scale(turned.iter().map(|v| v[i])))
+        .collect();
     let variances = DVector::from_fn(n, |i, _| along[i].1.powi(2).max(1e-12));
     let back = DMatrix::from_diagonal(&scale) * &axes;
     let covariance = &back * DMatrix::from_diagonal(&variances) * back.transpose();

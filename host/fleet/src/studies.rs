@@ -37,13 +37,22 @@ struct Value {
 }
 
 /// The study of all units that were measured repeatedly; `None` if there are fewer than two.
-pub fn study(all: &[Measurement], units: &[Vec<usize>], triads: &[Triad], options: &Options) -> Option<GageStudy> {
+pub fn study(
+    all: &[Measurement],
+    units: &[Vec<usize>],
+    triads: &[Triad],
+    options: &Options,
+) -> Option<GageStudy> {
     let names: Vec<String> = match options.factors.is_empty() {
         true => FACTORS.map(String::from).to_vec(),
         false => options.factors.clone(),
     };
     let level = |m: &Measurement, name: &str| match name {
-        DATE => m.labels.get(DATE).cloned().or_else(|| m.day.map(|d| d.to_string())),
+        DATE => m
+            .labels
+            .get(DATE)
+            .cloned()
+            .or_else(|| m.day.map(|d| d.to_string())),
         _ => m.labels.get(name).cloned(),
     };
     let factors: Vec<(String, Vec<Option<String>>)> = names
@@ -54,7 +63,9 @@ pub fn study(all: &[Measurement], units: &[Vec<usize>], triads: &[Triad], option
         })
         .collect();
     let (mut study, members) = Study::of(units, &factors, MOST_UNITS)?;
-    study.factors.retain(|f| f.1.iter().max().is_none_or(|m| *m < MOST_LEVELS));
+    study
+        .factors
+        .retain(|f| f.1.iter().max().is_none_or(|m| *m < MOST_LEVELS));
     let mut values = of_triads(triads);
     values.extend(of_properties(all));
     let each = values.par_iter().filter_map(|value| {
@@ -76,11 +87,18 @@ fn of_triads(triads: &[Triad]) -> Vec<Value> {
         sensor: triad.basis.sensor,
         name: triad.basis.parameter(i).to_string(),
         unit: triad.basis.unit(i).to_string(),
-        values: triad.estimates.iter().map(|e| e.as_ref().map(|e| e.values[i])).collect(),
+        values: triad
+            .estimates
+            .iter()
+            .map(|e| e.as_ref().map(|e| e.values[i]))
+            .collect(),
         fit_sigma: triad.fit[(i, i)].sqrt(),
         tolerance: None,
     };
-    triads.iter().flat_map(|t| (0..t.n()).map(move |i| of(t, i))).collect()
+    triads
+        .iter()
+        .flat_map(|t| (0..t.n()).map(move |i| of(t, i)))
+        .collect()
 }
 
 /// Half of a 95 % interval of a normal variable in standard deviations.
@@ -92,7 +110,9 @@ fn of_properties(all: &[Measurement]) -> Vec<Value> {
     };
     let of = |row: &Row| {
         let same = |m: &Measurement| {
-            let found = m.properties.iter().find(|r| r.sensor == row.sensor && r.property == row.property && r.axis == row.axis);
+            let found = m.properties.iter().find(|r| {
+                r.sensor == row.sensor && r.property == row.property && r.axis == row.axis
+            });
             found.map(|r| (r.value, r.half_width))
         };
         let mut halves: Vec<f64> = all.iter().filter_map(|m| same(m)?.1).collect();
@@ -119,7 +139,11 @@ fn result(value: &Value, gage: &Gage) -> GageOfParameter {
         reproducibility: gage.reproducibility,
         measurement: gage.measurement,
         between_units: gage.units,
-        components: gage.components.iter().map(|c| (c.name.clone(), c.variance.sqrt())).collect(),
+        components: gage
+            .components
+            .iter()
+            .map(|c| (c.name.clone(), c.variance.sqrt()))
+            .collect(),
         share_of_variation: measurement / measurement.hypot(units),
         share_of_tolerance: value.tolerance.map(|t| ALL * measurement / t),
         categories: (2f64.sqrt() * units / measurement).floor(),

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use jiff::civil::Date;
+use mimu::Error;
 use mimu::calibration::Calibration;
 use mimu::data_sheet::{DataSheet, Part, Row};
-use mimu::Error;
 use mimu_recording::UNNAMED;
 use rayon::prelude::*;
 
@@ -70,13 +70,21 @@ impl Tree {
     ///
     /// # Errors
     /// A root cannot be read. Faults of files below it are in [`Self::left_out`].
-    pub fn read(roots: &[PathBuf], search: Search, progress: &(dyn Fn(f64) + Sync)) -> Result<Self, Error> {
+    pub fn read(
+        roots: &[PathBuf],
+        search: Search,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Self, Error> {
         let mut files = Vec::new();
         let mut tree = Self::default();
         for root in roots {
             match root.is_file() {
-                true => files.push((root.clone(), root.file_name().map(PathBuf::from).unwrap_or_default())),
-                false => find(root, root, 0, &mut files, &mut tree.left_out).map_err(|e| Error::io(root, &e))?,
+                true => files.push((
+                    root.clone(),
+                    root.file_name().map(PathBuf::from).unwrap_or_default(),
+                )),
+                false => find(root, root, 0, &mut files, &mut tree.left_out)
+                    .map_err(|e| Error::io(root, &e))?,
             }
         }
         let count = files.len();
@@ -129,7 +137,9 @@ fn find(
         if path.is_dir() {
             let within = match depth < DEEPEST {
                 true => find(root, &path, depth + 1, files, left_out),
-                false => Err(std::io::Error::other(format!("more than {DEEPEST} folders deep; is a link circular?"))),
+                false => Err(std::io::Error::other(format!(
+                    "more than {DEEPEST} folders deep; is a link circular?"
+                ))),
             };
             if let Err(error) = within {
                 left_out.push(LeftOut {
@@ -137,7 +147,10 @@ fn find(
                     reason: error.to_string(),
                 });
             }
-        } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        } else if path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+        {
             files.push((path, relative));
         }
     }
@@ -146,10 +159,15 @@ fn find(
 
 /// Formats of this program's files that are no calibrations.
 fn is_other(text: &str) -> bool {
-    let format = text.lines().find_map(|line| line.trim_start().strip_prefix("format"));
+    let format = text
+        .lines()
+        .find_map(|line| line.trim_start().strip_prefix("format"));
     let named = format.and_then(|rest| rest.trim_start().strip_prefix('='));
     match named {
-        Some(name) => !name.trim_start().trim_start_matches(['"', '\'']).starts_with("mimu-calibration"),
+        Some(name) => !name
+            .trim_start()
+            .trim_start_matches(['"', '\''])
+            .starts_with("mimu-calibration"),
         // A calibration that was cut off before its format is a fault; another program's TOML is none of ours.
         None => !text.contains("[gyro]") && !text.contains("[accel]"),
     }
@@ -178,20 +196,33 @@ fn read(path: &Path, relative: &Path, search: Search) -> Read {
         Err(reason) => return left_out(reason),
     };
     let mut labels = labels::of_folders(relative, search.folders);
-    let stem = || path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stem = || {
+        path.file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
     let in_file = || {
         let number = calibration.unit_id.clone();
-        let name = Some(calibration.device.clone()).filter(|name| name != UNNAMED && !name.is_empty());
+        let name =
+            Some(calibration.device.clone()).filter(|name| name != UNNAMED && !name.is_empty());
         number.or(name).unwrap_or_else(stem)
     };
     let mut unit = labels.remove(UNIT).unwrap_or_else(in_file);
-    let labelled = search.table.is_none_or(|table| table.add(&mut labels, relative, &unit));
+    let labelled = search
+        .table
+        .is_none_or(|table| table.add(&mut labels, relative, &unit));
     if let Some(of_table) = labels.remove(UNIT) {
         unit = of_table;
     }
     let created = calibration.created.as_deref().and_then(labels::day);
-    let day = labels.get(DATE).and_then(|text| labels::day(text)).or(created);
-    let properties = search.part.map(|part| DataSheet::of(&calibration, None, part).rows);
+    let day = labels
+        .get(DATE)
+        .and_then(|text| labels::day(text))
+        .or(created);
+    let properties = search
+        .part
+        .map(|part| DataSheet::of(&calibration, None, part).rows);
     let measurement = Measurement {
         file: slashes(relative),
         unit,

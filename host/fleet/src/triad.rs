@@ -33,15 +33,27 @@ const SIGMAS: f64 = 5.125;
 
 impl Triad {
     /// The triad of `sensor`. `None` if too few units have it, or if a covariance is singular.
-    pub fn of(sensor: Sensor, reference: Option<Reference>, all: &[Measurement], units: &[Vec<usize>]) -> Option<Self> {
+    pub fn of(
+        sensor: Sensor,
+        reference: Option<Reference>,
+        all: &[Measurement],
+        units: &[Vec<usize>],
+    ) -> Option<Self> {
         let physical: Vec<_> = all.iter().map(|m| m.of.triads[sensor]).collect();
         let basis = Basis::of(sensor, reference, &physical)?;
-        let estimates: Vec<Option<Estimates>> = physical.iter().map(|p| p.as_ref().map(|p| basis.estimates(p))).collect();
+        let estimates: Vec<Option<Estimates>> = physical
+            .iter()
+            .map(|p| p.as_ref().map(|p| basis.estimates(p)))
+            .collect();
         let repeats = Repeats::of(&estimates, units)?;
         let population = population::fit(&repeats.estimates, None)?;
         let n = basis.free.len();
         let fit = DMatrix::from_fn(n, n, |i, j| {
-            let mut sum: Vec<f64> = estimates.iter().flatten().map(|e| e.covariance[(i, j)]).collect();
+            let mut sum: Vec<f64> = estimates
+                .iter()
+                .flatten()
+                .map(|e| e.covariance[(i, j)])
+                .collect();
             crate::robust::median(&mut sum)
         });
         Some(Self {
@@ -104,7 +116,11 @@ impl Triad {
             sigma: population.covariance[(i, i)].sqrt(),
             fit_sigma: self.fit[(i, i)].sqrt(),
             within_sigma: within,
-            histogram: Histogram { from, width, counts },
+            histogram: Histogram {
+                from,
+                width,
+                counts,
+            },
         }
     }
 }

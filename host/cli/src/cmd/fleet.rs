@@ -64,7 +64,11 @@ pub fn run(args: &FleetArgs, command_line: &str) -> Result<()> {
     let mut text = fleet_text(&result, args.verbose.verbose);
     let mut page = None;
     if let Some(out) = &args.out {
-        let names: Vec<String> = args.folders.iter().map(|f| f.display().to_string()).collect();
+        let names: Vec<String> = args
+            .folders
+            .iter()
+            .map(|f| f.display().to_string())
+            .collect();
         let made = Made {
             recording: names.join(", "),
             command: command_line.to_owned(),

@@ -6,23 +6,24 @@ mod tables;
 
 use std::fmt::Write as _;
 
-use mimu::quantity::{p_value, plural, significant};
+use mimu::quantity::{p_value, plural, plus_minus, significant};
 use mimu_fleet::Fleet;
-use mimu_fleet::result::{ChangedLevel, ChartOfParameter, DifferentLevel, Stranger};
+use mimu_fleet::result::{
+    ChangedLevel, ChartOfParameter, DifferentLevel, GageOfParameter, GageStudy, Stranger,
+};
 
 pub use page::fleet_page;
 
 use super::text::wrap;
 use tables::{parameter, readable};
 
-/// Lines of each list in a summary.
-const SHOWN: usize = 3;
+/// Lists of a summary that have two lines each; of more lists each has one.
+const FEW_LISTS: usize = 2;
 
 /// The result as text: a summary, or everything.
 pub fn fleet_text(fleet: &Fleet, verbose: bool) -> String {
     let mut out = String::new();
     wrap(&mut out, "", &head(fleet));
-    let shown = if verbose { usize::MAX } else { SHOWN };
     wrap(&mut out, "judgement: ", &fleet.judgement.to_string());
     files(&mut out, fleet, verbose);
     out.push('\n');
@@ -35,26 +36,75 @@ pub fn fleet_text(fleet: &Fleet, verbose: bool) -> String {
         }
         false => out += &tables::spreads(fleet).text(""),
     }
-    list(&mut out, fleet.strangers.iter().map(unit), shown, "units that do not belong");
-    list(&mut out, fleet.contradicting.iter().map(calibration), shown, "calibrations that contradict others of their unit");
-    list(&mut out, fleet.different.iter().map(level), shown, "labels that differ");
-    list(&mut out, fleet.changed.iter().map(changed), shown, "labels that changed");
-    let signals = fleet.drift.iter().flat_map(|d| &d.charts).filter(|c| c.signal.is_some());
-    list(&mut out, signals.map(drift), shown, "parameters that drift");
+    let lists: Vec<(&str, Vec<String>)> = lists(fleet)
+        .into_iter()
+        .filter(|l| !l.1.is_empty())
+        .collect();
+    let shown = match (verbose, lists.len()) {
+        (true, _) => usize::MAX,
+        (_, count) if count > FEW_LISTS => 1,
+        _ => 2,
+    };
+    for (what, all) in lists {
+        let more = if all.len() > shown {
+            " (--verbose)"
+        } else {
+            ""
+        };
+        let _ = writeln!(out, "{what}: {}{more}", all.len());
+        all.iter()
+            .take(shown)
+            .for_each(|line| wrap(&mut out, "  ", line));
+    }
     if let Some(gage) = &fleet.gage {
-        let _ = writeln!(out, "\n{}", gage_line(gage));
+        let worst = worst(gage).filter(|_| !verbose);
+        let worst = worst.map_or_else(String::new, |worst| format!("; {worst}"));
+        wrap(&mut out, "", &format!("{}{worst}", gage_line(gage)));
         if verbose {
             out += &tables::gage(gage).text("");
-        } else if let Some(worst) = worst(gage) {
-            let _ = writeln!(out, "{worst}");
         }
     }
     capability(&mut out, fleet, verbose);
     out
 }
 
+/// What is found, by kind, the most significant first. The JSON has all triads of a label, the list the one that shows it most.
+fn lists(fleet: &Fleet) -> [(&'static str, Vec<String>); 5] {
+    let mut labels: Vec<(&str, &str)> = Vec::new();
+    let different = fleet.different.iter().filter(|d| {
+        let new = !labels.contains(&(&d.label, &d.level));
+        labels.push((&d.label, &d.level));
+        new
+    });
+    let different = different.map(level).collect();
+    let signals = fleet
+        .drift
+        .iter()
+        .flat_map(|d| &d.charts)
+        .filter(|c| c.signal.is_some());
+    [
+        (
+            "units that do not belong",
+            fleet.strangers.iter().map(unit).collect(),
+        ),
+        (
+            "calibrations that contradict others of their unit",
+            fleet.contradicting.iter().map(calibration).collect(),
+        ),
+        ("labels that differ", different),
+        (
+            "labels that changed",
+            fleet.changed.iter().map(changed).collect(),
+        ),
+        ("parameters that drift", signals.map(drift).collect()),
+    ]
+}
+
 fn head(fleet: &Fleet) -> String {
-    let days = fleet.days.as_ref().map_or_else(String::new, |[from, to]| format!(", {from} to {to}"));
+    let days = fleet
+        .days
+        .as_ref()
+        .map_or_else(String::new, |[from, to]| format!(", {from} to {to}"));
     format!(
         "fleet: {}, {}{days}, readings in {} with reference \"{}\"",
         plural(fleet.units as u64, "unit"),
@@ -80,21 +130,11 @@ fn files(out: &mut String, fleet: &Fleet, verbose: bool) {
         let _ = writeln!(out, "left out: {} (--verbose)", plural(rest, "more file"));
     }
     if fleet.unlabelled > 0 {
-        let _ = writeln!(out, "warning: {} without a row in the table of labels", plural(fleet.unlabelled as u64, "calibration"));
-    }
-}
-
-fn list(out: &mut String, all: impl Iterator<Item = String>, shown: usize, what: &str) {
-    let all: Vec<String> = all.collect();
-    if all.is_empty() {
-        return;
-    }
-    let _ = writeln!(out, "\n{what}: {}", all.len());
-    for line in all.iter().take(shown) {
-        wrap(out, "  ", line);
-    }
-    if all.len() > shown {
-        let _ = writeln!(out, "  and {} more (--verbose)", all.len() - shown);
+        let _ = writeln!(
+            out,
+            "warning: {} without a row in the table of labels",
+            plural(fleet.unlabelled as u64, "calibration")
+        );
     }
 }
 
@@ -104,21 +144,14 @@ pub(super) fn signed(unit: &str, change: f64) -> String {
     format!("{sign}{}", readable(unit).write(change.abs()))
 }
 
-fn labels(one: &Stranger) -> String {
-    let each = one.labels.iter().map(|(name, value)| format!("{name} {value}"));
-    let all: Vec<String> = each.collect();
-    if all.is_empty() { String::new() } else { format!("; {}", all.join(", ")) }
-}
-
 fn unit(one: &Stranger) -> String {
     format!(
-        "{} ({}): {} {} by {} sigmas{}",
+        "{}: {} {} ({} sigmas, {})",
         one.unit,
-        p_value(one.p),
         parameter(one.sensor, &one.parameter),
         signed(one.parameter_unit, one.change),
         significant(one.sigmas.abs()),
-        labels(one)
+        p_value(one.p),
     )
 }
 
@@ -128,25 +161,28 @@ fn calibration(one: &Stranger) -> String {
 
 fn level(one: &DifferentLevel) -> String {
     format!(
-        "{} {} ({} of {}): {} {} ({} sigmas of the population)",
+        "{} {}: {} {} ({} sigmas of the population, {}, {})",
         one.label,
         one.level,
-        p_value(one.p),
-        plural(one.count as u64, "calibration"),
         parameter(one.sensor, &one.parameter),
         signed(one.parameter_unit, one.change),
-        significant(one.sigmas.abs())
+        significant(one.sigmas.abs()),
+        plural(one.count as u64, "unit"),
+        p_value(one.p),
     )
 }
 
 fn since(chart: &ChartOfParameter) -> String {
     let change = chart.change.unwrap_or(f64::NAN);
+    let signal = chart
+        .signal
+        .as_ref()
+        .map_or_else(String::new, |day| format!(", beyond the limits on {day}"));
     format!(
-        "{} {} since {} (beyond the limits on {})",
+        "{} {} since {}{signal}",
         parameter(chart.sensor, &chart.parameter),
         signed(chart.unit, change),
         chart.since.as_deref().unwrap_or("the first day"),
-        chart.signal.as_deref().unwrap_or("no day"),
     )
 }
 
@@ -158,57 +194,71 @@ fn drift(chart: &ChartOfParameter) -> String {
     since(chart)
 }
 
-fn gage_line(gage: &mimu_fleet::result::GageStudy) -> String {
+fn gage_line(gage: &GageStudy) -> String {
     let factors = match gage.factors.is_empty() {
-        true => "no operator, fixture or day changes within a unit, so that reproducibility is unknown".to_string(),
-        false => format!("reproducibility by {}", gage.factors.join(", ")),
+        true => "no operator, fixture or day changes within a unit".to_string(),
+        false => format!("by {}", gage.factors.join(", ")),
+    };
+    let units = match gage.units {
+        [all, used] if all == used => plural(all as u64, "unit"),
+        [all, used] => format!("{used} of {}", plural(all as u64, "unit")),
     };
     format!(
-        "repeatability and reproducibility: {} of {} with repeated calibrations; {factors}",
-        gage.units[1],
-        plural(gage.units[0] as u64, "unit")
+        "repeatability and reproducibility: {units} with {}, {factors}",
+        plural(gage.measurements as u64, "calibration")
     )
 }
 
 /// The parameter whose measurement has the largest share of the tolerance, or else of the variation.
-fn worst(gage: &mimu_fleet::result::GageStudy) -> Option<String> {
-    let with = |p: &&mimu_fleet::result::GageOfParameter| p.share_of_tolerance.is_some();
-    let by_tolerance = gage.parameters.iter().filter(with).max_by(|a, b| a.share_of_tolerance.unwrap_or(0.0).total_cmp(&b.share_of_tolerance.unwrap_or(0.0)));
-    let worst = by_tolerance.or_else(|| gage.parameters.iter().max_by(|a, b| a.share_of_variation.total_cmp(&b.share_of_variation)))?;
-    let (share, of) = match worst.share_of_tolerance {
-        Some(share) => (share, "tolerance"),
-        None => (worst.share_of_variation, "variation"),
-    };
+fn worst(gage: &GageStudy) -> Option<String> {
+    let by_tolerance = gage
+        .parameters
+        .iter()
+        .filter_map(|p| Some((p, p.share_of_tolerance?, "tolerance")));
+    let by_variation = gage
+        .parameters
+        .iter()
+        .map(|p| (p, p.share_of_variation, "variation"));
+    let largest =
+        |a: &(&GageOfParameter, f64, &str), b: &(&GageOfParameter, f64, &str)| a.1.total_cmp(&b.1);
+    let (worst, share, of) = by_tolerance
+        .max_by(largest)
+        .or_else(|| by_variation.max_by(largest))?;
     Some(format!(
-        "  the measurement takes at most {} % of the {of}: {}, 1 sigma {}",
+        "at most {} % of the {of} ({})",
         significant(100.0 * share),
-        parameter(worst.sensor, &worst.name),
-        readable(&worst.unit).write(worst.measurement.value)
+        parameter(worst.sensor, &worst.name)
     ))
 }
 
 fn capability(out: &mut String, fleet: &Fleet, verbose: bool) {
     let Some(part) = &fleet.part else { return };
-    let _ = writeln!(out, "\nagainst the limits of {part}");
-    if fleet.capability.is_empty() {
-        let _ = writeln!(out, "  no limit could be compared: sensitivities need readings of a range of the part");
+    let worst = fleet
+        .capability
+        .iter()
+        .min_by(|a, b| a.cpk.total_cmp(&b.cpk));
+    let Some(worst) = worst else {
+        wrap(
+            out,
+            "",
+            &format!(
+                "limits of {part}: none could be compared; sensitivities need readings in a range of the part"
+            ),
+        );
         return;
-    }
+    };
+    let line = format!(
+        "limits of {part}: least Cpk {} ({} {} {}, {} beyond {} {})",
+        plus_minus(worst.cpk, worst.cpk_half_width),
+        worst.sensor,
+        worst.property.name(worst.sensor),
+        worst.axis,
+        plural(worst.beyond as u64, "unit"),
+        significant(worst.at_most),
+        worst.unit
+    );
+    wrap(out, "", &line);
     if verbose {
         *out += &tables::capability(&fleet.capability).text("");
-        return;
-    }
-    if let Some(worst) = fleet.capability.iter().min_by(|a, b| a.cpk.total_cmp(&b.cpk)) {
-        let _ = writeln!(
-            out,
-            "  least Cpk {}: {} {} {}, {} beyond {} {}",
-            mimu::quantity::plus_minus(worst.cpk, worst.cpk_half_width),
-            worst.sensor,
-            worst.property.name(worst.sensor),
-            worst.axis,
-            plural(worst.beyond as u64, "unit"),
-            significant(worst.at_most),
-            worst.unit
-        );
     }
 }

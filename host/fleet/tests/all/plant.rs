@@ -16,6 +16,21 @@ pub const ACCEL: [f64; 4] = [3e-3, 0.0, 2e-3, 0.2];
 /// Scale factors, raw/SI.
 pub const SCALE: [f64; 2] = [940.0, 1670.0];
 
+/// Processor time of this program, s: user and system, from Linux; elapsed time elsewhere says the same on an idle machine.
+pub fn processor_time() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let after = stat.rsplit(')').next().unwrap_or_default();
+    let ticks = |k: usize| {
+        after
+            .split_whitespace()
+            .nth(k)
+            .and_then(|t| t.parse::<f64>().ok())
+            .unwrap_or(0.0)
+    };
+    // Fields 14 and 15 of proc(5), in hundredths of a second.
+    (ticks(11) + ticks(12)) / 100.0
+}
+
 /// Faults of the production.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Faults {
@@ -80,23 +95,41 @@ impl Plant {
     pub fn tree(&self) -> Tree {
         let mut random = Random::new(self.seed, "plant");
         let mut measurements = Vec::new();
-        let factors = [correlation(&mut random), correlation(&mut random)].map(|c| c.cholesky().unwrap().l());
-        let operators: Vec<[SVector<f64, 12>; 2]> = (0..3).map(|_| [0, 1].map(|_| standard(&mut random))).collect();
+        let factors =
+            [correlation(&mut random), correlation(&mut random)].map(|c| c.cholesky().unwrap().l());
+        let operators: Vec<[SVector<f64, 12>; 2]> = (0..3)
+            .map(|_| [0, 1].map(|_| standard(&mut random)))
+            .collect();
         for k in 0..self.units {
             let truth = [0, 1].map(|s| factors[s].clone() * standard(&mut random));
             let truth = truth.map(|t| SVector::<f64, 12>::from_fn(|i, _| t[i]));
             let own = ["A", "B", "C", "D"][(4.0 * random.uniform()) as usize % 4];
             let runs = if k < self.repeated { 6 } else { 1 };
             for run in 0..runs {
-                let operator = if k < self.repeated { run / 2 } else { (3.0 * random.uniform()) as usize % 3 };
+                let operator = if k < self.repeated {
+                    run / 2
+                } else {
+                    (3.0 * random.uniform()) as usize % 3
+                };
                 let each = [0, 1].map(|s| {
                     let repetition = standard(&mut random) * self.repetition;
-                    truth[s] + operators[operator][s] * self.operator + repetition + self.fault(k, s, own)
+                    truth[s]
+                        + operators[operator][s] * self.operator
+                        + repetition
+                        + self.fault(k, s, own)
                 });
-                measurements.push(self.measurement(&mut random, (k, run), &each, [own, ["eva", "max", "ida"][operator]]));
+                measurements.push(self.measurement(
+                    &mut random,
+                    (k, run),
+                    &each,
+                    [own, ["eva", "max", "ida"][operator]],
+                ));
             }
         }
-        Tree { measurements, ..Tree::default() }
+        Tree {
+            measurements,
+            ..Tree::default()
+        }
     }
 
     /// What faults add to the parameters of unit `k`, standard deviations of units.
@@ -121,7 +154,13 @@ impl Plant {
     }
 
     /// Estimates of parameters that are given in standard deviations of units.
-    fn measurement(&self, random: &mut Random, (k, run): (usize, usize), truth: &[SVector<f64, 12>; 2], labels: [&str; 2]) -> Measurement {
+    fn measurement(
+        &self,
+        random: &mut Random,
+        (k, run): (usize, usize),
+        truth: &[SVector<f64, 12>; 2],
+        labels: [&str; 2],
+    ) -> Measurement {
         let mut triads = PerSensor::default();
         for (s, sensor) in Sensor::BOTH.into_iter().enumerate() {
             let sizes = [GYRO, ACCEL][s];
@@ -137,15 +176,27 @@ impl Plant {
             let errors = &root * DMatrix::from_fn(16, 1, |_, _| random.normal());
             let covariance = &root * root.transpose();
             let values = SVector::from_fn(|i, _| mean(i) + raw(i) * (truth[s][i] + errors[i]));
-            triads[sensor] = Some((values, Covariance::from_fn(|i, j| covariance[(i, j)] * raw(i) * raw(j))));
+            triads[sensor] = Some((
+                values,
+                Covariance::from_fn(|i, j| covariance[(i, j)] * raw(i) * raw(j)),
+            ));
         }
-        let labels = [("fixture", labels[0].to_string()), ("operator", labels[1].to_string()), ("batch", format!("{:02}", self.batch(k)))];
+        let labels = [
+            ("fixture", labels[0].to_string()),
+            ("operator", labels[1].to_string()),
+            ("batch", format!("{:02}", self.batch(k))),
+        ];
         let first = jiff::civil::date(2026, 1, 5);
-        let day: Date = first.checked_add(jiff::Span::new().days(self.day(k) as i64)).unwrap();
+        let day: Date = first
+            .checked_add(jiff::Span::new().days(self.day(k) as i64))
+            .unwrap();
         Measurement {
             file: format!("u{k:05}-{run}.toml"),
             unit: format!("u{k:05}"),
-            labels: labels.map(|(a, b)| (a.to_string(), b)).into_iter().collect::<BTreeMap<_, _>>(),
+            labels: labels
+                .map(|(a, b)| (a.to_string(), b))
+                .into_iter()
+                .collect::<BTreeMap<_, _>>(),
             day: Some(day),
             of: OfCalibration {
                 setting: Setting {

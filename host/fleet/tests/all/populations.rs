@@ -12,7 +12,9 @@ fn units(random: &mut Random, count: usize, n: usize, errors: f64) -> Vec<Estima
     let normal = |random: &mut Random, n: usize| DVector::from_fn(n, |_, _| random.normal());
     let of = |_| {
         let quality = errors * 2f64.powf(random.within(1.0));
-        let root = DMatrix::from_fn(n, n + 4, |_, _| quality * random.normal() / ((n + 4) as f64).sqrt());
+        let root = DMatrix::from_fn(n, n + 4, |_, _| {
+            quality * random.normal() / ((n + 4) as f64).sqrt()
+        });
         let error = &root * normal(random, n + 4);
         Estimates {
             values: &factor * normal(random, n) + error,
@@ -31,8 +33,16 @@ fn mean_and_covariance_are_those_of_the_units_without_the_errors_of_their_fits()
         let expected = DMatrix::from_fn(9, 9, |i, j| 0.6f64.powi(i.abs_diff(j) as i32));
         // The error of a variance of 4000 units is 2.2 % of that of units and fits, which is 1 + errors².
         let far = (&found.covariance - expected).abs().max() / (1.0 + errors * errors);
-        assert!(far < 0.08, "errors {errors}: {far}\n{:.3}", found.covariance);
-        let z = found.mean.iter().enumerate().map(|(i, m)| m / found.mean_covariance[(i, i)].sqrt());
+        assert!(
+            far < 0.08,
+            "errors {errors}: {far}\n{:.3}",
+            found.covariance
+        );
+        let z = found
+            .mean
+            .iter()
+            .enumerate()
+            .map(|(i, m)| m / found.mean_covariance[(i, i)].sqrt());
         let z: f64 = z.map(|z| z * z).sum();
         assert!(z < 30.0, "chi-square of nine means {z}");
         let used = found.used.iter().filter(|u| **u).count();
@@ -40,8 +50,8 @@ fn mean_and_covariance_are_those_of_the_units_without_the_errors_of_their_fits()
     }
 }
 
-/// Share of fleets without a stranger in which one is named, and of fleets with three alike ones how many of these are.
-fn named(count: usize, n: usize, fleets: u64) -> (f64, f64) {
+/// Share of fleets without a stranger in which one is named, and of fleets with three alike ones at a distance of `far` how many of these are.
+fn named(count: usize, n: usize, fleets: u64, far: f64) -> (f64, f64) {
     let (mut false_alarms, mut found) = (0, 0);
     for seed in 0..fleets {
         let mut random = Random::new(seed, "strangers");
@@ -49,36 +59,62 @@ fn named(count: usize, n: usize, fleets: u64) -> (f64, f64) {
         let is_named = |all: &[Estimates]| -> Vec<usize> {
             let fit = population::fit(all, None).unwrap();
             let of = fit.distances.iter().enumerate();
-            of.filter(|(_, d)| d.p * (count as f64) < 0.01).map(|(k, _)| k).collect()
+            of.filter(|(_, d)| d.p * (count as f64) < 0.01)
+                .map(|(k, _)| k)
+                .collect()
         };
         false_alarms += usize::from(!is_named(&all).is_empty());
         // Of the same kind, so that each would hide the others.
         for one in all.iter_mut().take(3) {
-            one.values[n / 2] += 15.0;
+            one.values[n / 2] += far;
         }
         found += is_named(&all).iter().filter(|k| **k < 3).count();
     }
-    (false_alarms as f64 / fleets as f64, found as f64 / (3 * fleets) as f64)
+    (
+        false_alarms as f64 / fleets as f64,
+        found as f64 / (3 * fleets) as f64,
+    )
 }
 
 #[test]
 fn three_strangers_of_one_kind_are_found_and_few_fleets_without_any_have_one() {
-    for (count, fleets) in [(12, 100), (JOINTLY * 9, 60), (200, 20)] {
-        let (false_alarms, found) = named(count, 9, fleets);
+    // Nine units know a standard deviation to a quarter, and the probability is that of the most distant of twelve in nine parameters.
+    for (count, fleets, far) in [(12, 100, 25.0), (JOINTLY * 9, 60, 15.0), (200, 20, 15.0)] {
+        let (false_alarms, found) = named(count, 9, fleets, far);
         assert!(found > 0.9, "{count} units: {found} found");
         // 1 % are meant; of a hundred fleets five have a probability of 0.3 %.
-        assert!(false_alarms <= 0.05, "{count} units: {false_alarms} false alarms");
+        assert!(
+            false_alarms <= 0.05,
+            "{count} units: {false_alarms} false alarms"
+        );
     }
 }
 
 #[test]
-#[ignore = "nightly: 14,000 fleets"]
+#[ignore = "nightly: 15,000 fleets"]
 fn strangers_by_size_of_fleet() {
-    println!("| units | parameters | fleets | with a false alarm, % | strangers found, % |");
-    for (count, n, fleets) in [(8, 9, 4000), (12, 9, 3000), (30, 9, 2000), (44, 9, 1500), (45, 9, 1500), (60, 9, 1000), (100, 9, 600), (300, 9, 300), (60, 12, 1000), (1000, 12, 100)] {
-        let (false_alarms, found) = named(count, n, fleets);
-        println!("| {count} | {n} | {fleets} | {:.1} | {:.1} |", 100.0 * false_alarms, 100.0 * found);
+    println!("| units | parameters | fleets | with a false alarm, % | three strangers found, % |");
+    let sizes = [
+        (8, 9, 4000),
+        (12, 9, 3000),
+        (30, 9, 2000),
+        (44, 9, 1500),
+        (45, 9, 1500),
+        (60, 9, 1000),
+        (100, 9, 600),
+        (300, 9, 300),
+        (60, 12, 1000),
+        (1000, 12, 100),
+    ];
+    for (count, n, fleets) in sizes {
+        let (false_alarms, found) = named(count, n, fleets, 15.0);
+        println!(
+            "| {count} | {n} | {fleets} | {:.1} | {:.1} |",
+            100.0 * false_alarms,
+            100.0 * found
+        );
         assert!(false_alarms < 0.03, "{count} units: {false_alarms}");
+        assert!(found > 0.9 || count < 30, "{count} units: {found}");
     }
 }
 

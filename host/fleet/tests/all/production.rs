@@ -5,7 +5,7 @@ use std::time::Instant;
 use mimu::JudgementKind;
 use mimu_fleet::{Fleet, Options, fleet};
 
-use crate::plant::{Faults, Plant};
+use crate::plant::{Faults, Plant, processor_time};
 
 fn result(plant: &Plant) -> Fleet {
     fleet(plant.tree(), None, &Options::default()).unwrap()
@@ -13,25 +13,70 @@ fn result(plant: &Plant) -> Fleet {
 
 /// Names of everything that is found.
 fn found(fleet: &Fleet) -> Vec<String> {
-    let mut all: Vec<String> = fleet.different.iter().map(|d| format!("{} {} {}", d.label, d.level, d.sensor)).collect();
-    all.extend(fleet.changed.iter().map(|c| format!("{} {} since {} {}", c.label, c.level, c.chart.since.as_deref().unwrap_or("-"), c.chart.parameter)));
-    let charts = fleet.drift.iter().flat_map(|d| &d.charts).filter(|c| c.signal.is_some());
-    all.extend(charts.map(|c| format!("drift {} {} since {}", c.sensor, c.parameter, c.since.as_deref().unwrap_or("-"))));
+    let mut all: Vec<String> = fleet
+        .different
+        .iter()
+        .map(|d| format!("{} {} {}", d.label, d.level, d.sensor))
+        .collect();
+    all.extend(fleet.changed.iter().map(|c| {
+        format!(
+            "{} {} since {} {}",
+            c.label,
+            c.level,
+            c.chart.since.as_deref().unwrap_or("-"),
+            c.chart.parameter
+        )
+    }));
+    let charts = fleet
+        .drift
+        .iter()
+        .flat_map(|d| &d.charts)
+        .filter(|c| c.signal.is_some());
+    all.extend(charts.map(|c| {
+        format!(
+            "drift {} {} since {}",
+            c.sensor,
+            c.parameter,
+            c.since.as_deref().unwrap_or("-")
+        )
+    }));
     all
 }
 
 #[test]
 fn production_without_faults_is_one_population() {
     let fleet = result(&Plant::new(1500, 1));
-    assert_eq!(fleet.judgement.kind, JudgementKind::Good, "{} {:?} {:?}", fleet.judgement, found(&fleet), fleet.strangers);
+    assert_eq!(
+        fleet.judgement.kind,
+        JudgementKind::Good,
+        "{} {:?} {:?}",
+        fleet.judgement,
+        found(&fleet),
+        fleet.strangers
+    );
     assert_eq!((fleet.units, fleet.measurements), (1500, 1500));
     let gyro = fleet.sensors.gyro.as_ref().unwrap();
     let accel = fleet.sensors.accel.as_ref().unwrap();
     // Gravity shows no misalignment of the accelerometer.
     assert_eq!((gyro.parameters.len(), accel.parameters.len()), (12, 9));
-    let sigma = |name: &str| gyro.parameters.iter().find(|p| p.name == name).unwrap().sigma;
-    for (name, truth) in [("scale_x", 5e-3), ("misalignment_y", 6e-3), ("non_orthogonality_zx", 3e-3), ("bias_z", 0.01)] {
-        assert!((sigma(name) / truth - 1.0).abs() < 0.1, "{name}: {} {truth}", sigma(name));
+    let sigma = |name: &str| {
+        gyro.parameters
+            .iter()
+            .find(|p| p.name == name)
+            .unwrap()
+            .sigma
+    };
+    for (name, truth) in [
+        ("scale_x", 5e-3),
+        ("misalignment_y", 6e-3),
+        ("non_orthogonality_zx", 3e-3),
+        ("bias_z", 0.01),
+    ] {
+        assert!(
+            (sigma(name) / truth - 1.0).abs() < 0.1,
+            "{name}: {} {truth}",
+            sigma(name)
+        );
     }
 }
 
@@ -54,8 +99,16 @@ fn a_bad_batch_a_drift_and_a_moved_fixture_are_found() {
     // Fixture C moved on day 60, 2026-03-06.
     assert!(has("fixture C since 2026-03-0"), "{found:?}");
     // It begins on 2026-03-18 and grows slowly; the average last was at the centre some days later.
-    assert!(has("drift accel bias_z since 2026-03") || has("drift accel bias_z since 2026-04-0"), "{found:?}");
-    let others = found.iter().filter(|f| f.starts_with("operator") || f.starts_with("fixture A") || f.contains("drift gyro")).count();
+    assert!(
+        has("drift accel bias_z since 2026-03") || has("drift accel bias_z since 2026-04-0"),
+        "{found:?}"
+    );
+    let others = found
+        .iter()
+        .filter(|f| {
+            f.starts_with("operator") || f.starts_with("fixture A") || f.contains("drift gyro")
+        })
+        .count();
     assert_eq!(others, 0, "{found:?}");
 }
 
@@ -71,11 +124,19 @@ fn strangers_are_named_with_what_shows_them() {
         ..Plant::new(1500, 3)
     };
     let fleet = result(&plant);
-    let truth: Vec<String> = (0..1500).filter(|k| plant.is_stranger(*k)).map(|k| format!("u{k:05}")).collect();
+    let truth: Vec<String> = (0..1500)
+        .filter(|k| plant.is_stranger(*k))
+        .map(|k| format!("u{k:05}"))
+        .collect();
     let mut named: Vec<String> = fleet.strangers.iter().map(|s| s.unit.clone()).collect();
     named.sort();
     assert_eq!(named, truth);
-    assert!(fleet.strangers.iter().all(|s| s.parameter.starts_with("scale") && s.change > 0.0));
+    assert!(
+        fleet
+            .strangers
+            .iter()
+            .all(|s| s.parameter.starts_with("scale") && s.change > 0.0)
+    );
 }
 
 #[test]
@@ -92,9 +153,15 @@ fn operators_and_repetitions_are_separated_from_units() {
     assert_eq!(gage.factors, ["operator"]);
     // 0.2 of repetitions and 0.1 to 0.2 of fits; three operators scatter themselves, so their mean over 21 parameters counts.
     let sizes = |p: &mimu_fleet::result::GageOfParameter| {
-        let kinds = [("scale", 0), ("misalignment", 1), ("non_orthogonality", 2), ("bias", 3)];
+        let kinds = [
+            ("scale", 0),
+            ("misalignment", 1),
+            ("non_orthogonality", 2),
+            ("bias", 3),
+        ];
         let kind = kinds.iter().find(|k| p.name.starts_with(k.0)).unwrap().1;
-        [crate::plant::GYRO, crate::plant::ACCEL][usize::from(p.sensor == mimu::Sensor::Accel)][kind]
+        [crate::plant::GYRO, crate::plant::ACCEL][usize::from(p.sensor == mimu::Sensor::Accel)]
+            [kind]
     };
     let count = gage.parameters.len() as f64;
     assert_eq!(count, 21.0);
@@ -105,9 +172,15 @@ fn operators_and_repetitions_are_separated_from_units() {
     let repeatability = mean(&|p| p.repeatability.value);
     // The mean square of 2^u, u from -1 to 1, is 1.353.
     let expected = (0.2f64.powi(2) + 1.353 * 0.1f64.powi(2)).sqrt();
-    assert!((repeatability / expected - 1.0).abs() < 0.05, "{repeatability} {expected}");
+    assert!(
+        (repeatability / expected - 1.0).abs() < 0.05,
+        "{repeatability} {expected}"
+    );
     let reproducibility = mean(&|p| p.reproducibility.value);
-    assert!((reproducibility / 0.3 - 1.0).abs() < 0.35, "{reproducibility}");
+    assert!(
+        (reproducibility / 0.3 - 1.0).abs() < 0.35,
+        "{reproducibility}"
+    );
     let units = mean(&|p| p.between_units.value);
     assert!((units - 1.0).abs() < 0.15, "{units}");
 }
@@ -124,7 +197,11 @@ fn a_calibration_that_contradicts_five_others_of_its_unit_is_named_and_not_used(
     let (values, _) = tree.measurements[8].of.triads.gyro.as_mut().unwrap();
     values[5] += 3.0 * crate::plant::GYRO[1];
     let fleet = fleet(tree, None, &Options::default()).unwrap();
-    let named: Vec<&str> = fleet.contradicting.iter().map(|c| c.files[0].as_str()).collect();
+    let named: Vec<&str> = fleet
+        .contradicting
+        .iter()
+        .map(|c| c.files[0].as_str())
+        .collect();
     assert_eq!(named, ["u00001-2.toml"]);
     assert_eq!(fleet.contradicting[0].parameter, "misalignment_z");
     assert!(fleet.strangers.is_empty(), "{:?}", fleet.strangers);
@@ -145,21 +222,44 @@ fn ten_thousand_units_with_faults_and_without() {
         ..Plant::new(10_000, 7)
     };
     let tree = plant.tree();
-    let begun = Instant::now();
+    let (begun, time) = (Instant::now(), processor_time());
     let with = fleet(tree, None, &Options::default()).unwrap();
-    println!("10,000 units: {:.1} s on {} threads", begun.elapsed().as_secs_f64(), std::thread::available_parallelism().unwrap());
+    println!(
+        "10,000 units: {:.1} s of processor time, {:.1} s elapsed",
+        processor_time() - time,
+        begun.elapsed().as_secs_f64()
+    );
     println!("{}\n{:#?}", with.judgement, found(&with));
-    let named = with.strangers.iter().filter(|s| plant.is_stranger(s.unit[1..].parse().unwrap())).count();
-    println!("strangers: {named} of 20, and {} others named", with.strangers.len() - named);
+    let named = with
+        .strangers
+        .iter()
+        .filter(|s| plant.is_stranger(s.unit[1..].parse().unwrap()))
+        .count();
+    println!(
+        "strangers: {named} of 20, and {} others named",
+        with.strangers.len() - named
+    );
     assert!(named >= 18);
     let mut alarms = [0; 4];
     let productions = 40;
     for seed in 0..productions {
         let none = result(&Plant::new(2000, 100 + seed));
-        let signals = none.drift.iter().flat_map(|d| &d.charts).filter(|c| c.signal.is_some()).count();
-        let each = [none.strangers.len(), none.different.len(), none.changed.len(), signals];
+        let signals = none
+            .drift
+            .iter()
+            .flat_map(|d| &d.charts)
+            .filter(|c| c.signal.is_some())
+            .count();
+        let each = [
+            none.strangers.len(),
+            none.different.len(),
+            none.changed.len(),
+            signals,
+        ];
         (0..4).for_each(|k| alarms[k] += usize::from(each[k] > 0));
     }
-    println!("of {productions} productions of 2,000 units without faults, with strangers, labels, changed labels, drifts: {alarms:?}");
+    println!(
+        "of {productions} productions of 2,000 units without faults, with strangers, labels, changed labels, drifts: {alarms:?}"
+    );
     assert!(alarms.iter().all(|a| *a <= 3), "{alarms:?}");
 }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 use mimu::quantity::plural;
 use mimu_fleet::Fleet;
 
-use super::{changed, drift, figures, gage_line, head, level, tables};
+use super::{changed, drift, figures, gage_line, head, tables};
 use crate::report::page::{Made, judged, page, spoken};
 
 /// Units in a table: the first of thousands. The JSON has all.
@@ -32,7 +32,7 @@ pub fn fleet_page(fleet: &Fleet, made: &Made) -> String {
             h3 class="sensor" { (spoken(sensor)) }
             (tables::population(sensor, triad).html())
             @if !triad.jointly { p class="dim" { "Too few units for covariances between parameters: each parameter is judged alone." } }
-            figure { div class="figures" { @for p in &triad.parameters { (figures::histogram(sensor, p)) } } }
+            figure { div class="figures small" { @for p in &triad.parameters { (figures::histogram(sensor, p)) } } }
         }
         @if let Some(gage) = &fleet.gage {
             h2 id="gage" { "Repeatability and reproducibility" }
@@ -109,7 +109,6 @@ fn labels(fleet: &Fleet) -> Markup {
         @else {
             p { "A level differs by its medians, which single units hardly move." }
             (tables::different(&fleet.different).html())
-            @for one in fleet.different.iter().take(3) { p class="dim" { (level(one)) "." } }
         }
         @if !fleet.changed.is_empty() {
             h3 { "Changed since a day" }
