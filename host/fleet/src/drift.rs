@@ -9,6 +9,8 @@ use jiff::civil::Date;
 use mimu::sessions::contradiction::FALSE_FINDING;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use crate::robust::median;
+
 /// Weight of the newest point.
 pub const LAMBDA: f64 = 0.2;
 /// Fewest days of a chart.
@@ -32,7 +34,7 @@ pub struct Point {
     pub day: Date,
     /// Mean minus the centre.
     pub mean: f64,
-    /// Moving average of the centred means, in the unit of the values.
+    /// Moving average of the centred means in their standard deviations, times that of a usual day.
     pub average: f64,
     /// Largest magnitude of [`Self::average`] without a drift.
     pub limit: f64,
@@ -120,6 +122,9 @@ pub fn chart(days: &[Day], sigma: f64, limit: f64) -> Option<Chart> {
     let own = |day: &Day| sigma * sigma / day.count;
     let between = between_days(days, sigma);
     let (mut standard, mut points) = (0.0, Vec::with_capacity(days.len()));
+    // Averages and limits of standard points, in the unit of the values by the scale of a usual day: otherwise a day with a single unit would be a spike in both.
+    let mut scales: Vec<f64> = days.iter().map(|d| (own(d) + between).sqrt()).collect();
+    let usual = median(&mut scales);
     for (t, day) in days.iter().enumerate() {
         let scale = (own(day) + between).sqrt();
         standard = LAMBDA * day.mean / scale + (1.0 - LAMBDA) * standard;
@@ -127,8 +132,8 @@ pub fn chart(days: &[Day], sigma: f64, limit: f64) -> Option<Chart> {
         points.push(Point {
             day: day.day,
             mean: day.mean,
-            average: standard * scale,
-            limit: limit * variance.sqrt() * scale,
+            average: standard * usual,
+            limit: limit * variance.sqrt() * usual,
         });
     }
     let signal = points.iter().position(|p| p.average.abs() > p.limit);

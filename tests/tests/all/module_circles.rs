@@ -18,6 +18,7 @@ const CRATES: [&str; 14] = [
     "host/device",
     "host/equipment",
     "host/export",
+    "host/fleet",
     "host/wizard",
     "host/station",
     "host/cli",

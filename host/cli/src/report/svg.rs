@@ -310,7 +310,7 @@ pub fn raised(text: &str) -> String {
 }
 
 /// About this many round numbers in the range, with their labels.
-fn ticks(range: &Range<f64>, about: usize) -> Vec<(f64, String)> {
+pub fn ticks(range: &Range<f64>, about: usize) -> Vec<(f64, String)> {
     let width = range.end - range.start;
     let rough = width / about as f64;
     let decade = 10f64.powf(rough.log10().floor());

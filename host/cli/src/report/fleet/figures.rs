@@ -8,7 +8,7 @@ use mimu::quantity::Sensor;
 use mimu_fleet::result::{ChartOfParameter, ParameterOfFleet};
 
 use super::tables::{parameter, readable};
-use crate::report::svg::{Frame, Panel, range};
+use crate::report::svg::{Frame, Panel, px, range, ticks};
 
 /// A small panel: three stand side by side.
 const SMALL: Panel = Panel {
@@ -18,7 +18,7 @@ const SMALL: Panel = Panel {
 /// A control chart.
 const CHART: Panel = Panel {
     size: (560.0, 220.0),
-    room: [66.0, 8.0, 26.0, 24.0],
+    room: [66.0, 34.0, 26.0, 24.0],
 };
 
 /// Histogram of a parameter over the units, minus its mean, with the normal distribution of units and fit.
@@ -110,15 +110,11 @@ pub(super) fn chart(of: &ChartOfParameter, heading: &str) -> Markup {
         .map(|s| number(&s));
     let spans: Vec<(f64, f64)> = since.map(|from| (from, frame.x.end)).collect();
     let title = format!("{heading}, {}", readable.unit);
-    // The grid of the axes has days as numbers; only its ordinate and its zero are wanted.
-    let ordinate = Frame {
-        x: -2.0..-1.0,
-        ..frame.clone()
-    };
+    let ordinate = ticks(&frame.y, 5);
     let inside = html! {
         (frame.spans("block", &spans))
-        (ordinate.axes(&title, true))
-        (frame.grid("", &labels, &[], false))
+        (frame.grid(&title, &labels, &ordinate, true))
+        path class="zero" d={ "M" (px(frame.across.start)) " " (px(frame.at_y(0.0))) "H" (px(frame.across.end)) } {}
         (frame.dots("dot small", at.iter().copied().zip(means.iter().map(|m| shown(*m)))))
         (frame.line("limit", at.iter().copied().zip(limits.iter().copied())))
         (frame.line("limit", at.iter().copied().zip(limits.iter().map(|l| -l))))

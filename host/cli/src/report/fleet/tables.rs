@@ -133,11 +133,11 @@ pub(super) fn strangers(all: &[Stranger], caption: String, shown: usize) -> Tabl
 
 /// Labels that differ.
 pub(super) fn different(all: &[DifferentLevel]) -> Table {
-    let mut table = Table::new("Labels whose units differ from the others", "label")
+    let mut table = Table::new("Labels whose units differ from the others: how many of these units do not belong to the population, and the difference in its standard deviations", "label")
         .words("probability")
-        .numbers(["calibrations", "of units that do not belong"])
+        .numbers(["units", "strangers"])
         .words("shown by")
-        .numbers(["change", "in sigmas of the population"]);
+        .numbers(["change", "sigmas"]);
     for one in all {
         table.row([
             Cell::from(format!("{} {}", one.label, one.level)),
