@@ -6,6 +6,7 @@
 //! | [`blind`], [`by_hand`] | units with undeclared effects, on a table and by hand             |
 //! | [`joint`]              | several sessions of one unit together, and their file on another session |
 //! | [`sessions`]           | several sessions of one unit, and one that they predict           |
+//! | [`fleet`] | units of one population, and the prior of it                  |
 //! | [`slow_bias`]          | units by hand whose biases move with time or temperature, at once or with a lag |
 //! | [`coverage`]           | how often intervals contain the truth, from recording to fit      |
 //! | [`earth`]              | the Earth's rate in the biases of gyros on a table                |
@@ -26,6 +27,7 @@ pub mod blind;
 pub mod by_hand;
 pub mod coverage;
 pub mod earth;
+pub mod fleet;
 pub mod joint;
 pub mod niu;
 pub mod noise_in_use;

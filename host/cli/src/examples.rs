@@ -31,6 +31,7 @@ const EXAMPLES: [(&str, &[&str]); 18] = [
             "mimu fit rec -o cal.toml",
             "mimu fit rec --noise noise.toml --verbose",
             "mimu fit monday tuesday friday -o cal.toml",
+            "mimu fit six-poses --prior kind.toml -o cal.toml",
             "mimu fit rec --json -",
         ],
     ),
@@ -51,6 +52,7 @@ const EXAMPLES: [(&str, &[&str]); 18] = [
         &[
             "mimu fleet calibrations -o fleet.html",
             "mimu fleet calibrations --labels units.csv --limits icm42688p -o fleet.html",
+            "mimu fleet calibrations --prior kind.toml",
             "mimu fleet calibrations --folders line,batch --gage operator,fixture --json fleet.json",
         ],
     ),

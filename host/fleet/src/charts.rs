@@ -164,14 +164,14 @@ impl Series<'_> {
             .into_iter()
             .zip(&self.days);
         let days = days.filter(|((count, _), _)| *count > 0.0);
-        let days: Vec<Day> = days
+        let mut days: Vec<Day> = days
             .map(|((count, sum), day)| Day {
                 day: *day,
                 count,
                 mean: sum / count,
             })
             .collect();
-        drift::chart(&days, self.sigma(of), self.limit)
+        drift::chart_about_beginning(&mut days, self.sigma(of), self.limit)
     }
 
     /// Differences of a level from the others of the same days.

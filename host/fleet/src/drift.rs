@@ -104,6 +104,35 @@ pub fn step(days: &[Day], sigma: f64) -> Option<Step> {
     each.max_by(|a, b| a.size.total_cmp(&b.size))
 }
 
+/// The chart about the centre; if it has a signal, about the mean of the days before the drift. The median of all days is neither that before it nor that after.
+pub fn chart_about_beginning(days: &mut [Day], sigma: f64, limit: f64) -> Option<Chart> {
+    let about_centre = chart(days, sigma, limit)?;
+    let Some(mut first) = about_centre.signal.and_then(|_| Some(step(days, sigma)?.first)) else {
+        return Some(about_centre);
+    };
+    let mut best = about_centre;
+    // The largest step of a slow drift is in its middle: its beginning is found from there.
+    for _ in 0..BEGINNINGS {
+        let part = &days[..first.max(BESIDE)];
+        let sum = part.iter().fold((0.0, 0.0), |(n, s), d| (n + d.count, s + d.count * d.mean));
+        let before = sum.1 / sum.0;
+        days.iter_mut().for_each(|d| d.mean -= before);
+        let Some(next) = chart(days, sigma, limit).filter(|c| c.signal.is_some()) else {
+            break;
+        };
+        let since = next.since.unwrap_or(first);
+        best = next;
+        if since >= first {
+            break;
+        }
+        first = since;
+    }
+    Some(best)
+}
+
+/// Rounds in which the beginning of a drift is found.
+const BEGINNINGS: usize = 3;
+
 /// Variance of days beyond the scatter of their values, by successive days.
 fn between_days(days: &[Day], sigma: f64) -> f64 {
     let own = |day: &Day| sigma * sigma / day.count;

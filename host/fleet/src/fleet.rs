@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use mimu::Error;
 use mimu::data_sheet::{Part, Row};
+use mimu::prior::Prior;
 use mimu::quantity::Sensor;
 use mimu::sessions::contradiction::FALSE_FINDING;
-use mimu_recording::Reference;
+use mimu::{Error, RawUnit, Reference};
 
 use crate::capability;
 use crate::charts;
@@ -15,6 +15,7 @@ use crate::labels::DATE;
 use crate::levels::{self, Levels, Units};
 use crate::measured::Setting;
 use crate::population::{Distance, FEWEST};
+use crate::prior;
 use crate::repeats::by_unit;
 use crate::result::{DifferentLevel, Fleet, Stranger};
 use crate::studies::{self, Options};
@@ -25,9 +26,35 @@ use crate::triad::Triad;
 ///
 /// # Errors
 /// Fewer than five comparable units, or a triad whose covariances are singular.
-pub fn fleet(mut tree: Tree, part: Option<&Part>, options: &Options) -> Result<Fleet, Error> {
+pub fn fleet(tree: Tree, part: Option<&Part>, options: &Options) -> Result<Fleet, Error> {
+    Ok(analysed(tree, part, options)?.0)
+}
+
+/// The same, with the population as a prior of a further unit.
+///
+/// # Errors
+/// Those of [`fleet`], and fewer units than a prior needs.
+pub fn fleet_and_prior(
+    tree: Tree,
+    part: Option<&Part>,
+    options: &Options,
+) -> Result<(Fleet, Prior), Error> {
+    let (result, triads, of) = analysed(tree, part, options)?;
+    let prior = prior::prior(&result.tool, &triads, of)?;
+    Ok((result, prior))
+}
+
+/// What the readings of the fleet are in, and what was known of their input.
+type Readings = (RawUnit, Option<Reference>);
+
+fn analysed(
+    mut tree: Tree,
+    part: Option<&Part>,
+    options: &Options,
+) -> Result<(Fleet, Vec<Triad>, Readings), Error> {
     let (setting, reference) = keep_comparable(&mut tree);
     let all = &tree.measurements;
+    let raw_unit = all.first().map_or(RawUnit::Si, |m| m.of.raw_unit);
     let names = by_unit(all.iter().map(|m| m.unit.as_str()));
     let units: Vec<Vec<usize>> = names.into_values().collect();
     if units.len() < FEWEST {
@@ -105,7 +132,7 @@ pub fn fleet(mut tree: Tree, part: Option<&Part>, options: &Options) -> Result<F
     }
     result.left_out = tree.left_out;
     result.judgement = judge(&result);
-    Ok(result)
+    Ok((result, triads, (raw_unit, reference)))
 }
 
 fn too_few(tree: &Tree, units: usize) -> Error {

@@ -13,6 +13,7 @@
 //! | [`capability`] | Cp and Cpk against the limits of a part |
 //! | `triad`, `charts`, `studies` | these of one triad, of all labels, of all parameters |
 //! | `judge` | the judgement |
+//! | [`prior`] | the population as a prior of a further unit |
 //! | [`fleet`](mod@fleet) | puts it together |
 //! | [`result`] | the result, as JSON has it |
 //!
@@ -28,6 +29,7 @@ pub mod labels;
 pub mod levels;
 pub mod measured;
 pub mod population;
+pub mod prior;
 pub mod repeats;
 pub mod result;
 mod robust;
@@ -35,6 +37,6 @@ mod studies;
 pub mod tree;
 mod triad;
 
-pub use fleet::fleet;
+pub use fleet::{fleet, fleet_and_prior};
 pub use result::Fleet;
 pub use studies::Options;

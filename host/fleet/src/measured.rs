@@ -9,6 +9,9 @@ use mimu::triad::{Covariance, Part, Triad};
 use mimu::{PerSensor, RawUnit};
 use mimu_recording::Reference;
 
+/// How the name of an estimator ends that has used a prior.
+const WITH_PRIOR: &str = " and a prior";
+
 /// Physical parameters of a triad and the covariance of their fit, in the order of [`TriadParameter::physical`]: raw, raw/SI and rad.
 pub type Physical = (SVector<f64, 12>, Covariance);
 
@@ -52,6 +55,12 @@ impl OfCalibration {
             let Some(inverse) = calibration.inverse(sensor) else {
                 continue;
             };
+            let judged = calibration.table(sensor).and_then(|t| t.judged.as_ref());
+            if judged.is_some_and(|j| j.estimator.ends_with(WITH_PRIOR)) {
+                return Err(format!(
+                    "its {sensor} was fitted with a prior, and would confirm the population of that"
+                ));
+            }
             let covariance = calibration.covariance(sensor);
             let covariance = covariance.ok_or_else(|| format!("its {sensor} has no covariance"))?;
             let part = Part {
@@ -146,6 +155,17 @@ impl Basis {
                 covariance[(self.free[i], self.free[j])] * by(i) * by(j)
             }),
         }
+    }
+
+    /// Factor from the unit of the fleet to that of the files, for the free parameter `i`.
+    pub fn to_file(&self, i: usize) -> f64 {
+        1.0 / self.factor(self.free[i])
+    }
+
+    /// The free parameter `i` of this value in the unit of the files.
+    pub fn in_file(&self, i: usize, value: f64) -> f64 {
+        let relative = if self.free[i] < 3 { 1.0 } else { 0.0 };
+        (value + relative) * self.to_file(i)
     }
 
     /// The free parameter `i`.

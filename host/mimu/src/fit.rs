@@ -19,9 +19,12 @@ mod sensor;
 pub mod session_bias;
 pub(crate) mod uncalibrated;
 
+use std::sync::Arc;
+
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::estimate::{Estimated, Observation};
 use crate::prepared::Prepared;
+use crate::prior::{FALSE_STRANGER, Prior};
 use crate::quantity::{Figure, Sensor};
 use crate::signal::blocks::extent;
 use crate::triad::Triad;
@@ -119,6 +122,13 @@ pub struct Fit {
 impl Fit {
     /// Name of the estimator of `sensor`.
     pub fn estimator(&self, sensor: Sensor) -> &'static str {
+        let prior = self.prepared.prior.as_ref();
+        if prior.is_some_and(|p| p.table(sensor).is_some()) {
+            return match sensor {
+                Sensor::Gyro => "turns, rests and a prior",
+                Sensor::Accel => "magnitude of specific force and a prior",
+            };
+        }
         match (self.prepared.manifest.reference, sensor) {
             (Reference::Table, _) => self.options.method.name(),
             (Reference::TurntableRate, Sensor::Gyro) => "magnitude of the rate",
@@ -141,8 +151,51 @@ impl Fit {
     }
 }
 
-/// Fits both triads of a recording.
-pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
+/// Fits both triads of a recording. If it has a [prior](crate::prior) that the data contradict, the triad is fitted without it, and a warning says so.
+pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
+    let Some(prior) = prepared.prior.clone() else {
+        return fit_as_prepared(prepared, options);
+    };
+    let mut fitted = fit_as_prepared(prepared.clone(), options)?;
+    let (mut given_up, mut warnings) = (Prior::clone(&prior), Vec::new());
+    // Without its prior an accelerometer has other directions, by which the gyro is judged again.
+    for _ in 0..Sensor::BOTH.len() {
+        let found = strangers(&fitted, &given_up);
+        if found.is_empty() {
+            break;
+        }
+        for (sensor, warning) in found {
+            given_up.remove(sensor);
+            warnings.push(warning);
+        }
+        let named: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+        let mut again = prepared.clone();
+        again.prior = Some(Arc::new(given_up.clone()));
+        fitted = fit_as_prepared(again, options).map_err(|error| {
+            error.map(|e| {
+                e.problem = format!("{}; without the prior {}", named.join("; "), e.problem)
+            })
+        })?;
+    }
+    fitted.warnings.extend(warnings);
+    Ok(fitted)
+}
+
+/// Triads whose data contradict the `prior` that they were fitted with.
+fn strangers(fitted: &Fit, prior: &Prior) -> Vec<(Sensor, Warning)> {
+    let each = fitted.sensors.iter().filter_map(|fit| {
+        let moved = prior.triad(fit.sensor)?.movement(&fit.estimated.triad)?;
+        let warning = Warning::NotOfPopulation {
+            p: moved.p,
+            parameter: format!("{} {}", moved.most.0.words(), moved.most.axis()),
+            sigmas: moved.sigmas,
+        };
+        (moved.p < FALSE_STRANGER).then(|| (fit.sensor, warning.of(fit.sensor)))
+    });
+    each.collect()
+}
+
+fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
     if let Some(only) = options.only
         && !prepared.has(only)
     {

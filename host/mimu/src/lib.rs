@@ -92,6 +92,8 @@ pub mod pose_means;
 #[doc(hidden)]
 pub mod prepared;
 #[doc(hidden)]
+pub mod prior;
+#[doc(hidden)]
 pub mod quantity;
 #[doc(hidden)]
 pub mod readable;

@@ -71,6 +71,7 @@ impl Prepared {
             bias_removal: None,
             lever_arm_m: 0.0,
             earth_on_table: None,
+            prior: None,
         };
         Ok(prepared.with_earth())
     }

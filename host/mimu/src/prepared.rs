@@ -13,6 +13,7 @@ use crate::estimate::{EarthShare, Failure, Observation, known_input, magnitude};
 use crate::noise::Noise;
 use crate::noise::noise_file::NoiseFile;
 use crate::observation::turn::{Motion, Rest, Turn};
+use crate::prior::Prior;
 use crate::quantity::Sensor;
 use crate::signal::bias_removal;
 use crate::signal::blocks::Condensed;
@@ -48,6 +49,8 @@ pub struct Prepared {
     pub(crate) reference_error: Option<ReferenceError>,
     /// The Earth's rate in the dwells on a table; `None` without a table or a gyro.
     pub earth_on_table: Option<Arc<EarthOnTable>>,
+    /// What the population of the unit's kind says of it; `None` if nothing is given.
+    pub prior: Option<Arc<Prior>>,
 }
 
 impl Prepared {
@@ -147,6 +150,7 @@ impl Prepared {
             bias_removal,
             lever_arm_m: 0.0,
             earth_on_table: None,
+            prior: None,
         };
         Ok(prepared.with_earth())
     }
@@ -192,6 +196,37 @@ impl Prepared {
         let Dwells { list, warnings, .. } = &mut self.dwells;
         self.noise
             .use_noise_at_rest(file, &self.manifest, list, warnings)?;
+        Ok(self)
+    }
+
+    /// The fit uses this prior of the unit's parameters.
+    ///
+    /// # Errors
+    /// The prior is of other readings, or of another frame; known inputs or whole turns, which need none.
+    pub fn with_prior(mut self, prior: Arc<Prior>) -> Result<Self> {
+        let ours = &self.manifest;
+        let refuse = |problem: String, remedy: &str| Err(Error::new(&self.place, problem, remedy));
+        if ours.raw_unit != prior.raw_unit {
+            let problem = format!(
+                "its readings are in {}, and those of the prior in {}",
+                ours.raw_unit, prior.raw_unit
+            );
+            return refuse(problem, "use the prior of units that are read alike");
+        }
+        if ours.reference != Reference::Gravity || prior.reference != Reference::Gravity {
+            let problem = format!(
+                "a prior is used where gravity is the only reference, and reference is \"{}\" here and \"{}\" in the prior",
+                ours.reference, prior.reference
+            );
+            return refuse(problem, "leave the prior out");
+        }
+        if ours.whole_turns.is_some() {
+            return refuse(
+                "whole turns are fitted without a prior".into(),
+                "leave the prior or the whole turns out",
+            );
+        }
+        self.prior = Some(prior);
         Ok(self)
     }
 

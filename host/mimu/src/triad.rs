@@ -273,6 +273,17 @@ impl Triad {
     }
 }
 
+/// The physical parameters of an inverse model, in the order of [`Triad::physical_parts`], and their derivatives by C (rows) and o. `None` if C is singular.
+pub(crate) fn physical_of(inverse: &Affine<f64>) -> Option<(SVector<f64, 12>, Covariance)> {
+    let forward = Forward::of(inverse)?;
+    let by_forward = Physical::jacobian(&forward, Angles::Exact);
+    let values = Physical::vector_of(&forward, Angles::Exact);
+    Some((
+        values,
+        by_forward * inversion_jacobian(&forward.matrix, &forward.bias),
+    ))
+}
+
 /// A number with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {

@@ -15,7 +15,7 @@ use serde::{Serialize, Serializer};
 
 use crate::bias_removal::BiasRemoval;
 use crate::fault::Fault;
-use crate::quantity::{Sensor, duration, normal_gravity, plural, significant};
+use crate::quantity::{Sensor, duration, normal_gravity, p_value, plural, significant};
 
 /// Range of the difference of local gravity from normal gravity at sea level, m/s²: heights of up to 5500 m subtract 0.017, and depths of
 /// 400 m add 0.001. Anomalies of the Earth's field are up to 0.003 either way (0.005 on a few peaks and islands).
@@ -191,6 +191,13 @@ pub enum Warning {
     /// Dwells whose input moves, and the method that uses their means alone.
     #[error("{} {} an input that moves; {method} uses its mean only, least squares also how the readings follow it", plural(*.dwells, "dwell"), if *.dwells == 1 { "has" } else { "have" })]
     MeansAlone { dwells: u64, method: &'static str },
+    /// The data contradict the prior of the unit's population: the probability that they do, the parameter that has moved most, and by how many standard deviations of the population.
+    #[error("the unit is not of the population of the prior ({}: {parameter} {sigmas:+.1} sigmas): the prior is given up for it", p_value(*.p))]
+    NotOfPopulation {
+        p: f64,
+        parameter: String,
+        sigmas: f64,
+    },
     /// No turn lies between two usable dwells.
     #[error("not calibrated: no turn connects two usable dwells")]
     NoTurn,

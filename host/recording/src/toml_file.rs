@@ -21,7 +21,7 @@ pub fn read_text(path: &Path) -> Result<String> {
 }
 
 /// Files of this program, by the name in their key `format`, with what makes them.
-const FILES: [(&str, &str); 6] = [
+const FILES: [(&str, &str); 7] = [
     ("mimu-calibration", "a calibration (`mimu fit -o`)"),
     ("mimu-noise", "a noise file (`mimu allan -o`)"),
     ("mimu-plan", "a plan (`mimu design -o`)"),
@@ -29,6 +29,7 @@ const FILES: [(&str, &str); 6] = [
         "mimu-recording",
         "the manifest of a recording (`mimu import`)",
     ),
+    ("mimu-prior", "a prior (`mimu fleet --prior`)"),
     ("mimu-driver", "a description of a turntable"),
     (
         "mimu-thermal-biases",

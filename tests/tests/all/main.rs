@@ -8,6 +8,7 @@ mod dwells_found;
 mod earth;
 mod few_poses;
 mod flaws;
+mod fleet;
 mod joint;
 mod judgement;
 mod led_whole_turns;

@@ -1,6 +1,7 @@
 //! `mimu fit`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
@@ -9,6 +10,7 @@ use mimu::fit::{Fit, Method, Options, fit};
 use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
+use mimu::prior::Prior;
 use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
@@ -65,6 +67,11 @@ pub(crate) struct FitArgs {
     whole: WholeTurnArgs,
     #[command(flatten)]
     noise: NoiseArgs,
+    /// Population of the unit's kind (`mimu fleet --prior`), which determines what the poses leave open
+    ///
+    /// With it six poses by hand suffice. If the data contradict it, a warning says so, and the prior is given up for the sensor.
+    #[arg(long, value_name = "FILE", conflicts_with = "class")]
+    prior: Option<PathBuf>,
     #[command(flatten)]
     part: PartArgs,
     /// List the dwells
@@ -155,6 +162,17 @@ fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
         None => prepared,
     };
     refuse_reference_error(&prepared, args.method)?;
+    let inputs = [args.noise.file.as_deref(), args.prior.as_deref()];
+    let finding = args.still.finding();
+    let prepared = read_samples_or_means(recording, &args.log, finding, &outputs, &inputs)?;
+    args.writing.check(args.output.as_deref())?;
+    let prepared = args.keep.apply(args.noise.apply(prepared)?);
+    let prepared = args.whole.apply(prepared)?;
+    let prior = args.prior.as_deref().map(Prior::read).transpose()?;
+    let prepared = match prior {
+        Some(prior) => prepared.with_prior(Arc::new(prior))?,
+        None => prepared,
+    };
     if args.method.is_some() && prepared.manifest.reference != Reference::Table {
         return Err(Error::new(
             recording.display(),

@@ -6,7 +6,7 @@ use clap::Args;
 use mimu::data_sheet::Part;
 use mimu_fleet::labels::LabelTable;
 use mimu_fleet::tree::{Search, Tree};
-use mimu_fleet::{Options, fleet};
+use mimu_fleet::{Options, fleet, fleet_and_prior};
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
@@ -38,6 +38,9 @@ pub struct FleetArgs {
     /// Page to write
     #[arg(short = 'o', long = "out", value_name = "FILE.html")]
     out: Option<PathBuf>,
+    /// Prior to write: the population, for `mimu fit --prior` of a further unit
+    #[arg(long, value_name = "FILE.toml")]
+    prior: Option<PathBuf>,
     #[command(flatten)]
     verbose: VerboseArgs,
     #[command(flatten)]
@@ -47,7 +50,10 @@ pub struct FleetArgs {
 pub fn run(args: &FleetArgs, command_line: &str) -> Result<()> {
     let part = args.limits.as_deref().map(Part::find).transpose()?;
     let inputs: Vec<_> = args.labels.as_deref().into_iter().collect();
-    check_outputs(&[args.out.as_deref(), args.json.file()], &inputs)?;
+    check_outputs(
+        &[args.out.as_deref(), args.prior.as_deref(), args.json.file()],
+        &inputs,
+    )?;
     let table = args.labels.as_deref().map(LabelTable::read).transpose()?;
     let search = Search {
         folders: &args.names,
@@ -60,9 +66,15 @@ pub fn run(args: &FleetArgs, command_line: &str) -> Result<()> {
     let options = Options {
         factors: args.gage.clone(),
     };
-    let result = fleet(tree?, part.as_ref(), &options)?;
+    let (result, prior) = match args.prior.is_some() {
+        true => {
+            let (result, prior) = fleet_and_prior(tree?, part.as_ref(), &options)?;
+            (result, Some(prior))
+        }
+        false => (fleet(tree?, part.as_ref(), &options)?, None),
+    };
     let mut text = fleet_text(&result, args.verbose.verbose);
-    let mut page = None;
+    let mut files = Vec::new();
     if let Some(out) = &args.out {
         let names: Vec<String> = args
             .folders
@@ -74,8 +86,12 @@ pub fn run(args: &FleetArgs, command_line: &str) -> Result<()> {
             command: command_line.to_owned(),
             created: now(),
         };
-        page = Some(stage(out, fleet_page(&result, &made))?);
+        files.push(stage(out, fleet_page(&result, &made))?);
         text += &format!("page: {}\n", out.display());
     }
-    print(&args.json, &text, &result, page)
+    if let Some((path, prior)) = args.prior.as_ref().zip(prior) {
+        files.push(stage(path, prior.to_toml())?);
+        text += &format!("prior: {}\n", path.display());
+    }
+    print(&args.json, &text, &result, files)
 }

@@ -15,8 +15,9 @@ use crate::observable::Observable;
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::Rest;
 use crate::observation::{LOWER, free, from_centre, place, vector};
+use crate::prior::TriadPrior;
 use crate::quantity::{AXES, Sensor, plural};
-use crate::triad::{Part, Triad};
+use crate::triad::{Forward, Part, Triad};
 use crate::warning::Warning;
 
 /// Number of parameters: six of C, three of o.
@@ -35,6 +36,8 @@ pub struct KnownMagnitudes<'a> {
     pub level_of: &'a [usize],
     /// Dwells whose input vector is known, such as a gyro at rest.
     pub rests: &'a [Rest],
+    /// What is known of the parameters beforehand.
+    pub prior: Option<&'a TriadPrior>,
 }
 
 /// Readings in units in which a perfect sensor has C = 1 and o = 0 at the largest magnitude.
@@ -107,6 +110,11 @@ fn flat(raw: &[Vector3<f64>]) -> Vec<usize> {
         .collect()
 }
 
+/// Fewest poses beside a prior: they show the bias.
+const FEWEST_WITH_PRIOR: usize = 3;
+/// Standard deviation of a magnitude in the first solution beside a prior, over gravity: 5 mg.
+const BY_HAND: f64 = 5e-3;
+
 /// First guess, by the sphere through the readings: one scale factor for all axes. `None` if they do not lie on a sphere.
 pub fn first_guess(observations: &[Observation], gravity: f64) -> Option<Affine<f64>> {
     let sphere = Sphere::through(observations, &vec![1.0; observations.len()], &[])?;
@@ -117,11 +125,12 @@ pub fn first_guess(observations: &[Observation], gravity: f64) -> Option<Affine<
     })
 }
 
-/// Fits C and o of an accelerometer to `|C u + o| = gravity` (m/s²) over all observations; see [`estimate`].
+/// Fits C and o of an accelerometer to `|C u + o| = gravity` (m/s²) over all observations, and to a `prior`; see [`estimate`].
 pub fn by_gravity(
     observations: &[Observation],
     variances: &[f64],
     gravity: f64,
+    prior: Option<&TriadPrior>,
 ) -> Result<Estimated, Failure> {
     let known = KnownMagnitudes {
         sensor: Sensor::Accel,
@@ -129,6 +138,7 @@ pub fn by_gravity(
         level_sigma: 0.0,
         level_of: &vec![0; observations.len()],
         rests: &[],
+        prior,
     };
     estimate(observations, variances, &known)
 }
@@ -136,6 +146,9 @@ pub fn by_gravity(
 /// Refuses experiments that cannot determine the nine parameters, whatever the noise.
 fn refuse_too_little(observations: &[Observation], known: &KnownMagnitudes) -> Result<(), Failure> {
     let n = observations.len();
+    if known.prior.is_some() && n >= FEWEST_WITH_PRIOR {
+        return Ok(());
+    }
     let rows = n + 3 * known.rests.len();
     // The rests determine o only.
     let needed = if known.rests.is_empty() {
@@ -197,7 +210,7 @@ fn refuse_too_little(observations: &[Observation], known: &KnownMagnitudes) -> R
 
 /// The experiment in units of the largest magnitude, so that parameters and columns are of order one: readings on a sphere of radius one.
 ///
-/// Rows are the magnitudes, then the rests by axes, then the errors of the levels; parameters are the nine, then the errors of the levels.
+/// Rows are the magnitudes, then the rests by axes, then the errors of the levels, then the prior; parameters are the nine, then the errors of the levels.
 struct Scaled<'a> {
     known: &'a KnownMagnitudes<'a>,
     sphere: Sphere,
@@ -223,7 +236,16 @@ impl<'a> Scaled<'a> {
         let unit = known.levels.iter().copied().fold(0.0, f64::max);
         let level_of = known.level_of.iter();
         let shares: Vec<f64> = level_of.map(|l| known.levels[*l] / unit).collect();
-        let sphere = Sphere::through(observations, &shares, known.rests)
+        let middle = known.prior.and_then(TriadPrior::middle);
+        let sphere = match middle.as_ref().and_then(Forward::of) {
+            // Few poses may be on many spheres.
+            Some(forward) => Some(Sphere {
+                centre: forward.bias,
+                radius: unit * forward.matrix.norm() / 3f64.sqrt(),
+            }),
+            None => Sphere::through(observations, &shares, known.rests),
+        };
+        let sphere = sphere
             .ok_or_else(|| Failure::NoSolution("the dwell means do not lie on a sphere".into()))?;
         let scaled = |raw: &Vector3<f64>| (raw - sphere.centre) / sphere.radius;
         let mut scaled = Self {
@@ -243,11 +265,17 @@ impl<'a> Scaled<'a> {
         Ok(scaled)
     }
 
-    /// Where the rows of the magnitudes, those of the rests, and all end.
-    fn ends(&self) -> [usize; 3] {
+    /// Where the rows of the magnitudes, those of the rests, those of the levels, and all end.
+    fn ends(&self) -> [usize; 4] {
         let turned = self.turned.len();
         let resting = turned + 3 * self.resting.len();
-        [turned, resting, resting + self.levels]
+        let levels = resting + self.levels;
+        [
+            turned,
+            resting,
+            levels,
+            levels + self.known.prior.map_or(0, TriadPrior::rows),
+        ]
     }
 
     /// The unit matrix without bias, at the given levels.
@@ -271,7 +299,11 @@ impl<'a> Scaled<'a> {
         let floor = (1e-12 * all.iter().copied().fold(0.0, f64::max)).max(1e-24);
         let noise = all.iter().map(|v| (v / (self.unit * self.unit)).max(floor));
         let by_level = std::iter::repeat_n(self.known.level_sigma.powi(2), self.levels);
-        noise.chain(by_level).collect()
+        let by_prior = self.known.prior.map_or(0, TriadPrior::rows);
+        noise
+            .chain(by_level)
+            .chain(std::iter::repeat_n(1.0, by_prior))
+            .collect()
     }
 
     /// Observability of the nine at known levels: the levels can worsen it only by their error.
@@ -283,12 +315,14 @@ impl<'a> Scaled<'a> {
     /// The first solution: all rows weighted alike but the levels.
     fn solved(&self) -> Result<DVector<f64>, Failure> {
         let start = self.start();
-        let [_, resting, rows] = self.ends();
-        let mut alike = vec![1.0; resting];
-        alike.resize(rows, self.known.level_sigma.recip());
+        let [_, resting, levels, rows] = self.ends();
+        let of_one = self.known.prior.map_or(1.0, |_| BY_HAND.recip());
+        let mut alike = vec![of_one; resting];
+        alike.resize(levels, self.known.level_sigma.recip());
+        alike.resize(rows, 1.0);
         let alike = |p: &DVector<f64>| self.linearize(p).weighted(&alike);
         let shape = self.shape(&start);
-        if !shape.is_complete() {
+        if !shape.is_complete() && self.known.prior.is_none() {
             return Err(undetermined(&shape, self.known.sensor));
         }
         let first = minimize(start.clone(), alike);
@@ -296,7 +330,10 @@ impl<'a> Scaled<'a> {
         match first.filter(|(p, _)| is_triad(&lower_triangular(p).matrix)) {
             Some((p, _)) => Ok(p),
             None => Err(match weak_beside_scatter(&start, alike) {
-                Some(shape) => undetermined(&shape, self.known.sensor),
+                Some(shape) if self.known.prior.is_none() => {
+                    undetermined(&shape, self.known.sensor)
+                }
+                Some(_) => self.lost(),
                 None => self.lost(),
             }),
         }
@@ -354,7 +391,7 @@ impl Grouped<2> for Scaled<'_> {
     const SHARE: f64 = 1e-6;
 
     fn linearize(&self, p: &DVector<f64>) -> Linearized {
-        let [turned, resting, rows] = self.ends();
+        let [turned, resting, levels, rows] = self.ends();
         let model = lower_triangular(p);
         let mut out = Linearized::zeros(rows, PARAMETERS + self.levels);
         let nine = |jacobian: &mut DMatrix<f64>, row: usize, by: &SVector<f64, 12>| {
@@ -387,6 +424,25 @@ impl Grouped<2> for Scaled<'_> {
             out.residuals[resting + l] = p[PARAMETERS + l];
             out.jacobian[(resting + l, PARAMETERS + l)] = 1.0;
         }
+        if let Some(prior) = self.known.prior {
+            let (inverse, change) = self.to_si(p);
+            match prior.residuals(&inverse) {
+                Some((residuals, by)) => {
+                    out.residuals
+                        .rows_mut(levels, rows - levels)
+                        .copy_from(&residuals);
+                    let by = by * change;
+                    out.jacobian
+                        .view_mut((levels, 0), (rows - levels, PARAMETERS))
+                        .copy_from(&by);
+                }
+                // No unit: a step that leads here is taken back.
+                None => out
+                    .residuals
+                    .rows_mut(levels, rows - levels)
+                    .fill(f64::INFINITY),
+            }
+        }
         out
     }
 
@@ -414,7 +470,7 @@ pub fn estimate(
 ) -> Result<Estimated, Failure> {
     refuse_too_little(observations, known)?;
     let scaled = Scaled::of(observations, variances, known)?;
-    let [turned, resting, rows] = scaled.ends();
+    let [turned, resting, levels, rows] = scaled.ends();
     let mut groups = Reweighted::new([0..turned, turned..resting], [0.0; 2]);
     let solved = groups.solve(&scaled, scaled.solved()?)?;
     let p = solved.found.parameters;
@@ -422,11 +478,16 @@ pub fn estimate(
     let last = scaled
         .linearize(&p)
         .weighted(&groups.weights(&scaled.variances));
-    let shape = scaled.shape(&p);
-    if !shape.is_complete() {
+    let mut shape = scaled.shape(&p);
+    if !shape.is_complete() && known.prior.is_none() {
         return Err(undetermined(&shape, known.sensor));
     }
     let covariance = last.covariance()?;
+    if known.prior.is_some() {
+        // Of data and prior together, in their parameters of order one.
+        let eigen = covariance.symmetric_eigenvalues();
+        shape.condition = (eigen.max() / eigen.min()).sqrt();
+    }
     let (inverse, change) = scaled.to_si(&p);
     let mut scatter = groups.scatter;
     for (g, scatter) in scatter.iter_mut().enumerate() {
@@ -449,7 +510,10 @@ pub fn estimate(
     }
     if scaled.levels > 0 {
         // The error of a turntable's rate is given; the dwells do not determine it.
-        parts.push(part(resting..rows, f64::INFINITY));
+        parts.push(part(resting..levels, f64::INFINITY));
+    }
+    if known.prior.is_some() {
+        parts.push(part(levels..rows, f64::INFINITY));
     }
     let triad = Triad::from_inverse(inverse, parts)
         .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;

@@ -17,6 +17,7 @@ use crate::observable::Observable;
 use crate::observation::closure::{ClosureError, Closures};
 use crate::observation::turn::{Motion, Rest, Rotations, Turn, TurnError};
 use crate::observation::{ByTriad, from_centre};
+use crate::prior::TriadPrior;
 use crate::quantity::AXES;
 use crate::triad::{Covariance, Part, Triad, affine};
 
@@ -115,6 +116,8 @@ struct ByTurns<'a> {
     of_errors: Option<DMatrix<f64>>,
     /// Covariance of C and o of the accelerometer.
     of_accel: Covariance,
+    /// What is known of the parameters beforehand: rows behind all others.
+    prior: Option<&'a TriadPrior>,
 }
 
 impl<'a> ByTurns<'a> {
@@ -126,6 +129,7 @@ impl<'a> ByTurns<'a> {
         at_rest: Vector3<f64>,
         size: f64,
         of_accel: Covariance,
+        prior: Option<&'a TriadPrior>,
     ) -> Self {
         // Headings do not depend on the accelerometer, and directions do, all of them by the same errors. To weigh one against the other these errors have to be
         // parameters: without them, directions of a tenth of a degree were believed to a fiftieth, and the headings that contradicted them were not.
@@ -151,6 +155,7 @@ impl<'a> ByTurns<'a> {
             rows,
             of_errors,
             of_accel,
+            prior,
             turns,
             rest,
             whole,
@@ -164,6 +169,11 @@ impl<'a> ByTurns<'a> {
     /// Number of rows of directions and headings, which depend on the accelerometer.
     fn by_directions(&self) -> usize {
         self.rows.0[2].end
+    }
+
+    /// Number of rows of the prior.
+    fn prior_rows(&self) -> usize {
+        self.prior.map_or(0, TriadPrior::rows)
     }
 
     /// Number of rows that determine C.
@@ -264,7 +274,8 @@ impl Grouped<6> for ByTurns<'_> {
         let (errors, whole) = self.errors(&model);
         let rows = (self.chains).rows(self.turns, &errors, self.rest, &model, &self.at_rest);
         let [_, _, headings, delivered, prior, rests] = &self.rows.0;
-        let mut out = Linearized::zeros(rests.end, self.parameters());
+        let all = rests.end + self.prior_rows();
+        let mut out = Linearized::zeros(all, self.parameters());
         for (row, k) in delivered.clone().zip(CROSS) {
             out.residuals[row] = p[k];
             out.jacobian[(row, k)] = 1.0;
@@ -302,6 +313,23 @@ impl Grouped<6> for ByTurns<'_> {
                 out.jacobian[(row, first + k)] = 1.0;
             }
         }
+        if let Some(prior) = self.prior {
+            let count = self.prior_rows();
+            let (inverse, change) = self.about_zero(p);
+            match prior.residuals(&inverse) {
+                Some((residuals, by)) => {
+                    out.residuals
+                        .rows_mut(rests.end, count)
+                        .copy_from(&residuals);
+                    let by = by * change;
+                    out.jacobian
+                        .view_mut((rests.end, 0), (count, PARAMETERS))
+                        .copy_from(&by);
+                }
+                // No unit: a step that leads here is taken back.
+                None => out.residuals.rows_mut(rests.end, count).fill(f64::INFINITY),
+            }
+        }
         out
     }
 
@@ -324,6 +352,7 @@ impl Grouped<6> for ByTurns<'_> {
         all.extend(prior.clone().map(|_| 1.0));
         all.extend(rest);
         debug_assert_eq!(all.len(), rests.end);
+        all.resize(rests.end + self.prior_rows(), 1.0);
         let chains = self.chains.of_turn.iter();
         for ((turn, chain), first) in self.turns.iter().zip(chains).zip(&self.row_of) {
             let known = turn.variance(mean) + unknown(chain) * turn.earth_variance;
@@ -350,7 +379,7 @@ impl Grouped<6> for ByTurns<'_> {
 
     fn check(&self, found: &Minimum) -> Result<(), Failure> {
         let shape = self.shape(found);
-        match shape.is_complete() {
+        match shape.is_complete() || self.prior.is_some() {
             true => Ok(()),
             false => Err(undetermined(&shape)),
         }
@@ -377,7 +406,7 @@ fn undetermined(shape: &Observability) -> Failure {
 ///
 /// The directions of gravity come from `accel`. Its errors are common to all turns, so its covariance is propagated into that of the gyro. (Without
 /// this, the intervals of a quiet gyro beside a noisy accelerometer contained the truth in 75 to 81 % of the cases.) `motions` give the first guess
-/// unless `start` does; `gravity` in m/s².
+/// unless `start` or a `prior` does; `gravity` in m/s².
 pub fn estimate(
     turns: &[Turn],
     rest: &[Rest],
@@ -385,10 +414,14 @@ pub fn estimate(
     motions: &[Motion],
     start: Option<&Affine<f64>>,
     gravity: f64,
+    prior: Option<&TriadPrior>,
 ) -> Result<Estimated, Failure> {
-    refuse_few(turns, rest, &Closures::default())?;
+    if prior.is_none() || rest.is_empty() {
+        refuse_few(turns, rest, &Closures::default())?;
+    }
     let at_rest = mean_at_rest(rest);
-    let first = match start {
+    let middle = prior.and_then(TriadPrior::middle);
+    let first = match start.or(middle.as_ref()) {
         Some(start) => start.matrix,
         None => guess(motions, &at_rest, gravity).ok_or_else(|| {
             Failure::NoSolution(
@@ -396,7 +429,7 @@ pub fn estimate(
             )
         })?,
     };
-    from(turns, rest, accel, &first, &Closures::default())
+    fitted(turns, rest, accel, &first, (&Closures::default(), prior))
 }
 
 /// Mean reading at rest.
@@ -428,10 +461,20 @@ pub(super) fn from(
     whole: &Closures,
 ) -> Result<Estimated, Failure> {
     refuse_few(turns, rest, whole)?;
+    fitted(turns, rest, accel, first, (whole, None))
+}
+
+fn fitted(
+    turns: &[Turn],
+    rest: &[Rest],
+    accel: &Triad,
+    first: &Matrix3<f64>,
+    (whole, prior): (&Closures, Option<&TriadPrior>),
+) -> Result<Estimated, Failure> {
     let at_rest = mean_at_rest(rest);
     let of_accel = Covariance::from_fn(|i, j| accel.inverse_covariance[(i, j)]);
     let size = first.norm() / 3f64.sqrt();
-    let by = ByTurns::of(turns, rest, whole, at_rest, size, of_accel);
+    let by = ByTurns::of(turns, rest, whole, at_rest, size, of_accel, prior);
     let p = by.start(first);
     // The first weights: half a degree, and the scatter of the dwells.
     let residuals = by.linearize(&p).residuals;
@@ -468,7 +511,16 @@ pub(super) fn from(
     });
     let shared = of_accelerometer.iter();
     let shared = shared.filter_map(|part| Some(part.seen_by(gain.as_ref()?)));
-    let parts = own.chain(shared).map(|part| part.seen_by(&change));
+    let by_prior = prior.map(|prior| {
+        let rows = rests.end..rests.end + prior.rows();
+        let own = found.at.part(&covariance, &rows);
+        Part {
+            covariance: Covariance::from_fn(|i, j| own[(i, j)]),
+            dof: f64::INFINITY,
+        }
+    });
+    let parts = own.chain(shared).chain(by_prior);
+    let parts = parts.map(|part| part.seen_by(&change));
     let triad = Triad::from_inverse(inverse, parts.collect()).ok_or_else(|| {
         Failure::NoSolution(
             "C is singular: the gyro does not respond to turns about some axis".into(),
@@ -483,7 +535,15 @@ pub(super) fn from(
             .filter(|((observable, _), rows)| *observable == Observable::Turns || !rows.is_empty())
             .map(|(group, _)| group)
             .collect(),
-        condition: by.shape(&found).condition,
+        condition: match prior {
+            None => by.shape(&found).condition,
+            // Of data and prior together.
+            Some(_) => {
+                let of_matrix = covariance.view((0, 0), (9, 9)).into_owned();
+                let eigen = of_matrix.symmetric_eigenvalues();
+                (eigen.max() / eigen.min()).sqrt()
+            }
+        },
         delays: None,
         earth: Vec::new(),
         notes: Vec::new(),

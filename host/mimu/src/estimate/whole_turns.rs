@@ -14,6 +14,7 @@ use super::{Estimated, Failure};
 use crate::observation::ByTriad;
 use crate::observation::closure::{Closure, ClosureError, Closures};
 use crate::observation::turn::{Motion, Path, Rest, Turn};
+use crate::prior::TriadPrior;
 use crate::triad::Triad;
 use crate::warning::Warning;
 
@@ -68,6 +69,8 @@ pub struct Data<'a> {
     pub start: Option<&'a Affine<f64>>,
     /// Magnitude of gravity, m/s².
     pub gravity: f64,
+    /// What is known of the gyro beforehand; whole turns do not use it.
+    pub prior: Option<&'a TriadPrior>,
 }
 
 /// How turns end.
@@ -201,7 +204,15 @@ impl Stated {
     pub fn estimate(&self, data: &Data) -> Result<Estimated, Failure> {
         let (turns, rest) = (data.turns, data.rest);
         if rest.is_empty() {
-            return rotation::estimate(turns, rest, data.accel, data.motions, None, data.gravity);
+            return rotation::estimate(
+                turns,
+                rest,
+                data.accel,
+                data.motions,
+                None,
+                data.gravity,
+                None,
+            );
         }
         let at_rest = mean_at_rest(rest);
         let start = data.start.map(|start| start.matrix).or(self.nominal);

@@ -14,6 +14,7 @@ use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::{Rest, Turn, TurnError};
 use crate::observation::{place, vector};
 use crate::prepared::Prepared;
+use crate::prior::TriadPrior;
 use crate::quantity::{AXES, Figure, Sensor};
 use crate::signal::blocks::quantile;
 use crate::signal::dwell::Fault;
@@ -30,9 +31,12 @@ pub(super) fn fit_gravity(
     let g = prepared.manifest.gravity_mps2;
     let poses = poses(prepared)?;
     let variances = |accel: &Affine<f64>| prepared.magnitude_variances(accel, &poses);
-    let by_sphere =
-        magnitude::first_guess(&poses, g).map_or_else(|| vec![0.0; poses.len()], |a| variances(&a));
+    let prior = prior(prepared, Sensor::Accel);
+    let middle = prior.as_ref().and_then(TriadPrior::middle);
+    let first = middle.or_else(|| magnitude::first_guess(&poses, g));
+    let by_sphere = first.map_or_else(|| vec![0.0; poses.len()], |a| variances(&a));
     let by_poses = ByPoses {
+        prior: prior.as_ref(),
         prepared,
         poses: &poses,
         variances: &by_sphere,
@@ -118,6 +122,11 @@ pub(super) fn fit_gravity(
     Ok(sensors)
 }
 
+/// The prior of `sensor`, if one is given.
+fn prior(prepared: &Prepared, sensor: Sensor) -> Option<TriadPrior> {
+    prepared.prior.as_ref()?.triad(sensor)
+}
+
 /// The gyro alone, by whole turns, if the poses do not determine the accelerometer: its readings as delivered give the directions of gravity.
 fn turns_alone(
     prepared: &Prepared,
@@ -153,6 +162,7 @@ pub(super) fn by_turns(prepared: &Prepared, data: &Data) -> Outcome<Estimated> {
             data.motions,
             data.start,
             data.gravity,
+            data.prior,
         ),
     }
 }
@@ -225,6 +235,7 @@ const FEWEST_TURNS: usize = 5;
 
 /// The accelerometer by its poses and, if these determine it poorly, by the turns between them as well.
 struct ByPoses<'a> {
+    prior: Option<&'a TriadPrior>,
     prepared: &'a Prepared,
     poses: &'a [Observation],
     variances: &'a [f64],
@@ -245,7 +256,8 @@ impl ByPoses<'_> {
 
     fn estimate(&self) -> Outcome<(Estimated, Option<Guesses>)> {
         let alone = self.without(&|_| true, None);
-        let poor = !alone.as_ref().is_ok_and(|a| a.condition <= POOR_POSES);
+        // What poses leave open beside a prior, the prior has.
+        let poor = self.prior.is_none() && !alone.as_ref().is_ok_and(|a| a.condition <= POOR_POSES);
         let enough = self.poses.len() >= magnitude::PARAMETERS;
         if poor
             && enough
@@ -288,6 +300,7 @@ impl ByPoses<'_> {
                 motions: &motions,
                 start: None,
                 gravity: self.gravity(),
+                prior: None,
             },
         );
         Some(Guesses {
@@ -340,7 +353,7 @@ impl ByPoses<'_> {
             .map(|(o, v)| (*o, *v))
             .unzip();
         let Some(Guesses { accel, gyro }) = guesses else {
-            return magnitude::by_gravity(&poses, &variances, self.gravity());
+            return magnitude::by_gravity(&poses, &variances, self.gravity(), self.prior);
         };
         let (turns, _) = self.prepared.turns(accel);
         let turns: Vec<Turn> = turns
@@ -434,6 +447,7 @@ fn refits(
                 motions: &[],
                 start,
                 gravity: data.gravity,
+                prior: data.prior,
             },
         )?;
         let open = data.turns.iter().filter(|t| of_part(t.to)).map(|t| {
@@ -466,7 +480,9 @@ fn fit_turns(
         return Ok(None);
     }
     let motions = prepared.motions(by_full);
+    let prior = prior(prepared, Sensor::Gyro);
     let data = Data {
+        prior: prior.as_ref(),
         turns: &turns,
         rest: &rest,
         accel: &accel.triad,

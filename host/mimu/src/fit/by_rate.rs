@@ -155,6 +155,7 @@ fn estimate(
     let rests = dwells.rests.iter().filter(|r| kept(r.dwell));
     let rests: Vec<Rest> = rests.copied().collect();
     let known = KnownMagnitudes {
+        prior: None,
         sensor: Sensor::Gyro,
         levels: &dwells.rates,
         level_sigma: dwells.rate_sigma,

@@ -135,7 +135,8 @@ fn fit_poses(prepared: &Prepared, poses: &[Observation]) -> Option<Estimated> {
     let g = prepared.manifest.gravity_mps2;
     let first = magnitude::first_guess(poses, g)?;
     let variances = prepared.magnitude_variances(&first, poses);
-    magnitude::by_gravity(poses, &variances, g).ok()
+    // By the data alone: a prior that does not hold would make poses outlying.
+    magnitude::by_gravity(poses, &variances, g, None).ok()
 }
 
 fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {
@@ -195,6 +196,7 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
         motions: &motions,
         start: None,
         gravity: g,
+        prior: None,
     };
     let Ok(gyro) = by_turns(prepared, &data) else {
         return out;

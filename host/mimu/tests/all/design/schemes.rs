@@ -104,7 +104,7 @@ fn the_estimators_claim_the_sigmas_that_the_design_promised() {
         .triad
         .forward_covariance;
     let variances = vec![sigma * sigma; settings.len()];
-    let size = magnitude::by_gravity(&observations, &variances, GRAVITY)
+    let size = magnitude::by_gravity(&observations, &variances, GRAVITY, None)
         .unwrap()
         .triad;
     for (reference, covariance) in [

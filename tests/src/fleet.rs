@@ -1,0 +1,234 @@
+//! Units of one population by hand on the bench: what a prior of the population adds to few poses, and units that are none of it.
+
+use std::sync::Arc;
+
+use mimu::fit::{Fit, Options, fit};
+use mimu::prior::Prior;
+use mimu::{Angles, Calibration, Sensor};
+use mimu_fleet::measured::OfCalibration;
+use mimu_fleet::tree::{Measurement, Tree};
+use mimu_recording::error::Result;
+use mimu_rig::located::Source;
+use mimu_rig::random::Random;
+use mimu_rig::rig_file::{AffineFile, CurvesFile, RigFile};
+use rayon::prelude::*;
+
+use crate::bench;
+use crate::sessions::Shares;
+
+/// Standard deviations between units: scale factors (relative), misalignments and non-orthogonalities (rad), biases (SI).
+const SIZES: [[f64; 4]; 2] = [[0.01, 0.01, 0.005, 0.02], [0.008, 0.0, 0.004, 0.2]];
+/// Means: scale factors, raw/SI.
+const SCALE: [f64; 2] = [3750.0, 1665.0];
+
+/// A unit with its true parameters: scale factors, misalignments, non-orthogonalities, biases, of gyro and accelerometer, in raw, raw/SI and rad.
+pub struct Drawn {
+    /// The unit for the bench.
+    pub file: RigFile,
+    /// Its parameters.
+    pub truth: [[f64; 12]; 2],
+}
+
+/// Unit `seed` of the population. Scale factors of a triad have a correlation of a half. A stranger has the scale factor x of its gyro that many standard deviations off.
+pub fn unit(seed: u64, stranger: f64) -> Drawn {
+    let text = include_str!("../../rig/rigs/sessions.toml");
+    let mut file = RigFile::parse(&Source::new("sessions.toml", text)).expect("a rig");
+    file.curves = CurvesFile::default();
+    file.effect.clear();
+    // The wander of biases within a recording has no true value.
+    for axes in [&mut file.unit.gyro_axes, &mut file.unit.accel_axes] {
+        axes.instability_si = Some([0.0; 3]);
+        axes.walk_si = Some([0.0; 3]);
+    }
+    let mut random = Random::new(seed, "unit of a fleet");
+    let truth = [0, 1].map(|s| {
+        let common = random.normal();
+        std::array::from_fn(|k| {
+            let z = random.normal();
+            let size = SIZES[s][k / 3];
+            match k / 3 {
+                0 => SCALE[s] * (1.0 + size * 0.5f64.sqrt() * (common + z)),
+                3 => SCALE[s] * size * z,
+                _ => size * z,
+            }
+        })
+    });
+    let mut truth: [[f64; 12]; 2] = truth;
+    truth[0][0] += stranger * SCALE[0] * SIZES[0][0];
+    file.unit.gyro_affine = Some(affine(&truth[0]));
+    file.unit.accel_affine = Some(affine(&truth[1]));
+    Drawn { file, truth }
+}
+
+/// `P = K Mo Mp`, `Mp = Rz Ry Rx`, and the bias: docs/estimation, written out here.
+fn affine(t: &[f64; 12]) -> AffineFile {
+    let [x, y, z] = [t[3], t[4], t[5]];
+    let (rx, ry, rz) = (
+        [
+            [1.0, 0.0, 0.0],
+            [0.0, x.cos(), -x.sin()],
+            [0.0, x.sin(), x.cos()],
+        ],
+        [
+            [y.cos(), 0.0, y.sin()],
+            [0.0, 1.0, 0.0],
+            [-y.sin(), 0.0, y.cos()],
+        ],
+        [
+            [z.cos(), -z.sin(), 0.0],
+            [z.sin(), z.cos(), 0.0],
+            [0.0, 0.0, 1.0],
+        ],
+    );
+    let [yz, zy, zx] = [t[6].sin(), t[7].sin(), t[8].sin()];
+    let mo = [
+        [1.0, 0.0, 0.0],
+        [yz, (1.0 - yz * yz).sqrt(), 0.0],
+        [-zy, zx, (1.0 - zy * zy - zx * zx).sqrt()],
+    ];
+    let product = |a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]| -> [[f64; 3]; 3] {
+        std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+    };
+    let m = product(&mo, &product(&rz, &product(&ry, &rx)));
+    AffineFile {
+        matrix: std::array::from_fn(|i| std::array::from_fn(|j| t[i] * m[i][j])),
+        bias: [t[9], t[10], t[11]],
+    }
+}
+
+/// A fit of so many poses of a unit.
+///
+/// # Errors
+/// Those of the fit.
+pub fn fitted(drawn: &Drawn, poses: usize, seed: u64, prior: Option<&Arc<Prior>>) -> Result<Fit> {
+    let mut prepared = bench::recorded(&bench::hand_plan(poses), &drawn.file, seed);
+    if let Some(prior) = prior {
+        prepared = prepared.with_prior(Arc::clone(prior))?;
+    }
+    fit(prepared, Options::IN_SAMPLE)
+}
+
+/// The prior of `units` units, each fitted to twenty poses, as its file is read.
+pub fn prior(units: u64) -> Arc<Prior> {
+    let one = |seed: u64| {
+        let made = fitted(&unit(seed, 0.0), 20, seed, None).ok()?;
+        let calibration = Calibration::of(&made, &[], "2026-01-05T12:00:00Z").ok()?;
+        Some(Measurement {
+            file: format!("u{seed}.toml"),
+            unit: format!("u{seed}"),
+            labels: Default::default(),
+            day: None,
+            of: OfCalibration::of(&calibration).expect("comparable"),
+            properties: Vec::new(),
+        })
+    };
+    let measurements: Vec<Measurement> = (1..=units).into_par_iter().filter_map(one).collect();
+    let tree = Tree {
+        measurements,
+        ..Tree::default()
+    };
+    let (_, prior) =
+        mimu_fleet::fleet_and_prior(tree, None, &mimu_fleet::Options::default()).expect("a fleet");
+    Arc::new(Prior::parse(&prior.to_toml(), "prior.toml").expect("it reads what it writes"))
+}
+
+/// Which intervals of a fit contain the truth, and the half-widths in units of the population's standard deviations.
+#[derive(Debug, Clone, Default)]
+pub struct Judged {
+    /// Shares inside.
+    pub shares: Shares,
+    /// Names and half-widths.
+    pub widths: Vec<(String, f64)>,
+}
+
+impl Judged {
+    /// Adds the parameters of a fit.
+    pub fn add(&mut self, fit: &Fit, truth: &[[f64; 12]; 2]) {
+        for (s, sensor) in Sensor::BOTH.into_iter().enumerate() {
+            let Some(found) = fit.sensor(sensor) else {
+                continue;
+            };
+            let p = found.estimated.triad.physical(Angles::Exact);
+            let all = [p.scale, p.misalignment, p.non_orthogonality, p.bias].concat();
+            for (k, estimate) in all.iter().enumerate() {
+                let size = SIZES[s][k / 3]
+                    * if matches!(k / 3, 0 | 3) {
+                        SCALE[s]
+                    } else {
+                        1.0
+                    };
+                if size == 0.0 {
+                    continue;
+                }
+                let kind = ["scale", "angle", "angle", "bias"][k / 3];
+                let name = format!("{sensor} {kind}");
+                let inside = (estimate.value - truth[s][k]).abs() <= estimate.interval;
+                self.shares.add(name.clone(), inside);
+                self.widths.push((name, estimate.interval / size));
+            }
+        }
+    }
+
+    /// Both together.
+    pub fn merge(mut self, other: Self) -> Self {
+        self.shares = self.shares.merge(other.shares);
+        self.widths.extend(other.widths);
+        self
+    }
+
+    /// Median half-width of the parameters whose name begins so.
+    pub fn width(&self, start: &str) -> f64 {
+        let mut all: Vec<f64> = self
+            .widths
+            .iter()
+            .filter(|w| w.0.starts_with(start))
+            .map(|w| w.1)
+            .collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+    }
+
+    /// A line of median half-widths, as that of [`Shares::line`].
+    pub fn line_of_widths(&self) -> String {
+        let names = [
+            "gyro scale",
+            "gyro angle",
+            "gyro bias",
+            "accel scale",
+            "accel angle",
+            "accel bias",
+        ];
+        names.map(|n| format!(" {:5.3} |", self.width(n))).concat()
+    }
+}
+
+/// Units `seeds` fitted to so many poses: those that could be fitted, judged; how many could not; and how many gave a prior up.
+pub fn study(
+    seeds: std::ops::Range<u64>,
+    poses: usize,
+    prior: Option<&Arc<Prior>>,
+    stranger: f64,
+) -> (Judged, usize, usize) {
+    let one = |seed: u64| {
+        let drawn = unit(seed, stranger);
+        let mut judged = Judged::default();
+        match fitted(&drawn, poses, 7_000_000 + seed, prior) {
+            Ok(fit) => {
+                judged.add(&fit, &drawn.truth);
+                let given_up = fit
+                    .warnings
+                    .iter()
+                    .any(|w| w.to_string().contains("not of the population"));
+                (judged, 0, usize::from(given_up))
+            }
+            Err(error) => {
+                let given_up = error.to_string().contains("not of the population");
+                (judged, 1, usize::from(given_up))
+            }
+        }
+    };
+    let nothing = || (Judged::default(), 0, 0);
+    let all: Vec<_> = seeds.into_par_iter().map(one).collect();
+    all.into_iter()
+        .fold(nothing(), |a, b| (a.0.merge(b.0), a.1 + b.1, a.2 + b.2))
+}
