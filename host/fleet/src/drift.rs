@@ -107,14 +107,19 @@ pub fn step(days: &[Day], sigma: f64) -> Option<Step> {
 /// The chart about the centre; if it has a signal, about the mean of the days before the drift. The median of all days is neither that before it nor that after.
 pub fn chart_about_beginning(days: &mut [Day], sigma: f64, limit: f64) -> Option<Chart> {
     let about_centre = chart(days, sigma, limit)?;
-    let Some(mut first) = about_centre.signal.and_then(|_| Some(step(days, sigma)?.first)) else {
+    let Some(mut first) = about_centre
+        .signal
+        .and_then(|_| Some(step(days, sigma)?.first))
+    else {
         return Some(about_centre);
     };
     let mut best = about_centre;
     // The largest step of a slow drift is in its middle: its beginning is found from there.
     for _ in 0..BEGINNINGS {
         let part = &days[..first.max(BESIDE)];
-        let sum = part.iter().fold((0.0, 0.0), |(n, s), d| (n + d.count, s + d.count * d.mean));
+        let sum = part
+            .iter()
+            .fold((0.0, 0.0), |(n, s), d| (n + d.count, s + d.count * d.mean));
         let before = sum.1 / sum.0;
         days.iter_mut().for_each(|d| d.mean -= before);
         let Some(next) = chart(days, sigma, limit).filter(|c| c.signal.is_some()) else {

@@ -151,7 +151,7 @@ fn options(args: &FitArgs) -> Options {
 /// Reads and prepares a recording as the arguments say.
 fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
     let outputs = [args.output.as_deref(), args.json.file()];
-    let inputs = [args.noise.file.as_deref()];
+    let inputs = [args.noise.file.as_deref(), args.prior.as_deref()];
     let search = args.still.search();
     let prepared = read_samples_or_means(recording, &args.log, search, &outputs, &inputs)?;
     args.writing.check(args.output.as_deref())?;
@@ -162,12 +162,6 @@ fn prepared(args: &FitArgs, recording: &Path) -> Result<Prepared> {
         None => prepared,
     };
     refuse_reference_error(&prepared, args.method)?;
-    let inputs = [args.noise.file.as_deref(), args.prior.as_deref()];
-    let finding = args.still.finding();
-    let prepared = read_samples_or_means(recording, &args.log, finding, &outputs, &inputs)?;
-    args.writing.check(args.output.as_deref())?;
-    let prepared = args.keep.apply(args.noise.apply(prepared)?);
-    let prepared = args.whole.apply(prepared)?;
     let prior = args.prior.as_deref().map(Prior::read).transpose()?;
     let prepared = match prior {
         Some(prior) => prepared.with_prior(Arc::new(prior))?,
