@@ -5,7 +5,7 @@ use clap::CommandFactory;
 use crate::Cli;
 
 /// Name of a subcommand, and its command lines.
-const EXAMPLES: [(&str, &[&str]); 18] = [
+const EXAMPLES: [(&str, &[&str]); 19] = [
     (
         "wizard",
         &[

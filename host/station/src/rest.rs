@@ -6,7 +6,7 @@ use mimu::noise::Noise;
 use mimu::quantity::Sensor;
 use mimu::signal::blocks::Condensed;
 use mimu::signal::dwell::{Dwell, Dwells};
-use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
+use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
 use mimu_recording::Batch;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Vector3;
@@ -62,7 +62,7 @@ impl Rest {
         };
         let manifest = samples.manifest(rate_hz);
         let condensed = Condensed::of(&regular, rate_hz, false)?;
-        let finding = Finding {
+        let search = DwellSearch {
             still_factor: STILL_FACTOR,
             steps: Steps::Found,
         };
@@ -71,7 +71,7 @@ impl Rest {
             Error::undetermined(place, problem, "let it lie still, and measure again")
         };
         let dwells =
-            Dwells::find(&condensed, &manifest, finding).map_err(|_| moved(String::new()))?;
+            Dwells::find(&condensed, &manifest, search).map_err(|_| moved(String::new()))?;
         let longest = dwells.list.iter().max_by_key(|d| d.rows);
         let dwell = longest.ok_or_else(|| moved(String::new()))?;
         if (dwell.rows as f64) < LEAST_SHARE * n as f64 {
