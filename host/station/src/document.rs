@@ -1,6 +1,7 @@
 //! The result of a station for one unit, `mimu-measurements/1`.
 
 use mimu::data_sheet::Part;
+use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -146,7 +147,8 @@ impl Document {
     /// With what was measured.
     ///
     /// # Errors
-    /// Every limit is kept, but the file names a quantity that was not measured: the unit can be neither accepted nor rejected.
+    /// Every limit is kept, but the file names a quantity that was not measured, or the data sheet limits a sensor that is silent: the unit can be neither
+    /// accepted nor rejected.
     pub fn judge(
         mut self,
         found: &Quantities,
@@ -164,6 +166,17 @@ impl Document {
         // A unit that is beyond one limit has failed, whatever else was not measured.
         if self.verdict == Verdict::Failed {
             return Ok(self);
+        }
+        let silent = |sensor: &Sensor| {
+            let limited = part.is_some_and(|part| part.sensor(*sensor).is_some());
+            limited && !samples.has(*sensor as usize)
+        };
+        if let Some(sensor) = Sensor::BOTH.iter().find(|sensor| silent(sensor)) {
+            return Err(Error::undetermined(
+                &samples.place,
+                format!("the data sheet limits the {sensor}, and the unit sends no readings of it"),
+                "check the columns and the wiring; or write the limits of the other sensor to a file, without the part",
+            ));
         }
         let names: Vec<&str> = found.measured.iter().map(|m| m.name.as_str()).collect();
         if let Some(row) = limits.not_met(&names).first() {

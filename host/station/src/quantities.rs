@@ -76,7 +76,10 @@ pub fn measure(samples: &Samples, scale: &Scale, expected_up: Option<&str>) -> R
         all.offsets(&rest, scale);
     }
     for sensor in Sensor::BOTH {
-        if samples.has(sensor as usize) {
+        if !samples.has(sensor as usize) {
+            all.not_measured
+                .push(format!("{sensor}: the unit sends no readings of it"));
+        } else {
             all.noise(samples, &rest, scale, sensor, rate.hz);
             all.codes(samples, &rest, scale, sensor);
         }

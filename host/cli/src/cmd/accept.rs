@@ -51,8 +51,8 @@ pub(crate) struct AcceptArgs {
     /// Data sheet that limits what the file does not: a name (icm42688p, mpu6050, lsm6dso, lsm6dsv16x, bmi088, bmi270), or a file NAME.toml
     #[arg(long, value_name = "NAME|FILE.toml")]
     part: Option<String>,
-    /// Ranges that the sensors are set to, g and deg/s: 16,2000; they say what a count is
-    #[arg(long, value_name = "G,DEG/S", value_parser = ranges)]
+    /// Ranges that the sensors are set to, g and deg/s: 16,2000; they say what a count is; `-` for a sensor that the unit lacks
+    #[arg(long, value_name = "G,DEG/S", allow_hyphen_values = true, value_parser = ranges)]
     range: Option<Ranges>,
     /// Side that has to be up: +x, -x, +y, -y, +z, -z; the limits of `tilt` are about it
     #[arg(long, value_name = "SIDE", allow_hyphen_values = true, value_parser = side)]
@@ -99,6 +99,7 @@ fn ranges(text: &str) -> std::result::Result<Ranges, String> {
     };
     let (g, dps) = text.split_once(',').ok_or_else(wrong)?;
     let positive = |text: &str| match text.trim().parse::<f64>() {
+        _ if text.trim() == "-" => Ok(None),
         Ok(range) if range > 0.0 && range.is_finite() => Ok(Some(range)),
         _ => Err(wrong()),
     };

@@ -47,7 +47,7 @@ pub fn accept_text(document: &Document, all: bool) -> String {
     out.push('\n');
     let shown = |m: &&Measurement| all || m.passed.is_some() && !is_plain_count(m);
     let rows: Vec<&Measurement> = document.measurements.iter().filter(shown).collect();
-    out += &table(&rows, all).text("  ");
+    out += &table(&rows).text("  ");
     let hidden = document.measurements.len() - rows.len();
     if hidden > 0 {
         let hidden = plural(hidden as u64, "value");
@@ -55,6 +55,9 @@ pub fn accept_text(document: &Document, all: bool) -> String {
             out,
             "  and {hidden} without limits, or counts within them (--verbose)"
         );
+    }
+    if all {
+        sources(&mut out, &document.measurements);
     }
     if let Some(found) = &document.as_found {
         let verdict = found.verdict.name();
@@ -65,7 +68,7 @@ pub fn accept_text(document: &Document, all: bool) -> String {
             m.passed.is_some() && !document.measurements.iter().any(same)
         };
         let rows: Vec<&Measurement> = found.measurements.iter().filter(other).collect();
-        out += &table(&rows, all).text("  ");
+        out += &table(&rows).text("  ");
     }
     for missing in &document.not_measured {
         wrap(&mut out, "  not measured: ", missing);
@@ -147,23 +150,40 @@ fn value(m: &Measurement) -> String {
     }
 }
 
+/// Where the limits are from, each source once.
+fn sources(out: &mut String, measurements: &[Measurement]) {
+    let mut known: Vec<&str> = Vec::new();
+    for source in measurements.iter().filter_map(|m| m.limits_of.as_deref()) {
+        if known.contains(&source) {
+            continue;
+        }
+        known.push(source);
+        let own = measurements
+            .iter()
+            .filter(|m| m.limits_of.as_deref() == Some(source));
+        let names: Vec<&str> = own.map(|m| m.measured.name.as_str()).collect();
+        wrap(
+            out,
+            "  limits of ",
+            &format!("{}: {source}", names.join(", ")),
+        );
+    }
+}
+
 /// Whether it is a count that passes, such as of stuck bits: a summary leaves these out.
 fn is_plain_count(m: &Measurement) -> bool {
     m.measured.sigma == 0.0 && m.passed == Some(true)
 }
 
-fn table(measurements: &[&Measurement], all: bool) -> Table {
+fn table(measurements: &[&Measurement]) -> Table {
     let heads = ["measured, ± 2 σ", "lower", "upper"];
     let mut table = Table::new("Measurements against their limits", "quantity")
         .numbers(heads)
         .words("unit")
         .words("");
-    if all {
-        table = table.words("limits of");
-    }
     for m in measurements {
         let limit = |limit: Option<f64>| limit.map_or(Cell::Empty, |v| Cell::number(v, 1.0));
-        let mut cells = vec![
+        let cells = [
             Cell::from(m.measured.name.clone()),
             Cell::from(value(m)),
             limit(m.lower),
@@ -175,9 +195,6 @@ fn table(measurements: &[&Measurement], all: bool) -> Table {
                 None => "",
             }),
         ];
-        if all {
-            cells.push(Cell::from(m.limits_of.clone().unwrap_or_default()));
-        }
         table.row(cells);
     }
     table

@@ -1,10 +1,14 @@
 //! Each fault of a unit fails by the quantity that shows it, and a measurement that says nothing about the unit is refused.
 
+use mimu::data_sheet::Part;
 use mimu_recording::Batch;
-use mimu_station::document::Verdict;
+use mimu_station::document::{Document, Verdict};
 use mimu_station::gather::Samples;
+use mimu_station::limits::Limits;
+use mimu_station::quantities::measure;
+use mimu_station::scale::Scale;
 
-use super::bench::{LIMITS, Unit, beyond, judged, up};
+use super::bench::{LIMITS, RANGES, Unit, beyond, judged, up};
 
 /// A unit whose readings were changed.
 fn changed(unit: &Unit, change: impl Fn(&mut Batch)) -> Samples {
@@ -175,4 +179,22 @@ fn too_short_a_measurement_and_a_limit_without_a_measurement_are_refused() {
         problem.problem.contains("accel_offset") && problem.remedy.contains("--faces"),
         "{problem:?}"
     );
+}
+
+#[test]
+fn a_silent_sensor_that_the_data_sheet_limits_is_no_pass() {
+    let mut samples = Unit::default().samples(7);
+    samples.batch.raw[3..].iter_mut().for_each(Vec::clear);
+    let part = Part::find("mpu6050").unwrap();
+    let scale = Scale::of(&samples, None, Some(&RANGES), Some(&part)).unwrap();
+    let found = measure(&samples, &scale, None).unwrap();
+    let judge = |part: Option<&Part>| {
+        let limits = Limits::default();
+        let document = Document::new("u", Vec::new(), "2026-01-01T00:00:00Z", &limits, part);
+        document.judge(&found, &samples, &limits, part, &scale)
+    };
+    let refused = judge(Some(&part)).unwrap_err().to_string();
+    assert!(refused.contains("limits the accel"), "{refused}");
+    let judged = judge(None).unwrap();
+    assert!(judged.not_measured.iter().any(|m| m.contains("accel")));
 }

@@ -4,7 +4,7 @@ use std::io::BufRead as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use mimu::quantity::normal_gravity;
+use mimu::quantity::{normal_gravity, plural};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Recording, UNNAMED, are_two_units};
 use mimu_station::boards::Boards;
@@ -66,8 +66,9 @@ impl AcceptArgs {
             return Ok(());
         }
         let problem = format!(
-            "{} names are given, and there are {units} units",
-            self.units.len()
+            "{} given, and {} measured",
+            plural(self.units.len() as u64, "name"),
+            plural(units as u64, "unit")
         );
         let remedy = "give one for each unit, in the order of the recordings or ports";
         Err(Error::new("--unit", problem, remedy))
