@@ -9,6 +9,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::data_sheet::Part;
+use mimu_recording::are_two_units;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use mimu_station::decision::Rule;
@@ -181,6 +182,12 @@ impl<'a> Station<'a> {
     fn measured(&self, document: Document, samples: &[Samples]) -> Result<Document> {
         self.args.golden.check_shift(&samples[0].unit, &self.time)?;
         let (limits, part) = (&self.limits, self.part.as_ref());
+        for of in [&self.calibration, &self.as_found].into_iter().flatten() {
+            let (name, unit) = (&of.device, &samples[0].unit);
+            if are_two_units(name, unit) {
+                eprintln!("warning: {unit} is measured through a calibration of {name}");
+            }
+        }
         let (found, scale) = self.quantities(samples, self.calibration.as_ref())?;
         let mut document = document.judge(&found, &samples[0], limits, part, &scale)?;
         if let (Some(calibration), Some(path)) = (&self.as_found, &self.args.as_found) {

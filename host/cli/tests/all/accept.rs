@@ -12,7 +12,10 @@ use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::record::{Row, samples};
 use mimu_rig::rig_file::{RigFile, RigTruth};
+use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
+
+use super::device::calibration::text_of;
 
 /// Samples a second of the boards.
 const RATE_HZ: f64 = 200.0;
@@ -403,4 +406,46 @@ fn a_board_is_turned_to_three_sides_when_the_station_asks() {
     let row = measurement(&document, "accel_y_offset");
     let [value, sigma] = ["value", "sigma"].map(|key| row[key].as_f64().unwrap());
     assert!((value - 12.0).abs() < 2.0 * sigma && sigma < 2.0, "{row}");
+}
+
+#[test]
+fn a_unit_is_measured_as_found_and_as_left_on_the_same_samples() {
+    let folder = place();
+    let model = |gyro_z_dps: f64| {
+        let (gyro, accel) = (65.5f64.to_degrees(), 16384.0 / 9.80665);
+        let bias = Vector3::new(20.0, -31.0, 65.5 * gyro_z_dps);
+        let force = Vector3::new(40.0, 16.384 * GOOD.accel_y_mg, -60.0);
+        let models = [
+            (Matrix3::identity() * gyro, bias),
+            (Matrix3::identity() * accel, force),
+        ];
+        text_of(&models, "count", "")
+    };
+    let write = |name: &str, text: String| std::fs::write(folder.path().join(name), text).unwrap();
+    // Since its last calibration the offset of z has moved by 1.5 deg/s.
+    write("old.toml", model(GOOD.gyro_z_dps - 1.5));
+    write("new.toml", model(GOOD.gyro_z_dps));
+    write(
+        "recal.toml",
+        LIMITS.replace("lower = -2, upper = 2", "lower = -0.1, upper = 0.1"),
+    );
+    let ran = mimu(
+        folder.path(),
+        "accept good --calibration new.toml --as-found old.toml --limits recal.toml --json -",
+    );
+    assert_eq!(ran.status, Some(0), "{}{}", ran.out, ran.err);
+    let document: Value = serde_json::from_str(&ran.out).unwrap();
+    let value = |of: &Value| measurement(of, "gyro_z_offset")["value"].as_f64().unwrap();
+    let found = &document["as_found"];
+    assert_eq!(
+        (&document["verdict"], &found["verdict"]),
+        (&"passed".into(), &"failed".into())
+    );
+    assert!(value(&document).abs() < 0.02, "{document}");
+    assert!((value(found) - 1.5).abs() < 0.02, "{found}");
+    let ran = mimu(
+        folder.path(),
+        "accept good --calibration old.toml --limits recal.toml",
+    );
+    assert_eq!(ran.status, Some(3), "{}{}", ran.out, ran.err);
 }

@@ -79,6 +79,7 @@ fn offsets_gravity_and_noise_are_within_their_uncertainties_as_often_as_stated()
 }
 
 #[test]
+#[ignore = "nightly: figures for the guide"]
 fn flicker_moves_offsets_by_more_than_ten_seconds_show() {
     let found = deviations([0.002, 0.03]);
     let (share, rms) = coverage(&found.offsets);

@@ -3,7 +3,7 @@
 #![cfg(unix)]
 
 mod board;
-mod calibration;
+pub(crate) mod calibration;
 mod conversation;
 mod fuzz;
 mod kept;
