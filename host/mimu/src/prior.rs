@@ -2,14 +2,15 @@
 //!
 //! The prior is a group of rows of a fit like any other: in units of its standard deviations, the parameters minus their means. Few poses then determine what they can, and
 //! the population the rest. Whether the unit is of the population is judged by how far the data have moved it: for a prior covariance T and a posterior one C the
-//! movement has the covariance T - C (the data alone may leave parameters open), and its square over that a chi-square distribution.
+//! movement has the covariance T - C (the data alone may leave parameters open), and its square over that a chi-square distribution; Hotelling's, because T is estimated from some
+//! number of units.
 
 use std::path::Path;
 
 use mimu_core::compensation::Affine;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::parameter::TriadParameter;
 use crate::quantity::{PerSensor, Sensor, raw_unit, scale_unit};
@@ -75,6 +76,8 @@ pub struct TriadPrior {
     mean: SVector<f64, 12>,
     /// Numbers of the parameters with a prior.
     of: Vec<usize>,
+    /// Units that it was made from.
+    units: f64,
     covariance: DMatrix<f64>,
     factor: Cholesky<f64, Dyn>,
 }
@@ -211,6 +214,7 @@ impl Prior {
         let scales = (0..3).all(|k| mean[k] != 0.0);
         match Cholesky::new(covariance.clone()).filter(|_| finite && scales) {
             Some(factor) => Ok(Some(TriadPrior {
+                units: table.units as f64,
                 mean,
                 of,
                 covariance,
@@ -298,12 +302,7 @@ impl TriadPrior {
         let squares =
             seen.map(|k| moved.eigenvectors.column(k).dot(&white).powi(2) / moved.eigenvalues[k]);
         let squares: Vec<f64> = squares.collect();
-        let dof = squares.len() as f64;
-        let p = match ChiSquared::new(dof) {
-            Ok(of) => of.sf(squares.iter().sum()),
-            // Nothing was seen.
-            Err(_) => 1.0,
-        };
+        let p = self.beyond(squares.iter().sum(), squares.len() as f64);
         let sigmas = |i: usize| from[i] / self.covariance[(i, i)].sqrt();
         let most = (0..n).max_by(|a, b| sigmas(*a).abs().total_cmp(&sigmas(*b).abs()))?;
         Some(Movement {
@@ -311,6 +310,20 @@ impl TriadPrior {
             most: TriadParameter::physical()[self.of[most]],
             sigmas: sigmas(most),
         })
+    }
+}
+
+impl TriadPrior {
+    /// Probability that the square of a movement along `seen` directions is larger: Hotelling's distribution, because the covariance is estimated from the units.
+    ///
+    /// The file's covariance is larger than the estimate, by the bias of its inverse: `(N - 1)/(N - n - 2)`.
+    fn beyond(&self, square: f64, seen: f64) -> f64 {
+        let rest = (self.units - seen).max(3.0);
+        if !(seen > 0.0) {
+            return 1.0;
+        }
+        let scaled = square / seen * rest / (rest - 2.0);
+        FisherSnedecor::new(seen, rest).map_or(1.0, |d| d.sf(scaled))
     }
 }
 

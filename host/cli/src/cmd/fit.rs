@@ -11,6 +11,7 @@ use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::prior::Prior;
+use mimu::quantity::Sensor;
 use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
@@ -129,6 +130,16 @@ const CHECK: &str =
 pub(crate) fn run(args: &FitArgs) -> Result<Status> {
     // A part that is not known is refused before anything is computed.
     args.part.part()?;
+    if let (Some(prior), [_, second, ..]) = (&args.prior, &args.recordings[..]) {
+        return Err(Error::new(
+            prior.display(),
+            format!(
+                "a prior is used for one session, and {} is another",
+                second.display()
+            ),
+            "leave --prior out: several sessions determine a unit without it",
+        ));
+    }
     match (&args.recordings[..], args.class) {
         ([recording], None) => one(args, recording),
         _ => several(args),
@@ -218,6 +229,13 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
     let result = FitResult::of(&fitted);
     let mut text = report::fit_text(&result, args.verbose.verbose);
     text += &budget_text(&result);
+    if let Some((path, prior)) = args.prior.as_ref().zip(fitted.prepared.prior.as_ref()) {
+        let of = |sensor| Some(format!("{sensor} of {} units", prior.table(sensor)?.units));
+        let used: Vec<String> = Sensor::BOTH.into_iter().filter_map(of).collect();
+        if !used.is_empty() {
+            text += &format!("prior: {}, {}\n", path.display(), used.join(", "));
+        }
+    }
     if args.dwells {
         text.push('\n');
         text.push_str(&report::dwell_table(&result.dwells));

@@ -481,7 +481,11 @@ fn fitted(
     let rests = by.rows.0[5].clone();
     let of_rest = residuals.rows(rests.start, rests.len());
     let of_rest = of_rest.norm_squared() / rests.len() as f64;
-    let half_degree = 0.5f64.to_radians().powi(2);
+    // Beside a prior they are those of the noise: with half a degree a prior that does not hold was believed, and what then remained of the turns was taken for their scatter.
+    let half_degree = match prior {
+        None => 0.5f64.to_radians().powi(2),
+        Some(_) => 0.0,
+    };
     let mut groups = Reweighted::new(
         by.rows.0.clone(),
         [half_degree, half_degree, 0.0, 0.0, 0.0, of_rest],
