@@ -8,6 +8,7 @@ pub(crate) enum Status {
     /// Status 3: the result is written, `--strict` was given, and the judgement of the result is worse than `good`.
     NotGood,
     /// Status 3: the result is written, and a unit is beyond its limits.
+    #[cfg(not(target_family = "wasm"))]
     Rejected,
 }
 
@@ -16,7 +17,9 @@ impl Status {
     pub(crate) fn code(self) -> u8 {
         match self {
             Self::Done => 0,
-            Self::NotGood | Self::Rejected => 3,
+            Self::NotGood => 3,
+            #[cfg(not(target_family = "wasm"))]
+            Self::Rejected => 3,
         }
     }
 }
