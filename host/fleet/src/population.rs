@@ -17,7 +17,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT}
 use crate::robust;
 
 /// Units for each parameter from which on covariances between parameters are estimated. Below, distances of a normal population have other distributions.
-pub const JOINTLY: usize = 5;
+pub const JOINTLY: usize = 4;
 /// Fewest units of a population.
 pub const FEWEST: usize = 5;
 /// Share of a normal population that is used.

@@ -297,7 +297,6 @@ impl TriadPrior {
         let half = l.solve_lower_triangular(&posterior)?;
         let posterior = l.solve_lower_triangular(&half.transpose())?;
         let moved = SymmetricEigen::new(DMatrix::identity(n, n) - posterior);
-        // Directions that the data hardly see have hardly moved, and would only divide two small numbers.
         let seen = (0..n).filter(|k| moved.eigenvalues[*k] > SEEN);
         let squares =
             seen.map(|k| moved.eigenvectors.column(k).dot(&white).powi(2) / moved.eigenvalues[k]);
@@ -327,5 +326,6 @@ impl TriadPrior {
     }
 }
 
-/// Share of a direction's prior variance that the data have to remove for it to count as seen.
-const SEEN: f64 = 0.1;
+/// Share of a direction's prior variance that the data have to remove for it to count as seen. Few poses may err by more than they show, which matters where data and prior are
+/// about equally certain.
+const SEEN: f64 = 0.8;
