@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates, as folders from the root of the repository.
-const CRATES: [&str; 14] = [
+const CRATES: [&str; 15] = [
     "core",
     "firmware",
     "host/recording",
