@@ -239,7 +239,7 @@ mod tests {
         let mut golden = Golden::new("golden");
         for _ in 0..FEWEST - 1 {
             // Short in decimal: reading JSON may change the last bit of a long number.
-            let short = |m: Measurement| Measurement {
+            let short = |m: Measured| Measured {
                 value: (m.value * 1024.0).round() / 1024.0,
                 ..m
             };
