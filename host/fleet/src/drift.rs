@@ -74,7 +74,7 @@ pub struct Step {
     pub size: f64,
 }
 
-/// The largest step, in standard deviations, of all days with [`BESIDE`] on both sides. Without a step [`limit`] of the number of days is exceeded in [`FALSE_FINDING`] of cases at most.
+/// The largest step, in standard deviations, of all days with `BESIDE` on both sides. Without a step [`limit`] of the number of days is exceeded in [`FALSE_FINDING`] of cases at most.
 pub fn step(days: &[Day], sigma: f64) -> Option<Step> {
     let between = between_days(days, sigma);
     let weight = |day: &Day| 1.0 / (sigma * sigma / day.count + between);

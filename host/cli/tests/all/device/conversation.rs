@@ -386,8 +386,8 @@ fn the_kalman_bank_is_compared_on_the_samples_that_it_took_in() {
         let of = |key: &str| inputs[i][key].as_u64().unwrap();
         of("last") - of("first") + 1
     };
-    // A second each, and the samples until the device received the stop: on a busy machine these may be many.
-    assert!(taken(0) >= 1000 && taken(1) >= 1000, "{result}");
+    // A second each by the command's samples. On a busy machine the device gets input and stop later, each by its own delay, so that it has more or fewer.
+    assert!(taken(0) >= 500 && taken(1) >= 500, "{result}");
     let largest = result["largest_distance_sigma"].as_f64().unwrap();
     assert!(largest < 0.1, "{largest}");
     // b + 9.81 P3 is the mean of the script's readings under the first input, independent of a bank.
