@@ -52,7 +52,7 @@ holds "$work/info.json" "r['brown_out_level'] == 3 and not r['banks_swapped']"
 step "the supply is really off: the device starts from power-on, and knows that it has just been"
 cycle
 ask cycled device info
-holds "$work/cycled.json" "r['start']['cause'] == 'power-on' and r['starts'] == 1 and r['powered_for_ms'] < 2000"
+holds "$work/cycled.json" "r['start']['reason'] == 'power-on' and r['starts'] == 1 and r['powered_for_ms'] < 2000"
 
 step "the converter's own factors come back with the calibration after a power cycle"
 ask one device upload "$a"
@@ -76,6 +76,8 @@ for ((k = 1; k <= cuts; k++)); do
   # Up to a fifth longer than an upload takes, so that some cuts come after it.
   sleep "$(python3 -c 'import random, sys; print(random.uniform(0, 1.2e-3 * float(sys.argv[1])))' "$took_ms")"
   power off
+  # It would go on asking a dead line.
+  kill "$upload" 2>/dev/null || true
   wait "$upload" 2>/dev/null || true
   sleep 1
   power on
