@@ -98,7 +98,8 @@ if [ -n "${MIMU_NOISE:-}" ]; then
   $MIMU_NOISE on >/dev/null
   ask noisy record -o "$work/noisy" --for 60s --gravity 9.81 || true
   $MIMU_NOISE off >/dev/null
-  holds "$work/noisy.json" "abs(r['samples'] + r['missing'] - 60 * r['sample_rate_hz']) < 100"
+  rate=$(value "$work/info.json" "r['sample_rate_hz']")
+  holds "$work/noisy.json" "abs(r['samples'] + r['missing'] - 60 * $rate) < 100"
   printf '%s samples missing in %s gaps\n' "$(value "$work/noisy.json" "r['missing']")" "$(value "$work/noisy.json" "r['gaps']")"
 fi
 
