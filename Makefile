@@ -143,10 +143,11 @@ demo: toolchain ## calibrate and verify a board on the virtual bench; SEED=n is 
 	@rm -rf $(DEMO)
 	@target/debug/demo $(SEED) $(DEMO) $(BOARD)
 
-faults: toolchain ## a session of the wizard with faults caused on purpose
+faults: toolchain ## a session of the wizard with faults caused on purpose; BOARD=matek with the digital sensor
+	@if [ $(BOARD) = matek ]; then $(MATEK) -q && cp $(IMAGES)/mimu-firmware $(IMAGES)/mimu-firmware-matek-h743; fi
 	@$(FIRMWARE) -q
 	$(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bins
-	target/debug/faults
+	target/debug/faults $(BOARD)
 
 data: ## bring the public recordings, 27 MB, into $MIMU_DATA or ../shared/data, so that the tests on real units run
 	./tests/data.sh

@@ -59,11 +59,8 @@ impl Truth {
     /// Truth of the bench's unit.
     pub fn of(truth: &RigTruth, by_hand: bool) -> Result<Self, String> {
         let unit = &truth.file.unit;
-        let pins = unit
-            .gyro_reference_v
-            .ok_or("the unit has no reference pins")?;
-        // The firmware measures the gyros against the reference pin of the first, assuming its nominal voltage.
-        let ratios = [2.5 / pins[0], 1.0];
+        // The firmware measures analog gyros against the reference pin of the first, assuming its nominal voltage. A digital unit has no such pin.
+        let ratios = [unit.gyro_reference_v.map_or(1.0, |pins| 2.5 / pins[0]), 1.0];
         let affine = [&unit.gyro_affine, &unit.accel_affine];
         let mut triads = [Forward {
             matrix: [[0.0; 3]; 3],

@@ -25,6 +25,18 @@ pub const LATITUDE_DEG: f64 = 30.5;
 /// Longest wait for an answer, long enough for a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// Which board is emulated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// NUCLEO-H743ZI2 with analog sensors.
+    Nucleo,
+    /// Matek H743 with its digital sensor.
+    Matek {
+        /// As in [`Board::digital`].
+        crystal: f64,
+    },
+}
+
 /// A board with its unit on a fixture, at the fast pace. Its folder contains `port`, a link to the serial port, and `flash`, the stored contents of
 /// the device.
 #[derive(Debug)]
@@ -50,6 +62,7 @@ impl Commanded {
     ///
     /// Errors: the folder cannot be written to, the unit is refused, or no terminal is available.
     pub fn start(
+        kind: Kind,
         image: &Image,
         fixture: &str,
         truth: &RigTruth,
@@ -57,24 +70,17 @@ impl Commanded {
         unit_id: [u8; 12],
         folder: &Path,
     ) -> Result<Self, String> {
-        let front = Front::commanded(&place(fixture)?, truth, seed)?;
-        let board = Board::numbered(image, front, unit_id)?;
+        let place = place(fixture)?;
+        let board = match kind {
+            Kind::Nucleo => {
+                Board::numbered(image, Front::commanded(&place, truth, seed)?, unit_id)?
+            }
+            Kind::Matek { crystal } => {
+                let front = Front::commanded_digital(&place, truth, seed, crystal)?;
+                Board::matek(image, front, unit_id)?
+            }
+        };
         Self::serve(board, seed, folder)
-    }
-
-    /// The same with the Matek H743 and its digital sensor; `crystal` as in [`Board::digital`].
-    ///
-    /// Errors: as [`Commanded::start`].
-    pub fn matek(
-        image: &Image,
-        fixture: &str,
-        truth: &RigTruth,
-        (seed, crystal): (u64, f64),
-        unit_id: [u8; 12],
-        folder: &Path,
-    ) -> Result<Self, String> {
-        let front = Front::commanded_digital(&place(fixture)?, truth, seed, crystal)?;
-        Self::serve(Board::matek(image, front, unit_id)?, seed, folder)
     }
 
     fn serve(board: Board, seed: u64, folder: &Path) -> Result<Self, String> {

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
 
-use mimu_board::commanded::Commanded;
+use mimu_board::commanded::{Commanded, Kind};
 use mimu_board::inertial::with_digital_parts;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_tests::blind::{is_listed, unit, with_effects};
@@ -30,13 +30,13 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let seed = arguments.first().map_or(Ok(1), |a| a.parse());
     let board = arguments.get(2).map_or("nucleo", String::as_str);
-    let digital = match board {
-        "nucleo" => Some(false),
-        "matek" => Some(true),
+    let kind = match board {
+        "nucleo" => Some(Kind::Nucleo),
+        "matek" => Some(Kind::Matek { crystal: CRYSTAL }),
         _ => None,
     };
-    let done = match (seed, arguments.get(1), digital) {
-        (Ok(seed), Some(folder), Some(digital)) => demo(seed, Path::new(folder), digital),
+    let done = match (seed, arguments.get(1), kind) {
+        (Ok(seed), Some(folder), Some(kind)) => demo(seed, Path::new(folder), kind),
         _ => Err("usage: demo SEED FOLDER [nucleo|matek]".into()),
     };
     match done {
@@ -51,12 +51,12 @@ fn main() -> ExitCode {
 /// Crystal of the Matek relative to its nominal frequency: to it, the sensor's clock is 1 % fast.
 const CRYSTAL: f64 = 0.99;
 
-fn demo(seed: u64, folder: &Path, digital: bool) -> Result<(), String> {
+fn demo(seed: u64, folder: &Path, kind: Kind) -> Result<(), String> {
     let began = Instant::now();
     let effect = EFFECTS[(seed as usize + EFFECTS.len() - 1) % EFFECTS.len()];
-    let mut file = match digital {
-        true => with_effects(with_digital_parts(RigFile::default()), &[effect], seed),
-        false => unit(&[effect], seed),
+    let mut file = match kind {
+        Kind::Matek { .. } => with_effects(with_digital_parts(RigFile::default()), &[effect], seed),
+        Kind::Nucleo => unit(&[effect], seed),
     };
     // It has been on for long: no warm-up.
     file.thermal.on_before_s = Some(f64::INFINITY);
@@ -70,16 +70,8 @@ fn demo(seed: u64, folder: &Path, digital: bool) -> Result<(), String> {
     );
     let mut unit_id = [0; 12];
     unit_id[4..].copy_from_slice(&seed.to_be_bytes());
-    let board = match digital {
-        true => {
-            let image = mimu_board_tests::digital_image();
-            Commanded::matek(&image, "table", &truth, (seed, CRYSTAL), unit_id, folder)?
-        }
-        false => {
-            let image = mimu_board_tests::image();
-            Commanded::start(&image, "table", &truth, seed, unit_id, folder)?
-        }
-    };
+    let image = mimu_board_tests::image_of(kind);
+    let board = Commanded::start(kind, &image, "table", &truth, seed, unit_id, folder)?;
     let driver = folder.join("turntable.toml");
     let text = include_str!("turntable.toml").replace("HOST:PORT", &board.address().to_string());
     std::fs::write(&driver, text).map_err(|e| format!("the driver file: {e}"))?;

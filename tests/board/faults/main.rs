@@ -1,7 +1,7 @@
 //! Faults and mistakes during a session of the wizard: each session must end with a calibration that contains the truth, or stop with a reason.
 //! Prints a line for each.
 //!
-//! `faults [NAME ...]`: without names, all of them.
+//! `faults [nucleo|matek] [NAME ...]`: without names, all of them.
 
 mod mistakes;
 mod run;
@@ -13,18 +13,20 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use mimu_board::commanded::Commanded;
+use mimu_board::commanded::{Commanded, Kind};
 use run::Ended;
-use session::{WizardSession, unit};
+use session::{Bench, WizardSession};
 
 /// Errors above these mean a wrong calibration: several times the errors from dwells of one second. deg/s, mg.
 const RIGHT: [f64; 2] = [0.3, 3.0];
 /// How often the command is killed in one session.
 const KILLS: usize = 50;
 
-type Scenario = fn(&Path) -> Result<Ended, String>;
+/// To the Matek, its sensor's clock is 1 % fast.
+const MATEK: Kind = Kind::Matek { crystal: 0.99 };
 
-const ALL: &[(&str, Scenario)] = &[
+/// With a board of ours.
+const OURS: &[(&str, fn(Bench<'_>) -> Result<Ended, String>)] = &[
     ("nothing", nothing),
     ("by-device", by_device),
     ("garbled", garbled),
@@ -46,6 +48,10 @@ const ALL: &[(&str, Scenario)] = &[
     ("changed-flag", mistakes::changed_flag),
     ("early-yes", mistakes::early_yes),
     ("table-250", mistakes::table_250),
+];
+
+/// With a board of another maker, which writes lines.
+const TEXT: &[(&str, fn(&Path) -> Result<Ended, String>)] = &[
     ("text", text_mistakes::text_nothing),
     ("text-z-inv", text_mistakes::text_z_inverted),
     ("text-negated", text_mistakes::text_negated),
@@ -66,34 +72,47 @@ const ALL: &[(&str, Scenario)] = &[
 ];
 
 fn main() -> ExitCode {
-    let names: Vec<String> = std::env::args().skip(1).collect();
+    let mut names: Vec<String> = std::env::args().skip(1).collect();
+    let kind = match names.first().map(String::as_str) {
+        Some("nucleo") => Some(Kind::Nucleo),
+        Some("matek") => Some(MATEK),
+        _ => None,
+    };
+    if kind.is_some() {
+        names.remove(0);
+    }
+    let kind = kind.unwrap_or(Kind::Nucleo);
     println!(
         "{:14} {:>6} {:>7} {:>6} {:>6} {:>6}  outcome",
         "fault", "s", "unit s", "dwells", "discarded", "broken"
     );
+    let wanted = |name: &str| names.is_empty() || names.iter().any(|n| n == name);
     let mut wrong = 0;
-    for (name, scenario) in ALL {
-        if !names.is_empty() && !names.iter().any(|n| n == name) {
-            continue;
-        }
-        let folder = match tempfile::tempdir() {
-            Ok(folder) => folder,
-            Err(e) => {
-                eprintln!("faults: {e}");
-                return ExitCode::FAILURE;
-            }
-        };
-        match scenario(folder.path()) {
-            Ok(ended) => wrong += usize::from(!report(name, &ended)),
-            Err(problem) => {
-                println!("{name:14} {problem}");
-                wrong += 1;
-            }
-        }
+    for (name, scenario) in OURS.iter().filter(|(name, _)| wanted(name)) {
+        wrong += usize::from(!ended_right(name, |folder| {
+            scenario(Bench { kind, folder })
+        }));
+    }
+    // They do not depend on our board.
+    let text = if kind == Kind::Nucleo { TEXT } else { &[] };
+    for (name, scenario) in text.iter().filter(|(name, _)| wanted(name)) {
+        wrong += usize::from(!ended_right(name, scenario));
     }
     match wrong {
         0 => ExitCode::SUCCESS,
         _ => ExitCode::FAILURE,
+    }
+}
+
+/// Plays a scenario in a folder of its own, prints a line, and returns whether nothing wrong is stored.
+fn ended_right(name: &str, scenario: impl FnOnce(&Path) -> Result<Ended, String>) -> bool {
+    let folder = tempfile::tempdir().map_err(|e| e.to_string());
+    match folder.and_then(|folder| scenario(folder.path())) {
+        Ok(ended) => report(name, &ended),
+        Err(problem) => {
+            println!("{name:14} {problem}");
+            false
+        }
     }
 }
 
@@ -131,37 +150,37 @@ const TABLE: [&str; 9] = [
     "--as-planned",
 ];
 
-fn on_table(seed: u64, folder: &Path) -> Result<WizardSession, String> {
-    let mut session = WizardSession::new("table", seed, folder, &TABLE)?;
+fn on_table(seed: u64, bench: Bench<'_>) -> Result<WizardSession, String> {
+    let mut session = WizardSession::new("table", seed, bench, &TABLE)?;
     session.run()?;
     Ok(session)
 }
 
-fn nothing(folder: &Path) -> Result<Ended, String> {
-    on_table(1, folder)?.end()
+fn nothing(bench: Bench<'_>) -> Result<Ended, String> {
+    on_table(1, bench)?.end()
 }
 
-fn by_device(folder: &Path) -> Result<Ended, String> {
+fn by_device(bench: Bench<'_>) -> Result<Ended, String> {
     let arguments = [&TABLE[..], &["--by", "device"]].concat();
-    let mut session = WizardSession::new("table", 2, folder, &arguments)?;
+    let mut session = WizardSession::new("table", 2, bench, &arguments)?;
     session.run()?;
     session.end()
 }
 
-fn garbled(folder: &Path) -> Result<Ended, String> {
-    let mut session = on_table(3, folder)?;
+fn garbled(bench: Bench<'_>) -> Result<Ended, String> {
+    let mut session = on_table(3, bench)?;
     session.board.tell("GARBLE 1000")?;
     session.end()
 }
 
 /// Does something after every few dwells, several times.
 fn now_and_then(
-    folder: &Path,
+    bench: Bench<'_>,
     seed: u64,
     times: usize,
     mut strike: impl FnMut(&mut Commanded) -> Result<(), String>,
 ) -> Result<Ended, String> {
-    let mut session = on_table(seed, folder)?;
+    let mut session = on_table(seed, bench)?;
     for k in 1..=times {
         // Later ones would also strike verification and store, which have fewer dwells.
         if !session.wait_for(|s| s.told("step") >= 2 * k)? {
@@ -172,32 +191,32 @@ fn now_and_then(
     session.end()
 }
 
-fn bursts(folder: &Path) -> Result<Ended, String> {
-    now_and_then(folder, 4, 10, |board| board.tell("BURST 200"))
+fn bursts(bench: Bench<'_>) -> Result<Ended, String> {
+    now_and_then(bench, 4, 10, |board| board.tell("BURST 200"))
 }
 
-fn link(folder: &Path) -> Result<Ended, String> {
-    now_and_then(folder, 5, 10, |board| {
+fn link(bench: Bench<'_>) -> Result<Ended, String> {
+    now_and_then(bench, 5, 10, |board| {
         board.tell("LINK OFF")?;
         std::thread::sleep(Duration::from_millis(300));
         board.tell("LINK ON")
     })
 }
 
-fn reset(folder: &Path) -> Result<Ended, String> {
-    now_and_then(folder, 6, 2, |board| board.tell("RESET"))
+fn reset(bench: Bench<'_>) -> Result<Ended, String> {
+    now_and_then(bench, 6, 2, |board| board.tell("RESET"))
 }
 
-fn supply(folder: &Path) -> Result<Ended, String> {
-    now_and_then(folder, 7, 2, |board| {
+fn supply(bench: Bench<'_>) -> Result<Ended, String> {
+    now_and_then(bench, 7, 2, |board| {
         board.tell("POWER OFF")?;
         std::thread::sleep(Duration::from_millis(300));
         board.tell("POWER ON")
     })
 }
 
-fn killed(folder: &Path) -> Result<Ended, String> {
-    let mut session = on_table(8, folder)?;
+fn killed(bench: Bench<'_>) -> Result<Ended, String> {
+    let mut session = on_table(8, bench)?;
     let mut kills = 0;
     // Times independent of its work, a third of a second to three seconds after each start.
     for k in 0..4 * KILLS {
@@ -223,23 +242,24 @@ fn killed(folder: &Path) -> Result<Ended, String> {
     Ok(ended)
 }
 
-fn other_unit(folder: &Path) -> Result<Ended, String> {
-    let mut session = on_table(9, folder)?;
+fn other_unit(bench: Bench<'_>) -> Result<Ended, String> {
+    let mut session = on_table(9, bench)?;
     session.wait_for(|s| s.told("dwell") >= 3)?;
     session.board.tell("LINK OFF")?;
-    let other_folder = folder.join("other");
-    let image = mimu_board_tests::image();
+    let other_folder = bench.folder.join("other");
+    let image = mimu_board_tests::image_of(bench.kind);
     let mut other = Commanded::start(
+        bench.kind,
         &image,
         "table",
-        &unit(99, "table")?,
+        &bench.unit(99, "table")?,
         99,
         [9; 12],
         &other_folder,
     )?;
     // Plugged into the same port.
     let port = std::fs::read_link(other_folder.join("port")).map_err(|e| e.to_string())?;
-    let link = folder.join("port");
+    let link = bench.folder.join("port");
     std::os::unix::fs::symlink(port, &link).map_err(|e| e.to_string())?;
     let before = session.told("interrupted");
     session.wait_for(|s| s.told("interrupted") > before)?;
@@ -255,16 +275,16 @@ fn other_unit(folder: &Path) -> Result<Ended, String> {
     Ok(ended)
 }
 
-fn drift(folder: &Path) -> Result<Ended, String> {
-    let mut session = on_table(10, folder)?;
+fn drift(bench: Bench<'_>) -> Result<Ended, String> {
+    let mut session = on_table(10, bench)?;
     session.board.tell("CHAMBER 70 20")?;
     session.end()
 }
 
-fn wrong_axis(folder: &Path) -> Result<Ended, String> {
+fn wrong_axis(bench: Bench<'_>) -> Result<Ended, String> {
     let arguments = [&TABLE[..], &["--patience", "10"]].concat();
-    let mut session = WizardSession::new("table", 11, folder, &arguments)?;
-    let path = folder.join("driver.toml");
+    let mut session = WizardSession::new("table", 11, bench, &arguments)?;
+    let path = bench.folder.join("driver.toml");
     let driver = std::fs::read_to_string(&path).map_err(|e| e.to_string())?;
     let driver = driver.replace("{x} {y} {z}", "{y} {z} {x}");
     std::fs::write(&path, driver).map_err(|e| e.to_string())?;
@@ -281,17 +301,17 @@ const HANDS: [&str; 6] = [
     "2",
 ];
 
-fn fidget(folder: &Path) -> Result<Ended, String> {
-    let mut session = WizardSession::new("hands", 12, folder, &HANDS)?;
+fn fidget(bench: Bench<'_>) -> Result<Ended, String> {
+    let mut session = WizardSession::new("hands", 12, bench, &HANDS)?;
     session.board.tell("FIDGET 3")?;
     session.run()?;
     session.end()
 }
 
 /// A person who first takes the faces, edges and corners of a box in their own order, and only then follows the requests.
-fn any_order(folder: &Path) -> Result<Ended, String> {
+fn any_order(bench: Bench<'_>) -> Result<Ended, String> {
     let mut session =
-        WizardSession::new("hands", 13, folder, &["--fixture", "hands", "--dwell", "2"])?;
+        WizardSession::new("hands", 13, bench, &["--fixture", "hands", "--dwell", "2"])?;
     session.run()?;
     let mut poses = Vec::new();
     for x in [-1, 0, 1] {
@@ -326,16 +346,16 @@ fn any_order(folder: &Path) -> Result<Ended, String> {
     Ok(ended)
 }
 
-fn hands(folder: &Path) -> Result<Ended, String> {
-    let mut session = WizardSession::new("hands", 14, folder, &HANDS)?;
+fn hands(bench: Bench<'_>) -> Result<Ended, String> {
+    let mut session = WizardSession::new("hands", 14, bench, &HANDS)?;
     session.run()?;
     session.end()
 }
 
 /// The same person with all planned poses, even if fewer would suffice.
-fn hands_fixed(folder: &Path) -> Result<Ended, String> {
+fn hands_fixed(bench: Bench<'_>) -> Result<Ended, String> {
     let arguments = [&HANDS[..], &["--as-planned"]].concat();
-    let mut session = WizardSession::new("hands", 14, folder, &arguments)?;
+    let mut session = WizardSession::new("hands", 14, bench, &arguments)?;
     session.run()?;
     session.end()
 }

@@ -1,13 +1,12 @@
 //! Mistakes of a person: wrongly wired or named axes, wrong units and time stamps, changed flags, answers given too early. The stored calibration
 //! must contain the truth all the same, or one line must name the mistake.
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use mimu_rig::rig_file::RigTruth;
 
 use crate::run::Ended;
-use crate::session::{WizardSession, unit};
+use crate::session::{Bench, WizardSession};
 use mimu_tests::stored_calibration::half_widths;
 
 pub const BY_HAND: [&str; 4] = ["--fixture", "hands", "--dwell", "2"];
@@ -16,19 +15,19 @@ const PUZZLED: Duration = Duration::from_secs(12);
 
 /// Our board in the hands of a person who follows the requests; `rewire` changes the wiring of its sensors.
 fn our_board(
-    folder: &Path,
+    bench: Bench<'_>,
     seed: u64,
     fixture: &str,
     rewire: impl Fn(&mut RigTruth),
 ) -> Result<Ended, String> {
-    let mut truth = unit(seed, fixture)?;
+    let mut truth = bench.unit(seed, fixture)?;
     rewire(&mut truth);
     let truth = RigTruth::resolve(&truth.file, seed)?;
     let arguments: &[&str] = match fixture {
         "hands" => &BY_HAND,
         _ => &crate::TABLE,
     };
-    let mut session = WizardSession::with(fixture, &truth, seed, folder, arguments)?;
+    let mut session = WizardSession::with(fixture, &truth, seed, bench, arguments)?;
     session.run()?;
     let mut steps = 0;
     loop {
@@ -58,26 +57,26 @@ fn rewired(truth: &mut RigTruth, sensor: usize, order: [usize; 3], signs: [f64; 
     }
 }
 
-pub fn board_z_inverted(folder: &Path) -> Result<Ended, String> {
-    our_board(folder, 21, "hands", |unit| {
+pub fn board_z_inverted(bench: Bench<'_>) -> Result<Ended, String> {
+    our_board(bench, 21, "hands", |unit| {
         rewired(unit, 1, [0, 1, 2], [1.0, 1.0, -1.0])
     })
 }
 
-pub fn board_gyro_swapped(folder: &Path) -> Result<Ended, String> {
-    our_board(folder, 22, "hands", |unit| {
+pub fn board_gyro_swapped(bench: Bench<'_>) -> Result<Ended, String> {
+    our_board(bench, 22, "hands", |unit| {
         rewired(unit, 0, [1, 0, 2], [1.0; 3])
     })
 }
 
-pub fn table_z_inverted(folder: &Path) -> Result<Ended, String> {
-    our_board(folder, 23, "table", |unit| {
+pub fn table_z_inverted(bench: Bench<'_>) -> Result<Ended, String> {
+    our_board(bench, 23, "table", |unit| {
         rewired(unit, 1, [0, 1, 2], [1.0, 1.0, -1.0])
     })
 }
 
-pub fn changed_flag(folder: &Path) -> Result<Ended, String> {
-    let mut session = crate::on_table(24, folder)?;
+pub fn changed_flag(bench: Bench<'_>) -> Result<Ended, String> {
+    let mut session = crate::on_table(24, bench)?;
     session.wait_for(|s| s.told("dwell") >= 3)?;
     session.kill()?;
     session.gravity = "9.81".into();
@@ -86,9 +85,9 @@ pub fn changed_flag(folder: &Path) -> Result<Ended, String> {
 }
 
 /// `yes` is typed at the start, and again without the supply turned off; then the supply is turned off.
-pub fn early_yes(folder: &Path) -> Result<Ended, String> {
-    let mut session = WizardSession::new("table", 25, folder, &crate::TABLE)?;
-    let path = folder.join("driver.toml");
+pub fn early_yes(bench: Bench<'_>) -> Result<Ended, String> {
+    let mut session = WizardSession::new("table", 25, bench, &crate::TABLE)?;
+    let path = bench.folder.join("driver.toml");
     let driver = std::fs::read_to_string(&path).map_err(|e| e.to_string())?;
     let [before, after] = ["[power]", "# A chamber"].map(|at| driver.find(at).unwrap_or(0));
     let driver = [&driver[..before], &driver[after..]].concat();
@@ -128,8 +127,8 @@ pub fn early_yes(folder: &Path) -> Result<Ended, String> {
 }
 
 /// The session of the documentation's example: a table at 250 deg/s with typical flaws, the board off its axes.
-pub fn table_250(folder: &Path) -> Result<Ended, String> {
-    let truth = crate::session::on_real_table(26)?;
+pub fn table_250(bench: Bench<'_>) -> Result<Ended, String> {
+    let truth = bench.on_real_table(26)?;
     let arguments = [
         "--fixture",
         "table",
@@ -140,7 +139,7 @@ pub fn table_250(folder: &Path) -> Result<Ended, String> {
         "--latitude",
         "30.5",
     ];
-    let mut session = WizardSession::with("table", &truth, 26, folder, &arguments)?;
+    let mut session = WizardSession::with("table", &truth, 26, bench, &arguments)?;
     session.run()?;
     let mut first = String::new();
     if session.wait_for(|s| s.told("stored") > 0)? {
@@ -150,7 +149,7 @@ pub fn table_250(folder: &Path) -> Result<Ended, String> {
     let mut ended = session.end()?;
     ended.notes.push(format!("first stored: {first}"));
     for name in ["calibration.toml", "with-effects.toml"] {
-        let file = folder.join("session").join(name);
+        let file = bench.folder.join("session").join(name);
         if let Ok(both) = half_widths(&file, &truth) {
             let [gyro, accel] = both.map(|all| {
                 let outside = all.iter().filter(|r| **r > 1.0).count();

@@ -12,6 +12,7 @@ pub mod traces;
 
 use std::path::PathBuf;
 
+use mimu_board::commanded::Kind;
 use mimu_board::front::Front;
 use mimu_board::image::Image;
 use mimu_board::running::Board;
@@ -48,6 +49,18 @@ pub fn digital_image() -> Image {
     match Image::read(&path) {
         Ok(image) => image,
         Err(problem) => panic!("{problem}; `make images` builds it"),
+    }
+}
+
+/// The release image of a board.
+///
+/// # Panics
+///
+/// If it was not built.
+pub fn image_of(kind: Kind) -> Image {
+    match kind {
+        Kind::Nucleo => image(),
+        Kind::Matek { .. } => digital_image(),
     }
 }
 

@@ -8,13 +8,14 @@ use mimu_core::stored;
 use mimu_device::Image;
 use mimu_export::{Sources, rust};
 
-use crate::stream::lines;
-use crate::unit::calibration;
+use crate::stream::{COUNTS, VOLTS, lines};
+use crate::unit::calibration_of;
 
 const MAIN: &str = "mod stream;
 fn main() {
     let compensator = exported::calibration::compensator().unwrap();
-    for line in stream::lines(&compensator) {
+    let counts = std::env::args().nth(1).is_some_and(|unit| unit == \"count\");
+    for line in stream::lines(&compensator, if counts { stream::COUNTS } else { stream::VOLTS }) {
         println!(\"{line}\");
     }
 }
@@ -51,8 +52,9 @@ fn crate_of(calibration: &Calibration) -> PathBuf {
 fn cargo(folder: &Path, arguments: &[&str]) -> String {
     let out = Command::new(env!("CARGO"))
         .current_dir(folder)
-        .args(arguments)
+        .args(&arguments[..1])
         .args(["--offline", "--quiet"])
+        .args(&arguments[1..])
         .env("CARGO_TARGET_DIR", folder.join("target"))
         .output()
         .unwrap();
@@ -64,13 +66,15 @@ fn cargo(folder: &Path, arguments: &[&str]) -> String {
 #[test]
 fn a_program_with_the_module_computes_what_the_device_computes_bit_by_bit() {
     // One after the other in one crate, whose dependencies are compiled once.
-    for over_temperature in [true, false] {
-        let calibration = calibration(over_temperature);
+    for (raw_unit, over_temperature) in
+        [("V", true), ("V", false), ("count", true), ("count", false)]
+    {
+        let calibration = calibration_of(raw_unit, over_temperature);
         let folder = crate_of(&calibration);
-        let theirs = cargo(&folder, &["run"]);
+        let theirs = cargo(&folder, &["run", "--", raw_unit]);
         let image = Image::new(&calibration, "test").unwrap();
         let device = stored::decode(&image.bytes).unwrap().compensator;
-        let ours = lines(&device);
+        let ours = lines(&device, if raw_unit == "count" { COUNTS } else { VOLTS });
         assert_eq!(theirs.lines().count(), ours.len());
         for (at, (theirs, ours)) in theirs.lines().zip(&ours).enumerate() {
             assert_eq!(theirs, ours, "sample {at}");

@@ -3,9 +3,14 @@
 use mimu_core::compensation::Sample;
 use mimu_core::compensator::Compensator;
 
+/// Middle and half of the range of readings, gyro and accelerometer: of analog sensors in volts, and of a digital one in counts.
+pub const VOLTS: [[f32; 2]; 2] = [[2.5, 1.0], [1.65, 0.4]];
+pub const COUNTS: [[f32; 2]; 2] = [[40.0, 30_000.0], [-60.0, 16_000.0]];
+
 /// Each compensated sample in hexadecimal digits.
 pub fn lines<const NODES: usize, const ROOM: usize>(
     compensator: &Compensator<f32, NODES, ROOM>,
+    readings: [[f32; 2]; 2],
 ) -> Vec<String> {
     let mut state = compensator.state(100.0);
     let mut random = 1u32;
@@ -21,14 +26,22 @@ pub fn lines<const NODES: usize, const ROOM: usize>(
             let temp_c = -30.0 + 110.0 * (k as f32 / 2000.0);
             compensator.follow(&mut state, 0.1, Some(temp_c));
         }
+        let mut triad = |[middle, half]: [f32; 2]| {
+            let reading = [
+                middle + half * next(),
+                middle + half * next(),
+                middle + half * next(),
+            ];
+            // Counts are whole numbers.
+            if half > 100.0 {
+                reading.map(f32::round)
+            } else {
+                reading
+            }
+        };
         let raw = Sample {
-            gyro: [2.5 + next(), 2.5 + next(), 2.5 + next()].into(),
-            accel: [
-                1.65 + 0.4 * next(),
-                1.65 + 0.4 * next(),
-                1.65 + 0.4 * next(),
-            ]
-            .into(),
+            gyro: triad(readings[0]).into(),
+            accel: triad(readings[1]).into(),
         };
         let out = compensator.apply(&mut state, &raw);
         let all = out.gyro.iter().chain(out.accel.iter());

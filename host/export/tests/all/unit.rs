@@ -1,4 +1,4 @@
-//! A made-up unit over temperature with effects of every kind, readings in volts.
+//! A made-up unit over temperature with effects of every kind, readings in volts or counts.
 
 use std::fmt::Write as _;
 
@@ -33,13 +33,21 @@ fn rows(m: &Matrix3<f64>) -> String {
     format!("[{}, {}, {}]", row(0), row(1), row(2))
 }
 
+/// Nominal scale and null by the sensor, raw per SI and raw: analog sensors, and a digital one of 2000 deg/s and 16 g in 19 bits.
+fn nominal(raw_unit: &str, sensor: &str) -> (f64, f64) {
+    match (raw_unit, sensor) {
+        ("count", "gyro") => (7509.9, 40.0),
+        ("count", _) => (835.35, -60.0),
+        (_, "gyro") => (0.344, 2.5),
+        _ => (0.0306, 1.65),
+    }
+}
+
 /// P and b, SI to raw.
-fn forward(sensor: &str, temp_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
+fn forward(raw_unit: &str, sensor: &str, temp_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
     let across = Matrix3::new(0.0, 0.01, -0.004, 0.002, 0.0, 0.006, -0.003, 0.005, 0.0);
-    let (gain, zero, per_k) = match sensor {
-        "gyro" => (0.344, 2.5, 4e-4),
-        _ => (0.0306, 1.65, -1.5e-4),
-    };
+    let (gain, zero) = nominal(raw_unit, sensor);
+    let per_k = if sensor == "gyro" { 4e-4 } else { -1.5e-4 };
     let scale = 1.0 + per_k * (temp_c - 20.0);
     let bias = Vector3::new(0.01, -0.02, 0.03) * (temp_c - 20.0) / 40.0;
     (
@@ -48,23 +56,31 @@ fn forward(sensor: &str, temp_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
     )
 }
 
-fn inverse(sensor: &str, temp_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
-    let (p, b) = forward(sensor, temp_c);
+fn inverse(raw_unit: &str, sensor: &str, temp_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
+    let (p, b) = forward(raw_unit, sensor, temp_c);
     let c = p.try_inverse().unwrap();
     (c, -(c * b))
 }
 
-/// Without its curves and its effects it is a unit at one temperature.
+/// Of readings in volts. Without its curves and its effects it is a unit at one temperature.
 pub fn calibration(over_temperature: bool) -> Calibration {
+    calibration_of("V", over_temperature)
+}
+
+/// Of readings in `V` or `count`.
+pub fn calibration_of(raw_unit: &str, over_temperature: bool) -> Calibration {
     let version = if over_temperature { 2 } else { 1 };
     let mut text = format!(
-        "format = \"mimu-calibration/{version}\"\ndevice = \"unit\"\ncreated = \"2026-01-02T03:04:05Z\"\ntool = \"test\"\n[recording]\nraw_unit = \"V\"\ntemp_c = 20.0\n"
+        "format = \"mimu-calibration/{version}\"\ndevice = \"unit\"\ncreated = \"2026-01-02T03:04:05Z\"\ntool = \"test\"\n[recording]\nraw_unit = \"{raw_unit}\"\ntemp_c = 20.0\n"
     );
     for (sensor, unit) in [("gyro", "rad/s"), ("accel", "m/s^2")] {
-        let ((c, o), (p, b)) = (inverse(sensor, 20.0), forward(sensor, 20.0));
+        let ((c, o), (p, b)) = (
+            inverse(raw_unit, sensor, 20.0),
+            forward(raw_unit, sensor, 20.0),
+        );
         let _ = writeln!(
             text,
-            "[{sensor}]\nformula = \"x = C u + o\"\ndirection = \"raw to SI\"\nraw_unit = \"V\"\nunit = \"{unit}\"\nframe = \"body\"\n\
+            "[{sensor}]\nformula = \"x = C u + o\"\ndirection = \"raw to SI\"\nraw_unit = \"{raw_unit}\"\nunit = \"{unit}\"\nframe = \"body\"\n\
              C = {}\no = {:?}\n[{sensor}.forward]\nformula = \"u = P x + b\"\ndirection = \"SI to raw\"\nP = {}\nb = {:?}\n\
              [{sensor}.physical]\nformula = \"\"\nscale_factor = [1.0, 1.0, 1.0]\nbias = [0.0, 0.0, 0.0]\n\
              misalignment_deg = [0.0, 0.0, 0.0]\nnon_orthogonality_deg = [0.0, 0.0, 0.0]",
@@ -79,10 +95,12 @@ pub fn calibration(over_temperature: bool) -> Calibration {
         for temp_c in [-20.0, 10.0, 30.0, 60.0] {
             let _ = writeln!(text, "[[temperature.node]]\ntemp_c = {temp_c:?}");
             for sensor in ["gyro", "accel"] {
-                let (c, o) = inverse(sensor, temp_c);
+                let (c, o) = inverse(raw_unit, sensor, temp_c);
                 let h = 1e-3;
-                let ((ca, oa), (cb, ob)) =
-                    (inverse(sensor, temp_c - h), inverse(sensor, temp_c + h));
+                let ((ca, oa), (cb, ob)) = (
+                    inverse(raw_unit, sensor, temp_c - h),
+                    inverse(raw_unit, sensor, temp_c + h),
+                );
                 let slope_o = (ob - oa) / (2.0 * h);
                 let _ = writeln!(
                     text,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use mimu_board::commanded::Commanded;
+use mimu_board::commanded::{Commanded, Kind};
 use mimu_board::image::{Image, digital_release_image, release_image};
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::table::TableTruth;
@@ -58,8 +58,16 @@ impl Bench {
         let folder = tempfile::tempdir().unwrap();
         let mut unit_id = [0; 12];
         unit_id[11] = seed as u8;
-        let board =
-            Commanded::start(&image(), fixture, &truth, seed, unit_id, folder.path()).unwrap();
+        let board = Commanded::start(
+            Kind::Nucleo,
+            &image(),
+            fixture,
+            &truth,
+            seed,
+            unit_id,
+            folder.path(),
+        )
+        .unwrap();
         let driver =
             std::fs::read_to_string(in_repository("tests/board/demo/turntable.toml")).unwrap();
         let driver = driver.replace("HOST:PORT", &board.address().to_string());
