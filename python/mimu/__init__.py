@@ -23,14 +23,16 @@ from mimu._error import Error
 from mimu._files import Export, SensorVerification, Verification, export, load, load_noise, verify
 from mimu._fit import Dwell, Figures, Fit, Parameter, SensorFit, fit
 from mimu._mimu import Calibration, Noise, Recording
+from mimu._noise_in_use import Cause, Consistency, Density, Nees, NoiseInUse, noise_in_use
 from mimu._recording import read
 from mimu._result import Judgement, Message
 
 __version__ = _version("mimu")
 
 __all__ = [
-    "Allan", "Calibration", "Channel", "Coefficient", "CoefficientSigma", "Design", "Diagnosis", "Dwell", "Effect", "Error", "Export",
-    "Figures", "Fit", "Judgement", "Leftover", "Message", "NextExperiment", "Noise", "NoiseCoefficient", "NotExcited", "Parameter", "ParameterSigma",
-    "Recording", "Rejected", "SchemeComparison", "SensorDiagnosis", "SensorFit", "SensorVerification", "Shown", "Verification", "allan",
-    "compare_schemes", "design", "diagnose", "export", "fit", "load", "load_noise", "next_experiment", "read", "thermal", "verify",
+    "Allan", "Calibration", "Cause", "Channel", "Coefficient", "CoefficientSigma", "Consistency", "Density", "Design", "Diagnosis", "Dwell",
+    "Effect", "Error", "Export", "Figures", "Fit", "Judgement", "Leftover", "Message", "Nees", "NextExperiment", "Noise",
+    "NoiseCoefficient", "NoiseInUse", "NotExcited", "Parameter", "ParameterSigma", "Recording", "Rejected", "SchemeComparison",
+    "SensorDiagnosis", "SensorFit", "SensorVerification", "Shown", "Verification", "allan", "compare_schemes", "design", "diagnose",
+    "export", "fit", "load", "load_noise", "next_experiment", "noise_in_use", "read", "thermal", "verify",
 ]

@@ -142,6 +142,13 @@ class Allan:
     def noise(self) -> Noise: ...
 
 @final
+class NoiseInUse:
+    def json(self) -> str: ...
+    def text(self) -> str: ...
+    def html(self) -> str: ...
+    def noise(self) -> Noise: ...
+
+@final
 class ThermalFit:
     def json(self) -> str: ...
     def text(self) -> str: ...
@@ -212,6 +219,16 @@ def allan(
     confidence: float,
     calibration: Calibration | None,
 ) -> Allan: ...
+def noise_in_use(
+    recording: Recording,
+    calibration: Calibration,
+    noise: Noise,
+    *,
+    trajectory: _Path | None,
+    trajectory_zero: float,
+    still: float | None,
+    steps: str | None,
+) -> NoiseInUse: ...
 def thermal_fit(
     recordings: list[Recording],
     *,

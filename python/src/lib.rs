@@ -48,7 +48,7 @@ mod _mimu {
     #[pymodule_export]
     use super::fit::{Fit, fit};
     #[pymodule_export]
-    use super::noise::{Noise, load_noise, parse_noise};
+    use super::noise::{Noise, NoiseInUse, load_noise, noise_in_use, parse_noise};
     #[pymodule_export]
     use super::recording::{Recording, open, read, unpickled_arrays, unpickled_files};
     #[pymodule_export]

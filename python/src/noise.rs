@@ -1,12 +1,17 @@
-//! Noise of a unit at rest, as `mimu allan -o` writes it.
+//! Noise of a unit: at rest, as `mimu allan -o` writes it, and in use, as `mimu noise` finds it.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use mimu::in_use::{self, Against, Trajectory};
 use mimu::noise::noise_file::NoiseFile;
+use mimu_cli::report::{self, fragment};
 use mimu_recording::result_file::stage;
 use pyo3::prelude::*;
 
+use crate::calibration::Calibration;
+use crate::preparation::Preparation;
+use crate::recording::Recording;
 use crate::work::{computed, json, loaded};
 
 /// Noise of a unit at rest.
@@ -71,5 +76,71 @@ pub(crate) fn load_noise(py: Python<'_>, path: PathBuf) -> PyResult<Noise> {
     let file = computed(py, move || NoiseFile::read(&path))?;
     Ok(Noise {
         file: Arc::new(file),
+    })
+}
+
+/// Noise that explains the errors of dead reckoning in motion.
+#[pyclass(frozen, module = "mimu._mimu")]
+pub(crate) struct NoiseInUse {
+    found: in_use::NoiseInUse,
+}
+
+#[pymethods]
+impl NoiseInUse {
+    /// JSON of the result, as `mimu noise --json` writes it.
+    fn json(&self) -> PyResult<String> {
+        json(&self.found)
+    }
+
+    /// The text that `mimu noise` prints.
+    fn text(&self) -> String {
+        report::noise_in_use_text(&self.found)
+    }
+
+    /// The tables.
+    fn html(&self) -> String {
+        fragment::of_noise_in_use(&self.found)
+    }
+
+    /// The noise with these densities.
+    fn noise(&self) -> Noise {
+        Noise {
+            file: Arc::new(self.found.noise_file.clone()),
+        }
+    }
+}
+
+/// Finds the noise of a unit in use.
+#[pyfunction]
+#[expect(clippy::too_many_arguments)]
+#[pyo3(signature = (recording, calibration, noise, *, trajectory, trajectory_zero, still, steps))]
+pub(crate) fn noise_in_use(
+    py: Python<'_>,
+    recording: &Recording,
+    calibration: &Calibration,
+    noise: &Noise,
+    trajectory: Option<PathBuf>,
+    trajectory_zero: f64,
+    still: Option<f64>,
+    steps: Option<&str>,
+) -> PyResult<NoiseInUse> {
+    let by = Preparation::of(still, steps, None, None)?;
+    let (source, model) = (recording.source.clone(), calibration.model.clone());
+    let noise = noise.file.clone();
+    computed(py, move || {
+        let samples = source.samples()?;
+        let found = match trajectory {
+            Some(path) => {
+                let poses = Trajectory::read(&path)?.counted_from(trajectory_zero);
+                let against = Against::Trajectory(&poses);
+                in_use::noise_in_use(samples, &model, &noise, against, |_| ())?
+            }
+            None => {
+                let prepared = source.prepared(&by)?;
+                let against = Against::Rests(&prepared);
+                in_use::noise_in_use(samples, &model, &noise, against, |_| ())?
+            }
+        };
+        Ok(NoiseInUse { found })
     })
 }

@@ -96,6 +96,22 @@ def test_noise_is_that_of_the_command(at_rest: mimu.Recording, tmp_path: Path) -
         assert without(here, "recording") == without(there, "recording")
 
 
+def test_noise_in_use_is_that_of_the_command(folder: Path, by_hand: mimu.Recording, at_rest: mimu.Recording, tmp_path: Path) -> None:
+    fit, noise = mimu.fit(by_hand), mimu.allan(at_rest)
+    fit.save(tmp_path / "cal.toml")
+    noise.save(tmp_path / "noise.toml")
+    found = mimu.noise_in_use(by_hand, fit, noise)
+    command = json_of(
+        "noise", folder, "--calibration", tmp_path / "cal.toml", "--noise", tmp_path / "noise.toml", "-o", tmp_path / "in-use.toml"
+    )
+    assert found.to_dict() == command
+    assert found.noise.to_toml() == (tmp_path / "in-use.toml").read_text()
+    assert [d.value for d in found.densities] == [d["value"] for d in command["densities"]]
+    assert found.nees.in_use.value == command["nees"]["in_use"]["value"]
+    # The calibration was made from the same recording.
+    assert found.judgement.kind == "untested"
+
+
 def test_curves_over_temperature_are_those_of_the_command(chamber: ModuleType, tmp_path: Path) -> None:
     recording = mimu.Recording(**chamber.session().keywords())
     path = recording.save(tmp_path / "sweep")

@@ -4,17 +4,20 @@ use std::fs;
 
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::parameter::TriadParameter;
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::sessions::Sessions;
 use mimu::sessions::between::{Design, Estimates, Kinds, VariancePrior, fit as fit_between};
 use mimu::sessions::class::PartClass;
-use mimu_recording::RawUnit;
+use mimu::signal::stillness::STILL_FACTOR;
+use mimu_recording::{RawUnit, Recording};
 use mimu_rig::history::{ChangeSizes, History};
 use mimu_rig::located::Source;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, CurvesFile, RigFile};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use tempfile::TempDir;
 
 use crate::bench;
 use crate::recordings::{Foreign, data_set};
@@ -364,25 +367,38 @@ pub const ARRAY_UNITS: usize = 8;
 /// Number of its sessions that can be read.
 pub const ARRAY_SESSIONS: usize = 9;
 
-/// Sessions of one of the eight MPU-9150 of an array of H. Carlsson, I. Skog and J. Jaldén (IEEE Sensors J. 2021), 62.5 Hz, twenty poses and
-/// turns in each; `None` if the data are missing.
-pub fn of_array(unit: usize) -> Option<Vec<Fit>> {
+/// Recording of a session of one of the eight MPU-9150 of an array of H. Carlsson, I. Skog and J. Jaldén (IEEE Sensors J. 2021), 62.5 Hz, twenty
+/// poses and turns, in a folder of its own; `None` if the data are missing.
+pub fn of_array_recorded(unit: usize, session: usize) -> Option<(TempDir, Recording)> {
     let folder = data_set("carlsson_mpu9150x8")?;
+    let bytes = fs::read(folder.join(format!("exp_{}/data.bin", session + 1))).ok()?;
+    let temporary = TempDir::new().expect("a folder");
+    let log = temporary.path().join("log.csv");
+    fs::write(&log, table(&bytes, unit)).expect("writable");
+    let foreign = Foreign {
+        files: vec![(log, "t_s,accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z")],
+        rate_hz: None,
+        // Stockholm.
+        gravity_mps2: 9.818,
+        raw_unit: RawUnit::Count,
+        scales: &[],
+        inputs: None,
+    };
+    let recording = foreign.import(&temporary).expect("it can be imported");
+    Some((temporary, recording))
+}
+
+/// The nine sessions of a unit of the array; `None` if the data are missing.
+pub fn of_array(unit: usize) -> Option<Vec<Fit>> {
     let of = |session: usize| {
-        let bytes = fs::read(folder.join(format!("exp_{}/data.bin", session + 1))).ok()?;
-        let temporary = tempfile::tempdir().expect("a folder");
-        let log = temporary.path().join("log.csv");
-        fs::write(&log, table(&bytes, unit)).expect("writable");
-        let foreign = Foreign {
-            files: vec![(log, "t_s,accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z")],
-            rate_hz: None,
-            // Stockholm.
-            gravity_mps2: 9.818,
-            raw_unit: RawUnit::Count,
-            scales: &[],
-            inputs: None,
+        let (_folder, recording) = of_array_recorded(unit, session)?;
+        let options = Options {
+            method: Method::LeastSquares,
+            holdout_blocks: 4,
+            only: None,
         };
-        Some(foreign.fit(Method::LeastSquares).expect("it can be fitted"))
+        let prepared = Prepared::read(&recording, STILL_FACTOR, |_| {}).expect("it has dwells");
+        Some(fit(prepared, options).expect("it can be fitted"))
     };
     (0..ARRAY_SESSIONS).into_par_iter().map(of).collect()
 }

@@ -1,8 +1,16 @@
-//! Noise in use: nothing is inflated where nothing is wrong, and what is wrong comes out as itself.
+//! Noise in use: nothing is inflated where nothing is wrong, and what is wrong comes out as itself. On real units, each session by the calibration
+//! of the others.
 
-use mimu::in_use::{Cause, NoiseInUse};
+use mimu::Calibration;
+use mimu::in_use::{Against, Cause, NoiseInUse, noise_in_use};
+use mimu::noise::noise_file::NoiseFile;
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
+use mimu::sessions::Sessions;
+use mimu::sessions::class::PartClass;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_tests::noise_in_use::{Wrong, case, row};
+use mimu_tests::sessions::{ARRAY_SESSIONS, ARRAY_UNITS, of_array, of_array_recorded};
 use rayon::prelude::*;
 
 const HEAD: &str = "| wrong | seed | segments | gyro white | accel white | gyro walk | accel walk | NEES Allan | with calibration | in use | causes |";
@@ -93,4 +101,67 @@ fn table_of_causes() {
         }
         assert!(right * 10 >= 8 * runs, "{wrong:?}: {right} of {runs}");
     }
+}
+
+/// Densities at rest of an MPU-6050, the same sensors: by `mimu allan` of the ten minutes of sunsided (docs/recordings.md).
+fn at_rest() -> NoiseFile {
+    let mut text = String::from(
+        "format = \"mimu-noise/1\"\ndevice = \"mpu6050\"\nsample_rate_hz = 99.3\nduration_s = 655.0\nconfidence = 0.95\n",
+    );
+    for (name, unit, n) in [
+        ("gyro_x", "rad/s", 2.19e-4),
+        ("gyro_y", "rad/s", 1.60e-4),
+        ("gyro_z", "rad/s", 1.69e-4),
+        ("accel_x", "m/s^2", 2.98e-3),
+        ("accel_y", "m/s^2", 3.07e-3),
+        ("accel_z", "m/s^2", 4.90e-3),
+    ] {
+        text += &format!(
+            "[[channel]]\nname = \"{name}\"\nunit = \"{unit}\"\nsamples = 65000\n\
+             n = {{ value = {n:e}, sigma = 0.0, lower = {n:e}, upper = {n:e}, unit = \"{unit}\" }}\n"
+        );
+    }
+    NoiseFile::parse(&text, "noise").unwrap()
+}
+
+#[test]
+#[ignore = "nightly: 72 real sessions, minutes"]
+fn sessions_of_the_array_by_the_calibration_of_the_others() {
+    let noise = at_rest();
+    let mut all: Vec<[f64; 2]> = Vec::new();
+    let mut good = 0;
+    for unit in 0..ARRAY_UNITS {
+        let Some(fits) = of_array(unit) else { return };
+        let of = |k: usize| {
+            let mut others = fits.clone();
+            others.remove(k);
+            let sessions = Sessions::combine(others, PartClass::Consumer).ok()?;
+            let made = Calibration::of_sessions(&sessions, "2026-01-01T00:00:00Z").ok()?;
+            let (_folder, recording) = of_array_recorded(unit, k)?;
+            let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).ok()?;
+            let against = Against::Rests(&prepared);
+            noise_in_use(&recording, &made.calibration, &noise, against, |_| ()).ok()
+        };
+        let found: Vec<_> = (0..ARRAY_SESSIONS).into_par_iter().map(of).collect();
+        for (k, found) in found.into_iter().enumerate() {
+            let found = found.unwrap_or_else(|| panic!("unit {unit}, session {k}"));
+            println!("{}", row(Wrong::Calibrated, k as u64, &found));
+            let nees = &found.nees;
+            let [low, high] = nees.in_use.by_chance;
+            good += usize::from((low.min(0.8)..=high.max(1.25)).contains(&nees.in_use.value));
+            all.push([nees.allan.value, nees.in_use.value]);
+        }
+    }
+    let quantiles = |k: usize| {
+        let mut of: Vec<f64> = all.iter().map(|n| n[k]).collect();
+        of.sort_by(f64::total_cmp);
+        [0.1, 0.5, 0.9].map(|q| of[(q * (of.len() - 1) as f64) as usize])
+    };
+    println!(
+        "{} sessions: NEES at 10, 50, 90 %: Allan {:.2?}, in use {:.2?}; good {good}",
+        all.len(),
+        quantiles(0),
+        quantiles(1)
+    );
+    assert!(quantiles(1)[1] < 2.0 && quantiles(0)[1] > 5.0);
 }

@@ -6,6 +6,7 @@ use maud::{Markup, PreEscaped, html};
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::Verification;
 use mimu::fit::Fit;
+use mimu::in_use::NoiseInUse;
 use mimu::result::allan::AllanResult;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::result::fit::FitResult;
@@ -13,7 +14,7 @@ use mimu_recording::error::Result;
 use mimu_thermal::result::ThermalResult;
 
 use super::page::{Made, STYLE};
-use super::{allan_plot, diagnosis, fit, thermal_page, unit, verify};
+use super::{allan_plot, diagnosis, fit, noise_in_use, thermal_page, unit, verify};
 use crate::hint;
 use crate::output::now;
 
@@ -51,6 +52,17 @@ pub fn of_allan(result: &AllanResult) -> String {
             img alt="Allan deviation with its fitted model" style="max-width:100%" src=(data_url(&allan_plot::svg(result))) {}
         }
         @if !result.warnings.is_empty() { ul { @for warning in &result.warnings { li { (warning) } } } }
+    })
+}
+
+/// Noise in use: densities, consistency and causes.
+pub fn of_noise_in_use(result: &NoiseInUse) -> String {
+    fragment(&html! {
+        h1 { "Noise in use of " (result.device) }
+        p { (result.judgement.to_string()) }
+        @for table in noise_in_use::tables(result) { (table.html()) }
+        @for sentence in &result.sentences { p { (sentence) } }
+        @if !result.warnings.is_empty() { ul { @for warning in &result.warnings { li { (warning.to_string()) } } } }
     })
 }
 

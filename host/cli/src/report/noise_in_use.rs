@@ -30,15 +30,20 @@ pub fn noise_in_use_text(result: &NoiseInUse) -> String {
             n => format!("; {n} left out"),
         }
     );
-    out += &densities(result).text("");
-    let _ = writeln!(out);
-    out += &consistency(result).text("");
-    let _ = writeln!(out);
+    for table in tables(result) {
+        out += &table.text("");
+        let _ = writeln!(out);
+    }
     for sentence in &result.sentences {
         wrap(&mut out, "", sentence);
     }
     warn(&mut out, result.warnings.iter());
     out
+}
+
+/// What its page and its text show.
+pub(super) fn tables(result: &NoiseInUse) -> [Table; 2] {
+    [densities(result), consistency(result)]
 }
 
 fn densities(result: &NoiseInUse) -> Table {

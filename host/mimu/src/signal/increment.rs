@@ -55,10 +55,15 @@ impl Increment {
 }
 
 /// Integrates raw gyro samples to [`Increment`]s.
+///
+/// The rate in an interval is the parabola through its ends and the sample before. With a straight line, an oscillation at f loses (2π f dt)²/6 of its coning:
+/// a hand of 10 Hz at 200 samples a second 1.6 %.
 pub(crate) struct Integrator {
     period_s: f64,
     longest_s: f64,
     before: Option<(f64, [f64; 3])>,
+    /// The reading before that, if it was one regular interval earlier.
+    earlier: Option<[f64; 3]>,
     open: Increment,
     sum: [f64; 3],
 }
@@ -70,6 +75,7 @@ impl Integrator {
             // Half a period of slack, as time stamps jitter.
             longest_s: INCREMENT_S.max(period_s) - 0.5 * period_s,
             before: None,
+            earlier: None,
             open: Increment::EMPTY,
             sum: [0.0; 3],
         }
@@ -80,18 +86,24 @@ impl Integrator {
         let (t0, u0) = self.before.replace((t, u))?;
         let dt = t - t0;
         let open = &mut self.open;
-        let gap = gap && !is_bridged(dt, self.period_s);
-        if gap || !u.iter().chain(&u0).all(|x| x.is_finite()) {
+        let lost = gap && !is_bridged(dt, self.period_s);
+        if lost || !u.iter().chain(&u0).all(|x| x.is_finite()) {
             open.whole = false;
         }
-        // The rate is taken as linear between samples. Its integral is then exact, and the coning within one interval is dt²/6 u0 × u.
-        let within = cross(u0, u);
+        let regular = !gap && (dt - self.period_s).abs() < 0.1 * self.period_s;
+        let earlier = self.earlier.filter(|_| regular);
+        self.earlier = regular.then_some(u0);
+        // u(s) = u0 + b s + c s² for s from 0 to 1, integrated once and twice, and its coning.
+        let c = [0, 1, 2].map(|k| earlier.map_or(0.0, |e| 0.5 * (u[k] - 2.0 * u0[k] + e[k])));
+        let b = [0, 1, 2].map(|k| u[k] - u0[k] - c[k]);
         let a0 = open.integral;
-        let step = [0, 1, 2].map(|k| 0.5 * dt * (u0[k] + u[k]));
+        let step = [0, 1, 2].map(|k| dt * (u0[k] + b[k] / 2.0 + c[k] / 3.0));
         let across = cross(a0, step);
+        let (linear, with_u0, with_b) = (cross(u0, b), cross(u0, c), cross(b, c));
         for k in 0..3 {
-            open.coning[k] += across[k] + dt * dt / 6.0 * within[k];
-            self.sum[k] += dt * a0[k] + dt * dt / 6.0 * (2.0 * u0[k] + u[k]);
+            let within = (linear[k] + with_u0[k]) / 6.0 + with_b[k] / 30.0;
+            open.coning[k] += across[k] + dt * dt * within;
+            self.sum[k] += dt * a0[k] + dt * dt * (u0[k] / 2.0 + b[k] / 6.0 + c[k] / 12.0);
             open.integral[k] += step[k];
         }
         open.duration_s += dt;

@@ -1,0 +1,144 @@
+"""Noise of a unit in motion."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+from mimu import _mimu
+from mimu._allan import Allan
+from mimu._diagnosis import Diagnosis
+from mimu._files import calibration_of, noise_of
+from mimu._fit import Fit, Steps
+from mimu._mimu import Calibration, Noise, Recording
+from mimu._result import Judgement, Message, Result, judged, messages, typed
+from mimu.thermal import ThermalFit
+
+
+@dataclass(frozen=True)
+class Density:
+    """A density that a filter takes; ``unit`` is that of value and interval."""
+
+    sensor: str
+    #: ``"white"`` or ``"walk"``.
+    term: str
+    value: float
+    interval: list[float]
+    unit: str
+    #: The same at rest, and value over it; None where the noise file shows none.
+    allan: float | None
+    factor: float | None
+    factor_interval: list[float] | None
+
+
+@dataclass(frozen=True)
+class Nees:
+    """Squared errors of held-out segments over what a filter believes; 1 is right."""
+
+    value: float
+    #: Where chance puts 95 of 100 recordings.
+    by_chance: list[float]
+    dof: int
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """The same by Allan's noise alone, with the calibration's uncertainty, and by the noise in use."""
+
+    allan: Nees
+    with_calibration: Nees
+    in_use: Nees
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause of errors beyond Allan's noise; ``sensor`` is None for the reference."""
+
+    sensor: str | None
+    cause: str
+    size: float
+    unit: str
+    #: Share of the errors of its sensor beyond Allan's noise, from 0 to 1.
+    share: float
+
+
+class NoiseInUse(Result):
+    """The densities that explain the errors of dead reckoning in motion."""
+
+    _native: _mimu.NoiseInUse
+    _questions = ("json", "text", "html", "noise")
+
+    densities: list[Density]
+    nees: Consistency
+    causes: list[Cause]
+    #: For each sensor whose noise is inflated, one sentence that says why.
+    sentences: list[str]
+    #: Whether it may be used.
+    judgement: Judgement
+    #: Warnings, one sentence each, with its ``kind``.
+    warnings: list[Message]
+    device: str
+
+    def __init__(self, native: _mimu.NoiseInUse) -> None:
+        super().__init__(native)
+        data = self.to_dict()
+        self.densities = [typed(Density, density) for density in data["densities"]]
+        self.nees = typed(Consistency, data["nees"])
+        self.causes = [typed(Cause, cause) for cause in data["causes"]]
+        self.sentences = data["sentences"]
+        self.judgement = judged(data)
+        self.warnings = messages(data)
+        self.device = data["device"]
+
+    @property
+    def noise(self) -> Noise:
+        """The argument ``noise`` of :func:`mimu.export`, as for Kalibr."""
+        return self._native.noise()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the noise file, as ``mimu noise -o FILE.toml`` does: whole or not at all."""
+        self.noise.save(path)
+
+    def __str__(self) -> str:
+        return self._native.text()
+
+    def __repr__(self) -> str:
+        return f"<mimu.NoiseInUse of {self.device!r}: {self.judgement}>"
+
+
+def noise_in_use(
+    recording: Recording,
+    calibration: Calibration | Fit | Diagnosis | ThermalFit,
+    noise: Noise | Allan,
+    *,
+    trajectory: str | os.PathLike[str] | None = None,
+    trajectory_zero: float = 0.0,
+    still: float | None = None,
+    steps: Steps | None = None,
+) -> NoiseInUse:
+    """Finds the noise that a filter wants, as ``mimu noise`` does.
+
+    Parameters
+    ----------
+    recording : Recording
+        In motion, with rests before and after each motion, or with a ``trajectory``. It must not be the one that the calibration was made from.
+    calibration : Calibration, Fit, Diagnosis or thermal.ThermalFit
+        Of the unit.
+    noise : Noise or Allan
+        Of the unit at rest.
+    trajectory, trajectory_zero
+        A file with poses of the unit by another instrument: ground truth of EuRoC, or of TUM's benchmarks; and its time at which ``t`` is 0, s.
+    still, steps
+        As for :func:`mimu.fit`.
+
+    Returns
+    -------
+    NoiseInUse
+        With a ``judgement``, the ``densities``, and the ``causes``.
+    """
+    given = noise_of(noise)
+    assert given is not None
+    found = _mimu.noise_in_use(
+        recording, calibration_of(calibration), given, trajectory=trajectory, trajectory_zero=trajectory_zero, still=still, steps=steps
+    )
+    return NoiseInUse(found)
