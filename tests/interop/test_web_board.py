@@ -4,6 +4,7 @@ Needs what test_web.py needs, and the virtual bench beside the command.
 """
 import io
 import json
+import os
 import time
 import tomllib
 import zipfile
@@ -139,6 +140,29 @@ def test_a_whole_session_gives_the_calibration_of_the_command(usb, lines, tmp_pa
     usb.wait_for_selector("#away:not([hidden])", timeout=100_000)
     assert "finished" in usb.inner_text("#loaded")
     same(json.loads(taken_away(usb, "fit.json")), fit, "fit of the journal")
+
+
+def test_a_session_with_whole_turns_counts_them_and_says_what_one_is_read_as(usb, tmp_path):
+    spun = web_board.lines(tmp_path, whole_turns=True)
+    connect(usb, spun)
+    usb.check("#board-turns")
+    begin(usb)
+    usb.locator("#count", has_text="whole turns").wait_for(timeout=100_000)
+    usb.locator("#turns-of", has_text="of 10 turns about").wait_for(timeout=100_000)
+    if shots := os.environ.get("MIMU_SHOTS"):
+        usb.screenshot(path=f"{shots}/spin.png", full_page=True)
+    finished(usb)
+    said = usb.inner_text("#log")
+    print(said)
+    assert said.count("whole turns about") >= 7 or "360" in said, said
+    ours = journal(usb, tmp_path / "page")
+    calibration = tomllib.loads((ours / "calibration.toml").read_text())
+    web_board.assert_true(calibration)
+    made = [entry["spin"] for entry in entries(ours) if entry["entry"] == "spin"]
+    assert [(spin["axis"], spin["turns"]) for spin in made[:6]] == [(axis, n) for axis in [2, 0, 1] for n in [10, -10]]
+    # A scale factor to 0.02 %; turns between rests give 0.1 %.
+    for i in range(3):
+        assert calibration["gyro"]["interval_C"][i][i] < 2e-4 * abs(calibration["gyro"]["C"][i][i])
 
 
 def test_a_session_that_is_unplugged_goes_on_and_the_command_ends_it(usb, lines, tmp_path):

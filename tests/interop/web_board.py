@@ -65,8 +65,19 @@ def wizard(port, folder, until=None):
     return running.communicate(timeout=120)[0]
 
 
-def lines(folder):
-    """The lines of the board, some lost and some truncated. Its poses are those that a session asks for, repeated."""
+def spins(axes, turns=10):
+    """Steps of a plan: each axis up against an edge, and turned both ways."""
+    steps = ""
+    for axis in axes:
+        up = [float(k == "xyz".index(axis)) for k in range(3)]
+        steps += f"[[step]]\nup = {up}\ndwell_s = 3.0\n"
+        steps += "".join(f"[[step]]\nwhole_turns = {n}\nabout = {up}\ndwell_s = 3.0\n" for n in [turns, -turns])
+    return steps
+
+
+def lines(folder, whole_turns=False):
+    """The lines of the board, some lost and some truncated. Its poses are those that a session asks for, repeated; with `whole_turns` they are
+    followed by ten turns each way about each axis, and those of the verification by turns about z."""
     rest = [f"{10_000 * k},700,-400,17400,120,-210,{64 + k % 3}\r\n" for k in range(3000)]
     board = Socket(rest)
     wizard(board.port, folder / "plan", until=lambda _: (folder / "plan" / "session.json").exists())
@@ -74,7 +85,8 @@ def lines(folder):
     asked = json.loads((folder / "plan" / "session.json").read_text())["asked"]
     first, then = asked["steps"], asked["verification"]
     plan = 'format = "mimu-plan/1"\nsample_rate_hz = 100.0\ncarrier = "hands"\nlead_in_s = 30.0\n'
-    plan += "".join(f"[[step]]\nup = {step['up']}\ndwell_s = 3.0\n" for step in [*first, *then, *first, *then, *then])
+    poses = lambda steps: "".join(f"[[step]]\nup = {step['up']}\ndwell_s = 3.0\n" for step in steps)
+    plan += poses([*first, *first]) + spins("zxy") + 2 * (poses(then) + spins("z")) if whole_turns else poses([*first, *then, *first, *then, *then])
     (folder / "plan.toml").write_text(plan)
     # White noise, so that a diagnosis finds nothing else.
     still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n"

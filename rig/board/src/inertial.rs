@@ -124,8 +124,8 @@ pub(crate) struct Inertial {
     crystal: f64,
     selected: bool,
     self_test: SelfTest,
-    /// The next update of the grid.
-    due: Option<EventId>,
+    /// The next update of the grid, and its time, ns.
+    due: Option<(EventId, u64)>,
 }
 
 impl fmt::Debug for Inertial {
@@ -172,7 +172,7 @@ impl Inertial {
 
     fn schedule(&mut self, context: &mut Timeline<'_, '_>) {
         let next = (context.now().0 / GRID_NS + 1) * GRID_NS;
-        self.due = Some(context.schedule(VirtualNanos(next)));
+        self.due = Some((context.schedule(VirtualNanos(next)), next));
     }
 }
 
@@ -183,7 +183,9 @@ impl Peer for Inertial {
     fn select(&mut self, context: &mut Timeline<'_, '_>) {
         self.selected = true;
         self.self_test.address = None;
-        if self.due.is_none() {
+        // The emulator may lose what was scheduled in a reset by pin: the chip then gave the values from before it for ever.
+        if self.due.is_none_or(|(_, at)| at < context.now().0) {
+            self.sense(context.now());
             self.schedule(context);
         }
         self.chip.select(context);
@@ -200,7 +202,7 @@ impl Peer for Inertial {
     }
 
     fn on_event(&mut self, event: EventId, context: &mut Timeline<'_, '_>) {
-        if self.due != Some(event) {
+        if self.due.map(|(due, _)| due) != Some(event) {
             return;
         }
         self.sense(context.now());

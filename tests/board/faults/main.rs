@@ -184,7 +184,8 @@ fn now_and_then(
     for k in 1..=times {
         // Later ones would also strike verification and store, which have fewer dwells.
         if !session.wait_for(|s| s.told("step") >= 2 * k)? {
-            return Err(format!("it ended after {} of {times}", k - 1));
+            let why = session.end()?.stopped.unwrap_or_default();
+            return Err(format!("it ended after {} of {times}: {why}", k - 1));
         }
         strike(&mut session.board)?;
     }

@@ -249,6 +249,30 @@ fn after_the_supply_comes_back_the_sensor_is_set_up_again() {
     );
 }
 
+#[test]
+fn after_a_reset_the_readings_are_again_those_of_the_present() {
+    let mut device = streaming(feed(), 1.0);
+    // At other phases of the polls and of the bench's grid.
+    for k in 0..4 {
+        device.run_for(300 * MS + k * 237_000);
+        device.board.reset_by_pin(k).unwrap();
+        device.run_for(50 * MS);
+        device.greeting();
+        device.samples.clear();
+        let raw = Request::Stream {
+            raw: true,
+            compensated: false,
+        };
+        assert_eq!(device.ask(raw), Answer::Done);
+        device.run_for(1_500 * MS);
+        assert!(device.samples.len() > 400, "{}", device.samples.len());
+        // The clock on the z axis never stands still.
+        let mut pairs = device.samples.windows(2);
+        let standing = pairs.find(|p| p[0].counts.accel[2] == p[1].counts.accel[2]);
+        assert!(standing.is_none(), "reset {k}: {standing:?}");
+    }
+}
+
 /// A calibration of counts at one temperature, as the device stores it: the inverse of a unit within the data sheet's limits.
 fn calibration(effects: &[DeviceEffect<f32>], settings: Option<PerSensor<Setting>>) -> Vec<u8> {
     let affine = |per_si: f32, shear: f32, bias: f32| {
