@@ -161,7 +161,7 @@ impl Document {
         self.up.clone_from(&found.up);
         self.duration_s = Some(found.duration_s);
         self.not_measured.clone_from(&found.not_measured);
-        self.measurements = judged(found, limits, part, scale);
+        self.measurements = judged(found, samples, limits, part, scale)?;
         self.verdict = verdict(&self.measurements);
         // A unit that is beyond one limit has failed, whatever else was not measured.
         if self.verdict == Verdict::Failed {
@@ -215,13 +215,18 @@ impl Document {
 }
 
 /// What was measured beside its limits.
+///
+/// # Errors
+/// The population of the limits reads in another unit.
 pub fn judged(
     found: &Quantities,
+    samples: &Samples,
     limits: &Limits,
     part: Option<&Part>,
     scale: &Scale,
-) -> Vec<Measurement> {
-    let (decision, all) = (limits.decision(), limits.of(found, part, scale));
+) -> Result<Vec<Measurement>> {
+    let decision = limits.decision();
+    let all = limits.of(found, part, scale, samples.raw_unit)?;
     let judge = |measured: &Measured| {
         let measured = limits.wander.apply(measured.clone());
         // The last one that is for it counts; one for this axis before one for all axes.
@@ -239,7 +244,7 @@ pub fn judged(
             measured,
         }
     };
-    found.measured.iter().map(judge).collect()
+    Ok(found.measured.iter().map(judge).collect())
 }
 
 /// The verdict of measurements.

@@ -14,6 +14,7 @@
 //! | [`faces`] | offsets and sensitivities from three sides up |
 //! | [`measured`] | one measured quantity: value, unit, uncertainty |
 //! | [`own_limit`], [`limits`] | the file of limits, and limits of data sheets |
+//! | [`population`] | limits by the units of the same kind |
 //! | [`decision`] | the decision about a value near its limit (JCGM 106) |
 //! | [`document`] | the result, `mimu-measurements/1` |
 //! | [`golden`] | the unit that tells whether the station still measures what it measured before |
@@ -29,6 +30,7 @@ pub mod limits;
 pub mod measured;
 pub mod noise;
 pub mod own_limit;
+pub mod population;
 pub mod quantities;
 pub mod quantity;
 pub mod rate;

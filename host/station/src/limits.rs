@@ -6,13 +6,14 @@ use mimu::data_sheet::{Part, Property};
 use mimu::quantity::Sensor;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{check_kind, parse_toml, read_text};
+use mimu_recording::{RawUnit, check_kind, parse_toml, read_text};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::decision::{Decision, Rule};
 use crate::measured::Measured;
 use crate::own_limit::OwnLimit;
+use crate::population::Population;
 use crate::quantities::Quantities;
 use crate::quantity::{Quantity, without_axis};
 use crate::scale::{Ranges, Scale};
@@ -101,6 +102,9 @@ pub struct Limits {
     /// The limits.
     #[serde(default)]
     pub rows: Vec<LimitRow>,
+    /// Units of the same kind, which limit what no row names.
+    #[serde(skip)]
+    pub population: Option<Population>,
     /// Path of the file.
     #[serde(skip)]
     pub place: String,
@@ -213,8 +217,18 @@ impl Limits {
         }
     }
 
-    /// The limits of what was measured, by name, with their source: those of the measurement itself, then those of `part`, then the rows of the file.
-    pub fn of(&self, found: &Quantities, part: Option<&Part>, scale: &Scale) -> Vec<OwnLimit> {
+    /// The limits of what was measured, by name, with their source: those of the measurement itself, then those of `part`, then those of the population,
+    /// then the rows of the file.
+    ///
+    /// # Errors
+    /// The population reads in another unit.
+    pub fn of(
+        &self,
+        found: &Quantities,
+        part: Option<&Part>,
+        scale: &Scale,
+        raw_unit: RawUnit,
+    ) -> Result<Vec<OwnLimit>> {
         let mut all = built_in();
         all.extend(found.own_limits.iter().cloned());
         if let Some(part) = part {
@@ -222,13 +236,16 @@ impl Limits {
             let factor = self.typical_factor.unwrap_or(TYPICAL);
             all.extend(of_part(part, force.as_ref(), scale, factor));
         }
+        if let Some(population) = &self.population {
+            all.extend(population.limits(scale, raw_unit)?);
+        }
         all.extend(self.rows.iter().map(|row| OwnLimit {
             name: row.name.clone(),
             lower: row.lower,
             upper: row.upper,
             source: self.place.clone(),
         }));
-        all
+        Ok(all)
     }
 
     /// Rows of the file for which nothing was measured.

@@ -9,6 +9,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::data_sheet::Part;
+use mimu::prior::Prior;
 use mimu_recording::are_two_units;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
@@ -17,6 +18,7 @@ use mimu_station::document::{AsFound, Document, Verdict, judged, verdict};
 use mimu_station::faces::{Face, by_faces};
 use mimu_station::gather::Samples;
 use mimu_station::limits::Limits;
+use mimu_station::population::Population;
 use mimu_station::quantities::{Quantities, measure};
 use mimu_station::scale::{Ranges, Scale};
 use mimu_station::side::direction;
@@ -52,6 +54,10 @@ pub(crate) struct AcceptArgs {
     /// Data sheet that limits what the file does not: a name (icm42688p, mpu6050, lsm6dso, lsm6dsv16x, bmi088, bmi270), or a file NAME.toml
     #[arg(long, value_name = "NAME|FILE.toml")]
     part: Option<String>,
+    /// Units of the same kind (`mimu fleet DIR --prior FILE`), which limit what the file does not: offsets and sensitivities that all but one in a thousand of
+    /// them have
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "calibration")]
+    prior: Option<PathBuf>,
     /// Ranges that the sensors are set to, g and deg/s: 16,2000; they say what a count is; `-` for a sensor that the unit lacks
     #[arg(long, value_name = "G,DEG/S", allow_hyphen_values = true, value_parser = ranges)]
     range: Option<Ranges>,
@@ -148,9 +154,15 @@ impl<'a> Station<'a> {
         };
         let part = args.part.as_deref().or(limits.part.as_deref());
         let part = part.map(Part::find).transpose()?;
-        if args.limits.is_none() && part.is_none() {
+        if let Some(path) = &args.prior {
+            limits.population = Some(Population {
+                prior: Prior::read(path)?,
+                place: path.display().to_string(),
+            });
+        }
+        if args.limits.is_none() && part.is_none() && limits.population.is_none() {
             let problem = "nothing says which values pass";
-            let remedy = "give --limits FILE, or the data sheet, --part icm42688p";
+            let remedy = "give --limits FILE, the data sheet, --part icm42688p, or the units of the same kind, --prior FILE";
             return Err(Error::new("accept", problem, remedy));
         }
         let read = |path: &Option<PathBuf>| path.as_deref().map(Calibration::read).transpose();
@@ -192,7 +204,7 @@ impl<'a> Station<'a> {
         let mut document = document.judge(&found, &samples[0], limits, part, &scale)?;
         if let (Some(calibration), Some(path)) = (&self.as_found, &self.args.as_found) {
             let (found, scale) = self.quantities(samples, Some(calibration))?;
-            let measurements = judged(&found, limits, part, &scale);
+            let measurements = judged(&found, &samples[0], limits, part, &scale)?;
             document.as_found = Some(AsFound {
                 calibration: path.display().to_string(),
                 verdict: verdict(&measurements),

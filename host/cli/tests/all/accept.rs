@@ -177,6 +177,65 @@ fn the_exit_status_says_whether_a_unit_passed_failed_or_was_not_measured() {
     }
 }
 
+/// The population of such units: the rate of z at rest is 0.5 deg/s with a scatter of `dps`.
+fn population(folder: &Path, dps: f64) {
+    let gyro = 65.5f64.to_degrees();
+    let mean = [gyro, gyro, gyro, 20.0, -31.0, 65.5 * 0.5];
+    let sigma = [
+        0.01 * gyro,
+        0.01 * gyro,
+        0.01 * gyro,
+        20.0,
+        20.0,
+        65.5 * dps,
+    ];
+    let row = |i: usize| {
+        let of: Vec<f64> = (0..6)
+            .map(|j| if i == j { sigma[i] * sigma[i] } else { 0.0 })
+            .collect();
+        format!("{of:?}")
+    };
+    let rows: Vec<String> = (0..6).map(row).collect();
+    let text = format!(
+        "format = \"mimu-prior/1\"\ntool = \"test\"\nraw_unit = \"count\"\nreference = \"gravity\"\nbiases = true\n[gyro]\nunits = 40\n\
+         parameters = [\"scale_x\", \"scale_y\", \"scale_z\", \"bias_x\", \"bias_y\", \"bias_z\"]\n\
+         parameter_units = [\"\", \"\", \"\", \"\", \"\", \"\"]\nmean = {mean:?}\nsigma = {sigma:?}\ncovariance = [{}]\n",
+        rows.join(", ")
+    );
+    std::fs::write(folder.join("fleet.toml"), text).unwrap();
+}
+
+#[test]
+fn a_unit_far_from_its_kind_fails_although_it_keeps_the_data_sheet() {
+    let place = place();
+    let command = "accept bad --part mpu6050 --range 2,500 --json -";
+    assert_eq!(mimu(place.path(), command).status, Some(0));
+    // Twelve standard deviations of 0.2 deg/s off.
+    population(place.path(), 0.2);
+    let command = "accept bad --part mpu6050 --range 2,500 --prior fleet.toml --json -";
+    let ran = mimu(place.path(), command);
+    assert_eq!(ran.status, Some(3), "{}", ran.err);
+    let document: Value = serde_json::from_str(&ran.out).unwrap();
+    let offset = measurement(&document, "gyro_z_offset");
+    assert_eq!(offset["passed"], false, "{offset}");
+    assert!(
+        offset["limits_of"]
+            .as_str()
+            .unwrap()
+            .starts_with("fleet.toml"),
+        "{offset}"
+    );
+    // Of 40 units, 0.1 % are beyond 3.56 sigma: 0.5 - 0.71 to 0.5 + 0.71.
+    assert!(
+        (offset["upper"].as_f64().unwrap() - 1.21).abs() < 0.01,
+        "{offset}"
+    );
+    // In a kind that scatters by a degree it is no stranger, and alone the population suffices.
+    population(place.path(), 1.0);
+    let alone = mimu(place.path(), "accept bad --range 2,500 --prior fleet.toml");
+    assert_eq!(alone.status, Some(0), "{} {}", alone.out, alone.err);
+}
+
 #[test]
 fn several_units_have_a_line_and_a_file_each() {
     let folder = place();
