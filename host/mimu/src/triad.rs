@@ -110,10 +110,15 @@ pub struct Part {
 
 /// Half of a 95 % interval around an estimate whose error is the sum of independent `contributions`: the variance of each, and its degrees
 /// of freedom.
-///
-/// The degrees of freedom of the sum are those of Welch and Satterthwaite. With one factor for all parameters, that of the group with the
-/// fewest, the intervals of xu's offsets contained the truth in all runs.
 pub fn half_width_95(contributions: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (variance, dof) = effective_dof(contributions);
+    students_factor(dof) * variance.max(0.0).sqrt()
+}
+
+/// Variance of the sum of independent `contributions`, and its degrees of freedom by Welch and Satterthwaite (JCGM 100:2008, G.4).
+///
+/// With one factor for all parameters, that of the group with the fewest, the intervals of xu's offsets contained the truth in all runs.
+pub fn effective_dof(contributions: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     let (mut variance, mut doubt) = (0.0, 0.0);
     for (v, dof) in contributions {
         variance += v;
@@ -124,7 +129,7 @@ pub fn half_width_95(contributions: impl Iterator<Item = (f64, f64)>) -> f64 {
     } else {
         f64::INFINITY
     };
-    students_factor(dof) * variance.max(0.0).sqrt()
+    (variance, dof)
 }
 
 /// Half of a 95 % interval in sigmas, of Student's distribution.

@@ -21,7 +21,7 @@ pub fn read_text(path: &Path) -> Result<String> {
 }
 
 /// Files of this program, by the name in their key `format`, with what makes them.
-const FILES: [(&str, &str); 7] = [
+const FILES: [(&str, &str); 9] = [
     ("mimu-calibration", "a calibration (`mimu fit -o`)"),
     ("mimu-noise", "a noise file (`mimu allan -o`)"),
     ("mimu-plan", "a plan (`mimu design -o`)"),
@@ -31,6 +31,14 @@ const FILES: [(&str, &str); 7] = [
     ),
     ("mimu-prior", "a prior (`mimu fleet --prior`)"),
     ("mimu-driver", "a description of a turntable"),
+    (
+        "mimu-reference",
+        "the errors of a reference (--reference-error)",
+    ),
+    (
+        "mimu-particulars",
+        "the particulars of a certificate (`mimu report --certificate`)",
+    ),
     (
         "mimu-thermal-biases",
         "biases over temperature (`mimu thermal fit --at-rest -o`)",

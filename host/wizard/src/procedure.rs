@@ -5,7 +5,7 @@ use mimu::plan::design::next_pose::Had;
 use mimu::plan::design::reach::{Fixture as Reached, Rates, Reach};
 use mimu::plan::design::tour::randomised;
 use mimu::quantity::normal_gravity;
-use mimu_recording::{Reference, WholeTurns};
+use mimu_recording::{Reference, ReferenceError, WholeTurns};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -86,6 +86,9 @@ pub struct SessionConfig {
     /// Misalignment of the unit on the table: half-width of the 95 % interval of each angle, degrees.
     #[serde(default)]
     pub mounting_deg: f64,
+    /// What the table does wrong, as its driver file states it. Fits count it; the mounting is then part of it, and [`Self::mounting_deg`] is 0.
+    #[serde(default)]
+    pub reference_error: Option<ReferenceError>,
     /// Whole turns by hand after the poses, if the session has them: how many, and how well the unit is put back.
     #[serde(default)]
     pub whole_turns: Option<WholeTurns>,
@@ -102,8 +105,16 @@ impl SessionConfig {
             true => "normal gravity at sea level; 1000 m higher it is 315 ppm less",
             false => "as given",
         };
+        let error = self
+            .reference_error
+            .as_ref()
+            .map_or(0.0, |e| e.gravity_mps2);
+        let counted = match error > 0.0 {
+            true => format!("the intervals include the stated {error} m/s²"),
+            false => "no interval includes it".into(),
+        };
         format!(
-            "gravity is assumed to be {:.4} m/s² ({source}): each ppm of its error is a ppm of every scale factor of the accelerometer, and no interval includes it",
+            "gravity is assumed to be {:.4} m/s² ({source}): each ppm of its error is a ppm of every scale factor of the accelerometer, and {counted}",
             self.gravity_mps2
         )
     }
@@ -433,6 +444,7 @@ mod tests {
             most_drift_c: 5.0,
             targets: Targets::default(),
             mounting_deg: 0.0,
+            reference_error: None,
             whole_turns: None,
             by_device: false,
         }

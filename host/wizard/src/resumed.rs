@@ -88,6 +88,7 @@ pub fn resumed(begun: &SessionConfig, now: &SessionConfig, place: &Path) -> Resu
         most_drift_c: now.most_drift_c,
         targets: now.targets,
         mounting_deg: now.mounting_deg,
+        reference_error: now.reference_error,
         ..begun.clone()
     })
 }
@@ -114,6 +115,7 @@ mod tests {
             most_drift_c: 5.0,
             targets: Targets::default(),
             mounting_deg: 0.02,
+            reference_error: None,
             whole_turns: None,
             by_device: false,
         }

@@ -191,6 +191,7 @@ impl UnitSession {
         );
         manifest.latitude_deg = config.latitude_deg;
         manifest.power_on_s = self.power_on_s;
+        manifest.reference_error = config.reference_error.clone();
         manifest.whole_turns = config.whole_turns.filter(|_| part != Part::Confirmation);
         if unit.is_device {
             manifest.recorded = Some(Recorded {

@@ -1,5 +1,7 @@
 //! `mimu report`: arguments and execution.
 
+mod certificate;
+
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -20,6 +22,8 @@ use crate::reading::{LogArgs, read};
 use crate::report::refused;
 use crate::report::text::problems;
 use crate::report::{Made, UnitReport, unit_page};
+
+use self::certificate::{CertificateArgs, Given};
 
 #[derive(Args)]
 pub struct ReportArgs {
@@ -47,6 +51,8 @@ pub struct ReportArgs {
     part: PartArgs,
     #[command(flatten)]
     whole: WholeTurnArgs,
+    #[command(flatten)]
+    certificate: CertificateArgs,
 }
 
 /// Sources of a page.
@@ -91,7 +97,8 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let part = args.part.part()?;
     let inputs = Inputs::of(args)?;
     let outputs = [Some(args.out.as_path())];
-    let others = [args.noise.file.as_deref(), inputs.calibration.as_deref()];
+    let mut others = vec![args.noise.file.as_deref(), inputs.calibration.as_deref()];
+    others.extend(args.certificate.inputs());
     let open = |path: &PathBuf| -> Result<(String, Prepared)> {
         let prepared = read(path, &args.log, args.still.search(), &outputs, &others)?;
         let prepared = args.whole.apply(args.noise.apply(prepared)?)?;
@@ -99,14 +106,25 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         Ok((path.display().to_string(), prepared))
     };
     let recordings: Vec<_> = inputs.recordings.iter().map(open).collect::<Result<_>>()?;
-    let others: Vec<_> = inputs.verify.iter().map(open).collect::<Result<_>>()?;
-    let now = now();
     let noise = args
         .noise
         .file
         .as_deref()
         .map(NoiseFile::read)
         .transpose()?;
+    if let Some(particulars) = &args.certificate.particulars {
+        let given = Given {
+            recording: the_only(recordings)?,
+            calibration: args.calibration.as_deref(),
+            noise: noise.as_ref(),
+            part: part.as_ref(),
+            out: &args.out,
+            command_line,
+        };
+        return args.certificate.write(particulars, given);
+    }
+    let others: Vec<_> = inputs.verify.iter().map(open).collect::<Result<_>>()?;
+    let now = now();
     let found = match recordings.is_empty() {
         true => None,
         false => {
@@ -184,6 +202,21 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         },
     };
     show(&format!("{verdict}page: {}\n", args.out.display()))
+}
+
+/// The recording of a certificate.
+fn the_only(recordings: Vec<(String, Prepared)>) -> Result<(String, Prepared)> {
+    match <[_; 1]>::try_from(recordings) {
+        Ok([recording]) => Ok(recording),
+        Err(all) => Err(Error::new(
+            "recordings",
+            format!(
+                "a certificate is made from one, and {} are given",
+                all.len()
+            ),
+            "name the recording, or the folder of the session, that the certificate is about",
+        )),
+    }
 }
 
 /// The diagnosis of the recordings. An effect that the first verification recording contradicts is not accepted.

@@ -12,10 +12,10 @@ use mimu::quantity::normal_gravity;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::warning::Warning;
-use mimu_equipment::drive::Person;
+use mimu_equipment::drive::{Person, TextDriver};
 use mimu_equipment::step::Step;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, RawUnit};
+use mimu_recording::{Manifest, RawUnit, ReferenceError};
 use mimu_wizard::event::View;
 use mimu_wizard::procedure::{Fixture, SessionConfig, Targets, first_steps, verification};
 use mimu_wizard::relay::{Stamped, relayed};
@@ -30,6 +30,9 @@ use crate::report::{self, Made};
 
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use terminal::run;
+
+/// Alignment of the unit with a table if nothing is stated, degrees, half of a 95 % interval: a bracket with dowel pins.
+const MOUNTING_DEG: f64 = 0.02;
 
 #[derive(Args)]
 pub(crate) struct WizardArgs {
@@ -72,9 +75,10 @@ pub(crate) struct WizardArgs {
     /// Plan of `mimu design` for the first dwells [default: the wizard makes one]
     #[arg(long, value_name = "PLAN")]
     plan: Option<PathBuf>,
-    /// How well the unit's axes are aligned with the table's, degrees: 95 % of each angle; no dwell shows it, so the intervals include it
-    #[arg(long, value_name = "DEG", default_value_t = 0.02, value_parser = |t: &str| number(t, 0.0, 10.0))]
-    mounting: f64,
+    /// How well the unit's axes are aligned with the table's, degrees: 95 % of each angle; no dwell shows it, so the intervals include it [default:
+    /// mounting_deg of the driver file's [reference_error], else 0.02]
+    #[arg(long, value_name = "DEG", value_parser = |t: &str| number(t, 0.0, 10.0))]
+    mounting: Option<f64>,
     #[command(flatten)]
     whole: SpinArgs,
     /// Whose estimate becomes the calibration; the other one is compared with it
@@ -240,6 +244,45 @@ impl WizardArgs {
         Ok(targets)
     }
 
+    /// What the tables do wrong by their driver files, the mounting of the unit included. `None` if no file says anything.
+    fn reference_error(&self, fixture: Fixture) -> Result<Option<ReferenceError>> {
+        let mut stated: Option<(&Path, ReferenceError)> = None;
+        for path in &self.drivers {
+            let Some(error) = TextDriver::reference_error(path)? else {
+                continue;
+            };
+            if let Some((first, before)) = &stated
+                && *before != error
+            {
+                return Err(Error::new(
+                    path.display(),
+                    format!(
+                        "its [reference_error] differs from that of {}",
+                        first.display()
+                    ),
+                    "make a session with each table, or state the larger errors in both files",
+                ));
+            }
+            stated = Some((path, error));
+        }
+        let Some((path, mut error)) = stated else {
+            return Ok(None);
+        };
+        if fixture != Fixture::Table || self.by == By::Device {
+            let problem = "[reference_error] is for fits with a table's inputs, by the PC";
+            let remedy =
+                "use --fixture table without --by device, or remove the table from the file";
+            return Err(Error::new(path.display(), problem, remedy));
+        }
+        let by_file = error.mounting_deg > 0.0;
+        if let Some(mounting) = self.mounting.or((!by_file).then_some(MOUNTING_DEG)) {
+            error.mounting_deg = mounting;
+            // --mounting is half of a 95 % interval.
+            error.rectangular.retain(|key| key != "mounting_deg");
+        }
+        Ok(Some(error))
+    }
+
     fn config(&self) -> Result<SessionConfig> {
         let fixture = self.fixture.fixture();
         if self.by == By::Device && (fixture != Fixture::Table || self.text.text.is_some()) {
@@ -287,6 +330,8 @@ impl WizardArgs {
             fixture.reference(),
         );
         manifest.latitude_deg = latitude_deg;
+        let reference_error = self.reference_error(fixture)?;
+        manifest.reference_error = reference_error.clone();
         manifest.check("wizard")?;
         Ok(SessionConfig {
             text: self.text.words(),
@@ -303,7 +348,11 @@ impl WizardArgs {
             warm_c_per_min: (self.warm_up > 0.0).then_some(self.warm_up),
             most_drift_c: self.drift,
             targets: self.targets()?,
-            mounting_deg: self.mounting,
+            mounting_deg: match reference_error {
+                Some(_) => 0.0,
+                None => self.mounting.unwrap_or(MOUNTING_DEG),
+            },
+            reference_error,
             whole_turns,
             by_device: self.by == By::Device,
         })

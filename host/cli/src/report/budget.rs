@@ -15,7 +15,7 @@ pub(crate) fn budget_text(fit: &FitResult) -> String {
 }
 
 /// The table of one triad.
-fn table(sensor: impl std::fmt::Display, rows: &[BudgetRow]) -> Option<Table> {
+pub(super) fn table(sensor: impl std::fmt::Display, rows: &[BudgetRow]) -> Option<Table> {
     let first = rows.first()?;
     let causes = first.shares.iter().map(|(cause, _)| cause.name());
     let mut table = Table::new(

@@ -4,6 +4,7 @@ mod accept;
 mod allan_command;
 mod bad_input;
 mod biases_at_rest;
+mod certificate;
 mod design_command;
 mod device;
 mod diagnosis_page;

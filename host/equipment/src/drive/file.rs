@@ -4,7 +4,7 @@ use std::path::Path;
 
 use mimu::plan::TableAxis;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{parse_toml, read_text};
+use mimu_recording::{ReferenceError, parse_toml, read_text};
 use serde::Deserialize;
 
 use super::{ChamberLimits, Limits};
@@ -35,6 +35,8 @@ pub(super) struct DriverFile {
     #[serde(default)]
     pub limits: Limits,
     pub chamber: Option<Chamber>,
+    /// What the table does wrong, by its certificate.
+    pub reference_error: Option<ReferenceError>,
 }
 
 fn usual_baud() -> u32 {
@@ -145,6 +147,9 @@ impl DriverFile {
                     "give from_c and to_c, the chamber's limits, and a safe rest_c within them";
                 return refuse(&problem, remedy);
             }
+        }
+        if let Some(error) = &file.reference_error {
+            error.check(&format!("{place}, reference_error"))?;
         }
         Ok(file)
     }

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use mimu::plan::{TableAxis, Turn};
+use mimu_recording::ReferenceError;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Vector3;
 
@@ -22,6 +23,14 @@ pub struct TextDriver {
 }
 
 impl TextDriver {
+    /// Errors of the table that the driver file states; the table need not be there.
+    ///
+    /// # Errors
+    /// The file cannot be read, or states impossible errors.
+    pub fn reference_error(path: &Path) -> Result<Option<ReferenceError>> {
+        Ok(DriverFile::read(path)?.reference_error)
+    }
+
     /// Reads the driver file and opens the line.
     pub fn open(path: &Path) -> Result<Self> {
         let place = path.display().to_string();

@@ -13,9 +13,6 @@ use crate::signal::dwell::Dwell;
 use crate::triad::{Covariance, Part, Triad};
 use mimu_recording::ReferenceError;
 
-/// A half of a 95 % interval in standard deviations.
-const HALF_WIDTH: f64 = 1.959_964;
-
 /// What errs in the reference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -76,10 +73,10 @@ impl Influences {
         error: &ReferenceError,
         forward: Matrix3<f64>,
     ) -> Self {
+        let sigma = error.standard();
         let mut sources = Vec::new();
-        let mut push = |cause, half: f64, by: &dyn Fn(&Dwell, &Vector3<f64>) -> Vector3<f64>| {
-            if half > 0.0 {
-                let sigma = half / HALF_WIDTH;
+        let mut push = |cause, sigma: f64, by: &dyn Fn(&Dwell, &Vector3<f64>) -> Vector3<f64>| {
+            if sigma > 0.0 {
                 let input = |dwell: &Dwell| {
                     let input = dwell.input(sensor).unwrap_or_else(Vector3::zeros);
                     by(dwell, &input) * sigma
@@ -90,37 +87,37 @@ impl Influences {
         };
         let is_accel = sensor == Sensor::Accel;
         if is_accel {
-            push(Cause::Gravity, error.gravity_mps2, &|_, f| {
+            push(Cause::Gravity, sigma.gravity_mps2, &|_, f| {
                 f.try_normalize(1e-9).unwrap_or_else(Vector3::zeros)
             });
         } else {
-            push(Cause::Rate, error.rate, &|_, rate| *rate);
+            push(Cause::Rate, sigma.rate, &|_, rate| *rate);
         }
         for axis in 0..3 {
             let unit = Vector3::ith(axis, 1.0);
-            let half = error.mounting_deg.to_radians();
-            push(Cause::Mounting, half, &|_, x| unit.cross(x));
+            let by = sigma.mounting_deg.to_radians();
+            push(Cause::Mounting, by, &|_, x| unit.cross(x));
         }
-        let right = error.orthogonality_deg.to_radians();
+        let right = sigma.orthogonality_deg.to_radians();
         push(Cause::Orthogonality, right, &|dwell, x| {
             inner_axis_off(dwell).cross(x)
         });
         if is_accel {
             for axis in 0..2 {
                 let unit = Vector3::ith(axis, 1.0);
-                let half = error.tilt_deg.to_radians();
-                push(Cause::Tilt, half, &|dwell, x| match dwell.spins() {
+                let by = sigma.tilt_deg.to_radians();
+                push(Cause::Tilt, by, &|dwell, x| match dwell.spins() {
                     // A turn about the vertical averages it.
                     true => Vector3::zeros(),
                     false => in_body(dwell, &unit).cross(x),
                 });
             }
-            let half = error.level_deg.to_radians();
+            let by = sigma.level_deg.to_radians();
             for dwell in 0..dwells.len() {
                 for axis in 0..3 {
                     let unit = Vector3::ith(axis, 1.0);
                     let own = dwells[dwell].start_s;
-                    push(Cause::Level, half, &|other, x| match other.start_s == own {
+                    push(Cause::Level, by, &|other, x| match other.start_s == own {
                         true => unit.cross(x),
                         false => Vector3::zeros(),
                     });

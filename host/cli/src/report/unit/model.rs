@@ -93,7 +93,7 @@ fn digits(value: f64) -> String {
     }
 }
 
-fn matrix(sensor: Sensor, table: &TriadTable, effects: &[String]) -> Markup {
+pub(in crate::report) fn matrix(sensor: Sensor, table: &TriadTable, effects: &[String]) -> Markup {
     let input = match sensor {
         Sensor::Gyro => "rate",
         Sensor::Accel => "specific force",
