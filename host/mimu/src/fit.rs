@@ -221,6 +221,7 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
         return Err(fault.refusal(&prepared.place));
     }
     plausible::check_readings(&prepared)?;
+    reference_error::refuse_unused(&prepared, options.method)?;
     let mut with_all = PerSensor::default();
     if prepared.manifest.reference == Reference::Gravity {
         // Turns connect dwells that are not left out, so the poses are judged first.
@@ -248,6 +249,16 @@ fn fit_as_prepared(mut prepared: Prepared, options: Options) -> Result<Fit> {
         sensor
             .warnings
             .extend(earth::in_intervals(&prepared, sensor));
+    }
+    let by_gravity = prepared.manifest.reference != Reference::Table;
+    let accels = sensors.iter_mut().filter(|s| s.sensor == Sensor::Accel);
+    for accel in accels.filter(|_| by_gravity) {
+        if let Some((triad, influence)) =
+            reference_error::with_gravity(&accel.estimated.triad, &prepared)
+        {
+            accel.estimated.triad = triad;
+            accel.influences.push(influence);
+        }
     }
     let by_magnitude = |s: &&SensorFit| s.figure == Figure::GravityMagnitude;
     let accel = sensors.iter().find(by_magnitude);

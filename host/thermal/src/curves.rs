@@ -3,6 +3,7 @@
 use mimu::triad::{Angles, Covariance, Forward, Part, Triad};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
+use crate::reference_error::CommonErrors;
 use crate::regression::{CurveKind, Problem};
 use crate::smoothness::{Smoothness, TriadFit};
 
@@ -22,6 +23,7 @@ pub struct LagFit {
 pub struct TriadCurves {
     problem: Problem,
     fits: Vec<LagFit>,
+    common: CommonErrors,
     /// Temperatures of the die in the recordings, °C.
     pub range_c: [f64; 2],
 }
@@ -35,8 +37,14 @@ impl TriadCurves {
         Self {
             problem,
             fits,
+            common: CommonErrors::default(),
             range_c,
         }
+    }
+
+    /// The same, with errors of the reference in the covariance.
+    pub(crate) fn count(&mut self, common: CommonErrors) {
+        self.common = common;
     }
 
     /// From one estimate, for a known lag.
@@ -71,8 +79,14 @@ impl TriadCurves {
         sum.map(|s| forward(&s))
     }
 
-    /// Covariance of the forward model at `temp_c`, in the order of [`mimu::triad::vector`], from the noise and from the lag.
+    /// Covariance of the forward model at `temp_c`, in the order of [`mimu::triad::vector`], from the noise, the lag and errors of the reference.
     pub fn covariance(&self, temp_c: f64) -> Covariance {
+        let [model, _] = self.forward(temp_c);
+        self.covariance_by_noise(temp_c) + self.common.covariance(&model)
+    }
+
+    /// The same without errors of the reference.
+    fn covariance_by_noise(&self, temp_c: f64) -> Covariance {
         let numbers = |of: &LagFit| self.numbers(&of.fit, temp_c, false);
         let each: Vec<Twelve> = self.fits.iter().map(numbers).collect();
         let shares = self.fits.iter().map(|of| of.share);
@@ -101,7 +115,7 @@ impl TriadCurves {
     /// Condition of the design at `temp_c`, as the covariance of the model there shows it: ratio of the largest to the smallest standard
     /// deviation of a combination of the parameters of one axis, in units of their own standard deviations.
     pub fn condition(&self, temp_c: f64) -> f64 {
-        let covariance = self.covariance(temp_c);
+        let covariance = self.covariance_by_noise(temp_c);
         let of_axis = |axis: usize| {
             let places = [3 * axis, 3 * axis + 1, 3 * axis + 2, 9 + axis];
             let correlation = nalgebra::Matrix4::from_fn(|i, j| {

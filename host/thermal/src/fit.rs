@@ -17,6 +17,7 @@ use crate::judge::{self, Bin, DwellError, Hysteresis, Judging, rms};
 use crate::nodes;
 use crate::path::is_one_way;
 use crate::profile::Profile;
+use crate::reference_error::{self, CommonErrors};
 use crate::session::Session;
 use crate::thermometer::{Die, Start};
 use crate::warning::Warning;
@@ -125,7 +126,9 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         .collect();
     check_verifying(&sessions, verify)?;
     coverage::check(&sessions, &mut warnings)?;
-    let joint = match options.estimator {
+    let has_intervals = !matches!(options.estimator, Estimator::Classic(_));
+    reference_error::check(&sessions, has_intervals)?;
+    let mut joint = match options.estimator {
         Estimator::Joint => smooth(&sessions, options, &mut warnings)?,
         Estimator::Cubic => {
             let choice = Choice {
@@ -136,9 +139,13 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         }
         Estimator::Classic(classic) => of_literature(&sessions, classic)?,
     };
+    for (sensor, curves) in joint.curves.as_mut() {
+        if let Some(curves) = curves {
+            curves.count(CommonErrors::of(&sessions, sensor));
+        }
+    }
     warnings.extend(joint.warnings.iter().cloned());
-    let estimated = !matches!(options.estimator, Estimator::Classic(_));
-    if estimated && sessions.iter().all(|s| s.noise_at_rest == [None; 6]) {
+    if has_intervals && sessions.iter().all(|s| s.noise_at_rest == [None; 6]) {
         warnings.push(Warning::WithoutNoise);
     }
     check_range(&joint, options.range_c)?;
@@ -149,7 +156,7 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         floor > 0.0 && own > MISFIT * floor
     };
     let verdict = match joint.one_way {
-        _ if estimated && judged.present().any(|(_, j)| misfits(j)) => FitVerdict::Misfit,
+        _ if has_intervals && judged.present().any(|(_, j)| misfits(j)) => FitVerdict::Misfit,
         true => FitVerdict::OneWay,
         false => FitVerdict::Fitted,
     };

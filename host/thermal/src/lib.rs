@@ -46,6 +46,7 @@ pub mod path;
 pub mod plan;
 pub mod points;
 pub mod profile;
+mod reference_error;
 pub mod regression;
 pub mod result;
 pub mod row;

@@ -7,7 +7,7 @@ use mimu::signal::blocks::{Block, Condensed};
 use mimu::signal::dwell::Dwell;
 use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference, SensorSettings};
+use mimu_recording::{RawUnit, Reference, ReferenceError, SensorSettings};
 use nalgebra::Vector3;
 
 use crate::bias_jumps::{self, BiasJump};
@@ -57,6 +57,8 @@ pub struct Session {
     pub gravity_mps2: f64,
     /// Latitude, degrees, if it is known.
     pub latitude_deg: Option<f64>,
+    /// Errors of the reference, if they are stated.
+    pub reference_error: Option<ReferenceError>,
     /// SHA-256 of the samples file.
     pub sha256: String,
     /// Samples a second.
@@ -138,6 +140,7 @@ impl Session {
             reference: manifest.reference,
             gravity_mps2: manifest.gravity_mps2,
             latitude_deg: manifest.latitude_deg,
+            reference_error: prepared.reference_error().cloned(),
             sha256: condensed.sha256.clone(),
             rate_hz: 1.0 / condensed.period_s,
             thermometer,

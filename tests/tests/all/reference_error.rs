@@ -176,3 +176,48 @@ fn what_no_pose_shows_widens_the_intervals_by_all_of_it() {
         assert!(off.abs() < 0.05, "{name}: {off}");
     }
 }
+
+/// By hand the assumed gravity errs, and with it every scale factor of the accelerometer by the same share.
+#[test]
+fn by_hand_intervals_that_count_the_error_of_gravity_hold_the_truth() {
+    let stated = ReferenceError {
+        gravity_mps2: 0.05,
+        ..ReferenceError::default()
+    };
+    let places: Vec<usize> = vec![0, 3, 4, 6, 7, 8];
+    let mut tallies =
+        ["not stated", "stated"].map(|name| Tally::new(format!("gravity {name}"), &places));
+    let runs = 60;
+    for run in 0..runs {
+        let mut random = Random::new(run, "gravity by hand");
+        let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+        let file = bench::clean(gyro, accel.clone());
+        let mut prepared = bench::recorded(&bench::hand_plan(20), &file, run);
+        prepared.manifest.gravity_mps2 += random.normal() * stated.gravity_mps2 / HALF;
+        let with = prepared.clone().with_reference_error(stated.clone());
+        for (prepared, tally) in [prepared, with].into_iter().zip(&mut tallies) {
+            let found = fit(prepared, Options::default()).expect("a fit");
+            let found = found.sensor(Sensor::Accel).expect("an accelerometer");
+            tally.add(&found.estimated.triad, &bench::parameters(&accel));
+        }
+    }
+    let [without, with] = tallies.map(|tally| tally.summary());
+    println!("not stated {without:?}, stated {with:?}");
+    let margin = |share: f64| 4.0 * (share * (1.0 - share) / runs as f64).sqrt();
+    let [mean, low, _] = with;
+    assert!(low > 0.93 - margin(0.93) && mean > 0.92, "{with:?}");
+    assert!(without[1] < 0.75, "{without:?}");
+}
+
+#[test]
+fn errors_that_a_fit_cannot_count_are_refused_by_name() {
+    let mut random = Random::new(1, "refused");
+    let file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let by_hand = bench::recorded(&bench::hand_plan(20), &file, 1);
+    let refused = fit(by_hand.with_reference_error(stated()), Options::default());
+    let said = refused.unwrap_err().to_string();
+    for key in ["rate", "mounting_deg", "tilt_deg", "orthogonality_deg"] {
+        assert!(said.contains(key), "{said}");
+    }
+    assert!(said.contains("only gravity_mps2 applies"), "{said}");
+}

@@ -141,9 +141,14 @@ impl<'a> Known<'a> {
         });
     }
 
-    /// What each error of the reference adds to the covariance, if least squares over dwell means was used. The parts of `estimated` are separated.
+    /// What each error of the reference adds to the covariance, if dwell means alone were used: the filters give the estimate of least squares. The parts of
+    /// `estimated` are separated.
     fn influences(&self, estimated: &mut Estimated) -> Vec<Influence> {
-        let by_means = self.options.method == Method::LeastSquares && self.within.is_empty();
+        let by_means = match self.options.method {
+            Method::LeastSquares => self.within.is_empty(),
+            Method::Kalman => true,
+            Method::InverseForm | Method::SixPositions => false,
+        };
         match (&self.reference, &self.shared) {
             (Some(reference), Some(shared)) if by_means => reference
                 .separate(estimated, &self.weighed, shared)

@@ -7,11 +7,14 @@
 use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
 use serde::Serialize;
 
+use super::Method;
 use crate::estimate::{Estimated, Observation, known_input};
+use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::signal::dwell::Dwell;
-use crate::triad::{Covariance, Part, Triad};
-use mimu_recording::ReferenceError;
+use crate::triad::{Covariance, Part, Triad, vector};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Reference, ReferenceError};
 
 /// What errs in the reference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -210,6 +213,60 @@ impl Influences {
         estimated.triad = Triad::from_forward(estimated.triad.forward, parts)?;
         Some(influences)
     }
+}
+
+/// Refuses errors of the reference that a fit by `method` cannot count, instead of making intervals that lack them.
+///
+/// # Errors
+/// The keys that do not apply, and why.
+pub(super) fn refuse_unused(prepared: &Prepared, method: Method) -> Result<()> {
+    let Some(stated) = &prepared.reference_error else {
+        return Ok(());
+    };
+    let (why, applies): (&str, fn(&str) -> bool) = match (prepared.manifest.reference, method) {
+        (Reference::Table, Method::LeastSquares | Method::Kalman) => return Ok(()),
+        (Reference::Table, Method::InverseForm | Method::SixPositions) => (
+            "this estimator weighs dwells by noise alone; use least-squares or kalman",
+            |_| false,
+        ),
+        (Reference::Gravity, _) => (
+            "by hand neither a pose nor a rate is taken as known: only gravity_mps2 applies",
+            |key| key == "gravity_mps2",
+        ),
+        (Reference::TurntableRate, _) => (
+            "on a turntable only the magnitude of the rate is known, and [turntable] states its rate_error: only gravity_mps2 applies",
+            |key| key == "gravity_mps2",
+        ),
+    };
+    let keys: Vec<&str> = stated.stated().map(|(key, ..)| key).collect();
+    let unused: Vec<&str> = keys.into_iter().filter(|key| !applies(key)).collect();
+    match unused.is_empty() {
+        true => Ok(()),
+        false => Err(Error::new(
+            format!("{}, errors of the reference", prepared.place),
+            format!("this fit cannot count {}: {why}", unused.join(", ")),
+            "leave them out of recording.toml or of the file, and know that no interval includes them",
+        )),
+    }
+}
+
+/// An accelerometer whose reference is the magnitude of gravity, and what the error of the assumed gravity adds to its covariance: every scale factor errs
+/// by the same share, which no pose shows. `None` if no such error is stated.
+pub(super) fn with_gravity(triad: &Triad, prepared: &Prepared) -> Option<(Triad, Influence)> {
+    let sigma = prepared.reference_error.as_ref()?.standard().gravity_mps2;
+    let share = sigma / prepared.manifest.gravity_mps2;
+    let by = vector(&(triad.forward.matrix * share), &Vector3::zeros());
+    let influence = Influence {
+        cause: Cause::Gravity,
+        covariance: by * by.transpose(),
+    };
+    let mut parts = triad.forward_parts.clone();
+    parts.push(Part {
+        covariance: influence.covariance,
+        dof: f64::INFINITY,
+    });
+    let triad = Triad::from_forward(triad.forward, parts).filter(|_| sigma > 0.0)?;
+    Some((triad, influence))
 }
 
 /// Angles of the table by the direction that is up, rad: tilt about the level axis, turn about the body's z axis. `None` without a force. The body is first

@@ -48,6 +48,20 @@ pub struct Sessions {
     pub triads: PerSensor<Option<CommonTriad>>,
 }
 
+/// Refuses fits that count errors of the reference: these are common to the sessions, and the model of the sessions takes each fit's errors as its own, so
+/// that its intervals would be too narrow.
+fn refuse_common_errors(fits: &[Fit]) -> Result<()> {
+    let counts = |fit: &&Fit| fit.sensors.iter().any(|s| !s.influences.is_empty());
+    match fits.iter().find(counts) {
+        Some(fit) if fits.len() > 1 => Err(Error::new(
+            &fit.prepared.place,
+            "errors of the reference are stated, and several sessions on one reference share them: a fit of the sessions would count them as independent",
+            "fit each session by itself, or leave the errors out and know that no interval includes them",
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// One triad of all sessions.
 #[derive(Debug, Clone)]
 pub struct CommonTriad {
@@ -125,6 +139,7 @@ impl Sessions {
     /// Fits of two units, or in two raw units; no triad that all determine.
     pub fn combine(fits: Vec<Fit>, class: PartClass) -> Result<Self> {
         check(&fits)?;
+        refuse_common_errors(&fits)?;
         let physical = Sensor::BOTH.map(|sensor| of_fits(&fits, sensor));
         let free = physical.each_ref().map(|all| free(all));
         let data: Vec<Triads> = Sensor::BOTH

@@ -1,0 +1,101 @@
+//! Errors of the reference that all temperatures share: they widen every curve by the same pattern, and no recording shows them.
+
+use mimu::quantity::Sensor;
+use mimu::triad::{Covariance, Forward, vector};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Reference, ReferenceError};
+use nalgebra::Vector3;
+
+use crate::session::Session;
+
+/// Standard uncertainties of the errors that a triad cannot distinguish from its own parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct CommonErrors {
+    /// Of all inputs by one factor: the share of the rates, or of gravity.
+    share: f64,
+    /// Of the orientation of the unit on its mount, rad about each axis.
+    mounting_rad: f64,
+}
+
+impl CommonErrors {
+    /// Those of `sensor` by the statement of the sessions.
+    pub fn of(sessions: &[Session], sensor: Sensor) -> Self {
+        let Some((session, error)) = stated(sessions) else {
+            return Self::default();
+        };
+        let sigma = error.standard();
+        Self {
+            share: match sensor {
+                Sensor::Gyro => sigma.rate,
+                Sensor::Accel => sigma.gravity_mps2 / session.gravity_mps2,
+            },
+            mounting_rad: sigma.mounting_deg.to_radians(),
+        }
+    }
+
+    /// What they add to the covariance of `model`: P errs by a factor, and by a rotation of the body. Biases do not err.
+    pub fn covariance(&self, model: &Forward) -> Covariance {
+        let mut all = Covariance::zeros();
+        let mut add = |by: nalgebra::Matrix3<f64>| {
+            let by = vector(&by, &Vector3::zeros());
+            all += by * by.transpose();
+        };
+        add(model.matrix * self.share);
+        for axis in 0..3 {
+            add(model.matrix * Vector3::ith(axis, self.mounting_rad).cross_matrix());
+        }
+        all
+    }
+}
+
+/// The first session with a statement, and the statement.
+fn stated(sessions: &[Session]) -> Option<(&Session, &ReferenceError)> {
+    let each = sessions.iter();
+    let mut each = each.filter_map(|s| Some((s, s.reference_error.as_ref()?)));
+    each.next()
+}
+
+/// Refuses statements that the curves cannot count, instead of making intervals that lack them. `has_intervals`: whether the estimator gives any.
+///
+/// # Errors
+/// Sessions that state different errors, errors that depend on the pose, an estimator without intervals, recordings at rest.
+pub(crate) fn check(sessions: &[Session], has_intervals: bool) -> Result<()> {
+    let Some((first, error)) = stated(sessions) else {
+        return Ok(());
+    };
+    let refuse = |place: &str, problem: String, remedy: &str| {
+        Err(Error::new(
+            format!("{place}, errors of the reference"),
+            problem,
+            remedy,
+        ))
+    };
+    if let Some(other) = sessions
+        .iter()
+        .find(|s| s.reference_error.as_ref() != Some(error))
+    {
+        let problem = format!("{} states other errors or none", other.place);
+        let remedy = "state the same in all recordings: they are common to all temperatures";
+        return refuse(&first.place, problem, remedy);
+    }
+    if first.reference != Reference::Table || !has_intervals {
+        let problem = "curves count them only for known inputs (reference = \"table\") and the estimators joint and cubic";
+        let remedy = "leave them out, and know that no interval includes them";
+        return refuse(&first.place, problem.into(), remedy);
+    }
+    let common = ["gravity_mps2", "rate", "mounting_deg"];
+    let keys = error.stated().map(|(key, ..)| key);
+    let unused: Vec<&str> = keys.filter(|key| !common.contains(key)).collect();
+    if unused.is_empty() {
+        return Ok(());
+    }
+    let problem = format!(
+        "curves over temperature cannot count {}: they depend on the pose, and the regression takes its poses as exact",
+        unused.join(", ")
+    );
+    refuse(
+        &first.place,
+        problem,
+        "leave them out, and know that no interval includes them; gravity_mps2, rate and mounting_deg apply",
+    )
+}
