@@ -99,3 +99,41 @@ pub(crate) fn check(sessions: &[Session], has_intervals: bool) -> Result<()> {
         "leave them out, and know that no interval includes them; gravity_mps2, rate and mounting_deg apply",
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Rotation3};
+
+    use super::*;
+
+    /// A gyro that is calibrated with rates too large by a share, on a mount that is turned, finds P (1 + share) R: its spread over all errors is what the
+    /// interval has to contain.
+    #[test]
+    fn the_covariance_is_the_spread_of_the_curves_that_such_references_give() {
+        let model = Forward {
+            matrix: Matrix3::new(0.012, 1e-4, 0.0, -2e-4, 0.0118, 5e-5, 0.0, -1e-4, 0.0122),
+            bias: Vector3::new(2.5, 2.49, 2.52),
+        };
+        let errors = CommonErrors {
+            share: 2e-3,
+            mounting_rad: 1.5e-3,
+        };
+        // One standard deviation either way of each of the four: the mean square of independent changes.
+        let mut spread = Covariance::zeros();
+        let mut add = |changed: Matrix3<f64>| {
+            let off = vector(&(changed - model.matrix), &Vector3::zeros());
+            spread += off * off.transpose() / 2.0;
+        };
+        for sign in [1.0, -1.0] {
+            add(model.matrix * (1.0 + sign * errors.share));
+            for axis in 0..3 {
+                let turn = Vector3::ith(axis, sign * errors.mounting_rad);
+                add(model.matrix * Rotation3::new(turn).matrix());
+            }
+        }
+        let found = errors.covariance(&model);
+        assert!((found - spread).amax() < 1e-5 * spread.amax(), "{found}");
+        // The null does not depend on the reference.
+        assert!((9..12).all(|k| found[(k, k)] == 0.0));
+    }
+}

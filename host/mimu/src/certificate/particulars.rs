@@ -1,6 +1,6 @@
 //! What a certificate says that no recording contains: who calibrated what for whom, where and when.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 
 use mimu_recording::error::{Error, Result};
@@ -38,11 +38,13 @@ pub struct Particulars {
     /// Number of the certificate, unique in the laboratory.
     pub number: String,
     /// Day on which the laboratory received the item, YYYY-MM-DD.
+    #[serde(deserialize_with = "day")]
     pub received: String,
     /// Day of the recording.
+    #[serde(deserialize_with = "day")]
     pub performed: String,
     /// Day of issue; without it, the day on which the certificate is made.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "day")]
     pub issued: String,
     /// Where the calibration was performed.
     pub location: String,
@@ -94,6 +96,20 @@ pub struct Item {
     pub settings: String,
 }
 
+/// A day as text: TOML has dates of its own.
+fn day<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<String, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Day {
+        Date(toml::value::Datetime),
+        Text(String),
+    }
+    Ok(match Day::deserialize(from)? {
+        Day::Date(day) => day.to_string(),
+        Day::Text(day) => day,
+    })
+}
+
 impl Particulars {
     /// Reads the file. `has_traceability`: whether another file states that of the reference. `today` is the day of issue if the file has none, YYYY-MM-DD.
     ///
@@ -107,19 +123,11 @@ impl Particulars {
     fn parse(text: &str, place: &str, has_traceability: bool, today: &str) -> Result<Self> {
         check_kind(text, place, "mimu-particulars")?;
         // The error of a file that is no TOML names its line.
-        let mut table: toml::Table = parse_toml(text, place, None)?;
+        let table: toml::Table = parse_toml(text, place, None)?;
         let format = table.get("format").and_then(toml::Value::as_str);
         if format != Some(FORMAT) {
             let problem = format!("format is not {FORMAT:?}");
             return Err(Error::new(place, problem, EXAMPLE));
-        }
-        for key in DATES {
-            // TOML has dates of its own.
-            if let Some(value) = table.get_mut(key)
-                && let toml::Value::Datetime(day) = value
-            {
-                *value = toml::Value::String(day.to_string());
-            }
         }
         let missing: Vec<&str> = REQUIRED
             .into_iter()
@@ -133,11 +141,7 @@ impl Particulars {
                 format!("add what is missing or empty; {EXAMPLE}"),
             ));
         }
-        // Parsed from the text for the line of an error, unless dates were rewritten.
-        let mut found: Self = match parse_toml(text, place, None) {
-            Ok(found) => found,
-            Err(error) => table.try_into().map_err(|_| error)?,
-        };
+        let mut found: Self = parse_toml(text, place, None)?;
         if found.issued.trim().is_empty() {
             today.clone_into(&mut found.issued);
         }
