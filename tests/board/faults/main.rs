@@ -25,8 +25,11 @@ const KILLS: usize = 50;
 /// To the Matek, its sensor's clock is 1 % fast.
 const MATEK: Kind = Kind::Matek { crystal: 0.99 };
 
+type OfOurs = fn(Bench<'_>) -> Result<Ended, String>;
+type OfText = fn(&Path) -> Result<Ended, String>;
+
 /// With a board of ours.
-const OURS: &[(&str, fn(Bench<'_>) -> Result<Ended, String>)] = &[
+const OURS: &[(&str, OfOurs)] = &[
     ("nothing", nothing),
     ("by-device", by_device),
     ("garbled", garbled),
@@ -51,7 +54,7 @@ const OURS: &[(&str, fn(Bench<'_>) -> Result<Ended, String>)] = &[
 ];
 
 /// With a board of another maker, which writes lines.
-const TEXT: &[(&str, fn(&Path) -> Result<Ended, String>)] = &[
+const TEXT: &[(&str, OfText)] = &[
     ("text", text_mistakes::text_nothing),
     ("text-z-inv", text_mistakes::text_z_inverted),
     ("text-negated", text_mistakes::text_negated),
