@@ -102,6 +102,10 @@ fn the_devices_own_filters_make_the_calibration_and_a_dwell_with_a_lost_line_lea
 #[test]
 fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_holds_the_truth() {
     let mut bench = Bench::new("table", unit(7), 7);
+    // The driver file states what the table's certificate says of its rates.
+    let driver = std::fs::read_to_string(bench.path("driver.toml")).unwrap();
+    let stated = "\n[reference_error]\nsource = \"certificate\"\nrate = 2e-2\n";
+    std::fs::write(bench.path("driver.toml"), driver + stated).unwrap();
     let plan = short_plan(&bench);
     let arguments = on_table(&plan);
     let mut child = bench.wizard(&arguments).spawn().unwrap();
@@ -142,6 +146,11 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
     let manifest =
         std::fs::read_to_string(bench.path("session/calibration/recording.toml")).unwrap();
     assert!(!manifest.contains("unfinished"), "{manifest}");
+    // With two per cent, half of the interval of a scale factor of the gyro is that, and noise.
+    assert!(manifest.contains("rate = 0.02"), "{manifest}");
+    let gyro = calibration.table(Sensor::Gyro).unwrap();
+    let share = gyro.interval_C.unwrap()[0][0] / gyro.C[0][0].abs();
+    assert!((0.0195..0.023).contains(&share), "{share}");
 }
 
 #[test]
