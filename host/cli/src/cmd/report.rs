@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu::calibration::verify::verify;
+use mimu::calibration::verify::{Verification, WholeTurnsOfAxis, verify};
 use mimu::data_sheet::DataSheet;
 use mimu::diagnose::Recordings;
 use mimu::diagnosed::{Diagnosed, diagnosed};
@@ -151,19 +151,7 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
             Err(why) => not_judged.push(format!("{name}: {why}")),
         }
     }
-    let mut whole_turns = Vec::new();
-    for (name, prepared) in &recordings {
-        // Only for its whole turns: a recording does not judge what was made from it.
-        let turned = prepared
-            .manifest
-            .whole_turns
-            .map(|_| verify(prepared, &calibration));
-        let turned = turned.and_then(Result::ok).map(|v| v.whole_turns);
-        whole_turns.extend(turned.map(|turned| (name.clone(), args.calibration.is_none(), turned)));
-    }
-    let others = verified.iter();
-    whole_turns.extend(others.map(|(name, v)| (name.clone(), false, v.whole_turns.clone())));
-    whole_turns.retain(|(.., turned)| !turned.is_empty());
+    let whole_turns = whole_turns(&recordings, args, &calibration, &verified);
     let file = inputs.calibration.as_deref().map(Path::display);
     let file = file.map(|path| path.to_string());
     let sheet = part.map(|part| DataSheet::of(&calibration, noise.as_ref(), &part));
@@ -185,7 +173,38 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
         created: now,
     };
     stage(&args.out, unit_page(&unit, &made)?)?.publish()?;
-    let verdict = match unit.diagnosis {
+    let verdict = verdict(&unit);
+    show(&format!("{verdict}page: {}\n", args.out.display()))
+}
+
+/// The whole turns in recordings: name, whether the calibration was made from it, and degrees for each turn about each axis.
+type WholeTurns = Vec<(String, bool, Vec<WholeTurnsOfAxis>)>;
+
+fn whole_turns(
+    recordings: &[(String, Prepared)],
+    args: &ReportArgs,
+    calibration: &Calibration,
+    verified: &[(String, Verification)],
+) -> WholeTurns {
+    let mut all = Vec::new();
+    for (name, prepared) in recordings {
+        // Only for its whole turns: a recording does not judge what was made from it.
+        let turned = prepared
+            .manifest
+            .whole_turns
+            .map(|_| verify(prepared, calibration));
+        let turned = turned.and_then(Result::ok).map(|v| v.whole_turns);
+        all.extend(turned.map(|turned| (name.clone(), args.calibration.is_none(), turned)));
+    }
+    let others = verified.iter();
+    all.extend(others.map(|(name, v)| (name.clone(), false, v.whole_turns.clone())));
+    all.retain(|(.., turned)| !turned.is_empty());
+    all
+}
+
+/// What is printed of a unit.
+fn verdict(unit: &UnitReport) -> String {
+    match unit.diagnosis {
         Some(d) => {
             let mut out = String::new();
             problems(&mut out, &d.recording_problems, d.has_several(), false);
@@ -196,12 +215,11 @@ pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
                 d.judgement
             )
         }
-        None => match &calibration.judgement {
-            Some(judgement) => format!("{}\njudgement: {judgement}\n", calibration.device),
-            None => format!("{}\n", calibration.device),
+        None => match &unit.calibration.judgement {
+            Some(judgement) => format!("{}\njudgement: {judgement}\n", unit.calibration.device),
+            None => format!("{}\n", unit.calibration.device),
         },
-    };
-    show(&format!("{verdict}page: {}\n", args.out.display()))
+    }
 }
 
 /// The recording of a certificate.
