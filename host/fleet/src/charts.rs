@@ -239,25 +239,30 @@ impl Series<'_> {
     }
 
     fn result(&self, (t, i): Of, chart: &Chart) -> ChartOfParameter {
-        let basis = &self.triads[t].basis;
-        let day = |k: Option<usize>| k.map(|k| chart.points[k].day.to_string());
-        let change = chart.signal.and_then(|s| {
-            let after = chart.points[s..].iter().map(|p| p.average);
-            after.max_by(|a, b| a.abs().total_cmp(&b.abs()))
-        });
-        ChartOfParameter {
-            sensor: basis.sensor,
-            parameter: basis.parameter(i).to_string(),
-            unit: basis.unit(i),
-            between_days: chart.between_days,
-            sigma: self.sigma((t, i)),
-            signal: day(chart.signal),
-            since: day(chart.since),
-            change,
-            days: chart.points.iter().map(|p| p.day.to_string()).collect(),
-            means: chart.points.iter().map(|p| p.mean).collect(),
-            averages: chart.points.iter().map(|p| p.average).collect(),
-            limits: chart.points.iter().map(|p| p.limit).collect(),
-        }
+        of_parameter(&self.triads[t], i, chart)
+    }
+}
+
+/// The chart of parameter `i` of a triad, as in the result.
+pub fn of_parameter(triad: &Triad, i: usize, chart: &Chart) -> ChartOfParameter {
+    let basis = &triad.basis;
+    let day = |k: Option<usize>| k.map(|k| chart.points[k].day.to_string());
+    let change = chart.signal.and_then(|s| {
+        let after = chart.points[s..].iter().map(|p| p.average);
+        after.max_by(|a, b| a.abs().total_cmp(&b.abs()))
+    });
+    ChartOfParameter {
+        sensor: basis.sensor,
+        parameter: basis.parameter(i).to_string(),
+        unit: basis.unit(i),
+        between_days: chart.between_days,
+        sigma: triad.of_one()[(i, i)].sqrt(),
+        signal: day(chart.signal),
+        since: day(chart.since),
+        change,
+        days: chart.points.iter().map(|p| p.day.to_string()).collect(),
+        means: chart.points.iter().map(|p| p.mean).collect(),
+        averages: chart.points.iter().map(|p| p.average).collect(),
+        limits: chart.points.iter().map(|p| p.limit).collect(),
     }
 }

@@ -16,11 +16,12 @@ use crate::levels::{self, Levels, Units};
 use crate::measured::Setting;
 use crate::population::{Distance, FEWEST};
 use crate::prior;
+use crate::remeasured::{self, Change};
 use crate::repeats::by_unit;
-use crate::result::{DifferentLevel, Fleet, Stranger};
+use crate::result::{ChangedUnit, DifferentLevel, Fleet, Stranger};
 use crate::studies::{self, Options};
 use crate::tree::{LeftOut, Measurement, Tree};
-use crate::triad::Triad;
+use crate::triad::{Estimated, Triad};
 
 /// Everything that the calibrations of `tree` say together. `part` is the one whose limits were compared while they were read.
 ///
@@ -60,9 +61,16 @@ fn analysed(
     if units.len() < FEWEST {
         return Err(too_few(&tree, units.len()));
     }
-    let triads: Vec<Triad> = Sensor::BOTH
+    let estimated: Vec<Estimated> = Sensor::BOTH
         .iter()
-        .filter_map(|s| Triad::of(*s, reference, all, &units))
+        .filter_map(|s| Estimated::of(*s, reference, all))
+        .collect();
+    let changes = remeasured::changes(all, &units, &estimated);
+    let sensors: Vec<Sensor> = estimated.iter().map(|e| e.basis.sensor).collect();
+    let constant = constant(&units, &changes);
+    let triads: Vec<Triad> = estimated
+        .into_iter()
+        .filter_map(|e| Triad::of(e, &constant))
         .collect();
     if triads.is_empty() {
         let problem = "no triad has five units with a regular covariance";
@@ -95,7 +103,19 @@ fn analysed(
             .collect::<Vec<&[Row]>>()
     });
     let collected = capability::collect(rows);
-    let gage = studies::study(all, &units, &triads, options);
+    let gage = studies::study(all, &constant, &triads, options);
+    let changed_units = changes.iter().filter_map(|change| {
+        let triad = triads
+            .iter()
+            .find(|t| t.basis.sensor == sensors[change.of.0])?;
+        let members = &units[change.unit];
+        Some(ChangedUnit {
+            unit: all[members[0]].unit.clone(),
+            measurements: members.len(),
+            chart: charts::of_parameter(triad, change.of.1, &change.chart),
+        })
+    });
+    let changed_units = changed_units.collect();
     let mut days: Vec<_> = all.iter().filter_map(|m| m.day).collect();
     days.sort_unstable();
     let mut result = Fleet {
@@ -119,6 +139,7 @@ fn analysed(
         sensors: mimu::PerSensor::default(),
         strangers,
         contradicting,
+        changed_units,
         different,
         changed: charts.changed,
         drift: charts.drift,
@@ -133,6 +154,19 @@ fn analysed(
     result.left_out = tree.left_out;
     result.judgement = judge(&result);
     Ok((result, triads, (raw_unit, reference)))
+}
+
+/// The units, with the first measurement only of those that change: a unit that ages shows neither how well measurements repeat nor what a unit of the kind is.
+fn constant(units: &[Vec<usize>], changes: &[Change]) -> Vec<Vec<usize>> {
+    let changed: Vec<usize> = changes.iter().map(|c| c.unit).collect();
+    let each = units
+        .iter()
+        .enumerate()
+        .map(|(k, unit)| match changed.contains(&k) {
+            true => unit[..1].to_vec(),
+            false => unit.clone(),
+        });
+    each.collect()
 }
 
 fn too_few(tree: &Tree, units: usize) -> Error {

@@ -29,6 +29,13 @@ pub fn judge(fleet: &Fleet) -> Judgement {
         };
         reasons.push(format!("{count} {verb} others of the same unit"));
     }
+    let mut changed: Vec<String> = fleet
+        .changed_units
+        .iter()
+        .map(|c| format!("unit {} changes", c.unit))
+        .collect();
+    changed.dedup();
+    reasons.extend(changed);
     let mut levels: Vec<String> = fleet
         .different
         .iter()

@@ -7,6 +7,7 @@
 //! | [`measured`] | the parameters of a calibration in units that a fleet has in common |
 //! | [`population`] | mean and covariance with the uncertainty of the fits removed, and how improbable each unit is |
 //! | [`repeats`] | several measurements of a unit |
+//! | `remeasured` | units that are measured on many days and change |
 //! | [`levels`] | batches, fixtures, operators that differ from the others |
 //! | [`drift`] | control charts (EWMA) by date |
 //! | [`gage`] | repeatability and reproducibility (Gage R&R) |
@@ -30,6 +31,7 @@ pub mod levels;
 pub mod measured;
 pub mod population;
 pub mod prior;
+mod remeasured;
 pub mod repeats;
 pub mod result;
 mod robust;

@@ -44,6 +44,8 @@ pub struct Fleet {
     pub strangers: Vec<Stranger>,
     /// Calibrations that contradict the others of their unit.
     pub contradicting: Vec<Stranger>,
+    /// Units that are measured on many days and change, with the charts of the parameters that do.
+    pub changed_units: Vec<ChangedUnit>,
     /// Labels whose units differ from the others.
     pub different: Vec<DifferentLevel>,
     /// Labels that differ from the others since a day.
@@ -167,6 +169,17 @@ pub struct ChangedLevel {
     /// Level.
     pub level: String,
     /// Chart of its difference from the other levels of the same days.
+    pub chart: ChartOfParameter,
+}
+
+/// A parameter of a unit that is measured on many days and changes: a golden unit that ages, or a station.
+#[derive(Debug, Clone, Serialize)]
+pub struct ChangedUnit {
+    /// Unit.
+    pub unit: String,
+    /// Its measurements. Only the first is used for the population.
+    pub measurements: usize,
+    /// Chart of the parameter against its own mean before the change.
     pub chart: ChartOfParameter,
 }
 

@@ -11,6 +11,33 @@ use crate::repeats::Repeats;
 use crate::result::{Histogram, ParameterOfFleet, TriadOfFleet};
 use crate::tree::Measurement;
 
+/// The measurements of one triad.
+pub struct Estimated {
+    /// Units of its parameters.
+    pub basis: Basis,
+    /// Estimates of each measurement; `None` without this triad.
+    pub estimates: Vec<Option<Estimates>>,
+}
+
+impl Estimated {
+    /// Those of `sensor`. `None` if no measurement has it.
+    pub fn of(sensor: Sensor, reference: Option<Reference>, all: &[Measurement]) -> Option<Self> {
+        let physical: Vec<_> = all.iter().map(|m| m.of.triads[sensor]).collect();
+        let basis = Basis::of(sensor, reference, &physical)?;
+        let each = physical.iter();
+        let estimates = each.map(|p| p.as_ref().map(|p| basis.estimates(p)));
+        Some(Self {
+            estimates: estimates.collect(),
+            basis,
+        })
+    }
+
+    /// Number of parameters.
+    pub fn n(&self) -> usize {
+        self.basis.free.len()
+    }
+}
+
 /// One triad of the fleet.
 pub struct Triad {
     /// Units of its parameters.
@@ -32,19 +59,9 @@ const BINS: usize = 41;
 const SIGMAS: f64 = 5.125;
 
 impl Triad {
-    /// The triad of `sensor`. `None` if too few units have it, or if a covariance is singular.
-    pub fn of(
-        sensor: Sensor,
-        reference: Option<Reference>,
-        all: &[Measurement],
-        units: &[Vec<usize>],
-    ) -> Option<Self> {
-        let physical: Vec<_> = all.iter().map(|m| m.of.triads[sensor]).collect();
-        let basis = Basis::of(sensor, reference, &physical)?;
-        let estimates: Vec<Option<Estimates>> = physical
-            .iter()
-            .map(|p| p.as_ref().map(|p| basis.estimates(p)))
-            .collect();
+    /// The triad by its measurements of these units. `None` if too few have it, or if a covariance is singular.
+    pub fn of(estimated: Estimated, units: &[Vec<usize>]) -> Option<Self> {
+        let Estimated { basis, estimates } = estimated;
         let repeats = Repeats::of(&estimates, units)?;
         let population = population::fit(&repeats.estimates, None)?;
         let n = basis.free.len();

@@ -163,6 +163,13 @@ impl Prior {
         }
     }
 
+    /// Sensors and numbers of units: `gyro of 60 units, accel of 60 units`. Empty if it has no table.
+    pub fn words(&self) -> String {
+        let of = |sensor| Some(format!("{sensor} of {} units", self.table(sensor)?.units));
+        let each: Vec<String> = Sensor::BOTH.into_iter().filter_map(of).collect();
+        each.join(", ")
+    }
+
     /// Gives up the prior of a triad.
     pub fn remove(&mut self, sensor: Sensor) {
         match sensor {

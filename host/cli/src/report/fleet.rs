@@ -9,7 +9,8 @@ use std::fmt::Write as _;
 use mimu::quantity::{p_value, plural, plus_minus, significant};
 use mimu_fleet::Fleet;
 use mimu_fleet::result::{
-    ChangedLevel, ChartOfParameter, DifferentLevel, GageOfParameter, GageStudy, Stranger,
+    ChangedLevel, ChangedUnit, ChartOfParameter, DifferentLevel, GageOfParameter, GageStudy,
+    Stranger,
 };
 
 pub use page::fleet_page;
@@ -69,7 +70,7 @@ pub fn fleet_text(fleet: &Fleet, verbose: bool) -> String {
 }
 
 /// What is found, by kind, the most significant first. The JSON has all triads of a label, the list the one that shows it most.
-fn lists(fleet: &Fleet) -> [(&'static str, Vec<String>); 5] {
+fn lists(fleet: &Fleet) -> [(&'static str, Vec<String>); 6] {
     let mut labels: Vec<(&str, &str)> = Vec::new();
     let different = fleet.different.iter().filter(|d| {
         let new = !labels.contains(&(&d.label, &d.level));
@@ -90,6 +91,10 @@ fn lists(fleet: &Fleet) -> [(&'static str, Vec<String>); 5] {
         (
             "calibrations that contradict others of their unit",
             fleet.contradicting.iter().map(calibration).collect(),
+        ),
+        (
+            "units measured on many days that change",
+            fleet.changed_units.iter().map(changed_unit).collect(),
         ),
         ("labels that differ", different),
         (
@@ -188,6 +193,15 @@ fn since(chart: &ChartOfParameter) -> String {
 
 fn changed(one: &ChangedLevel) -> String {
     format!("{} {}: {}", one.label, one.level, since(&one.chart))
+}
+
+fn changed_unit(one: &ChangedUnit) -> String {
+    format!(
+        "{}, measured {}: {}",
+        one.unit,
+        plural(one.measurements as u64, "time"),
+        since(&one.chart)
+    )
 }
 
 fn drift(chart: &ChartOfParameter) -> String {

@@ -40,6 +40,9 @@ pub struct Faults {
     pub drift: f64,
     /// Shift of gyro misalignment z since the middle on fixture C, standard deviations.
     pub fixture: f64,
+    /// The golden unit, which is measured every day on fixture A: change of its gyro's scale factor x over the last 40 % of the days, standard deviations of units.
+    /// `None` if there is no such unit.
+    pub golden: Option<f64>,
     /// Every how many-th unit is none of the population; 0 for none.
     pub stranger: usize,
     /// Distance of these in all scale factors of the gyro, standard deviations; all in the same direction.
@@ -124,6 +127,21 @@ impl Plant {
                     &each,
                     [own, ["eva", "max", "ida"][operator]],
                 ));
+            }
+        }
+        if let Some(change) = self.faults.golden {
+            let truth = [0, 1].map(|s| &factors[s] * standard(&mut random));
+            let truth = truth.map(|t| SVector::<f64, 12>::from_fn(|i, _| t[i]));
+            for day in 0..self.days {
+                let mut each = truth;
+                let late = (day as f64 / self.days as f64 - 0.6) / 0.4;
+                each[0][0] += change * late.max(0.0);
+                // Units are numbered by the day on which they are made.
+                let k = (self.units * day).div_ceil(self.days);
+                let mut one = self.measurement(&mut random, (k, day), &each, ["A", "eva"]);
+                one.unit = "golden".into();
+                one.file = format!("golden-{day}.toml");
+                measurements.push(one);
             }
         }
         Tree {

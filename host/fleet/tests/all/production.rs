@@ -27,6 +27,15 @@ fn found(fleet: &Fleet) -> Vec<String> {
             c.chart.parameter
         )
     }));
+    all.extend(fleet.changed_units.iter().map(|c| {
+        format!(
+            "unit {} {} {} since {}",
+            c.unit,
+            c.chart.sensor,
+            c.chart.parameter,
+            c.chart.since.as_deref().unwrap_or("-")
+        )
+    }));
     let charts = fleet
         .drift
         .iter()
@@ -208,6 +217,47 @@ fn a_calibration_that_contradicts_five_others_of_its_unit_is_named_and_not_used(
 }
 
 #[test]
+fn a_golden_unit_that_ages_is_named_and_one_that_does_not_is_none_of_the_findings() {
+    let with = |golden: f64| {
+        let faults = Faults {
+            golden: Some(golden),
+            ..Faults::default()
+        };
+        result(&Plant {
+            faults,
+            ..Plant::new(1000, 6)
+        })
+    };
+    let aged = with(1.0);
+    // It begins on 2026-03-18 and grows to five errors of a fit.
+    let all = found(&aged);
+    assert_eq!(all.len(), 1, "{all:?}");
+    assert!(
+        all[0].starts_with("unit golden gyro scale_x since 2026-03")
+            || all[0].starts_with("unit golden gyro scale_x since 2026-04"),
+        "{all:?}"
+    );
+    let change = aged.changed_units[0].chart.change.unwrap();
+    assert!(
+        (0.5..1.2).contains(&(change / crate::plant::GYRO[0])),
+        "{change}"
+    );
+    assert!(aged.strangers.is_empty() && aged.contradicting.is_empty());
+    assert!(
+        aged.judgement.to_string().contains("unit golden changes"),
+        "{}",
+        aged.judgement
+    );
+    let constant = with(0.0);
+    assert_eq!(
+        constant.judgement.kind,
+        JudgementKind::Good,
+        "{}",
+        constant.judgement
+    );
+}
+
+#[test]
 #[ignore = "nightly: 10,000 units, forty productions"]
 fn ten_thousand_units_with_faults_and_without() {
     let faults = Faults {
@@ -216,6 +266,7 @@ fn ten_thousand_units_with_faults_and_without() {
         fixture: 1.0,
         stranger: 500,
         far: 6.0,
+        golden: Some(1.0),
     };
     let plant = Plant {
         faults,
@@ -240,10 +291,22 @@ fn ten_thousand_units_with_faults_and_without() {
         with.strangers.len() - named
     );
     assert!(named >= 18);
-    let mut alarms = [0; 4];
+    assert!(
+        found(&with)
+            .iter()
+            .any(|f| f.starts_with("unit golden gyro scale_x"))
+    );
+    let mut alarms = [0; 5];
     let productions = 40;
     for seed in 0..productions {
-        let none = result(&Plant::new(2000, 100 + seed));
+        let faults = Faults {
+            golden: Some(0.0),
+            ..Faults::default()
+        };
+        let none = result(&Plant {
+            faults,
+            ..Plant::new(2000, 100 + seed)
+        });
         let signals = none
             .drift
             .iter()
@@ -255,11 +318,12 @@ fn ten_thousand_units_with_faults_and_without() {
             none.different.len(),
             none.changed.len(),
             signals,
+            none.changed_units.len(),
         ];
-        (0..4).for_each(|k| alarms[k] += usize::from(each[k] > 0));
+        (0..5).for_each(|k| alarms[k] += usize::from(each[k] > 0));
     }
     println!(
-        "of {productions} productions of 2,000 units without faults, with strangers, labels, changed labels, drifts: {alarms:?}"
+        "of {productions} productions of 2,000 units without faults, with strangers, labels, changed labels, drifts, changed units: {alarms:?}"
     );
     assert!(alarms.iter().all(|a| *a <= 3), "{alarms:?}");
 }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 use mimu::quantity::plural;
 use mimu_fleet::Fleet;
 
-use super::{changed, drift, figures, gage_line, head, tables};
+use super::{changed, changed_unit, drift, figures, gage_line, head, tables};
 use crate::report::page::{Made, judged, page, spoken};
 
 /// Units in a table: the first of thousands. The JSON has all.
@@ -95,6 +95,14 @@ fn strangers(fleet: &Fleet) -> Markup {
         @else {
             p { "By their Mahalanobis distance. The probability is that of any unit so far away in a fleet of this size without such a unit." }
             (tables::strangers(&fleet.strangers, several(fleet.strangers.len(), "units"), SHOWN).html())
+        }
+        @if !fleet.changed_units.is_empty() {
+            h3 { "Units measured on many days that change" }
+            p { "Each against its own mean before: a golden unit ages, or the station does. Only the first measurement of such a unit is used for the population." }
+            ul { @for one in &fleet.changed_units { li { (changed_unit(one)) "." } } }
+            figure { div class="figures" {
+                @for one in &fleet.changed_units { (figures::chart(&one.chart, &format!("{}: {}", one.unit, tables::parameter(one.chart.sensor, &one.chart.parameter)))) }
+            } }
         }
         @if !fleet.contradicting.is_empty() {
             h3 { "Calibrations that contradict others of their unit" }
