@@ -1,9 +1,13 @@
 //! Sessions of the wizard with boards that write text, in the hands of people who err, in virtual time: `clumsy SESSIONS [FIRST [FOLDER]]`. FIRST is
 //! the first seed; FOLDER keeps the sessions.
 //!
+//! `clumsy population PART UNITS SESSIONS`: sessions of so many units of a part make its population (`mimu fleet --prior`), and as many further units as
+//! SESSIONS are calibrated with it and without it.
+//!
 //! A session passes if it ends in a calibration that is right. One that ends in another way says why; a wrong calibration is an error of the wizard.
 
 mod person;
+mod population;
 mod sensors;
 
 use std::collections::BTreeMap;
@@ -74,6 +78,17 @@ struct Session {
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let [what, part, numbers @ ..] = &arguments[..]
+        && what == "population"
+    {
+        let numbers: Result<Vec<u64>, _> = numbers.iter().map(|a| a.parse()).collect();
+        let (Some(part), Ok([units, sessions])) = (sensors::number(part), numbers.as_deref())
+        else {
+            eprintln!("clumsy: give a part, the units of its population and the sessions");
+            return ExitCode::FAILURE;
+        };
+        return population::run(part, *units, *sessions);
+    }
     let kept = arguments.get(2).map(PathBuf::from);
     let numbers: Result<Vec<u64>, _> = arguments.iter().take(2).map(|a| a.parse()).collect();
     let Ok([sessions, rest @ ..]) = numbers.as_deref() else {
@@ -84,7 +99,7 @@ fn main() -> ExitCode {
     let all: Vec<Session> = (first..first + sessions)
         .into_par_iter()
         .map(|seed| {
-            let session = session(seed, kept.as_deref());
+            let session = session(seed, kept.as_deref(), "");
             println!("{}", session.line());
             session
         })
@@ -121,8 +136,8 @@ impl Session {
     }
 }
 
-/// The units and habits of a seed, and what became of them.
-fn session(seed: u64, kept: Option<&Path>) -> Session {
+/// The units and habits of a seed, and what became of them. `more`: further arguments.
+fn session(seed: u64, kept: Option<&Path>, more: &str) -> Session {
     let sensor = Sensor::of(seed);
     let habits = Habits::of(seed);
     let folder = tempfile::tempdir().expect("a folder");
@@ -134,7 +149,7 @@ fn session(seed: u64, kept: Option<&Path>) -> Session {
     let (mut runs, mut end) = (0, End::Refused(String::new()));
     while runs <= AGAIN {
         runs += 1;
-        end = run(&sensor, &mut person, &out);
+        end = run(&sensor, &mut person, &out, more);
         match &end {
             End::Refused(_) if person.now_s < LONGEST_S => {}
             _ => break,
@@ -153,11 +168,11 @@ fn session(seed: u64, kept: Option<&Path>) -> Session {
 }
 
 /// Runs the command until it ends, or the person has no more patience.
-fn run(sensor: &Sensor, person: &mut Person, out: &Path) -> End {
+fn run(sensor: &Sensor, person: &mut Person, out: &Path, more: &str) -> End {
     let (arrivals, heard): (Sender<Stamped>, Receiver<Stamped>) = channel();
     let (tell, events) = channel();
     let arguments = format!(
-        "wizard -o {} --port USB --gravity 9.793 --text t_us,ax,ay,az,gx,gy,gz --raw-unit {} --device unit --dwell 2 --warm-up 0",
+        "wizard -o {} --port USB --gravity 9.793 --text t_us,ax,ay,az,gx,gy,gz --raw-unit {} --device unit --dwell 2 --warm-up 0{more}",
         out.display(),
         sensor.unit
     );

@@ -155,6 +155,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Plan => "--plan",
         Argument::Seed => "--seed",
         Argument::Drift => "--drift",
+        Argument::Prior => "--prior",
         Argument::EstimatedBy => "--by",
         Argument::Output => "-o",
         Argument::Noise => "--noise",

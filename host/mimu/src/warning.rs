@@ -600,6 +600,14 @@ impl Warning {
         }
     }
 
+    /// Whether it says that a prior is given up.
+    pub fn gives_prior_up(&self) -> bool {
+        match self {
+            Self::Of { warning, .. } => warning.gives_prior_up(),
+            other => matches!(other, Self::NotOfPopulation { .. }),
+        }
+    }
+
     /// If the warning is about a dwell or turn that was left out: the dwell to keep, so that it is used.
     pub fn left_out(&self) -> Option<i32> {
         match self {

@@ -146,6 +146,8 @@ pub enum Argument {
     Seed,
     /// Largest change of temperature during a session.
     Drift,
+    /// The population that a unit is from.
+    Prior,
     /// Whether the PC or the device estimates the calibration.
     EstimatedBy,
     /// Folder that is written.

@@ -4,6 +4,7 @@ use mimu::plan::design::model::{Model, Setting, Terms};
 use mimu::plan::design::next_pose::Had;
 use mimu::plan::design::reach::{Fixture as Reached, Rates, Reach};
 use mimu::plan::design::tour::randomised;
+use mimu::prior::Prior;
 use mimu::quantity::normal_gravity;
 use mimu_recording::{Reference, ReferenceError, WholeTurns};
 use nalgebra::{Matrix3, Vector3};
@@ -95,9 +96,22 @@ pub struct SessionConfig {
     /// Whether the device's own Kalman filters give the calibration; on a table only.
     #[serde(default)]
     pub by_device: bool,
+    /// The population that the units are from, by hand only. Kept with the session, because its poses do not suffice without it.
+    #[serde(default)]
+    pub prior: Option<Prior>,
 }
 
 impl SessionConfig {
+    /// Fewest dwells of a calibration. The rest must remain determined if a part is held out: half as many dwells again as that needs. Beside a prior the faces
+    /// suffice.
+    pub fn fewest_dwells(&self) -> usize {
+        match (self.fixture, &self.prior) {
+            (Fixture::Table, _) => 18,
+            (Fixture::Cube | Fixture::Hands, Some(_)) => 6,
+            (Fixture::Cube | Fixture::Hands, None) => 14,
+        }
+    }
+
     /// States the assumed gravity, and the effect of an error in it: no reading would reveal one.
     pub fn gravity_words(&self) -> String {
         let normal = self.latitude_deg.map(normal_gravity);
@@ -197,6 +211,13 @@ pub fn first_steps(fixture: Fixture, dwell_s: f64, largest_rate_dps: f64, seed: 
         dwell_s,
     };
     settings.into_iter().map(step).collect()
+}
+
+/// The first dwells by hand beside a prior: the faces show biases and scale factors. The angles follow if the population is wider than their targets.
+pub fn faces(dwell_s: f64) -> Vec<Step> {
+    let [faces, ..] = directions();
+    let step = |s: Setting| Step::at_rest(s.up, dwell_s);
+    chained(&faces).into_iter().map(step).collect()
 }
 
 /// By hand the turns between poses calibrate the gyro: each is to be a quarter turn or more, about alternating axes.
@@ -447,6 +468,7 @@ mod tests {
             reference_error: None,
             whole_turns: None,
             by_device: false,
+            prior: None,
         }
     }
 

@@ -1,7 +1,10 @@
 //! The calibration so far, with each parameter's uncertainty and target.
 
+use std::sync::Arc;
+
 use mimu::fit::{Fit, Options, SensorFit, fit};
 use mimu::prepared::Prepared;
+use mimu::prior::Prior;
 use mimu::quantity::{AXES, Sensor};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::signal::stillness::STILL_FACTOR;
@@ -85,14 +88,19 @@ impl Progress {
     }
 }
 
-/// Fits the dwells so far. `holdout_blocks` as in [`Options`].
-pub fn calibrate(manifest: &Manifest, samples: &Batch, holdout_blocks: usize) -> Result<Fit> {
-    let options = Options {
-        holdout_blocks,
-        ..Options::default()
-    };
+/// Fits the dwells so far, with the population of the unit's kind if it is known.
+pub fn calibrate(manifest: &Manifest, samples: &Batch, prior: Option<&Prior>) -> Result<Fit> {
     let prepared = Prepared::of(manifest.clone(), samples, STILL_FACTOR)?;
-    fit(prepared.beside_axis(LEVER_ARM_M), options)
+    let prepared = prepared.beside_axis(LEVER_ARM_M);
+    fit(of_population(prepared, prior)?, Options::IN_SAMPLE)
+}
+
+/// With this prior, if there is one.
+pub fn of_population(prepared: Prepared, prior: Option<&Prior>) -> Result<Prepared> {
+    match prior {
+        Some(prior) => prepared.with_prior(Arc::new(prior.clone())),
+        None => Ok(prepared),
+    }
 }
 
 /// Assumed distance of a board's sensors from the axes of a table, m, one standard deviation: 3 to 5 mm are usual.

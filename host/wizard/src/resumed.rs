@@ -66,6 +66,17 @@ pub fn resumed(begun: &SessionConfig, now: &SessionConfig, place: &Path) -> Resu
             (argument, format!("{name} was {begun}, now it is {now}"))
         })
         .unzip();
+    if begun.prior != now.prior {
+        let [before, after] = [begun, &now].map(|c| match &c.prior {
+            Some(prior) => prior.words(),
+            None => "none".into(),
+        });
+        differ.push(match before == after {
+            true => "the prior is another one".into(),
+            false => format!("prior was {before}, now it is {after}"),
+        });
+        arguments.push(Argument::Prior);
+    }
     if differ.is_empty() && begun.steps != now.steps {
         differ.push("the planned poses differ".into());
         arguments.extend([Argument::Plan, Argument::Seed]);
@@ -118,6 +129,7 @@ mod tests {
             reference_error: None,
             whole_turns: None,
             by_device: false,
+            prior: None,
         }
     }
 

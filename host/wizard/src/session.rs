@@ -6,8 +6,9 @@ use mimu::calibration::Calibration;
 use mimu::diagnose::Verdict;
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
+use mimu::prior::Prior;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::result_file::stage;
 use serde::Serialize;
 
@@ -16,8 +17,9 @@ use crate::clock::ClockRate;
 use crate::event::{Event, Phase, Question, View};
 use crate::folder::{Begun, Entry, Folder, Part};
 use crate::procedure::{Fixture, SessionConfig};
-use crate::refit::LEVER_ARM_M;
+use crate::refit::{LEVER_ARM_M, of_population};
 use crate::resumed::resumed;
+use crate::source::Unit;
 use crate::station::Connect;
 use crate::unit_session::UnitSession;
 use crate::verdict::{Judged, judge, prepared};
@@ -107,6 +109,7 @@ pub async fn run(
             }
             None => {
                 let station = connect(0, None).await?;
+                read_alike(&station.unit, kept.prior.as_ref())?;
                 let begun = Begun {
                     format: "mimu-wizard-session/1".into(),
                     unit_id: station.unit.id.clone(),
@@ -135,6 +138,19 @@ pub async fn run(
     stopped?;
     let outcomes = session.outcomes();
     Ok(Outcome::of(outcomes, ended == Ended::Cancelled))
+}
+
+/// Refuses a unit whose readings are in another unit than those of the prior.
+fn read_alike(unit: &Unit, prior: Option<&Prior>) -> Result<()> {
+    let Some(prior) = prior.filter(|p| p.raw_unit != unit.raw_unit) else {
+        return Ok(());
+    };
+    let problem = format!(
+        "its readings are in {}, and those of the prior in {}",
+        unit.raw_unit, prior.raw_unit
+    );
+    let remedy = "use the prior of units that are read alike";
+    Err(Error::new(&unit.name, problem, remedy).about(Argument::Prior))
 }
 
 impl Outcome {
@@ -292,9 +308,16 @@ impl OpenSession<'_> {
     /// The fit of each unit to its calibration dwells, or the estimate of its filters.
     fn fits(&mut self) -> Result<Vec<Fit>> {
         let mut fits = Vec::new();
-        for unit in &self.wizard.units {
+        for (unit, outcome) in self.wizard.units.iter().zip(&mut self.outcomes) {
             let first = prepared(&unit.folder.file(Part::Calibration.name()))?;
-            let fitted = fit(first.beside_axis(LEVER_ARM_M), Options::default())?;
+            let first = first.beside_axis(LEVER_ARM_M);
+            let first = of_population(first, self.wizard.config.prior.as_ref())?;
+            let fitted = fit(first, Options::default())?;
+            for warning in fitted.warnings.iter().filter(|w| w.gives_prior_up()) {
+                outcome.notes.push(warning.to_string());
+                let words = format!("{}: {warning}", unit.name());
+                self.wizard.view.tell(&Event::Note { words });
+            }
             if let Some(why) = axes::frames_apart(&fitted) {
                 return Err(Error::device(unit.name(), why, axes::REMEDY));
             }

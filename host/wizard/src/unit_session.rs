@@ -638,7 +638,8 @@ impl UnitSession {
     /// Fits the recording so far. From now on up is found with its result.
     pub fn refit(&mut self, config: &SessionConfig) -> Option<Fit> {
         let recording = self.recording.as_ref()?;
-        let fitted = calibrate(recording.manifest(), &recording.samples, 0);
+        let prior = config.prior.as_ref();
+        let fitted = calibrate(recording.manifest(), &recording.samples, prior);
         self.progress = progress(&fitted, &config.targets);
         self.refused = match &fitted {
             Err(error) if !matches!(error, Error::Undetermined(_)) => self.refused + 1,

@@ -9,7 +9,7 @@ use mimu_recording::error::{Error, Result};
 use crate::axes;
 use crate::event::{Event, Phase, Question, SessionState, UserRequest, View};
 use crate::folder::{Entry, Part};
-use crate::procedure::{Fixture, SessionConfig, next_step};
+use crate::procedure::{SessionConfig, next_step};
 use crate::turn::pause;
 use crate::unit_session::{Round, UnitSession};
 use crate::waiting::Waiting;
@@ -314,8 +314,7 @@ impl<'a> Wizard<'a> {
             .units
             .first()
             .map_or(0, |u| u.folder.dwells(part).len());
-        // The rest must remain determined if a part is held out: half as many dwells again as that needs.
-        if met && done >= least(self.config.fixture) || done >= self.config.most_dwells {
+        if met && done >= self.config.fewest_dwells() || done >= self.config.most_dwells {
             return None;
         }
         if !self.queue.is_empty() {
@@ -437,13 +436,5 @@ impl<'a> Wizard<'a> {
             unit.folder.add(entry.clone())?;
         }
         Ok(())
-    }
-}
-
-/// Fewest dwells of a calibration.
-fn least(fixture: Fixture) -> usize {
-    match fixture {
-        Fixture::Table => 18,
-        Fixture::Cube | Fixture::Hands => 14,
     }
 }

@@ -11,7 +11,6 @@ use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::prior::Prior;
-use mimu::quantity::Sensor;
 use mimu::recording_problem::OfRecording;
 use mimu::result::fit::{DwellResult, FitResult};
 use mimu::result::sessions::SessionsResult;
@@ -230,10 +229,9 @@ fn one(args: &FitArgs, recording: &Path) -> Result<Status> {
     let mut text = report::fit_text(&result, args.verbose.verbose);
     text += &budget_text(&result);
     if let Some((path, prior)) = args.prior.as_ref().zip(fitted.prepared.prior.as_ref()) {
-        let of = |sensor| Some(format!("{sensor} of {} units", prior.table(sensor)?.units));
-        let used: Vec<String> = Sensor::BOTH.into_iter().filter_map(of).collect();
+        let used = prior.words();
         if !used.is_empty() {
-            text += &format!("prior: {}, {}\n", path.display(), used.join(", "));
+            text += &format!("prior: {}, {used}\n", path.display());
         }
     }
     if args.dwells {

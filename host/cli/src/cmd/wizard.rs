@@ -8,6 +8,7 @@ use std::sync::mpsc::Receiver;
 
 use clap::{Args, ValueEnum};
 use mimu::plan::Plan;
+use mimu::prior::Prior;
 use mimu::quantity::normal_gravity;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
@@ -15,9 +16,9 @@ use mimu::warning::Warning;
 use mimu_equipment::drive::{Person, TextDriver};
 use mimu_equipment::step::Step;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, RawUnit, ReferenceError};
+use mimu_recording::{Manifest, RawUnit, Reference, ReferenceError};
 use mimu_wizard::event::View;
-use mimu_wizard::procedure::{Fixture, SessionConfig, Targets, first_steps, verification};
+use mimu_wizard::procedure::{Fixture, SessionConfig, Targets, faces, first_steps, verification};
 use mimu_wizard::relay::{Stamped, relayed};
 use mimu_wizard::session::{Outcome, UnitSpec, run as carry_out};
 use mimu_wizard::text::Text;
@@ -75,6 +76,10 @@ pub(crate) struct WizardArgs {
     /// Plan of `mimu design` for the first dwells [default: the wizard makes one]
     #[arg(long, value_name = "PLAN")]
     plan: Option<PathBuf>,
+    /// Population of the units' kind (`mimu fleet --prior`), by hand only: the wizard begins with the six faces, and asks for more poses if the
+    /// targets need them
+    #[arg(long, value_name = "FILE")]
+    prior: Option<PathBuf>,
     /// How well the unit's axes are aligned with the table's, degrees: 95 % of each angle; no dwell shows it, so the intervals include it [default:
     /// mounting_deg of the driver file's [reference_error], else 0.02]
     #[arg(long, value_name = "DEG", value_parser = |t: &str| number(t, 0.0, 10.0))]
@@ -283,6 +288,38 @@ impl WizardArgs {
         Ok(Some(error))
     }
 
+    /// The population of the units' kind, if it is given.
+    fn prior(&self, fixture: Fixture, whole_turns: bool) -> Result<Option<Prior>> {
+        let Some(path) = &self.prior else {
+            return Ok(None);
+        };
+        let refuse = |problem: &str, remedy: &str| Err(Error::new(path.display(), problem, remedy));
+        if fixture == Fixture::Table {
+            let problem =
+                "a prior is used where gravity is the only reference, and a table gives the inputs";
+            return refuse(problem, "leave --prior out, or use --fixture hands or cube");
+        }
+        if whole_turns {
+            let problem = "whole turns are fitted without a prior";
+            return refuse(problem, "leave --prior or --whole-turns out");
+        }
+        let prior = Prior::read(path)?;
+        if prior.reference != Reference::Gravity {
+            let problem = format!(
+                "it is of units with the reference \"{}\", and by hand it is gravity",
+                prior.reference
+            );
+            return refuse(&problem, "make it from calibrations by hand");
+        }
+        if prior.words().is_empty() {
+            return refuse(
+                "it has neither [gyro] nor [accel]",
+                "make it again: mimu fleet DIR --prior FILE",
+            );
+        }
+        Ok(Some(prior))
+    }
+
     fn config(&self) -> Result<SessionConfig> {
         let fixture = self.fixture.fixture();
         if self.by == By::Device && (fixture != Fixture::Table || self.text.text.is_some()) {
@@ -299,7 +336,9 @@ impl WizardArgs {
         }
         let mut gravity = self.gravity.or(self.latitude.map(normal_gravity));
         let mut latitude_deg = self.latitude;
+        let prior = self.prior(fixture, whole_turns.is_some())?;
         let steps = match &self.plan {
+            None if prior.is_some() => faces(self.dwell),
             None => first_steps(fixture, self.dwell, self.rate, self.seed),
             Some(path) => {
                 let plan = Plan::read(path)?;
@@ -355,6 +394,7 @@ impl WizardArgs {
             reference_error,
             whole_turns,
             by_device: self.by == By::Device,
+            prior,
         })
     }
 }

@@ -15,6 +15,7 @@ use super::{AffineCalibration, OpenSession, WITH_EFFECTS, add_mounting_uncertain
 use crate::event::{Event, Phase, Question};
 use crate::folder::{Entry, Part};
 use crate::procedure::verification;
+use crate::refit::of_population;
 use crate::verdict::{judge_all, prepared};
 use crate::wizard::Ended;
 use mimu_equipment::step::Step;
@@ -36,6 +37,7 @@ impl OpenSession<'_> {
         let other = &plain.other;
         let name = self.wizard.units[k].name();
         let first = prepared(&self.file(k, Part::Calibration.name()))?;
+        let first = of_population(first, self.wizard.config.prior.as_ref())?;
         let diagnosed = diagnose(
             Recordings {
                 second: Some(other.clone()),
