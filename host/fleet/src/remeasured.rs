@@ -66,34 +66,32 @@ fn by_day(all: &[Measurement], members: &[usize]) -> BTreeMap<Date, Vec<usize>> 
     days
 }
 
-/// The chart of parameter `i` of a unit about the median of its days. What its days differ beyond the error of a fit is estimated of successive ones.
+/// The chart of parameter `i` of a unit about the median of its days, each with the error of its own fits: it differs from fit to fit, and one for all of them would make a day of a
+/// poor fit an alarm. What days differ beyond that is estimated of successive ones.
 fn own_chart(
     triad: &Estimated,
     i: usize,
     days: &BTreeMap<Date, Vec<usize>>,
     limit: f64,
 ) -> Option<Chart> {
-    let (mut variance, mut count) = (0.0, 0.0);
     let mut points = Vec::with_capacity(days.len());
     for (day, members) in days {
         let own = members.iter().filter_map(|m| triad.estimates[*m].as_ref());
-        let (mut n, mut sum) = (0.0, 0.0);
-        for estimate in own {
-            n += 1.0;
-            sum += estimate.values[i];
-            variance += estimate.covariance[(i, i)];
-        }
-        count += n;
-        if n > 0.0 {
+        let (weight, sum) = own.fold((0.0, 0.0), |(weight, sum), e| {
+            let by = 1.0 / e.covariance[(i, i)];
+            (weight + by, sum + by * e.values[i])
+        });
+        if weight > 0.0 {
             points.push(Day {
                 day: *day,
-                count: n,
-                mean: sum / n,
+                // Of values with the standard deviation 1 in the parameter's unit.
+                count: weight,
+                mean: sum / weight,
             });
         }
     }
     let mut means: Vec<f64> = points.iter().map(|d| d.mean).collect();
     let centre = robust::median(&mut means);
     points.iter_mut().for_each(|d| d.mean -= centre);
-    drift::chart_about_beginning(&mut points, (variance / count).sqrt(), limit)
+    drift::chart_about_beginning(&mut points, 1.0, limit)
 }

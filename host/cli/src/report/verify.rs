@@ -247,6 +247,13 @@ fn verdict(s: &SensorVerification) -> String {
             "{noise}; a power-on changes it by up to {}, as the sessions showed",
             figure.write(next)
         ),
-        None => noise,
+        None => match s.parameter_uncertainty {
+            // Beside the noise a smaller one hardly counts.
+            Some(own) if own > s.noise_floor => format!(
+                "{noise}; the intervals of the calibration explain up to {}",
+                figure.write(own)
+            ),
+            _ => noise,
+        },
     }
 }

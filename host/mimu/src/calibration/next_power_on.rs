@@ -125,6 +125,17 @@ impl NextPowerOn {
 }
 
 impl super::Calibration {
+    /// Covariance of C by rows, then o, and the half-width of a 95 % interval in standard deviations. `None` if it is not known.
+    pub fn uncertainty(&self, sensor: Sensor) -> Option<(Covariance, f64)> {
+        let table = self.table(sensor)?;
+        let sum = |all: Option<[f64; 3]>| all.map(|a| a.iter().sum::<f64>());
+        let sigmas = sum(table.interval_o)? / sum(table.sigma_o)?;
+        Some((
+            self.covariance(sensor)?,
+            if sigmas.is_finite() { sigmas } else { 1.96 },
+        ))
+    }
+
     /// Covariance of C by rows, then o, at the next power-on, and the half-width of a 95 % interval in standard deviations. `None` for a calibration of one
     /// session, which does not show how much parameters change.
     pub fn next_power_on(&self, sensor: Sensor) -> Option<(Covariance, f64)> {

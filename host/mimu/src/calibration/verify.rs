@@ -50,6 +50,10 @@ pub struct SensorVerification {
     pub max: f64,
     /// By noise alone, in [`Self::unit`]; null if the noise is not known.
     pub noise_floor: f64,
+    /// What the uncertainty of the calibration's parameters adds to the noise by its own account, rms in [`Self::unit`]: the largest in 95 % of cases. Absent if it is not
+    /// known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameter_uncertainty: Option<f64>,
     /// What a power-on adds to the noise by the calibration's own account, rms in [`Self::unit`]: the largest in 95 % of cases. Absent for a calibration of one
     /// session, which does not show how much parameters change.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -340,10 +344,11 @@ fn judge(
     let judged = judged?;
     let accel = calibration.inverse(Sensor::Accel);
     let causes = causes::of(prepared, sensor, &inverse, accel.as_ref());
-    let next_power_on = causes::at_next_power_on(prepared, sensor, calibration);
+    let announced = |of| causes::announced(prepared, sensor, calibration, of);
     let judged = SensorVerification {
         causes,
-        next_power_on,
+        parameter_uncertainty: announced(&|s| calibration.uncertainty(s)),
+        next_power_on: announced(&|s| calibration.next_power_on(s)),
         ..judged
     };
     Some((judged, warnings))
@@ -398,6 +403,7 @@ fn judged(
         rms: rms(after),
         max: largest(after),
         noise_floor: rms(floor),
+        parameter_uncertainty: None,
         next_power_on: None,
         static_rms: None,
         causes: None,

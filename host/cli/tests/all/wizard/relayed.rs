@@ -4,13 +4,14 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use mimu_cli::called::{Session, wizard};
+use mimu_cli::called::{Refusal, Session, wizard};
 use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
+use mimu_wizard::procedure::faces;
 use mimu_wizard::relay::{Arrival, Stamped};
 use mimu_wizard::session::Outcome;
 use mimu_wizard::turn::go_on;
 
-use super::text::{judge, lines};
+use super::text::{judge, lines, lines_in};
 
 /// Relays events, and ends the session on request.
 struct Told {
@@ -43,6 +44,11 @@ struct Relay {
 }
 
 fn begin(folder: &Path) -> Relay {
+    begin_with(folder, "").unwrap_or_else(|why| panic!("{why}"))
+}
+
+/// With further arguments; or why the command is refused.
+fn begin_with(folder: &Path, more: &str) -> Result<Relay, String> {
     let (arrivals, heard) = channel();
     let (tell, events) = channel();
     let (requests, wished) = channel();
@@ -52,16 +58,19 @@ fn begin(folder: &Path) -> Relay {
     };
     let folder = folder.display();
     let arguments = format!(
-        "wizard -o {folder} --port USB --gravity 9.80665 --text t_us,ax,ay,az,gx,gy,gz --device plane-7 --dwell 1.2 --warm-up 0 --as-planned"
+        "wizard -o {folder} --port USB --gravity 9.80665 --text t_us,ax,ay,az,gx,gy,gz --device plane-7 --dwell 1.2 --warm-up 0 --as-planned{more}"
     );
     let arguments = arguments.split(' ').map(OsString::from).collect();
-    let session = wizard(arguments, heard, Box::new(view)).unwrap_or_else(|_| panic!("refused"));
-    Relay {
+    let session = wizard(arguments, heard, Box::new(view)).map_err(|refused| match refused {
+        Refusal::Usage(why) => why,
+        Refusal::Data(error) => error.to_string(),
+    })?;
+    Ok(Relay {
         session,
         arrivals,
         events,
         requests,
-    }
+    })
 }
 
 impl Relay {
@@ -139,4 +148,109 @@ fn a_session_that_is_relayed_is_unplugged_stopped_and_gone_on_with_and_its_inter
         Some(out.join("calibration.toml").display().to_string())
     );
     judge(&out.join("calibration.toml"), "");
+}
+
+/// A population of a hundred units in counts: scale factors of the MPU-6050 within 1.5 %, axes within 20 mrad, biases within 300 and 600 counts. `larger`: by how
+/// much its gyros' scale factors are larger than those of the part.
+fn population(larger: f64) -> String {
+    let names = |of: &str, axes: [&str; 3]| axes.map(|a| format!("{of}_{a}"));
+    let all = [
+        names("scale", ["x", "y", "z"]),
+        names("misalignment", ["x", "y", "z"]),
+        names("non_orthogonality", ["yz", "zy", "zx"]),
+        names("bias", ["x", "y", "z"]),
+    ]
+    .concat();
+    let mut text = String::from(
+        "format = \"mimu-prior/1\"\ntool = \"a test\"\nraw_unit = \"count\"\nreference = \"gravity\"\nbiases = true\n",
+    );
+    for (sensor, scale, bias) in [("gyro", 3754.9 * larger, 300.0), ("accel", 1670.1, 600.0)] {
+        // By hand the accelerometer's own axes are the body's: it has no misalignment.
+        let of: Vec<usize> = (0..12).filter(|k| sensor == "gyro" || k / 3 != 1).collect();
+        let sigma = |k: usize| [0.015 * scale, 0.02, 0.02, bias][k / 3];
+        let mean = |k: usize| if k < 3 { scale } else { 0.0 };
+        let row = |i: &usize| -> Vec<f64> {
+            let each = of
+                .iter()
+                .map(|j| if i == j { sigma(*i).powi(2) } else { 0.0 });
+            each.collect()
+        };
+        let names: Vec<&String> = of.iter().map(|k| &all[*k]).collect();
+        let units: Vec<&str> = of.iter().map(|_| "as fits have it").collect();
+        let means: Vec<f64> = of.iter().map(|k| mean(*k)).collect();
+        let sigmas: Vec<f64> = of.iter().map(|k| sigma(*k)).collect();
+        let rows: Vec<Vec<f64>> = of.iter().map(row).collect();
+        text += &format!(
+            "[{sensor}]\nunits = 100\nparameters = {names:?}\nparameter_units = {units:?}\nmean = {means:?}\nsigma = {sigmas:?}\ncovariance = {rows:?}\n"
+        );
+    }
+    text
+}
+
+#[test]
+fn with_the_population_six_faces_end_in_a_calibration_whose_intervals_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let kind = folder.path().join("kind.toml");
+    std::fs::write(&kind, population(1.0)).unwrap();
+    let with = format!(" --prior {}", kind.display());
+    let (lines, mut at) = (lines_in(faces(1.2)), 0);
+    let mut relay = begin_with(&out, &with).unwrap_or_else(|why| panic!("{why}"));
+    relay.send(0.0, Arrival::Opened);
+    assert!(relay.hear(&lines, &mut at, 3).is_none());
+    relay.requests.send(UserRequest::Cancel).unwrap();
+    relay.go_on().unwrap();
+    drop(relay);
+    // Without the prior these poses would not suffice, and others would have been asked for.
+    let without = begin(&out);
+    without.send(0.01 * at as f64, Arrival::Opened);
+    let mut without = without;
+    let (_, refused) = without.go_on().unwrap();
+    let refused = refused.unwrap();
+    assert!(
+        refused.contains("prior was gyro of 100 units, accel of 100 units, now it is none")
+            && refused.contains("--prior"),
+        "{refused}"
+    );
+    let mut relay = begin_with(&out, &with).unwrap_or_else(|why| panic!("{why}"));
+    relay.send(0.01 * at as f64, Arrival::Opened);
+    let (outcome, refused) = relay.hear(&lines, &mut at, usize::MAX).unwrap();
+    assert_eq!(refused, None);
+    let unit = &outcome.unwrap().units[0];
+    assert_eq!(unit.dwells, 6, "{unit:?}");
+    let calibration = out.join("calibration.toml");
+    assert_eq!(
+        unit.stored,
+        Some(calibration.display().to_string()),
+        "{unit:?}"
+    );
+    judge(&calibration, "");
+}
+
+#[test]
+fn a_unit_that_is_not_of_the_population_is_named_and_its_six_faces_do_not_suffice() {
+    let folder = tempfile::tempdir().unwrap();
+    let kind = folder.path().join("kind.toml");
+    std::fs::write(&kind, population(1.3)).unwrap();
+    let out = folder.path().join("out");
+    let with = format!(" --prior {}", kind.display());
+    let (lines, mut at) = (lines_in(faces(1.2)), 0);
+    let mut relay = begin_with(&out, &with).unwrap_or_else(|why| panic!("{why}"));
+    relay.send(0.0, Arrival::Opened);
+    let (_, refused) = relay.hear(&lines, &mut at, usize::MAX).unwrap();
+    let refused = refused.unwrap();
+    assert!(refused.contains("not of the population"), "{refused}");
+    // What is refused before any port is opened.
+    for (more, says) in [
+        (" --fixture table", "gravity is the only reference"),
+        (" --whole-turns", "whole turns are fitted without a prior"),
+    ] {
+        let arguments = format!("{with}{more}");
+        let why = begin_with(&folder.path().join("other"), &arguments)
+            .err()
+            .unwrap();
+        assert!(why.contains(says), "{why}");
+    }
+    let nothing = begin_with(&out, " --prior nothing.toml").err().unwrap();
+    assert!(nothing.contains("nothing.toml"), "{nothing}");
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
+use mimu_equipment::step::Step;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::record::samples;
@@ -48,9 +49,8 @@ fn truth() -> RigTruth {
     RigTruth::resolve(&file, 3).unwrap()
 }
 
-/// The poses that the wizard asks for, repeated: a discarded one comes again.
-fn plan() -> Plan {
-    let first = first_steps(Fixture::Hands, 1.2, 100.0, 1);
+/// The poses that the wizard asks for after `first`, repeated: a discarded one comes again.
+fn plan(first: Vec<Step>) -> Plan {
     let then = verification(Fixture::Hands, &first, 1.2, 100.0);
     let mut plan = String::from(
         "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\nlead_in_s = 8.0\n",
@@ -61,9 +61,15 @@ fn plan() -> Plan {
     Plan::parse(Source::new("PLAN.toml", plan)).unwrap()
 }
 
-/// The lines of the board: a greeting, its clock in microseconds, and counts. Some lines are lost and some truncated.
+/// The lines of the board in the poses of a session without a prior.
 pub fn lines() -> Vec<String> {
-    let (plan, truth) = (plan(), truth());
+    lines_in(first_steps(Fixture::Hands, 1.2, 100.0, 1))
+}
+
+/// The lines of the board in these poses and those of the verification: a greeting, its clock in microseconds, and counts. Some lines are lost and some
+/// truncated.
+pub fn lines_in(first: Vec<Step>) -> Vec<String> {
+    let (plan, truth) = (plan(first), truth());
     let mut lines = vec!["MPU6050 OK\r\n".into(), "t,ax,ay,az,gx,gy,gz\r\n".into()];
     for (k, row) in samples(&plan, &truth, 5).unwrap().enumerate() {
         let [gyro, accel] = [row.readings.gyro, row.readings.accel].map(|r| r.map(f64::round));

@@ -147,15 +147,20 @@ fn known_rows(prepared: &Prepared, sensor: Sensor, model: &Affine<f64>) -> Optio
     Some(Rows::of(rows, OF_TRIAD))
 }
 
-/// Rms of the errors of `sensor` that the change of its parameters to the next power-on causes in this recording: the largest in 95 % of cases. `None` if the
-/// calibration does not have it.
-pub(super) fn at_next_power_on(
+/// How uncertain the parameters of each sensor are: the covariance of C by rows and o, and the half-width of a 95 % interval in standard deviations.
+pub(super) type Uncertainty<'a> = &'a dyn Fn(Sensor) -> Option<(Covariance, f64)>;
+
+/// Rms of the errors of `sensor` in this recording that this uncertainty of its parameters causes: the largest in 95 % of cases. For the turns of a gyro, that of the
+/// accelerometer's directions too. `None` if it is not known.
+pub(super) fn announced(
     prepared: &Prepared,
     sensor: Sensor,
     calibration: &Calibration,
+    uncertainty: Uncertainty,
 ) -> Option<f64> {
-    let (covariance, sigmas) = calibration.next_power_on(sensor)?;
     let model = calibration.inverse(sensor)?;
+    let (own, sigmas) = of_errors(&model, uncertainty(sensor)?)?;
+    let mut of_accel = Covariance::zeros();
     // Errors of each observation: one for a magnitude, two for a turn.
     let (rows, each) = match (prepared.manifest.reference, sensor) {
         (Reference::Table, _) => (known_rows(prepared, sensor, &model)?, 1.0),
@@ -169,22 +174,37 @@ pub(super) fn at_next_power_on(
         }
         (Reference::Gravity, Sensor::Gyro) => {
             let accel = calibration.inverse(Sensor::Accel)?;
+            if let Some(known) = uncertainty(Sensor::Accel) {
+                of_accel = of_errors(&accel, known)?.0;
+            }
             let (turns, _) = prepared.turns(&accel);
             let rows = turns.iter().flat_map(|t| turn_rows(t, &model, 1.0));
             (Rows::of(rows.collect(), OF_TRIAD + OF_MAGNITUDE), 2.0)
         }
     };
-    let of_a = changes(&model)?;
-    let covariance = of_a * covariance * of_a.transpose();
-    let square = |row: nalgebra::RowDVector<f64>| {
-        let by = spread(row.as_slice());
-        by.dot(&(covariance * by))
+    let square = |row: &[f64]| {
+        let part = |row: &[f64], covariance: &Covariance| {
+            let by = spread(row);
+            by.dot(&(covariance * by))
+        };
+        match row.len() {
+            n if n > OF_TRIAD => part(&row[..OF_TRIAD], &own) + part(&row[OF_TRIAD..], &of_accel),
+            _ => part(row, &own),
+        }
     };
     let n = rows.design.nrows();
-    let sum: f64 = (0..n)
-        .map(|i| square(rows.design.row(i).into_owned()))
-        .sum();
+    let row = |i: usize| -> Vec<f64> { rows.design.row(i).iter().copied().collect() };
+    let sum: f64 = (0..n).map(|i| square(&row(i))).sum();
     (n > 0).then(|| sigmas * (each * sum.max(0.0) / n as f64).sqrt())
+}
+
+/// The covariance of d and A instead of C and o.
+fn of_errors(
+    model: &Affine<f64>,
+    (covariance, sigmas): (Covariance, f64),
+) -> Option<(Covariance, f64)> {
+    let by = changes(model)?;
+    Some((by * covariance * by.transpose(), sigmas))
 }
 
 /// Derivatives of d and A by C by rows and o: for a unit with the model C and o, a calibration `C + dC, o + do` has `A = dC C⁻¹` and `d = do - A o`.

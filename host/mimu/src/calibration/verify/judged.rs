@@ -67,7 +67,7 @@ fn figures(
         noise_floor: s.noise_floor,
         input: input_size(prepared, sensor, s.figure),
         // A calibration that errs by as much as it says is right.
-        usual: BEYOND_NOISE.hypot(s.next_power_on.unwrap_or(0.0) / s.noise_floor),
+        usual: BEYOND_NOISE.hypot(s.announced() / s.noise_floor),
         cause: s.causes.as_ref().map(Causes::words),
         few: None,
     }
@@ -99,11 +99,15 @@ pub(super) fn judgement(
         })
         .collect();
     let mut by_errors = errors::judge(&figures);
-    let changed = |(_, s): &&(Sensor, &SensorVerification)| {
-        s.next_power_on.is_some() && s.rms > BEYOND_NOISE * s.noise_floor
-    };
-    if by_errors.is_good() && sensors.iter().any(|s| changed(&s)) {
-        by_errors.reason += ", and within what the calibration announces for the next power-on";
+    let mut beyond = sensors
+        .iter()
+        .filter(|(_, s)| s.rms > BEYOND_NOISE * s.noise_floor)
+        .peekable();
+    if by_errors.is_good() && beyond.peek().is_some() {
+        by_errors.reason += match beyond.any(|(_, s)| s.next_power_on.is_some()) {
+            true => ", and within what the calibration announces for the next power-on",
+            false => ", and within the uncertainty that the calibration states",
+        };
     }
     let all = input::judgements(&problems, warnings);
     Judgement::worst(all.into_iter().chain([by_errors.clone()])).unwrap_or(by_errors)
@@ -135,6 +139,15 @@ pub(super) fn other_gravity(calibration: &Calibration, prepared: &Prepared) -> O
         force_mps2: mean,
         contradicted,
     })
+}
+
+impl SensorVerification {
+    /// What the calibration itself says that it may err by beside the noise, in [`Self::unit`]: at the next power-on, if it knows that.
+    pub fn announced(&self) -> f64 {
+        self.next_power_on
+            .or(self.parameter_uncertainty)
+            .unwrap_or(0.0)
+    }
 }
 
 impl Verification {
