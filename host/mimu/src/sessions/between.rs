@@ -9,6 +9,10 @@
 //! a variance of the kind, which is integrated over too (Morris 1983; Smyth 2004). That variance has the prior `1 / (s + v)`, v the variance of the fits: flat in
 //! its logarithm where changes exceed the uncertainty of the fits, finite where they do not. With one or two sessions the prior of a
 //! [class of parts](super::class) replaces it.
+//!
+//! Some parts age, too slowly for the sessions to name it: each parameter then has a slope from session to session, normal with a standard deviation that is a share of that between
+//! sessions. The share is common to a triad, so that its parameters show it together, and is averaged over: the results of [`AGEING`] are weighed by their restricted
+//! likelihoods. One fixed share would be wrong for units that do not age, as the nine sessions of eight MPU-9150.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -35,6 +39,9 @@ pub struct VariancePrior {
 /// Degrees of freedom of the distribution of the variances of a kind. The axes of a part differ: the variances of eight MPU-9150 in nine sessions.
 pub const ALIKE_DOF: f64 = 4.0;
 
+/// Standard deviations of the change from each session to the next by ageing, over that of the changes of a power-on.
+const AGEING: [f64; 4] = [0.0, 0.1, 0.25, 0.5];
+
 /// Kinds of parameters, whose variances inform each other.
 #[derive(Debug, Clone, Default)]
 pub struct Kinds {
@@ -51,6 +58,8 @@ pub struct Design {
     pub sessions: Vec<DMatrix<f64>>,
     /// The same for the next session.
     pub next: DMatrix<f64>,
+    /// For each coefficient beyond the expectations its standard deviation over that of its parameter between sessions; `None` if nothing is known of it.
+    pub slopes: Vec<Option<f64>>,
 }
 
 impl Design {
@@ -69,7 +78,35 @@ impl Design {
         Self {
             sessions: (0..sessions).map(|s| of(at(s))).collect(),
             next: of(covariate.1),
+            slopes: vec![None; with.len()],
         }
+    }
+
+    /// Parameters that age by this share. Sessions have these numbers, and the next one `next`; nothing is known of the slopes of `drifting` parameters.
+    fn ageing(n: usize, (numbers, next): (&[f64], f64), drifting: &[usize], share: f64) -> Self {
+        if share == 0.0 {
+            return Self::constant(n, numbers.len(), drifting, (numbers, next));
+        }
+        let all: Vec<usize> = (0..n).collect();
+        let slope = |i: &usize| (!drifting.contains(i)).then_some(share);
+        Self {
+            slopes: all.iter().map(slope).collect(),
+            ..Self::constant(n, numbers.len(), &all, (numbers, next))
+        }
+    }
+}
+
+impl Design {
+    /// Slopes of which something is known: column, parameter, and variance over that of the parameter between sessions.
+    fn known_slopes(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        let n = self.next.nrows();
+        let each = self.slopes.iter().enumerate();
+        each.filter_map(move |(k, ratio)| {
+            let column = n + k;
+            let mut all = self.sessions.iter().chain([&self.next]);
+            let parameter = all.find_map(|x| (0..n).find(|i| x[(*i, column)] != 0.0))?;
+            Some((column, parameter, ratio.as_ref()?.powi(2)))
+        })
     }
 }
 
@@ -95,10 +132,55 @@ pub struct Between {
     pub coefficients: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
+    /// Logarithm of the restricted likelihood, without constants.
+    pub log_likelihood: f64,
+    /// Covariance of the expected values in the next session.
+    pub expected: DMatrix<f64>,
     /// Distributions of the coefficients beyond the expectations: slopes or steps.
     pub slopes: Vec<Mixture>,
     /// Number of each slope's parameter.
     pub slope_of: Vec<usize>,
+}
+
+/// Fits the model of sessions with these numbers, whose parameters age: the average over the shares of [`AGEING`]. Nothing is known of the slopes of `drifting` parameters.
+/// `priors` as in [`fit`].
+///
+/// # Errors
+/// `None` if the sessions do not determine the expectations.
+pub fn fit_ageing(
+    estimates: &[Estimates],
+    numbers: (&[f64], f64),
+    drifting: &[usize],
+    kinds: &Kinds,
+    priors: Option<&[VariancePrior]>,
+) -> Option<Between> {
+    let n = estimates.first()?.values.len();
+    let of = |share: f64| {
+        let design = Design::ageing(n, numbers, drifting, share);
+        fit(estimates, &design, kinds, priors)
+    };
+    let all: Vec<Between> = AGEING.into_iter().map(of).collect::<Option<_>>()?;
+    let weights = exponentials(&all.iter().map(|b| b.log_likelihood).collect::<Vec<_>>());
+    let total: f64 = weights.iter().sum();
+    let each = || all.iter().zip(&weights).map(|(b, w)| (b, w / total));
+    let best = each().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
+    let of_parameter = |i: usize| {
+        let mixed = |of: fn(&OfParameter) -> &Mixture| {
+            Mixture::average(each().map(|(b, w)| (of(&b.parameters[i]), w)))
+        };
+        OfParameter {
+            common: mixed(|p| &p.common),
+            next: mixed(|p| &p.next),
+            ..best.parameters[i].clone()
+        }
+    };
+    // The correlations of the expected values; their variances are those of the mixtures.
+    let expected = each().fold(DMatrix::zeros(n, n), |sum, (b, w)| sum + &b.expected * w);
+    Some(Between {
+        parameters: (0..n).map(of_parameter).collect(),
+        expected,
+        ..best.clone()
+    })
 }
 
 /// Points of the grid of a variance in each round. Variances are estimated in turn and change each other little: between the last two rounds by 1e-4. The last
@@ -173,17 +255,20 @@ pub fn fit(
             .find_map(nonzero)
     };
     let owners: Vec<usize> = (0..all).map(owner).collect::<Option<_>>()?;
-    let slopes = (n..all).map(|c| profiles[owners[c]].coefficient(c, units[owners[c]]));
     let scale = |c: usize| units[owners[c]];
+    let scaled = |a: usize, b: usize| last.covariance[(a, b)] * scale(a) * scale(b);
+    let covariance = DMatrix::from_fn(all, all, scaled);
+    let slopes = (n..all).map(|c| profiles[owners[c]].coefficient(c, units[owners[c]]));
     Some(Between {
         parameters,
         coefficients: DVector::from_fn(all, |c, _| {
             let from = if c < n { origin[c] } else { 0.0 };
             from + last.coefficients[c] * scale(c)
         }),
-        covariance: DMatrix::from_fn(all, all, |a, b| {
-            last.covariance[(a, b)] * scale(a) * scale(b)
-        }),
+        // In the data's own units the restricted likelihoods of designs with the same data compare.
+        log_likelihood: last.log_likelihood,
+        expected: &design.next * &covariance * design.next.transpose(),
+        covariance,
         slopes: slopes.collect(),
         slope_of: owners[n..].to_vec(),
     })
@@ -210,6 +295,8 @@ struct Along {
     right: DVector<f64>,
     square: f64,
     log_determinant: f64,
+    /// Column of the parameter's slope, and its variance over that of the parameter, if something is known of it.
+    slope: Option<(usize, f64)>,
 }
 
 /// What the variance changes in one session.
@@ -231,7 +318,18 @@ impl Problem<'_> {
             right: DVector::zeros(columns),
             square: 0.0,
             log_determinant: 0.0,
+            slope: None,
         };
+        for (column, parameter, ratio) in self.design.known_slopes() {
+            match parameter == i {
+                true => out.slope = Some((column, ratio)),
+                false => {
+                    let variance = ratio * (self.variances[parameter] + LEAST);
+                    out.normal[(column, column)] += 1.0 / variance;
+                    out.log_determinant += variance.ln();
+                }
+            }
+        }
         for (e, x) in self.estimates.iter().zip(&self.design.sessions) {
             let mut total = e.covariance.clone();
             for (k, own) in self.variances.iter().enumerate() {
@@ -285,6 +383,11 @@ impl Along {
             right.axpy(-by * s.value, &s.along, 1.0);
             square -= by * s.value * s.value;
             log_determinant += more.ln();
+        }
+        if let Some((column, ratio)) = self.slope {
+            let slope = ratio * (variance + LEAST);
+            normal[(column, column)] += 1.0 / slope;
+            log_determinant += slope.ln();
         }
         let factor = normal.cholesky()?;
         log_determinant += 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();

@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
-use super::between::{Between, Design, Estimates, Kinds, VariancePrior, fit};
+use super::between::{Between, Design, Estimates, Kinds, VariancePrior, fit, fit_ageing};
 use super::mixture::Mixture;
 
 /// Probability of a false finding in a set of sessions.
@@ -65,13 +65,18 @@ impl Triads {
         }
     }
 
-    /// The model with constant parameters, except for those that drift with the number of the session.
+    /// The model of parameters that age, and of those that drift with the number of the session.
     pub fn fitted(&self, drifting: &[usize], next: f64) -> Option<Between> {
         let estimates = self.estimates();
         let numbers: Vec<f64> = self.sessions.iter().map(|(s, _)| *s as f64).collect();
-        let with = (&numbers[..], next);
-        let design = Design::constant(self.bias.len(), estimates.len(), drifting, with);
-        fit(&estimates, &design, &self.kinds, self.priors_if_few())
+        let numbers = (&numbers[..], next);
+        fit_ageing(
+            &estimates,
+            numbers,
+            drifting,
+            &self.kinds,
+            self.priors_if_few(),
+        )
     }
 
     fn estimates(&self) -> Vec<Estimates> {
@@ -164,12 +169,12 @@ pub fn session(triads: &[Triads], s: usize, biases: bool) -> Option<Finding> {
             all.push((empty(), &triad.bias[..0]));
             continue;
         };
-        let model = others.fitted(&[], 0.0)?;
+        let model = others.fitted(&[], s as f64)?;
         let n = own.values.len();
         let change = DVector::from_fn(n, |i, _| own.values[i] - model.parameters[i].next.mean());
         let without = (0..n).map(|i| model.parameters[i].next.plus(own.covariance[(i, i)]));
         let without: Vec<Mixture> = without.collect();
-        let covariance = &own.covariance + model.covariance.view((0, 0), (n, n));
+        let covariance = &own.covariance + &model.expected;
         all.push((changes(&change, &without, &covariance), &triad.bias[..]));
     }
     let (p, most, change) = judged(&all, biases);

@@ -32,6 +32,13 @@ impl Mixture {
         Self(components)
     }
 
+    /// Of mixtures with these weights, which add up to one.
+    pub fn average<'a>(all: impl Iterator<Item = (&'a Self, f64)>) -> Self {
+        let each =
+            all.flat_map(|(mixture, by)| mixture.0.iter().map(move |[w, m, v]| [by * w, *m, *v]));
+        Self::new(each.collect())
+    }
+
     /// Mean.
     pub fn mean(&self) -> f64 {
         self.0.iter().map(|[w, m, _]| w * m).sum()

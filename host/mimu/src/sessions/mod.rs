@@ -391,7 +391,7 @@ fn parts(free: &[usize], between: &Between, matched: &[Matched]) -> Vec<Part> {
     let mut shared = Covariance::zeros();
     for (i, a) in free.iter().enumerate() {
         for (j, b) in free.iter().enumerate() {
-            shared[(*a, *b)] = between.covariance[(i, j)];
+            shared[(*a, *b)] = between.expected[(i, j)];
         }
     }
     let mut parts = Vec::with_capacity(n + 1);
@@ -428,7 +428,7 @@ fn left_out(
         if others.sessions.is_empty() {
             return None;
         }
-        let model = others.fitted(&[], 0.0)?;
+        let model = others.fitted(&[], s as f64)?;
         let each = model.parameters.iter().enumerate();
         let each = each.map(|(i, p)| LeftOut {
             value: own.1.values[i],
