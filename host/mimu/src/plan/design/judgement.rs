@@ -31,9 +31,10 @@ pub struct Judgement {
     /// The settings, one a dwell, in the order given.
     pub settings: Vec<Setting>,
     /// `det(F'F/n)`, fang (22), of one sensor where all three have the same regressors, else the product over
-    /// them.
+    /// them. Not a number beside a population, whose part does not grow with n.
     pub determinant: f64,
-    /// D-efficiency against the continuous optimum over the reach: 1 is the best possible, 0 is singular.
+    /// D-efficiency against the continuous optimum over the reach: 1 is the best possible, 0 is singular. Not a number beside a population: the
+    /// optimum then depends on the number of dwells and their noise.
     pub d_efficiency: f64,
     /// Sigma of a dwell mean, SI, from which the sigmas of the parameters follow.
     pub sigma: f64,
@@ -42,9 +43,10 @@ pub struct Judgement {
     /// Geometric mean of the semi-axes of the parameters' one-sigma ellipsoid, normalised: what the criterion
     /// minimises. Infinite if singular.
     pub mean_sigma: f64,
-    /// Largest over smallest singular value of F; infinite if singular.
+    /// Largest over smallest singular value of F, the rows of the population included; infinite if singular.
     pub condition: f64,
-    /// Residual degrees of freedom of a regression from different inputs: these reveal a wrong model.
+    /// Residual degrees of freedom of a regression from different inputs and the population: these reveal a wrong model, or a unit that is none of
+    /// the population.
     pub lack_of_fit_dof: usize,
     /// Residual degrees of freedom of a regression from repeated inputs: these show the noise, whatever the
     /// model.
@@ -54,13 +56,23 @@ pub struct Judgement {
 }
 
 impl Problem {
+    /// [`Judgement::mean_sigma`] of these settings.
+    pub(super) fn mean_sigma(&self, settings: &[Setting], sigma: f64) -> f64 {
+        self.mean_sigma_by(self.log_det_of(settings, self.given(sigma)), sigma)
+    }
+
+    fn mean_sigma_by(&self, log_det: f64, sigma: f64) -> f64 {
+        sigma * (-log_det / (2.0 * self.optimum.parameters as f64)).exp()
+    }
+
     /// Judges `settings`, one dwell each, whose means have the sigma `sigma` (SI unit of the sensor).
     ///
-    /// They need not be within reach; the efficiency is against the optimum within reach.
+    /// They need not be within reach; the efficiency is against the optimum within reach. Without settings, the population alone is judged.
     pub fn judge(&self, settings: &[Setting], sigma: f64) -> Judgement {
         let model = &self.reach.model;
         let n = settings.len();
-        let log_det = self.log_det(settings);
+        let given = self.given(sigma);
+        let log_det = self.log_det_of(settings, given.clone());
         let p = self.optimum.parameters;
         let mut parameters = Vec::new();
         let mut condition = 0.0_f64;
@@ -69,7 +81,7 @@ impl Problem {
         for regression in 0..model.regressions() {
             let list = model.parameters(regression);
             width = list.len();
-            let mut rows = Rows::new(&[width]);
+            let mut rows = Rows::new(&[width]).beside(given.clone());
             let mut row = Vec::new();
             for s in settings {
                 row.clear();
@@ -96,17 +108,25 @@ impl Problem {
                 });
             }
         }
+        let (determinant, d_efficiency) = match &given {
+            Some(_) => (f64::NAN, f64::NAN),
+            None => (
+                (log_det - p as f64 * (n as f64).ln()).exp(),
+                self.optimum.efficiency(log_det, n),
+            ),
+        };
         Judgement {
             settings: settings.to_vec(),
-            determinant: (log_det - p as f64 * (n as f64).ln()).exp(),
-            d_efficiency: self.optimum.efficiency(log_det, n),
+            determinant,
+            d_efficiency,
             sigma,
             parameters,
-            mean_sigma: sigma * (-log_det / (2.0 * p as f64)).exp(),
+            mean_sigma: self.mean_sigma_by(log_det, sigma),
             condition,
-            lack_of_fit_dof: distinct.saturating_sub(width),
+            lack_of_fit_dof: (distinct + given.as_ref().map_or(0, |g| g.nrows()))
+                .saturating_sub(width),
             repetition_dof: n - distinct,
-            notices: notices(model, settings),
+            notices: notices(model, settings, given.as_ref()),
         }
     }
 }
