@@ -1,6 +1,7 @@
 //! `mimu design`: arguments and execution.
 
 mod effects;
+mod prior;
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -27,12 +28,13 @@ use crate::output::{check_outputs, print};
 use crate::report;
 
 #[derive(Args)]
-#[command(group(ArgGroup::new("design").required(true).args(["n", "budget", "scheme", "compare", "effects"])))]
+#[command(group(ArgGroup::new("design").args(["n", "budget", "scheme", "compare", "effects"])))]
+#[command(group(ArgGroup::new("goal").required(true).multiple(true).args(["n", "budget", "scheme", "compare", "effects", "prior"])))]
 pub struct DesignArgs {
     /// Sensor to calibrate
     #[arg(long, value_enum, default_value = "accel")]
     sensor: SensorArg,
-    /// What is known of the input: table (all of it) or gravity (its magnitude at rest) [default: table, or gravity with --table hand]
+    /// What is known of the input: table (all of it) or gravity (its magnitude at rest) [default: table, or gravity with --table hand or --prior]
     #[arg(long)]
     reference: Option<Reference>,
     /// Terms to be determined: affine, and any of quadratic, cubic, cross, g-sensitivity
@@ -60,7 +62,17 @@ pub struct DesignArgs {
     /// With --effects: temperatures of the chamber, °C: the one at the beginning and the end, and the two extremes
     #[arg(long, value_name = "C,C,C", requires = "effects", allow_hyphen_values = true, value_parser = effects::chamber)]
     chamber: Option<[f64; 3]>,
-    /// What holds the unit [default: three-axis, or hand with --reference gravity]
+    /// Population of the unit's kind (`mimu fleet --prior`): the plan counts what it says, and is for poses by hand
+    ///
+    /// Without -n, --budget or --scheme, the plan has the fewest dwells that meet the targets. Fit its recording with `mimu fit --prior` and the same
+    /// file.
+    #[arg(long, value_name = "FILE")]
+    prior: Option<PathBuf>,
+    /// With --prior: target for the half-width of a 95 % interval: accel-bias=1 (mg), accel-scale=1000 (ppm), accel-angle=1000 (µrad), which are the
+    /// defaults and those of the wizard; may be repeated
+    #[arg(long = "target", value_name = "NAME=VALUE", requires = "prior", conflicts_with_all = ["n", "budget", "scheme"])]
+    targets: Vec<String>,
+    /// What holds the unit [default: three-axis, or hand with --reference gravity or --prior]
     #[arg(long, value_enum)]
     table: Option<TableArg>,
     /// Length of a dwell, s
@@ -193,8 +205,8 @@ impl DesignArgs {
     }
 
     fn reference(&self) -> Reference {
-        self.reference.unwrap_or(match self.table {
-            Some(TableArg::Hand) => Reference::Gravity,
+        self.reference.unwrap_or(match (self.table, &self.prior) {
+            (Some(TableArg::Hand), _) | (_, Some(_)) => Reference::Gravity,
             _ => Reference::Table,
         })
     }
@@ -266,6 +278,14 @@ impl DesignArgs {
             })
     }
 
+    /// Noise of the sensor, length of a dwell, s, and sigma of its mean, SI.
+    fn dwell(&self) -> Result<(DwellNoise, f64, f64)> {
+        let noise = self.noise()?;
+        let dwell_s = self.dwell_s(&noise);
+        let sigma = self.sigma.unwrap_or_else(|| noise.sigma(dwell_s));
+        Ok((noise, dwell_s, sigma))
+    }
+
     /// Requested order of a design; `None`: the default, which for a published scheme is the published order.
     fn order(&self) -> Option<Order> {
         self.order.map(|order| match order {
@@ -320,9 +340,7 @@ impl DesignArgs {
         settings: &[Setting],
         order: Option<Order>,
     ) -> Result<Design> {
-        let noise = self.noise()?;
-        let dwell_s = self.dwell_s(&noise);
-        let sigma = self.sigma.unwrap_or_else(|| noise.sigma(dwell_s));
+        let (noise, dwell_s, sigma) = self.dwell()?;
         let motion = self.motion();
         let shortest = motion.shortest(settings);
         let shortest_moves_s = motion.moves_s(&shortest).min(motion.moves_s(settings));
@@ -402,14 +420,24 @@ impl DesignArgs {
                     SchemeArg::XuRates => Scheme::XuRates,
                     SchemeArg::Niu8 => Scheme::Niu8,
                 };
-                self.scheme(&self.problem(scheme.rate_span(), Rates::Any)?, scheme)
+                let problem = self.problem(scheme.rate_span(), Rates::Any)?;
+                let problem = self.beside_prior(problem)?;
+                let design = self.scheme(&problem, scheme)?;
+                Ok(design.beside_population(&problem, self.seed, None))
             }
-            (_, Some(minutes), _) => self.within(&self.own_problem()?, minutes),
-            (_, _, n) => {
-                let n = usize::from(n.unwrap_or_default());
+            (_, Some(minutes), _) => {
+                let problem = self.beside_prior(self.own_problem()?)?;
+                let design = self.within(&problem, minutes)?;
+                Ok(design.beside_population(&problem, self.seed, None))
+            }
+            (_, _, Some(n)) => {
+                let n = usize::from(n);
                 let title = format!("best of {n} dwells found (seed {})", self.seed);
-                self.best(&self.own_problem()?, n, title)
+                let problem = self.beside_prior(self.own_problem()?)?;
+                let design = self.best(&problem, n, title)?;
+                Ok(design.beside_population(&problem, self.seed, None))
             }
+            (_, _, None) => self.fewest(&self.beside_prior(self.own_problem()?)?),
         }
     }
 
@@ -468,6 +496,7 @@ impl Designed {
 impl DesignArgs {
     /// The requested result, and its plan as TOML.
     pub(crate) fn made(&self) -> Result<(Designed, Option<String>)> {
+        self.refuse_beside_prior()?;
         if let Some(ids) = &self.effects {
             let (next, plan) = effects::smallest_experiment(self, ids)?;
             return Ok((Designed::NextExperiment(Box::new(next)), Some(plan)));
@@ -482,10 +511,11 @@ impl DesignArgs {
 }
 
 pub fn run(args: &DesignArgs) -> Result<()> {
-    let stated: Vec<&Path> = match &args.noise {
-        Some(NoiseArg::File(path)) => vec![path],
-        _ => Vec::new(),
+    let noise = match &args.noise {
+        Some(NoiseArg::File(path)) => Some(path),
+        _ => None,
     };
+    let stated: Vec<&Path> = noise.iter().copied().chain(&args.prior).map(PathBuf::as_path).collect();
     check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
     let (made, plan) = args.made()?;
     let mut text = made.text(args.verbose.verbose);

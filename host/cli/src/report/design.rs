@@ -1,6 +1,7 @@
 //! A design as text.
 
 mod next;
+mod prior;
 mod text;
 
 pub use next::next_text;

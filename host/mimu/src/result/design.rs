@@ -1,11 +1,13 @@
 //! A design, as reported: each result is one type, and JSON is that type.
 
+pub mod beside_population;
+
 use std::borrow::Cow;
 
 use serde::Serialize;
 
 use super::TOOL;
-use super::design_beside_population::BesidePopulation;
+use beside_population::BesidePopulation;
 use crate::plan::design::Problem;
 use crate::plan::design::budget::{Budget, DwellNoise, Spending};
 use crate::plan::design::judgement::{HALF_95, Judgement};

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::prior;
 use crate::report::text::{columns, wrap};
 use mimu::plan::design::judgement::WEAK;
 use mimu::plan::round;
@@ -26,25 +27,19 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
     };
     line("design", report.title.clone());
     let n = report.positions.len();
-    line(
-        "D-efficiency",
-        format!(
-            "{:.4}, of the continuous optimum over the reach",
-            report.d_efficiency
-        ),
-    );
-    line(
-        "det(F'F/n)",
-        format!(
-            "{}, optimum {}{}",
-            significant(report.determinant),
-            significant(report.optimum.determinant),
-            match report.regressions {
-                1 => "",
-                _ => ": product over the three sensors",
-            }
-        ),
-    );
+    if let Some(prior) = &report.prior {
+        line("prior", prior::population(prior));
+        line("worth", prior::worth(prior, n));
+        line(
+            "D-efficiency",
+            "none: with a prior the optimum depends on the number of dwells and their noise".into(),
+        );
+    } else {
+        efficiency(&mut out, report);
+    }
+    let mut line = |name: &str, text: String| {
+        let _ = writeln!(out, "  {name:<22}{text}");
+    };
     line(
         "condition",
         if report.condition.is_finite() {
@@ -74,7 +69,7 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
     line(
         "spare",
         format!(
-            "{}, which alone reveal a wrong model, and {} from repetitions",
+            "{}, and {} from repetitions",
             spare(report),
             report.dof.repetition
         ),
@@ -106,6 +101,9 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
     }
     settings(&mut out, report);
     parameters(&mut out, report, usize::MAX);
+    if let Some(prior) = &report.prior {
+        prior::by_dwells(&mut out, report, prior);
+    }
     out
 }
 
@@ -118,11 +116,18 @@ fn summary(out: &mut String, report: &Design) {
     let mut line = |name: &str, text: String| {
         let _ = writeln!(out, "  {name:<22}{text}");
     };
-    line(
-        "design",
-        format!("{}, D-efficiency {:.4}", report.title, report.d_efficiency),
-    );
     let n = report.positions.len();
+    match &report.prior {
+        None => line(
+            "design",
+            format!("{}, D-efficiency {:.4}", report.title, report.d_efficiency),
+        ),
+        Some(prior) => {
+            line("design", report.title.clone());
+            line("prior", prior::population(prior));
+            line("worth", prior::worth(prior, n));
+        }
+    }
     let time = minutes(report.time_s);
     let dwells = plural(n as u64, "dwell");
     line(
@@ -137,10 +142,7 @@ fn summary(out: &mut String, report: &Design) {
         None => sigma(report),
     };
     line("sigma of a dwell mean", sigma);
-    line(
-        "spare",
-        format!("{}, which alone reveal a wrong model", spare(report)),
-    );
+    line("spare", spare(report));
     if report.turned_over {
         line(
             "mounted",
@@ -184,6 +186,9 @@ fn summary(out: &mut String, report: &Design) {
         let _ = writeln!(out, "  the other dwells: --verbose, -o, --json");
     }
     parameters(out, report, 6);
+    if let Some(prior) = &report.prior {
+        prior::few_dwells(out, report, prior);
+    }
     out.push_str(
         "next: -o plan.toml writes it for mimu wizard and mimu record; --verbose prints more\n",
     );
@@ -192,7 +197,35 @@ fn summary(out: &mut String, report: &Design) {
 /// Equations beyond the unknown parameters, of each sensor.
 fn spare(report: &Design) -> String {
     let left = report.dof.lack_of_fit as u64;
-    format!("{} beyond the parameters", plural(left, "dwell"))
+    match report.prior {
+        None => format!(
+            "{} beyond the parameters, which alone reveal a wrong model",
+            plural(left, "dwell")
+        ),
+        Some(_) => format!(
+            "{left} of the dwells and the prior's values beyond the parameters, which reveal a unit of another kind"
+        ),
+    }
+}
+
+/// How near the design is to the best possible.
+fn efficiency(out: &mut String, report: &Design) {
+    let _ = writeln!(
+        out,
+        "  {:<22}{:.4}, of the continuous optimum over the reach",
+        "D-efficiency", report.d_efficiency
+    );
+    let _ = writeln!(
+        out,
+        "  {:<22}{}, optimum {}{}",
+        "det(F'F/n)",
+        significant(report.determinant),
+        significant(report.optimum.determinant),
+        match report.regressions {
+            1 => "",
+            _ => ": product over the three sensors",
+        }
+    );
 }
 
 /// Wrapped text next to a name.
@@ -307,7 +340,14 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
         .iter()
         .map(|p| match p.data_sheet.half_width_95 {
             half if half.is_finite() => {
-                format!("{} ± {} {}", p.name, significant(half), p.data_sheet.unit)
+                let alone = p.data_sheet.population_half_width_95;
+                format!(
+                    "{} ± {} {}{}",
+                    p.name,
+                    significant(half),
+                    p.data_sheet.unit,
+                    alone.map_or_else(String::new, prior::alone)
+                )
             }
             _ => format!("{} undetermined", p.name),
         })
@@ -316,10 +356,11 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
     // One column for each sensor if they fit.
     let across = (columns() / width).clamp(1, 3);
     let rows = cells.len().div_ceil(across);
-    let _ = writeln!(
-        out,
-        "\n  95 % intervals if the noise is known (FS: full scale, the effect at full input)"
-    );
+    let beside = match report.prior {
+        None => "(FS: full scale, the effect at full input)",
+        Some(_) => "[in brackets: by the population alone, without dwells]",
+    };
+    let _ = writeln!(out, "\n  95 % intervals if the noise is known {beside}");
     for row in 0..rows.min(most) {
         let line: String = (0..across)
             .filter_map(|c| cells.get(c * rows + row))
@@ -331,6 +372,8 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
         let _ = writeln!(out, "  the other parameters: --verbose, --json");
     }
     let weak = report.sigma_per_parameter.iter();
+    // Beside a prior, what the dwells hardly show has the half-width in brackets.
+    let weak = weak.filter(|_| report.prior.is_none());
     for p in weak.filter(|p| p.inflation >= WEAK && p.value.is_finite()) {
         let _ = writeln!(
             out,

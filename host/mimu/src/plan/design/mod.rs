@@ -7,7 +7,8 @@
 //! | [`exchange`], [`refinement`]  | exact designs of n dwells: on candidates, then between them              |
 //! | [`continuous`]                | the optimum that no n dwells can beat, with a proof of how near it is    |
 //! | [`judgement`], [`lack_of_fit`] | what a set of settings determines, how well, and what it would notice   |
-//! | [`population`]                | what the population of a unit's kind says beside the dwells, and how few then do |
+//! | [`population`]                | what the population of a unit's kind says beside the dwells               |
+//! | [`fewest`]                    | half-widths that a design predicts, and the fewest dwells that suffice   |
 //! | [`next_pose`]                 | what one more dwell adds to those that a unit has had                    |
 //! | [`tour`], [`budget`]          | order and time of a sequence; best use of a limited time                 |
 //! | [`schemes`]                   | published schemes                                                        |
@@ -33,6 +34,7 @@
 pub mod budget;
 pub mod continuous;
 pub mod exchange;
+pub mod fewest;
 pub mod information;
 pub mod judgement;
 pub mod lack_of_fit;
