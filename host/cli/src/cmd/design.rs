@@ -515,7 +515,12 @@ pub fn run(args: &DesignArgs) -> Result<()> {
         Some(NoiseArg::File(path)) => Some(path),
         _ => None,
     };
-    let stated: Vec<&Path> = noise.iter().copied().chain(&args.prior).map(PathBuf::as_path).collect();
+    let stated: Vec<&Path> = noise
+        .iter()
+        .copied()
+        .chain(&args.prior)
+        .map(PathBuf::as_path)
+        .collect();
     check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
     let (made, plan) = args.made()?;
     let mut text = made.text(args.verbose.verbose);

@@ -23,9 +23,9 @@ use mimu_wizard::session::{Outcome, UnitSpec, run as carry_out};
 use mimu_wizard::text::Text;
 use mimu_wizard::text_line::Columns;
 
+use crate::arguments::targets;
 use crate::arguments::{JsonArgs, whole_turns};
 use crate::cmd::design::number;
-use crate::arguments::targets;
 use crate::output::now;
 use crate::report::{self, Made};
 

@@ -7,7 +7,6 @@ use std::borrow::Cow;
 use serde::Serialize;
 
 use super::TOOL;
-use beside_population::BesidePopulation;
 use crate::plan::design::Problem;
 use crate::plan::design::budget::{Budget, DwellNoise, Spending};
 use crate::plan::design::judgement::{HALF_95, Judgement};
@@ -17,6 +16,7 @@ use crate::plan::design::schemes::{FANG_FILTERS, Scheme};
 use crate::plan::design::tour::{Motion, Order};
 use crate::plan::{Plan, Step};
 use crate::quantity::{Sensor, minutes, significant};
+use beside_population::BesidePopulation;
 use mimu_recording::Reference;
 
 /// Sample rate of the recording that a plan asks for, Hz.

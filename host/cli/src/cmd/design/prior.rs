@@ -33,7 +33,11 @@ impl DesignArgs {
             return Ok(());
         }
         let refuse = |option: String, problem: &str, remedy: &str| {
-            Err(Error::new(format!("{option} with --prior"), problem, remedy))
+            Err(Error::new(
+                format!("{option} with --prior"),
+                problem,
+                remedy,
+            ))
         };
         let by_hand =
             "a prior is for poses by hand with gravity as the reference, as in mimu fit --prior";

@@ -71,7 +71,11 @@ pub(super) fn few_dwells(out: &mut String, report: &Design, prior: &BesidePopula
         .iter()
         .filter(|b| SHOWN.contains(&b.dwells))
         .collect();
-    let _ = write!(out, "  {:<22}", format!("dwells of {} s", significant(report.dwell_s)));
+    let _ = write!(
+        out,
+        "  {:<22}",
+        format!("dwells of {} s", significant(report.dwell_s))
+    );
     for by in &shown {
         let _ = write!(out, "{:>10}", by.dwells);
     }
@@ -83,7 +87,9 @@ pub(super) fn few_dwells(out: &mut String, report: &Design, prior: &BesidePopula
         }
         let _ = writeln!(out);
     }
-    out.push_str("  the gyro's prior is for mimu fit --prior; this plan does not design the turns\n");
+    out.push_str(
+        "  the gyro's prior is for mimu fit --prior; this plan does not design the turns\n",
+    );
 }
 
 /// Largest half-widths for all listed numbers of dwells, with the prior and without, and what is not designed.
@@ -93,7 +99,11 @@ pub(super) fn by_dwells(out: &mut String, report: &Design, prior: &BesidePopulat
         "\n  largest half-widths of the best designs of dwells of {} s (0: the population alone)",
         significant(report.dwell_s)
     );
-    let _ = writeln!(out, "  {:<8}{:>39}{:>39}", "", "with the prior", "without it");
+    let _ = writeln!(
+        out,
+        "  {:<8}{:>39}{:>39}",
+        "", "with the prior", "without it"
+    );
     let _ = write!(out, "  {:<8}", "dwells");
     for name in NAMES.iter().chain(&NAMES) {
         let _ = write!(out, "{name:>13}");

@@ -23,7 +23,13 @@ impl Widths {
             scale: 0.0,
             angle: 0.0,
         };
-        for (k, Determined { parameter, sigma, .. }) in LOWER.iter().zip(&judgement.parameters) {
+        for (
+            k,
+            Determined {
+                parameter, sigma, ..
+            },
+        ) in LOWER.iter().zip(&judgement.parameters)
+        {
             let kind = match place(*k) {
                 (_, None) => &mut widths.bias,
                 (i, Some(j)) if i == j => &mut widths.scale,

@@ -80,12 +80,7 @@ fn unseen_by(given: Option<&DMatrix<f64>>, lacking: DMatrix<f64>) -> DMatrix<f64
     stacked(lacking, Some(&zeros))
 }
 
-fn notice(
-    model: &Model,
-    settings: &[Setting],
-    given: Option<&DMatrix<f64>>,
-    term: Term,
-) -> Notice {
+fn notice(model: &Model, settings: &[Setting], given: Option<&DMatrix<f64>>, term: Term) -> Notice {
     let mut found = Notice {
         term,
         parameters: 0,

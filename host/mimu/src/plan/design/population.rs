@@ -52,7 +52,9 @@ impl Population {
             );
         };
         let angles = |kind| kind == ParameterKind::Misalignment;
-        let found = triad.middle().filter(|_| triad.parameters().all(|p| !angles(p.0)));
+        let found = triad
+            .middle()
+            .filter(|_| triad.parameters().all(|p| !angles(p.0)));
         let rows = found.and_then(|middle| Some((triad.residuals(&middle)?.1, middle)));
         let Some((by, middle)) = rows else {
             return refuse(
@@ -64,7 +66,12 @@ impl Population {
         let si: Vec<f64> = model.parameters(0).iter().map(|p| p.si).collect();
         let lower: Vec<SVector<f64, 9>> = by
             .row_iter()
-            .map(|row| free(&of_output(&SVector::from_fn(|k, _| row[k]), &middle), &LOWER))
+            .map(|row| {
+                free(
+                    &of_output(&SVector::from_fn(|k, _| row[k]), &middle),
+                    &LOWER,
+                )
+            })
             .collect();
         Ok(Self {
             rows: DMatrix::from_fn(lower.len(), LOWER.len(), |i, k| lower[i][k] * si[k]),

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::Design;
 use crate::plan::design::Problem;
-use crate::plan::design::judgement::Judgement;
 use crate::plan::design::fewest::Widths;
+use crate::plan::design::judgement::Judgement;
 use crate::plan::design::population::Population;
 use mimu_recording::RawUnit;
 
