@@ -269,8 +269,9 @@ pub struct Promise {
 const OF_DESIGN: [usize; 9] = [0, 2, 5, 1, 3, 4, 6, 7, 8];
 
 impl Promise {
-    /// The best design of so many poses beside a prior, recorded by the units `seeds` and fitted with the prior.
-    pub fn of(prior: &Arc<Prior>, poses: usize, seeds: std::ops::Range<u64>) -> Self {
+    /// The best design of so many poses beside a prior, for a person who errs by `aim_deg` in a pose; recorded by such a person with the units `seeds`, and
+    /// fitted with the prior.
+    pub fn of(prior: &Arc<Prior>, poses: usize, aim_deg: f64, seeds: std::ops::Range<u64>) -> Self {
         let noise = DwellNoise {
             n: WHITE,
             b: 0.0,
@@ -280,7 +281,9 @@ impl Promise {
         let population = Population::of(prior, "prior.toml").expect("a population");
         let model = Model::accel(Reference::Gravity, &Terms::default());
         let problem = Problem::accel(model, Fixture::Hand).expect("determined");
-        let problem = problem.beside(population, sigma).expect("by hand");
+        let problem = problem
+            .beside(population, sigma, aim_deg.to_radians())
+            .expect("by hand");
         let settings = problem.best(poses, 1).expect("a design");
         let halves = |settings| {
             let judged = problem.judge(settings, sigma);
@@ -296,7 +299,9 @@ impl Promise {
             let _ = writeln!(plan, "[[step]]\nup = {up:?}\ndwell_s = {DWELL_S:?}");
         }
         let one = |seed: u64| {
-            let fit = fitted_by(&unit(seed, 0.0), &plan, 8_000_000 + seed, Some(prior)).ok()?;
+            let mut drawn = unit(seed, 0.0);
+            drawn.file.hands.aim_deg = aim_deg;
+            let fit = fitted_by(&drawn, &plan, 8_000_000 + seed, Some(prior)).ok()?;
             let kept = fit.estimator(Sensor::Accel).ends_with("and a prior");
             let found = &fit.sensor(Sensor::Accel)?.estimated.triad;
             let p = found.physical(Angles::Exact);

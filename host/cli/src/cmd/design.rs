@@ -1,15 +1,14 @@
 //! `mimu design`: arguments and execution.
 
 mod effects;
+mod noise;
 mod prior;
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::Problem;
-use mimu::plan::design::budget::{DwellNoise, Session};
+use mimu::plan::design::budget::Session;
 use mimu::plan::design::model::{Model, Setting, Terms};
 use mimu::plan::design::reach::{Fixture, RateList, Rates};
 use mimu::plan::design::schemes::Scheme;
@@ -26,6 +25,7 @@ use serde::Serialize;
 use crate::arguments::{JsonArgs, SensorArg, VerboseArgs};
 use crate::output::{check_outputs, print};
 use crate::report;
+use noise::NoiseArg;
 
 #[derive(Args)]
 #[command(group(ArgGroup::new("design").args(["n", "budget", "scheme", "compare", "effects"])))]
@@ -68,6 +68,12 @@ pub struct DesignArgs {
     /// file.
     #[arg(long, value_name = "FILE")]
     prior: Option<PathBuf>,
+    /// With --prior: how well a person takes a pose, degrees about each level axis, one standard deviation
+    ///
+    /// Beside few poses the intervals depend on it: six faces hit exactly do not show the angles between the axes, and 3 degrees beside them these enter the
+    /// scale factors.
+    #[arg(long, value_name = "DEG", requires = "prior", default_value_t = 3.0, value_parser = |t: &str| number(t, 0.0, 25.0))]
+    aim: f64,
     /// With --prior: target for the half-width of a 95 % interval: accel-bias=1 (mg), accel-scale=1000 (ppm), accel-angle=1000 (µrad), which are the
     /// defaults and those of the wizard; may be repeated
     #[arg(long = "target", value_name = "NAME=VALUE", requires = "prior", conflicts_with_all = ["n", "budget", "scheme"])]
@@ -173,29 +179,6 @@ pub fn number(text: &str, lowest: f64, highest: f64) -> std::result::Result<f64,
     }
 }
 
-/// White noise, or the noise file.
-#[derive(Clone)]
-enum NoiseArg {
-    Density(f64),
-    File(PathBuf),
-}
-
-impl FromStr for NoiseArg {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        match text.parse::<f64>() {
-            Ok(_) => number(text, 1e-12, 1e3).map(Self::Density),
-            Err(_) => Ok(Self::File(text.into())),
-        }
-    }
-}
-
-/// Default length of a dwell for an unknown unit: fang's, s.
-const DWELL_S: f64 = 20.0;
-/// The same by hand, s: a person does not hold still for longer.
-const BY_HAND_S: f64 = 4.0;
-
 impl DesignArgs {
     fn sensor(&self) -> Sensor {
         match self.sensor {
@@ -229,61 +212,6 @@ impl DesignArgs {
             settle_s: self.settle,
             ..usual
         }
-    }
-
-    /// Noise of the sensor. Values given as options override the file.
-    fn noise(&self) -> Result<DwellNoise> {
-        let at_rest = match &self.noise {
-            Some(NoiseArg::File(path)) => {
-                DwellNoise::from_file(&NoiseFile::read(path)?, self.sensor())?
-            }
-            other => {
-                let fang = DwellNoise::fang(self.sensor());
-                let n = match other {
-                    Some(NoiseArg::Density(n)) => *n,
-                    _ => fang.n,
-                };
-                let b = fang.b * n / fang.n;
-                DwellNoise { n, b, k: 0.0 }
-            }
-        };
-        Ok(DwellNoise {
-            n: at_rest.n,
-            b: self.instability.unwrap_or(at_rest.b),
-            k: self.walk.unwrap_or(at_rest.k),
-        })
-    }
-
-    /// Whose noise is assumed, if none is given.
-    fn assumed_noise(&self) -> Option<&'static str> {
-        let given = self.sigma.is_some() || self.noise.is_some();
-        (!given).then_some(match self.sensor() {
-            Sensor::Gyro => "an ADXRS300",
-            Sensor::Accel => "an MMA7260QT",
-        })
-    }
-
-    /// Length of a dwell, s.
-    fn dwell_s(&self, noise: &DwellNoise) -> f64 {
-        let useful = match &self.noise {
-            Some(NoiseArg::File(_)) => noise.useful_s(),
-            _ => None,
-        };
-        // Tables are set to tenths of a second.
-        self.dwell
-            .or(useful.map(|s| ((10.0 * s).ceil() / 10.0).max(1.0)))
-            .unwrap_or(match self.fixture() {
-                Fixture::Hand => BY_HAND_S,
-                _ => DWELL_S,
-            })
-    }
-
-    /// Noise of the sensor, length of a dwell, s, and sigma of its mean, SI.
-    fn dwell(&self) -> Result<(DwellNoise, f64, f64)> {
-        let noise = self.noise()?;
-        let dwell_s = self.dwell_s(&noise);
-        let sigma = self.sigma.unwrap_or_else(|| noise.sigma(dwell_s));
-        Ok((noise, dwell_s, sigma))
     }
 
     /// Requested order of a design; `None`: the default, which for a published scheme is the published order.

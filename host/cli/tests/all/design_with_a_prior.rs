@@ -100,7 +100,12 @@ fn six_poses_are_designed_beside_the_population_alone() {
         let found = all.iter().find(|p| p["name"] == name).unwrap();
         let alone = found["population_half_width_95"].as_f64().unwrap();
         assert!((alone / half - 1.0).abs() < 1e-4, "{name}: {alone}");
-        assert!(found["half_width_95"].as_f64().unwrap() < alone);
+        // Six faces leave the angles to the population.
+        let share = found["half_width_95"].as_f64().unwrap() / alone;
+        assert!(
+            share <= 1.0 && (share < 0.1 || name == "C_zx"),
+            "{name}: {share}"
+        );
     }
     // Nine dwells at least without a prior.
     assert!(design["prior"]["dwells_without"].as_u64().unwrap() >= 9);
@@ -239,11 +244,7 @@ fn what_a_prior_is_not_for_is_refused_by_its_name() {
             1,
             "--reference turntable-rate",
         ),
-        (
-            "--prior kind.toml --sensor gyro",
-            1,
-            "turns between the dwells",
-        ),
+        ("--prior kind.toml --sensor gyro", 1, "turns between dwells"),
         ("--prior kind.toml --compare", 1, "--scheme"),
         (
             "--prior kind.toml --effects accel_warm_up",

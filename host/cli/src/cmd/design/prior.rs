@@ -24,7 +24,7 @@ impl DesignArgs {
         };
         let (_, _, sigma) = self.dwell()?;
         let population = Population::of(&Prior::read(path)?, &path.display().to_string())?;
-        problem.beside(population, sigma)
+        problem.beside(population, sigma, self.aim.to_radians())
     }
 
     /// Refuses what a prior is not for, by its option.

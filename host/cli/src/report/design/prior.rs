@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
+use super::wrapped;
+use mimu::plan::design::fewest::MOST;
 use mimu::quantity::{plural, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::design::Design;
 use mimu::result::design::beside_population::{BesidePopulation, ByDwells, HalfWidths};
-
-use crate::report::text::wrap;
 
 /// Numbers of dwells in a summary.
 const SHOWN: [usize; 5] = [0, 3, 6, 9, 12];
@@ -26,18 +26,17 @@ pub(super) fn population(prior: &BesidePopulation) -> String {
     )
 }
 
-/// How many dwells the prior spares.
-pub(super) fn worth(prior: &BesidePopulation, dwells: usize) -> String {
+/// How many dwells the design would need without the prior.
+pub(super) fn without(prior: &BesidePopulation) -> String {
     let as_good = match prior.dwells_without {
-        Some(n) if n > dwells => format!("{n} dwells without the prior have this mean sigma"),
-        Some(n) => format!("none: {n} dwells without it have this mean sigma"),
-        None => "no feasible number of dwells without the prior has this mean sigma".into(),
+        Some(n) => format!("{n} dwells have the same mean sigma"),
+        None => format!("{MOST} dwells do not have the same mean sigma"),
     };
     let targets = prior.targets.map(|t| match t.dwells_without {
-        Some(n) => format!("{n} meet the targets"),
-        None => "no feasible number meets the targets".into(),
+        Some(n) => format!(", and {n} meet the targets"),
+        None => format!(", and {MOST} do not meet the targets"),
     });
-    targets.map_or(as_good.clone(), |t| format!("{as_good}, and {t}"))
+    as_good + &targets.unwrap_or_default()
 }
 
 /// The half-width by the population alone, in brackets.
@@ -64,33 +63,39 @@ fn cells(widths: &HalfWidths) -> [String; 3] {
 
 const NAMES: [&str; 3] = ["bias, mg", "scale, ppm", "angle, µrad"];
 
-/// Largest half-widths for a few numbers of dwells, and what is not designed.
-pub(super) fn few_dwells(out: &mut String, report: &Design, prior: &BesidePopulation) {
+/// Largest half-widths for a few numbers of dwells, and what is assumed and not designed.
+pub(super) fn few_dwells(out: &mut String, prior: &BesidePopulation) {
     let shown: Vec<&ByDwells> = prior
         .by_dwells
         .iter()
         .filter(|b| SHOWN.contains(&b.dwells))
         .collect();
-    let _ = write!(
-        out,
-        "  {:<22}",
-        format!("dwells of {} s", significant(report.dwell_s))
-    );
-    for by in &shown {
-        let _ = write!(out, "{:>10}", by.dwells);
-    }
-    let _ = writeln!(out, "   largest half-width; 0: population");
-    for (k, name) in NAMES.iter().enumerate() {
-        let _ = write!(out, "  {name:<22}");
+    let mut row = |name: &str, cell: &dyn Fn(&ByDwells) -> String| {
+        let _ = write!(out, "  {name:<30}");
         for by in &shown {
-            let _ = write!(out, "{:>10}", cells(&by.with)[k]);
+            let _ = write!(out, "{:>10}", cell(by));
         }
-        let _ = writeln!(out);
+        out.push('\n');
+    };
+    row("dwells (0: population alone)", &|by| by.dwells.to_string());
+    for (k, name) in NAMES.iter().enumerate() {
+        row(&format!("  largest {name}"), &|by| {
+            cells(&by.with)[k].clone()
+        });
     }
-    out.push_str(
-        "  the gyro's prior is for mimu fit --prior; this plan does not design the turns\n",
-    );
+    wrapped(out, "poses", &taken(prior));
+    wrapped(out, "gyro", GYRO);
 }
+
+/// How well poses are assumed to be taken.
+fn taken(prior: &BesidePopulation) -> String {
+    format!(
+        "assumed to be taken to within {}° about each level axis, 1 sigma (--aim)",
+        significant(prior.aim_deg)
+    )
+}
+
+const GYRO: &str = "not designed: its inputs are the turns; mimu fit --prior uses its prior too";
 
 /// Largest half-widths for all listed numbers of dwells, with the prior and without, and what is not designed.
 pub(super) fn by_dwells(out: &mut String, report: &Design, prior: &BesidePopulation) {
@@ -120,9 +125,7 @@ pub(super) fn by_dwells(out: &mut String, report: &Design, prior: &BesidePopulat
         }
         out.push('\n');
     }
-    wrap(
-        out,
-        &format!("  {:<22}", "gyro"),
-        "by hand its known inputs are the turns between the poses, which this plan does not design; mimu fit --prior uses its prior in the same recording",
-    );
+    out.push('\n');
+    wrapped(out, "poses", &taken(prior));
+    wrapped(out, "gyro", GYRO);
 }

@@ -1,9 +1,11 @@
 //! What a set of settings determines, and how well.
 
+use super::aim;
 use super::information::{Inverse, Rows};
 use super::lack_of_fit::{Notice, notices};
 use super::model::{Parameter, Setting};
 use super::problem::Problem;
+use super::refinement::Region as _;
 use crate::estimate::least_squares::Observability;
 
 /// Half of a 95 % interval in sigmas, where the noise of a dwell mean is known.
@@ -38,7 +40,8 @@ pub struct Judgement {
     pub d_efficiency: f64,
     /// Sigma of a dwell mean, SI, from which the sigmas of the parameters follow.
     pub sigma: f64,
-    /// All parameters of the triad.
+    /// All parameters of the triad. If a person takes the poses with a stated error ([`Problem::aim`]), a sigma is the median over such poses, and all else
+    /// is that of the poses as planned.
     pub parameters: Vec<Determined>,
     /// Geometric mean of the semi-axes of the parameters' one-sigma ellipsoid, normalised: what the criterion
     /// minimises. Infinite if singular.
@@ -63,6 +66,26 @@ impl Problem {
 
     fn mean_sigma_by(&self, log_det: f64, sigma: f64) -> f64 {
         sigma * (-log_det / (2.0 * self.optimum.parameters as f64)).exp()
+    }
+
+    /// Puts the medians over a person's poses in place of the sigmas of `parameters`, which are those of a single regression.
+    fn as_taken(&self, settings: &[Setting], sigma: f64, parameters: &mut [Determined]) {
+        let given = self.given(sigma);
+        let mut found = vec![Vec::new(); parameters.len()];
+        for poses in aim::taken(settings, self.aim()) {
+            let rows = self.reach.rows(&poses).beside(given.clone());
+            let inverse = Inverse::of(&rows, (0..rows.len()).map(|i| (i, 1.0)));
+            for (k, found) in found.iter_mut().enumerate() {
+                let variance = inverse.as_ref().map(|i| i.block(0)[(k, k)]);
+                found.push(sigma * variance.map_or(f64::INFINITY, f64::sqrt));
+            }
+        }
+        for (parameter, found) in parameters.iter_mut().zip(found) {
+            // What the poses as planned do not determine, chance errors of a person must not.
+            if parameter.sigma.is_finite() {
+                parameter.sigma = aim::median(found);
+            }
+        }
     }
 
     /// Judges `settings`, one dwell each, whose means have the sigma `sigma` (SI unit of the sensor).
@@ -107,6 +130,9 @@ impl Problem {
                     inflation: variance.sqrt() * alone,
                 });
             }
+        }
+        if self.aim() > 0.0 && n > 0 {
+            self.as_taken(settings, sigma, &mut parameters);
         }
         let (determinant, d_efficiency) = match &given {
             Some(_) => (f64::NAN, f64::NAN),

@@ -10,6 +10,7 @@
 //! | [`population`]                | what the population of a unit's kind says beside the dwells               |
 //! | [`fewest`]                    | half-widths that a design predicts, and the fewest dwells that suffice   |
 //! | [`next_pose`]                 | what one more dwell adds to those that a unit has had                    |
+//! | `aim`                         | poses as a person takes them, near those of the plan                     |
 //! | [`tour`], [`budget`]          | order and time of a sequence; best use of a limited time                 |
 //! | [`schemes`]                   | published schemes                                                        |
 //! | [`problem`]                   | a model, what it can be measured with, and the best designs of it        |
@@ -31,6 +32,7 @@
 //! # Ok::<(), mimu_recording::error::Error>(())
 //! ```
 
+mod aim;
 pub mod budget;
 pub mod continuous;
 pub mod exchange;

@@ -27,6 +27,8 @@ pub struct Problem {
     candidates: Vec<Setting>,
     rows: Rows,
     population: Option<Beside>,
+    /// How well a person takes the poses, rad about each level axis, one standard deviation; 0: exactly.
+    aim: f64,
 }
 
 /// The population beside which designs are made.
@@ -100,16 +102,18 @@ impl Problem {
                 candidates,
                 rows,
                 population: None,
+                aim: 0.0,
             }),
             None => Err(undetermined(&reach, &rows)),
         }
     }
 
-    /// The same beside what the population of the unit's kind says of its parameters, for dwells whose means have the sigma `sigma`, SI.
+    /// The same beside what the population of the unit's kind says of its parameters, for dwells whose means have the sigma `sigma`, SI, of a person who
+    /// takes poses with the standard deviation `aim`, rad, about each level axis.
     ///
     /// # Errors
     /// The model or the fixture is none that a fit with a prior has: poses by hand, the affine model, the magnitude of gravity.
-    pub fn beside(self, population: Population, sigma: f64) -> Result<Self> {
+    pub fn beside(self, population: Population, sigma: f64, aim: f64) -> Result<Self> {
         let model = &self.reach.model;
         let fits = model.sensor == Sensor::Accel
             && model.reference == Reference::Gravity
@@ -123,7 +127,11 @@ impl Problem {
             ));
         }
         let population = Some(Beside { population, sigma });
-        Ok(Self { population, ..self })
+        Ok(Self {
+            population,
+            aim,
+            ..self
+        })
     }
 
     /// The same for dwells whose means have another sigma; only a population makes a difference.
@@ -141,6 +149,11 @@ impl Problem {
             population: None,
             ..self.clone()
         }
+    }
+
+    /// How well a person takes the poses, rad about each level axis, one standard deviation; 0 if that is not counted.
+    pub fn aim(&self) -> f64 {
+        self.aim
     }
 
     /// The population beside which designs are made.

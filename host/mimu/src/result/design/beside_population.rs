@@ -21,6 +21,8 @@ pub struct BesidePopulation {
     pub raw_unit: RawUnit,
     /// Whether it says something of the biases.
     pub biases: bool,
+    /// How well a person is assumed to take a pose, degrees about each level axis, one standard deviation. Sigmas of parameters are medians over such poses.
+    pub aim_deg: f64,
     /// Fewest dwells of the same length that without the prior have at most the mean sigma of the design; `None` if more than
     /// [`crate::plan::design::fewest::MOST`].
     pub dwells_without: Option<usize>,
@@ -111,6 +113,7 @@ impl Design {
             units,
             raw_unit,
             biases,
+            aim_deg: problem.aim().to_degrees(),
             dwells_without: without.fewest_with(sigma, seed, as_good),
             by_dwells: by_dwells.collect(),
             targets: targets.map(|targets| Sought {

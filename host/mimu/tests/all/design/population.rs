@@ -51,7 +51,7 @@ fn by_hand() -> Problem {
 
 fn beside(prior: &Prior, sigma: f64) -> Problem {
     let population = Population::of(prior, "kind.toml").unwrap();
-    by_hand().beside(population, sigma).unwrap()
+    by_hand().beside(population, sigma, 0.0).unwrap()
 }
 
 /// `P = K Mo`, `Mo` of unit rows, and the bias: docs/estimation, written out here.
@@ -75,7 +75,7 @@ fn unit(t: &Nine) -> (Matrix3<f64>, Vector3<f64>) {
 /// Derivatives of `of` by the nine parameters at the mean, by central differences.
 fn slopes<const N: usize>(of: impl Fn(&Nine) -> SVector<f64, N>) -> SMatrix<f64, N, 9> {
     let mean = Nine::from(MEAN);
-    let mut by = SMatrix::zeros();
+    let mut by = SMatrix::<f64, N, 9>::zeros();
     for k in 0..9 {
         let mut step = Nine::zeros();
         step[k] = 1e-3 * SIZES[k];
@@ -225,7 +225,10 @@ fn what_a_fit_with_a_prior_refuses_is_no_design() {
     assert!(two.contains("at least 3"), "{two}");
     let table = Model::accel(Reference::Table, &terms("affine"));
     let table = Problem::accel(table, Fixture::ThreeAxis).unwrap();
-    let refused = table.beside(population(), 2e-3).unwrap_err().to_string();
+    let refused = table
+        .beside(population(), 2e-3, 0.0)
+        .unwrap_err()
+        .to_string();
     assert!(refused.contains("by hand"), "{refused}");
     let mut on_a_table = kind.clone();
     on_a_table.reference = Reference::Table;
@@ -254,4 +257,21 @@ fn a_term_beyond_the_model_shows_against_the_population_too() {
     assert_eq!(size(&by_hand()), None);
     let [wide, narrow] = [1.0, 0.01].map(|s| size(&beside(&prior(&covariance(s)), sigma)).unwrap());
     assert!(narrow < 0.1 * wide, "{narrow} {wide}");
+}
+
+#[test]
+fn a_persons_error_of_a_pose_matters_to_few_poses_only() {
+    let sigma = 2e-3;
+    let kind = prior(&covariance(1.0));
+    let population = || Population::of(&kind, "kind.toml").unwrap();
+    let width = |n: usize, aim_deg: f64| {
+        let problem = by_hand().beside(population(), sigma, f64::to_radians(aim_deg));
+        let problem = problem.unwrap();
+        Widths::of(&problem.judge(&problem.best(n, 1).unwrap(), sigma)).scale
+    };
+    // Six faces show scale factors and biases. The angles, which these dwells leave open, enter by the error of the poses.
+    assert!(close(width(6, 1e-3), width(6, 0.0), 1e-3));
+    assert!(width(6, 3.0) > 1.3 * width(6, 0.0));
+    assert!(width(6, 6.0) > 1.5 * width(6, 3.0));
+    assert!(close(width(16, 3.0), width(16, 0.0), 0.05));
 }
