@@ -16,6 +16,7 @@ use mimu_fleet::measured::OfCalibration;
 use mimu_fleet::tree::{Measurement, Tree};
 use mimu_recording::Reference;
 use mimu_recording::error::Result;
+use mimu_rig::hands::HandsTruth;
 use mimu_rig::located::Source;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, CurvesFile, RigFile};
@@ -277,7 +278,9 @@ impl Promise {
             b: 0.0,
             k: 0.0,
         };
-        let sigma = noise.sigma(DWELL_S);
+        // The person rests before and after a dwell, and a fit uses this rest too.
+        let [shortest, longest] = HandsTruth::default().pause_s;
+        let sigma = noise.sigma(DWELL_S + shortest + longest);
         let population = Population::of(prior, "prior.toml").expect("a population");
         let model = Model::accel(Reference::Gravity, &Terms::default());
         let problem = Problem::accel(model, Fixture::Hand).expect("determined");

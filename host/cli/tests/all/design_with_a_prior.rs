@@ -269,7 +269,7 @@ fn what_a_prior_is_not_for_is_refused_by_its_name() {
         ("--prior gyro.toml", 1, "gyro.toml: it has no accelerometer"),
         ("--prior table.toml", 1, "table.toml: its reference"),
         ("--prior nonsense.toml", 1, "nonsense.toml"),
-        ("--prior plan.toml", 1, "mimu-plan/1"),
+        ("--prior plan.toml", 1, "this is a plan"),
         ("--prior negative.toml", 1, "negative.toml, [accel]"),
         ("--prior short.toml", 1, "short.toml, [accel]"),
         ("--prior missing.toml", 1, "missing.toml"),

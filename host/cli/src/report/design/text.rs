@@ -66,14 +66,11 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
             format!("that of {part} is assumed: --noise takes yours"),
         );
     }
-    line(
-        "spare",
-        format!(
-            "{}, and {} from repetitions",
-            spare(report),
-            report.dof.repetition
-        ),
-    );
+    let repeated = match report.prior {
+        None => format!(", and {} from repetitions", report.dof.repetition),
+        Some(_) => String::new(),
+    };
+    line("spare", spare(report) + &repeated);
     for (name, text) in noticed(report) {
         line(name, text);
     }
