@@ -41,8 +41,8 @@ class Design(Result):
     positions: Array
     #: Rate about the vertical in each dwell, deg/s; None for an accelerometer.
     rates_dps: Array | None
-    #: 1 is the best possible, 0 singular.
-    d_efficiency: float
+    #: 1 is the best possible, 0 singular; None with a prior, where the optimum depends on the number of dwells.
+    d_efficiency: float | None
     sigma_per_parameter: list[ParameterSigma]
     dwell_s: float
     #: All dwells and moves.
@@ -70,7 +70,8 @@ class Design(Result):
         return self._native.text()
 
     def __repr__(self) -> str:
-        return f"<mimu.Design: {self.title}, D-efficiency {self.d_efficiency:.3f}>"
+        quality = "with a prior" if self.d_efficiency is None else f"D-efficiency {self.d_efficiency:.3f}"
+        return f"<mimu.Design: {self.title}, {quality}>"
 
 
 @dataclass(frozen=True)
@@ -179,8 +180,11 @@ def design(
     n: int | None = None,
     budget: float | None = None,
     scheme: Literal["six-face", "fang-nine", "xu-33", "xu-rates", "niu-8"] | None = None,
+    prior: str | os.PathLike[str] | None = None,
+    aim: float | None = None,
+    target: Sequence[str] | None = None,
     sensor: Literal["gyro", "accel"] = "accel",
-    reference: Reference = "table",
+    reference: Reference | None = None,
     model: str | None = None,
     table: Table | None = None,
     dwell: float | None = None,
@@ -198,10 +202,12 @@ def design(
 
     ``dwell`` and ``settle`` are in seconds, ``slew`` and ``rates`` in deg/s (``"10,100,300"``, or ``"..300"`` for any up to 300), ``sigma``,
     ``instability``, ``walk`` and a number as ``noise`` in SI; ``noise`` may also be a noise file. ``model`` lists terms: ``"affine,cubic"``.
+    ``prior`` is a file of ``mimu fleet --prior``: poses by hand that count what the population of the unit's kind says; without ``n``, ``budget`` and
+    ``scheme`` as few as meet each ``target`` (``"accel-scale=500"``). ``aim`` is how well a person takes a pose, degrees. The reference is by default ``"table"``, with a prior ``"gravity"``.
     """
     options = dict(
-        n=n, budget=budget, scheme=scheme, sensor=sensor, reference=reference, model=model, table=table, dwell=dwell, order=order,
-        rates=rates, slew=slew, settle=settle, sigma=sigma, noise=noise, instability=instability, walk=walk, seed=seed,
+        n=n, budget=budget, scheme=scheme, prior=prior, aim=aim, target=target, sensor=sensor, reference=reference, model=model, table=table,
+        dwell=dwell, order=order, rates=rates, slew=slew, settle=settle, sigma=sigma, noise=noise, instability=instability, walk=walk, seed=seed,
     )
     return Design(_mimu.design(arguments(options)))
 

@@ -1,13 +1,22 @@
 //! Units of one population by hand on the bench: what a prior of the population adds to few poses, and units that are none of it.
 
+use std::fmt::Write as _;
 use std::sync::Arc;
 
 use mimu::fit::{Fit, Options, fit};
+use mimu::plan::design::Problem;
+use mimu::plan::design::budget::DwellNoise;
+use mimu::plan::design::judgement::HALF_95;
+use mimu::plan::design::model::{Model, Terms};
+use mimu::plan::design::population::Population;
+use mimu::plan::design::reach::Fixture;
 use mimu::prior::Prior;
 use mimu::{Angles, Calibration, Sensor};
 use mimu_fleet::measured::OfCalibration;
 use mimu_fleet::tree::{Measurement, Tree};
+use mimu_recording::Reference;
 use mimu_recording::error::Result;
+use mimu_rig::hands::HandsTruth;
 use mimu_rig::located::Source;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, CurvesFile, RigFile};
@@ -101,7 +110,12 @@ fn affine(t: &[f64; 12]) -> AffineFile {
 /// # Errors
 /// Those of the fit.
 pub fn fitted(drawn: &Drawn, poses: usize, seed: u64, prior: Option<&Arc<Prior>>) -> Result<Fit> {
-    let mut prepared = bench::recorded(&bench::hand_plan(poses), &drawn.file, seed);
+    fitted_by(drawn, &bench::hand_plan(poses), seed, prior)
+}
+
+/// A fit of the poses of a plan.
+fn fitted_by(drawn: &Drawn, plan: &str, seed: u64, prior: Option<&Arc<Prior>>) -> Result<Fit> {
+    let mut prepared = bench::recorded(plan, &drawn.file, seed);
     if let Some(prior) = prior {
         prepared = prepared.with_prior(Arc::clone(prior))?;
     }
@@ -231,4 +245,115 @@ pub fn study(
     let all: Vec<_> = seeds.into_par_iter().map(one).collect();
     all.into_iter()
         .fold(nothing(), |a, b| (a.0.merge(b.0), a.1 + b.1, a.2 + b.2))
+}
+
+/// Length of a designed dwell, s.
+const DWELL_S: f64 = 3.0;
+/// Density of the accelerometers of `rig/rigs/sessions.toml`, m/s²/√Hz.
+const WHITE: f64 = 2.6e-3;
+
+/// Half-widths of the accelerometer that a design beside a prior predicts, and those that fits of its poses state: scale factors (relative), angles
+/// between the axes (rad), biases (m/s²), three of each.
+#[derive(Debug, Clone)]
+pub struct Promise {
+    /// By the design.
+    pub predicted: [f64; 9],
+    /// By the prior alone.
+    pub alone: [f64; 9],
+    /// By the fit of each unit.
+    pub stated: Vec<[f64; 9]>,
+    /// Units that could not be fitted, or lost the prior of the accelerometer.
+    pub without: usize,
+}
+
+/// Which parameter of a design, C_xx, C_yx, C_yy, C_zx, C_zy, C_zz, o, is which scale factor, angle and bias: to first order C is the inverse of `K Mo`.
+const OF_DESIGN: [usize; 9] = [0, 2, 5, 1, 3, 4, 6, 7, 8];
+
+impl Promise {
+    /// The best design of so many poses beside a prior, for a person who errs by `aim_deg` in a pose; recorded by such a person with the units `seeds`, and
+    /// fitted with the prior.
+    pub fn of(prior: &Arc<Prior>, poses: usize, aim_deg: f64, seeds: std::ops::Range<u64>) -> Self {
+        let noise = DwellNoise {
+            n: WHITE,
+            b: 0.0,
+            k: 0.0,
+        };
+        // The person rests before and after a dwell, and a fit uses this rest too.
+        let [shortest, longest] = HandsTruth::default().pause_s;
+        let sigma = noise.sigma(DWELL_S + shortest + longest);
+        let population = Population::of(prior, "prior.toml").expect("a population");
+        let model = Model::accel(Reference::Gravity, &Terms::default());
+        let problem = Problem::accel(model, Fixture::Hand).expect("determined");
+        let problem = problem
+            .beside(population, sigma, aim_deg.to_radians())
+            .expect("by hand");
+        let settings = problem.best(poses, 1).expect("a design");
+        let halves = |settings| {
+            let judged = problem.judge(settings, sigma);
+            OF_DESIGN.map(|k| {
+                let of = &judged.parameters[k];
+                HALF_95 * of.sigma * of.parameter.si
+            })
+        };
+        let mut plan =
+            String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\n");
+        for setting in &settings {
+            let up: [f64; 3] = setting.up.into();
+            let _ = writeln!(plan, "[[step]]\nup = {up:?}\ndwell_s = {DWELL_S:?}");
+        }
+        let one = |seed: u64| {
+            let mut drawn = unit(seed, 0.0);
+            drawn.file.hands.aim_deg = aim_deg;
+            let fit = fitted_by(&drawn, &plan, 8_000_000 + seed, Some(prior)).ok()?;
+            let kept = fit.estimator(Sensor::Accel).ends_with("and a prior");
+            let found = &fit.sensor(Sensor::Accel)?.estimated.triad;
+            let p = found.physical(Angles::Exact);
+            let all = [p.scale, p.non_orthogonality, p.bias].concat();
+            kept.then(|| {
+                std::array::from_fn(|k| {
+                    let per = if k / 3 == 1 { 1.0 } else { SCALE[1] };
+                    all[k].interval / per
+                })
+            })
+        };
+        let count = seeds.end - seeds.start;
+        let stated: Vec<[f64; 9]> = seeds.into_par_iter().filter_map(one).collect();
+        Self {
+            predicted: halves(&settings),
+            alone: halves(&[]),
+            without: count as usize - stated.len(),
+            stated,
+        }
+    }
+
+    /// Median over the units of what the fits state of parameter `k`.
+    pub fn median(&self, k: usize) -> f64 {
+        let mut all: Vec<f64> = self.stated.iter().map(|s| s[k]).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+    }
+
+    /// Median stated half-width over the predicted one, of each parameter.
+    pub fn ratios(&self) -> [f64; 9] {
+        std::array::from_fn(|k| self.median(k) / self.predicted[k])
+    }
+
+    /// Largest of scale factors in ppm, angles in µrad, biases in mg: by the prior alone, predicted, stated.
+    pub fn line(&self) -> String {
+        let kinds = [(0, 1e6), (3, 1e6), (6, 1e3 / 9.80665)];
+        kinds
+            .map(|(from, factor)| {
+                let most = |of: &dyn Fn(usize) -> f64| {
+                    factor * (from..from + 3).map(of).fold(0.0, f64::max)
+                };
+                let values: [f64; 3] = [
+                    most(&|k| self.alone[k]),
+                    most(&|k| self.predicted[k]),
+                    most(&|k| self.median(k)),
+                ];
+                let [alone, predicted, stated] = values.map(mimu::quantity::significant);
+                format!(" {alone}, {predicted}, {stated} |")
+            })
+            .concat()
+    }
 }

@@ -12,6 +12,7 @@ use mimu::signal::dwell::Keep;
 use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Reference, WholeTurns};
+use mimu_wizard::procedure::Targets;
 
 use crate::status::Status;
 
@@ -276,4 +277,38 @@ impl SensorArg {
             Self::Accel => Sensor::Accel,
         }
     }
+}
+
+/// The wizard's targets, with those of `--target NAME=VALUE` in place of the defaults.
+///
+/// # Errors
+/// A text that is none of `NAME=VALUE`, or a value that is not above 0.
+pub(crate) fn targets(texts: &[String]) -> Result<Targets> {
+    let mut targets = Targets::default();
+    for text in texts {
+        let wrong = |problem: &str| {
+            let remedy = "write one of gyro-bias, gyro-scale, gyro-angle, accel-bias, accel-scale, accel-angle, =, and a number above 0";
+            Error::new(format!("--target {text}"), problem, remedy)
+        };
+        let (name, value) = text
+            .split_once('=')
+            .ok_or_else(|| wrong("the = is missing"))?;
+        let value: f64 = value
+            .parse()
+            .map_err(|_| wrong("the value is not a number"))?;
+        if !(value > 0.0) {
+            return Err(wrong("it is not above 0"));
+        }
+        let target = match name {
+            "gyro-bias" => &mut targets.gyro_bias_dps,
+            "gyro-scale" => &mut targets.gyro_scale_ppm,
+            "gyro-angle" => &mut targets.gyro_angle_urad,
+            "accel-bias" => &mut targets.accel_bias_mg,
+            "accel-scale" => &mut targets.accel_scale_ppm,
+            "accel-angle" => &mut targets.accel_angle_urad,
+            _ => return Err(wrong("the parameter is unknown")),
+        };
+        *target = value;
+    }
+    Ok(targets)
 }

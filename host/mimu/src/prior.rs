@@ -265,6 +265,12 @@ impl PriorTable {
 }
 
 impl TriadPrior {
+    /// The parameters that it is of.
+    pub fn parameters(&self) -> impl Iterator<Item = TriadParameter> {
+        let all = TriadParameter::physical();
+        self.of.iter().map(move |k| all[*k])
+    }
+
     /// Number of its rows in a fit.
     pub fn rows(&self) -> usize {
         self.of.len()

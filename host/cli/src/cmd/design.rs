@@ -1,14 +1,14 @@
 //! `mimu design`: arguments and execution.
 
 mod effects;
+mod noise;
+mod prior;
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::Problem;
-use mimu::plan::design::budget::{DwellNoise, Session};
+use mimu::plan::design::budget::Session;
 use mimu::plan::design::model::{Model, Setting, Terms};
 use mimu::plan::design::reach::{Fixture, RateList, Rates};
 use mimu::plan::design::schemes::Scheme;
@@ -25,14 +25,16 @@ use serde::Serialize;
 use crate::arguments::{JsonArgs, SensorArg, VerboseArgs};
 use crate::output::{check_outputs, print};
 use crate::report;
+use noise::NoiseArg;
 
 #[derive(Args)]
-#[command(group(ArgGroup::new("design").required(true).args(["n", "budget", "scheme", "compare", "effects"])))]
+#[command(group(ArgGroup::new("design").args(["n", "budget", "scheme", "compare", "effects"])))]
+#[command(group(ArgGroup::new("goal").required(true).multiple(true).args(["n", "budget", "scheme", "compare", "effects", "prior"])))]
 pub struct DesignArgs {
     /// Sensor to calibrate
     #[arg(long, value_enum, default_value = "accel")]
     sensor: SensorArg,
-    /// What is known of the input: table (all of it) or gravity (its magnitude at rest) [default: table, or gravity with --table hand]
+    /// What is known of the input: table (all of it) or gravity (its magnitude at rest) [default: table, or gravity with --table hand or --prior]
     #[arg(long)]
     reference: Option<Reference>,
     /// Terms to be determined: affine, and any of quadratic, cubic, cross, g-sensitivity
@@ -60,7 +62,23 @@ pub struct DesignArgs {
     /// With --effects: temperatures of the chamber, °C: the one at the beginning and the end, and the two extremes
     #[arg(long, value_name = "C,C,C", requires = "effects", allow_hyphen_values = true, value_parser = effects::chamber)]
     chamber: Option<[f64; 3]>,
-    /// What holds the unit [default: three-axis, or hand with --reference gravity]
+    /// Population of the unit's kind (`mimu fleet --prior`): the plan counts what it says, and is for poses by hand
+    ///
+    /// Without -n, --budget or --scheme, the plan has the fewest dwells that meet the targets. Fit its recording with `mimu fit --prior` and the same
+    /// file.
+    #[arg(long, value_name = "FILE")]
+    prior: Option<PathBuf>,
+    /// With --prior: how well a person takes a pose, degrees about each level axis, one standard deviation
+    ///
+    /// Beside few poses the intervals depend on it: six faces hit exactly do not show the angles between the axes, and 3 degrees beside them these enter the
+    /// scale factors.
+    #[arg(long, value_name = "DEG", requires = "prior", default_value_t = 3.0, value_parser = |t: &str| number(t, 0.0, 25.0))]
+    aim: f64,
+    /// With --prior: target for the half-width of a 95 % interval: accel-bias=1 (mg), accel-scale=1000 (ppm), accel-angle=1000 (µrad), which are the
+    /// defaults and those of the wizard; may be repeated
+    #[arg(long = "target", value_name = "NAME=VALUE", requires = "prior", conflicts_with_all = ["n", "budget", "scheme"])]
+    targets: Vec<String>,
+    /// What holds the unit [default: three-axis, or hand with --reference gravity or --prior]
     #[arg(long, value_enum)]
     table: Option<TableArg>,
     /// Length of a dwell, s
@@ -161,29 +179,6 @@ pub fn number(text: &str, lowest: f64, highest: f64) -> std::result::Result<f64,
     }
 }
 
-/// White noise, or the noise file.
-#[derive(Clone)]
-enum NoiseArg {
-    Density(f64),
-    File(PathBuf),
-}
-
-impl FromStr for NoiseArg {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        match text.parse::<f64>() {
-            Ok(_) => number(text, 1e-12, 1e3).map(Self::Density),
-            Err(_) => Ok(Self::File(text.into())),
-        }
-    }
-}
-
-/// Default length of a dwell for an unknown unit: fang's, s.
-const DWELL_S: f64 = 20.0;
-/// The same by hand, s: a person does not hold still for longer.
-const BY_HAND_S: f64 = 4.0;
-
 impl DesignArgs {
     fn sensor(&self) -> Sensor {
         match self.sensor {
@@ -193,8 +188,8 @@ impl DesignArgs {
     }
 
     fn reference(&self) -> Reference {
-        self.reference.unwrap_or(match self.table {
-            Some(TableArg::Hand) => Reference::Gravity,
+        self.reference.unwrap_or(match (self.table, &self.prior) {
+            (Some(TableArg::Hand), _) | (_, Some(_)) => Reference::Gravity,
             _ => Reference::Table,
         })
     }
@@ -217,53 +212,6 @@ impl DesignArgs {
             settle_s: self.settle,
             ..usual
         }
-    }
-
-    /// Noise of the sensor. Values given as options override the file.
-    fn noise(&self) -> Result<DwellNoise> {
-        let at_rest = match &self.noise {
-            Some(NoiseArg::File(path)) => {
-                DwellNoise::from_file(&NoiseFile::read(path)?, self.sensor())?
-            }
-            other => {
-                let fang = DwellNoise::fang(self.sensor());
-                let n = match other {
-                    Some(NoiseArg::Density(n)) => *n,
-                    _ => fang.n,
-                };
-                let b = fang.b * n / fang.n;
-                DwellNoise { n, b, k: 0.0 }
-            }
-        };
-        Ok(DwellNoise {
-            n: at_rest.n,
-            b: self.instability.unwrap_or(at_rest.b),
-            k: self.walk.unwrap_or(at_rest.k),
-        })
-    }
-
-    /// Whose noise is assumed, if none is given.
-    fn assumed_noise(&self) -> Option<&'static str> {
-        let given = self.sigma.is_some() || self.noise.is_some();
-        (!given).then_some(match self.sensor() {
-            Sensor::Gyro => "an ADXRS300",
-            Sensor::Accel => "an MMA7260QT",
-        })
-    }
-
-    /// Length of a dwell, s.
-    fn dwell_s(&self, noise: &DwellNoise) -> f64 {
-        let useful = match &self.noise {
-            Some(NoiseArg::File(_)) => noise.useful_s(),
-            _ => None,
-        };
-        // Tables are set to tenths of a second.
-        self.dwell
-            .or(useful.map(|s| ((10.0 * s).ceil() / 10.0).max(1.0)))
-            .unwrap_or(match self.fixture() {
-                Fixture::Hand => BY_HAND_S,
-                _ => DWELL_S,
-            })
     }
 
     /// Requested order of a design; `None`: the default, which for a published scheme is the published order.
@@ -320,9 +268,7 @@ impl DesignArgs {
         settings: &[Setting],
         order: Option<Order>,
     ) -> Result<Design> {
-        let noise = self.noise()?;
-        let dwell_s = self.dwell_s(&noise);
-        let sigma = self.sigma.unwrap_or_else(|| noise.sigma(dwell_s));
+        let (noise, dwell_s, sigma) = self.dwell()?;
         let motion = self.motion();
         let shortest = motion.shortest(settings);
         let shortest_moves_s = motion.moves_s(&shortest).min(motion.moves_s(settings));
@@ -402,14 +348,24 @@ impl DesignArgs {
                     SchemeArg::XuRates => Scheme::XuRates,
                     SchemeArg::Niu8 => Scheme::Niu8,
                 };
-                self.scheme(&self.problem(scheme.rate_span(), Rates::Any)?, scheme)
+                let problem = self.problem(scheme.rate_span(), Rates::Any)?;
+                let problem = self.beside_prior(problem)?;
+                let design = self.scheme(&problem, scheme)?;
+                Ok(design.beside_population(&problem, self.seed, None))
             }
-            (_, Some(minutes), _) => self.within(&self.own_problem()?, minutes),
-            (_, _, n) => {
-                let n = usize::from(n.unwrap_or_default());
+            (_, Some(minutes), _) => {
+                let problem = self.beside_prior(self.own_problem()?)?;
+                let design = self.within(&problem, minutes)?;
+                Ok(design.beside_population(&problem, self.seed, None))
+            }
+            (_, _, Some(n)) => {
+                let n = usize::from(n);
                 let title = format!("best of {n} dwells found (seed {})", self.seed);
-                self.best(&self.own_problem()?, n, title)
+                let problem = self.beside_prior(self.own_problem()?)?;
+                let design = self.best(&problem, n, title)?;
+                Ok(design.beside_population(&problem, self.seed, None))
             }
+            (_, _, None) => self.fewest(&self.beside_prior(self.own_problem()?)?),
         }
     }
 
@@ -468,6 +424,7 @@ impl Designed {
 impl DesignArgs {
     /// The requested result, and its plan as TOML.
     pub(crate) fn made(&self) -> Result<(Designed, Option<String>)> {
+        self.refuse_beside_prior()?;
         if let Some(ids) = &self.effects {
             let (next, plan) = effects::smallest_experiment(self, ids)?;
             return Ok((Designed::NextExperiment(Box::new(next)), Some(plan)));
@@ -482,10 +439,16 @@ impl DesignArgs {
 }
 
 pub fn run(args: &DesignArgs) -> Result<()> {
-    let stated: Vec<&Path> = match &args.noise {
-        Some(NoiseArg::File(path)) => vec![path],
-        _ => Vec::new(),
+    let noise = match &args.noise {
+        Some(NoiseArg::File(path)) => Some(path),
+        _ => None,
     };
+    let stated: Vec<&Path> = noise
+        .iter()
+        .copied()
+        .chain(&args.prior)
+        .map(PathBuf::as_path)
+        .collect();
     check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
     let (made, plan) = args.made()?;
     let mut text = made.text(args.verbose.verbose);

@@ -18,12 +18,13 @@ use mimu_equipment::step::Step;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RawUnit, Reference, ReferenceError};
 use mimu_wizard::event::View;
-use mimu_wizard::procedure::{Fixture, SessionConfig, Targets, faces, first_steps, verification};
+use mimu_wizard::procedure::{Fixture, SessionConfig, faces, first_steps, verification};
 use mimu_wizard::relay::{Stamped, relayed};
 use mimu_wizard::session::{Outcome, UnitSpec, run as carry_out};
 use mimu_wizard::text::Text;
 use mimu_wizard::text_line::Columns;
 
+use crate::arguments::targets;
 use crate::arguments::{JsonArgs, whole_turns};
 use crate::cmd::design::number;
 use crate::output::now;
@@ -219,36 +220,6 @@ impl FixtureArg {
 }
 
 impl WizardArgs {
-    fn targets(&self) -> Result<Targets> {
-        let mut targets = Targets::default();
-        for text in &self.targets {
-            let wrong = |problem: &str| {
-                let remedy = "write one of gyro-bias, gyro-scale, gyro-angle, accel-bias, accel-scale, accel-angle, =, and a number above 0";
-                Error::new(format!("--target {text}"), problem, remedy)
-            };
-            let (name, value) = text
-                .split_once('=')
-                .ok_or_else(|| wrong("the = is missing"))?;
-            let value: f64 = value
-                .parse()
-                .map_err(|_| wrong("the value is not a number"))?;
-            if !(value > 0.0) {
-                return Err(wrong("it is not above 0"));
-            }
-            let target = match name {
-                "gyro-bias" => &mut targets.gyro_bias_dps,
-                "gyro-scale" => &mut targets.gyro_scale_ppm,
-                "gyro-angle" => &mut targets.gyro_angle_urad,
-                "accel-bias" => &mut targets.accel_bias_mg,
-                "accel-scale" => &mut targets.accel_scale_ppm,
-                "accel-angle" => &mut targets.accel_angle_urad,
-                _ => return Err(wrong("the parameter is unknown")),
-            };
-            *target = value;
-        }
-        Ok(targets)
-    }
-
     /// What the tables do wrong by their driver files, the mounting of the unit included. `None` if no file says anything.
     fn reference_error(&self, fixture: Fixture) -> Result<Option<ReferenceError>> {
         let mut stated: Option<(&Path, ReferenceError)> = None;
@@ -386,7 +357,7 @@ impl WizardArgs {
             patience_s: self.patience,
             warm_c_per_min: (self.warm_up > 0.0).then_some(self.warm_up),
             most_drift_c: self.drift,
-            targets: self.targets()?,
+            targets: targets(&self.targets)?,
             mounting_deg: match reference_error {
                 Some(_) => 0.0,
                 None => self.mounting.unwrap_or(MOUNTING_DEG),

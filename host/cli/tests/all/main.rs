@@ -6,6 +6,7 @@ mod bad_input;
 mod biases_at_rest;
 mod certificate;
 mod design_command;
+mod design_with_a_prior;
 mod device;
 mod diagnosis_page;
 mod diagnosis_text;

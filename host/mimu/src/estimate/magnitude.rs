@@ -111,7 +111,7 @@ fn flat(raw: &[Vector3<f64>]) -> Vec<usize> {
 }
 
 /// Fewest poses beside a prior: they show the bias.
-const FEWEST_WITH_PRIOR: usize = 3;
+pub const FEWEST_WITH_PRIOR: usize = 3;
 /// Standard deviation of a magnitude in the first solution beside a prior, over gravity: 5 mg.
 const BY_HAND: f64 = 5e-3;
 

@@ -1,5 +1,7 @@
 //! A design, as reported: each result is one type, and JSON is that type.
 
+pub mod beside_population;
+
 use std::borrow::Cow;
 
 use serde::Serialize;
@@ -14,6 +16,7 @@ use crate::plan::design::schemes::{FANG_FILTERS, Scheme};
 use crate::plan::design::tour::{Motion, Order};
 use crate::plan::{Plan, Step};
 use crate::quantity::{Sensor, minutes, significant};
+use beside_population::BesidePopulation;
 use mimu_recording::Reference;
 
 /// Sample rate of the recording that a plan asks for, Hz.
@@ -60,7 +63,8 @@ pub struct Design {
     /// Rate about the vertical in each dwell of a gyro, deg/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rates_dps: Option<Vec<f64>>,
-    /// D-efficiency against the continuous optimum over the reach: 1 is the best possible, 0 is singular.
+    /// D-efficiency against the continuous optimum over the reach: 1 is the best possible, 0 is singular. With a prior not a number, null in JSON, as
+    /// are `determinant` and `optimum`: the optimum then depends on the number of dwells and their noise.
     pub d_efficiency: f64,
     /// `det(F'F/n)`, fang (22).
     pub determinant: f64,
@@ -112,6 +116,9 @@ pub struct Design {
     /// Ways to spend a budget.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub budget: Option<Spent>,
+    /// The prior that it counts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<BesidePopulation>,
     #[serde(skip)]
     settings: Vec<Setting>,
     #[serde(skip)]
@@ -147,6 +154,9 @@ pub struct ParameterSigma {
     pub unit: &'static str,
     /// Half of the 95 % interval if the noise is known, SI.
     pub half_width_95: f64,
+    /// The same before the first dwell, by the prior alone; infinite, null in JSON, if that says nothing. `None` without a prior.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub population_half_width_95: Option<f64>,
     /// The same in the unit of data sheets.
     pub data_sheet: DataSheet,
     /// Sigma over that if all the other parameters were known.
@@ -158,6 +168,9 @@ pub struct ParameterSigma {
 pub struct DataSheet {
     /// Half width in that unit.
     pub half_width_95: f64,
+    /// The same before the first dwell, by the prior alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub population_half_width_95: Option<f64>,
     /// mg, deg/s, ppm, µrad, ppm FS, (deg/s)/g.
     pub unit: Cow<'static, str>,
 }
@@ -258,17 +271,28 @@ impl Design {
     pub fn new(problem: &Problem, judgement: Judgement, conditions: Conditions) -> Self {
         let model = &problem.reach.model;
         let sigma = judgement.sigma;
-        let parameters = judgement.parameters.iter().map(|p| ParameterSigma {
-            name: p.parameter.name.clone(),
-            value: p.sigma * p.parameter.si,
-            unit: p.parameter.unit,
-            half_width_95: HALF_95 * p.sigma * p.parameter.si,
-            data_sheet: DataSheet {
-                half_width_95: HALF_95 * p.sigma * p.parameter.shown,
-                unit: p.parameter.shown_unit.clone(),
-            },
-            inflation: p.inflation,
+        let alone = problem.population().map(|_| problem.judge(&[], sigma));
+        let parameters = judgement.parameters.iter().enumerate().map(|(k, p)| {
+            let half = |factor: f64| HALF_95 * p.sigma * factor;
+            let alone = alone.as_ref().map(|a| HALF_95 * a.parameters[k].sigma);
+            ParameterSigma {
+                name: p.parameter.name.clone(),
+                value: p.sigma * p.parameter.si,
+                unit: p.parameter.unit,
+                half_width_95: half(p.parameter.si),
+                population_half_width_95: alone.map(|a| a * p.parameter.si),
+                data_sheet: DataSheet {
+                    half_width_95: half(p.parameter.shown),
+                    population_half_width_95: alone.map(|a| a * p.parameter.shown),
+                    unit: p.parameter.shown_unit.clone(),
+                },
+                inflation: p.inflation,
+            }
         });
+        let optimum = match alone {
+            Some(_) => f64::NAN,
+            None => problem.optimum.log_det.exp(),
+        };
         let notices = judgement.notices.iter().map(|notice| {
             let (factor, unit) = match notice.term {
                 Term::GSensitivity => (sigma.to_degrees(), "(deg/s)/g"),
@@ -299,7 +323,7 @@ impl Design {
             determinant: judgement.determinant,
             regressions: model.distinct_regressions(),
             optimum: Best {
-                determinant: problem.optimum.log_det.exp(),
+                determinant: optimum,
                 excess: problem.optimum.excess,
             },
             condition: judgement.condition,
@@ -329,6 +353,7 @@ impl Design {
             assumed: None,
             filters: None,
             budget: None,
+            prior: None,
             fixture: problem.reach.fixture,
             settings: judgement.settings,
         }
@@ -385,8 +410,12 @@ impl Design {
 
     /// Plan of the design, `mimu-plan/1`, with moves at `slew` rad/s.
     pub fn plan(&self, slew: f64) -> String {
+        let quality = match &self.prior {
+            Some(prior) => format!("with a prior of {} units", prior.units),
+            None => format!("D-efficiency {:.4}", self.d_efficiency),
+        };
         let about = format!(
-            "{}: {}\norder {}{}\nD-efficiency {:.4}, {} with moves at {} deg/s",
+            "{}: {}\norder {}{}\n{quality}, {} with moves at {} deg/s",
             self.subject(),
             self.title,
             self.order,
@@ -395,7 +424,6 @@ impl Design {
             } else {
                 ""
             },
-            self.d_efficiency,
             minutes(self.time_s),
             significant(slew.to_degrees()),
         );

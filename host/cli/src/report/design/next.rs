@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::text::{LISTED, wrapped};
+use super::text::LISTED;
+use super::wrapped;
 use mimu::quantity::{Figure, minutes, significant};
 use mimu::result::next_experiment::NextExperiment;
 

@@ -2,12 +2,13 @@
 
 use std::fmt::Write as _;
 
+use super::{budget, prior, wrapped};
 use crate::report::text::{columns, wrap};
 use mimu::plan::design::judgement::WEAK;
 use mimu::plan::round;
 use mimu::quantity::{minutes, plural, significant};
 use mimu::readable::{self, Readable};
-use mimu::result::design::{Comparison, Design, Noticed, Spent, Way};
+use mimu::result::design::Design;
 use mimu_equipment::step::words;
 
 /// Largest number of dwells listed: that of the longest design.
@@ -26,25 +27,19 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
     };
     line("design", report.title.clone());
     let n = report.positions.len();
-    line(
-        "D-efficiency",
-        format!(
-            "{:.4}, of the continuous optimum over the reach",
-            report.d_efficiency
-        ),
-    );
-    line(
-        "det(F'F/n)",
-        format!(
-            "{}, optimum {}{}",
-            significant(report.determinant),
-            significant(report.optimum.determinant),
-            match report.regressions {
-                1 => "",
-                _ => ": product over the three sensors",
-            }
-        ),
-    );
+    if let Some(prior) = &report.prior {
+        line("prior", prior::population(prior));
+        line("without the prior", prior::without(prior));
+        line(
+            "D-efficiency",
+            "none: a prior's optimum depends on the number of dwells and their noise".into(),
+        );
+    } else {
+        efficiency(&mut out, report);
+    }
+    let mut line = |name: &str, text: String| {
+        let _ = writeln!(out, "  {name:<22}{text}");
+    };
     line(
         "condition",
         if report.condition.is_finite() {
@@ -71,14 +66,11 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
             format!("that of {part} is assumed: --noise takes yours"),
         );
     }
-    line(
-        "spare",
-        format!(
-            "{}, which alone reveal a wrong model, and {} from repetitions",
-            spare(report),
-            report.dof.repetition
-        ),
-    );
+    let repeated = match report.prior {
+        None => format!(", and {} from repetitions", report.dof.repetition),
+        Some(_) => String::new(),
+    };
+    line("spare", spare(report) + &repeated);
     for (name, text) in noticed(report) {
         line(name, text);
     }
@@ -102,10 +94,13 @@ pub fn design_text(report: &Design, verbose: bool) -> String {
         wrapped(&mut out, "mounted", text);
     }
     if let Some(budget) = &report.budget {
-        spent(&mut out, report.noise.is_some(), budget);
+        budget::spent(&mut out, report.noise.is_some(), budget);
     }
     settings(&mut out, report);
     parameters(&mut out, report, usize::MAX);
+    if let Some(prior) = &report.prior {
+        prior::by_dwells(&mut out, report, prior);
+    }
     out
 }
 
@@ -118,11 +113,18 @@ fn summary(out: &mut String, report: &Design) {
     let mut line = |name: &str, text: String| {
         let _ = writeln!(out, "  {name:<22}{text}");
     };
-    line(
-        "design",
-        format!("{}, D-efficiency {:.4}", report.title, report.d_efficiency),
-    );
     let n = report.positions.len();
+    match &report.prior {
+        None => line(
+            "design",
+            format!("{}, D-efficiency {:.4}", report.title, report.d_efficiency),
+        ),
+        Some(prior) => {
+            line("design", report.title.clone());
+            line("prior", prior::population(prior));
+            line("without the prior", prior::without(prior));
+        }
+    }
     let time = minutes(report.time_s);
     let dwells = plural(n as u64, "dwell");
     line(
@@ -137,10 +139,7 @@ fn summary(out: &mut String, report: &Design) {
         None => sigma(report),
     };
     line("sigma of a dwell mean", sigma);
-    line(
-        "spare",
-        format!("{}, which alone reveal a wrong model", spare(report)),
-    );
+    line("spare", spare(report));
     if report.turned_over {
         line(
             "mounted",
@@ -184,6 +183,9 @@ fn summary(out: &mut String, report: &Design) {
         let _ = writeln!(out, "  the other dwells: --verbose, -o, --json");
     }
     parameters(out, report, 6);
+    if let Some(prior) = &report.prior {
+        prior::few_dwells(out, prior);
+    }
     out.push_str(
         "next: -o plan.toml writes it for mimu wizard and mimu record; --verbose prints more\n",
     );
@@ -192,12 +194,35 @@ fn summary(out: &mut String, report: &Design) {
 /// Equations beyond the unknown parameters, of each sensor.
 fn spare(report: &Design) -> String {
     let left = report.dof.lack_of_fit as u64;
-    format!("{} beyond the parameters", plural(left, "dwell"))
+    match report.prior {
+        None => format!(
+            "{} beyond the parameters, which alone reveal a wrong model",
+            plural(left, "dwell")
+        ),
+        Some(_) => {
+            format!("{left} values beyond the parameters, which reveal a unit of another kind")
+        }
+    }
 }
 
-/// Wrapped text next to a name.
-pub(super) fn wrapped(out: &mut String, name: &str, text: &str) {
-    wrap(out, &format!("  {name:<22}"), text);
+/// How near the design is to the best possible.
+fn efficiency(out: &mut String, report: &Design) {
+    let _ = writeln!(
+        out,
+        "  {:<22}{:.4}, of the continuous optimum over the reach",
+        "D-efficiency", report.d_efficiency
+    );
+    let _ = writeln!(
+        out,
+        "  {:<22}{}, optimum {}{}",
+        "det(F'F/n)",
+        significant(report.determinant),
+        significant(report.optimum.determinant),
+        match report.regressions {
+            1 => "",
+            _ => ": product over the three sensors",
+        }
+    );
 }
 
 /// Sigma of a dwell mean with its unit.
@@ -206,7 +231,7 @@ fn mean_sigma(report: &Design) -> String {
     format!("{} {unit}", significant(report.dwell_sigma.value * factor))
 }
 
-fn sigma(report: &Design) -> String {
+pub(super) fn sigma(report: &Design) -> String {
     let Readable { factor, unit } = readable::parameter(report.dwell_sigma.unit);
     let shown = |v: f64| significant(v * factor);
     let mean = shown(report.dwell_sigma.value);
@@ -307,7 +332,14 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
         .iter()
         .map(|p| match p.data_sheet.half_width_95 {
             half if half.is_finite() => {
-                format!("{} ± {} {}", p.name, significant(half), p.data_sheet.unit)
+                let alone = p.data_sheet.population_half_width_95;
+                format!(
+                    "{} ± {} {}{}",
+                    p.name,
+                    significant(half),
+                    p.data_sheet.unit,
+                    alone.map_or_else(String::new, prior::alone)
+                )
             }
             _ => format!("{} undetermined", p.name),
         })
@@ -316,10 +348,11 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
     // One column for each sensor if they fit.
     let across = (columns() / width).clamp(1, 3);
     let rows = cells.len().div_ceil(across);
-    let _ = writeln!(
-        out,
-        "\n  95 % intervals if the noise is known (FS: full scale, the effect at full input)"
-    );
+    let beside = match report.prior {
+        None => "(FS: full scale, the effect at full input)",
+        Some(_) => "[in brackets: by the population alone, without dwells]",
+    };
+    let _ = writeln!(out, "\n  95 % intervals if the noise is known {beside}");
     for row in 0..rows.min(most) {
         let line: String = (0..across)
             .filter_map(|c| cells.get(c * rows + row))
@@ -331,6 +364,8 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
         let _ = writeln!(out, "  the other parameters: --verbose, --json");
     }
     let weak = report.sigma_per_parameter.iter();
+    // Beside a prior, what the dwells hardly show has the half-width in brackets.
+    let weak = weak.filter(|_| report.prior.is_none());
     for p in weak.filter(|p| p.inflation >= WEAK && p.value.is_finite()) {
         let _ = writeln!(
             out,
@@ -339,112 +374,4 @@ fn parameters(out: &mut String, report: &Design, most: usize) {
             significant(p.inflation)
         );
     }
-}
-
-/// Use of a budget, and the alternatives that were considered.
-fn spent(out: &mut String, by_noise: bool, budget: &Spent) {
-    let best = &budget.best;
-    let moving = best.moves_s / budget.time_s;
-    if by_noise {
-        let shares = [
-            budget.shares.white,
-            budget.shares.instability,
-            budget.shares.walk,
-        ];
-        let [white, floor, walk] = shares.map(|s| 100.0 * s);
-        let limit = match (moving > 0.5, white >= floor.max(walk), floor >= walk) {
-            (true, ..) => "moves: a faster table",
-            (_, true, _) => "white noise: more time",
-            (_, _, true) => "the bias instability: more dwells",
-            _ => "the random walk: shorter dwells",
-        };
-        wrapped(
-            out,
-            "limited by",
-            &format!(
-                "{limit} would help. Shares in the variance of a dwell mean: white noise {white:.0} %, \
-                 bias instability {floor:.0} %, random walk {walk:.0} %; moves take {:.0} % of the time",
-                100.0 * moving
-            ),
-        );
-    }
-    let _ = writeln!(
-        out,
-        "\n  {:<10}{:>8}{:>10}{:>9}{:>16}",
-        "a pass", "passes", "dwell, s", "moves", "sigma over best"
-    );
-    let shown = [4, 5, 6, 8, 9, 10, 12, 14, 16, 20, 25, 30, 35, 40];
-    let is_best = |w: &Way| w.dwells_a_pass == best.dwells_a_pass;
-    for way in &budget.ways {
-        if is_best(way) || shown.contains(&way.dwells_a_pass) {
-            let _ = writeln!(
-                out,
-                "  {:<10}{:>8}{:>10}{:>7.0} %{:>16.3}{}",
-                way.dwells_a_pass,
-                way.passes,
-                significant(way.dwell_s),
-                100.0 * way.moves_s / budget.time_s,
-                way.mean_sigma / best.mean_sigma,
-                if is_best(way) { "  <" } else { "" }
-            );
-        }
-    }
-}
-
-/// Result of `mimu design --compare`: one line per design.
-pub fn comparison_text(comparison: &Comparison) -> String {
-    let mut out = String::new();
-    if let Some(first) = comparison.designs.first() {
-        let _ = writeln!(
-            out,
-            "{}: {} s a dwell",
-            first.subject(),
-            significant(first.dwell_s)
-        );
-        let _ = writeln!(out, "  sigma of a dwell mean {}", sigma(first));
-    }
-    let _ = writeln!(
-        out,
-        "\n  {:<19}{:>6}{:>13}{:>14}{:>15}{:>5}  can notice",
-        "design", "dwells", "D-efficiency", "mean sigma", "time", "dof"
-    );
-    for design in &comparison.designs {
-        let ppm = match 1e6 * design.mean_sigma_of_full_scale {
-            v if v.is_finite() => format!("{} ppm", significant(v)),
-            _ => "-".into(),
-        };
-        let noticed = |n: &&Noticed| n.noticed == n.parameters;
-        let notices = design.notices.iter();
-        let names: Vec<&str> = notices.filter(noticed).map(|n| n.term).collect();
-        let notices = match names.len() {
-            0 => "-".into(),
-            all if all > 1 && all == design.notices.len() => "all terms".into(),
-            _ => names.join(", "),
-        };
-        let _ = writeln!(
-            out,
-            "  {:<19}{:>6}{:>13.4}{:>14}{:>15}{:>5}  {notices}",
-            design.title,
-            design.positions.len(),
-            design.d_efficiency,
-            ppm,
-            minutes(design.time_s),
-            design.dof.lack_of_fit,
-        );
-    }
-    let _ = writeln!(
-        out,
-        "\n  mean sigma: geometric mean over the parameters, of full scale; dof: residual degrees of freedom;\n  \
-         can notice: terms beyond the model that the residuals show in every direction"
-    );
-    if !comparison.out_of_reach.is_empty() {
-        let names = comparison.out_of_reach.join(", ");
-        let _ = writeln!(out, "  out of this table's reach: {names}");
-    }
-    for design in &comparison.designs {
-        if let (Some(scheme), Some(assumed)) = (design.scheme, design.assumed) {
-            wrapped(&mut out, scheme, assumed);
-        }
-    }
-    out
 }

@@ -5,7 +5,6 @@ use serde::Serialize;
 
 use super::model::Setting;
 use super::problem::Problem;
-use super::refinement::Region as _;
 use super::tour::{Motion, Order, randomised};
 use crate::noise::noise_file::NoiseFile;
 use crate::quantity::Sensor;
@@ -216,16 +215,17 @@ impl Session {
     /// The number of dwells in a pass, the number of passes and the length of a dwell that make the parameters' mean sigma
     /// smallest. `seed` is that of the searches and of the randomised orders, which differ between passes.
     pub fn spend(&self, problem: &Problem, seed: u64) -> Result<Budget> {
-        let widths = problem.reach.widths();
-        let least = widths.iter().max().copied().unwrap_or(0);
+        let least = problem.fewest();
         let sizes: Vec<usize> = (least..=MOST.max(least)).collect();
         let ways: Vec<Option<Spending>> = sizes
             .into_par_iter()
             .map(|n| {
-                let settings = problem.best(n, seed)?;
-                let unit = problem.judge(&settings, 1.0).mean_sigma;
+                // Beside a population, the best poses depend on the noise, if weakly: that of a single pass without moves.
+                let dwell_s = (self.time_s / n as f64).min(self.noise.longest_s());
+                let sigma = self.noise.sigma(dwell_s.max(SHORTEST_S));
+                let settings = problem.at_sigma(sigma).best(n, seed)?;
                 let shortest = self.motion.shortest(&settings);
-                let ways = (1..=PASSES).filter_map(|k| self.passes(&shortest, k, unit, seed));
+                let ways = (1..=PASSES).filter_map(|k| self.passes(problem, &shortest, k, seed));
                 Ok(ways.min_by(|a, b| a.mean_sigma.total_cmp(&b.mean_sigma)))
             })
             .collect::<Result<_>>()?;
@@ -243,13 +243,12 @@ impl Session {
         }
     }
 
-    /// So many passes over the settings; `unit` is their mean sigma if a dwell has a sigma of 1. `None` if there is no time
-    /// for them.
+    /// So many passes over the settings. `None` if there is no time for them.
     fn passes(
         &self,
+        problem: &Problem,
         shortest: &[Setting],
         passes: usize,
-        unit: f64,
         seed: u64,
     ) -> Option<Spending> {
         // All passes go the same way: on a way back, two dwells in a row at the same setting would share the drift.
@@ -265,14 +264,19 @@ impl Session {
         let most_s = (self.time_s - moves_s) / settings.len() as f64;
         let dwell_s = most_s.min(self.noise.longest_s().max(SHORTEST_S));
         let sigma = self.noise.sigma(dwell_s);
-        (dwell_s >= SHORTEST_S).then_some(Spending {
-            settings,
+        if !(dwell_s >= SHORTEST_S) {
+            return None;
+        }
+        // A pass over dwells with the sigma of a mean over all passes.
+        let mean = sigma / (passes as f64).sqrt();
+        Some(Spending {
             passes,
             dwell_s,
             moves_s,
             shortest_moves_s,
             sigma,
-            mean_sigma: unit * sigma / (passes as f64).sqrt(),
+            mean_sigma: problem.mean_sigma(shortest, mean),
+            settings,
         })
     }
 }

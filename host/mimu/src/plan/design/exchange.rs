@@ -28,14 +28,15 @@ const DRAWS: usize = 8;
 /// Best designs of `n` points found, the best first, each once.
 ///
 /// `starts` random starts, determinate for a `seed`. Empty if no `n` of the candidates determine the
-/// parameters.
+/// parameters, beside what the rows have as given.
 pub fn search(rows: &Rows, n: usize, starts: usize, seed: u64) -> Vec<Found> {
-    if rows.is_empty() || rows.widths().iter().any(|p| n < *p) {
+    let too_few = !rows.has_given() && rows.widths().iter().any(|p| n < *p);
+    if rows.is_empty() || too_few {
         return Vec::new();
     }
     let run = |start: usize| {
         let mut random = SplitMix(seed ^ (start as u64).wrapping_mul(0xd1b5_4a32_d192_ed03));
-        improve(rows, random_start(rows, n, &mut random))
+        improve(rows, random_start(rows, n, &mut random)?)
     };
     let mut found: Vec<Found> = (0..starts).into_par_iter().filter_map(run).collect();
     found.sort_by(|a, b| b.log_det.total_cmp(&a.log_det));
@@ -44,8 +45,8 @@ pub fn search(rows: &Rows, n: usize, starts: usize, seed: u64) -> Vec<Found> {
 }
 
 /// Points added one by one, each the one of a few drawn that adds most to the determinant.
-fn random_start(rows: &Rows, n: usize, random: &mut SplitMix) -> Vec<usize> {
-    let mut inverse = Inverse::ridge(rows.widths());
+fn random_start(rows: &Rows, n: usize, random: &mut SplitMix) -> Option<Vec<usize>> {
+    let mut inverse = Inverse::ridge(rows)?;
     let mut points = Vec::with_capacity(n);
     for _ in 0..n {
         let gain = |&i: &usize| -> f64 {
@@ -63,7 +64,7 @@ fn random_start(rows: &Rows, n: usize, random: &mut SplitMix) -> Vec<usize> {
         }
         points.push(best);
     }
-    points
+    Some(points)
 }
 
 /// Exchanges until none helps. `None` if the start is singular.

@@ -12,6 +12,8 @@ pub struct Rows {
     widths: Vec<usize>,
     blocks: Vec<Vec<f64>>,
     len: usize,
+    /// Rows that every design has beside its own, of the only block; see [`Self::beside`].
+    given: Option<DMatrix<f64>>,
 }
 
 impl Rows {
@@ -21,7 +23,21 @@ impl Rows {
             widths: widths.to_vec(),
             blocks: vec![Vec::new(); widths.len()],
             len: 0,
+            given: None,
         }
+    }
+
+    /// The same, with rows that every design has beside its own: what is known of the parameters beforehand, in units of the sigma of an
+    /// observation. Rows have a single block.
+    pub fn beside(mut self, given: Option<DMatrix<f64>>) -> Self {
+        debug_assert!(given.is_none() || self.widths.len() == 1);
+        self.given = given;
+        self
+    }
+
+    /// Whether something is known of the parameters beforehand.
+    pub fn has_given(&self) -> bool {
+        self.given.is_some()
     }
 
     /// Appends a row, its blocks one after the other.
@@ -60,16 +76,38 @@ impl Rows {
         &self.blocks[block][i * width..(i + 1) * width]
     }
 
-    /// Block `block` of all rows, rows by parameters.
+    /// Block `block` of all rows, rows by parameters; then the rows that are given.
     pub fn matrix(&self, block: usize) -> DMatrix<f64> {
-        DMatrix::from_row_slice(self.len, self.widths[block], &self.blocks[block])
+        let own = DMatrix::from_row_slice(self.len, self.widths[block], &self.blocks[block]);
+        stacked(own, self.given.as_ref())
     }
+
+    /// Information of the rows that are given.
+    fn given_information(&self, block: usize) -> DMatrix<f64> {
+        let p = self.widths[block];
+        let given = self.given.as_ref();
+        given.map_or_else(|| DMatrix::zeros(p, p), |g| g.transpose() * g)
+    }
+}
+
+/// The rows of `own`, then those of `below`.
+pub(super) fn stacked(own: DMatrix<f64>, below: Option<&DMatrix<f64>>) -> DMatrix<f64> {
+    let Some(below) = below else {
+        return own;
+    };
+    let n = own.nrows();
+    DMatrix::from_fn(n + below.nrows(), own.ncols(), |i, j| match i < n {
+        true => own[(i, j)],
+        false => below[(i - n, j)],
+    })
 }
 
 /// Smallest share of a squared regressor that the other regressors may leave unexplained; below it the design
 /// is singular. It is the inverse square of the condition 1e5 at which an estimator refuses
 /// ([`crate::estimate::least_squares::UNDETERMINED`]).
 const SINGULAR: f64 = 1e-10;
+/// The same beside given rows: a fit with a prior refuses none for its condition, so only rounding limits it (p times 2e-16).
+const SINGULAR_BESIDE: f64 = 1e-13;
 
 /// Inverse of an information matrix `Σ w f f'`, block by block, with the logarithm of the determinant.
 #[derive(Debug, Clone)]
@@ -83,8 +121,13 @@ impl Inverse {
     pub fn of(rows: &Rows, weighted: impl Iterator<Item = (usize, f64)> + Clone) -> Option<Self> {
         let mut blocks = Vec::with_capacity(rows.widths.len());
         let mut log_det = 0.0;
+        let singular = if rows.has_given() {
+            SINGULAR_BESIDE
+        } else {
+            SINGULAR
+        };
         for (b, &p) in rows.widths.iter().enumerate() {
-            let mut m = DMatrix::<f64>::zeros(p, p);
+            let mut m = rows.given_information(b);
             for (i, weight) in weighted.clone() {
                 let f = rows.row(b, i);
                 for r in 0..p {
@@ -98,7 +141,7 @@ impl Inverse {
             let l = cholesky.l_dirty();
             for k in 0..p {
                 let pivot = l[(k, k)] * l[(k, k)];
-                if !(pivot > SINGULAR * diagonal[k]) {
+                if !(pivot > singular * diagonal[k]) {
                     return None;
                 }
                 log_det += pivot.ln();
@@ -108,13 +151,17 @@ impl Inverse {
         Some(Self { blocks, log_det })
     }
 
-    /// Of a millionth of the unit matrix, which a random design starts from.
-    pub(super) fn ridge(widths: &[usize]) -> Self {
-        let diagonal = |&p: &usize| DMatrix::from_diagonal_element(p, p, 1e6);
-        Self {
-            blocks: widths.iter().map(diagonal).collect(),
-            log_det: widths.iter().sum::<usize>() as f64 * 1e-6_f64.ln(),
+    /// Of a millionth of the unit matrix beside the given rows, which a random design starts from.
+    pub(super) fn ridge(rows: &Rows) -> Option<Self> {
+        let (mut blocks, mut log_det) = (Vec::new(), 0.0);
+        for (b, &p) in rows.widths.iter().enumerate() {
+            let m = rows.given_information(b) + DMatrix::from_diagonal_element(p, p, 1e-6);
+            let cholesky = m.cholesky()?;
+            let diagonal = cholesky.l_dirty().diagonal();
+            log_det += diagonal.iter().map(|d| 2.0 * d.ln()).sum::<f64>();
+            blocks.push(cholesky.inverse());
         }
+        Some(Self { blocks, log_det })
     }
 
     /// Logarithm of the determinant of the information matrix (not of its inverse).

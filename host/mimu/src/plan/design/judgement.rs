@@ -1,9 +1,11 @@
 //! What a set of settings determines, and how well.
 
+use super::aim;
 use super::information::{Inverse, Rows};
 use super::lack_of_fit::{Notice, notices};
 use super::model::{Parameter, Setting};
 use super::problem::Problem;
+use super::refinement::Region as _;
 use crate::estimate::least_squares::Observability;
 
 /// Half of a 95 % interval in sigmas, where the noise of a dwell mean is known.
@@ -31,20 +33,23 @@ pub struct Judgement {
     /// The settings, one a dwell, in the order given.
     pub settings: Vec<Setting>,
     /// `det(F'F/n)`, fang (22), of one sensor where all three have the same regressors, else the product over
-    /// them.
+    /// them. Not a number beside a population, whose part does not grow with n.
     pub determinant: f64,
-    /// D-efficiency against the continuous optimum over the reach: 1 is the best possible, 0 is singular.
+    /// D-efficiency against the continuous optimum over the reach: 1 is the best possible, 0 is singular. Not a number beside a population: the
+    /// optimum then depends on the number of dwells and their noise.
     pub d_efficiency: f64,
     /// Sigma of a dwell mean, SI, from which the sigmas of the parameters follow.
     pub sigma: f64,
-    /// All parameters of the triad.
+    /// All parameters of the triad. If a person takes the poses with a stated error ([`Problem::aim`]), a sigma is the median over such poses, and all else
+    /// is that of the poses as planned.
     pub parameters: Vec<Determined>,
     /// Geometric mean of the semi-axes of the parameters' one-sigma ellipsoid, normalised: what the criterion
     /// minimises. Infinite if singular.
     pub mean_sigma: f64,
-    /// Largest over smallest singular value of F; infinite if singular.
+    /// Largest over smallest singular value of F, the rows of the population included; infinite if singular.
     pub condition: f64,
-    /// Residual degrees of freedom of a regression from different inputs: these reveal a wrong model.
+    /// Residual degrees of freedom of a regression from different inputs and the population: these reveal a wrong model, or a unit that is none of
+    /// the population.
     pub lack_of_fit_dof: usize,
     /// Residual degrees of freedom of a regression from repeated inputs: these show the noise, whatever the
     /// model.
@@ -54,13 +59,43 @@ pub struct Judgement {
 }
 
 impl Problem {
+    /// [`Judgement::mean_sigma`] of these settings.
+    pub(super) fn mean_sigma(&self, settings: &[Setting], sigma: f64) -> f64 {
+        self.mean_sigma_by(self.log_det_of(settings, self.given(sigma)), sigma)
+    }
+
+    fn mean_sigma_by(&self, log_det: f64, sigma: f64) -> f64 {
+        sigma * (-log_det / (2.0 * self.optimum.parameters as f64)).exp()
+    }
+
+    /// Puts the medians over a person's poses in place of the sigmas of `parameters`, which are those of a single regression.
+    fn as_taken(&self, settings: &[Setting], sigma: f64, parameters: &mut [Determined]) {
+        let given = self.given(sigma);
+        let mut found = vec![Vec::new(); parameters.len()];
+        for poses in aim::taken(settings, self.aim()) {
+            let rows = self.reach.rows(&poses).beside(given.clone());
+            let inverse = Inverse::of(&rows, (0..rows.len()).map(|i| (i, 1.0)));
+            for (k, found) in found.iter_mut().enumerate() {
+                let variance = inverse.as_ref().map(|i| i.block(0)[(k, k)]);
+                found.push(sigma * variance.map_or(f64::INFINITY, f64::sqrt));
+            }
+        }
+        for (parameter, found) in parameters.iter_mut().zip(found) {
+            // What the poses as planned do not determine, chance errors of a person must not.
+            if parameter.sigma.is_finite() {
+                parameter.sigma = aim::median(found);
+            }
+        }
+    }
+
     /// Judges `settings`, one dwell each, whose means have the sigma `sigma` (SI unit of the sensor).
     ///
-    /// They need not be within reach; the efficiency is against the optimum within reach.
+    /// They need not be within reach; the efficiency is against the optimum within reach. Without settings, the population alone is judged.
     pub fn judge(&self, settings: &[Setting], sigma: f64) -> Judgement {
         let model = &self.reach.model;
         let n = settings.len();
-        let log_det = self.log_det(settings);
+        let given = self.given(sigma);
+        let log_det = self.log_det_of(settings, given.clone());
         let p = self.optimum.parameters;
         let mut parameters = Vec::new();
         let mut condition = 0.0_f64;
@@ -69,7 +104,7 @@ impl Problem {
         for regression in 0..model.regressions() {
             let list = model.parameters(regression);
             width = list.len();
-            let mut rows = Rows::new(&[width]);
+            let mut rows = Rows::new(&[width]).beside(given.clone());
             let mut row = Vec::new();
             for s in settings {
                 row.clear();
@@ -96,17 +131,28 @@ impl Problem {
                 });
             }
         }
+        if self.aim() > 0.0 && n > 0 {
+            self.as_taken(settings, sigma, &mut parameters);
+        }
+        let (determinant, d_efficiency) = match &given {
+            Some(_) => (f64::NAN, f64::NAN),
+            None => (
+                (log_det - p as f64 * (n as f64).ln()).exp(),
+                self.optimum.efficiency(log_det, n),
+            ),
+        };
         Judgement {
             settings: settings.to_vec(),
-            determinant: (log_det - p as f64 * (n as f64).ln()).exp(),
-            d_efficiency: self.optimum.efficiency(log_det, n),
+            determinant,
+            d_efficiency,
             sigma,
             parameters,
-            mean_sigma: sigma * (-log_det / (2.0 * p as f64)).exp(),
+            mean_sigma: self.mean_sigma_by(log_det, sigma),
             condition,
-            lack_of_fit_dof: distinct.saturating_sub(width),
+            lack_of_fit_dof: (distinct + given.as_ref().map_or(0, |g| g.nrows()))
+                .saturating_sub(width),
             repetition_dof: n - distinct,
-            notices: notices(model, settings),
+            notices: notices(model, settings, given.as_ref()),
         }
     }
 }

@@ -6,6 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::information::stacked;
 use super::model::{Model, Setting, Term};
 
 /// Sigmas at which 90 % of recordings show an effect in a two-sided test at 5 %: 1.960 + 1.282.
@@ -29,24 +30,26 @@ pub struct Notice {
     pub size: Option<f64>,
 }
 
-/// Each term that `model` lacks and its sensor may have.
-pub fn notices(model: &Model, settings: &[Setting]) -> Vec<Notice> {
+/// Each term that `model` lacks and its sensor may have. Rows that are `given` ([`super::information::Rows::beside`]) contradict a term as dwells do.
+pub fn notices(model: &Model, settings: &[Setting], given: Option<&DMatrix<f64>>) -> Vec<Notice> {
     missing(model)
-        .map(|term| notice(model, settings, *term))
+        .map(|term| notice(model, settings, given, *term))
         .collect()
 }
 
 /// How much a design would notice of all terms that `model` lacks together: `ln det(1 + Z'(I - H)Z)`, summed
 /// over the regressions; what the potential terms of DuMouchel and Jones (Technometrics 36, 1994) add to the
 /// criterion.
-pub fn potential(model: &Model, settings: &[Setting]) -> f64 {
+pub fn potential(model: &Model, settings: &[Setting], given: Option<&DMatrix<f64>>) -> f64 {
     let of = |regression| {
         let fitted = columns(settings, |s, row| model.regressors(regression, s, row));
+        let fitted = stacked(fitted, given);
         let lacking = columns(settings, |s, row| {
             for term in missing(model) {
                 model.term(*term, regression, s, row);
             }
         });
+        let lacking = unseen_by(given, lacking);
         let mut basis = Vec::new();
         for column in fitted.column_iter() {
             extend(&mut basis, column.into_owned());
@@ -70,7 +73,14 @@ fn missing(model: &Model) -> impl Iterator<Item = &'static Term> {
         .filter(|t| !model.terms.contains(t))
 }
 
-fn notice(model: &Model, settings: &[Setting], term: Term) -> Notice {
+/// The columns of terms that the rows `given` know nothing of.
+fn unseen_by(given: Option<&DMatrix<f64>>, lacking: DMatrix<f64>) -> DMatrix<f64> {
+    let rows = given.map_or(0, DMatrix::nrows);
+    let zeros = DMatrix::zeros(rows, lacking.ncols());
+    stacked(lacking, Some(&zeros))
+}
+
+fn notice(model: &Model, settings: &[Setting], given: Option<&DMatrix<f64>>, term: Term) -> Notice {
     let mut found = Notice {
         term,
         parameters: 0,
@@ -79,7 +89,9 @@ fn notice(model: &Model, settings: &[Setting], term: Term) -> Notice {
     };
     for regression in 0..model.regressions() {
         let fitted = columns(settings, |s, row| model.regressors(regression, s, row));
+        let fitted = stacked(fitted, given);
         let lacking = columns(settings, |s, row| model.term(term, regression, s, row));
+        let lacking = unseen_by(given, lacking);
         found.parameters += lacking.ncols();
         let mut basis = Vec::new();
         for column in fitted.column_iter() {

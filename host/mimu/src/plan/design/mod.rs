@@ -7,7 +7,10 @@
 //! | [`exchange`], [`refinement`]  | exact designs of n dwells: on candidates, then between them              |
 //! | [`continuous`]                | the optimum that no n dwells can beat, with a proof of how near it is    |
 //! | [`judgement`], [`lack_of_fit`] | what a set of settings determines, how well, and what it would notice   |
+//! | [`population`]                | what the population of a unit's kind says beside the dwells               |
+//! | [`fewest`]                    | half-widths that a design predicts, and the fewest dwells that suffice   |
 //! | [`next_pose`]                 | what one more dwell adds to those that a unit has had                    |
+//! | `aim`                         | poses as a person takes them, near those of the plan                     |
 //! | [`tour`], [`budget`]          | order and time of a sequence; best use of a limited time                 |
 //! | [`schemes`]                   | published schemes                                                        |
 //! | [`problem`]                   | a model, what it can be measured with, and the best designs of it        |
@@ -29,14 +32,17 @@
 //! # Ok::<(), mimu_recording::error::Error>(())
 //! ```
 
+mod aim;
 pub mod budget;
 pub mod continuous;
 pub mod exchange;
+pub mod fewest;
 pub mod information;
 pub mod judgement;
 pub mod lack_of_fit;
 pub mod model;
 pub mod next_pose;
+pub mod population;
 pub mod problem;
 pub mod reach;
 pub mod refinement;

@@ -77,6 +77,13 @@ impl Term {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Terms(Vec<Term>);
 
+impl Terms {
+    /// Whether there are no others.
+    pub fn is_affine(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
 impl FromStr for Terms {
     type Err = String;
 

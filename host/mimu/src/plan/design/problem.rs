@@ -1,15 +1,17 @@
 //! A model, what it can be measured with, and the best designs of it.
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 
 use super::continuous::{Optimum, TOLERANCE};
 use super::information::{Inverse, Rows};
 use super::model::{Model, Setting};
+use super::population::Population;
 use super::reach::{Fixture, Rates, Reach};
 use super::refinement::{Region as _, refine};
 use super::{continuous, exchange, lack_of_fit};
 use crate::estimate::least_squares::Observability;
+use crate::estimate::magnitude::FEWEST_WITH_PRIOR;
 use crate::quantity::Sensor;
 use crate::quantity::plural;
 use mimu_recording::Reference;
@@ -24,6 +26,17 @@ pub struct Problem {
     pub optimum: Optimum<Setting>,
     candidates: Vec<Setting>,
     rows: Rows,
+    population: Option<Beside>,
+    /// How well a person takes the poses, rad about each level axis, one standard deviation; 0: exactly.
+    aim: f64,
+}
+
+/// The population beside which designs are made.
+#[derive(Debug, Clone)]
+struct Beside {
+    population: Population,
+    /// Sigma of a dwell mean, SI: it weighs the population against the dwells.
+    sigma: f64,
 }
 
 /// Random starts of a search. In 17 problems (5 to 40 dwells; affine, cubic, magnitude of gravity) 200 found
@@ -88,8 +101,82 @@ impl Problem {
                 optimum,
                 candidates,
                 rows,
+                population: None,
+                aim: 0.0,
             }),
             None => Err(undetermined(&reach, &rows)),
+        }
+    }
+
+    /// The same beside what the population of the unit's kind says of its parameters, for dwells whose means have the sigma `sigma`, SI, of a person who
+    /// takes poses with the standard deviation `aim`, rad, about each level axis.
+    ///
+    /// # Errors
+    /// The model or the fixture is none that a fit with a prior has: poses by hand, the affine model, the magnitude of gravity.
+    pub fn beside(self, population: Population, sigma: f64, aim: f64) -> Result<Self> {
+        let model = &self.reach.model;
+        let fits = model.sensor == Sensor::Accel
+            && model.reference == Reference::Gravity
+            && model.terms.is_empty()
+            && self.reach.fixture == Fixture::Hand;
+        if !fits {
+            return Err(Error::new(
+                format!("{}, {model}, {}", model.sensor, self.reach.fixture.name()),
+                "a prior is for the affine model of an accelerometer by hand, with gravity as the reference",
+                "leave the prior out",
+            ));
+        }
+        let population = Some(Beside { population, sigma });
+        Ok(Self {
+            population,
+            aim,
+            ..self
+        })
+    }
+
+    /// The same for dwells whose means have another sigma; only a population makes a difference.
+    pub fn at_sigma(&self, sigma: f64) -> Self {
+        let mut other = self.clone();
+        if let Some(beside) = &mut other.population {
+            beside.sigma = sigma;
+        }
+        other
+    }
+
+    /// The same without the population.
+    pub fn alone(&self) -> Self {
+        Self {
+            population: None,
+            ..self.clone()
+        }
+    }
+
+    /// How well a person takes the poses, rad about each level axis, one standard deviation; 0 if that is not counted.
+    pub fn aim(&self) -> f64 {
+        self.aim
+    }
+
+    /// The population beside which designs are made.
+    pub fn population(&self) -> Option<&Population> {
+        self.population.as_ref().map(|b| &b.population)
+    }
+
+    /// Rows of the population beside dwell means of this sigma.
+    pub(super) fn given(&self, sigma: f64) -> Option<DMatrix<f64>> {
+        self.population().map(|p| p.rows(sigma))
+    }
+
+    /// The same for the sigma that designs are made for.
+    fn own_given(&self) -> Option<DMatrix<f64>> {
+        let beside = self.population.as_ref()?;
+        Some(beside.population.rows(beside.sigma))
+    }
+
+    /// Fewest dwells of a design, whatever their inputs.
+    pub fn fewest(&self) -> usize {
+        match self.population {
+            Some(_) => FEWEST_WITH_PRIOR,
+            None => self.rows.widths().iter().max().copied().unwrap_or(0),
         }
     }
 
@@ -99,25 +186,29 @@ impl Problem {
     /// 0.97. Of equally good designs, one on different faces is taken, which people and fixtures can hold; else the
     /// one that would notice most of the terms that the model lacks ([`lack_of_fit::potential`]).
     pub fn best(&self, n: usize, seed: u64) -> Result<Vec<Setting>> {
+        if n < self.fewest() {
+            return Err(self.too_few(n));
+        }
+        let given = self.own_given();
         let plain = self.reach.plain();
         let faces: Vec<Setting> = plain
             .iter()
             .filter(|s| Fixture::Faces.reaches(&s.up))
             .copied()
             .collect();
-        let search = |from: &[Setting], rows: &Rows| -> Vec<Vec<Setting>> {
-            let found = exchange::search(rows, n, STARTS, seed);
+        let search = |from: &[Setting], rows: Rows| -> Vec<Vec<Setting>> {
+            let found = exchange::search(&rows.beside(given.clone()), n, STARTS, seed);
             found
                 .iter()
                 .map(|f| f.points.iter().map(|&i| from[i]).collect())
                 .collect()
         };
-        let on_faces = search(&faces, &self.reach.rows(&faces));
-        let on_plain = search(&plain, &self.reach.rows(&plain));
+        let on_faces = search(&faces, self.reach.rows(&faces));
+        let on_plain = search(&plain, self.reach.rows(&plain));
         let by_hand = self.reach.fixture == Fixture::Hand;
         let on_grid = match by_hand {
             true => Vec::new(),
-            false => search(&self.candidates, &self.rows),
+            false => search(&self.candidates, self.rows.clone()),
         };
         let refined = |designs: &[Vec<Setting>]| -> Vec<Vec<Setting>> {
             let each = designs.par_iter().take(REFINED);
@@ -136,7 +227,7 @@ impl Problem {
             let held = settings.iter().all(|s| Fixture::Faces.reaches(&s.up));
             match held && self.distinct(settings).len() == n {
                 true => f64::INFINITY,
-                false => lack_of_fit::potential(&self.reach.model, settings),
+                false => lack_of_fit::potential(&self.reach.model, settings, given.as_ref()),
             }
         };
         let equal = all
@@ -147,22 +238,34 @@ impl Problem {
         let best = valued
             .reduce(|a, b| if b.0 > a.0 { b } else { a })
             .map(|(_, settings)| settings);
-        best.ok_or_else(|| {
-            let p = self.rows.widths().iter().max().copied().unwrap_or(0);
-            Error::new(
-                format!("{}, {}", self.reach.model.sensor, self.reach.model),
-                format!(
-                    "{} cannot determine {p} parameters",
-                    plural(n as u64, "dwell")
-                ),
-                format!("design at least {p}"),
-            )
-        })
+        best.ok_or_else(|| self.too_few(n))
     }
 
-    /// Logarithm of `det F'F` of one dwell at each of the settings; minus infinity if singular.
+    fn too_few(&self, n: usize) -> Error {
+        let p = self.rows.widths().iter().max().copied().unwrap_or(0);
+        let beside = match self.population {
+            Some(_) => " beside a prior",
+            None => "",
+        };
+        let problem = format!(
+            "{} cannot determine {p} parameters{beside}",
+            plural(n as u64, "dwell")
+        );
+        let remedy = format!("design at least {}", self.fewest().max(n + 1).min(p));
+        Error::new(
+            format!("{}, {}", self.reach.model.sensor, self.reach.model),
+            problem,
+            remedy,
+        )
+    }
+
+    /// Logarithm of `det F'F` of one dwell at each of the settings, the population included; minus infinity if singular.
     pub fn log_det(&self, settings: &[Setting]) -> f64 {
-        let rows = self.reach.rows(settings);
+        self.log_det_of(settings, self.own_given())
+    }
+
+    pub(super) fn log_det_of(&self, settings: &[Setting], given: Option<DMatrix<f64>>) -> f64 {
+        let rows = self.reach.rows(settings).beside(given);
         let inverse = Inverse::of(&rows, (0..rows.len()).map(|i| (i, 1.0)));
         inverse.map_or(f64::NEG_INFINITY, |i| i.log_det())
     }

@@ -3,6 +3,7 @@
 mod brute_force;
 mod next_experiment;
 mod polynomials;
+mod population;
 mod schemes;
 mod sphere;
 mod time;

@@ -136,7 +136,7 @@ fn the_estimators_claim_the_sigmas_that_the_design_promised() {
 fn six_faces_cannot_notice_cubes_and_products() {
     let settings = Scheme::SixFace.settings(Sensor::Accel).unwrap();
     let model = Model::accel(Reference::Table, &Terms::default());
-    let found = lack_of_fit::notices(&model, &settings);
+    let found = lack_of_fit::notices(&model, &settings, None);
     let of = |term: Term| found.iter().find(|n| n.term == term).unwrap();
     // On faces x³ = x and xy = 0. x² is 1 on two faces and 0 on four: apart from the mean, 4/3 of its square remains.
     assert_eq!((of(Term::Cubic).noticed, of(Term::Cubic).size), (0, None));

@@ -1,0 +1,304 @@
+//! The command `mimu design --prior`: its output and its refusals.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// 0.8 % of 1665 counts per m/s², 4 mrad, 0.2 m/s².
+const SIZES: [f64; 9] = [13.32, 13.32, 13.32, 4e-3, 4e-3, 4e-3, 333.0, 333.0, 333.0];
+const NAMES: [&str; 9] = [
+    "scale_x",
+    "scale_y",
+    "scale_z",
+    "non_orthogonality_yz",
+    "non_orthogonality_zy",
+    "non_orthogonality_zx",
+    "bias_x",
+    "bias_y",
+    "bias_z",
+];
+
+/// A prior of `sensor` whose parameters are independent.
+fn kind(sensor: &str, reference: &str, biases: bool) -> String {
+    let mean = [1665.0, 1665.0, 1665.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let mut text = format!(
+        "format = \"mimu-prior/1\"\ntool = \"test\"\nraw_unit = \"count\"\nreference = \"{reference}\"\nbiases = {biases}\n[{sensor}]\nunits = 60\n\
+         parameters = {NAMES:?}\nparameter_units = {:?}\nmean = {mean:?}\nsigma = {SIZES:?}\ncovariance = [\n",
+        [""; 9]
+    );
+    for (i, size) in SIZES.iter().enumerate() {
+        let row: [f64; 9] = std::array::from_fn(|j| if i == j { size * size } else { 0.0 });
+        writeln!(text, "{row:?},").unwrap();
+    }
+    text + "]\n"
+}
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let files = [
+        ("kind.toml", kind("accel", "gravity", true)),
+        ("unbiased.toml", kind("accel", "gravity", false)),
+        ("gyro.toml", kind("gyro", "gravity", true)),
+        ("table.toml", kind("accel", "table", true)),
+        ("nonsense.toml", "one = two".into()),
+        ("plan.toml", "format = \"mimu-plan/1\"\n".into()),
+        (
+            "negative.toml",
+            kind("accel", "gravity", true).replace("177.4", "-177.4"),
+        ),
+        (
+            "short.toml",
+            kind("accel", "gravity", true).replace("\"bias_z\"]", "]"),
+        ),
+    ];
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+fn mimu(folder: &Path, arguments: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
+    command
+        .current_dir(folder)
+        .arg("design")
+        .args(arguments.split(' '));
+    command.output().unwrap()
+}
+
+fn text(folder: &Path, arguments: &str) -> String {
+    let out = mimu(folder, arguments);
+    let error = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(out.status.success(), "{arguments}: {error}");
+    String::from_utf8(out.stdout).unwrap()
+}
+
+fn json(folder: &Path, arguments: &str) -> serde_json::Value {
+    serde_json::from_str(&text(folder, &format!("{arguments} --json -"))).unwrap()
+}
+
+#[test]
+fn six_poses_are_designed_beside_the_population_alone() {
+    let folder = folder();
+    let design = json(folder.path(), "--prior kind.toml -n 6 --sigma 0.0015");
+    assert_eq!(design["positions"].as_array().unwrap().len(), 6);
+    assert_eq!(
+        (&design["reference"], &design["table"]),
+        (&"gravity".into(), &"hand".into())
+    );
+    assert_eq!(design["prior"]["units"], 60);
+    // The optimum depends on the number of dwells.
+    assert!(design["d_efficiency"].is_null() && design["optimum"]["determinant"].is_null());
+    let known = [
+        ("C_yy", 1.96 * 0.008),
+        ("C_zx", 1.96 * 4e-3),
+        ("o_z", 1.96 * 0.2),
+    ];
+    for (name, half) in known {
+        let all = design["sigma_per_parameter"].as_array().unwrap();
+        let found = all.iter().find(|p| p["name"] == name).unwrap();
+        let alone = found["population_half_width_95"].as_f64().unwrap();
+        assert!((alone / half - 1.0).abs() < 1e-4, "{name}: {alone}");
+        // Six faces leave the angles to the population.
+        let share = found["half_width_95"].as_f64().unwrap() / alone;
+        assert!(
+            share <= 1.0 && (share < 0.1 || name == "C_zx"),
+            "{name}: {share}"
+        );
+    }
+    // Nine dwells at least without a prior.
+    assert!(design["prior"]["dwells_without"].as_u64().unwrap() >= 9);
+    let by = design["prior"]["by_dwells"].as_array().unwrap();
+    let six = by.iter().find(|b| b["dwells"] == 6).unwrap();
+    assert!(six["without"].is_null() && six["with"]["scale"].is_number());
+    assert!(by.iter().find(|b| b["dwells"] == 9).unwrap()["without"]["scale"].is_number());
+    // Without a prior nothing has changed.
+    let without = json(folder.path(), "-n 12 --table hand");
+    assert!(without["d_efficiency"].is_number() && without.get("prior").is_none());
+    assert!(
+        without["sigma_per_parameter"][0]
+            .get("population_half_width_95")
+            .is_none()
+    );
+}
+
+#[test]
+fn without_a_number_the_plan_has_the_fewest_dwells_for_the_targets() {
+    let folder = folder();
+    let of = |arguments: &str| {
+        let design = json(
+            folder.path(),
+            &format!("--prior kind.toml --sigma 0.0015{arguments}"),
+        );
+        let dwells = design["positions"].as_array().unwrap().len();
+        let widest = |start: &str, wanted: &dyn Fn(&str) -> bool| {
+            let all = design["sigma_per_parameter"].as_array().unwrap().iter();
+            all.filter(|p| {
+                let name = p["name"].as_str().unwrap();
+                name.starts_with(start) && wanted(name)
+            })
+            .map(|p| p["half_width_95"].as_f64().unwrap())
+            .fold(0.0, f64::max)
+        };
+        let scale = widest("C_", &|n| n.as_bytes()[2] == n.as_bytes()[3]);
+        (dwells, scale, widest("o_", &|_| true))
+    };
+    let (dwells, scale, bias) = of("");
+    assert!(scale <= 1e-3 && bias <= 1e-3 * 9.80665, "{scale} {bias}");
+    let (fewer, coarse, _) =
+        of(" --target accel-scale=5000 --target accel-angle=9000 --target accel-bias=5");
+    assert!(
+        fewer < dwells && coarse <= 5e-3,
+        "{fewer} {dwells} {coarse}"
+    );
+    // The plan is that of a person, as without a prior.
+    text(
+        folder.path(),
+        "--prior kind.toml --sigma 0.0015 -o made.toml",
+    );
+    let plan: toml::Table = fs::read_to_string(folder.path().join("made.toml"))
+        .unwrap()
+        .parse()
+        .unwrap();
+    assert_eq!(plan["carrier"].as_str(), Some("hands"));
+    assert_eq!(plan["step"].as_array().unwrap().len(), dwells);
+}
+
+#[test]
+fn a_budget_and_a_scheme_count_the_prior() {
+    let folder = folder();
+    let budget = json(folder.path(), "--prior kind.toml --budget 1");
+    assert!(budget["time_s"].as_f64().unwrap() <= 60.0);
+    let ways = budget["budget"]["ways"].as_array().unwrap();
+    assert_eq!(ways[0]["dwells_a_pass"], 3);
+    let scheme = json(folder.path(), "--prior kind.toml --scheme six-face");
+    assert_eq!(scheme["undetermined"].as_array().unwrap().len(), 0);
+    // Faces do not show angles: these remain what the population says.
+    let all = scheme["sigma_per_parameter"].as_array().unwrap();
+    let angle = all.iter().find(|p| p["name"] == "C_zy").unwrap();
+    let share = angle["half_width_95"].as_f64().unwrap()
+        / angle["population_half_width_95"].as_f64().unwrap();
+    assert!(share > 0.9, "{share}");
+}
+
+#[test]
+fn people_read_both_half_widths_in_a_hundred_columns() {
+    let folder = folder();
+    for arguments in [
+        "--prior kind.toml",
+        "--prior kind.toml -n 3",
+        "--prior kind.toml -n 6 --noise 0.001",
+        "--prior unbiased.toml -n 20",
+        "--prior kind.toml --budget 5",
+        "--prior kind.toml --scheme six-face",
+    ] {
+        let short = text(folder.path(), arguments);
+        assert!(short.lines().count() <= 30, "{arguments}: {short}");
+        let long = text(folder.path(), &format!("{arguments} --verbose"));
+        for line in short.lines().chain(long.lines()) {
+            assert!(line.chars().count() <= 100, "{arguments}: {line}");
+        }
+        for says in ["of 60 units", "gyro", "brackets"] {
+            assert!(
+                short.contains(says) && long.contains(says),
+                "{says}: {short}"
+            );
+        }
+        assert!(!short.contains("NaN") && !long.contains("NaN"), "{long}");
+    }
+    let six = text(folder.path(), "--prior kind.toml -n 6");
+    // 1.96 × 0.8 %, 4 mrad, 20.4 mg.
+    for says in ["[15680]", "[7840]", "[40.0]"] {
+        assert!(six.contains(says), "{says}: {six}");
+    }
+    let open = text(folder.path(), "--prior unbiased.toml -n 6");
+    assert!(
+        open.contains("[open]") && open.contains("nothing of the biases"),
+        "{open}"
+    );
+}
+
+#[test]
+fn what_a_prior_is_not_for_is_refused_by_its_name() {
+    let folder = folder();
+    let cases = [
+        (
+            "--prior kind.toml --table three-axis",
+            1,
+            "--table three-axis with --prior",
+        ),
+        ("--prior kind.toml --table two-axis -n 9", 1, "by hand"),
+        (
+            "--prior kind.toml --table faces -n 9",
+            1,
+            "leave --table out",
+        ),
+        (
+            "--prior kind.toml --reference table",
+            1,
+            "--reference table with --prior",
+        ),
+        (
+            "--prior kind.toml --reference turntable-rate",
+            1,
+            "--reference turntable-rate",
+        ),
+        ("--prior kind.toml --sensor gyro", 1, "turns between dwells"),
+        ("--prior kind.toml --compare", 1, "--scheme"),
+        (
+            "--prior kind.toml --effects accel_warm_up",
+            1,
+            "leave --prior out",
+        ),
+        (
+            "--prior kind.toml --effects accel_warm_up --chamber 20,0,40",
+            1,
+            "leave --prior out",
+        ),
+        (
+            "--prior kind.toml -n 12 --model affine,quadratic",
+            1,
+            "leave --model out",
+        ),
+        ("--prior kind.toml -n 12 --rates 100", 1, "at rest"),
+        ("--prior kind.toml -n 1", 1, "at least 3"),
+        ("--prior kind.toml -n 2", 1, "at least 3"),
+        ("--prior kind.toml -n 0", 2, "whole number, 1 to 200"),
+        ("--prior kind.toml --poses 1", 2, "unexpected argument"),
+        ("--prior gyro.toml", 1, "gyro.toml: it has no accelerometer"),
+        ("--prior table.toml", 1, "table.toml: its reference"),
+        ("--prior nonsense.toml", 1, "nonsense.toml"),
+        ("--prior plan.toml", 1, "this is a plan"),
+        ("--prior negative.toml", 1, "negative.toml, [accel]"),
+        ("--prior short.toml", 1, "short.toml, [accel]"),
+        ("--prior missing.toml", 1, "missing.toml"),
+        ("--prior kind.toml -o kind.toml", 1, "kind.toml"),
+        ("--prior kind.toml --target accel-scale=0.001", 1, "--dwell"),
+        ("--prior kind.toml --target gyro-bias=1", 1, "mimu wizard"),
+        ("--prior kind.toml --target accel-size=1", 1, "unknown"),
+        ("--prior kind.toml --target accel-bias=-1", 1, "above 0"),
+        (
+            "--prior kind.toml -n 6 --target accel-bias=1",
+            2,
+            "cannot be used with",
+        ),
+        ("-n 12 --target accel-bias=1", 2, "cannot be used with"),
+        ("--target accel-bias=1", 2, "--prior"),
+    ];
+    for (arguments, status, says) in cases {
+        let out = mimu(folder.path(), arguments);
+        let error = String::from_utf8(out.stderr).unwrap();
+        assert_eq!(out.status.code(), Some(status), "{arguments}: {error}");
+        assert!(error.contains(says), "{arguments}: {error}");
+        assert!(
+            status == 2 || error.lines().count() == 1,
+            "{arguments}: {error}"
+        );
+        assert!(out.stdout.is_empty(), "{arguments}");
+    }
+    assert_eq!(
+        fs::read_to_string(folder.path().join("kind.toml")).unwrap(),
+        kind("accel", "gravity", true)
+    );
+}

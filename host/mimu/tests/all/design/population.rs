@@ -1,0 +1,278 @@
+//! Designs beside the population of a unit's kind, against formulas of this file.
+
+use mimu::plan::design::fewest::Widths;
+use mimu::plan::design::judgement::Judgement;
+use mimu::plan::design::model::Setting;
+use mimu::plan::design::population::Population;
+use mimu::plan::design::reach::Fixture;
+use mimu::plan::design::{Problem, model::Model};
+use mimu::prior::{Prior, PriorTable};
+use mimu::quantity::{PerSensor, Sensor};
+use mimu_recording::{RawUnit, Reference};
+use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
+
+use super::{close, terms};
+
+const G: f64 = 9.80665;
+/// Scale factors in counts per m/s², sines of the angles between the axes, biases in counts.
+const MEAN: [f64; 9] = [
+    1600.0, 1700.0, 1650.0, 0.03, -0.02, 0.05, 3000.0, -2000.0, 5000.0,
+];
+const SIZES: [f64; 9] = [16.0, 14.0, 13.0, 4e-3, 5e-3, 3e-3, 300.0, 350.0, 280.0];
+
+type Nine = SVector<f64, 9>;
+
+/// Covariance of a population whose scale factors correlate by a half.
+fn covariance(size: f64) -> DMatrix<f64> {
+    let correlation = |i: usize, j: usize| match (i, j) {
+        _ if i == j => 1.0,
+        (0..3, 0..3) => 0.5,
+        _ => 0.0,
+    };
+    DMatrix::from_fn(9, 9, |i, j| {
+        size * size * correlation(i, j) * SIZES[i] * SIZES[j]
+    })
+}
+
+fn prior(covariance: &DMatrix<f64>) -> Prior {
+    let of = [0, 1, 2, 6, 7, 8, 9, 10, 11];
+    let table = PriorTable::new(Sensor::Accel, RawUnit::Count, 50, &of, &MEAN, covariance);
+    let tables = PerSensor {
+        gyro: None,
+        accel: Some(table),
+    };
+    Prior::new("test".into(), RawUnit::Count, Reference::Gravity, tables)
+}
+
+fn by_hand() -> Problem {
+    let model = Model::accel(Reference::Gravity, &terms("affine"));
+    Problem::accel(model, Fixture::Hand).unwrap()
+}
+
+fn beside(prior: &Prior, sigma: f64) -> Problem {
+    let population = Population::of(prior, "kind.toml").unwrap();
+    by_hand().beside(population, sigma, 0.0).unwrap()
+}
+
+/// `P = K Mo`, `Mo` of unit rows, and the bias: docs/estimation, written out here.
+fn unit(t: &Nine) -> (Matrix3<f64>, Vector3<f64>) {
+    let [yz, zy, zx] = [t[3].sin(), t[4].sin(), t[5].sin()];
+    let mo = Matrix3::new(
+        1.0,
+        0.0,
+        0.0,
+        yz,
+        (1.0 - yz * yz).sqrt(),
+        0.0,
+        -zy,
+        zx,
+        (1.0 - zy * zy - zx * zx).sqrt(),
+    );
+    let k = Matrix3::from_diagonal(&Vector3::new(t[0], t[1], t[2]));
+    (k * mo, Vector3::new(t[6], t[7], t[8]))
+}
+
+/// Derivatives of `of` by the nine parameters at the mean, by central differences.
+fn slopes<const N: usize>(of: impl Fn(&Nine) -> SVector<f64, N>) -> SMatrix<f64, N, 9> {
+    let mean = Nine::from(MEAN);
+    let mut by = SMatrix::<f64, N, 9>::zeros();
+    for k in 0..9 {
+        let mut step = Nine::zeros();
+        step[k] = 1e-3 * SIZES[k];
+        by.set_column(
+            k,
+            &((of(&(mean + step)) - of(&(mean - step))) / (2.0 * step[k])),
+        );
+    }
+    by
+}
+
+/// Sigmas of `(1 + D) x + d` in the order C_xx, C_yx, C_yy, C_zx, C_zy, C_zz, o of a fit with the population, from the definition of a reading.
+fn expected(settings: &[Setting], sigma: f64, covariance: &DMatrix<f64>) -> [f64; 9] {
+    let (p0, b0) = unit(&MEAN.into());
+    let covariance = SMatrix::<f64, 9, 9>::from_fn(|i, j| covariance[(i, j)]);
+    let mut information = covariance.try_inverse().unwrap();
+    for setting in settings {
+        let reading = p0 * setting.up * G + b0;
+        let row = slopes(|t| {
+            let (p, b) = unit(t);
+            SVector::<f64, 1>::new((p.try_inverse().unwrap() * (reading - b)).norm())
+        });
+        information += row.transpose() * row / (sigma * sigma);
+    }
+    let to_design = slopes(|t| {
+        let (p, b) = unit(t);
+        let inverse = p.try_inverse().unwrap();
+        let (d, o) = (inverse * p0, inverse * (b0 - b));
+        Nine::from([
+            d[(0, 0)],
+            d[(1, 0)],
+            d[(1, 1)],
+            d[(2, 0)],
+            d[(2, 1)],
+            d[(2, 2)],
+            o[0],
+            o[1],
+            o[2],
+        ])
+    });
+    let posterior = to_design * information.try_inverse().unwrap() * to_design.transpose();
+    std::array::from_fn(|k| posterior[(k, k)].sqrt())
+}
+
+fn sigmas(judged: &Judgement) -> [f64; 9] {
+    std::array::from_fn(|k| judged.parameters[k].sigma * judged.parameters[k].parameter.si)
+}
+
+#[test]
+fn sigmas_are_those_of_a_fit_by_the_definition_of_a_reading() {
+    let (sigma, covariance) = (2e-3, covariance(1.0));
+    let problem = beside(&prior(&covariance), sigma);
+    for n in [0, 3, 6, 9, 12] {
+        let settings = match n {
+            0 => Vec::new(),
+            _ => problem.best(n, 1).unwrap(),
+        };
+        let judged = sigmas(&problem.judge(&settings, sigma));
+        for (k, (judged, expected)) in judged
+            .iter()
+            .zip(expected(&settings, sigma, &covariance))
+            .enumerate()
+        {
+            assert!(
+                close(*judged, expected, 1e-4),
+                "{n}, {k}: {judged} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_wide_population_says_nothing_and_a_narrow_one_everything() {
+    let sigma = 2e-3;
+    let alone = by_hand();
+    let settings = alone.best(12, 1).unwrap();
+    let without = sigmas(&alone.judge(&settings, sigma));
+    let wide = sigmas(&beside(&prior(&covariance(1e4)), sigma).judge(&settings, sigma));
+    let narrow = beside(&prior(&covariance(1e-5)), sigma);
+    let before = sigmas(&narrow.judge(&[], sigma));
+    let after = sigmas(&narrow.judge(&settings, sigma));
+    for k in 0..9 {
+        assert!(close(wide[k], without[k], 1e-4), "{k}");
+        assert!(close(after[k], before[k], 1e-3), "{k}");
+    }
+}
+
+#[test]
+fn the_search_finds_the_best_three_poses_of_all() {
+    let sigma = 2e-3;
+    let problem = beside(&prior(&covariance(1.0)), sigma);
+    let found = problem.log_det(&problem.best(3, 1).unwrap());
+    let plain = problem.reach.plain();
+    let mut most = f64::NEG_INFINITY;
+    for i in 0..plain.len() {
+        for j in i..plain.len() {
+            for k in j..plain.len() {
+                most = most.max(problem.log_det(&[plain[i], plain[j], plain[k]]));
+            }
+        }
+    }
+    assert!((found - most).abs() < 1e-9, "{found} {most}");
+}
+
+#[test]
+fn more_dwells_and_quieter_ones_leave_less_open() {
+    let problem = beside(&prior(&covariance(1.0)), 2e-3);
+    let width = |n: usize, sigma: f64| {
+        let at = problem.at_sigma(sigma);
+        Widths::of(&at.judge(&at.best(n, 1).unwrap(), sigma))
+    };
+    let (three, six, quiet) = (width(3, 2e-3), width(6, 2e-3), width(6, 2e-4));
+    assert!(six.meet(&three) && !three.meet(&six));
+    assert!(quiet.meet(&six) && !six.meet(&quiet));
+    // Fewest: one dwell fewer does not do.
+    let wanted = Widths {
+        bias: 5e-3,
+        scale: 1e-3,
+        // Wider than the population's.
+        angle: 0.012,
+    };
+    let enough = |j: &Judgement| Widths::of(j).meet(&wanted);
+    let with = problem.fewest_with(2e-3, 1, enough).unwrap();
+    let without = by_hand().fewest_with(2e-3, 1, enough).unwrap();
+    assert!(with < without, "{with} {without}");
+    assert!(width(with, 2e-3).meet(&wanted) && !width(with - 1, 2e-3).meet(&wanted));
+}
+
+#[test]
+fn a_prior_without_biases_leaves_them_to_the_dwells() {
+    let sigma = 2e-3;
+    let mut kind = prior(&covariance(1.0));
+    kind.biases = false;
+    let problem = beside(&kind, sigma);
+    let before = sigmas(&problem.judge(&[], sigma));
+    assert!(before[..6].iter().all(|s| s.is_finite()));
+    assert!(before[6..].iter().all(|s| s.is_infinite()), "{before:?}");
+    let three = sigmas(&problem.judge(&problem.best(3, 1).unwrap(), sigma));
+    assert!(three.iter().all(|s| s.is_finite()), "{three:?}");
+}
+
+#[test]
+fn what_a_fit_with_a_prior_refuses_is_no_design() {
+    let kind = prior(&covariance(1.0));
+    let population = || Population::of(&kind, "kind.toml").unwrap();
+    // A fit needs three poses beside a prior.
+    let two = beside(&kind, 2e-3).best(2, 1).unwrap_err().to_string();
+    assert!(two.contains("at least 3"), "{two}");
+    let table = Model::accel(Reference::Table, &terms("affine"));
+    let table = Problem::accel(table, Fixture::ThreeAxis).unwrap();
+    let refused = table
+        .beside(population(), 2e-3, 0.0)
+        .unwrap_err()
+        .to_string();
+    assert!(refused.contains("by hand"), "{refused}");
+    let mut on_a_table = kind.clone();
+    on_a_table.reference = Reference::Table;
+    let refused = Population::of(&on_a_table, "kind.toml").unwrap_err();
+    assert!(
+        refused
+            .to_string()
+            .starts_with("kind.toml: its reference is \"table\""),
+        "{refused}"
+    );
+    let mut gyro_only = kind.clone();
+    gyro_only.gyro = gyro_only.accel.take();
+    let refused = Population::of(&gyro_only, "kind.toml").unwrap_err();
+    assert!(
+        refused.to_string().contains("no accelerometer"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_term_beyond_the_model_shows_against_the_population_too() {
+    let sigma = 2e-3;
+    let settings = by_hand().best(9, 1).unwrap();
+    let size = |problem: &Problem| problem.judge(&settings, sigma).notices[0].size;
+    // Nine dwells for nine parameters have no residuals.
+    assert_eq!(size(&by_hand()), None);
+    let [wide, narrow] = [1.0, 0.01].map(|s| size(&beside(&prior(&covariance(s)), sigma)).unwrap());
+    assert!(narrow < 0.1 * wide, "{narrow} {wide}");
+}
+
+#[test]
+fn a_persons_error_of_a_pose_matters_to_few_poses_only() {
+    let sigma = 2e-3;
+    let kind = prior(&covariance(1.0));
+    let population = || Population::of(&kind, "kind.toml").unwrap();
+    let width = |n: usize, aim_deg: f64| {
+        let problem = by_hand().beside(population(), sigma, f64::to_radians(aim_deg));
+        let problem = problem.unwrap();
+        Widths::of(&problem.judge(&problem.best(n, 1).unwrap(), sigma)).scale
+    };
+    // Six faces show scale factors and biases. The angles, which these dwells leave open, enter by the error of the poses.
+    assert!(close(width(6, 1e-3), width(6, 0.0), 1e-3));
+    assert!(width(6, 3.0) > 1.3 * width(6, 0.0));
+    assert!(width(6, 6.0) > 1.5 * width(6, 3.0));
+    assert!(close(width(16, 3.0), width(16, 0.0), 0.05));
+}
