@@ -21,7 +21,7 @@ from mimu._design import (
 from mimu._diagnosis import Coefficient, Diagnosis, Effect, Leftover, NotExcited, Rejected, SensorDiagnosis, diagnose
 from mimu._error import Error
 from mimu._files import Export, SensorVerification, Verification, export, load, load_noise, verify
-from mimu._fit import Dwell, Figures, Fit, Parameter, SensorFit, fit
+from mimu._fit import Dwell, Figures, Fit, Parameter, SensorFit, SessionsFit, fit, fit_sessions
 from mimu._mimu import Calibration, Noise, Recording
 from mimu._noise_in_use import Cause, Consistency, Density, Nees, NoiseInUse, noise_in_use
 from mimu._recording import read
@@ -33,6 +33,6 @@ __all__ = [
     "Allan", "Calibration", "Cause", "Channel", "Coefficient", "CoefficientSigma", "Consistency", "Density", "Design", "Diagnosis", "Dwell",
     "Effect", "Error", "Export", "Figures", "Fit", "Judgement", "Leftover", "Message", "Nees", "NextExperiment", "Noise",
     "NoiseCoefficient", "NoiseInUse", "NotExcited", "Parameter", "ParameterSigma", "Recording", "Rejected", "SchemeComparison",
-    "SensorDiagnosis", "SensorFit", "SensorVerification", "Shown", "Verification", "allan", "compare_schemes", "design", "diagnose",
-    "export", "fit", "load", "load_noise", "next_experiment", "noise_in_use", "read", "thermal", "verify",
+    "SensorDiagnosis", "SensorFit", "SensorVerification", "SessionsFit", "Shown", "Verification", "allan", "compare_schemes", "design", "diagnose",
+    "export", "fit", "fit_sessions", "load", "load_noise", "next_experiment", "noise_in_use", "read", "thermal", "verify",
 ]

@@ -242,6 +242,7 @@ def fit(
     steps: Steps | None = None,
     keep: Keep | None = None,
     noise: Noise | None = None,
+    prior: str | os.PathLike[str] | None = None,
 ) -> Fit:
     """Calibrates the gyro and the accelerometer of a recording, as ``mimu fit`` does.
 
@@ -263,6 +264,8 @@ def fit(
         Dwells to use although the others contradict them.
     noise : Noise, optional
         Noise of the unit at rest: ``mimu.allan(...).noise``, or from :func:`mimu.load_noise`.
+    prior : path, optional
+        Population of the unit's kind, as ``mimu fleet --prior`` writes it: it determines what few poses leave open.
 
     Returns
     -------
@@ -280,7 +283,76 @@ def fit(
     >>> fit.judgement.kind, fit.gyro.parameters["scale_x"].value
     """
     return Fit(
-        _mimu.fit(recording, holdout=holdout, method=method, only=only, still=still, steps=steps, keep=_keep(keep), noise=noise)
+        _mimu.fit(recording, holdout=holdout, method=method, only=only, still=still, steps=steps, keep=_keep(keep), noise=noise, prior=prior)
+    )
+
+
+class SessionsFit(Result):
+    """One calibration of several sessions of a unit, with what the next power-on makes of it."""
+
+    _native: _mimu.SessionsFit
+    _questions = ("json", "text", "html", "calibration")
+
+    #: By sensor, then by name as ``"bias_x"``: ``value`` with ``lower`` and ``upper`` of the expected value, ``next_power_on`` with the interval of tomorrow, and
+    #: ``between_sigma``. As in the JSON of ``mimu fit``.
+    parameters: dict[str, dict[str, dict[str, Any]]]
+    #: What does not fit one set of constant parameters, in sentences.
+    findings: list[str]
+    #: Whether it may be used.
+    judgement: Judgement
+    device: str
+
+    def __init__(self, native: _mimu.SessionsFit) -> None:
+        super().__init__(native)
+        data = self.to_dict()
+        self.parameters = {name: {p["name"]: p for p in sensor["parameters"]} for name, sensor in data["sensors"].items()}
+        self.findings = data["findings"]
+        self.judgement = judged(data)
+        self.device = data["device"]
+
+    @property
+    def calibration(self) -> Calibration:
+        """The calibration, to apply, save or export: with the intervals of the next power-on."""
+        return self._native.calibration()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the calibration file, as ``mimu fit -o`` does: whole or not at all."""
+        self.calibration.save(path)
+
+    def __str__(self) -> str:
+        return self._native.text()
+
+    def __repr__(self) -> str:
+        return f"<mimu.SessionsFit of {self.device!r}: {self.judgement}>"
+
+
+def fit_sessions(
+    recordings: Sequence[Recording],
+    *,
+    part_class: Literal["consumer", "tactical"] = "consumer",
+    holdout: int = 4,
+    still: float | None = None,
+    steps: Steps | None = None,
+    noise: Noise | None = None,
+) -> SessionsFit:
+    """Makes one calibration of several sessions of a unit, as ``mimu fit S1 S2 ...`` does.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        In the order in which they took place. The unit was switched off between them.
+    part_class : {"consumer", "tactical"}
+        How much such parts change between power-ons: used for one or two sessions.
+    holdout, still, steps, noise
+        As for :func:`mimu.fit`.
+
+    Returns
+    -------
+    SessionsFit
+        Look at ``judgement`` and ``findings`` first; ``parameters["gyro"]["bias_x"]["next_power_on"]`` is the interval of tomorrow.
+    """
+    return SessionsFit(
+        _mimu.fit_sessions(list(recordings), part_class=part_class, holdout=holdout, still=still, steps=steps, noise=noise)
     )
 
 

@@ -127,6 +127,13 @@ class Fit:
     def calibration(self) -> Calibration: ...
 
 @final
+class SessionsFit:
+    def json(self) -> str: ...
+    def text(self) -> str: ...
+    def html(self) -> str: ...
+    def calibration(self) -> Calibration: ...
+
+@final
 class Diagnosis:
     def json(self) -> str: ...
     def text(self, everything: bool) -> str: ...
@@ -196,7 +203,17 @@ def fit(
     steps: str | None,
     keep: str | Sequence[int] | None,
     noise: Noise | None,
+    prior: str | os.PathLike[str] | None,
 ) -> Fit: ...
+def fit_sessions(
+    recordings: list[Recording],
+    *,
+    part_class: str,
+    holdout: int,
+    still: float | None,
+    steps: str | None,
+    noise: Noise | None,
+) -> SessionsFit: ...
 def diagnose(
     recordings: list[Recording],
     *,

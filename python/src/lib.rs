@@ -46,7 +46,7 @@ mod _mimu {
     #[pymodule_export]
     use super::export::{Export, export};
     #[pymodule_export]
-    use super::fit::{Fit, fit};
+    use super::fit::{Fit, SessionsFit, fit, fit_sessions};
     #[pymodule_export]
     use super::noise::{Noise, NoiseInUse, load_noise, noise_in_use, parse_noise};
     #[pymodule_export]

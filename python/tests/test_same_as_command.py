@@ -9,6 +9,7 @@ from typing import Any
 
 import mimu
 import numpy as np
+import pytest
 from conftest import EXAMPLE, json_of, run
 
 
@@ -110,6 +111,29 @@ def test_noise_in_use_is_that_of_the_command(folder: Path, by_hand: mimu.Recordi
     assert found.nees.in_use.value == command["nees"]["in_use"]["value"]
     # The calibration was made from the same recording.
     assert found.judgement.kind == "untested"
+
+
+def test_several_sessions_are_those_of_the_command(folder: Path, tmp_path: Path) -> None:
+    recording = mimu.read(folder)
+    found = mimu.fit_sessions([recording], part_class="tactical")
+    command = json_of("fit", folder, "--class", "tactical", "-o", tmp_path / "cal.toml")
+    assert found.to_dict() == command
+    assert found.judgement.kind == command["judgement"]["kind"]
+    next_bias = found.parameters["gyro"]["bias_x"]["next_power_on"]
+    own = found.parameters["gyro"]["bias_x"]
+    assert next_bias[0] < own["lower"] < own["upper"] < next_bias[1]
+    assert "next_power_on" in found.calibration.to_toml()
+    with pytest.raises(mimu.Error, match="samples of"):
+        mimu.fit_sessions([recording, recording])
+    with pytest.raises(ValueError, match="consumer or tactical"):
+        mimu.fit_sessions([recording], part_class="medical")  # type: ignore[arg-type]
+
+
+def test_a_prior_that_is_none_is_refused_by_its_name(by_hand: mimu.Recording, tmp_path: Path) -> None:
+    none = tmp_path / "none.toml"
+    none.write_text("format = 'mimu-calibration/1'\n")
+    with pytest.raises(mimu.Error, match="none.toml"):
+        mimu.fit(by_hand, prior=none)
 
 
 def test_curves_over_temperature_are_those_of_the_command(chamber: ModuleType, tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 //! Sessions of the wizard with boards that write text, in the hands of people who err, in virtual time: `clumsy SESSIONS [FIRST [FOLDER]]`. FIRST is
 //! the first seed; FOLDER keeps the sessions.
 //!
-//! `clumsy population PART UNITS SESSIONS`: sessions of so many units of a part make its population (`mimu fleet --prior`), and as many further units as
+//! `clumsy population PART UNITS SESSIONS [FOLDER]`: sessions of so many units of a part make its population (`mimu fleet --prior`), and as many further units as
 //! SESSIONS are calibrated with it and without it.
 //!
 //! A session passes if it ends in a calibration that is right. One that ends in another way says why; a wrong calibration is an error of the wizard.
@@ -81,13 +81,14 @@ fn main() -> ExitCode {
     if let [what, part, numbers @ ..] = &arguments[..]
         && what == "population"
     {
-        let numbers: Result<Vec<u64>, _> = numbers.iter().map(|a| a.parse()).collect();
+        let kept = numbers.get(2).map(PathBuf::from);
+        let numbers: Result<Vec<u64>, _> = numbers.iter().take(2).map(|a| a.parse()).collect();
         let (Some(part), Ok([units, sessions])) = (sensors::number(part), numbers.as_deref())
         else {
             eprintln!("clumsy: give a part, the units of its population and the sessions");
             return ExitCode::FAILURE;
         };
-        return population::run(part, *units, *sessions);
+        return population::run(part, *units, *sessions, kept.as_deref());
     }
     let kept = arguments.get(2).map(PathBuf::from);
     let numbers: Result<Vec<u64>, _> = arguments.iter().take(2).map(|a| a.parse()).collect();

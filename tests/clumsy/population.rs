@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::{End, Session, session};
 
-/// Sessions of `units` units of a part make its population, and `sessions` further units are calibrated with it and without it.
-pub fn run(part: u64, units: u64, sessions: u64) -> ExitCode {
+/// Sessions of `units` units of a part make its population, and `sessions` further units are calibrated with it and without it; `kept` keeps those with it.
+pub fn run(part: u64, units: u64, sessions: u64, kept: Option<&Path>) -> ExitCode {
     let folder = tempfile::tempdir().expect("a folder");
     let (made, prior) = (folder.path().join("units"), folder.path().join("kind.toml"));
     let seeds = |from: u64, count: u64| (from..from + count).map(move |k| part + 10 * k);
@@ -38,7 +38,7 @@ pub fn run(part: u64, units: u64, sessions: u64) -> ExitCode {
     let with = format!(" --prior {} --as-planned", prior.display());
     let further: Vec<u64> = seeds(units, sessions).collect();
     let each = further.par_iter().map(|seed| {
-        let both = ["", &with].map(|more| session(*seed, None, more));
+        let both = [("", None), (&with[..], kept)].map(|(more, kept)| session(*seed, kept, more));
         println!("without: {}\nwith:    {}", both[0].line(), both[1].line());
         both
     });

@@ -10,11 +10,12 @@ use mimu::in_use::NoiseInUse;
 use mimu::result::allan::AllanResult;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::result::fit::FitResult;
+use mimu::result::sessions::SessionsResult;
 use mimu_recording::error::Result;
 use mimu_thermal::result::ThermalResult;
 
 use super::page::{Made, STYLE};
-use super::{allan_plot, diagnosis, fit, noise_in_use, thermal_page, unit, verify};
+use super::{allan_plot, diagnosis, fit, noise_in_use, sessions_text, thermal_page, unit, verify};
 use crate::hint;
 use crate::output::now;
 
@@ -64,6 +65,11 @@ pub fn of_noise_in_use(result: &NoiseInUse) -> String {
         @for sentence in &result.sentences { p { (sentence) } }
         @if !result.warnings.is_empty() { ul { @for warning in &result.warnings { li { (warning.to_string()) } } } }
     })
+}
+
+/// A calibration of several sessions, as the command prints it.
+pub fn of_sessions(result: &SessionsResult) -> String {
+    fragment(&html! { pre { (sessions_text(result, true)) } })
 }
 
 /// A fit over temperature, as on its page.

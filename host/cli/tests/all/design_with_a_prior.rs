@@ -189,7 +189,7 @@ fn people_read_both_half_widths_in_a_hundred_columns() {
         "--prior kind.toml",
         "--prior kind.toml -n 3",
         "--prior kind.toml -n 6 --noise 0.001",
-        "--prior unbiased.toml -n 20",
+        "--prior unbiased.toml -n 12",
         "--prior kind.toml --budget 5",
         "--prior kind.toml --scheme six-face",
     ] {
