@@ -11,6 +11,7 @@ const EXAMPLES: [(&str, &[&str]); 19] = [
         &[
             "mimu wizard --text t_ms,ax,ay,az,gx,gy,gz -o session --port /dev/ttyUSB0 --latitude 48.1",
             "mimu wizard -o session --port /dev/ttyACM0",
+            "mimu wizard -o session --prior kind.toml --as-planned --latitude 48.1",
             "mimu wizard -o session --fixture table --driver turntable.toml --rate 250 --latitude 48.1",
         ],
     ),
@@ -68,6 +69,7 @@ const EXAMPLES: [(&str, &[&str]); 19] = [
         &[
             "mimu design -n 12 --reference gravity --table hand",
             "mimu design --budget 10 --sensor gyro -o plan.toml",
+            "mimu design --prior kind.toml --target accel-scale=500 -o plan.toml",
         ],
     ),
     (
