@@ -7,6 +7,7 @@ use mimu::diagnose::Verdict;
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::prior::Prior;
+use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::result_file::stage;
@@ -151,6 +152,16 @@ fn read_alike(unit: &Unit, prior: Option<&Prior>) -> Result<()> {
     );
     let remedy = "use the prior of units that are read alike";
     Err(Error::new(&unit.name, problem, remedy).about(Argument::Prior))
+}
+
+/// Sensors that the dwells do not calibrate, with what the fit says of them.
+fn not_calibrated(fitted: &Fit) -> Vec<String> {
+    let missing = Sensor::BOTH
+        .into_iter()
+        .filter(|s| fitted.sensor(*s).is_none());
+    let why: Vec<String> = fitted.warnings.iter().map(ToString::to_string).collect();
+    let each = missing.map(|sensor| format!("{sensor} is not calibrated: {}", why.join("; ")));
+    each.collect()
 }
 
 impl Outcome {
@@ -313,10 +324,12 @@ impl OpenSession<'_> {
             let first = first.beside_axis(LEVER_ARM_M);
             let first = of_population(first, self.wizard.config.prior.as_ref())?;
             let fitted = fit(first, Options::default())?;
-            for warning in fitted.warnings.iter().filter(|w| w.gives_prior_up()) {
-                outcome.notes.push(warning.to_string());
-                let words = format!("{}: {warning}", unit.name());
+            let given_up = fitted.warnings.iter().filter(|w| w.gives_prior_up());
+            let given_up = given_up.map(ToString::to_string);
+            for note in given_up.chain(not_calibrated(&fitted)) {
+                let words = format!("{}: {note}", unit.name());
                 self.wizard.view.tell(&Event::Note { words });
+                outcome.notes.push(note);
             }
             if let Some(why) = axes::frames_apart(&fitted) {
                 return Err(Error::device(unit.name(), why, axes::REMEDY));
