@@ -33,10 +33,16 @@ def test_the_command_is_there_with_its_help_and_status() -> None:
         (mimu.read, "import", {"json", "o", "x", "y", "z"}),
         # Results other than a design, and the options for these only.
         (mimu.design, "design", {"json", "o", "compare", "effects", "after", "chamber", "verbose"}),
-        (mimu.compare_schemes, "design", {"json", "o", "compare", "effects", "after", "chamber", "verbose", "n", "budget", "scheme", "rates"}),
+        (
+            mimu.compare_schemes, "design",
+            {"json", "o", "compare", "effects", "after", "chamber", "verbose", "n", "budget", "scheme", "rates", "prior", "aim", "target"},
+        ),
         (
             mimu.next_experiment, "design",
-            {"json", "o", "compare", "verbose", "n", "budget", "scheme", "model", "sigma", "instability", "walk", "order", "sensor"},
+            {
+                "json", "o", "compare", "verbose", "n", "budget", "scheme", "model", "sigma", "instability", "walk", "order", "sensor", "prior", "aim",
+                "target",
+            },
         ),
     ],
 )
