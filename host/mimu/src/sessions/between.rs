@@ -40,7 +40,7 @@ pub struct VariancePrior {
 pub const ALIKE_DOF: f64 = 4.0;
 
 /// Standard deviations of the change from each session to the next by ageing, over that of the changes of a power-on.
-const AGEING: [f64; 4] = [0.0, 0.1, 0.25, 0.5];
+pub const AGEING: [f64; 4] = [0.0, 0.1, 0.25, 0.5];
 
 /// Kinds of parameters, whose variances inform each other.
 #[derive(Debug, Clone, Default)]
