@@ -63,10 +63,7 @@ impl OfCalibration {
             }
             let covariance = calibration.covariance(sensor);
             let covariance = covariance.ok_or_else(|| format!("its {sensor} has no covariance"))?;
-            let part = Part {
-                covariance,
-                dof: f64::INFINITY,
-            };
+            let part = Part::known(covariance);
             let triad = Triad::from_inverse(inverse, vec![part]);
             let triad = triad.ok_or_else(|| format!("the matrix of its {sensor} is singular"))?;
             let (values, parts) = triad.physical_parts();

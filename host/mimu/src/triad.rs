@@ -106,6 +106,8 @@ pub struct Part {
     pub covariance: Covariance,
     /// Degrees of freedom from which its size was estimated; infinite if the noise was known beforehand.
     pub dof: f64,
+    /// Share of it that what is known beforehand gives: noise and stated errors. The rest is by scatter beyond these, which a misfit widens.
+    pub known: f64,
 }
 
 /// Half of a 95 % interval around an estimate whose error is the sum of independent `contributions`: the variance of each, and its degrees
@@ -205,10 +207,7 @@ impl Triad {
             let by = vector(&turned, &Vector3::zeros());
             covariance += by * by.transpose();
         }
-        self.forward_parts.push(Part {
-            covariance,
-            dof: f64::INFINITY,
-        });
+        self.forward_parts.push(Part::known(covariance));
         self.forward_covariance += covariance;
         let j = inversion_jacobian(&self.inverse.matrix, &self.inverse.offset);
         self.inverse_covariance += j * covariance * j.transpose();
@@ -219,6 +218,12 @@ impl Triad {
     pub fn inverse_parts(&self) -> Vec<Part> {
         let j = inversion_jacobian(&self.inverse.matrix, &self.inverse.offset);
         self.forward_parts.iter().map(|p| p.seen_by(&j)).collect()
+    }
+
+    /// Covariance of C by rows, then o, by what is known beforehand alone: the noise, without the scatter beyond it.
+    pub fn known_covariance(&self) -> Covariance {
+        let parts = self.inverse_parts().into_iter();
+        parts.fold(Covariance::zeros(), |sum, p| sum + p.covariance * p.known)
     }
 
     /// P by rows, then b, each with sigma and interval.
@@ -305,7 +310,16 @@ impl Part {
     pub fn seen_by(&self, jacobian: &Covariance) -> Self {
         Self {
             covariance: jacobian * self.covariance * jacobian.transpose(),
-            dof: self.dof,
+            ..*self
+        }
+    }
+
+    /// One whose size is known beforehand.
+    pub fn known(covariance: Covariance) -> Self {
+        Self {
+            covariance,
+            dof: f64::INFINITY,
+            known: 1.0,
         }
     }
 }

@@ -58,10 +58,7 @@ impl Based<'_> {
         let mut covariance = self.covariance;
         let mut of_offset = covariance.fixed_view_mut::<3, 3>(9, 9);
         of_offset += matrix * added * matrix.transpose();
-        let part = Part {
-            covariance,
-            dof: f64::INFINITY,
-        };
+        let part = Part::known(covariance);
         Triad::from_inverse(self.inverse(temp_c).model, vec![part])
     }
 }

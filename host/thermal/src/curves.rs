@@ -105,10 +105,7 @@ impl TriadCurves {
             return None;
         }
         let [model, _] = self.forward(temp_c);
-        let part = Part {
-            covariance: self.covariance(temp_c),
-            dof: f64::INFINITY,
-        };
+        let part = Part::known(self.covariance(temp_c));
         Triad::from_forward(model, vec![part])
     }
 

@@ -35,10 +35,7 @@ pub fn file(measurement: &Measurement) -> String {
                 covariance.column_mut(k).fill(0.0);
             }
         }
-        let part = OfCovariance {
-            covariance,
-            dof: f64::INFINITY,
-        };
+        let part = OfCovariance::known(covariance);
         let triad = Triad::from_physical(&values, &[part]).unwrap();
         let by_rows =
             |m: &mimu::nalgebra::Matrix3<f64>| [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[(i, j)]));

@@ -44,10 +44,7 @@ pub fn of_affine(rows: &Rows, decision: &Decision) -> Option<Part> {
     let of_first = by_effects.rows(0, rows.parameters.ncols());
     let into = &rows.parameters * of_first;
     let added = &into * &decision.nonlinear.covariance * into.transpose();
-    Some(Part {
-        covariance: Covariance::from_fn(|i, j| added[(i, j)]),
-        dof: f64::INFINITY,
-    })
+    Some(Part::known(Covariance::from_fn(|i, j| added[(i, j)])))
 }
 
 /// Errors of the forces of an accelerometer that was calibrated by the magnitude of gravity alone.

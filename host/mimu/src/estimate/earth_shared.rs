@@ -275,10 +275,7 @@ pub fn apart(
     }
     let covariance = &by * &numbers.covariance * by.transpose();
     let covariance = Covariance::from_fn(|i, j| covariance[(i, j)]);
-    let open = Part {
-        covariance,
-        dof: f64::INFINITY,
-    };
+    let open = Part::known(covariance);
     let parts = estimated.triad.inverse_parts().into_iter().chain([open]);
     estimated.triad = Triad::from_inverse(estimated.triad.inverse, parts.collect())
         .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;

@@ -215,11 +215,7 @@ pub fn kalman(
         let errors = errors(observations, axis, wander, &forward_matrix);
         let known = DVector::from_fn(observations.len(), |i, _| observations[i].variance[axis]);
         let floor = positive(known).max();
-        let mut scatter = Scatter {
-            extra_variance: 0.0,
-            chi2: 0.0,
-            dof,
-        };
+        let mut scatter = Scatter::of_noise(dof);
         let mut round = 0;
         loop {
             let mut filter = Filter::<f64>::diffuse(floor + scatter.extra_variance, 1.0);
@@ -283,6 +279,7 @@ pub(super) fn forward(
     for (axis, found) in axes.iter().enumerate() {
         let (parameters, of_axis) = (&found.parameters, &found.covariance);
         let dof = found.scatter.iter().map(|s| s.1.variance_dof());
+        let known = found.scatter.iter().map(|s| s.1.known);
         let mut covariance = Covariance::zeros();
         // Indices of b, P1, P2, P3 of this sensor among the twelve.
         let places = [9 + axis, 3 * axis, 3 * axis + 1, 3 * axis + 2];
@@ -299,6 +296,7 @@ pub(super) fn forward(
         parts.push(Part {
             covariance,
             dof: dof.fold(f64::INFINITY, f64::min),
+            known: known.fold(1.0, f64::min),
         });
     }
     let scatter: Vec<_> = axes.iter().flat_map(|a| a.scatter.clone()).collect();
@@ -313,6 +311,7 @@ pub(super) fn forward(
         condition,
         delays: None,
         earth: Vec::new(),
+        follows_accel: None,
         notes: Vec::new(),
     })
 }
@@ -471,9 +470,10 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         &covariance,
         &scatter,
     );
-    let parts = parts.into_iter().map(|(covariance, dof)| Part {
+    let parts = parts.into_iter().map(|(covariance, dof, known)| Part {
         covariance: by_c * covariance * by_c.transpose(),
         dof,
+        known,
     });
     let inverse = Affine { matrix, offset };
     let triad = Triad::from_inverse(inverse, parts.chain(of_rest.parts()).collect())
@@ -485,6 +485,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         condition: observability.condition,
         delays: None,
         earth: Vec::new(),
+        follows_accel: None,
         notes: unpaired.into_iter().collect(),
     })
 }
@@ -494,6 +495,8 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
 struct RestNoise {
     covariance: Matrix3<f64>,
     dof: [f64; 3],
+    /// Share of the known noise in each variance.
+    known: [f64; 3],
     /// Scatter beyond the known noise, where there is some.
     scatter: Vec<(Observable, Scatter)>,
 }
@@ -509,6 +512,7 @@ impl RestNoise {
         let count = deviations.len() as f64;
         let mut covariance = variances.iter().sum::<Matrix3<f64>>() / (count * count);
         let mut dof = [f64::INFINITY; 3];
+        let mut known = [1.0; 3];
         let mut scatter = Vec::new();
         for axis in 0..3 {
             let values = deviations.iter().map(|d| d[axis]).collect();
@@ -518,7 +522,11 @@ impl RestNoise {
                 false => (0.5 * of_pairs[axis].extra_variance, &of_pairs[axis]),
             };
             dof[axis] = of.variance_dof();
+            let by_noise = covariance[(axis, axis)];
             covariance[(axis, axis)] += extra / count;
+            if extra > 0.0 {
+                known[axis] = by_noise / covariance[(axis, axis)];
+            }
             if of_rest.extra_variance > 0.0 {
                 scatter.push((Observable::AtRest(axis), of_rest));
             }
@@ -526,6 +534,7 @@ impl RestNoise {
         Self {
             covariance,
             dof,
+            known,
             scatter,
         }
     }
@@ -534,28 +543,32 @@ impl RestNoise {
     fn parts(&self) -> impl Iterator<Item = Part> {
         let diagonal = self.covariance.diagonal();
         let between = self.covariance - Matrix3::from_diagonal(&diagonal);
-        let of_offset = |own: Matrix3<f64>, dof: f64| {
+        let of_offset = |own: Matrix3<f64>| {
             let mut covariance = Covariance::zeros();
             covariance.fixed_view_mut::<3, 3>(9, 9).copy_from(&own);
-            Part { covariance, dof }
+            Part::known(covariance)
         };
-        let dof = self.dof;
+        let (dof, known) = (self.dof, self.known);
         let each = (0..3).map(move |r| {
             let mut own = Vector3::zeros();
             own[r] = diagonal[r];
-            of_offset(Matrix3::from_diagonal(&own), dof[r])
+            Part {
+                dof: dof[r],
+                known: known[r],
+                ..of_offset(Matrix3::from_diagonal(&own))
+            }
         });
-        each.chain([of_offset(between, f64::INFINITY)])
+        each.chain([of_offset(between)])
     }
 }
 
 /// Splits a covariance: one part for each row of the model, whose size the row's scatter determines, and the part that correlates the rows, which is
-/// known beforehand. `row_of` gives the row of an element.
+/// known beforehand; with the degrees of freedom and the known share of each. `row_of` gives the row of an element.
 fn by_row<const N: usize>(
     row_of: impl Fn(usize, usize) -> Option<usize>,
     covariance: &SMatrix<f64, N, N>,
     scatter: &[(Observable, Scatter)],
-) -> Vec<(SMatrix<f64, N, N>, f64)> {
+) -> Vec<(SMatrix<f64, N, N>, f64, f64)> {
     let of = |row: Option<usize>| {
         SMatrix::from_fn(|a, b| {
             if row_of(a, b) == row {
@@ -565,8 +578,9 @@ fn by_row<const N: usize>(
             }
         })
     };
-    let rows = (0..3).map(|r| (of(Some(r)), scatter[r].1.variance_dof()));
-    rows.chain([(of(None), f64::INFINITY)]).collect()
+    let rows = (0..3).map(|r| (of(Some(r)), &scatter[r].1));
+    let rows = rows.map(|(own, scatter)| (own, scatter.variance_dof(), scatter.known));
+    rows.chain([(of(None), f64::INFINITY, 1.0)]).collect()
 }
 
 /// Covariance of three rows that are all estimated by `left` (3 or 4 by observations), if the errors of one observation are correlated across the
@@ -664,7 +678,14 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
     let row = |a: usize| if a < 9 { a / 3 } else { a - 9 };
     let parts = by_row(|a, b| (row(a) == row(b)).then(|| row(a)), &full, &scatter)
         .into_iter()
-        .map(|(covariance, dof)| Part { covariance, dof }.seen_by(&change))
+        .map(|(covariance, dof, known)| {
+            let part = Part {
+                covariance,
+                dof,
+                known,
+            };
+            part.seen_by(&change)
+        })
         .collect();
     let triad = Triad::from_inverse(inverse, parts)
         .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
@@ -674,6 +695,7 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
         condition: observability.condition,
         delays: None,
         earth: Vec::new(),
+        follows_accel: None,
         notes: Vec::new(),
     })
 }

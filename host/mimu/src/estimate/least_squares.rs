@@ -144,6 +144,24 @@ impl Errors {
         }
     }
 
+    /// Variance of each observation.
+    pub fn variances(&self) -> DVector<f64> {
+        match self {
+            Self::Independent(variances) => variances.clone(),
+            Self::Correlated(covariance) => covariance.diagonal(),
+            Self::Shared(variances, factor) => {
+                let shared = factor.row_iter().map(|row| row.norm_squared());
+                variances + DVector::from_iterator(variances.len(), shared)
+            }
+        }
+    }
+
+    /// Share of these errors in the variance of an observation if an `extra` variance is added, mean over the observations.
+    fn share_beside(&self, extra: f64) -> f64 {
+        let variances = self.variances();
+        variances.map(|v| v / (v + extra)).mean()
+    }
+
     /// The covariance of so many observations.
     pub(super) fn covariance(&self) -> DMatrix<f64> {
         match self {
@@ -286,9 +304,21 @@ pub struct Scatter {
     pub chi2: f64,
     /// Degrees of freedom.
     pub dof: f64,
+    /// Share of the known noise in the variance of an observation, mean over them: 1 if noise explains the residual.
+    pub known: f64,
 }
 
 impl Scatter {
+    /// Noise alone, of so many degrees of freedom, before any residual is seen.
+    pub fn of_noise(dof: f64) -> Self {
+        Self {
+            extra_variance: 0.0,
+            chi2: 0.0,
+            dof,
+            known: 1.0,
+        }
+    }
+
     /// Whether the scatter exceeds the noise so clearly that a person should know.
     pub fn is_significant(&self) -> bool {
         self.extra_variance > 0.0 && exceeds(self.chi2, self.dof, EXTRA_FALSE_ALARM)
@@ -324,9 +354,8 @@ pub fn extra_variance_of(residuals: &DVector<f64>, errors: &Errors, dof: f64) ->
     let chi2_at = |s: f64| errors.chi2(s, residuals);
     let chi2 = chi2_at(0.0);
     let none = Scatter {
-        extra_variance: 0.0,
         chi2,
-        dof,
+        ..Scatter::of_noise(dof)
     };
     if !(dof >= 1.0) || chi2.is_nan() || !exceeds(chi2, dof, EXTRA_IN_DOUBT) {
         return none;
@@ -342,6 +371,7 @@ pub fn extra_variance_of(residuals: &DVector<f64>, errors: &Errors, dof: f64) ->
     }
     Scatter {
         extra_variance: high,
+        known: errors.share_beside(high),
         ..none
     }
 }
@@ -485,8 +515,7 @@ impl<const N: usize> Reweighted<N> {
     pub fn new(rows: [Range<usize>; N], extra: [f64; N]) -> Self {
         let scatter = extra.map(|extra_variance| Scatter {
             extra_variance,
-            chi2: 0.0,
-            dof: 1.0,
+            ..Scatter::of_noise(1.0)
         });
         Self { rows, scatter }
     }

@@ -9,7 +9,7 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
-use super::least_squares::{Grouped, Linearized, Observability, Reweighted, minimize};
+use super::least_squares::{Grouped, Linearized, Observability, Reweighted, Scatter, minimize};
 use super::{Estimated, Failure, Observation, lower_triangular};
 use crate::observable::Observable;
 use crate::observation::magnitude::Magnitude;
@@ -494,26 +494,28 @@ pub fn estimate(
         scatter.extra_variance *= scaled.unit * scaled.unit;
         scatter.chi2 = solved.first_chi2[g];
     }
-    let part = |rows: std::ops::Range<usize>, dof: f64| {
+    let part = |rows: std::ops::Range<usize>| {
         let own = last.part(&covariance, &rows);
         let nine = SMatrix::<f64, 9, 9>::from_fn(|i, j| own[(i, j)]);
-        Part {
-            covariance: change * nine * change.transpose(),
-            dof,
-        }
+        Part::known(change * nine * change.transpose())
     };
-    let mut parts = vec![part(0..turned, scatter[0].variance_dof())];
+    let scattered = |rows, scatter: &Scatter| Part {
+        dof: scatter.variance_dof(),
+        known: scatter.known,
+        ..part(rows)
+    };
+    let mut parts = vec![scattered(0..turned, &scatter[0])];
     let mut found = vec![(Observable::Magnitude, scatter[0])];
     if !known.rests.is_empty() {
-        parts.push(part(turned..resting, scatter[1].variance_dof()));
+        parts.push(scattered(turned..resting, &scatter[1]));
         found.push((Observable::Rest, scatter[1]));
     }
     if scaled.levels > 0 {
         // The error of a turntable's rate is given; the dwells do not determine it.
-        parts.push(part(resting..levels, f64::INFINITY));
+        parts.push(part(resting..levels));
     }
     if known.prior.is_some() {
-        parts.push(part(levels..rows, f64::INFINITY));
+        parts.push(part(levels..rows));
     }
     let triad = Triad::from_inverse(inverse, parts)
         .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
@@ -523,6 +525,7 @@ pub fn estimate(
         condition: shape.condition,
         delays: None,
         earth: Vec::new(),
+        follows_accel: None,
         notes: scaled.contradicted(&p).into_iter().collect(),
     })
 }

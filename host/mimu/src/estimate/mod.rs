@@ -35,7 +35,7 @@ use nalgebra::{DVector, Matrix3, Vector3};
 use crate::observable::Observable;
 use crate::observation::{LOWER, place};
 use crate::quantity::Sensor;
-use crate::triad::Triad;
+use crate::triad::{Covariance, Triad};
 use crate::warning::Warning;
 pub use earth_on_table::EarthShare;
 use least_squares::Scatter;
@@ -103,6 +103,9 @@ pub struct Estimated {
     pub delays: Option<Delays>,
     /// The unknown numbers of the Earth's rate, if known inputs contain it: by heading, in standard deviations.
     pub earth: Vec<Vector3<f64>>,
+    /// What a unit of error of each of the accelerometer's twelve parameters (C by rows, then o) adds to those of a gyro that was estimated with the
+    /// accelerometer's directions.
+    pub follows_accel: Option<Covariance>,
     /// What a person should know.
     pub notes: Vec<Warning>,
 }

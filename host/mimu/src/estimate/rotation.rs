@@ -218,14 +218,29 @@ impl<'a> ByTurns<'a> {
         Observability::of(&found.at.jacobian.rows(0, turns).columns(0, 9).into_owned())
     }
 
-    /// What a unit of each of the accelerometer's parameters adds to those of `found`.
-    fn gain(&self, found: &Minimum, covariance: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut weighted = self.by_accelerometer(&found.parameters);
-        for (mut row, weight) in weighted.row_iter_mut().zip(&found.weights) {
-            row *= *weight;
-        }
-        let by_turns = found.at.jacobian.rows(0, self.by_directions());
-        covariance * by_turns.transpose() * weighted
+    /// What a unit of error of each of the accelerometer's parameters adds to those of `found`.
+    ///
+    /// If the accelerometer's errors are parameters `e` themselves, in units of a root L of their covariance, the covariance of both is that of `found`
+    /// with `e` times L', and the gain is this over `L L'`.
+    fn gain(&self, found: &Minimum, covariance: &DMatrix<f64>) -> Result<Covariance, Failure> {
+        let gain = match &self.of_errors {
+            Some(root) => {
+                let first = self.first_error();
+                let with_errors = covariance.view((0, first), (PARAMETERS, root.ncols()));
+                let back = root.clone().pseudo_inverse(f64::MIN_POSITIVE);
+                let singular = |_| Failure::NoSolution("the accelerometer has no errors".into());
+                with_errors * back.map_err(singular)?
+            }
+            None => {
+                let mut weighted = self.by_accelerometer(&found.parameters);
+                for (mut row, weight) in weighted.row_iter_mut().zip(&found.weights) {
+                    row *= *weight;
+                }
+                let by_turns = found.at.jacobian.rows(0, self.by_directions());
+                -(covariance * by_turns.transpose() * weighted)
+            }
+        };
+        Ok(Covariance::from_fn(|i, j| gain[(i, j)]))
     }
 
     /// Derivatives of the residuals of turns and whole turns by C and o of the accelerometer.
@@ -497,31 +512,29 @@ fn fitted(
     let of_accelerometer = accel.inverse_parts();
     let accel_dof = of_accelerometer.iter().map(|part| part.dof);
     let accel_dof = accel_dof.fold(f64::INFINITY, f64::min);
+    let accel_known = accel.known_covariance().trace() / accel.inverse_covariance.trace();
     let own = groups.rows.iter().zip(&groups.scatter).enumerate();
     let own = own.filter(|(_, (rows, _))| !rows.is_empty());
     let own = own.map(|(group, (rows, scatter))| {
         let own = found.at.part(&covariance, rows);
+        let (dof, known) = match group {
+            ERRORS => (accel_dof, accel_known),
+            _ => (scatter.variance_dof(), scatter.known),
+        };
         Part {
             covariance: Covariance::from_fn(|i, j| own[(i, j)]),
-            dof: match group {
-                ERRORS => accel_dof,
-                _ => scatter.variance_dof(),
-            },
+            dof,
+            known,
         }
     });
-    let gain = by.of_errors.is_none().then(|| {
-        let gain = by.gain(&found, &covariance);
-        Covariance::from_fn(|i, j| gain[(i, j)])
-    });
+    let gain = by.gain(&found, &covariance)?;
     let shared = of_accelerometer.iter();
-    let shared = shared.filter_map(|part| Some(part.seen_by(gain.as_ref()?)));
+    let shared = shared.filter(|_| by.of_errors.is_none());
+    let shared = shared.map(|part| part.seen_by(&gain));
     let by_prior = prior.map(|prior| {
         let rows = rests.end..rests.end + prior.rows();
         let own = found.at.part(&covariance, &rows);
-        Part {
-            covariance: Covariance::from_fn(|i, j| own[(i, j)]),
-            dof: f64::INFINITY,
-        }
+        Part::known(Covariance::from_fn(|i, j| own[(i, j)]))
     });
     let parts = own.chain(shared).chain(by_prior);
     let parts = parts.map(|part| part.seen_by(&change));
@@ -550,6 +563,7 @@ fn fitted(
         },
         delays: None,
         earth: Vec::new(),
+        follows_accel: Some(change * gain),
         notes: Vec::new(),
     })
 }

@@ -81,6 +81,7 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         parts.push(Part {
             covariance,
             dof: of_axis.variance_dof(),
+            known: of_axis.known,
         });
     }
     let triad = Triad::from_forward(model, parts)
@@ -91,6 +92,7 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         condition: 1.0,
         delays: None,
         earth: Vec::new(),
+        follows_accel: None,
         notes: Vec::new(),
     })
 }

@@ -241,6 +241,7 @@ impl JointFit<'_> {
             Part {
                 covariance,
                 dof: groups.scatter[g].variance_dof(),
+                known: groups.scatter[g].known,
             }
         });
         let triad = Triad::from_inverse(inverse, parts.collect())
@@ -254,6 +255,7 @@ impl JointFit<'_> {
             condition,
             delays: None,
             earth: Vec::new(),
+            follows_accel: None,
             notes: vec![Warning::WithTurns],
         })
     }

@@ -23,10 +23,7 @@ fn with_biases(covariance: &Covariance, mean: &Vector3<f64>) -> Part {
         by[(i, i)] = 1.0;
         by[(9 + i / 3, i)] = -mean[i % 3];
     }
-    Part {
-        covariance: by * covariance * by.transpose(),
-        dof: f64::INFINITY,
-    }
+    Part::known(by * covariance * by.transpose())
 }
 
 /// Fits the biases of `prepared` to matrices that are `given`: gyro, accelerometer, raw to SI. `covariances` are those of C by rows, then o, if they

@@ -323,10 +323,7 @@ impl ByPoses<'_> {
             (true, Some(_)) => (DELIVERED.0 * scale).powi(2),
             (true, None) => (DELIVERED.1 * self.gravity()).powi(2),
         });
-        let part = Part {
-            covariance: errors,
-            dof: f64::INFINITY,
-        };
+        let part = Part::known(errors);
         let inverse = Affine {
             matrix: Matrix3::identity() * scale,
             offset: Vector3::zeros(),
@@ -337,6 +334,7 @@ impl ByPoses<'_> {
             condition: 1.0,
             delays: None,
             earth: Vec::new(),
+            follows_accel: None,
             notes: Vec::new(),
         })
     }

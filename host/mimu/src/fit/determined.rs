@@ -217,6 +217,7 @@ mod tests {
         let part = crate::triad::Part {
             covariance,
             dof: 9.0,
+            known: 1.0,
         };
         Triad::from_inverse(one, vec![part]).unwrap()
     }

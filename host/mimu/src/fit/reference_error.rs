@@ -206,10 +206,7 @@ impl Influences {
                 part.covariance[(a, a)] = part.covariance[(a, a)].max(0.0);
             }
         }
-        parts.extend(influences.iter().map(|i| Part {
-            covariance: i.covariance,
-            dof: f64::INFINITY,
-        }));
+        parts.extend(influences.iter().map(|i| Part::known(i.covariance)));
         estimated.triad = Triad::from_forward(estimated.triad.forward, parts)?;
         Some(influences)
     }
@@ -261,10 +258,7 @@ pub(super) fn with_gravity(triad: &Triad, prepared: &Prepared) -> Option<(Triad,
         covariance: by * by.transpose(),
     };
     let mut parts = triad.forward_parts.clone();
-    parts.push(Part {
-        covariance: influence.covariance,
-        dof: f64::INFINITY,
-    });
+    parts.push(Part::known(influence.covariance));
     let triad = Triad::from_forward(triad.forward, parts).filter(|_| sigma > 0.0)?;
     Some((triad, influence))
 }

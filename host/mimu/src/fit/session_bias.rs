@@ -51,9 +51,11 @@ pub fn estimate(
     } = found.ok_or_else(none)?;
     let matrix = known.matrix;
     let dof = scatter.iter().map(|s| s.1.variance_dof());
+    let known = scatter.iter().map(|s| s.1.known);
     let part = Part {
         covariance,
         dof: dof.fold(f64::INFINITY, f64::min),
+        known: known.fold(1.0, f64::min),
     };
     let triad = Triad::from_inverse(Affine { matrix, offset }, vec![part])
         .ok_or_else(|| Failure::NoSolution("the given matrix is singular".into()))?;
@@ -64,6 +66,7 @@ pub fn estimate(
         condition: 1.0,
         delays: None,
         earth,
+        follows_accel: None,
         notes: vec![Warning::MatrixGiven {
             with_intervals: false,
         }],

@@ -36,10 +36,7 @@ pub(super) fn budget(found: &SensorFit, raw: RawUnit) -> Vec<BudgetRow> {
         .influences
         .iter()
         .map(|influence| {
-            let part = Part {
-                covariance: influence.covariance,
-                dof: f64::INFINITY,
-            };
+            let part = Part::known(influence.covariance);
             let triad = Triad::from_forward(triad.forward, vec![part])?;
             Some((influence.cause, sigmas(&triad)))
         })

@@ -406,12 +406,12 @@ fn parts(free: &[usize], between: &Between, matched: &[Matched]) -> Vec<Part> {
         covariance[(*k, *k)] = rest;
         // Welch and Satterthwaite, the other way round.
         let dof = matched[i].dof * (rest / variance).powi(2);
-        parts.push(Part { covariance, dof });
+        parts.push(Part {
+            dof,
+            ..Part::known(covariance)
+        });
     }
-    parts.push(Part {
-        covariance: shared,
-        dof: f64::INFINITY,
-    });
+    parts.push(Part::known(shared));
     parts
 }
 
