@@ -2,7 +2,8 @@
 //!
 //! | module | judges |
 //! |---|---|
-//! | [`errors`] | error figures, by the input and by the noise |
+//! | [`errors`] | error figures, by the input and by what is predicted of them |
+//! | [`unseen`] | errors of unseen data against their predicted covariance |
 //! | [`input`] | whether the input is what it is declared to be |
 //! | `of_fit` | a fit |
 //!
@@ -11,3 +12,4 @@
 pub mod errors;
 pub mod input;
 mod of_fit;
+pub mod unseen;

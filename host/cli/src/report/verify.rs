@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use mimu::calibration::verify::{Causes, SensorVerification, Verification, WholeTurnsOfAxis};
-use mimu::judge::errors::BEYOND_NOISE;
 use mimu::judgement::JudgementKind;
 use mimu::quantity::{AXES, Figure, Sensor, plural, plus_minus, significant};
 use mimu::readable;
@@ -161,7 +160,7 @@ pub(super) fn errors(all: &[(String, Verification)], named: bool) -> Table {
 }
 
 fn beyond_noise(s: &SensorVerification) -> bool {
-    s.rms > BEYOND_NOISE * s.noise_floor
+    s.test.is_none_or(|test| test.fails())
 }
 
 /// How much the bias has changed, and how much of the error that explains.

@@ -11,7 +11,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::chains::Chains;
-use super::least_squares::{Grouped, Linearized, Minimum, Observability, Reweighted, Solved};
+use super::least_squares::{Grouped, Linearized, Minimum, Observability, Reweighted, Solved, root};
 use super::{Estimated, Failure};
 use crate::observable::Observable;
 use crate::observation::closure::{ClosureError, Closures};
@@ -36,16 +36,6 @@ const ERRORS: usize = 4;
 
 /// The elements of C across the axes.
 const CROSS: [usize; 6] = [1, 2, 3, 5, 6, 7];
-
-/// A square root of a covariance: one column for each direction of it that has a variance.
-fn root(covariance: &Covariance) -> DMatrix<f64> {
-    let eigen = covariance.symmetric_eigen();
-    let largest = eigen.eigenvalues.max();
-    let used = (0..12).filter(|k| eigen.eigenvalues[*k] > 1e-14 * largest);
-    let columns = used.map(|k| eigen.eigenvectors.column(k) * eigen.eigenvalues[k].sqrt());
-    let columns: Vec<_> = columns.collect();
-    DMatrix::from_fn(12, columns.len(), |i, j| columns[j][i])
-}
 
 /// Rows of each of [`GROUPS`].
 struct Rows([Range<usize>; 6]);
@@ -134,7 +124,8 @@ impl<'a> ByTurns<'a> {
         // Headings do not depend on the accelerometer, and directions do, all of them by the same errors. To weigh one against the other these errors have to be
         // parameters: without them, directions of a tenth of a degree were believed to a fiftieth, and the headings that contradicted them were not.
         let with_errors = !whole.list.is_empty();
-        let of_errors = with_errors.then(|| root(&of_accel));
+        let of_errors =
+            with_errors.then(|| root(&DMatrix::from_column_slice(12, 12, of_accel.as_slice())));
         let of_whole = |t: usize| whole.list.iter().any(|c| c.turns.contains(&t));
         let rows = Rows::of([
             2 * (0..turns.len()).filter(|t| !of_whole(*t)).count(),
@@ -370,7 +361,10 @@ impl Grouped<6> for ByTurns<'_> {
         all.resize(rests.end + self.prior_rows(), 1.0);
         let chains = self.chains.of_turn.iter();
         for ((turn, chain), first) in self.turns.iter().zip(chains).zip(&self.row_of) {
-            let known = turn.variance(mean) + unknown(chain) * turn.earth_variance;
+            let known = match chain {
+                Some(_) => turn.variance_beside_earth(mean),
+                None => turn.variance(mean),
+            };
             all[*first..first + 2].fill(known);
         }
         all.into_iter().map(|v| v.max(1e-20)).collect()

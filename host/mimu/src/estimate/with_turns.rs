@@ -194,7 +194,7 @@ impl Grouped<3> for Scaled<'_> {
         let g = self.data.gravity;
         let poses = self.data.variances.iter().map(|v| v / (g * g));
         let turns = self.data.turns.iter();
-        let turns = turns.flat_map(|t| [t.variance(mean) + t.earth_variance; 2]);
+        let turns = turns.flat_map(|t| [t.variance(mean); 2]);
         let rest = self.data.rest.iter().flat_map(|o| {
             let v = squared * o.variance + o.rate_variance;
             [v.x, v.y, v.z]

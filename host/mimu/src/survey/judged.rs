@@ -1,8 +1,8 @@
 //! The judgement of noise at rest.
 
 use super::{Channel, Survey};
-use crate::judge::errors::BEYOND_NOISE;
 use crate::judge::input;
+use crate::judge::unseen::BEYOND_NOISE;
 use crate::judgement::{Judgement, JudgementKind};
 use crate::quantity::{duration, plural, significant};
 use crate::warning::Warning;
