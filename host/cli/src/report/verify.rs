@@ -234,12 +234,12 @@ fn verdict(s: &SensorVerification) -> String {
         true => format!("{rms} rms instead of {before} {what}"),
         false => format!("{rms} rms, not better than {before} {what}"),
     };
-    let noise = match s.noise_floor.is_finite() && s.noise_floor > 0.0 {
-        true => format!(
-            "{how}; {} times the noise",
-            significant(s.rms / s.noise_floor)
+    let noise = match &s.test {
+        Some(test) => format!(
+            "{how}; {} times what noise predicts",
+            significant(test.ratio)
         ),
-        false => format!("{how}; the noise is unknown"),
+        None => format!("{how}; the noise is unknown"),
     };
     match s.next_power_on {
         Some(next) => format!(
