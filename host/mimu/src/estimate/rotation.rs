@@ -213,14 +213,17 @@ impl<'a> ByTurns<'a> {
     ///
     /// If the accelerometer's errors are parameters `e` themselves, in units of a root L of their covariance, the covariance of both is that of `found`
     /// with `e` times L', and the gain is this over `L L'`.
-    fn gain(&self, found: &Minimum, covariance: &DMatrix<f64>) -> Result<Covariance, Failure> {
+    fn gain(&self, found: &Minimum, covariance: &DMatrix<f64>) -> Covariance {
         let gain = match &self.of_errors {
             Some(root) => {
                 let first = self.first_error();
                 let with_errors = covariance.view((0, first), (PARAMETERS, root.ncols()));
-                let back = root.clone().pseudo_inverse(f64::MIN_POSITIVE);
-                let singular = |_| Failure::NoSolution("the accelerometer has no errors".into());
-                with_errors * back.map_err(singular)?
+                // The columns of the root are orthogonal.
+                let mut back = root.transpose();
+                for mut row in back.row_iter_mut() {
+                    row /= row.norm_squared();
+                }
+                with_errors * back
             }
             None => {
                 let mut weighted = self.by_accelerometer(&found.parameters);
@@ -231,7 +234,7 @@ impl<'a> ByTurns<'a> {
                 -(covariance * by_turns.transpose() * weighted)
             }
         };
-        Ok(Covariance::from_fn(|i, j| gain[(i, j)]))
+        Covariance::from_fn(|i, j| gain[(i, j)])
     }
 
     /// Derivatives of the residuals of turns and whole turns by C and o of the accelerometer.
@@ -521,7 +524,7 @@ fn fitted(
             known,
         }
     });
-    let gain = by.gain(&found, &covariance)?;
+    let gain = by.gain(&found, &covariance);
     let shared = of_accelerometer.iter();
     let shared = shared.filter(|_| by.of_errors.is_none());
     let shared = shared.map(|part| part.seen_by(&gain));
