@@ -24,13 +24,13 @@ use std::sync::Arc;
 
 use crate::estimate::least_squares::{POORLY_DETERMINED, Scatter};
 use crate::estimate::{Estimated, Observation};
-use crate::judge::unseen::{Test, Unseen};
 use crate::prepared::Prepared;
 use crate::prior::{FALSE_STRANGER, Prior};
 use crate::quantity::{Figure, Sensor};
 use crate::signal::blocks::extent;
 use crate::triad::Triad;
 use crate::turntable::RatedDwells;
+use crate::unseen::{Test, Unseen};
 use crate::warning::Warning;
 use mimu_core::PerSensor;
 use mimu_recording::error::{Argument, Error, Result};

@@ -3,7 +3,6 @@
 //! | module | judges |
 //! |---|---|
 //! | [`errors`] | error figures, by the input and by what is predicted of them |
-//! | [`unseen`] | errors of unseen data against their predicted covariance |
 //! | [`input`] | whether the input is what it is declared to be |
 //! | `of_fit` | a fit |
 //!
@@ -12,4 +11,3 @@
 pub mod errors;
 pub mod input;
 mod of_fit;
-pub mod unseen;

@@ -2,10 +2,10 @@
 
 use mimu::judge::errors::{self, ErrorFigures};
 use mimu::judge::input;
-use mimu::judge::unseen::Test;
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::quantity::{Figure, Sensor, significant};
 use mimu::readable;
+use mimu::unseen::Test;
 
 use crate::fit::{FitVerdict, Judged, ThermalFit};
 use crate::judge::rms;

@@ -1,12 +1,12 @@
 //! Typical sessions of users: thirteen poses, ten on a fixture, six faces; with a disturbed dwell, or with a correct dwell that no other confirms.
 
 use mimu::fit::{Fit, Method, Options, fit};
-use mimu::judge::unseen::{BEYOND_NOISE, FALSE_ALARM, Test, Unseen};
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::Keep;
 use mimu::signal::stillness::{DwellSearch, STILL_FACTOR, Steps};
+use mimu::unseen::{BEYOND_NOISE, FALSE_ALARM, Test, Unseen};
 use mimu::warning::Warning;
 use mimu_recording::error::Error;
 use mimu_recording::{Batch, Manifest, RawUnit, Reference};

@@ -4,9 +4,9 @@ use super::decision::{Leftover, WANDERS};
 use super::{Diagnosis, SensorDiagnosis};
 use crate::judge::errors::{self, ErrorFigures};
 use crate::judge::input;
-use crate::judge::unseen::Test;
 use crate::judgement::{Judgement, JudgementKind};
 use crate::readable;
+use crate::unseen::Test;
 
 impl Diagnosis {
     /// The judgement: the worst that residuals, errors, recordings and warnings lead to.

@@ -11,13 +11,13 @@ use super::sensor::{Residual, SensorFit, rms, typical};
 use super::{Options, finish, predicted, uncalibrated};
 use crate::estimate::magnitude::{self, KnownMagnitudes};
 use crate::estimate::{Estimated, Failure, Observation};
-use crate::judge::unseen::Unseen;
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::Rest;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
 use crate::triad::{Triad, vector};
 use crate::turntable::RatedDwells;
+use crate::unseen::Unseen;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 

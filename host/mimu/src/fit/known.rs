@@ -10,11 +10,11 @@ use super::{Method, Options, finish, lever_arm, refuse_wrong_gravity, uncalibrat
 use crate::estimate::{
     Estimated, Failure, Observation, earth_shared, known_input, moving_input, six_positions,
 };
-use crate::judge::unseen::Unseen;
 use crate::observable::Observable;
 use crate::observation::slope;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
+use crate::unseen::Unseen;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 

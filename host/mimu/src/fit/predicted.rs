@@ -1,15 +1,15 @@
-//! Held-out errors of a fit and their predicted covariances, for [`crate::judge::unseen`].
+//! Held-out errors of a fit and their predicted covariances, for [`crate::unseen`].
 
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use crate::estimate::least_squares::{Errors, root};
 use crate::estimate::{Estimated, Observation};
-use crate::judge::unseen::Unseen;
 use crate::observation::ByTriad;
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::{Turn, TurnError};
 use crate::triad::{Covariance, Triad};
+use crate::unseen::Unseen;
 
 /// Derivatives of errors by twelve parameters, as rows.
 fn rows(all: &[ByTriad]) -> DMatrix<f64> {

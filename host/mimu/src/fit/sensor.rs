@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use super::hold_out::HoldOut;
 use super::reference_error::Influence;
 use crate::estimate::Estimated;
-use crate::judge::unseen::Test;
 use crate::quantity::{Figure, Sensor};
+use crate::unseen::Test;
 use crate::warning::Warning;
 
 /// One residual: where it is, and how large in sample and held out.

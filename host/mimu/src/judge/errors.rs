@@ -1,8 +1,8 @@
 //! Error figures, judged by the size of the input and by what is predicted of them.
 
-use super::unseen::Test;
 use crate::judgement::{Judgement, JudgementKind};
 use crate::quantity::{Figure, Sensor, significant};
+use crate::unseen::Test;
 
 /// Largest share of the input that a calibration may leave unexplained. Consumer parts leave their factory with scale factors within 3 %
 /// and zeros within 50 to 80 mg (MPU-6050, BMI160, LSM6DS3), so a calibration that errs by more does worse than the data sheet.
@@ -137,7 +137,7 @@ pub fn judge(all: &[ErrorFigures]) -> Judgement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::judge::unseen::{BEYOND_NOISE, VISIBLE};
+    use crate::unseen::{BEYOND_NOISE, VISIBLE};
     use JudgementKind::{Good, Misfit, Unexplained, Untested};
 
     fn figures(sensor: Sensor, ratio: f64, unseen: bool) -> ErrorFigures {

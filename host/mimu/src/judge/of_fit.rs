@@ -2,7 +2,6 @@
 
 use super::errors::{self, ErrorFigures};
 use super::input;
-use super::unseen::{self, Test};
 use crate::fit::plausible::input_size;
 use crate::fit::{Fit, SensorFit};
 use crate::judgement::{Judgement, JudgementKind};
@@ -10,6 +9,7 @@ use crate::observable::Observable;
 use crate::quantity::{Figure, significant};
 use crate::readable;
 use crate::recording_problem::RecordingProblem;
+use crate::unseen::{self, Test};
 
 impl ErrorFigures {
     /// The figures of one triad of `fit`.

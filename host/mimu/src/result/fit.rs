@@ -9,7 +9,6 @@ use super::TOOL;
 use super::budget::{BudgetRow, budget};
 use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
-use crate::judge::unseen::Test;
 use crate::judgement::Judgement;
 use crate::observable::Observable;
 use crate::parameter::{ParameterKind, TriadParameter, parameters};
@@ -19,6 +18,7 @@ use crate::recording_problem::OfRecording;
 use crate::signal::dwell::Dwell;
 use crate::signal::stillness::Detection;
 use crate::triad::{Angles, Estimate};
+use crate::unseen::Test;
 use crate::warning::Warning;
 
 /// Result of a fit.

@@ -2,9 +2,9 @@
 
 use super::{Channel, Survey};
 use crate::judge::input;
-use crate::judge::unseen::BEYOND_NOISE;
 use crate::judgement::{Judgement, JudgementKind};
 use crate::quantity::{duration, plural, significant};
+use crate::unseen::BEYOND_NOISE;
 use crate::warning::Warning;
 use mimu_allan::model::Term;
 
