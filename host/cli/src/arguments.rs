@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use mimu::data_sheet::Part;
-use mimu::judgement::{Judgement, JudgementKind};
+use mimu::judgement::Judgement;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -231,10 +231,8 @@ impl WritingArgs {
         place: &str,
         remedy: &str,
     ) -> Option<Error> {
-        if self.force || judgement.kind != JudgementKind::Misfit {
-            return None;
-        }
-        let problem = format!("no calibration is written, because it is a {judgement}");
+        let why = judgement.needs_consent().filter(|_| !self.force)?;
+        let problem = format!("no calibration is written, because {why}");
         Some(Error::new(place, problem, remedy).about(Argument::Force))
     }
 }

@@ -231,6 +231,10 @@ pub struct TriadTable {
     /// 12x12.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
+    /// The part of the covariance that noise and stated errors alone give, 12x12; absent if that is all of it. The rest is by scatter beyond the noise: it
+    /// widens the intervals, and excuses no error.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub covariance_by_noise: Vec<Vec<f64>>,
     /// Error figures of its fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub judged: Option<Judged>,
@@ -448,6 +452,17 @@ impl Calibration {
     pub fn covariance(&self, sensor: Sensor) -> Option<Covariance> {
         let table = self.table(sensor).filter(|t| !t.covariance.is_empty())?;
         Some(Covariance::from_fn(|i, j| table.covariance[i][j]))
+    }
+
+    /// What noise and stated errors alone give of [`Self::covariance`]; at the next power-on, if several sessions show what that changes. Zero if nothing is
+    /// known.
+    pub fn known_covariance(&self, sensor: Sensor) -> Covariance {
+        let by_noise = self.table(sensor).map(|table| &table.covariance_by_noise);
+        let by_noise = by_noise.filter(|rows| !rows.is_empty());
+        let by_noise = by_noise.map(|rows| Covariance::from_fn(|i, j| rows[i][j]));
+        let next = self.next_power_on(sensor).map(|next| next.0);
+        let known = next.or(by_noise).or_else(|| self.covariance(sensor));
+        known.unwrap_or_else(Covariance::zeros)
     }
 
     /// The inverse model of `sensor`.

@@ -15,13 +15,14 @@ mod of_temperature;
 mod off_level;
 mod outlying;
 pub mod plausible;
+pub(crate) mod predicted;
 mod sensor;
 pub mod session_bias;
 pub(crate) mod uncalibrated;
 
 use std::sync::Arc;
 
-use crate::estimate::least_squares::POORLY_DETERMINED;
+use crate::estimate::least_squares::{POORLY_DETERMINED, Scatter};
 use crate::estimate::{Estimated, Observation};
 use crate::prepared::Prepared;
 use crate::prior::{FALSE_STRANGER, Prior};
@@ -29,6 +30,7 @@ use crate::quantity::{Figure, Sensor};
 use crate::signal::blocks::extent;
 use crate::triad::Triad;
 use crate::turntable::RatedDwells;
+use crate::unseen::{Test, Unseen};
 use crate::warning::Warning;
 use mimu_core::PerSensor;
 use mimu_recording::error::{Argument, Error, Result};
@@ -325,6 +327,7 @@ fn finish(
     dwells: usize,
     static_rms: Option<(f64, Option<f64>)>,
     held_out: HoldOut,
+    unseen: &[Unseen],
 ) -> SensorFit {
     let mut warnings = estimated.notes.clone();
     // Means of dwells and sums within dwells determine an axis together.
@@ -354,6 +357,7 @@ fn finish(
         warnings.push(Warning::LeftHanded);
     }
     warnings.extend(held_out.reasons.iter().cloned());
+    let test = tested(&estimated, figure, &residuals, unseen);
     let warnings = warnings.into_iter().map(|w| w.of(sensor)).collect();
     SensorFit {
         sensor,
@@ -363,9 +367,55 @@ fn finish(
         dwells,
         static_rms,
         held_out,
+        test,
         uncalibrated_rms: None,
         influences: Vec::new(),
         warnings,
+    }
+}
+
+/// Rows of a dwell or a turn, and the groups of observations that a figure describes.
+fn described(figure: Figure) -> (f64, fn(Observable) -> bool) {
+    match figure {
+        Figure::Input => (3.0, |group| {
+            matches!(group, Observable::Axis(_) | Observable::Within(_))
+        }),
+        Figure::GravityMagnitude | Figure::RateMagnitude => {
+            (1.0, |group| group == Observable::Magnitude)
+        }
+        // A direction has two angles.
+        Figure::Direction => (2.0, |group| {
+            matches!(group, Observable::Turns | Observable::AfterWholeTurns)
+        }),
+    }
+}
+
+/// How the `unseen` errors compare with their prediction; if nothing was held out, how the residuals compare with the noise.
+fn tested(
+    estimated: &Estimated,
+    figure: Figure,
+    residuals: &[Residual],
+    unseen: &[Unseen],
+) -> Option<Test> {
+    if residuals.iter().any(|r| r.floor.is_nan()) {
+        return None;
+    }
+    let (each, is_described) = described(figure);
+    let groups = estimated
+        .scatter
+        .iter()
+        .filter(|(group, _)| is_described(*group));
+    let sum = |of: fn(&Scatter) -> f64| groups.clone().map(|(_, s)| of(s)).sum::<f64>();
+    let rows = each * residuals.len() as f64;
+    match unseen.is_empty() {
+        false => Test::of(unseen, (sum(|s| s.dof), rows)),
+        true => {
+            let all = Scatter {
+                chi2: sum(|s| s.chi2),
+                ..Scatter::of_noise(sum(|s| s.dof))
+            };
+            Test::of_scatter(&all, rows)
+        }
     }
 }
 

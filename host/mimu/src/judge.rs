@@ -2,7 +2,7 @@
 //!
 //! | module | judges |
 //! |---|---|
-//! | [`errors`] | error figures, by the input and by the noise |
+//! | [`errors`] | error figures, by the input and by what is predicted of them |
 //! | [`input`] | whether the input is what it is declared to be |
 //! | `of_fit` | a fit |
 //!

@@ -66,6 +66,14 @@ impl Judgement {
             .reduce(|worst, next| if next.kind > worst.kind { next } else { worst })
     }
 
+    /// Why a calibration that is judged so is written, stored or uploaded only if a person agrees: a file, a board and a page ask alike. `None` if it may be.
+    ///
+    /// A model that does not describe the readings makes them worse. Anything better than that is stored with its judgement: on real units by hand `unexplained`
+    /// is the rule, and still a tenth of the error before.
+    pub fn needs_consent(&self) -> Option<String> {
+        (self.kind == JudgementKind::Misfit).then(|| format!("it is judged a {self}"))
+    }
+
     /// Whether it is `good`.
     pub fn is_good(&self) -> bool {
         self.kind == JudgementKind::Good

@@ -119,6 +119,8 @@ pub mod triad;
 #[doc(hidden)]
 pub mod turntable;
 #[doc(hidden)]
+pub mod unseen;
+#[doc(hidden)]
 pub mod warning;
 
 pub use calibration::Calibration;

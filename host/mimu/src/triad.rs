@@ -226,6 +226,11 @@ impl Triad {
         parts.fold(Covariance::zeros(), |sum, p| sum + p.covariance * p.known)
     }
 
+    /// Whether that is all of the covariance.
+    pub fn is_by_noise(&self) -> bool {
+        self.forward_parts.iter().all(|part| part.known == 1.0)
+    }
+
     /// P by rows, then b, each with sigma and interval.
     pub fn forward_estimates(&self) -> [Estimate; 12] {
         let at = vector(&self.forward.matrix, &self.forward.bias);

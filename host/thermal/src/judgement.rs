@@ -5,6 +5,7 @@ use mimu::judge::input;
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::quantity::{Figure, Sensor, significant};
 use mimu::readable;
+use mimu::unseen::Test;
 
 use crate::fit::{FitVerdict, Judged, ThermalFit};
 use crate::judge::rms;
@@ -32,13 +33,11 @@ impl ThermalFit {
             .map(|(sensor, judged)| self.figures(sensor, judged))
             .collect();
         let by_errors = errors::judge(&figures);
-        let all = by_input
-            .chain(self.by_verdict(&figures))
-            .chain([by_errors.clone()]);
+        let all = by_input.chain(self.by_verdict()).chain([by_errors.clone()]);
         Judgement::worst(all).unwrap_or(by_errors)
     }
 
-    fn by_verdict(&self, figures: &[ErrorFigures]) -> Option<Judgement> {
+    fn by_verdict(&self) -> Option<Judgement> {
         match self.verdict {
             FitVerdict::Fitted => None,
             FitVerdict::OneWay => Some(Judgement::new(
@@ -46,14 +45,17 @@ impl ThermalFit {
                 "the temperature goes one way only, so the lag of the dies and the slopes of the curves look alike",
             )),
             FitVerdict::Misfit => {
-                let in_sample = |f: &&ErrorFigures| f.rms / f.noise_floor;
-                let worst = figures
-                    .iter()
-                    .max_by(|a, b| in_sample(a).total_cmp(&in_sample(b)))?;
+                let in_sample = |judged: &Judged| {
+                    let [own, noise_floor] = rms(&judged.errors);
+                    own / noise_floor
+                };
+                let all = self.judged.present();
+                let all = all.map(|(sensor, judged)| (sensor, in_sample(judged)));
+                let (sensor, worst) = all.max_by(|a, b| a.1.total_cmp(&b.1))?;
                 let reason = format!(
                     "{}: the curves err by {} times the noise in the recordings that they were fitted to",
-                    worst.sensor,
-                    significant(in_sample(&worst))
+                    sensor,
+                    significant(worst)
                 );
                 Some(Judgement::new(JudgementKind::Misfit, reason))
             }
@@ -66,22 +68,25 @@ impl ThermalFit {
         let biases_only = self.joint.curves[sensor]
             .as_ref()
             .is_some_and(|c| c.biases_only());
+        // Biases change between power-ons; no curve over temperature predicts that.
+        let unseen = judged.without_session_bias.or(held_out);
+        let error = unseen.unwrap_or(own);
         ErrorFigures {
             sensor,
             figure: Figure::Input,
-            rms: own,
-            // Biases change between power-ons; no curve over temperature predicts that.
-            held_out_rms: judged.without_session_bias.or(held_out),
-            noise_floor,
+            error,
+            unseen: unseen.is_some(),
             // Where only biases are estimated, the input is constant.
             input: match (biases_only, sensor) {
                 (true, _) => f64::INFINITY,
                 (false, Sensor::Gyro) => LARGE_RATE,
                 (false, Sensor::Accel) => readable::STANDARD_GRAVITY,
             },
-            usual: USUAL,
+            test: noise_floor
+                .is_finite()
+                .then(|| Test::of_ratio(error / noise_floor, USUAL, judged.errors.len())),
             cause: None,
-            few: None,
+            too_few: None,
         }
     }
 }

@@ -70,6 +70,9 @@ pub struct UnitOutcome {
     pub verified: Option<Judged>,
     /// Verdict of the diagnosis.
     pub verdict: Option<Verdict>,
+    /// Ids of all effects that the diagnosis found, also of those that belong to the session and are not stored.
+    #[serde(skip)]
+    pub accepted: Vec<String>,
     /// Ids of the effects found.
     pub effects: Vec<String>,
     /// The calibration with effects, judged by a third set of poses.
@@ -376,12 +379,13 @@ impl OpenSession<'_> {
     /// Stores rough calibrations where nothing else was stored, if the user agrees.
     async fn store_rough(&mut self, plain: &[AffineCalibration]) -> Result<Ended> {
         for (k, plain) in plain.iter().enumerate() {
-            let Some(why) = plain
-                .rough
-                .clone()
-                .filter(|_| self.outcomes[k].stored.is_none())
-            else {
+            let outcome = &self.outcomes[k];
+            let Some(why) = plain.rough.as_ref().filter(|_| outcome.stored.is_none()) else {
                 continue;
+            };
+            let why = match &outcome.accepted[..] {
+                [] => why.clone(),
+                found => format!("{why}; the diagnosis found {}", found.join(", ")),
             };
             match self.wizard.ask(&Question::StoreRough(why.clone())).await? {
                 None => return Ok(Ended::Cancelled),

@@ -18,7 +18,10 @@ pub const CLEAN: f64 = 1.3;
 /// Largest ratio of the error to the prediction (held-out error and noise). With six or more dwells, more is no accident.
 const BROKEN: f64 = 2.0;
 
-/// An error of more than this many noise floors, and more than this fraction of the data sheet's error, is too large for a good calibration. The
+/// If the error that is predicted exceeds the noise by this factor, most of it is what the poses leave open.
+const OPEN: f64 = std::f64::consts::SQRT_2;
+
+/// An error of more than this many predicted standard deviations, and more than this fraction of the data sheet's error, is too large for a good calibration. The
 /// held-out error does not reveal it, because it is as large.
 const ROUGH: (f64, f64) = (5.0, 0.05);
 
@@ -41,8 +44,10 @@ pub struct SensorJudged {
     pub floor: f64,
     /// Predicted error: held out of the fit of the calibration.
     pub promised: Option<f64>,
-    /// Error beside the noise that the calibration's own uncertainty explains, in 95 % of cases: with a prior, few poses leave much open.
-    pub announced: f64,
+    /// Error that the noise and the known uncertainty of the parameters predict: with a prior, few poses leave much open.
+    pub predicted: f64,
+    /// The error in predicted standard deviations, as it is judged.
+    pub ratio: f64,
     /// Number of dwells or turns.
     pub count: usize,
 }
@@ -58,17 +63,20 @@ impl SensorJudged {
             after: found.rms,
             floor: found.noise_floor,
             promised,
-            announced: found.announced(),
+            predicted: found.test.map_or(found.noise_floor, |test| test.predicted),
+            ratio: found
+                .test
+                .map_or(found.rms / found.noise_floor, |test| test.ratio),
             count: found.count,
         }
     }
 
     /// Why it must not be stored, if so.
     pub fn broken(&self) -> Option<String> {
-        let promised = self.promised.unwrap_or(0.0).max(self.announced);
-        let promised = promised.hypot(self.floor);
+        let promised = self.promised.unwrap_or(0.0).hypot(self.floor);
+        let promised = promised.max(self.predicted);
         // What few poses leave open is as in the data sheet's model, so that either may happen to err less.
-        let is_open = self.announced > self.floor && self.after <= promised;
+        let is_open = self.predicted > OPEN * self.floor && self.after <= BROKEN * self.predicted;
         if !(self.after < self.before || is_open) {
             return Some(format!(
                 "{}: the error of the {} is {} {} with the calibration and {} without",
@@ -95,17 +103,16 @@ impl SensorJudged {
 impl SensorJudged {
     /// Why the user has to agree before it is stored: an error that the model lacks.
     fn rough(&self) -> Option<String> {
-        let floor = self.floor.hypot(self.announced);
-        let rough = self.after > ROUGH.0 * floor && self.after > ROUGH.1 * self.before;
+        let rough = self.ratio > ROUGH.0 && self.after > ROUGH.1 * self.before;
         rough.then(|| {
             let shown = |si: f64| mimu::quantity::significant(si);
             format!(
-                "{}: the error of the {} is {} {} in poses that the fit has not used, {:.1} times the noise; with the data sheet's values it is {}",
+                "{}: the error of the {} is {} {} in poses that the fit has not used, {:.1} times what noise predicts; with the data sheet's values it is {}",
                 self.sensor,
                 self.figure.description(),
                 shown(self.after),
                 self.unit,
-                self.after / self.floor,
+                self.ratio,
                 shown(self.before)
             )
         })
@@ -151,7 +158,11 @@ impl Judged {
     pub fn rough(&self) -> Option<String> {
         let of_sensors = self.sensors.iter().filter_map(SensorJudged::rough);
         let of_turns = self.whole_turns.iter().filter_map(rough_turns);
-        let rough: Vec<String> = of_sensors.chain(of_turns).collect();
+        let rough = of_sensors.chain(of_turns);
+        let mut rough: Vec<String> = rough.collect();
+        if rough.is_empty() {
+            rough.extend(self.judgement.needs_consent());
+        }
         (!rough.is_empty()).then(|| rough.join(", "))
     }
 
@@ -236,7 +247,8 @@ mod tests {
             after,
             floor,
             promised: Some(promised),
-            announced: 0.0,
+            predicted: floor,
+            ratio: after / floor,
             count: 6,
         };
         let sensors = vec![

@@ -38,8 +38,13 @@ fn kind(prepared: Prepared) -> JudgementKind {
 /// 1.65 V, then changed by `fault`, which is given the share of the recording that has passed and the six readings. Time is multiplied by
 /// `time`.
 fn driven(unit: RawUnit, time: f64, fault: impl Fn(f64, &mut [f64])) -> Prepared {
+    driven_on(SEED, unit, time, fault)
+}
+
+/// The same on the day `seed`.
+fn driven_on(seed: u64, unit: RawUnit, time: f64, fault: impl Fn(f64, &mut [f64])) -> Prepared {
     let plan = bench::hand_plan(30).replace("carrier", "samples = \"csv\"\ncarrier");
-    let folder = bench::written(&plan, &self::unit(), SEED);
+    let folder = bench::written(&plan, &self::unit(), seed);
     let recording = folder.path().join("recording");
     convert(&recording.join("samples.csv"), time, fault);
     let mut recording = Recording::open(&recording).expect("a recording");
@@ -126,16 +131,42 @@ fn nothing_held_out_is_untested() {
 
 #[test]
 fn an_error_that_the_model_lacks_is_unexplained_and_a_file_contains_it() {
-    let bent = driven(RawUnit::Si, 1.0, |_, six| {
-        six[3..].iter_mut().for_each(|v| *v += 2e-3 * *v * *v);
-    });
-    let fit = fitted(bent);
+    let fit = fitted(driven(RawUnit::Si, 1.0, bent));
     let judgement = Judgement::of_fit(&fit);
     println!("{judgement}");
     assert_eq!(judgement.kind, JudgementKind::Unexplained);
     let file = Calibration::of(&fit, &[], "").expect("a file").to_toml();
     let read = Calibration::parse(&file, "file").expect("readable");
     assert_eq!(read.judgement, Some(judgement));
+}
+
+/// A quadratic of 20 mg at 1 g.
+fn bent(_: f64, six: &mut [f64]) {
+    six[3..].iter_mut().for_each(|v| *v += 2e-3 * *v * *v);
+}
+
+/// The misfit widens the intervals of the file, and is as large on the next day.
+#[test]
+fn a_file_whose_own_fit_errs_is_good_on_no_other_day() {
+    let first = fitted(driven(RawUnit::Si, 1.0, bent));
+    let file = Calibration::of(&first, &[], "").expect("a file");
+    let own = file.judgement.clone().expect("a judgement");
+    for seed in [5, 6] {
+        let later = driven_on(seed, RawUnit::Si, 1.0, bent);
+        let found = verify(&later, &file).expect("verified");
+        println!("{}", found.judgement);
+        assert!(found.judgement.kind >= own.kind, "{}", found.judgement);
+        // Also without the word of the file.
+        let mut unjudged = file.clone();
+        unjudged.judgement = None;
+        let found = verify(&later, &unjudged).expect("verified");
+        assert_eq!(
+            found.judgement.kind,
+            JudgementKind::Unexplained,
+            "{}",
+            found.judgement
+        );
+    }
 }
 
 fn matrix(model: &AffineFile) -> Matrix3<f64> {

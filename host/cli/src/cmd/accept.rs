@@ -3,12 +3,13 @@
 mod golden;
 mod units;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::data_sheet::Part;
+use mimu::judgement::JudgementKind;
 use mimu::prior::Prior;
 use mimu_recording::are_two_units;
 use mimu_recording::error::{Error, Result};
@@ -123,6 +124,27 @@ fn side(text: &str) -> std::result::Result<String, String> {
     }
 }
 
+/// No unit passes through a calibration that is judged a misfit; with one whose errors are unexplained or suspect, a warning says so.
+///
+/// # Errors
+/// A misfit.
+fn check_judgement(calibration: &Calibration, path: &Path) -> Result<()> {
+    let Some(judgement) = &calibration.judgement else {
+        return Ok(());
+    };
+    if let Some(why) = judgement.needs_consent() {
+        return Err(Error::new(
+            path.display(),
+            format!("no unit is accepted through it, because {why}"),
+            "calibrate the unit again",
+        ));
+    }
+    if judgement.kind > JudgementKind::Untested {
+        eprintln!("warning: the calibration is judged {judgement}");
+    }
+    Ok(())
+}
+
 /// What all units are judged by.
 struct Station<'a> {
     args: &'a AcceptArgs,
@@ -166,11 +188,15 @@ impl<'a> Station<'a> {
             return Err(Error::new("accept", problem, remedy));
         }
         let read = |path: &Option<PathBuf>| path.as_deref().map(Calibration::read).transpose();
+        let calibration = read(&args.calibration)?;
+        if let (Some(of), Some(path)) = (&calibration, &args.calibration) {
+            check_judgement(of, path)?;
+        }
         Ok(Self {
             args,
             limits,
             part,
-            calibration: read(&args.calibration)?,
+            calibration,
             as_found: read(&args.as_found)?,
             time: now(),
         })

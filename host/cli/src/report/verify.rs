@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use mimu::calibration::verify::{Causes, SensorVerification, Verification, WholeTurnsOfAxis};
-use mimu::judge::errors::BEYOND_NOISE;
 use mimu::judgement::JudgementKind;
 use mimu::quantity::{AXES, Figure, Sensor, plural, plus_minus, significant};
 use mimu::readable;
@@ -161,7 +160,7 @@ pub(super) fn errors(all: &[(String, Verification)], named: bool) -> Table {
 }
 
 fn beyond_noise(s: &SensorVerification) -> bool {
-    s.rms > BEYOND_NOISE * s.noise_floor
+    s.test.is_none_or(|test| test.fails())
 }
 
 /// How much the bias has changed, and how much of the error that explains.
@@ -235,12 +234,12 @@ fn verdict(s: &SensorVerification) -> String {
         true => format!("{rms} rms instead of {before} {what}"),
         false => format!("{rms} rms, not better than {before} {what}"),
     };
-    let noise = match s.noise_floor.is_finite() && s.noise_floor > 0.0 {
-        true => format!(
-            "{how}; {} times the noise",
-            significant(s.rms / s.noise_floor)
+    let noise = match &s.test {
+        Some(test) => format!(
+            "{how}; {} times what noise predicts",
+            significant(test.ratio)
         ),
-        false => format!("{how}; the noise is unknown"),
+        None => format!("{how}; the noise is unknown"),
     };
     match s.next_power_on {
         Some(next) => format!(

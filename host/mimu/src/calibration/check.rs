@@ -25,7 +25,8 @@ impl Calibration {
                 .iter()
                 .flatten()
                 .chain(&table.o)
-                .chain(table.covariance.iter().flatten());
+                .chain(table.covariance.iter().flatten())
+                .chain(table.covariance_by_noise.iter().flatten());
             if !numbers.into_iter().all(|x| x.is_finite()) {
                 return Err(Error::new(
                     place,
@@ -52,8 +53,11 @@ impl Calibration {
                 ));
             }
             let known = table.sigma_C.is_some();
-            if known && table.covariance.len() != 12
-                || table.covariance.iter().any(|r| r.len() != 12)
+            let square = |rows: &[Vec<f64>]| rows.len() == 12 && rows.iter().all(|r| r.len() == 12);
+            let is_square = |rows: &[Vec<f64>]| rows.is_empty() || square(rows);
+            if known && !square(&table.covariance)
+                || !is_square(&table.covariance)
+                || !is_square(&table.covariance_by_noise)
             {
                 return Err(Error::new(
                     place,

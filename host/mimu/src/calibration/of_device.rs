@@ -151,6 +151,7 @@ fn triad_table(model: &Affine<f32>, sensor: Sensor, raw_unit: RawUnit) -> Option
         interval_o: None,
         parameters: Vec::new(),
         covariance: Vec::new(),
+        covariance_by_noise: Vec::new(),
         judged: None,
         next_power_on: None,
         forward: forward_table(&triad.forward),

@@ -140,6 +140,10 @@ pub(super) fn triad_table(
         interval_o: Some([9, 10, 11].map(intervals)),
         parameters: inverse_names().into(),
         covariance: nested(covariance),
+        covariance_by_noise: match triad.is_by_noise() {
+            true => Vec::new(),
+            false => nested(&triad.known_covariance()),
+        },
         judged: Some(judged),
         next_power_on: None,
         forward: forward_table(&triad.forward),

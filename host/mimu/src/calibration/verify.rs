@@ -28,6 +28,7 @@ use crate::quantity::{PerSensor, Sensor, present};
 use crate::signal::unit_in_si::restless;
 use crate::triad::Forward;
 use crate::turntable::RatedDwells;
+use crate::unseen::Test;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, Reference};
@@ -58,6 +59,8 @@ pub struct SensorVerification {
     /// session, which does not show how much parameters change.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub next_power_on: Option<f64>,
+    /// How the errors compare with the noise and with what the calibration's parameters are known to err by; null if the noise is not known.
+    pub test: Option<Test>,
     /// SI unit of the figures.
     pub unit: &'static str,
     /// The quantity that they describe.
@@ -132,7 +135,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let all: Vec<(Sensor, &SensorVerification)> = sensors.present().collect();
     Ok(Verification {
         format: "mimu-verify/1",
-        judgement: judged::judgement(&readings.as_read, &all, &warnings),
+        judgement: judged::judgement(&readings.as_read, calibration, &all, &warnings),
         same_recording,
         sensors,
         whole_turns,
@@ -347,6 +350,7 @@ fn judge(
     let announced = |of| causes::announced(prepared, sensor, calibration, of);
     let judged = SensorVerification {
         causes,
+        test: judged::test(prepared, sensor, calibration),
         parameter_uncertainty: announced(&|s| calibration.uncertainty(s)),
         next_power_on: announced(&|s| calibration.next_power_on(s)),
         ..judged
@@ -405,6 +409,7 @@ fn judged(
         noise_floor: rms(floor),
         parameter_uncertainty: None,
         next_power_on: None,
+        test: None,
         static_rms: None,
         causes: None,
         count: floor.len(),

@@ -2,11 +2,11 @@
 
 use super::decision::{Leftover, WANDERS};
 use super::{Diagnosis, SensorDiagnosis};
-use crate::fit::plausible::input_size;
-use crate::judge::errors::{self, ErrorFigures, Few};
+use crate::judge::errors::{self, ErrorFigures};
 use crate::judge::input;
 use crate::judgement::{Judgement, JudgementKind};
 use crate::readable;
+use crate::unseen::Test;
 
 impl Diagnosis {
     /// The judgement: the worst that residuals, errors, recordings and warnings lead to.
@@ -27,21 +27,31 @@ impl Diagnosis {
         Judgement::worst(all.chain([by_errors.clone()])).unwrap_or(by_errors)
     }
 
-    /// Error figures with the effects that were found.
+    /// Error figures with the effects that were found; without any, those of the fit.
     fn figures(&self, found: &SensorDiagnosis) -> Option<ErrorFigures> {
         let fit = self.before.sensor(found.sensor)?;
+        let of_fit = ErrorFigures::of_fit(&self.before, fit);
         let decision = &found.decision;
-        let held_out = decision.held_out_rms[1];
+        if decision.accepted.is_empty() {
+            return Some(of_fit);
+        }
+        let [_, held_out] = decision.held_out_rms;
+        let error = if held_out.is_finite() {
+            held_out
+        } else {
+            decision.rms[1]
+        };
+        let floor = decision.noise_floor.hypot(decision.reference_rms);
+        let test = |test: Test| Test {
+            ratio: error / floor,
+            limit: test.limit.max(WANDERS),
+            ..test
+        };
         Some(ErrorFigures {
-            sensor: found.sensor,
-            figure: fit.figure,
-            rms: decision.rms[1],
-            held_out_rms: held_out.is_finite().then_some(held_out),
-            noise_floor: decision.noise_floor.hypot(decision.reference_rms),
-            input: input_size(&self.before.prepared, fit),
-            usual: WANDERS,
-            cause: None,
-            few: Few::of_fit(&self.before, fit),
+            error,
+            unseen: held_out.is_finite(),
+            test: of_fit.test.map(test).filter(|_| floor > 0.0),
+            ..of_fit
         })
     }
 }

@@ -69,7 +69,7 @@ pub(super) fn complete(found: Observability, dwells: usize) -> Result<Observabil
 /// Known errors of the readings of sensor `axis`. `wander` is the covariance of errors that the means of all dwells share, by axis
 /// ([`crate::noise::Noise::wander`]); their variances contain it. `forward` is the sensor's matrix, raw/SI, to about a per cent: the unknown part of the
 /// Earth's rate in the readings is this times that in the inputs.
-pub(super) fn errors(
+pub(crate) fn errors(
     observations: &[Observation],
     axis: usize,
     wander: Option<&[DMatrix<f64>; 3]>,
@@ -317,7 +317,7 @@ pub(super) fn forward(
 }
 
 /// Variances, with a floor where a noiseless recording has none: 1e-12 of the largest, or of one.
-pub(super) fn positive(variances: DVector<f64>) -> DVector<f64> {
+pub(crate) fn positive(variances: DVector<f64>) -> DVector<f64> {
     let floor = 1e-12 * variances.max();
     variances.map(|v| {
         if v > floor {

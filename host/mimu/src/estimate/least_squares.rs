@@ -142,6 +142,26 @@ impl Errors {
         }
     }
 
+    /// These errors, and further independent ones behind them.
+    pub fn beside(self, further: DVector<f64>) -> Self {
+        let (n, more) = (self.variances().len(), further.len());
+        let both =
+            |v: DVector<f64>| DVector::from_iterator(n + more, v.iter().chain(&further).copied());
+        match self {
+            Self::Independent(variances) => Self::Independent(both(variances)),
+            Self::Shared(variances, factor) => {
+                Self::Shared(both(variances), factor.resize_vertically(n + more, 0.0))
+            }
+            Self::Correlated(covariance) => {
+                let mut all = covariance.resize(n + more, n + more, 0.0);
+                for (i, variance) in further.iter().enumerate() {
+                    all[(n + i, n + i)] = *variance;
+                }
+                Self::Correlated(all)
+            }
+        }
+    }
+
     /// Variance of each observation.
     pub fn variances(&self) -> DVector<f64> {
         match self {
@@ -161,7 +181,7 @@ impl Errors {
     }
 
     /// The covariance of so many observations.
-    pub(super) fn covariance(&self) -> DMatrix<f64> {
+    pub fn covariance(&self) -> DMatrix<f64> {
         match self {
             Self::Independent(variances) => DMatrix::from_diagonal(variances),
             Self::Correlated(covariance) => covariance.clone(),
@@ -171,8 +191,31 @@ impl Errors {
         }
     }
 
+    /// Diagonal of the inverse of the covariance. `None` if that is singular.
+    pub fn precisions(&self) -> Option<DVector<f64>> {
+        match self {
+            Self::Independent(variances) => Some(variances.map(f64::recip)),
+            Self::Correlated(covariance) => {
+                let inverse = covariance.clone().cholesky()?.inverse();
+                Some(inverse.diagonal())
+            }
+            // By Woodbury's identity.
+            Self::Shared(variances, factor) => {
+                let scaled = Self::Independent(variances.clone()).whitened(0.0, factor)?;
+                let k = scaled.ncols();
+                let inner = (DMatrix::identity(k, k) + scaled.tr_mul(&scaled)).cholesky()?;
+                let back = inner.l().solve_lower_triangular(&scaled.transpose())?;
+                let taken = back.column_iter().map(|c| c.norm_squared());
+                let left = taken
+                    .zip(variances.iter())
+                    .map(|(t, v)| (1.0 - t).max(0.0) / v);
+                Some(DVector::from_iterator(variances.len(), left))
+            }
+        }
+    }
+
     /// Sum of the squares of decorrelated `residuals`, with the variance `extra` added to each.
-    fn chi2(&self, extra: f64, residuals: &DVector<f64>) -> f64 {
+    pub fn chi2(&self, extra: f64, residuals: &DVector<f64>) -> f64 {
         match self {
             Self::Independent(variances) => {
                 let terms = residuals.iter().zip(variances.iter());
@@ -185,6 +228,16 @@ impl Errors {
             }
         }
     }
+}
+
+/// A root of a covariance: one column for each direction of it that has a variance.
+pub fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = covariance.clone().symmetric_eigen();
+    let largest = eigen.eigenvalues.max();
+    let used = (0..covariance.nrows()).filter(|k| eigen.eigenvalues[*k] > 1e-14 * largest);
+    let columns = used.map(|k| eigen.eigenvectors.column(k) * eigen.eigenvalues[k].sqrt());
+    let columns: Vec<DVector<f64>> = columns.collect();
+    DMatrix::from_fn(covariance.nrows(), columns.len(), |i, j| columns[j][i])
 }
 
 /// `design` with the observations as its last column.

@@ -9,7 +9,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::factor_fit::{Coordinates, FactorFit, HALF_DEGREE, Minimum, Solved, mean_square};
-use super::least_squares::Observability;
+use super::least_squares::{Observability, root};
 use super::{Estimated, Failure};
 use crate::factor::chains::Chains;
 use crate::factor::{Block, Factors, Kind};
@@ -23,19 +23,6 @@ use crate::triad::{Covariance, Part, Triad, vector};
 
 /// The elements of C across the axes.
 const CROSS: [usize; 6] = [1, 2, 3, 5, 6, 7];
-
-/// A square root of a covariance, one column for each direction of it that has a variance, and the inverse of that.
-fn root(covariance: &Covariance) -> [DMatrix<f64>; 2] {
-    let eigen = covariance.symmetric_eigen();
-    let (values, largest) = (eigen.eigenvalues, eigen.eigenvalues.max());
-    let used: Vec<usize> = (0..12).filter(|k| values[*k] > 1e-14 * largest).collect();
-    let along = |power: f64| {
-        DMatrix::from_fn(12, used.len(), |i, j| {
-            eigen.eigenvectors[(i, used[j])] * values[used[j]].powf(power)
-        })
-    };
-    [along(0.5), along(-0.5).transpose()]
-}
 
 /// Number of parameters: nine of C, three of o.
 pub const PARAMETERS: usize = 12;
@@ -199,10 +186,15 @@ impl<'a> ByTurns<'a> {
         let at = DVector::from_column_slice(at.as_slice());
         // Headings do not depend on the accelerometer, and directions do, all of them by the same errors. To weigh one against the other these errors have to be
         // parameters: without them, directions of a tenth of a degree were believed to a fiftieth, and the headings that contradicted them were not.
-        let [errors, back] = match whole.list.is_empty() {
-            true => [DMatrix::zeros(12, 0), DMatrix::zeros(0, 12)],
-            false => root(&accel.inverse_covariance),
+        let errors = match whole.list.is_empty() {
+            true => DMatrix::zeros(12, 0),
+            false => root(&accel.inverse_covariance.resize(12, 12, 0.0)),
         };
+        // The columns of the root are orthogonal.
+        let mut back = errors.transpose();
+        for mut row in back.row_iter_mut() {
+            row /= row.norm_squared();
+        }
         let information = (!whole.list.is_empty()).then(|| back.tr_mul(&back));
         if !back.is_empty() {
             let stated = Kind::Stated(of_accel, at.clone(), back, 1.0);

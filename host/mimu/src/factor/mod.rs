@@ -313,10 +313,7 @@ impl<'a> Factors<'a> {
                 let all = noise + rest.rate_variance + rest.vertical_variance;
                 all.as_slice().to_vec()
             }
-            Kind::Turn(t, _) => {
-                let turn = &self.turns[*t];
-                vec![turn.variance(mean) + turn.earth_variance; 2]
-            }
+            Kind::Turn(t, _) => vec![self.turns[*t].variance(mean); 2],
             Kind::Closure(turns, known) => {
                 let noise = self.turns[turns.clone()].iter();
                 vec![known + mean * noise.map(|turn| turn.integral_variance).sum::<f64>()]

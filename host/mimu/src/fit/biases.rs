@@ -149,6 +149,7 @@ fn judged(
         n,
         None,
         HoldOut::none(),
+        &[],
     )
 }
 

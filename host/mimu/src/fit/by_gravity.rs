@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::determined::{faces_not_up, unseen_poses};
 use super::hold_out::{Refits, Split, determined};
+use super::predicted::{self, Both};
 use super::sensor::{Residual, SensorFit, rms, typical};
 use super::{Options, finish, refuse_wrong_gravity, uncalibrated};
 use crate::estimate::whole_turns::Data;
@@ -19,6 +20,7 @@ use crate::quantity::{AXES, Figure, Sensor};
 use crate::signal::blocks::quantile;
 use crate::signal::dwell::Fault;
 use crate::triad::{Covariance, Part, Triad};
+use crate::unseen::Unseen;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
@@ -88,6 +90,27 @@ pub(super) fn fit_gravity(
         let refit = held_out.without(part_of(held_out.split, o.dwell));
         residual.held_out = refit.map(|refit| size_error(&refit.triad, o));
     }
+    let unseen = |(part, refit): (usize, &Outcome<Estimated>)| {
+        let triad = &refit.as_ref().ok()?.triad;
+        let own = poses
+            .iter()
+            .filter(|o| part_of(held_out.split, o.dwell) == part);
+        let own: Vec<Observation> = own.copied().collect();
+        let noise = prepared.magnitude_variances(&triad.inverse, &own);
+        let known = own.iter().map(|o| (o, g));
+        Some(predicted::magnitudes(
+            &triad.inverse,
+            &triad.known_covariance(),
+            known,
+            noise,
+        ))
+    };
+    let unseen: Vec<Unseen> = held_out
+        .refits
+        .iter()
+        .enumerate()
+        .filter_map(unseen)
+        .collect();
     let mut sensors = Vec::new();
     // A table of means has no turns; its warnings say so.
     if prepared.has(Sensor::Gyro) && options.wants(Sensor::Gyro) && !prepared.manifest.means {
@@ -105,7 +128,7 @@ pub(super) fn fit_gravity(
         }
         sensors.extend(turns?);
     }
-    let unseen = unseen_poses(g, &accel.triad, typical);
+    let not_seen = unseen_poses(g, &accel.triad, typical);
     let mut fit = finish(
         Sensor::Accel,
         accel,
@@ -114,10 +137,11 @@ pub(super) fn fit_gravity(
         poses.len(),
         None,
         held_out.into(),
+        &unseen,
     );
     let known: Vec<(&Observation, f64)> = poses.iter().map(|o| (o, g)).collect();
     fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::GravityMagnitude, &known);
-    fit.warnings.extend(unseen);
+    fit.warnings.extend(not_seen);
     sensors.push(fit);
     Ok(sensors)
 }
@@ -507,18 +531,19 @@ fn fit_turns(
     let without = |dwell: usize| held.without((parts.of)(held.split, dwell));
     for (residual, turn) in residuals.iter_mut().zip(&turns) {
         residual.held_out = without(turn.to).map(|(gyro, accel)| {
-            let force = |dwell: usize| {
-                let raw = prepared.dwells.list[dwell].raw_mean(Sensor::Accel);
-                accel.triad.inverse.apply(&raw)
-            };
-            let turn = Turn {
-                before: force(turn.from),
-                after: force(turn.to),
-                ..*turn
-            };
-            TurnError::at(&turn, &gyro.triad.inverse).vector()
+            TurnError::at(&turn.with(&accel.triad.inverse), &gyro.triad.inverse).vector()
         });
     }
+    let unseen = |(part, refit): (usize, &Outcome<(Estimated, Estimated)>)| {
+        let (gyro, accel) = refit.as_ref().ok()?;
+        let own = turns
+            .iter()
+            .filter(|t| (parts.of)(held.split, t.to) == part);
+        let own: Vec<Turn> = own.map(|t| t.with(&accel.triad.inverse)).collect();
+        let both = Both::of(gyro, &accel.triad);
+        Some(predicted::directions(&own, &gyro.triad.inverse, &both))
+    };
+    let unseen: Vec<Unseen> = held.refits.iter().enumerate().filter_map(unseen).collect();
     let static_rms = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
         let all: Vec<_> = rest.iter().filter_map(rate).collect();
         (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))
@@ -535,6 +560,7 @@ fn fit_turns(
         rest.len(),
         in_sample.map(|r| (r, held_at_rest)),
         held.into(),
+        &unseen,
     );
     fit.uncalibrated_rms = uncalibrated::directions(prepared, &turns);
     if wide > 20f64.to_radians() {

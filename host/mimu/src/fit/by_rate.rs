@@ -8,15 +8,16 @@ use nalgebra::Vector3;
 use super::by_gravity::fit_gravity;
 use super::hold_out::{Refits, Split, determined};
 use super::sensor::{Residual, SensorFit, rms, typical};
-use super::{Options, finish, uncalibrated};
+use super::{Options, finish, predicted, uncalibrated};
 use crate::estimate::magnitude::{self, KnownMagnitudes};
 use crate::estimate::{Estimated, Failure, Observation};
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::Rest;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
-use crate::triad::Triad;
+use crate::triad::{Triad, vector};
 use crate::turntable::RatedDwells;
+use crate::unseen::Unseen;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 
@@ -116,6 +117,29 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
     };
     let static_rms = at_rest(&|r| Some(inverse.apply(&r.raw)));
     let static_held_out = at_rest(&|r| Some(without(r.dwell)?.triad.inverse.apply(&r.raw)));
+    let unseen = |(part, refit): (usize, &std::result::Result<Estimated, Failure>)| {
+        let triad = &refit.as_ref().ok()?.triad;
+        let own = || {
+            rated
+                .iter()
+                .filter(|(o, _)| part_of(held_out.split, o.dwell) == part)
+        };
+        let observations: Vec<Observation> = own().map(|(o, _)| **o).collect();
+        let common = vector(&triad.inverse.matrix, &triad.inverse.offset) * dwells.rate_sigma;
+        let covariance = triad.known_covariance() - common * common.transpose();
+        Some(predicted::magnitudes(
+            &triad.inverse,
+            &covariance,
+            own().copied(),
+            variances(&triad.inverse, &observations),
+        ))
+    };
+    let unseen: Vec<Unseen> = held_out
+        .refits
+        .iter()
+        .enumerate()
+        .filter_map(unseen)
+        .collect();
     let mut fit = finish(
         Sensor::Gyro,
         gyro,
@@ -124,6 +148,7 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         dwells.turning.len() + dwells.rests.len(),
         static_rms.map(|r| (r, static_held_out)),
         held_out.into(),
+        &unseen,
     );
     fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::RateMagnitude, &rated);
     let rates_dps = dwells.rates.iter().map(|r| r.to_degrees()).collect();

@@ -1,17 +1,20 @@
 //! Both triads under a known input: on a table, or in steps of known rate and force.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::hold_out::{Refits, Split, determined};
+use super::predicted::LinearAxis;
 use super::reference_error::{Influence, Influences};
 use super::sensor::{Residual, SensorFit, typical};
 use super::{Method, Options, finish, lever_arm, refuse_wrong_gravity, uncalibrated};
 use crate::estimate::{
     Estimated, Failure, Observation, earth_shared, known_input, moving_input, six_positions,
 };
+use crate::observable::Observable;
 use crate::observation::slope;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
+use crate::unseen::Unseen;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 
@@ -253,6 +256,10 @@ impl<'a> Known<'a> {
             let refit = held_out.without(part_of(held_out.split, o.dwell));
             residual.held_out = refit.map(|refit| refit.error(o, *bias));
         }
+        let unseen = match residuals.iter().any(|r| r.floor.is_nan()) {
+            true => Vec::new(),
+            false => self.unseen(&estimated, &all, &held_out, part_of),
+        };
         // In dwells that spin, the force of the arm is not an error of the sensor.
         let at_rest = |r: &Residual| !prepared.dwells.list[r.dwell].spins();
         if self.off_axis && residuals.iter().any(at_rest) {
@@ -266,10 +273,76 @@ impl<'a> Known<'a> {
             n,
             None,
             held_out.into(),
+            &unseen,
         );
         fit.influences = influences;
         fit.uncalibrated_rms = uncalibrated::inputs(prepared, all.iter().map(|(o, _)| *o));
         Ok(fit)
+    }
+}
+
+impl Known<'_> {
+    /// Errors of the readings of each axis in each part that was held out, as means of dwells and as sums within them (`all`, with the sum of their weights).
+    fn unseen(
+        &self,
+        estimated: &Estimated,
+        all: &[(&Observation, f64)],
+        held_out: &Refits<Estimated>,
+        part_of: impl Fn(Split, usize) -> usize,
+    ) -> Vec<Unseen> {
+        let mut found = Vec::new();
+        for axis in 0..3 {
+            let readings = self.axis(axis, estimated, all);
+            for (part, refit) in held_out.refits.iter().enumerate() {
+                let Ok(refit) = refit else { continue };
+                let own = |i: &usize| part_of(held_out.split, all[*i].0.dwell) == part;
+                let own: Vec<usize> = (0..all.len()).filter(own).collect();
+                let forward = refit.triad.forward.matrix.row(axis);
+                let error = |i: &usize| (forward * refit.error(all[*i].0, all[*i].1))[0];
+                let errors: Vec<f64> = own.iter().map(error).collect();
+                found.extend(readings.unseen(errors.into(), &own));
+            }
+        }
+        found
+    }
+
+    /// The readings of sensor `axis`.
+    fn axis(&self, axis: usize, estimated: &Estimated, all: &[(&Observation, f64)]) -> LinearAxis {
+        let forward = &estimated.triad.forward.matrix;
+        let span = all
+            .iter()
+            .map(|(o, _)| o.input.norm())
+            .fold(f64::MIN_POSITIVE, f64::max);
+        let delay = usize::from(estimated.delays.is_some());
+        let design = DMatrix::from_fn(all.len(), 4 + delay, |i, j| match j {
+            0 => all[i].1,
+            4 => -(forward.row(axis) * all[i].0.change)[0],
+            _ => all[i].0.input[j - 1] / span,
+        });
+        let means = known_input::errors(&self.weighed, axis, self.shared.as_ref(), forward);
+        let within = all.len() - self.weighed.len();
+        let of_within = self.within.iter().take(within).map(|o| {
+            let earth = (forward.row(axis) * o.earth.by).norm_squared();
+            o.variance[axis] + earth
+        });
+        let of_within = known_input::positive(DVector::from_iterator(within, of_within));
+        // The inverse form finds it in SI.
+        let unit = match self.options.method {
+            Method::InverseForm => forward[(axis, axis)].powi(2),
+            Method::LeastSquares | Method::Kalman | Method::SixPositions => 1.0,
+        };
+        let extra = |group| {
+            let of = estimated.scatter.iter().find(|(g, _)| *g == group);
+            of.map_or(0.0, |(_, s)| s.extra_variance * unit)
+        };
+        let groups = [Observable::Axis(axis), Observable::Within(axis)].map(extra);
+        LinearAxis {
+            design,
+            errors: means.beside(of_within),
+            extra: DVector::from_fn(all.len(), |i, _| {
+                groups[usize::from(i >= self.weighed.len())]
+            }),
+        }
     }
 }
 

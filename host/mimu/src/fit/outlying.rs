@@ -210,7 +210,7 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
         Row {
             error: error.vector(),
             by: DMatrix::from_column_slice(3, 12, by.as_slice()),
-            variance: (turn.variance(mean_square) + turn.earth_variance).max(1e-18),
+            variance: turn.variance(mean_square).max(1e-18),
         }
     };
     let mut rows: Vec<Row> = turns.iter().map(turned).collect();

@@ -6,6 +6,7 @@ use super::hold_out::HoldOut;
 use super::reference_error::Influence;
 use crate::estimate::Estimated;
 use crate::quantity::{Figure, Sensor};
+use crate::unseen::Test;
 use crate::warning::Warning;
 
 /// One residual: where it is, and how large in sample and held out.
@@ -40,6 +41,9 @@ pub struct SensorFit {
     pub static_rms: Option<(f64, Option<f64>)>,
     /// How its residuals were held out.
     pub held_out: HoldOut,
+    /// How the errors of data that were held out compare with what is predicted of them; those in sample if nothing was held out. `None` if the noise is
+    /// unknown.
+    pub test: Option<Test>,
     /// [`Self::rms`] without a calibration, if the readings are in SI.
     pub uncalibrated_rms: Option<f64>,
     /// What the stated errors of the reference add to the covariance. Empty without any.

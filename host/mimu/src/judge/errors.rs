@@ -1,15 +1,12 @@
-//! Error figures, judged by the size of the input and by the noise.
+//! Error figures, judged by the size of the input and by what is predicted of them.
 
 use crate::judgement::{Judgement, JudgementKind};
 use crate::quantity::{Figure, Sensor, significant};
+use crate::unseen::Test;
 
 /// Largest share of the input that a calibration may leave unexplained. Consumer parts leave their factory with scale factors within 3 %
 /// and zeros within 50 to 80 mg (MPU-6050, BMI160, LSM6DS3), so a calibration that errs by more does worse than the data sheet.
 pub const UNEXPLAINED_SHARE: f64 = 0.05;
-
-/// If the error exceeds this many noise floors, it contains more than noise. With twelve parameters and twenty dwells, the held-out error of
-/// noise alone is 1.3 floors.
-pub const BEYOND_NOISE: f64 = 2.0;
 
 /// Error figures of a sensor, all in the unit of `figure`.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,66 +15,28 @@ pub struct ErrorFigures {
     pub sensor: Sensor,
     /// The quantity that they describe.
     pub figure: Figure,
-    /// Rms error of the data that the model was fitted to.
-    pub rms: f64,
-    /// Rms error of data that were held out or belong to another recording; `None` if there are none.
-    pub held_out_rms: Option<f64>,
-    /// Rms error by noise alone; not a number if the noise is unknown.
-    pub noise_floor: f64,
+    /// Rms error: of data that were held out or belong to another recording, or else of those that the model was fitted to.
+    pub error: f64,
+    /// Whether the model has not seen the data of [`Self::error`].
+    pub unseen: bool,
     /// Size of the input: the share of it that remains is the error over this.
     pub input: f64,
-    /// Largest ratio of the error to the noise floor that noise and usual biases explain.
-    pub usual: f64,
+    /// How the errors compare with what is predicted of them; `None` if the noise is unknown.
+    pub test: Option<Test>,
     /// What is known of the causes of the error, as a sentence fragment.
     pub cause: Option<String>,
-    /// Set if the data are too few for a part of them to be held out.
-    pub few: Option<Few>,
-}
-
-/// Data so few for their parameters that noise alone may give a held-out error beyond `usual`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Few {
-    /// Number of dwells or turns.
-    pub residuals: usize,
-    /// What they are: `dwells` or `turns`.
-    pub what: &'static str,
-    /// Number of parameters that each row of them helps to determine.
-    pub parameters: usize,
-    /// The error in sample, corrected for the degrees of freedom that the parameters took.
-    pub corrected_rms: f64,
-    /// Number of dwells or turns from which on the held-out error can be compared with the noise.
-    pub wanted: usize,
-}
-
-/// Held-out error over the noise floor that noise alone gives, if `rows` determine `parameters` and one of `parts` is held out. For a random
-/// design (Breiman and Freedman 1983): the variance of the prediction by m rows is p / (m - p - 1) of that of a row.
-pub fn held_out_by_noise(rows: f64, parameters: f64, parts: usize) -> f64 {
-    let parts = parts as f64;
-    let spare = rows * (parts - 1.0) / parts - parameters - 1.0;
-    match spare > 0.0 {
-        true => (1.0 + parameters / spare).sqrt(),
-        false => f64::INFINITY,
-    }
+    /// How many data would test the model, if these are too few, as a sentence fragment.
+    pub too_few: Option<String>,
 }
 
 impl ErrorFigures {
-    /// The error that is judged: of unseen data; without them, that in sample. If the data are too few for that, the corrected one in sample.
-    pub fn error(&self) -> f64 {
-        match (&self.few, self.held_out_rms) {
-            (Some(few), _) => few.corrected_rms,
-            (None, Some(held_out)) => held_out,
-            (None, None) => self.rms,
-        }
-    }
-
-    /// [`Self::error`] over the noise floor.
-    pub fn over_noise(&self) -> f64 {
-        self.error() / self.noise_floor
-    }
-
     /// Share of the input that remains unexplained.
     pub fn share(&self) -> f64 {
-        self.error() / self.input
+        self.error / self.input
+    }
+
+    fn ratio(&self) -> f64 {
+        self.test.map_or(f64::NAN, |test| test.ratio)
     }
 
     fn written(&self, error: f64) -> String {
@@ -87,9 +46,9 @@ impl ErrorFigures {
 
     /// How the error was found.
     fn how(&self) -> &'static str {
-        match (&self.few, self.held_out_rms) {
-            (None, Some(_)) => "of unseen data",
-            (Some(_), _) | (None, None) => "in sample",
+        match self.unseen {
+            true => "of unseen data",
+            false => "in sample",
         }
     }
 
@@ -100,57 +59,76 @@ impl ErrorFigures {
             Some(cause) => format!("; {cause}"),
             None => String::new(),
         };
-        let (error, how) = (self.written(self.error()), self.how());
-        // An error that is not a number is none that a model may have.
-        if !(self.share() <= UNEXPLAINED_SHARE) {
+        let (error, how) = (self.written(self.error), self.how());
+        let untested = |reason: String| {
+            Some(Judgement::new(
+                JudgementKind::Untested,
+                format!("{sensor}: {reason}"),
+            ))
+        };
+        let share = |kind: JudgementKind| {
             let reason = format!(
                 "{sensor}: the error {how} is {error}, {} % of the input (at most {} % may remain){cause}",
                 significant(100.0 * self.share()),
                 100.0 * UNEXPLAINED_SHARE
             );
-            return Some(Judgement::new(JudgementKind::Misfit, reason));
+            Some(Judgement::new(kind, reason))
+        };
+        // An error that is not a number is none that a model may have.
+        let large = !(self.share() <= UNEXPLAINED_SHARE);
+        let Some(test) = &self.test else {
+            return match (large, self.unseen) {
+                (true, _) => share(JudgementKind::Misfit),
+                (false, true) => untested(format!(
+                    "the noise is unknown, so the error {how}, {error}, cannot be compared with it"
+                )),
+                (false, false) => untested(NOTHING_HELD_OUT.into()),
+            };
+        };
+        match (test.fails(), large) {
+            (true, true) => share(JudgementKind::Misfit),
+            (true, false) => {
+                let reason = format!(
+                    "{sensor}: the error {how} is {error}, {} times what noise predicts (at most {} by chance){cause}",
+                    significant(test.ratio),
+                    significant(test.limit)
+                );
+                Some(Judgement::new(JudgementKind::Unexplained, reason))
+            }
+            (false, _) if !self.unseen => untested(NOTHING_HELD_OUT.into()),
+            (false, true) => untested(format!(
+                "the error {how} is {error}, as is predicted: the data leave the parameters open"
+            )),
+            (false, false) if !test.can_fail() => untested(match &self.too_few {
+                Some(few) => few.clone(),
+                None => format!(
+                    "an error of {} times the noise would not show: the held-out data depend on parameters that the others leave open; record each pose twice",
+                    significant(test.visible)
+                ),
+            }),
+            (false, false) => None,
         }
-        if self.over_noise() > self.usual {
-            let reason = format!(
-                "{sensor}: the error {how} is {error}, {} times the noise{cause}",
-                significant(self.over_noise())
-            );
-            return Some(Judgement::new(JudgementKind::Unexplained, reason));
-        }
-        if let Some(few) = &self.few {
-            let reason = format!(
-                "{sensor}: {} {} for {} parameters are too few to test the model; record at least {}",
-                few.residuals, few.what, few.parameters, few.wanted
-            );
-            return Some(Judgement::new(JudgementKind::Untested, reason));
-        }
-        if self.held_out_rms.is_none() {
-            let reason = format!("{sensor}: nothing was held out, so no unseen data test it");
-            return Some(Judgement::new(JudgementKind::Untested, reason));
-        }
-        if !self.noise_floor.is_finite() {
-            let reason = format!(
-                "{sensor}: the noise is unknown, so the error {how}, {error}, cannot be compared with it"
-            );
-            return Some(Judgement::new(JudgementKind::Untested, reason));
-        }
-        None
     }
 }
+
+const NOTHING_HELD_OUT: &str = "nothing was held out, so no unseen data test it";
 
 /// Judges the figures of all sensors of a result. The worse kind wins; of two errors beyond the noise, the larger ratio.
 pub fn judge(all: &[ErrorFigures]) -> Judgement {
     let mut sorted: Vec<&ErrorFigures> = all.iter().collect();
-    sorted.sort_by(|a, b| b.over_noise().total_cmp(&a.over_noise()));
+    sorted.sort_by(|a, b| b.ratio().total_cmp(&a.ratio()));
     let bad = sorted.iter().filter_map(|figures| figures.judge());
     Judgement::worst(bad).unwrap_or_else(|| {
-        let each = all
-            .iter()
-            .map(|f| format!("{} ({})", significant(f.over_noise()), f.sensor));
-        let each: Vec<String> = each.collect();
+        let each = |of: fn(&Test) -> f64| -> String {
+            let each = all.iter().filter_map(|f| {
+                Some(format!("{} ({})", significant(of(f.test.as_ref()?)), f.sensor))
+            });
+            each.collect::<Vec<_>>().join(" and ")
+        };
         let reason = format!(
-            "the error of unseen data is {} times what noise explains",
-            each.join(" and ")
+            "the error of unseen data is {} times what noise predicts; {} times the noise would show",
+            each(|t| t.ratio),
+            each(|t| t.visible)
         );
         Judgement::new(JudgementKind::Good, reason)
     })
@@ -159,69 +137,79 @@ pub fn judge(all: &[ErrorFigures]) -> Judgement {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::unseen::{BEYOND_NOISE, VISIBLE};
     use JudgementKind::{Good, Misfit, Unexplained, Untested};
 
-    fn accel(error: f64, held_out: bool, noise_floor: f64) -> ErrorFigures {
+    fn figures(sensor: Sensor, ratio: f64, unseen: bool) -> ErrorFigures {
         ErrorFigures {
-            sensor: Sensor::Accel,
+            sensor,
             figure: Figure::GravityMagnitude,
-            rms: error,
-            held_out_rms: held_out.then_some(error),
-            noise_floor,
+            error: 0.001 * ratio,
+            unseen,
             input: 9.8,
-            usual: BEYOND_NOISE,
+            test: Some(Test::of_ratio(ratio, BEYOND_NOISE, 30)),
             cause: None,
-            few: None,
+            too_few: None,
         }
     }
 
-    #[test]
-    fn an_error_is_judged_by_the_input_then_by_the_noise_then_by_what_could_contradict_it() {
-        let kind = |f: ErrorFigures| judge(&[f]).kind;
-        assert_eq!(kind(accel(0.0011, true, 0.001)), Good);
-        assert_eq!(kind(accel(0.0011, false, 0.001)), Untested);
-        assert_eq!(kind(accel(0.0011, true, f64::NAN)), Untested);
-        assert_eq!(kind(accel(0.0031, false, 0.001)), Unexplained);
-        assert_eq!(kind(accel(3.2, true, 0.001)), Misfit);
-        assert_eq!(kind(accel(3.2, true, f64::NAN)), Misfit);
-        assert_eq!(kind(accel(f64::NAN, true, 0.001)), Misfit);
+    fn accel(ratio: f64) -> ErrorFigures {
+        figures(Sensor::Accel, ratio, true)
+    }
+
+    fn kind(f: ErrorFigures) -> JudgementKind {
+        judge(&[f]).kind
     }
 
     #[test]
-    fn an_error_by_too_few_data_is_untested_unless_the_fit_itself_is_bad() {
-        let of_few = |corrected_rms| {
-            let few = Few {
-                residuals: 12,
-                what: "dwells",
-                parameters: 9,
-                corrected_rms,
-                wanted: 18,
+    fn an_error_is_judged_by_its_prediction_then_by_the_input_then_by_what_could_contradict_it() {
+        assert_eq!(kind(accel(1.1)), Good);
+        assert_eq!(kind(figures(Sensor::Accel, 1.1, false)), Untested);
+        assert_eq!(kind(figures(Sensor::Accel, 3.1, false)), Unexplained);
+        assert_eq!(kind(accel(3.1)), Unexplained);
+        assert_eq!(kind(accel(3200.0)), Misfit);
+        assert_eq!(kind(accel(f64::NAN)), Misfit);
+        let unknown = |error| ErrorFigures {
+            test: None,
+            error,
+            ..accel(1.0)
+        };
+        assert_eq!(kind(unknown(0.0011)), Untested);
+        assert_eq!(kind(unknown(3.2)), Misfit);
+        assert_eq!(kind(unknown(f64::NAN)), Misfit);
+    }
+
+    #[test]
+    fn data_that_hide_an_error_do_not_test_the_model_unless_the_error_shows_nonetheless() {
+        let of_few = |ratio| {
+            let test = Test {
+                visible: 2.0 * VISIBLE,
+                ..Test::of_ratio(ratio, 3.0, 12)
             };
             judge(&[ErrorFigures {
-                few: Some(few),
-                ..accel(0.9, true, 0.001)
+                test: Some(test),
+                too_few: Some("record at least 18".into()),
+                ..accel(ratio)
             }])
         };
-        assert_eq!(of_few(0.0015).kind, Untested);
-        assert_eq!(of_few(0.0031).kind, Unexplained);
-        assert_eq!(of_few(0.9).kind, Misfit);
-        assert!(of_few(0.0015).reason.contains("at least 18"));
+        assert_eq!(of_few(2.5).kind, Untested);
+        assert_eq!(of_few(3.1).kind, Unexplained);
+        assert_eq!(of_few(900.0).kind, Misfit);
+        assert!(of_few(2.5).reason.contains("at least 18"));
+    }
+
+    #[test]
+    fn an_error_that_was_predicted_is_no_misfit_however_large() {
+        let open = ErrorFigures {
+            error: 1.0,
+            ..accel(1.1)
+        };
+        assert_eq!(kind(open), Untested);
     }
 
     #[test]
     fn the_reason_names_the_sensor_that_errs_most() {
-        let gyro = ErrorFigures {
-            sensor: Sensor::Gyro,
-            figure: Figure::Direction,
-            rms: 0.009,
-            held_out_rms: Some(0.009),
-            noise_floor: 0.001,
-            input: 1.0,
-            usual: BEYOND_NOISE,
-            cause: None,
-            few: None,
-        };
-        let both = judge(&[accel(0.003, true, 0.001), gyro]);
+        let both = judge(&[accel(3.0), figures(Sensor::Gyro, 9.0, true)]);
         assert_eq!(both.kind, Unexplained);
         assert!(both.reason.starts_with("gyro"), "{both}");
     }

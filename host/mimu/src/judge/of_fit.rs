@@ -1,111 +1,84 @@
 //! The judgement of a fit.
 
-use super::errors::{self, BEYOND_NOISE, ErrorFigures, Few};
+use super::errors::{self, ErrorFigures};
 use super::input;
 use crate::fit::plausible::input_size;
 use crate::fit::{Fit, SensorFit};
 use crate::judgement::{Judgement, JudgementKind};
 use crate::observable::Observable;
-use crate::quantity::{Figure, Sensor, significant};
+use crate::quantity::{Figure, significant};
 use crate::readable;
 use crate::recording_problem::RecordingProblem;
+use crate::unseen::{self, Test};
 
 impl ErrorFigures {
     /// The figures of one triad of `fit`.
     pub fn of_fit(fit: &Fit, sensor: &SensorFit) -> Self {
+        let held_out = sensor.held_out_rms();
         Self {
             sensor: sensor.sensor,
             figure: sensor.figure,
-            rms: sensor.rms(),
-            held_out_rms: sensor.held_out_rms(),
-            noise_floor: sensor.noise_floor(),
+            error: held_out.unwrap_or(sensor.rms()),
+            unseen: held_out.is_some(),
             input: input_size(&fit.prepared, sensor),
-            usual: BEYOND_NOISE,
+            test: sensor.test,
             cause: None,
-            few: Few::of_fit(fit, sensor),
+            too_few: too_few(sensor),
         }
     }
 }
 
-impl Few {
-    /// `Some` if noise alone may bring the held-out error of `sensor` beyond [`BEYOND_NOISE`]: twelve poses for the nine parameters of an
-    /// accelerometer had 3.9 times the noise held out, and less than the noise in sample.
-    ///
-    /// The directions that judge turns come from the accelerometer's fit to the same dwells: where these are too few, the turns are not tested
-    /// either.
-    pub fn of_fit(fit: &Fit, sensor: &SensorFit) -> Option<Self> {
-        match (sensor.figure, fit.sensor(Sensor::Accel)) {
-            (Figure::Direction, Some(accel)) => Self::of(sensor).or_else(|| {
-                let of_dwells = Self::of(accel)?;
-                Some(Self {
-                    corrected_rms: sensor.rms(),
-                    ..of_dwells
-                })
-            }),
-            _ => Self::of(sensor),
-        }
-    }
-
-    /// By the data of one sensor alone.
-    fn of(sensor: &SensorFit) -> Option<Self> {
-        let parts = sensor.held_out.parts;
-        if sensor.held_out.count == 0 || parts < 2 {
-            return None;
-        }
-        let residuals = sensor.residuals.iter().filter(|r| !r.within).count();
-        // Rows of a dwell or a turn in a group.
-        let (what, each) = match sensor.figure {
-            Figure::Input | Figure::GravityMagnitude | Figure::RateMagnitude => ("dwells", 1.0),
-            // A direction has two angles.
-            Figure::Direction => ("turns", 2.0),
-        };
-        let of_figure = |group: Observable| match sensor.figure {
-            Figure::Input => matches!(group, Observable::Axis(_)),
-            Figure::GravityMagnitude | Figure::RateMagnitude => group == Observable::Magnitude,
-            Figure::Direction => group == Observable::Turns,
-        };
-        let scatter = sensor.estimated.scatter.iter();
-        let groups = scatter.filter(|(group, _)| of_figure(*group));
-        let least = groups.map(|(_, s)| s.dof).min_by(f64::total_cmp)?;
-        let rows = each * residuals as f64;
-        let parameters = (rows - least).max(0.0);
-        let by_noise = |rows| errors::held_out_by_noise(rows, parameters, parts);
-        if by_noise(rows) <= BEYOND_NOISE {
-            return None;
-        }
-        let wanted = (residuals..).find(|n| by_noise(each * *n as f64) <= BEYOND_NOISE)?;
-        Some(Self {
-            residuals,
-            what,
-            parameters: parameters.round() as usize,
-            corrected_rms: sensor.rms() * (rows / least).sqrt(),
-            wanted,
-        })
-    }
+/// How many dwells or turns would test the model, if `sensor` has fewer.
+fn too_few(sensor: &SensorFit) -> Option<String> {
+    let (each, what) = match sensor.figure {
+        Figure::Input => (3.0, "dwells"),
+        Figure::GravityMagnitude | Figure::RateMagnitude => (1.0, "dwells"),
+        // A direction has two angles.
+        Figure::Direction => (2.0, "turns"),
+    };
+    let test = sensor.test.filter(|test| !test.can_fail())?;
+    let count = sensor.residuals.iter().filter(|r| !r.within).count();
+    // As many as the degrees of freedom of what was held out show.
+    let rows = each * count as f64;
+    let parameters = rows * (1.0 - test.dof / test.count as f64);
+    let wanted = unseen::fewest(count, each, parameters)?;
+    Some(format!(
+        "{count} {what} for {parameters:.0} parameters are too few to test the model; record at least {wanted}"
+    ))
 }
 
 /// The rates at rest of a gyro that gravity judges are in no figure of its turns. If they differ between dwells by more than biases usually wander,
 /// in noise of a dwell mean, that is an error too. Diagnoses draw the same line.
 const WANDERS: f64 = 4.0;
 
-/// `Unexplained` if the rates at rest differ too much.
-fn of_rests(sensor: &SensorFit) -> Option<Judgement> {
-    let (rms, _) = sensor.static_rms?;
-    let of_rests = sensor.estimated.scatter.iter();
-    let (_, scatter) = of_rests
-        .into_iter()
-        .find(|(group, _)| *group == Observable::Rest)?;
-    let over = (scatter.chi2 / scatter.dof).sqrt();
-    if !(scatter.dof >= 1.0 && over > WANDERS.hypot(1.0)) {
-        return None;
-    }
-    let reason = format!(
-        "{}: the rates at rest differ between dwells by {} rms, {} times the noise of a dwell",
-        sensor.sensor,
-        readable::error(sensor.sensor.unit()).write(rms),
-        significant(over)
-    );
-    Some(Judgement::new(JudgementKind::Unexplained, reason))
+/// `Unexplained` if the rates at rest, or the headings after whole turns, differ too much.
+fn of_groups(sensor: &SensorFit) -> Vec<Judgement> {
+    let group = |group: Observable| {
+        let all = sensor.estimated.scatter.iter();
+        let (_, scatter) = all.into_iter().find(|(g, _)| *g == group)?;
+        Test::of_scatter(scatter, scatter.dof)
+    };
+    let rests = sensor.static_rms.and_then(|(rms, _)| {
+        let test = group(Observable::Rest)?;
+        (test.ratio > WANDERS.hypot(1.0).max(test.limit)).then(|| {
+            format!(
+                "{}: the rates at rest differ between dwells by {} rms, {} times the noise of a dwell",
+                sensor.sensor,
+                readable::error(sensor.sensor.unit()).write(rms),
+                significant(test.ratio)
+            )
+        })
+    });
+    let headings = group(Observable::WholeTurns).filter(Test::fails).map(|test| {
+        format!(
+            "{}: the headings after whole turns err by {} times the stated placement and the noise",
+            sensor.sensor,
+            significant(test.ratio)
+        )
+    });
+    let all = rests.into_iter().chain(headings);
+    all.map(|reason| Judgement::new(JudgementKind::Unexplained, reason))
+        .collect()
 }
 
 impl Judgement {
@@ -116,10 +89,10 @@ impl Judgement {
         let problems = RecordingProblem::of(fit);
         let by_input = input::judgements(&problems, fit.all_warnings());
         let by_errors = errors::judge(&figures);
-        let by_rests = fit.sensors.iter().filter_map(of_rests);
+        let by_groups = fit.sensors.iter().flat_map(of_groups);
         // The input comes first: of two equally bad reasons it is the cause.
         let all = by_input.into_iter().chain([by_errors.clone()]);
-        let all = all.chain(by_rests);
+        let all = all.chain(by_groups);
         Self::worst(all).unwrap_or(by_errors)
     }
 }

@@ -18,6 +18,7 @@ use crate::recording_problem::OfRecording;
 use crate::signal::dwell::Dwell;
 use crate::signal::stillness::Detection;
 use crate::triad::{Angles, Estimate};
+use crate::unseen::Test;
 use crate::warning::Warning;
 
 /// Result of a fit.
@@ -143,6 +144,8 @@ pub struct SensorFitResult {
     pub held_out_rms: Option<f64>,
     /// What noise alone would give, in [`Self::unit`]; null where the noise is not known.
     pub noise_floor: f64,
+    /// How the errors of data that were held out compare with what is predicted of them; null if the noise is not known.
+    pub test: Option<Test>,
     /// Error of the readings before calibration, in [`Self::unit`]; absent if they are not in SI.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncalibrated_rms: Option<f64>,
@@ -361,6 +364,7 @@ impl SensorFitResult {
             rms: found.rms(),
             held_out_rms: found.held_out_rms(),
             noise_floor: found.noise_floor(),
+            test: found.test,
             uncalibrated_rms: found.uncalibrated_rms,
             unit: found.figure.unit(found.sensor),
             figure: found.figure,

@@ -1,10 +1,10 @@
 //! The judgement of noise at rest.
 
 use super::{Channel, Survey};
-use crate::judge::errors::BEYOND_NOISE;
 use crate::judge::input;
 use crate::judgement::{Judgement, JudgementKind};
 use crate::quantity::{duration, plural, significant};
+use crate::unseen::BEYOND_NOISE;
 use crate::warning::Warning;
 use mimu_allan::model::Term;
 

@@ -98,7 +98,10 @@ impl OpenSession<'_> {
         let folder = self.wizard.units[k].folder.path.clone();
         stage(&page, (self.page)(&result, &folder)?)?.publish()?;
         let effects: Vec<String> = made.effects().iter().map(|e| e.candidate.id()).collect();
+        let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
+        let accepted = accepted.map(|a| a.effect.candidate.id()).collect();
         let outcome = &mut self.outcomes[k];
+        outcome.accepted = accepted;
         let verdict = diagnosis.verdict;
         outcome.verdict = Some(verdict);
         outcome.effects.clone_from(&effects);

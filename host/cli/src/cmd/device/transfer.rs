@@ -9,7 +9,7 @@ use mimu_core::stored::{StoredError, VERSION};
 use mimu_device::{
     DeviceResult, Image, calibration, contents, download, outside_now, unit_name, upload,
 };
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::result_file::stage;
 
 use super::{PortArgs, open};
@@ -23,6 +23,9 @@ pub struct UploadArgs {
     /// Store it even if the calibration belongs to another unit
     #[arg(long)]
     other_unit: bool,
+    /// Store it although it is judged a misfit
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     port: PortArgs,
     #[command(flatten)]
@@ -51,6 +54,11 @@ pub fn run_upload(args: &UploadArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[&args.calibration])?;
     let place = args.calibration.display().to_string();
     let calibration = Calibration::read(&args.calibration)?;
+    let judgement = calibration.judgement.as_ref();
+    if let Some(why) = judgement.and_then(|j| j.needs_consent().filter(|_| !args.force)) {
+        let problem = format!("it is not uploaded, because {why}");
+        return Err(Error::new(place, problem, "calibrate the unit again").about(Argument::Force));
+    }
     let image = Image::new(&calibration, &place)?;
     let mut session = open(&args.port)?;
     if !args.other_unit {

@@ -1,15 +1,27 @@
 //! The judgement of a verification.
 
+use nalgebra::DMatrix;
+
 use super::causes::Causes;
 use super::{SensorVerification, Verification};
 use crate::calibration::Calibration;
-use crate::judge::errors::{self, BEYOND_NOISE, ErrorFigures};
+use crate::estimate::earth_shared;
+use crate::estimate::least_squares::root;
+use crate::fit::by_rate::variances;
+use crate::fit::predicted::{self, Both};
+use crate::judge::errors::{self, ErrorFigures};
 use crate::judge::input;
-use crate::judgement::Judgement;
-use crate::prepared::Prepared;
+use crate::judgement::{Judgement, JudgementKind};
+use crate::observation::vector;
+use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
 use crate::recording_problem::RecordingProblem;
+use crate::triad::{Covariance, Forward};
+use crate::turntable::RatedDwells;
+use crate::unseen::{Test, Unseen};
 use crate::warning::Warning;
+use mimu_core::compensation::Affine;
+use mimu_recording::Reference;
 
 /// Gravity of two files that differs by less, m/s², is the same: four decimals are usual.
 const SAME_GRAVITY: f64 = 5e-5;
@@ -62,20 +74,89 @@ fn figures(
     ErrorFigures {
         sensor,
         figure: s.figure,
-        rms: s.rms,
-        held_out_rms: unseen.then_some(s.rms),
-        noise_floor: s.noise_floor,
+        error: s.rms,
+        unseen,
         input: input_size(prepared, sensor, s.figure),
-        // A calibration that errs by as much as it says is right.
-        usual: BEYOND_NOISE.hypot(s.announced() / s.noise_floor),
+        test: s.test,
         cause: s.causes.as_ref().map(Causes::words),
-        few: None,
+        too_few: None,
     }
+}
+
+/// How the errors of `sensor` in this recording compare with the noise and with what the calibration's parameters are known to err by. `None` if the noise is
+/// unknown, or if nothing judges the sensor.
+pub(super) fn test(prepared: &Prepared, sensor: Sensor, calibration: &Calibration) -> Option<Test> {
+    let model = calibration.inverse(sensor)?;
+    let covariance = calibration.known_covariance(sensor);
+    let known = |s: &Sensor| prepared.noise.is_known(*s);
+    let by_turns = prepared.manifest.reference == Reference::Gravity && sensor == Sensor::Gyro;
+    let of = if by_turns {
+        &Sensor::BOTH[..]
+    } else {
+        std::slice::from_ref(&sensor)
+    };
+    if !of.iter().all(known) {
+        return None;
+    }
+    let unseen = match (prepared.manifest.reference, sensor) {
+        (Reference::Table, _) => inputs(prepared, sensor, &model, &covariance)?,
+        (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
+            let poses = prepared.observations(Sensor::Accel);
+            let noise = prepared.magnitude_variances(&model, &poses);
+            let g = prepared.manifest.gravity_mps2;
+            predicted::magnitudes(&model, &covariance, poses.iter().map(|o| (o, g)), noise)
+        }
+        (Reference::TurntableRate, Sensor::Gyro) => {
+            let dwells = RatedDwells::of(prepared).ok()?;
+            let noise = variances(&model, &dwells.turning);
+            let known = dwells.turning.iter().zip(dwells.magnitudes());
+            predicted::magnitudes(&model, &covariance, known, noise)
+        }
+        (Reference::Gravity, Sensor::Gyro) => {
+            let accel = calibration
+                .inverse(Sensor::Accel)
+                .unwrap_or_else(Affine::identity);
+            let both = Both {
+                gyro: covariance,
+                accel: calibration.known_covariance(Sensor::Accel),
+                follows: Covariance::zeros(),
+            };
+            predicted::directions(&prepared.turns(&accel).0, &model, &both)
+        }
+    };
+    Test::of(&[unseen], (f64::INFINITY, 0.0))
+}
+
+/// Errors at known inputs, three for each dwell.
+fn inputs(
+    prepared: &Prepared,
+    sensor: Sensor,
+    model: &Affine<f64>,
+    covariance: &Covariance,
+) -> Option<Unseen> {
+    let forward = Forward::of(model)?;
+    let all = earth_shared::likely(&prepared.observations(sensor), &forward.matrix);
+    let blocks: Vec<_> = all
+        .iter()
+        .map(|o| vector::at(model, &o.raw, &o.input))
+        .collect();
+    let errors = blocks
+        .iter()
+        .flat_map(|b| <[f64; 3]>::from(b.residual))
+        .collect::<Vec<f64>>();
+    let noise = all
+        .iter()
+        .flat_map(|o| <[f64; 3]>::from(si_covariance(&model.matrix, &o.variance).diagonal()));
+    let noise: Vec<f64> = noise.collect();
+    let by = DMatrix::from_fn(errors.len(), 12, |i, j| blocks[i / 3].by[(i % 3, j)]);
+    let factor = root(&DMatrix::from_column_slice(12, 12, covariance.as_slice()));
+    Some(Unseen::of(errors.into(), noise.into(), &by, &factor))
 }
 
 /// The judgement of the figures of `prepared`; `warnings` are those of the verification.
 pub(super) fn judgement(
     prepared: &Prepared,
+    calibration: &Calibration,
     sensors: &[(Sensor, &SensorVerification)],
     warnings: &[Warning],
 ) -> Judgement {
@@ -98,19 +179,17 @@ pub(super) fn judgement(
             _ => f,
         })
         .collect();
-    let mut by_errors = errors::judge(&figures);
-    let mut beyond = sensors
-        .iter()
-        .filter(|(_, s)| s.rms > BEYOND_NOISE * s.noise_floor)
-        .peekable();
-    if by_errors.is_good() && beyond.peek().is_some() {
-        by_errors.reason += match beyond.any(|(_, s)| s.next_power_on.is_some()) {
-            true => ", and within what the calibration announces for the next power-on",
-            false => ", and within the uncertainty that the calibration states",
-        };
-    }
-    let all = input::judgements(&problems, warnings);
-    Judgement::worst(all.into_iter().chain([by_errors.clone()])).unwrap_or(by_errors)
+    let by_errors = errors::judge(&figures);
+    let all = input::judgements(&problems, warnings).into_iter();
+    let all = all.chain([by_errors.clone()]).chain(of_file(calibration));
+    Judgement::worst(all).unwrap_or(by_errors)
+}
+
+/// The judgement that the file itself states: the ceiling of what any data say of it. Only what its own data left untested, others can test.
+fn of_file(calibration: &Calibration) -> Option<Judgement> {
+    let own = calibration.judgement.as_ref()?;
+    let reason = format!("the calibration itself is judged {own}");
+    (own.kind > JudgementKind::Untested).then(|| Judgement::new(own.kind, reason))
 }
 
 /// Warns if the gravity of the calibration differs from that of the recording. At two places it may; but if the readings agree with the
@@ -141,19 +220,10 @@ pub(super) fn other_gravity(calibration: &Calibration, prepared: &Prepared) -> O
     })
 }
 
-impl SensorVerification {
-    /// What the calibration itself says that it may err by beside the noise, in [`Self::unit`]: at the next power-on, if it knows that.
-    pub fn announced(&self) -> f64 {
-        self.next_power_on
-            .or(self.parameter_uncertainty)
-            .unwrap_or(0.0)
-    }
-}
-
 impl Verification {
     /// The sensor that errs by the largest multiple of its noise, with its figures.
     pub fn worst(&self) -> Option<(Sensor, &SensorVerification)> {
-        let over = |s: &SensorVerification| s.rms / s.noise_floor;
+        let over = |s: &SensorVerification| s.test.map_or(s.rms / s.noise_floor, |t| t.ratio);
         let all = self.sensors.present();
         all.max_by(|a, b| over(a.1).total_cmp(&over(b.1)))
     }

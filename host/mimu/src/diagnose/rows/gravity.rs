@@ -353,12 +353,11 @@ impl<'a> ByHand<'a> {
         let mean_square = self.inverse.matrix.norm_squared() / 3.0;
         let chains = self.turns.iter().zip(&self.chains.of_turn);
         let each = chains.flat_map(|(t, chain)| {
-            let earth = if chain.is_some() {
-                0.0
-            } else {
-                t.earth_variance
+            let variance = match chain {
+                Some(_) => t.variance_beside_earth(mean_square),
+                None => t.variance(mean_square),
             };
-            [t.variance(mean_square) + earth; 2]
+            [variance; 2]
         });
         each.collect()
     }
