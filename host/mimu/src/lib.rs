@@ -70,6 +70,8 @@ pub mod diagnosed;
 pub mod effects;
 #[doc(hidden)]
 pub mod estimate;
+#[doc(hidden)]
+pub mod factor;
 mod fault;
 #[doc(hidden)]
 pub mod fit;

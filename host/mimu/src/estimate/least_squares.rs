@@ -1,11 +1,9 @@
 //! Weighted least squares, linear and nonlinear, with covariance and observability.
 
-use std::ops::Range;
-
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::Failure;
+use crate::factor::Linearized;
 
 /// Condition number (columns scaled) from which on a parameter counts as undetermined: at 1e5 an input error of one part in 10⁵, which a good table
 /// has, is as large as the parameter.
@@ -345,7 +343,7 @@ pub fn solve_groups<const N: usize>(groups: &[Group; N]) -> Option<(Solution, [S
 
 /// Degrees of freedom of so many residuals, of which the parameters take `taken`: a whole number, to within the rounding of a trace. Ten poses once
 /// gave 1e-12 less than one degree of freedom, and intervals a sixth of the right ones.
-fn degrees_of_freedom(residuals: usize, taken: f64) -> f64 {
+pub(super) fn degrees_of_freedom(residuals: usize, taken: f64) -> f64 {
     let left = residuals as f64 - taken;
     let whole = (left - left.round()).abs() < 1e-6;
     if whole { left.round() } else { left }
@@ -429,201 +427,6 @@ pub fn extra_variance_of(residuals: &DVector<f64>, errors: &Errors, dof: f64) ->
         extra_variance: high,
         known: errors.share_beside(high),
         ..none
-    }
-}
-
-/// Residuals and their derivatives at some parameters.
-pub struct Linearized {
-    /// Residuals.
-    pub residuals: DVector<f64>,
-    /// Derivatives of the residuals, rows by parameters.
-    pub jacobian: DMatrix<f64>,
-}
-
-impl Linearized {
-    /// So many residuals by so many parameters, all zero.
-    pub fn zeros(rows: usize, parameters: usize) -> Self {
-        Self {
-            residuals: DVector::zeros(rows),
-            jacobian: DMatrix::zeros(rows, parameters),
-        }
-    }
-
-    /// Each row times its weight.
-    pub fn weighted(mut self, weights: &[f64]) -> Self {
-        for (k, weight) in weights.iter().enumerate() {
-            self.residuals[k] *= weight;
-            self.jacobian.row_mut(k).scale_mut(*weight);
-        }
-        self
-    }
-
-    /// Covariance of the parameters, for weighted rows.
-    pub fn covariance(&self) -> Result<DMatrix<f64>, Failure> {
-        (self.jacobian.transpose() * &self.jacobian)
-            .try_inverse()
-            .ok_or_else(|| Failure::NoSolution("the normal matrix is singular".into()))
-    }
-
-    /// The part of that `covariance` by the errors of some rows.
-    pub fn part(&self, covariance: &DMatrix<f64>, rows: &Range<usize>) -> DMatrix<f64> {
-        let j = self.jacobian.rows(rows.start, rows.len());
-        covariance * (j.transpose() * j) * covariance
-    }
-}
-
-/// Groups of rows of a nonlinear problem, each with the extra variance that its own residuals show, found by iterative reweighting.
-pub struct Reweighted<const N: usize> {
-    /// Rows of each group.
-    pub rows: [Range<usize>; N],
-    /// Their scatter so far.
-    pub scatter: [Scatter; N],
-}
-
-/// A minimum under given weights.
-pub struct Minimum {
-    /// Parameters.
-    pub parameters: DVector<f64>,
-    /// Weighted residuals and their derivatives there.
-    pub at: Linearized,
-    /// Weights of the rows.
-    pub weights: Vec<f64>,
-}
-
-/// A nonlinear fit whose rows fall in `N` groups: what differs between fits of turns, magnitudes and both.
-pub trait Grouped<const N: usize> {
-    /// The extra variances have converged when none changes by this share any more.
-    const SHARE: f64;
-    /// Fewest rounds.
-    const ROUNDS: usize = 1;
-
-    /// Unweighted residuals and derivatives.
-    fn linearize(&self, p: &DVector<f64>) -> Linearized;
-
-    /// Known variances of the rows, which are their weights beside the extra ones.
-    fn variances(&self, p: &DVector<f64>) -> Vec<f64>;
-
-    /// Variances that the residuals may have without an extra one. Errors that rows share are among these, but not among the weights.
-    fn allowed(&self, _found: &Minimum, variances: Vec<f64>) -> Vec<f64> {
-        variances
-    }
-
-    /// Refuses a minimum that the rows do not determine.
-    ///
-    /// # Errors
-    /// See [`Failure::Undetermined`].
-    fn check(&self, _found: &Minimum) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    /// Why there is no result if a round does not converge.
-    fn lost(&self) -> Failure;
-}
-
-/// Most rounds of a fit.
-const MOST_ROUNDS: usize = 30;
-
-/// The last round of a fit.
-pub struct Solved<const N: usize> {
-    /// The minimum, under the weights of the round before.
-    pub found: Minimum,
-    /// Covariance of its parameters.
-    pub covariance: DMatrix<f64>,
-    /// Chi-square of each group in the first round, under the first weights.
-    pub first_chi2: [f64; N],
-}
-
-impl<const N: usize> Reweighted<N> {
-    /// Minimizes `fit` from `start` on and estimates the extra variances from its residuals, in turn.
-    ///
-    /// # Errors
-    /// Those of `fit`; a singular covariance.
-    pub fn solve<F: Grouped<N>>(
-        &mut self,
-        fit: &F,
-        mut start: DVector<f64>,
-    ) -> Result<Solved<N>, Failure> {
-        let mut first_chi2 = None;
-        let mut round = 0;
-        loop {
-            let variances = fit.variances(&start);
-            let found = self
-                .minimize(start, &variances, |p| fit.linearize(p))
-                .ok_or_else(|| fit.lost())?;
-            fit.check(&found)?;
-            let covariance = found.at.covariance()?;
-            let allowed = fit.allowed(&found, variances);
-            let converged = self.update(&found, &covariance, &allowed, F::SHARE);
-            let first_chi2 = *first_chi2.get_or_insert(self.scatter.map(|s| s.chi2));
-            round += 1;
-            if converged && round >= F::ROUNDS || round == MOST_ROUNDS {
-                return Ok(Solved {
-                    found,
-                    covariance,
-                    first_chi2,
-                });
-            }
-            start = found.parameters;
-        }
-    }
-
-    /// Begins with these extra variances.
-    pub fn new(rows: [Range<usize>; N], extra: [f64; N]) -> Self {
-        let scatter = extra.map(|extra_variance| Scatter {
-            extra_variance,
-            ..Scatter::of_noise(1.0)
-        });
-        Self { rows, scatter }
-    }
-
-    /// Weights of rows with these known variances.
-    pub fn weights(&self, variances: &[f64]) -> Vec<f64> {
-        let mut total = variances.to_vec();
-        for (rows, scatter) in self.rows.iter().zip(&self.scatter) {
-            let own = &mut total[rows.clone()];
-            own.iter_mut().for_each(|v| *v += scatter.extra_variance);
-        }
-        total.iter().map(|v| v.sqrt().recip()).collect()
-    }
-
-    /// The minimum for rows with these known variances, from `start` on. `None` if it does not converge.
-    pub fn minimize(
-        &self,
-        start: DVector<f64>,
-        variances: &[f64],
-        linearize: impl Fn(&DVector<f64>) -> Linearized,
-    ) -> Option<Minimum> {
-        let weights = self.weights(variances);
-        let (parameters, at) = minimize(start, |p| linearize(p).weighted(&weights))?;
-        Some(Minimum {
-            parameters,
-            at,
-            weights,
-        })
-    }
-
-    /// Estimates the extra variances again beside these known ones, for parameters with this covariance. Returns whether all have changed by less than
-    /// this share.
-    pub fn update(
-        &mut self,
-        found: &Minimum,
-        covariance: &DMatrix<f64>,
-        variances: &[f64],
-        share: f64,
-    ) -> bool {
-        let mut converged = true;
-        for (rows, scatter) in self.rows.iter().zip(&mut self.scatter) {
-            let j = found.at.jacobian.rows(rows.start, rows.len());
-            // The trace of J C J' without that matrix, which would fill the memory for thousands of dwells.
-            let taken = (j * covariance).component_mul(&j).sum();
-            let residual = |k: usize| found.at.residuals[k] / found.weights[k];
-            let residuals: Vec<f64> = rows.clone().map(residual).collect();
-            let dof = degrees_of_freedom(rows.len(), taken);
-            let before = scatter.extra_variance;
-            *scatter = extra_variance(&residuals, &variances[rows.clone()], dof);
-            converged &= (scatter.extra_variance - before).abs() <= share * before;
-        }
-        converged
     }
 }
 

@@ -7,17 +7,17 @@
 //! either: it is taken from the raw readings.
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::least_squares::{Grouped, Linearized, Observability, Reweighted, Scatter, minimize};
-use super::{Estimated, Failure, Observation, lower_triangular};
-use crate::observable::Observable;
-use crate::observation::magnitude::Magnitude;
+use super::factor_fit::{Coordinates, FactorFit};
+use super::least_squares::{Observability, minimize};
+use super::{Estimated, Failure, Observation};
+use crate::factor::{Block, Factors, Kind, Linearized};
 use crate::observation::turn::Rest;
-use crate::observation::{LOWER, free, from_centre, place, vector};
+use crate::observation::{LOWER, place};
 use crate::prior::TriadPrior;
 use crate::quantity::{AXES, Sensor, plural};
-use crate::triad::{Forward, Part, Triad};
+use crate::triad::Forward;
 use crate::warning::Warning;
 
 /// Number of parameters: six of C, three of o.
@@ -88,6 +88,17 @@ impl Sphere {
     }
 }
 
+impl Sphere {
+    /// The triad with one scale factor for all axes that reads the `magnitude` on this sphere.
+    fn model(&self, magnitude: f64) -> Affine<f64> {
+        let matrix = Matrix3::from_diagonal_element(magnitude / self.radius);
+        Affine {
+            matrix,
+            offset: -(matrix * self.centre),
+        }
+    }
+}
+
 /// Readings whose extent across a plane is below this share of that along it lie in the plane.
 const FLAT: f64 = 0.01;
 
@@ -118,11 +129,7 @@ const BY_HAND: f64 = 5e-3;
 /// First guess, by the sphere through the readings: one scale factor for all axes. `None` if they do not lie on a sphere.
 pub fn first_guess(observations: &[Observation], gravity: f64) -> Option<Affine<f64>> {
     let sphere = Sphere::through(observations, &vec![1.0; observations.len()], &[])?;
-    let matrix = Matrix3::from_diagonal_element(gravity / sphere.radius);
-    Some(Affine {
-        matrix,
-        offset: -(matrix * sphere.centre),
-    })
+    Some(sphere.model(gravity))
 }
 
 /// Fits C and o of an accelerometer to `|C u + o| = gravity` (m/s²) over all observations, and to a `prior`; see [`estimate`].
@@ -208,25 +215,17 @@ fn refuse_too_little(observations: &[Observation], known: &KnownMagnitudes) -> R
     })
 }
 
-/// The experiment in units of the largest magnitude, so that parameters and columns are of order one: readings on a sphere of radius one.
-///
-/// Rows are the magnitudes, then the rests by axes, then the errors of the levels, then the prior; parameters are the nine, then the errors of the levels.
-struct Scaled<'a> {
+/// A fit by magnitudes: rows of dwells and rests, then of the errors of the levels and of the prior.
+struct ByMagnitudes<'a> {
     known: &'a KnownMagnitudes<'a>,
-    sphere: Sphere,
+    fit: FactorFit<'a>,
+    /// Number of the rows of dwells and rests, and of those and the errors of the levels.
+    rows: [usize; 2],
     /// The largest magnitude, SI.
     unit: f64,
-    /// Magnitude of each observation.
-    shares: Vec<f64>,
-    turned: Vec<Vector3<f64>>,
-    resting: Vec<Vector3<f64>>,
-    /// Number of levels that may err.
-    levels: usize,
-    /// Known variances of the rows.
-    variances: Vec<f64>,
 }
 
-impl<'a> Scaled<'a> {
+impl<'a> ByMagnitudes<'a> {
     /// `variances` are those of the magnitudes by noise, SI squared.
     fn of(
         observations: &[Observation],
@@ -247,215 +246,88 @@ impl<'a> Scaled<'a> {
         };
         let sphere = sphere
             .ok_or_else(|| Failure::NoSolution("the dwell means do not lie on a sphere".into()))?;
-        let scaled = |raw: &Vector3<f64>| (raw - sphere.centre) / sphere.radius;
-        let mut scaled = Self {
-            turned: observations.iter().map(|o| scaled(&o.raw)).collect(),
-            resting: known.rests.iter().map(|r| scaled(&r.raw)).collect(),
-            levels: match known.level_sigma > 0.0 {
-                true => known.levels.len(),
-                false => 0,
-            },
-            known,
-            sphere,
-            unit,
-            shares,
-            variances: Vec::new(),
-        };
-        scaled.variances = scaled.with_noise(variances);
-        Ok(scaled)
-    }
-
-    /// Where the rows of the magnitudes, those of the rests, those of the levels, and all end.
-    fn ends(&self) -> [usize; 4] {
-        let turned = self.turned.len();
-        let resting = turned + 3 * self.resting.len();
-        let levels = resting + self.levels;
-        [
-            turned,
-            resting,
-            levels,
-            levels + self.known.prior.map_or(0, TriadPrior::rows),
-        ]
-    }
-
-    /// The unit matrix without bias, at the given levels.
-    fn start(&self) -> DVector<f64> {
-        let mut start = DVector::zeros(PARAMETERS + self.levels);
-        for k in [0, 2, 5] {
-            start[k] = 1.0;
+        let first = sphere.model(unit);
+        let err = known.level_sigma > 0.0;
+        let mut factors = Factors::default();
+        for ((o, level), variance) in observations.iter().zip(known.level_of).zip(variances) {
+            let magnitude = (known.levels[*level], err.then_some(*level));
+            factors.magnitude(known.sensor, (o.dwell, o.raw), magnitude, *variance);
         }
-        start
-    }
-
-    /// Variances of the rows from those of the magnitudes by noise, SI squared. A noiseless recording has none; any positive number then weights all
-    /// poses alike.
-    fn with_noise(&self, by_noise: &[f64]) -> Vec<f64> {
-        let to_si = self.unit / self.sphere.radius;
-        let at_rest = self.known.rests.iter().flat_map(|r| {
-            let noise = r.variance * (to_si * to_si) + r.rate_variance;
-            <[f64; 3]>::from(noise)
-        });
-        let all: Vec<f64> = by_noise.iter().copied().chain(at_rest).collect();
-        let floor = (1e-12 * all.iter().copied().fold(0.0, f64::max)).max(1e-24);
-        let noise = all.iter().map(|v| (v / (self.unit * self.unit)).max(floor));
-        let by_level = std::iter::repeat_n(self.known.level_sigma.powi(2), self.levels);
-        let by_prior = self.known.prior.map_or(0, TriadPrior::rows);
-        noise
-            .chain(by_level)
-            .chain(std::iter::repeat_n(1.0, by_prior))
-            .collect()
+        factors.rests(known.rests);
+        let of_dwells = factors.rows();
+        let lower = Coordinates::triad(known.sensor, &first, &LOWER, &sphere.centre, unit);
+        let mut coordinates = vec![lower];
+        for level in (0..known.levels.len()).filter(|_| err) {
+            let block = Block::GivenMagnitude(level);
+            let (zero, one) = (DVector::zeros(1), DMatrix::identity(1, 1));
+            let stated = Kind::Stated(block, zero, one, known.level_sigma.powi(2));
+            factors.known(stated, None);
+            coordinates.push(Coordinates::around_zero(block));
+        }
+        let rows = [of_dwells, factors.rows()];
+        if let Some(prior) = known.prior {
+            factors.known(Kind::Population(known.sensor, prior), None);
+        }
+        let magnitude = match known.sensor {
+            Sensor::Accel => "magnitude of gravity",
+            Sensor::Gyro => "magnitude of the rate",
+        };
+        let lost = format!("the fit to the {magnitude} does not converge");
+        Ok(Self {
+            known,
+            fit: FactorFit::new(factors, coordinates, (1e-6, 1), lost),
+            rows,
+            unit,
+        })
     }
 
     /// Observability of the nine at known levels: the levels can worsen it only by their error.
     fn shape(&self, p: &DVector<f64>) -> Observability {
-        let all = self.linearize(p).jacobian;
-        Observability::of(&all.view((0, 0), (self.ends()[1], PARAMETERS)).into_owned())
+        let all = self.fit.linearize(p).jacobian;
+        Observability::of(&all.view((0, 0), (self.rows[0], PARAMETERS)).into_owned())
     }
 
     /// The first solution: all rows weighted alike but the levels.
     fn solved(&self) -> Result<DVector<f64>, Failure> {
-        let start = self.start();
-        let [_, resting, levels, rows] = self.ends();
-        let of_one = self.known.prior.map_or(1.0, |_| BY_HAND.recip());
-        let mut alike = vec![of_one; resting];
-        alike.resize(levels, self.known.level_sigma.recip());
-        alike.resize(rows, 1.0);
-        let alike = |p: &DVector<f64>| self.linearize(p).weighted(&alike);
+        let start = self.fit.start();
+        let of_one = self.known.prior.map_or(1.0, |_| BY_HAND.recip()) / self.unit;
+        let alike = |p: &DVector<f64>| {
+            let all = self.fit.linearize(p);
+            let mut weights = vec![of_one; self.rows[0]];
+            weights.resize(self.rows[1], self.known.level_sigma.recip());
+            weights.resize(all.residuals.len(), 1.0);
+            all.weighted(&weights)
+        };
         let shape = self.shape(&start);
         if !shape.is_complete() && self.known.prior.is_none() {
             return Err(undetermined(&shape, self.known.sensor));
         }
         let first = minimize(start.clone(), alike);
         // If the poses do not determine the angles between the sensors, the fit diverges towards C = 0 and |o| = g, which fits every pose.
-        match first.filter(|(p, _)| is_triad(&lower_triangular(p).matrix)) {
+        let is_triad = |p: &DVector<f64>| {
+            let triad = self.fit.values(p).triad(self.known.sensor);
+            triad.is_some_and(|triad| is_triad(&triad.matrix))
+        };
+        match first.filter(|(p, _)| is_triad(p)) {
             Some((p, _)) => Ok(p),
             None => Err(match weak_beside_scatter(&start, alike) {
                 Some(shape) if self.known.prior.is_none() => {
                     undetermined(&shape, self.known.sensor)
                 }
-                Some(_) => self.lost(),
-                None => self.lost(),
+                _ => self.fit.failure(),
             }),
         }
     }
 
-    /// Back: `x = m (C' (u - centre)/radius + o')`, with the derivatives of the twelve numbers by the nine parameters.
-    fn to_si(&self, p: &DVector<f64>) -> (Affine<f64>, SMatrix<f64, 12, 9>) {
-        let Affine {
-            matrix: mut c,
-            offset: mut o,
-        } = lower_triangular(p);
-        let scale = self.unit / self.sphere.radius;
-        let mut change = SMatrix::<f64, 12, 9>::zeros();
-        let about_zero = from_centre(&self.sphere.centre);
-        for (k, parameter) in LOWER.into_iter().enumerate() {
-            let per_unit = place(parameter).1.map_or(self.unit, |_| scale);
-            change.set_column(k, &(about_zero.column(parameter) * per_unit));
-        }
-        // Magnitudes do not show the sign of a row, and flipping rows keeps them: the raw reading decides. The diagonal has to be positive; the start
-        // (the unit matrix) makes a negative one all but impossible.
-        let mut flips = SVector::<f64, 12>::repeat(1.0);
-        for row in 0..3 {
-            if c[(row, row)] < 0.0 {
-                c.row_mut(row).neg_mut();
-                o[row] = -o[row];
-                for k in 0..3 {
-                    flips[3 * row + k] = -1.0;
-                }
-                flips[9 + row] = -1.0;
-            }
-        }
-        let matrix = c * scale;
-        let inverse = Affine {
-            matrix,
-            offset: o * self.unit - matrix * self.sphere.centre,
-        };
-        (inverse, SMatrix::from_diagonal(&flips) * change)
-    }
-
     /// A level that the others contradict.
     fn contradicted(&self, p: &DVector<f64>) -> Option<Warning> {
-        let off = (0..self.levels).map(|l| p[PARAMETERS + l]);
-        let worst = off
-            .enumerate()
-            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        let off = p.iter().skip(PARAMETERS).enumerate();
+        let worst = off.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let (l, off) = worst.filter(|w| w.1.abs() > CONTRADICTED * self.known.level_sigma)?;
         Some(Warning::RatesContradict {
             rate: self.known.levels[l],
-            off,
+            off: *off,
         })
-    }
-}
-
-impl Grouped<2> for Scaled<'_> {
-    const SHARE: f64 = 1e-6;
-
-    fn linearize(&self, p: &DVector<f64>) -> Linearized {
-        let [turned, resting, levels, rows] = self.ends();
-        let model = lower_triangular(p);
-        let mut out = Linearized::zeros(rows, PARAMETERS + self.levels);
-        let nine = |jacobian: &mut DMatrix<f64>, row: usize, by: &SVector<f64, 12>| {
-            jacobian
-                .view_mut((row, 0), (1, PARAMETERS))
-                .copy_from(&free(by, &LOWER).transpose());
-        };
-        for (i, u) in self.turned.iter().enumerate() {
-            let level = self.known.level_of[i];
-            let off = match self.levels {
-                0 => 0.0,
-                _ => p[PARAMETERS + level],
-            };
-            let found = Magnitude::at(&model, u, self.shares[i] * (1.0 + off));
-            out.residuals[i] = found.residual();
-            nine(&mut out.jacobian, i, &found.block.by(0));
-            if self.levels > 0 {
-                out.jacobian[(i, PARAMETERS + level)] = -self.shares[i];
-            }
-        }
-        for (r, u) in self.resting.iter().enumerate() {
-            let block = vector::at(&model, u, &(self.known.rests[r].rate / self.unit));
-            for axis in 0..3 {
-                let i = turned + 3 * r + axis;
-                out.residuals[i] = block.residual[axis];
-                nine(&mut out.jacobian, i, &block.by(axis));
-            }
-        }
-        for l in 0..self.levels {
-            out.residuals[resting + l] = p[PARAMETERS + l];
-            out.jacobian[(resting + l, PARAMETERS + l)] = 1.0;
-        }
-        if let Some(prior) = self.known.prior {
-            let (inverse, change) = self.to_si(p);
-            match prior.residuals(&inverse) {
-                Some((residuals, by)) => {
-                    out.residuals
-                        .rows_mut(levels, rows - levels)
-                        .copy_from(&residuals);
-                    let by = by * change;
-                    out.jacobian
-                        .view_mut((levels, 0), (rows - levels, PARAMETERS))
-                        .copy_from(&by);
-                }
-                // No unit: a step that leads here is taken back.
-                None => out
-                    .residuals
-                    .rows_mut(levels, rows - levels)
-                    .fill(f64::INFINITY),
-            }
-        }
-        out
-    }
-
-    fn variances(&self, _: &DVector<f64>) -> Vec<f64> {
-        self.variances.clone()
-    }
-
-    fn lost(&self) -> Failure {
-        let magnitude = match self.known.sensor {
-            Sensor::Accel => "magnitude of gravity",
-            Sensor::Gyro => "magnitude of the rate",
-        };
-        Failure::NoSolution(format!("the fit to the {magnitude} does not converge"))
     }
 }
 
@@ -469,64 +341,27 @@ pub fn estimate(
     known: &KnownMagnitudes,
 ) -> Result<Estimated, Failure> {
     refuse_too_little(observations, known)?;
-    let scaled = Scaled::of(observations, variances, known)?;
-    let [turned, resting, levels, rows] = scaled.ends();
-    let mut groups = Reweighted::new([0..turned, turned..resting], [0.0; 2]);
-    let solved = groups.solve(&scaled, scaled.solved()?)?;
-    let p = solved.found.parameters;
-    // Under the last extra variances.
-    let last = scaled
-        .linearize(&p)
-        .weighted(&groups.weights(&scaled.variances));
-    let mut shape = scaled.shape(&p);
+    let by = ByMagnitudes::of(observations, variances, known)?;
+    let solved = by.fit.solve(by.solved()?, &|_, _| 0.0, &|_| Ok(()))?;
+    let p = &solved.found.parameters;
+    let shape = by.shape(p);
     if !shape.is_complete() && known.prior.is_none() {
         return Err(undetermined(&shape, known.sensor));
     }
-    let covariance = last.covariance()?;
-    if known.prior.is_some() {
+    let condition = match known.prior {
+        None => shape.condition,
         // Of data and prior together, in their parameters of order one.
-        let eigen = covariance.symmetric_eigenvalues();
-        shape.condition = (eigen.max() / eigen.min()).sqrt();
-    }
-    let (inverse, change) = scaled.to_si(&p);
-    let mut scatter = groups.scatter;
-    for (g, scatter) in scatter.iter_mut().enumerate() {
-        scatter.extra_variance *= scaled.unit * scaled.unit;
-        scatter.chi2 = solved.first_chi2[g];
-    }
-    let part = |rows: std::ops::Range<usize>| {
-        let own = last.part(&covariance, &rows);
-        let nine = SMatrix::<f64, 9, 9>::from_fn(|i, j| own[(i, j)]);
-        Part::known(change * nine * change.transpose())
+        Some(_) => solved.condition(PARAMETERS),
     };
-    let scattered = |rows, scatter: &Scatter| Part {
-        dof: scatter.variance_dof(),
-        known: scatter.known,
-        ..part(rows)
-    };
-    let mut parts = vec![scattered(0..turned, &scatter[0])];
-    let mut found = vec![(Observable::Magnitude, scatter[0])];
-    if !known.rests.is_empty() {
-        parts.push(scattered(turned..resting, &scatter[1]));
-        found.push((Observable::Rest, scatter[1]));
+    let parts = solved.parts(known.sensor);
+    let triad = solved.triad(known.sensor, parts, "C is singular")?;
+    // Magnitudes do not show the sign of a row: the raw reading does, from which the fit has started.
+    if !(triad.inverse.matrix.diagonal().min() > 0.0) {
+        return Err(by.fit.failure());
     }
-    if scaled.levels > 0 {
-        // The error of a turntable's rate is given; the dwells do not determine it.
-        parts.push(part(resting..levels));
-    }
-    if known.prior.is_some() {
-        parts.push(part(levels..rows));
-    }
-    let triad = Triad::from_inverse(inverse, parts)
-        .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
     Ok(Estimated {
-        triad,
-        scatter: found,
-        condition: shape.condition,
-        delays: None,
-        earth: Vec::new(),
-        follows_accel: None,
-        notes: scaled.contradicted(&p).into_iter().collect(),
+        notes: by.contradicted(p).into_iter().collect(),
+        ..Estimated::new(triad, solved.scatter(true).collect(), condition)
     })
 }
 

@@ -9,16 +9,16 @@
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
 //! | [`whole_turns`]   | gravity   | the same with turns that end where they began            |
 //! | [`with_turns`]    | gravity   | accelerometer from magnitudes and turns together         |
-//! | [`chains`]        | gravity   | dwells that turns connect one to the next                 |
+//! | [`factor_fit`]    | gravity, turntable | the nonlinear fit of a list of factors, under the last four |
 //! | [`earth`]         | gravity   | the Earth's rate in the gyro's readings                   |
 //! | [`earth_on_table`] | table    | the same through the dwells of a table                    |
 //! | [`earth_shared`]  | table     | what is unknown of it, shared by dwells                   |
 //! | [`least_squares`] | both      | the algebra under all of them                            |
 
-pub mod chains;
 pub mod earth;
 pub mod earth_on_table;
 pub mod earth_shared;
+pub mod factor_fit;
 mod inputs;
 pub mod known_input;
 pub mod least_squares;
@@ -29,28 +29,14 @@ pub mod six_positions;
 pub mod whole_turns;
 pub mod with_turns;
 
-use mimu_core::compensation::Affine;
-use nalgebra::{DVector, Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use crate::observable::Observable;
-use crate::observation::{LOWER, place};
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Triad};
 use crate::warning::Warning;
 pub use earth_on_table::EarthShare;
 use least_squares::Scatter;
-
-/// The model with these values of the parameters [`LOWER`].
-fn lower_triangular(p: &DVector<f64>) -> Affine<f64> {
-    let (mut matrix, mut offset) = (Matrix3::zeros(), Vector3::zeros());
-    for (value, parameter) in p.iter().zip(LOWER) {
-        match place(parameter) {
-            (row, Some(column)) => matrix[(row, column)] = *value,
-            (row, None) => offset[row] = *value,
-        }
-    }
-    Affine { matrix, offset }
-}
 
 /// The mean of a dwell. If the input moves within the dwell, also another weighted sum over it, with weights that add to zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,6 +97,19 @@ pub struct Estimated {
 }
 
 impl Estimated {
+    /// Without delays, Earth and notes.
+    pub fn new(triad: Triad, scatter: Vec<(Observable, Scatter)>, condition: f64) -> Self {
+        Self {
+            triad,
+            scatter,
+            condition,
+            delays: None,
+            earth: Vec::new(),
+            follows_accel: None,
+            notes: Vec::new(),
+        }
+    }
+
     /// Error of an observation with a known input, SI: its calibrated value, corrected for the delay, minus its input. `bias` is the sum of the
     /// weights: 1 for a mean, 0 for the other sums.
     pub fn error(&self, o: &Observation, bias: f64) -> Vector3<f64> {

@@ -353,13 +353,14 @@ fn outlying(turns: &[Turn], done: &Estimated, closures: &Closures) -> Option<(us
     }
     let gyro = &done.triad.inverse;
     let c2 = gyro.matrix.norm_squared() / 3.0;
-    let variances: Vec<f64> = closures.variances(turns, c2).collect();
     let errors = closures.list.iter().map(|closure| {
         let own = &turns[closure.turns.clone()];
-        ClosureError::at(own, gyro, closures.vertical[0]).map_or(0.0, |e| e.block.residual[0])
+        let error = ClosureError::at(own, gyro, closures.vertical[0]);
+        let error = error.map_or(0.0, |e| e.block.residual[0]);
+        (error, error * error / closures.variance(own, c2))
     });
-    let errors: Vec<f64> = errors.collect();
-    let squared = |k: usize| errors[k] * errors[k] / variances[k];
+    let errors: Vec<(f64, f64)> = errors.collect();
+    let squared = |k: usize| errors[k].1;
     let worst = (0..count).max_by(|a, b| squared(*a).total_cmp(&squared(*b)))?;
     let others = (0..count).filter(|k| *k != worst).map(squared);
     let scatter = (others.sum::<f64>() / (count - 1) as f64).max(1.0);
@@ -369,7 +370,7 @@ fn outlying(turns: &[Turn], done: &Estimated, closures: &Closures) -> Option<(us
         let warning = Warning::WholeTurnLeftOut {
             from: own[0].steps[0],
             to: own[own.len() - 1].steps[1],
-            off: errors[worst].abs(),
+            off: errors[worst].0.abs(),
             sigmas,
         };
         (worst, warning)

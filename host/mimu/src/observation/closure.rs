@@ -20,14 +20,6 @@ pub struct Closure {
     pub path: Path,
 }
 
-impl Closure {
-    /// Raw readings of the accelerometer before and after.
-    pub fn raw(&self, turns: &[Turn]) -> [Vector3<f64>; 2] {
-        let own = &turns[self.turns.clone()];
-        [own[0].raw[0], own[own.len() - 1].raw[1]]
-    }
-}
-
 /// The whole turns among the turns of a recording, and what is known of where they end.
 #[derive(Debug, Clone, Default)]
 pub struct Closures {
@@ -42,23 +34,11 @@ pub struct Closures {
 }
 
 impl Closures {
-    /// The error of each, with the rotations of all turns.
-    pub(crate) fn errors(&self, turns: &[Turn], turned: &[Turned]) -> Vec<ClosureError> {
-        let one = |closure: &Closure| {
-            let own = closure.turns.clone();
-            ClosureError::of(&turns[own.clone()], &turned[own], self.vertical[0])
-        };
-        self.list.iter().filter_map(one).collect()
-    }
-
-    /// Known variance of each, rad², for a gyro with a mean square of `c2` per row of C.
-    pub fn variances(&self, turns: &[Turn], c2: f64) -> impl Iterator<Item = f64> {
-        self.list.iter().map(move |closure| {
-            let own = &turns[closure.turns.clone()];
-            let noise: f64 = own.iter().map(|turn| turn.integral_variance).sum();
-            let duration_s: f64 = own.iter().map(|turn| turn.duration_s).sum();
-            self.placement_variance + c2 * noise + self.vertical[1] * duration_s * duration_s
-        })
+    /// Known variance of one over these `turns`, rad², for a gyro with a mean square of `c2` per row of C.
+    pub fn variance(&self, turns: &[Turn], c2: f64) -> f64 {
+        let noise: f64 = turns.iter().map(|turn| turn.integral_variance).sum();
+        let duration_s: f64 = turns.iter().map(|turn| turn.duration_s).sum();
+        self.placement_variance + c2 * noise + self.vertical[1] * duration_s * duration_s
     }
 }
 

@@ -48,6 +48,9 @@ impl<const N: usize> Block<N> {
 /// through the sensor y, fang (13) with `Mp = 1`.
 pub const LOWER: [usize; 9] = [0, 3, 4, 6, 7, 8, 9, 10, 11];
 
+/// All parameters, which turns determine.
+pub const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+
 /// Row and column of parameter `k` in C; the column is `None` for an element of o.
 pub const fn place(k: usize) -> (usize, Option<usize>) {
     match k {

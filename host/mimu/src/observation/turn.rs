@@ -6,7 +6,7 @@
 use std::cell::RefCell;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
+use nalgebra::{Matrix2, Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::{Block, ByTriad, place, slope};
 use crate::signal::increment::Increment;
@@ -39,16 +39,6 @@ pub struct Turn<'a> {
 }
 
 impl Turn<'_> {
-    /// The same turn with the forces by the accelerometer `accel`, raw to m/s².
-    pub fn with(&self, accel: &Affine<f64>) -> Self {
-        let [before, after] = self.raw.map(|raw| accel.apply(&raw));
-        Self {
-            before,
-            after,
-            ..*self
-        }
-    }
-
     /// Variance of one component of the direction error, rad², for a gyro with a mean square of `c2` per row of C: by noise, and by the Earth's rate about
     /// a heading that is unknown. A quiet gyro in turns of eight seconds errs by the Earth twice as much as by its noise.
     pub fn variance(&self, c2: f64) -> f64 {
@@ -63,6 +53,20 @@ impl Turn<'_> {
     /// Size of the direction error (rad, two components) by noise and the Earth, with `c2` as for [`Self::variance`].
     pub fn floor(&self, c2: f64) -> f64 {
         (2.0 * self.variance(c2)).sqrt()
+    }
+
+    /// The same turn with the forces by the accelerometer `accel`, raw to m/s².
+    pub fn with(&self, accel: &Affine<f64>) -> Self {
+        let [before, after] = self.raw.map(|raw| accel.apply(&raw));
+        Self {
+            before,
+            after,
+            ..*self
+        }
+    }
+
+    fn pieces(&self) -> impl DoubleEndedIterator<Item = Piece> + ExactSizeIterator {
+        self.increments.iter().map(Piece::of)
     }
 }
 
@@ -96,31 +100,26 @@ pub struct Motion {
     pub duration_s: f64,
 }
 
-/// An increment with the reading at rest subtracted.
+/// An increment as vectors.
 #[derive(Debug, Clone, Copy)]
-struct Centred {
+struct Piece {
     integral: Vector3<f64>,
     coning: Vector3<f64>,
     moment: Vector3<f64>,
     duration: f64,
 }
 
-impl Centred {
-    /// With the reading `rest` subtracted.
-    fn new(increment: &Increment, rest: &Vector3<f64>) -> Self {
-        let [integral, coning, moment] =
-            [increment.integral, increment.coning, increment.moment].map(Vector3::from);
+impl Piece {
+    fn of(increment: &Increment) -> Self {
         Self {
-            integral: integral - rest * increment.duration_s,
-            coning: coning + rest.cross(&moment),
-            moment,
+            integral: increment.integral.into(),
+            coning: increment.coning.into(),
+            moment: increment.moment.into(),
             duration: increment.duration_s,
         }
     }
-}
 
-impl Centred {
-    /// Rotation vector under `ω = C (u - rest) + o`, rad; `half` is half the cofactor matrix of C.
+    /// Rotation vector under `ω = C u + o`, rad; `half` is half the cofactor matrix of C.
     fn rotation(&self, c: &Matrix3<f64>, o: &Vector3<f64>, half: &Matrix3<f64>) -> Vector3<f64> {
         c * self.integral
             + o * self.duration
@@ -176,8 +175,7 @@ pub(crate) struct Turned {
 impl Turned {
     /// Under the calibration `gyro`, raw to rad/s.
     pub(crate) fn at(turn: &Turn, gyro: &Affine<f64>) -> Self {
-        let pieces = about_zero(turn);
-        integrate(pieces, &gyro.matrix, &gyro.offset, |_, _| ())
+        integrate(turn.pieces(), gyro, |_, _| ())
     }
 
     /// This turn and the `next`, as one.
@@ -188,12 +186,6 @@ impl Turned {
             by: [0, 1, 2, 3].map(|k| rotation * self.by[k] + next.by[k]),
         }
     }
-}
-
-/// The pieces of a turn, with nothing subtracted from the readings.
-fn about_zero(turn: &Turn) -> impl DoubleEndedIterator<Item = Centred> + ExactSizeIterator {
-    let pieces = turn.increments.iter();
-    pieces.map(|increment| Centred::new(increment, &Vector3::zeros()))
 }
 
 /// How far the unit turned on its way, by the calibration `gyro`.
@@ -212,7 +204,7 @@ impl Path {
     pub fn of(turns: &[Turn], gyro: &Affine<f64>) -> Self {
         let half = cofactor(&gyro.matrix) * 0.5;
         let (mut sum, mut fastest) = (Vector3::zeros(), 0.0_f64);
-        for piece in turns.iter().flat_map(about_zero) {
+        for piece in turns.iter().flat_map(Turn::pieces) {
             let turned = piece.rotation(&gyro.matrix, &gyro.offset, &half);
             sum += turned;
             fastest = fastest.max(turned.norm() / piece.duration);
@@ -230,14 +222,14 @@ impl Path {
     }
 }
 
-/// The turn over `pieces` under `ω = C (u - rest) + o`. `each` is called with the index of each piece, and with the matrix that takes its rotation vector
+/// The turn over `pieces` under the calibration `gyro`. `each` is called with the index of each piece, and with the matrix that takes its rotation vector
 /// into the frame after the turn.
 fn integrate(
-    pieces: impl DoubleEndedIterator<Item = Centred> + ExactSizeIterator,
-    c: &Matrix3<f64>,
-    o: &Vector3<f64>,
+    pieces: impl DoubleEndedIterator<Item = Piece> + ExactSizeIterator,
+    gyro: &Affine<f64>,
     mut each: impl FnMut(usize, &Matrix3<f64>),
 ) -> Turned {
+    let (c, o) = (&gyro.matrix, &gyro.offset);
     let half = cofactor(c) * 0.5;
     let mut rotation = Matrix3::identity();
     let mut by = [Matrix3::zeros(); 4];
@@ -262,36 +254,35 @@ const NEAR: f64 = 1e-4;
 
 /// Rotations of turns as [`integrate`] gives them, at one calibration.
 struct Reference {
-    c: Matrix3<f64>,
-    o: Vector3<f64>,
+    gyro: Affine<f64>,
     turned: Vec<Turned>,
 }
 
 /// The rotations of turns under calibrations that a fit tries one after the other. After the first few these are near each other, and are not
 /// integrated again: integrating took 80 % of the time of a fit of 36 turns with its held-out refits.
+#[derive(Default)]
 pub(crate) struct Rotations {
-    pieces: Vec<Vec<Centred>>,
+    pieces: Vec<Vec<Piece>>,
     reference: RefCell<Option<Reference>>,
 }
 
 impl Rotations {
-    /// The rotations of `turns`, with the reading at rest subtracted.
-    pub(crate) fn new(turns: &[Turn], rest: &Vector3<f64>) -> Self {
-        let centred = |turn: &Turn| {
-            let pieces = turn.increments.iter();
-            pieces.map(|i| Centred::new(i, rest)).collect()
-        };
+    /// The rotations of `turns`.
+    pub(crate) fn new(turns: &[Turn]) -> Self {
         Self {
-            pieces: turns.iter().map(centred).collect(),
+            pieces: turns.iter().map(|turn| turn.pieces().collect()).collect(),
             reference: RefCell::new(None),
         }
     }
 
-    /// Each turn under `ω = C (u - rest) + o`.
-    pub(crate) fn at(&self, c: &Matrix3<f64>, o: &Vector3<f64>) -> Vec<Turned> {
+    /// Each turn under the calibration `gyro`, raw to rad/s.
+    pub(crate) fn at(&self, gyro: &Affine<f64>) -> Vec<Turned> {
         let mut reference = self.reference.borrow_mut();
         let near = reference.as_ref().and_then(|reference| {
-            let (c, o) = (c - reference.c, o - reference.o);
+            let (c, o) = (
+                gyro.matrix - reference.gyro.matrix,
+                gyro.offset - reference.gyro.offset,
+            );
             let moved = reference.turned.iter().map(|Turned { rotation, by }| {
                 let by_c: Vector3<f64> = (0..3).map(|k| by[k] * c.column(k)).sum();
                 let more = by_c + by[3] * o;
@@ -304,12 +295,10 @@ impl Rotations {
             moved.collect::<Option<Vec<_>>>()
         });
         near.unwrap_or_else(|| {
-            let whole = |pieces: &Vec<Centred>| integrate(pieces.iter().copied(), c, o, |_, _| ());
-            let turned = self.pieces.iter().map(whole);
-            let turned: Vec<_> = turned.collect();
+            let whole = |pieces: &Vec<Piece>| integrate(pieces.iter().copied(), gyro, |_, _| ());
+            let turned: Vec<_> = self.pieces.iter().map(whole).collect();
             *reference = Some(Reference {
-                c: *c,
-                o: *o,
+                gyro: *gyro,
                 turned: turned.clone(),
             });
             turned
@@ -377,8 +366,7 @@ impl TurnError {
         gyro: &Affine<f64>,
         each: impl FnMut(usize, &Matrix3<f64>),
     ) -> Self {
-        let turned = integrate(about_zero(turn), &gyro.matrix, &gyro.offset, each);
-        Self::of(turn, &turned)
+        Self::of(turn, &integrate(turn.pieces(), gyro, each))
     }
 
     /// The error as a rotation vector in the body frame after the turn, rad.
@@ -393,9 +381,9 @@ impl TurnError {
             .map(|[before, after]| slope(&before, &raw[0]) + slope(&after, &raw[1]))
     }
 
-    /// Derivatives of component `k` by the Earth's level rate, whose two directions `level` are known in the body frame after a turn of `duration_s`.
-    pub fn by_level(&self, k: usize, level: &[Vector3<f64>; 2], duration_s: f64) -> [f64; 2] {
-        level.map(|level| -duration_s * self.sides[k].dot(&level))
+    /// Derivatives of both components by the Earth's level rate, whose two directions `level` are known in the body frame after a turn of `duration_s`.
+    pub fn by_level(&self, level: &[Vector3<f64>; 2], duration_s: f64) -> Matrix2<f64> {
+        Matrix2::from_fn(|k, l| -duration_s * self.sides[k].dot(&level[l]))
     }
 }
 

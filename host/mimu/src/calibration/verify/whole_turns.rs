@@ -92,8 +92,7 @@ pub(super) fn verify(
     });
     let c2 = gyro.matrix.norm_squared() / 3.0;
     let mut sums = [Sum::default(); 4];
-    let variances = found.closures.variances(&turns, c2);
-    for (closure, variance) in found.closures.list.iter().zip(variances) {
+    for closure in &found.closures.list {
         let own = &turns[closure.turns.clone()];
         let largest = closure.path.axis.iamax();
         let near = closure.path.axis[largest].abs() >= NEAR_AXIS;
@@ -103,7 +102,7 @@ pub(super) fn verify(
         sum.times += 1;
         sum.turns += closure.path.turns().round();
         sum.error += error;
-        sum.variance += variance;
+        sum.variance += found.closures.variance(own, c2);
         sum.uncalibrated += as_came.as_ref().and_then(read).unwrap_or(f64::NAN);
         sum.one_for_all += one_for_all.as_ref().and_then(read).unwrap_or(f64::NAN);
     }

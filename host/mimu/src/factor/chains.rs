@@ -10,7 +10,7 @@ use crate::observation::{ByTriad, vector};
 
 /// Dwells that turns connect one to the next. Within a chain the heading is known except for one angle. So the Earth's rate across the vertical is
 /// known except for two numbers, which are estimated.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Chains {
     /// Chain to which each turn belongs.
     pub of_turn: Vec<Option<usize>>,
@@ -59,7 +59,10 @@ impl Chains {
             rows.extend([0, 1].map(|k| GyroRow {
                 residual: error.block.residual[k],
                 by: error.block.by(k),
-                level: earth.map(|(chain, l)| (chain, error.by_level(k, l, turn.duration_s))),
+                level: earth.map(|(chain, l)| {
+                    let by = error.by_level(l, turn.duration_s).row(k).transpose();
+                    (chain, by.into())
+                }),
             }));
         }
         for (r, o) in rest.iter().enumerate() {
@@ -98,7 +101,7 @@ impl Chains {
     }
 
     /// Two level directions, fixed in the world, in the body frame of each dwell of a chain; `rotations` are those of the turns.
-    fn level(
+    pub(super) fn level(
         &self,
         turns: &[Turn],
         rotations: impl Iterator<Item = Matrix3<f64>>,

@@ -1,0 +1,466 @@
+//! One list of factors: what a recording says of the parameters of a unit, and how surely.
+//!
+//! A factor has residuals, their derivatives by named blocks of parameters ([`Block`]), their known variances, the group whose scatter is estimated, and
+//! the dwells it comes from. Residuals and derivatives are those of [`crate::observation`]. A list is in groups: the factors of one stand together. A fit
+//! ([`crate::estimate::factor_fit`]) chooses which blocks are free and in which coordinates; a judgement evaluates the same list at given [`Values`].
+
+pub mod chains;
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, DVector, Dim, Matrix, Matrix3x2, RawStorage, SMatrix, Vector3};
+
+use crate::observable::Observable;
+use crate::observation::closure::{ClosureError, Closures};
+use crate::observation::magnitude::Magnitude;
+use crate::observation::turn::{Rest, Rotations, Turn, TurnError, Turned};
+use crate::observation::{ByTriad, vector};
+use crate::prior::TriadPrior;
+use crate::quantity::Sensor;
+use crate::triad::{affine, vector as parameters};
+use chains::Chains;
+
+/// A block of parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Block {
+    /// C by rows, then o of a triad, raw to SI: twelve.
+    Triad(Sensor),
+    /// The Earth's rate along the two level directions of a chain of dwells, rad/s.
+    LevelRate(usize),
+    /// Relative error of a magnitude that is given, such as the rate of a turntable.
+    GivenMagnitude(usize),
+}
+
+impl Block {
+    /// Number of its parameters.
+    pub fn size(self) -> usize {
+        match self {
+            Self::Triad(_) => 12,
+            Self::LevelRate(_) => 2,
+            Self::GivenMagnitude(_) => 1,
+        }
+    }
+}
+
+/// Values of blocks, one behind the other.
+#[derive(Debug, Clone)]
+pub struct Values {
+    blocks: Vec<Block>,
+    /// The numbers.
+    pub all: DVector<f64>,
+}
+
+impl Values {
+    /// Of these blocks.
+    pub fn new(blocks: Vec<Block>, all: DVector<f64>) -> Self {
+        Self { blocks, all }
+    }
+
+    /// Of triads alone.
+    pub fn of_triads(triads: &[(Sensor, &Affine<f64>)]) -> Self {
+        let numbers = triads.iter().map(|t| parameters(&t.1.matrix, &t.1.offset));
+        let numbers: Vec<f64> = numbers.flat_map(<[f64; 12]>::from).collect();
+        let blocks = triads.iter().map(|t| Block::Triad(t.0));
+        Self::new(blocks.collect(), DVector::from_vec(numbers))
+    }
+
+    /// Where a block is, if it is among them.
+    pub fn range(&self, block: Block) -> Option<Range<usize>> {
+        let before = self.blocks.iter().take_while(|b| **b != block);
+        let first = before.map(|b| b.size()).sum::<usize>();
+        (first < self.all.len()).then(|| first..first + block.size())
+    }
+
+    /// The calibration of a triad, raw to SI.
+    pub fn triad(&self, sensor: Sensor) -> Option<Affine<f64>> {
+        let of = self.range(Block::Triad(sensor))?;
+        Some(affine(&self.all.fixed_rows::<12>(of.start).into_owned()))
+    }
+}
+
+/// Residuals and their derivatives at some parameters.
+pub struct Linearized {
+    /// Residuals.
+    pub residuals: DVector<f64>,
+    /// Derivatives of the residuals, rows by parameters.
+    pub jacobian: DMatrix<f64>,
+}
+
+impl Linearized {
+    /// So many residuals by so many parameters, all zero.
+    pub fn zeros(rows: usize, parameters: usize) -> Self {
+        Self {
+            residuals: DVector::zeros(rows),
+            jacobian: DMatrix::zeros(rows, parameters),
+        }
+    }
+
+    /// Each row times its weight.
+    pub fn weighted(mut self, weights: &[f64]) -> Self {
+        for (k, weight) in weights.iter().enumerate() {
+            self.residuals[k] *= weight;
+            self.jacobian.row_mut(k).scale_mut(*weight);
+        }
+        self
+    }
+
+    /// Covariance of the parameters, for weighted rows; `None` if it is singular.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        (self.jacobian.transpose() * &self.jacobian).try_inverse()
+    }
+
+    /// The part of that `covariance` by the errors of some rows.
+    pub fn part(&self, covariance: &DMatrix<f64>, rows: &Range<usize>) -> DMatrix<f64> {
+        let j = self.jacobian.rows(rows.start, rows.len());
+        covariance * (j.transpose() * j) * covariance
+    }
+}
+
+/// What a factor observes.
+#[derive(Debug, Clone)]
+pub enum Kind<'a> {
+    /// The magnitude of a triad's input.
+    Magnitude {
+        /// The triad.
+        sensor: Sensor,
+        /// Its mean reading.
+        raw: Vector3<f64>,
+        /// The magnitude, SI.
+        known: f64,
+        /// The given magnitude whose error it has.
+        given: Option<usize>,
+        /// Variance by noise, SI squared.
+        variance: f64,
+    },
+    /// The rate of a gyro at rest, and its chain.
+    Rest(Rest, Option<usize>),
+    /// The direction of gravity after a turn, by its number, and its chain.
+    Turn(usize, Option<usize>),
+    /// The heading after whole turns, which are neighbours, and the variance without the noise of the gyro, rad².
+    Closure(Range<usize>, f64),
+    /// Sums of a block's parameters that are known beforehand: values, matrix of the sums (a row for each) and variance of each.
+    Stated(Block, DVector<f64>, DMatrix<f64>, f64),
+    /// The population of a triad's kind.
+    Population(Sensor, &'a TriadPrior),
+}
+
+/// An observation of a unit.
+#[derive(Debug, Clone)]
+pub struct Factor<'a> {
+    /// What it observes.
+    pub kind: Kind<'a>,
+    /// The group whose scatter its residuals share; `None` if the known variance is all.
+    pub group: Option<Observable>,
+    /// First and last of the dwells it comes from; `None` if it is known from elsewhere.
+    pub dwells: Option<[usize; 2]>,
+}
+
+impl Factor<'_> {
+    /// Number of residuals.
+    pub fn rows(&self) -> usize {
+        match &self.kind {
+            Kind::Magnitude { .. } | Kind::Closure(..) => 1,
+            Kind::Turn(..) => 2,
+            Kind::Rest(..) => 3,
+            Kind::Stated(_, _, sums, _) => sums.nrows(),
+            Kind::Population(_, prior) => prior.rows(),
+        }
+    }
+}
+
+/// A list of factors, with the turns that they refer to.
+#[derive(Default)]
+pub struct Factors<'a> {
+    /// The factors, those of a group together.
+    pub list: Vec<Factor<'a>>,
+    turns: Vec<Turn<'a>>,
+    rotations: Rotations,
+    chains: Chains,
+    /// Known rate of the Earth about the vertical, rad/s.
+    vertical: f64,
+}
+
+impl<'a> Factors<'a> {
+    /// Without factors yet; they may refer to `turns`. Within `chains` the Earth's level rate is a block, and no noise.
+    pub fn among(turns: &[Turn<'a>], chains: Chains) -> Self {
+        let mut own = turns.to_vec();
+        for (turn, chain) in own.iter_mut().zip(&chains.of_turn) {
+            if chain.is_some() {
+                turn.earth_variance = 0.0;
+            }
+        }
+        Self {
+            list: Vec::new(),
+            turns: own,
+            rotations: Rotations::new(turns),
+            chains,
+            vertical: 0.0,
+        }
+    }
+
+    fn push(&mut self, kind: Kind<'a>, group: Observable, dwells: [usize; 2]) {
+        self.list.push(Factor {
+            kind,
+            group: Some(group),
+            dwells: Some(dwells),
+        });
+    }
+
+    /// Adds the magnitude that a triad reads in a dwell.
+    pub fn magnitude(
+        &mut self,
+        sensor: Sensor,
+        (dwell, raw): (usize, Vector3<f64>),
+        (known, given): (f64, Option<usize>),
+        variance: f64,
+    ) {
+        let kind = Kind::Magnitude {
+            sensor,
+            raw,
+            known,
+            given,
+            variance,
+        };
+        self.push(kind, Observable::Magnitude, [dwell; 2]);
+    }
+
+    /// Adds the directions after those of the turns that are `of` this group.
+    pub fn directions(&mut self, group: Observable, of: impl Fn(usize) -> bool) {
+        for t in (0..self.turns.len()).filter(|t| of(*t)) {
+            let dwells = [self.turns[t].from, self.turns[t].to];
+            let chain = self.chains.of_turn.get(t).copied().flatten();
+            self.push(Kind::Turn(t, chain), group, dwells);
+        }
+    }
+
+    /// Adds the headings after whole turns.
+    pub fn headings(&mut self, whole: &Closures) {
+        self.vertical = whole.vertical[0];
+        for closure in &whole.list {
+            let own = &self.turns[closure.turns.clone()];
+            let dwells = [own[0].from, own[own.len() - 1].to];
+            let kind = Kind::Closure(closure.turns.clone(), whole.variance(own, 0.0));
+            self.push(kind, Observable::WholeTurns, dwells);
+        }
+    }
+
+    /// Adds the rates at rest.
+    pub fn rests(&mut self, rest: &[Rest]) {
+        let chains = self.chains.of_rest.clone();
+        let chains = chains.into_iter().chain(std::iter::repeat(None));
+        for (rest, chain) in rest.iter().zip(chains) {
+            let mut own = *rest;
+            if chain.is_some() {
+                own.rate_variance.fill(0.0);
+            }
+            self.push(Kind::Rest(own, chain), Observable::Rest, [rest.dwell; 2]);
+        }
+    }
+
+    /// Adds what is known beforehand.
+    pub fn known(&mut self, kind: Kind<'a>, group: Option<Observable>) {
+        self.list.push(Factor {
+            kind,
+            group,
+            dwells: None,
+        });
+    }
+
+    /// Number of residuals so far.
+    pub fn rows(&self) -> usize {
+        self.list.iter().map(Factor::rows).sum()
+    }
+
+    /// Number of chains.
+    pub fn chains(&self) -> usize {
+        self.chains.count
+    }
+
+    /// The rows of each factor.
+    pub fn ranges(&self) -> impl Iterator<Item = Range<usize>> {
+        ranges(self.list.iter().map(Factor::rows))
+    }
+
+    /// The groups and their rows.
+    pub fn groups(&self) -> impl Iterator<Item = (Option<Observable>, Range<usize>)> {
+        let groups = self.list.chunk_by(|a, b| a.group == b.group);
+        let rows = groups.clone().map(|g| g.iter().map(Factor::rows).sum());
+        groups.map(|g| g[0].group).zip(ranges(rows))
+    }
+
+    /// Residuals, and derivatives by all `values`. A block that has no values is known without error.
+    pub fn at(&self, values: &Values) -> Linearized {
+        let at = State::of(self, values);
+        let mut out = Linearized::zeros(self.rows(), values.all.len());
+        for (factor, rows) in self.list.iter().zip(self.ranges()) {
+            let (first, out) = (rows.start, &mut out);
+            at.evaluate(self, factor, &mut Rows { first, values, out });
+        }
+        out
+    }
+
+    /// Known variances of the residuals.
+    pub fn variances(&self, values: &Values) -> Vec<f64> {
+        let c = values.triad(Sensor::Gyro).map(|gyro| gyro.matrix);
+        let squared = c.map_or_else(Default::default, |c| c.component_mul(&c));
+        let mean = squared.sum() / 3.0;
+        let each = self.list.iter().flat_map(|factor| match &factor.kind {
+            Kind::Magnitude { variance, .. } => vec![*variance],
+            Kind::Rest(rest, _) => {
+                let noise = squared * rest.variance;
+                let all = noise + rest.rate_variance + rest.vertical_variance;
+                all.as_slice().to_vec()
+            }
+            Kind::Turn(t, _) => vec![self.turns[*t].variance(mean); 2],
+            Kind::Closure(turns, known) => {
+                let noise = self.turns[turns.clone()].iter();
+                vec![known + mean * noise.map(|turn| turn.integral_variance).sum::<f64>()]
+            }
+            Kind::Stated(_, _, sums, variance) => vec![*variance; sums.nrows()],
+            Kind::Population(_, prior) => vec![1.0; prior.rows()],
+        });
+        // Readings without noise have none; any positive number then weights all of them alike.
+        each.map(|v| v.max(1e-20)).collect()
+    }
+}
+
+/// Ranges of these lengths, one behind the other.
+fn ranges(lengths: impl Iterator<Item = usize>) -> impl Iterator<Item = Range<usize>> {
+    lengths.scan(0, |end, length| {
+        *end += length;
+        Some(*end - length..*end)
+    })
+}
+
+/// Rows of a factor, to be filled.
+struct Rows<'b> {
+    first: usize,
+    values: &'b Values,
+    out: &'b mut Linearized,
+}
+
+impl Rows<'_> {
+    fn residuals(&mut self, all: &[f64]) {
+        for (k, residual) in all.iter().enumerate() {
+            self.out.residuals[self.first + k] = *residual;
+        }
+    }
+
+    /// Derivatives of all rows by a block.
+    fn by<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
+        &mut self,
+        block: Block,
+        by: &Matrix<f64, R, C, S>,
+    ) {
+        let columns = self.values.range(block).unwrap_or_default();
+        for (k, column) in columns.enumerate() {
+            for row in 0..by.nrows() {
+                self.out.jacobian[(self.first + row, column)] = by[(row, k)];
+            }
+        }
+    }
+}
+
+/// What factors share at some values.
+struct State<'a> {
+    /// The turns with their forces.
+    turns: Vec<Turn<'a>>,
+    turned: Vec<Turned>,
+    errors: Vec<TurnError>,
+    /// Level directions in the body frame of each dwell of a chain.
+    level: BTreeMap<usize, [Vector3<f64>; 2]>,
+}
+
+impl<'a> State<'a> {
+    fn of(factors: &Factors<'a>, values: &Values) -> Self {
+        let gyro = values.triad(Sensor::Gyro).unwrap_or_else(Affine::identity);
+        let accel = values.triad(Sensor::Accel);
+        let turned = factors.rotations.at(&gyro);
+        let turns = factors.turns.iter().map(|turn| match &accel {
+            Some(accel) => turn.with(accel),
+            None => *turn,
+        });
+        let turns: Vec<Turn> = turns.collect();
+        let errors = turns.iter().zip(&turned);
+        let errors: Vec<_> = errors.map(|(turn, by)| TurnError::of(turn, by)).collect();
+        Self {
+            level: (factors.chains).level(&turns, turned.iter().map(|by| by.rotation)),
+            turns,
+            turned,
+            errors,
+        }
+    }
+
+    fn evaluate(&self, factors: &Factors, factor: &Factor, rows: &mut Rows) {
+        let model = |sensor| rows.values.triad(sensor).unwrap_or_else(Affine::identity);
+        let of_gyro = Block::Triad(Sensor::Gyro);
+        let of_accel = Block::Triad(Sensor::Accel);
+        match &factor.kind {
+            Kind::Magnitude {
+                sensor,
+                raw,
+                known,
+                given,
+                ..
+            } => {
+                let found = Magnitude::at(&model(*sensor), raw, *known);
+                rows.residuals(&[found.residual()]);
+                rows.by(Block::Triad(*sensor), &found.block.by);
+                if let Some(given) = given {
+                    rows.by(Block::GivenMagnitude(*given), &SMatrix::from([[-known]]));
+                }
+            }
+            Kind::Rest(rest, chain) => {
+                let found = vector::at(&model(Sensor::Gyro), &rest.raw, &rest.rate);
+                rows.residuals(found.residual.as_slice());
+                rows.by(of_gyro, &found.by);
+                if let Some((chain, level)) = chain.zip(self.level.get(&rest.dwell)) {
+                    rows.by(Block::LevelRate(chain), &-Matrix3x2::from_columns(level));
+                }
+            }
+            Kind::Turn(t, chain) => {
+                let (turn, error) = (&self.turns[*t], &self.errors[*t]);
+                rows.residuals(error.block.residual.as_slice());
+                rows.by(of_gyro, &error.block.by);
+                rows.by(of_accel, &stacked(&error.by_accel(&turn.raw)));
+                if let Some((chain, level)) = chain.zip(self.level.get(&turn.to)) {
+                    let by = error.by_level(level, turn.duration_s);
+                    rows.by(Block::LevelRate(chain), &by);
+                }
+            }
+            Kind::Closure(turns, _) => {
+                let (own, turned) = (&self.turns[turns.clone()], &self.turned[turns.clone()]);
+                if let Some(error) = ClosureError::of(own, turned, factors.vertical) {
+                    let raw = [own[0].raw[0], own[own.len() - 1].raw[1]];
+                    rows.residuals(error.block.residual.as_slice());
+                    rows.by(of_gyro, &error.block.by);
+                    rows.by(of_accel, &stacked(&[error.by_accel(&raw)]));
+                }
+            }
+            Kind::Stated(block, about, by, _) => {
+                if let Some(own) = rows.values.range(*block) {
+                    let moved = rows.values.all.rows_range(own) - about;
+                    rows.residuals((by * moved).as_slice());
+                    rows.by(*block, by);
+                }
+            }
+            Kind::Population(sensor, prior) => {
+                match prior.residuals(&model(*sensor)) {
+                    Some((residuals, by)) => {
+                        rows.residuals(residuals.as_slice());
+                        rows.by(Block::Triad(*sensor), &by);
+                    }
+                    // No unit: a step that leads here is taken back.
+                    None => rows.residuals(&vec![f64::INFINITY; prior.rows()]),
+                }
+            }
+        }
+    }
+}
+
+/// Derivatives as rows.
+fn stacked<const N: usize>(by: &[ByTriad; N]) -> SMatrix<f64, N, 12> {
+    SMatrix::from_rows(&by.map(|by| by.transpose()))
+}
