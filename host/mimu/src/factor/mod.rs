@@ -200,6 +200,13 @@ impl<'a> Factors<'a> {
         }
     }
 
+    /// The directions after `turns`, where the Earth's level rate is noise.
+    pub fn of_turns(turns: &[Turn<'a>]) -> Self {
+        let mut factors = Self::among(turns, Chains::default());
+        factors.directions(Observable::Turns, |_| true);
+        factors
+    }
+
     fn push(&mut self, kind: Kind<'a>, group: Observable, dwells: [usize; 2]) {
         self.list.push(Factor {
             kind,

@@ -6,9 +6,12 @@
 //! uncertainty of their parameters and is estimated from their scatter, with Student's distribution for their degrees of freedom (Belsley, Kuh and
 //! Welsch, 1980, section 2.1).
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use crate::factor::{Factors, Values};
 use crate::signal::blocks::quantile;
 
 /// An observation to judge: its error, the derivatives of the error by the parameters, and its variance by noise.
@@ -16,6 +19,27 @@ pub(super) struct Row {
     pub error: Vector3<f64>,
     pub by: DMatrix<f64>,
     pub variance: f64,
+}
+
+impl Row {
+    /// The factors of a list at `values`, by the parameters `free`.
+    pub fn of(factors: &Factors, values: &Values, free: &[usize]) -> Vec<Self> {
+        let (at, variances) = (factors.at(values), factors.variances(values));
+        let row = |rows: Range<usize>| {
+            let own = |i: usize, of: &dyn Fn(usize) -> f64| match i < rows.len() {
+                true => of(rows.start + i),
+                false => 0.0,
+            };
+            Self {
+                error: Vector3::from_fn(|i, _| own(i, &|row| at.residuals[row])),
+                by: DMatrix::from_fn(3, free.len(), |i, k| {
+                    own(i, &|row| at.jacobian[(row, free[k])])
+                }),
+                variance: variances[rows.clone()].iter().sum::<f64>() / rows.len() as f64,
+            }
+        };
+        factors.ranges().map(row).collect()
+    }
 }
 
 /// Error and standard deviations of each of the first `judged` rows against the prediction of the others; `dimensions` is the
