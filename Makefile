@@ -167,6 +167,8 @@ papers: toolchain ## compute every table and plot in docs/papers, and every tabl
 blind: toolchain ## undeclared effects on hundreds of units and in real recordings, and their diagnoses
 	$(CARGO) run --locked --release -p mimu-tests --bin blind
 	$(CARGO) run --locked --release -p mimu-tests --bin blind planted
+	$(CARGO) run --locked --release -p mimu-tests --bin blind judged 100
+	$(CARGO) run --locked --release -p mimu-tests --bin blind judged array
 
 clumsy: toolchain ## 200 sessions of the wizard with people and boards that err, in virtual time
 	$(CARGO) run --locked --release -p mimu-tests --features studies --bin clumsy 200

@@ -11,11 +11,14 @@
 //! | `blind joint SETS [FIRST]` | 2 to 9 sessions of one unit diagnosed together, and their file on another session; seeds from FIRST on |
 //! | `blind earth RUNS [NAME...]` | the Earth's rate in the biases of gyros on a table, with the latitude and without it |
 //! | `blind joint-warm-up SETS FIRST SESSIONS` | the same for digital units by hand, whose only effect is a warm-up of the accelerometer |
+//! | `blind judged SESSIONS [NAME...]` | judgements of clean sessions of each kind, and of sessions with an effect of five times the noise: false alarms and power; NAMEs select kinds |
+//! | `blind judged array` | judgements of an array of eight units, recorded by other people in nine sessions, with a planted quadratic and without it |
 //! | `blind planted SEEDS TIMES [NAME...]` | each effect planted SEEDS times, at TIMES the size of data sheets, in recordings by other people; NAMEs also select recordings |
 
 mod by_hand;
 mod earth;
 mod joint;
+mod judged;
 mod planted;
 mod slow_bias;
 
@@ -122,6 +125,14 @@ fn main() {
         let runs = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(100);
         let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
         return earth::run(runs, &chosen);
+    }
+    if args.first().is_some_and(|a| a == "judged") {
+        let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
+        if args.get(1).is_some_and(|a| a == "array") {
+            return judged::array();
+        }
+        let sessions = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(100);
+        return judged::run(sessions, &chosen);
     }
     let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
     let (seeds, clean): (u64, u64) = (number(0, 20), number(1, 200));

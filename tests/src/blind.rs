@@ -101,16 +101,17 @@ pub fn with_effects(mut file: RigFile, ids: &[&str], seed: u64) -> RigFile {
     let mut drawn = RigTruth::resolve(&file, seed).expect("a rig").file;
     let mut size = Random::new(seed, "size of the effect");
     for effect in &mut drawn.effect {
-        let spec = mimu_rig::effects::specs()
-            .find(|s| s.id == effect.id)
-            .expect("an effect");
-        let factor = 10f64.powf(size.within(0.5));
-        let first = &spec.parameters[0];
-        if let Some(value) = effect.parameters.get_mut(first.key) {
-            scale(value, factor);
-        }
+        resize(effect, 10f64.powf(size.within(0.5)));
     }
     drawn
+}
+
+/// Multiplies the size of `effect` by `factor`.
+pub(crate) fn resize(effect: &mut EffectFile, factor: f64) {
+    let spec = mimu_rig::effects::spec(&effect.id).expect("an effect");
+    if let Some(value) = effect.parameters.get_mut(spec.parameters[0].key) {
+        scale(value, factor);
+    }
 }
 
 fn scale(value: &mut toml::Value, factor: f64) {
@@ -153,7 +154,7 @@ pub struct Case {
 }
 
 /// Rms of the difference between two recordings after an affine model, over the noise floor, for the sensor where it is larger.
-fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
+pub(crate) fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
     let of = |sensor: Sensor| {
         let (a, all) = (with.observations(sensor), without.observations(sensor));
         // A dwell that the effect makes unusable is in only one of the recordings.

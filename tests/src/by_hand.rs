@@ -7,6 +7,7 @@ use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
+use mimu::triad::Triad;
 use mimu_rig::flaws::FlawsTruth;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, Parts, RigFile};
@@ -157,8 +158,13 @@ pub fn flaw(seed: u64) -> FlawsTruth {
 /// 26 to 42 poses in 2 to 4 minutes at 100 Hz.
 pub fn plan(seed: u64) -> String {
     let poses = 26 + (Random::new(seed, "poses").uniform() * 17.0) as usize;
+    plan_of(poses, 100.0)
+}
+
+/// `poses` poses at `rate_hz`.
+pub fn plan_of(poses: usize, rate_hz: f64) -> String {
     format!(
-        "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\nlead_in_s = 5.0\n\
+        "format = \"mimu-plan/1\"\nsample_rate_hz = {rate_hz:?}\ncarrier = \"hands\"\nlatitude_deg = 48.0\nlead_in_s = 5.0\n\
          [[step]]\nposes = {poses}\ndwell_s = 2.5\n"
     )
 }
@@ -178,18 +184,27 @@ fn strength(with: &Prepared, without: &Prepared) -> f64 {
     both[0].max(both[1])
 }
 
-/// How many intervals of C and o contain the truth. Parameters whose truth is NaN are not judged.
-fn inside(fit: &Fit, truths: &[SVector<f64, 12>; 2]) -> [[u32; 2]; 2] {
+/// Gyro and accelerometer of `fit`, as far as it has them.
+pub(crate) fn triads(fit: &Fit) -> [Option<&Triad>; 2] {
+    Sensor::BOTH.map(|sensor| Some(&fit.sensor(sensor)?.estimated.triad))
+}
+
+/// How many intervals of the forward models of gyro and accelerometer contain the truth, and of how many. Parameters whose truth is NaN are not judged.
+/// `own_frame`: the accelerometer defines the frame, as by hand.
+pub(crate) fn inside(
+    triads: [Option<&Triad>; 2],
+    truths: &[SVector<f64, 12>; 2],
+    own_frame: bool,
+) -> [[u32; 2]; 2] {
     std::array::from_fn(|k| {
-        let Some(found) = fit.sensor(Sensor::BOTH[k]) else {
+        let Some(found) = triads[k] else {
             return [0; 2];
         };
-        // By hand the accelerometer defines the frame.
-        let free: &[usize] = match k {
-            0 => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11],
-            _ => &[0, 3, 4, 6, 7, 8, 9, 10, 11],
+        let free: &[usize] = match own_frame && k == 1 {
+            true => &[0, 3, 4, 6, 7, 8, 9, 10, 11],
+            false => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11],
         };
-        let estimates = found.estimated.triad.forward_estimates();
+        let estimates = found.forward_estimates();
         let judged = || free.iter().filter(|i| truths[k][**i].is_finite());
         let held = judged().filter(|i| {
             let estimate = &estimates[**i];
@@ -293,7 +308,7 @@ pub(crate) fn case_of(
     case(
         found.collect(),
         diagnosis.verdict.name(),
-        inside(&diagnosis.after, &truths),
+        inside(triads(&diagnosis.after), &truths, true),
         left.collect(),
     )
 }

@@ -92,7 +92,7 @@ fn triad(fit: &Fit, sensor: Sensor) -> &Triad {
 }
 
 /// Forward models of gyro and accelerometer with the average biases of the recording.
-fn of_the_session(plan: &str, file: &RigFile, seed: u64) -> [SVector<f64, 12>; 2] {
+pub(crate) fn of_the_session(plan: &str, file: &RigFile, seed: u64) -> [SVector<f64, 12>; 2] {
     let wander = bench::wander(plan, file, seed);
     let models = [&file.unit.gyro_affine, &file.unit.accel_affine];
     std::array::from_fn(|k| {

@@ -7,13 +7,16 @@
 //! The true motion comes from the readings by data-sheet sensitivities, the bias of the gyro at rest, and a fit of three sensitivities and three
 //! biases of the accelerometer to the magnitude of gravity (`own_calibration`). It shares no code with the calibrations under test.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::fit::{Fit, Options};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::error::Result;
-use mimu_recording::{Batch, Manifest, RawUnit};
+use mimu_recording::{Batch, Manifest, RawUnit, Recording};
 use mimu_rig::effects::{Condition, Disturbance, EffectTruth, Sensors, Shape, spec};
 use mimu_rig::motion::Motion;
 use mimu_rig::noise::Coefficients;
@@ -26,6 +29,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use tempfile::TempDir;
 
 use crate::recordings::{Foreign, mikoff_session, xsens_session};
+use crate::sessions::of_array_recorded;
 
 /// Made course of the temperature: it rises and falls by this much, K, in half a sine over the session. The recordings have no thermometer, and their
 /// units are as warm as they were; only the planted error follows the course.
@@ -171,10 +175,30 @@ fn xsens() -> Option<Ground> {
     Some(Ground::of("Xsens MTi".into(), &foreign, sheet))
 }
 
+/// One of the eight MPU-9150 of the array in one of its nine sessions.
+pub fn array(unit: usize, session: usize) -> Option<Ground> {
+    // 16 g and 500 deg/s.
+    let sensitivity = [65.5_f64.to_degrees(), 2048.0 / 9.80665];
+    let sheet = DataSheet {
+        sensitivity: sensitivity.map(|s| [s; 3]),
+        null: [[0.0; 3]; 2],
+        code_low: -32768.0,
+        analog: false,
+        reading: [1.0; 2],
+    };
+    let (_folder, recording) = of_array_recorded(unit, session)?;
+    let name = format!("unit {unit}, session {session}");
+    Some(Ground::of_recording(name, recording, sheet))
+}
+
 impl Ground {
     fn of(name: String, foreign: &Foreign, sheet: DataSheet) -> Self {
         let folder = TempDir::new().expect("there is a temporary folder");
         let recording = foreign.import(&folder).expect("it can be imported");
+        Self::of_recording(name, recording, sheet)
+    }
+
+    fn of_recording(name: String, recording: Recording, sheet: DataSheet) -> Self {
         let mut samples = Batch::default();
         let collect = |batch: &Batch| {
             samples.t_s.extend(&batch.t_s);
@@ -288,6 +312,25 @@ impl Ground {
         }
         let prepared = Prepared::of(self.manifest.clone(), &samples, STILL_FACTOR)?;
         diagnose(prepared.into(), Options::IN_SAMPLE)
+    }
+
+    /// The recording as it is, or with the effect `id`, whose first parameter is `size` along each axis.
+    ///
+    /// # Errors
+    /// The recording is refused.
+    pub fn prepared(&self, planted: Option<(&str, f64)>) -> Result<Prepared> {
+        let samples = match planted {
+            None => self.samples.clone(),
+            Some((id, size)) => {
+                let key = spec(id).expect("an effect").parameters[0].key;
+                let sizes = BTreeMap::from([(key, vec![size; 3])]);
+                self.with(&EffectTruth::draw(id, sizes, 1.0, 0).expect("an effect"), 0)
+            }
+        };
+        let mut prepared = Prepared::of(self.manifest.clone(), &samples, STILL_FACTOR)?;
+        // Samples in memory have no file by whose sum a verification tells recordings apart.
+        Arc::make_mut(&mut prepared.condensed).sha256 = format!("{} {planted:?}", self.name);
+        Ok(prepared)
     }
 
     /// The recording without a planted effect.

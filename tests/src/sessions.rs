@@ -107,7 +107,7 @@ impl Life {
 }
 
 /// A consumer unit of its own.
-fn unit(seed: u64) -> RigFile {
+pub(crate) fn unit(seed: u64) -> RigFile {
     let text = include_str!("../../rig/rigs/sessions.toml");
     let mut file = RigFile::parse(&Source::new("sessions.toml", text)).expect("a rig");
     file.curves = CurvesFile::default();
@@ -129,7 +129,7 @@ fn unit(seed: u64) -> RigFile {
 }
 
 /// A session of the unit `seed`, and the seed of its noise.
-fn session(seed: u64, life: Life, session: u32) -> (RigFile, u64) {
+pub(crate) fn session(seed: u64, life: Life, session: u32) -> (RigFile, u64) {
     let mut file = unit(seed);
     file.history = life.history(seed, session);
     (file, 1000 * seed + u64::from(session))

@@ -42,10 +42,14 @@ impl Unseen {
         by: &DMatrix<f64>,
         factor: &DMatrix<f64>,
     ) -> Self {
+        let predicted = match factor.ncols() {
+            0 => Errors::Independent(noise.clone()),
+            _ => Errors::Shared(noise.clone(), by * factor),
+        };
         Self {
-            predicted: Errors::Shared(noise.clone(), by * factor),
             errors,
             noise,
+            predicted,
         }
     }
 }
@@ -61,6 +65,8 @@ pub struct Test {
     pub visible: f64,
     /// Predicted rms, in the unit of the errors; null if it is not computed.
     pub predicted: f64,
+    /// The part of it by the noise of the data themselves.
+    pub noise: f64,
     /// Number of errors.
     pub count: usize,
     /// Degrees of freedom of the mean square.
@@ -118,6 +124,7 @@ impl Test {
             limit,
             visible: visible(limit, seen / n),
             predicted: (predicted / n).sqrt(),
+            noise: (noise / n).sqrt(),
             count,
             dof,
         })
@@ -131,6 +138,7 @@ impl Test {
             limit,
             visible: visible(limit, scatter.dof / rows),
             predicted: f64::NAN,
+            noise: f64::NAN,
             count: rows as usize,
             dof: scatter.dof,
         })
@@ -143,6 +151,7 @@ impl Test {
             limit,
             visible: visible(limit, 1.0),
             predicted: f64::NAN,
+            noise: f64::NAN,
             count,
             dof: count as f64,
         }

@@ -9,46 +9,9 @@ use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::warning::Warning;
-use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
-
-/// Six faces at rest and rates in both directions, repeated, while the chamber goes through `chamber_c`.
-fn plan(rounds: u32, dwell_s: f64, chamber_c: &[[f64; 2]]) -> String {
-    let mut plan = format!(
-        "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\nrounds = {rounds}\nlead_in_s = 5.0\nchamber_c = {chamber_c:?}\n"
-    );
-    for axis in 0..3 {
-        let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
-        let down = up.map(|u| -u);
-        for (up, rate_dps) in [(up, 0.0), (down, 0.0), (up, 50.0), (up, -50.0)] {
-            plan +=
-                &format!("[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = {dwell_s:?}\n");
-        }
-    }
-    plan
-}
-
-/// A unit of the usual parts, warmed up, whose die is at the temperature of its board.
-fn unit(seed: u64) -> RigFile {
-    let mut random = Random::new(seed, "unit");
-    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let mut file = bench::clean(gyro, accel);
-    file.thermal.on_before_s = Some(f64::INFINITY);
-    file.thermal.board_lag_s = Some(60.0);
-    file.thermal.die_lag_s = Some([1.0; 4]);
-    file.thermal.die_heating_c = Some([0.0; 4]);
-    file
-}
-
-/// The same with biases that follow the temperature.
-fn thermal(seed: u64) -> RigFile {
-    let mut file = unit(seed);
-    let line = |slope: f64| [0.0, slope, 0.0, 0.0];
-    file.curves.gyro.bias_deg_per_h = Some([line(300.0), line(-360.0), line(240.0)]);
-    file.curves.accel.bias_mg = Some([line(2.0), line(-1.5), line(1.0)]);
-    file
-}
+use mimu_tests::ramp::{plan, thermal, unit};
 
 fn floors(prepared: Prepared) -> [f64; 2] {
     let fitted = fit(prepared, Options::IN_SAMPLE).expect("a fit");

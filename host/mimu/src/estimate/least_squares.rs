@@ -232,6 +232,9 @@ impl Errors {
 
 /// A root of a covariance: one column for each direction of it that has a variance.
 pub fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    if covariance.is_empty() {
+        return covariance.clone();
+    }
     let eigen = covariance.clone().symmetric_eigen();
     let largest = eigen.eigenvalues.max();
     let used = (0..covariance.nrows()).filter(|k| eigen.eigenvalues[*k] > 1e-14 * largest);

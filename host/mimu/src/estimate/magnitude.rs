@@ -17,7 +17,7 @@ use crate::observation::turn::Rest;
 use crate::observation::{LOWER, place};
 use crate::prior::TriadPrior;
 use crate::quantity::{AXES, Sensor, plural};
-use crate::triad::Forward;
+use crate::triad::{Covariance, Forward, Triad, affine, vector};
 use crate::warning::Warning;
 
 /// Number of parameters: six of C, three of o.
@@ -353,12 +353,18 @@ pub fn estimate(
         // Of data and prior together, in their parameters of order one.
         Some(_) => solved.condition(PARAMETERS),
     };
-    let parts = solved.parts(known.sensor);
-    let triad = solved.triad(known.sensor, parts, "C is singular")?;
-    // Magnitudes do not show the sign of a row: the raw reading does, from which the fit has started.
-    if !(triad.inverse.matrix.diagonal().min() > 0.0) {
-        return Err(by.fit.failure());
-    }
+    let inverse = solved
+        .values
+        .triad(known.sensor)
+        .ok_or_else(|| by.fit.failure())?;
+    // Magnitudes do not show the sign of a row, and a flipped row keeps them: the raw reading decides, by a positive diagonal.
+    let signs = Vector3::from_fn(|row, _| inverse.matrix[(row, row)].signum());
+    let flips = vector(&Matrix3::from_fn(|row, _| signs[row]), &signs);
+    let parts = solved.parts(known.sensor).into_iter();
+    let parts = parts.map(|part| part.seen_by(&Covariance::from_diagonal(&flips)));
+    let inverse = affine(&vector(&inverse.matrix, &inverse.offset).component_mul(&flips));
+    let triad = Triad::from_inverse(inverse, parts.collect())
+        .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
     Ok(Estimated {
         notes: by.contradicted(p).into_iter().collect(),
         ..Estimated::new(triad, solved.scatter(true).collect(), condition)

@@ -96,6 +96,14 @@ impl ErrorFigures {
                 Some(Judgement::new(JudgementKind::Unexplained, reason))
             }
             (false, _) if !self.unseen => untested(NOTHING_HELD_OUT.into()),
+            (false, true) if test.noise > UNEXPLAINED_SHARE * self.input => {
+                let reason = format!(
+                    "{sensor}: the noise alone is {}, {} % of the input: unit or sample rate is wrong",
+                    self.written(test.noise),
+                    significant(100.0 * test.noise / self.input)
+                );
+                Some(Judgement::new(JudgementKind::Suspect, reason))
+            }
             (false, true) => untested(format!(
                 "the error {how} is {error}, as is predicted: the data leave the parameters open"
             )),
