@@ -245,7 +245,7 @@ pub fn kalman(
                 return Ok(AxisEstimate {
                     parameters: mean,
                     covariance,
-                    scatter: vec![(Observable::Axis(axis), scatter[0])],
+                    scatter: vec![(Observable::Axis(axis), scatter)],
                 });
             }
         }

@@ -11,12 +11,12 @@
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, SVector};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
+use crate::estimate::earth_shared;
 use crate::estimate::least_squares::{Errors, Group, Observability, Solution, solve_groups};
-use crate::estimate::{Observation, earth_shared};
 use crate::factor::{Factors, Values};
 use crate::fit::by_rate::magnitudes;
 use crate::observable::Observable;
@@ -99,7 +99,7 @@ impl Rows {
                 }
                 columns(&by)
             };
-            let by = triads.iter().enumerate().flat_map(of_triad).collect();
+            let by: Vec<f64> = triads.iter().enumerate().flat_map(of_triad).collect();
             (by, at.residuals[i], variances[i])
         };
         let group = |(group, rows): (Option<Observable>, Range<usize>)| {
