@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::Failure;
 use super::least_squares::{Scatter, degrees_of_freedom, extra_variance, minimize};
-use crate::factor::{Block, Factors, Linearized, Values};
+use crate::factor::{Factors, Linearized, ParameterBlock, Values};
 use crate::observable::Observable;
 use crate::observation::from_centre;
 use crate::quantity::Sensor;
@@ -16,7 +16,7 @@ use crate::triad::{Covariance, Part, Triad, vector};
 
 /// How a fit moves a block: its values are `about + by * p`, for parameters p of order one.
 pub struct Coordinates {
-    block: Block,
+    block: ParameterBlock,
     about: DVector<f64>,
     by: DMatrix<f64>,
     /// Parameters to start from.
@@ -39,7 +39,7 @@ impl Coordinates {
         let change = from_centre(centre);
         let start = vector(&first.matrix, &first.apply(centre));
         Self {
-            block: Block::Triad(sensor),
+            block: ParameterBlock::Triad(sensor),
             about: DVector::zeros(12),
             by: DMatrix::from_fn(12, free.len(), |i, k| change[(i, free[k])] * unit(free[k])),
             start: DVector::from_fn(free.len(), |k, _| start[free[k]] / unit(free[k])),
@@ -48,7 +48,7 @@ impl Coordinates {
     }
 
     /// Of a block that moves from `about` along the columns of `by`. Residuals are linear in it, or taken to be.
-    pub fn linear(block: Block, about: DVector<f64>, by: DMatrix<f64>) -> Self {
+    pub fn linear(block: ParameterBlock, about: DVector<f64>, by: DMatrix<f64>) -> Self {
         Self {
             block,
             about,
@@ -59,7 +59,7 @@ impl Coordinates {
     }
 
     /// Of a block of numbers around zero.
-    pub fn around_zero(block: Block) -> Self {
+    pub fn around_zero(block: ParameterBlock) -> Self {
         let n = block.size();
         Self::linear(block, DVector::zeros(n), DMatrix::identity(n, n))
     }
@@ -68,7 +68,7 @@ impl Coordinates {
 /// A list of factors, and the blocks that are fitted to it.
 pub struct FactorFit<'a> {
     factors: Factors<'a>,
-    blocks: Vec<Block>,
+    blocks: Vec<ParameterBlock>,
     about: DVector<f64>,
     by: DMatrix<f64>,
     start: DVector<f64>,
@@ -81,7 +81,7 @@ pub struct FactorFit<'a> {
     pub lost: String,
     /// Covariance of an error of a block that is not fitted. It is common to all residuals: it goes into the size that these may have, but not into the
     /// weights.
-    pub common: Option<(Block, Covariance)>,
+    pub common: Option<(ParameterBlock, Covariance)>,
 }
 
 /// Rows that share one extra variance, if one is estimated.
@@ -255,7 +255,7 @@ impl<'a> FactorFit<'a> {
     }
 
     /// Unweighted derivatives by a block, whether it is fitted or not.
-    fn by_block(&self, block: Block, p: &DVector<f64>) -> DMatrix<f64> {
+    fn by_block(&self, block: ParameterBlock, p: &DVector<f64>) -> DMatrix<f64> {
         let all = self.by_values(p).jacobian;
         let columns = self.values(p).range(block).unwrap_or_default();
         all.columns_range(columns).into_owned()
@@ -306,14 +306,14 @@ fn update(
 
 impl Solved<'_> {
     /// Derivatives of the values of a block by the parameters.
-    fn change(&self, block: Block) -> DMatrix<f64> {
+    fn change(&self, block: ParameterBlock) -> DMatrix<f64> {
         let rows = self.values.range(block).unwrap_or_default();
         self.fit.by.rows_range(rows).into_owned()
     }
 
     /// What each group adds to the covariance of a triad.
     pub fn parts(&self, sensor: Sensor) -> Vec<Part> {
-        let change = self.change(Block::Triad(sensor));
+        let change = self.change(ParameterBlock::Triad(sensor));
         let part = |group: &Group| {
             let own = self.found.at.part(&self.covariance, &group.rows);
             let own = &change * own * change.transpose();
@@ -331,12 +331,12 @@ impl Solved<'_> {
     /// If the accelerometer is fitted too, beside what was known of it, it is the covariance of both times that `information`.
     pub fn gain(&self, information: Option<&DMatrix<f64>>) -> Covariance {
         let [gyro, accel] =
-            [Sensor::Gyro, Sensor::Accel].map(|sensor| self.change(Block::Triad(sensor)));
+            [Sensor::Gyro, Sensor::Accel].map(|sensor| self.change(ParameterBlock::Triad(sensor)));
         let gain = match information {
             Some(information) => gyro * &self.covariance * accel.transpose() * information,
             None => {
                 let p = &self.found.parameters;
-                let mut by = self.fit.by_block(Block::Triad(Sensor::Accel), p);
+                let mut by = self.fit.by_block(ParameterBlock::Triad(Sensor::Accel), p);
                 for (mut row, weight) in by.row_iter_mut().zip(&self.found.weights) {
                     row *= *weight;
                 }

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use super::by_gravity::{POOR_POSES, by_turns};
 use crate::estimate::whole_turns::Data;
 use crate::estimate::{Estimated, Observation, magnitude};
-use crate::factor::{Factors, Values};
+use crate::factor::Factors;
 use crate::observation::{ALL, LOWER};
 use crate::prepared::Prepared;
 use crate::quantity::{AXES, Sensor};
@@ -139,8 +139,8 @@ fn fit_poses(prepared: &Prepared, poses: &[Observation]) -> Option<Estimated> {
 }
 
 fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {
-    let values = Values::of_triads(&[(Sensor::Accel, accel)]);
-    let rows = Row::of(&prepared.magnitudes(accel), &values, &LOWER);
+    let factors = prepared.magnitudes(accel);
+    let rows = Row::of(&factors, (Sensor::Accel, accel), &LOWER);
     let Some(found) = against_others(&rows, rows.len(), 1.0) else {
         return Vec::new();
     };
@@ -191,8 +191,7 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
     };
     let mut factors = Factors::of_turns(&turns);
     factors.rests(&rest);
-    let values = Values::of_triads(&[(Sensor::Gyro, &gyro.triad.inverse)]);
-    let rows = Row::of(&factors, &values, &ALL);
+    let rows = Row::of(&factors, (Sensor::Gyro, &gyro.triad.inverse), &ALL);
     let Some(found) = against_others(&rows, turns.len(), 2.0) else {
         return out;
     };

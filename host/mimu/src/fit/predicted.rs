@@ -5,15 +5,16 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::least_squares::{Errors, root};
 use crate::estimate::{Estimated, Observation};
-use crate::factor::{Factors, Values};
+use crate::factor::Factors;
 use crate::observation::turn::Turn;
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Triad};
 use crate::unseen::Unseen;
 
-/// Errors of `factors` at `values` of parameters whose covariance is `root rootᵀ`.
-fn unseen(factors: &Factors, values: &Values, root: &DMatrix<f64>) -> Unseen {
-    let (at, noise) = (factors.at(values), factors.variances(values));
+/// Errors of `factors` by these calibrations, whose parameters have the covariance `root rootᵀ`.
+fn unseen(factors: &Factors, models: &[(Sensor, &Affine<f64>)], root: &DMatrix<f64>) -> Unseen {
+    let values = factors.values(models);
+    let (at, noise) = (factors.at(&values), factors.variances(&values));
     Unseen::of(at.residuals, noise.into(), &at.jacobian, root)
 }
 
@@ -28,8 +29,8 @@ pub(crate) fn magnitudes<'a>(
     for ((o, size), variance) in known.zip(variances) {
         factors.magnitude(Sensor::Accel, (o.dwell, o.raw), (size, None), variance);
     }
-    let values = Values::of_triads(&[(Sensor::Accel, model)]);
-    unseen(&factors, &values, &root(&covariance.resize(12, 12, 0.0)))
+    let models = [(Sensor::Accel, model)];
+    unseen(&factors, &models, &root(&covariance.resize(12, 12, 0.0)))
 }
 
 /// How uncertain a gyro and an accelerometer are by what is known: of one, of the other, and how the gyro follows the accelerometer.
@@ -67,8 +68,9 @@ impl Both {
 
 /// Errors of the directions after `turns`, two for each, by the gyro and the accelerometer.
 pub(crate) fn directions(turns: &[Turn], [gyro, accel]: [&Affine<f64>; 2], of: &Both) -> Unseen {
-    let values = Values::of_triads(&[(Sensor::Gyro, gyro), (Sensor::Accel, accel)]);
-    unseen(&Factors::of_turns(turns), &values, &of.root())
+    let factors = Factors::of_turns(turns);
+    let models = [(Sensor::Gyro, gyro), (Sensor::Accel, accel)];
+    unseen(&factors, &models, &of.root())
 }
 
 /// Readings of one axis that depend linearly on a few parameters, with their known errors, and how a fit weights them.

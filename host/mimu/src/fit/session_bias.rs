@@ -6,7 +6,6 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::estimate::least_squares::{Errors, Group, Scatter, Solution, solve_groups};
 use crate::estimate::{Estimated, Failure, Observation, earth_shared};
-use crate::factor::Values;
 use crate::observable::Observable;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Sensor;
@@ -88,7 +87,7 @@ fn by_magnitudes(prepared: &Prepared, known: &Affine<f64>) -> Option<Biases> {
     let mut kept = DMatrix::zeros(3, 0);
     for _ in 0..STEPS {
         let factors = prepared.magnitudes(&model);
-        let values = Values::of_triads(&[(Sensor::Accel, &model)]);
+        let values = factors.values(&[(Sensor::Accel, &model)]);
         let at = factors.at(&values);
         let design = at.jacobian.columns(9, 3).into_owned();
         // Directions of the bias that the poses show.

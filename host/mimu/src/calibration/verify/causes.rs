@@ -17,7 +17,7 @@ use serde::Serialize;
 use crate::calibration::Calibration;
 use crate::estimate::earth_shared;
 use crate::estimate::least_squares::{Errors, Group, Observability, Solution, solve_groups};
-use crate::factor::{Factors, Values};
+use crate::factor::Factors;
 use crate::fit::by_rate::magnitudes;
 use crate::observable::Observable;
 use crate::observation::{ByTriad, of_output, vector};
@@ -87,7 +87,7 @@ impl Rows {
             .iter()
             .map(|(sensor, model, _)| (*sensor, *model))
             .collect();
-        let values = Values::of_triads(&models);
+        let values = factors.values(&models);
         let (at, variances) = (factors.at(&values), factors.variances(&values));
         let row = |i: usize, at_rest: bool| {
             let of_triad = |(k, (_, model, columns)): (usize, &Columns)| {

@@ -8,10 +8,12 @@
 
 use std::ops::Range;
 
+use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::factor::{Factors, Values};
+use crate::factor::Factors;
+use crate::quantity::Sensor;
 use crate::signal::blocks::quantile;
 
 /// An observation to judge: its error, the derivatives of the error by the parameters, and its variance by noise.
@@ -22,9 +24,10 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// The factors of a list at `values`, by the parameters `free`.
-    pub fn of(factors: &Factors, values: &Values, free: &[usize]) -> Vec<Self> {
-        let (at, variances) = (factors.at(values), factors.variances(values));
+    /// The factors of a list by the parameters `free` of a triad.
+    pub fn of(factors: &Factors, triad: (Sensor, &Affine<f64>), free: &[usize]) -> Vec<Self> {
+        let values = factors.values(&[triad]);
+        let (at, variances) = (factors.at(&values), factors.variances(&values));
         let row = |rows: Range<usize>| {
             let own = |i: usize, of: &dyn Fn(usize) -> f64| match i < rows.len() {
                 true => of(rows.start + i),
