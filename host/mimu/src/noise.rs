@@ -8,7 +8,7 @@ pub mod noise_file;
 mod pool;
 pub mod wander;
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use mimu_core::compensation::Affine;
 
@@ -20,6 +20,7 @@ use crate::signal::blocks::{Block, Condensed, Rails, quantile};
 use crate::signal::course::Course;
 use crate::signal::dwell::Dwell;
 use crate::signal::ramp::ramps;
+use crate::triad::Covariance;
 use crate::warning::Warning;
 use mimu_allan::variance::AllanModel;
 use mimu_recording::error::{Error, Result};
@@ -367,6 +368,20 @@ impl Noise {
                 model.white / averaged_s + wander[(0, 0)]
             }
         })
+    }
+
+    /// Covariance of a change of the biases of `sensor` between parts of a session, if there are so many `parts` of equal length, by the noise over such a time:
+    /// twice its Allan variance. Of C by rows, then o, for readings that `matrix` converts to SI.
+    pub fn between_parts(&self, sensor: Sensor, matrix: &Matrix3<f64>, parts: usize) -> Covariance {
+        let from = sensor.channels().start;
+        let length_s = (self.session[1] - self.session[0]) / parts.max(1) as f64;
+        let mut covariance = Covariance::zeros();
+        if self.of_table.is_none() && length_s > 0.0 {
+            let raw = Vector3::from_fn(|i, _| 2.0 * self.variance(from + i, length_s, f64::NAN));
+            let si = matrix * Matrix3::from_diagonal(&raw) * matrix.transpose();
+            covariance.fixed_view_mut::<3, 3>(9, 9).copy_from(&si);
+        }
+        covariance
     }
 
     /// Covariances of the mean readings of `sensor` over `dwells` because of its wander, raw units squared, axis by axis: part of the

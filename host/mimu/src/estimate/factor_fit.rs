@@ -379,3 +379,107 @@ impl Solved<'_> {
         triad.ok_or_else(|| Failure::NoSolution(singular.into()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+
+    use super::*;
+    use crate::factor::Kind;
+    use crate::factor::chains::Chains;
+    use crate::observation::closure::{Closure, Closures};
+    use crate::observation::turn::{Path, Rest, Turn, TurnError};
+    use crate::observation::{ALL, LOWER};
+    use crate::signal::increment::Increment;
+
+    /// A turn by `angle`, rad, in a second, read in SI by a gyro with the bias `bias`.
+    fn increment(angle: [f64; 3], bias: &Vector3<f64>) -> Increment {
+        let mut one = Increment::EMPTY;
+        one.duration_s = 1.0;
+        one.integral = (Vector3::from(angle) + bias).into();
+        one
+    }
+
+    #[test]
+    fn derivatives_by_every_parameter_are_those_of_differences() {
+        let bias = Vector3::new(5.0, -3.0, 4.0);
+        let (gyro, accel) = (
+            Affine {
+                matrix: Matrix3::identity(),
+                offset: -bias,
+            },
+            Affine::identity(),
+        );
+        let angles = [
+            [1.2, 0.3, -0.2],
+            [-0.4, 1.1, 0.5],
+            [0.2, -0.7, 1.0],
+            [-1.3, 0.2, 0.4],
+            [0.6, 0.8, -0.9],
+        ];
+        let pieces = angles.map(|angle| [increment(angle, &bias)]);
+        let mut force = Vector3::new(1.0, -2.0, 9.5);
+        let mut turns: Vec<Turn> = Vec::new();
+        for (from, increments) in pieces.iter().enumerate() {
+            let mut turn = Turn {
+                from,
+                to: from + 1,
+                steps: [0; 2],
+                increments,
+                before: force,
+                after: force,
+                raw: [force; 2],
+                direction_variance: 0.0,
+                earth_variance: 0.0,
+                integral_variance: 0.0,
+                duration_s: 1.0,
+            };
+            force = TurnError::at(&turn, &gyro).rotation * force;
+            (turn.after, turn.raw[1]) = (force, force);
+            turns.push(turn);
+        }
+        let rest = [0, 1, 2, 3, 4, 5].map(|dwell| Rest {
+            dwell,
+            raw: bias,
+            variance: Vector3::zeros(),
+            rate: Vector3::zeros(),
+            rate_variance: Vector3::zeros(),
+            vertical_variance: Vector3::zeros(),
+        });
+        let whole = Closures {
+            list: vec![Closure {
+                turns: 1..3,
+                path: Path::of(&turns[1..3], &gyro),
+            }],
+            ..Closures::default()
+        };
+        let mut factors = Factors::among(&turns, Chains::of(&turns, &rest));
+        factors.directions(Observable::Turns, |_| true);
+        factors.headings(&whole);
+        factors.rests(&rest);
+        let given = ParameterBlock::GivenMagnitude(0);
+        factors.magnitude(Sensor::Accel, (0, force), (9.7, Some(0)), 1.0);
+        let one = DMatrix::identity(1, 1);
+        factors.known(Kind::Stated(given, DVector::zeros(1), one, 1.0), None);
+        let coordinates = vec![
+            Coordinates::triad(Sensor::Gyro, &gyro, &ALL, &bias, 0.1),
+            Coordinates::triad(Sensor::Accel, &accel, &LOWER, &Vector3::zeros(), 9.8),
+            Coordinates::around_zero(ParameterBlock::LevelRate(0)),
+            Coordinates::around_zero(given),
+        ];
+        let fit = FactorFit::new(factors, coordinates, (1e-3, 1), "lost");
+        // The derivatives of directions are those of small errors.
+        let p = fit.start() + DVector::from_fn(24, |k, _| 1e-4 * (k as f64).sin());
+        let jacobian = fit.linearize(&p).jacobian;
+        for k in 0..p.len() {
+            let at = |step: f64| {
+                let mut moved = p.clone();
+                moved[k] += step;
+                fit.linearize(&moved).residuals
+            };
+            let column = (at(1e-5) - at(-1e-5)) / 2e-5;
+            let (off, size) = ((&column - jacobian.column(k)).norm(), column.norm());
+            assert!(size > 0.0 && off < 1e-3 * size, "{k}: {off:e} of {size:e}");
+        }
+    }
+}
