@@ -539,9 +539,10 @@ fn fit_turns(
         let own = turns
             .iter()
             .filter(|t| (parts.of)(held.split, t.to) == part);
-        let own: Vec<Turn> = own.map(|t| t.with(&accel.triad.inverse)).collect();
+        let own: Vec<Turn> = own.copied().collect();
         let both = Both::of(gyro, &accel.triad);
-        Some(predicted::directions(&own, &gyro.triad.inverse, &both))
+        let models = [&gyro.triad.inverse, &accel.triad.inverse];
+        Some(predicted::directions(&own, models, &both))
     };
     let unseen: Vec<Unseen> = held.refits.iter().enumerate().filter_map(unseen).collect();
     let static_rms = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
