@@ -164,6 +164,6 @@ impl Test {
 
     /// Whether errors of the model would show.
     pub fn can_fail(&self) -> bool {
-        self.visible <= VISIBLE
+        self.visible <= VISIBLE.max(self.limit)
     }
 }
