@@ -1,5 +1,6 @@
 //! Several sessions of one unit: whether they predict one that was left out, on the bench and with the array of H. Carlsson.
 
+use std::fmt::Write as _;
 use std::fs;
 
 use mimu::fit::{Fit, Method, Options, fit};
@@ -13,8 +14,12 @@ use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::{RawUnit, Recording};
 use mimu_rig::history::{ChangeSizes, History};
 use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
 use mimu_rig::random::Random;
-use mimu_rig::rig_file::{AffineFile, CurvesFile, RigFile};
+use mimu_rig::record::{Row, samples};
+use mimu_rig::rig_file::{AffineFile, CurvesFile, RigFile, RigTruth};
+use mimu_rig::rotation::norm;
+use mimu_rig::table::TableTruth;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use tempfile::TempDir;
@@ -154,6 +159,112 @@ pub fn recorded(seed: u64, life: Life, sessions: u32) -> Vec<tempfile::TempDir> 
         bench::written(&plan, &file, noise)
     };
     (0..sessions).map(of).collect()
+}
+
+/// What moves a unit whose readings have no stamps, so that nothing shows a lost sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Carrier {
+    /// A table: twelve turns of 180 deg and the rests between them, gyro only.
+    Table,
+    /// A person: 24 poses.
+    Hands,
+}
+
+impl Carrier {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Table, Self::Hands];
+
+    /// The plan, and on a table the input of each step.
+    fn plan(self) -> (String, Option<String>) {
+        if self == Self::Hands {
+            return (bench::hand_plan(24), None);
+        }
+        let mut plan =
+            String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 50.0\ncarrier = \"table\"\n");
+        let mut inputs = String::from(
+            "step,turn_x_deg,turn_y_deg,turn_z_deg,ref_rate_x_dps,ref_rate_y_dps,ref_rate_z_dps\n",
+        );
+        // In another order than that of the axes: a drift is no scale factor.
+        for k in 0..12 {
+            let up: [f64; 3] = std::array::from_fn(|i| match i == k % 3 {
+                true => [1.0, -1.0][k % 2],
+                false => 0.0,
+            });
+            let angle_deg = [180.0, -180.0][k / 6];
+            let turn = up.map(|u| (u * angle_deg).to_string()).join(",");
+            let _ = writeln!(
+                plan,
+                "[[step]]\nup = {up:?}\ndwell_s = 2.0\n[[step]]\nturn_axis = \"outer\"\nturn_deg = {angle_deg:?}\nturn_dps = 90.0"
+            );
+            let _ = writeln!(inputs, "{},,,,0,0,0\n{},{turn},,,", 2 * k, 2 * k + 1);
+        }
+        (plan, Some(inputs))
+    }
+
+    fn turns(self, row: &Row) -> bool {
+        match self {
+            Self::Table => row.instant.step.is_some_and(|k| k % 2 == 1),
+            Self::Hands => row.instant.step.is_none(),
+        }
+    }
+}
+
+/// Session `number` of the unit `seed`, imported without stamps. In each of `turns` turns, evenly among all, `lost` samples are missing where the turn is fastest.
+pub fn losing(
+    carrier: Carrier,
+    (seed, life, number): (u64, Life, u32),
+    [turns, lost]: [usize; 2],
+) -> Fit {
+    let (mut file, noise) = session(seed, life, number);
+    file.table = TableTruth::ideal();
+    file.earth_rate = Some(false);
+    let (plan, inputs) = carrier.plan();
+    let plan = Plan::parse(Source::new("plan", &plan)).expect("a plan");
+    let truth = RigTruth::resolve(&file, noise).expect("a rig");
+    let rows: Vec<Row> = samples(&plan, &truth, noise).expect("a run").collect();
+    let turning = rows.chunk_by(|a, b| carrier.turns(a) == carrier.turns(b));
+    let mut at = 0;
+    let mut fastest = Vec::new();
+    for part in turning {
+        let rate = |k: &usize| norm(part[*k].instant.motion.rate);
+        let most = (0..part.len()).max_by(|a, b| rate(a).total_cmp(&rate(b)));
+        fastest.extend(most.filter(|_| carrier.turns(&part[0])).map(|k| at + k));
+        at += part.len();
+    }
+    let mut missing = vec![false; rows.len()];
+    for k in 0..turns {
+        let from = fastest[k * fastest.len() / turns];
+        missing[from..from + lost].fill(true);
+    }
+    let mut log = String::from("step,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n");
+    for (row, _) in rows.iter().zip(&missing).filter(|(_, missing)| !**missing) {
+        let step = row.instant.step.map_or(-1, i64::from);
+        let [gyro, accel] = [row.readings.gyro, row.readings.accel];
+        let all = [gyro, accel].concat();
+        let all: Vec<String> = all.iter().map(f64::to_string).collect();
+        let _ = writeln!(log, "{step},{}", all.join(","));
+    }
+    let temporary = TempDir::new().expect("a folder");
+    let path = temporary.path().join("log.csv");
+    fs::write(&path, log).expect("writable");
+    let foreign = Foreign {
+        files: vec![(
+            path,
+            match carrier {
+                Carrier::Table => "step,gyro_x,gyro_y,gyro_z,-,-,-",
+                Carrier::Hands => "-,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
+            },
+        )],
+        rate_hz: Some(plan.sample_rate_hz),
+        gravity_mps2: plan.place.gravity,
+        raw_unit: RawUnit::Count,
+        scales: &[],
+        inputs: inputs.as_deref(),
+    };
+    let recording = foreign.import(&temporary).expect("it can be imported");
+    let mut prepared = Prepared::read(&recording, STILL_FACTOR, |_| {}).expect("it has dwells");
+    prepared.place = format!("session {number} of unit {seed}");
+    fit(prepared, Options::default()).expect("it can be fitted")
 }
 
 /// Shares of inside by sensor and kind of parameter.

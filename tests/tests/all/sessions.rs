@@ -2,15 +2,16 @@
 
 use std::ffi::OsStr;
 
-use mimu::judgement::JudgementKind;
+use mimu::judgement::{Judgement, JudgementKind};
 use mimu::sessions::Sessions;
 use mimu::sessions::class::PartClass;
 use mimu::sessions::contradiction::Kind;
 use mimu::{Calibration, Sensor, verify};
 use mimu_tests::sessions::{
-    ARRAY_UNITS, Life, Shares, by_others, by_single, of_array, of_model, of_next, on_bench,
-    recorded, study,
+    ARRAY_UNITS, Carrier, Life, Shares, by_others, by_single, losing, of_array, of_model, of_next,
+    on_bench, recorded, study,
 };
+use rayon::prelude::*;
 
 fn combined(fits: Vec<mimu::Fit>) -> Sessions {
     Sessions::combine(fits, PartClass::Consumer).expect("one unit")
@@ -40,6 +41,200 @@ fn a_dropped_unit_is_found_and_only_the_sessions_since_are_used() {
     let text = made.calibration.to_toml();
     let read = Calibration::parse(&text, "cal.toml").expect("it reads what it writes");
     assert_eq!(read.sessions.iter().filter(|s| s.used).count(), 3);
+}
+
+/// Turns that lose samples, and how many samples each: by hand the fit forgives two turns.
+fn losses(carrier: Carrier) -> [usize; 2] {
+    match carrier {
+        Carrier::Table => [2, 2],
+        Carrier::Hands => [5, 4],
+    }
+}
+
+fn permutations(n: usize) -> Vec<Vec<usize>> {
+    let longer = |all: Vec<Vec<usize>>, _| {
+        let each = all.into_iter().flat_map(|order| {
+            let unused = (0..n).filter({
+                let order = order.clone();
+                move |k| !order.contains(k)
+            });
+            unused.map(move |k| [&order[..], &[k]].concat())
+        });
+        each.collect()
+    };
+    (0..n).fold(vec![Vec::new()], longer)
+}
+
+#[test]
+fn sessions_that_lost_samples_contradict_themselves_and_no_order_changes_the_answer() {
+    for carrier in Carrier::ALL {
+        let session = |number: u32| {
+            let lossy = number >= 2;
+            losing(
+                carrier,
+                (11, Life::Constant, number),
+                if lossy { losses(carrier) } else { [0, 0] },
+            )
+        };
+        let fits: Vec<_> = (0..4).map(session).collect();
+        let clean = combined(fits[..2].to_vec());
+        for order in permutations(4) {
+            let all = combined(order.iter().map(|s| fits[*s].clone()).collect());
+            let used: Vec<bool> = order.iter().map(|s| *s < 2).collect();
+            assert_eq!(
+                all.used,
+                used,
+                "{carrier:?} {order:?}: {:?}",
+                all.sentences()
+            );
+            assert!(all.findings.is_empty(), "{:?}", all.sentences());
+            for ((sensor, triad), (_, of_clean)) in all.triads.present().zip(clean.triads.present())
+            {
+                let sizes = of_clean.common.physical(mimu::Angles::Exact).scale;
+                for (i, (a, b)) in triad.predicted.iter().zip(&of_clean.predicted).enumerate() {
+                    let [a, b] = [a, b].map(|m| m.variance.sqrt());
+                    assert!((a / b - 1.0).abs() < 1e-9, "{sensor} {i}: {a} {b}");
+                }
+                let off = triad.common.forward.matrix - of_clean.common.forward.matrix;
+                let off = off.abs().max().max(
+                    (triad.common.forward.bias - of_clean.common.forward.bias)
+                        .abs()
+                        .max(),
+                );
+                assert!(
+                    off < 1e-9 * sizes[0].value,
+                    "{carrier:?} {order:?} {sensor}: {off}"
+                );
+            }
+            let made =
+                Calibration::of_sessions(&all, "2026-01-01T00:00:00Z").expect("a calibration");
+            let said = &made.judgement.reason;
+            assert_eq!(made.judgement.kind, JudgementKind::Suspect, "{said}");
+            assert!(
+                said.contains("contradict themselves and are not used: gyro: "),
+                "{said}"
+            );
+        }
+        // One that is good is enough to show it; two that are bad alike may be what the model lacks.
+        let few = |which: &[usize]| combined(which.iter().map(|s| fits[*s].clone()).collect());
+        assert_eq!(few(&[3, 1]).used, [false, true]);
+        let alike = few(&[2, 3]);
+        assert_eq!(alike.used, [true, true]);
+        let made = Calibration::of_sessions(&alike, "2026-01-01T00:00:00Z").expect("a calibration");
+        assert!(
+            made.judgement.kind >= JudgementKind::Unexplained,
+            "{}",
+            made.judgement
+        );
+    }
+}
+
+#[test]
+fn a_shock_is_found_beside_a_session_that_contradicts_itself() {
+    // Before the shock, directly after it, and last. Sessions 0 and 1 were before it.
+    for (lossy, said) in [
+        (1, "sessions 3 and 4"),
+        (2, "sessions 2 and 4"),
+        (5, "sessions 2 and 3"),
+    ] {
+        let session = |k: u32| {
+            let number = if lossy == 1 && k > 0 { k - 1 } else { k };
+            let lost = if k == lossy {
+                losses(Carrier::Hands)
+            } else {
+                [0, 0]
+            };
+            losing(Carrier::Hands, (1, Life::Dropped, number), lost)
+        };
+        let all = combined((0..6).map(session).collect());
+        let sentences = all.sentences();
+        let first = if lossy == 1 { 3 } else { 2 };
+        let used: Vec<bool> = (0..6).map(|k| k >= first && k != lossy).collect();
+        assert_eq!(all.used, used, "{sentences:?}");
+        assert!(
+            sentences[1].contains(&format!("between {said} the unit changed")),
+            "{sentences:?}"
+        );
+        let because = all.not_used(lossy as usize);
+        assert_eq!(
+            (all.not_used(0), because),
+            (Some("before_step"), Some("contradicts_itself"))
+        );
+        assert!(
+            sentences[0].starts_with(&format!("session {} contradicts itself", lossy + 1)),
+            "{sentences:?}"
+        );
+    }
+}
+
+/// Sets of four clean sessions of this many units, on a table and by hand. None may contradict itself, and no calibration may be better than a session that it is
+/// made from. Prints how many sets have another finding.
+fn clean_sets(units: u64) {
+    for carrier in Carrier::ALL {
+        let others = |seed: u64| {
+            let fits = (0..4).map(|k| losing(carrier, (seed, Life::PowerOn, k), [0, 0]));
+            let all = combined(fits.collect());
+            let sentences = all.sentences();
+            assert!(
+                all.inconsistent.iter().all(Option::is_none),
+                "{carrier:?} {seed}: {sentences:?}"
+            );
+            let made =
+                Calibration::of_sessions(&all, "2026-01-01T00:00:00Z").expect("a calibration");
+            let used = all.fits.iter().zip(&all.used).filter(|(_, used)| **used);
+            let worst = used.map(|(fit, _)| Judgement::of_fit(fit).kind).max();
+            let kind = made.judgement.kind;
+            assert!(
+                worst <= Some(kind.max(JudgementKind::Untested)),
+                "{worst:?}: {}",
+                made.judgement
+            );
+            usize::from(!all.findings.is_empty())
+        };
+        let found: usize = (1..=units).into_par_iter().map(others).sum();
+        println!(
+            "{carrier:?}: of {units} sets none contradicts itself, {found} have another finding"
+        );
+    }
+}
+
+#[test]
+fn clean_sessions_do_not_contradict_themselves() {
+    clean_sets(3);
+}
+
+#[test]
+#[ignore = "nightly: 40 sets of four sessions, a minute"]
+fn forty_sets_of_clean_sessions_do_not_contradict_themselves() {
+    clean_sets(20);
+}
+
+#[test]
+fn each_session_is_given_once_and_all_are_of_one_unit() {
+    let mut fits = on_bench(5, Life::PowerOn, 3);
+    for (k, fit) in fits.iter_mut().enumerate() {
+        fit.prepared.place = format!("session {k}");
+    }
+    let mut twice = fits.clone();
+    twice.push(fits[2].clone());
+    twice[3].prepared.place = "copy".into();
+    let error = Sessions::combine(twice, PartClass::Consumer)
+        .expect_err("a copy")
+        .to_string();
+    assert!(
+        error.contains("copy: it has the samples of session 2"),
+        "{error}"
+    );
+    for (fit, device) in fits.iter_mut().zip(["unnamed", "a", "b"]) {
+        fit.prepared.manifest.device = device.into();
+    }
+    let error = Sessions::combine(fits, PartClass::Consumer)
+        .expect_err("two units")
+        .to_string();
+    assert!(
+        error.contains("session 2") && error.contains("session 1"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -244,6 +439,8 @@ fn coverage_on_the_array() {
         let single = by_single(&fits);
         let combined = combined(fits.clone());
         println!("unit {}: {:?}", unit + 1, combined.sentences());
+        // All of them err by 5 to 21 times their noise.
+        assert!(combined.inconsistent.iter().all(Option::is_none));
         let left_out = by_others(&combined);
         let (next, _) = of_next(fits);
         for (sum, one) in all.iter_mut().zip([single, left_out, next]) {

@@ -60,7 +60,10 @@ fn next(result: &SessionsResult) -> &'static str {
             "look at the session that the judgement names (mimu fit SESSION), or record another"
         }
         JudgementKind::Untested => "record another session after the unit was off, and fit all",
-        _ => {
+        JudgementKind::Unexplained | JudgementKind::Misfit => {
+            "find what the model lacks (mimu diagnose SESSION), then judge the calibration on another recording (mimu verify OTHER --calibration FILE)"
+        }
+        JudgementKind::Good => {
             "use the calibration: mimu export c FILE -o calibration.h; --verbose prints each session"
         }
     }

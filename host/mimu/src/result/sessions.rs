@@ -46,6 +46,8 @@ pub struct SessionResult {
     /// What its file says of it.
     #[serde(flatten)]
     pub origin: SessionOrigin,
+    /// Why the calibration is not made from it: `contradicts_itself`, `contradicts_others` or `before_step`; null if it is.
+    pub not_used: Option<&'static str>,
 }
 
 /// The prior of a class of parts.
@@ -152,9 +154,11 @@ impl SessionsResult {
             judgement: combined.judgement.clone(),
             raw_unit: manifest.raw_unit,
             sessions: origins
-                .map(|(fit, origin)| SessionResult {
+                .enumerate()
+                .map(|(s, (fit, origin))| SessionResult {
                     recording: fit.prepared.place.clone(),
                     origin: origin.clone(),
+                    not_used: sessions.not_used(s),
                 })
                 .collect(),
             prior: sessions.prior.map(|class| PriorResult {

@@ -55,6 +55,15 @@ pub enum Kind {
     Drift,
 }
 
+impl Kind {
+    /// Renumbers the sessions from `s` on, because another one takes this number.
+    pub(super) fn make_room(&mut self, s: usize) {
+        if let Self::Session(k) | Self::Step(k) = self {
+            *k += usize::from(*k >= s);
+        }
+    }
+}
+
 impl Triads {
     /// Those of the sessions for which `keep` holds.
     pub fn of(&self, keep: impl Fn(usize) -> bool) -> Self {
@@ -68,7 +77,12 @@ impl Triads {
     /// The model of parameters that age, and of those that drift with the number of the session.
     pub fn fitted(&self, drifting: &[usize], next: f64) -> Option<Between> {
         let estimates = self.estimates();
-        let numbers: Vec<f64> = self.sessions.iter().map(|(s, _)| *s as f64).collect();
+        let mut numbers: Vec<f64> = self.sessions.iter().map(|(s, _)| *s as f64).collect();
+        if numbers.len() < LEAST_FOR_DRIFT {
+            // A few sessions do not show which way a unit ages: it adds to the intervals, and does not move the values.
+            let mean = numbers.iter().sum::<f64>() / numbers.len() as f64;
+            numbers.fill(mean);
+        }
         let numbers = (&numbers[..], next);
         fit_ageing(
             &estimates,

@@ -5,12 +5,14 @@
 //! | [`class`] | how much the parameters of a class of parts change: the prior of one or two sessions |
 //! | [`between`] | the random-effects model of the parameters of a triad |
 //! | [`mixture`] | its intervals |
+//! | `inconsistent` | sessions that contradict themselves |
 //! | [`contradiction`] | sessions that do not belong to the others, steps and drifts |
 //! | `together` | biases that move together |
 
 pub mod between;
 pub mod class;
 pub mod contradiction;
+mod inconsistent;
 pub mod mixture;
 pub mod together;
 mod words;
@@ -36,8 +38,10 @@ use mimu_recording::error::{Error, Result};
 pub struct Sessions {
     /// The fits, in the order in which the sessions took place.
     pub fits: Vec<Fit>,
-    /// Whether the calibration is made from each: not if it contradicts the others, or took place before a step.
+    /// Whether the calibration is made from each: not if it contradicts itself or the others, or took place before a step.
     pub used: Vec<bool>,
+    /// For each session that contradicts itself, by which error: the calibration is that of the other sessions, as if it had not taken place.
+    pub inconsistent: Vec<Option<String>>,
     /// What does not fit one set of constant parameters.
     pub findings: Vec<Finding>,
     /// The class whose prior was used for fewer than three sessions.
@@ -140,7 +144,32 @@ impl Sessions {
     pub fn combine(fits: Vec<Fit>, class: PartClass) -> Result<Self> {
         check(&fits)?;
         refuse_common_errors(&fits)?;
-        let physical = Sensor::BOTH.map(|sensor| of_fits(&fits, sensor));
+        let inconsistent = inconsistent::reasons(&fits);
+        let each = fits.iter().zip(&inconsistent);
+        let consistent: Vec<&Fit> = each.filter(|e| e.1.is_none()).map(|e| e.0).collect();
+        let mut found = Self::of_consistent(&consistent, class)?;
+        for s in (0..fits.len()).filter(|s| inconsistent[*s].is_some()) {
+            found.used.insert(s, false);
+            found.findings.iter_mut().for_each(|f| f.kind.make_room(s));
+            for triad in found
+                .triads
+                .as_mut()
+                .into_iter()
+                .filter_map(|t| t.1.as_mut())
+            {
+                triad.left_out.insert(s, None);
+            }
+        }
+        Ok(Self {
+            fits,
+            inconsistent,
+            ..found
+        })
+    }
+
+    /// Those of `fits`, without the fits themselves.
+    fn of_consistent(fits: &[&Fit], class: PartClass) -> Result<Self> {
+        let physical = Sensor::BOTH.map(|sensor| of_fits(fits, sensor));
         let free = physical.each_ref().map(|all| free(all));
         let data: Vec<Triads> = Sensor::BOTH
             .iter()
@@ -175,7 +204,8 @@ impl Sessions {
         Ok(Self {
             together: together(&data, &used),
             prior: few.then_some(class),
-            fits,
+            fits: Vec::new(),
+            inconsistent: Vec::new(),
             used,
             findings,
             triads: combined,
@@ -196,11 +226,16 @@ impl Sessions {
 }
 
 fn check(fits: &[Fit]) -> Result<()> {
-    let Some((first, others)) = fits.split_first() else {
+    if fits.is_empty() {
         return Err(Error::new("sessions", "none was given", "name recordings"));
-    };
-    let ours = &first.prepared.manifest;
-    for other in others {
+    }
+    // All pairs: an unnamed device is like any other, and only a second named one shows that there are two.
+    let pairs = fits
+        .iter()
+        .enumerate()
+        .flat_map(|(k, first)| fits[k + 1..].iter().map(move |o| (first, o)));
+    for (first, other) in pairs {
+        let ours = &first.prepared.manifest;
         let theirs = &other.prepared.manifest;
         let place = &other.prepared.place;
         let same = match (ours.unit_id(), theirs.unit_id()) {
@@ -251,8 +286,8 @@ fn undetermined(place: &str, sensor: Sensor) -> Error {
     )
 }
 
-fn of_fits(fits: &[Fit], sensor: Sensor) -> Vec<Option<Physical>> {
-    let of = |fit: &Fit| {
+fn of_fits(fits: &[&Fit], sensor: Sensor) -> Vec<Option<Physical>> {
+    let of = |fit: &&Fit| {
         let (values, parts) = fit.sensor(sensor)?.estimated.triad.physical_parts();
         let zero = Covariance::zeros();
         Some((values, parts.iter().fold(zero, |sum, p| sum + p.covariance)))
@@ -286,9 +321,14 @@ fn triads(sensor: Sensor, all: &[Option<Physical>], free: &[usize], class: PartC
         };
         Some((s, estimates))
     };
-    let first = all.iter().flatten().next();
     let names = TriadParameter::physical();
-    let scale = |i: usize| first.map_or(1.0, |(values, _)| values[i % 3].abs());
+    // Of all: that of the first session would make the prior depend on their order.
+    let sizes = |i: usize| {
+        all.iter()
+            .flatten()
+            .map(move |(values, _)| values[i % 3].abs())
+    };
+    let scale = |i: usize| sizes(i).sum::<f64>() / sizes(i).count() as f64;
     let prior = |i: &usize| class.prior(sensor, names[*i], scale(*i));
     let kinds = Kinds {
         // Angles of both kinds change by the same causes.
