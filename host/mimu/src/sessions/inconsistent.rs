@@ -17,7 +17,7 @@ fn worst(fit: &Fit) -> Option<(f64, ErrorFigures)> {
         let error = if misfit {
             f64::INFINITY
         } else {
-            figures.over_noise().max(1.0)
+            figures.test.map_or(1.0, |test| test.ratio).max(1.0)
         };
         (error, figures)
     };
