@@ -326,8 +326,7 @@ fn finish(
     residuals: Vec<Residual>,
     dwells: usize,
     static_rms: Option<(f64, Option<f64>)>,
-    held_out: HoldOut,
-    unseen: &[Unseen],
+    (held_out, unseen): (HoldOut, &[Unseen]),
 ) -> SensorFit {
     let mut warnings = estimated.notes.clone();
     // Means of dwells and sums within dwells determine an axis together.

@@ -148,8 +148,7 @@ fn judged(
         residuals,
         n,
         None,
-        HoldOut::none(),
-        &[],
+        (HoldOut::none(), &[]),
     )
 }
 

@@ -136,8 +136,7 @@ pub(super) fn fit_gravity(
         residuals,
         poses.len(),
         None,
-        held_out.into(),
-        &unseen,
+        (held_out.into(), &unseen),
     );
     let known: Vec<(&Observation, f64)> = poses.iter().map(|o| (o, g)).collect();
     fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::GravityMagnitude, &known);
@@ -560,8 +559,7 @@ fn fit_turns(
         residuals,
         rest.len(),
         in_sample.map(|r| (r, held_at_rest)),
-        held.into(),
-        &unseen,
+        (held.into(), &unseen),
     );
     fit.uncalibrated_rms = uncalibrated::directions(prepared, &turns);
     if wide > 20f64.to_radians() {

@@ -159,8 +159,7 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         residuals,
         dwells.turning.len() + dwells.rests.len(),
         static_rms.map(|r| (r, static_held_out)),
-        held_out.into(),
-        &unseen,
+        (held_out.into(), &unseen),
     );
     fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::RateMagnitude, &rated);
     let rates_dps = dwells.rates.iter().map(|r| r.to_degrees()).collect();

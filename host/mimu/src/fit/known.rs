@@ -272,8 +272,7 @@ impl<'a> Known<'a> {
             residuals,
             n,
             None,
-            held_out.into(),
-            &unseen,
+            (held_out.into(), &unseen),
         );
         fit.influences = influences;
         fit.uncalibrated_rms = uncalibrated::inputs(prepared, all.iter().map(|(o, _)| *o));
