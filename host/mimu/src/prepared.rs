@@ -10,6 +10,7 @@ use crate::estimate::earth::{Earth, poses};
 use crate::estimate::earth_on_table::EarthOnTable;
 use crate::estimate::whole_turns::Stated;
 use crate::estimate::{EarthShare, Failure, Observation, known_input, magnitude};
+use crate::factor::Factors;
 use crate::noise::Noise;
 use crate::noise::noise_file::NoiseFile;
 use crate::observation::turn::{Motion, Rest, Turn};
@@ -482,6 +483,18 @@ impl Prepared {
     /// Noise variances of the magnitude of specific force in each of `poses`, (m/s²)².
     pub fn magnitude_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
         self.magnitude_noise(accel, poses).0
+    }
+
+    /// The magnitudes of gravity in all poses, with their noise by `accel`.
+    pub(crate) fn magnitudes(&self, accel: &Affine<f64>) -> Factors<'_> {
+        let poses = self.observations(Sensor::Accel);
+        let variances = self.magnitude_variances(accel, &poses);
+        let mut factors = Factors::default();
+        for (o, variance) in poses.iter().zip(variances) {
+            let known = (self.manifest.gravity_mps2, None);
+            factors.magnitude(Sensor::Accel, (o.dwell, o.raw), known, variance);
+        }
+        factors
     }
 
     /// Standard deviations of the same, for people; not a number if the noise is unknown.

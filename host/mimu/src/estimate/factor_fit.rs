@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::Failure;
 use super::least_squares::{Scatter, degrees_of_freedom, extra_variance, minimize};
-use crate::factor::{Block, Factors, Linearized, Values};
+use crate::factor::{Factors, Linearized, ParameterBlock, Values};
 use crate::observable::Observable;
 use crate::observation::from_centre;
 use crate::quantity::Sensor;
@@ -16,7 +16,7 @@ use crate::triad::{Covariance, Part, Triad, vector};
 
 /// How a fit moves a block: its values are `about + by * p`, for parameters p of order one.
 pub struct Coordinates {
-    block: Block,
+    block: ParameterBlock,
     about: DVector<f64>,
     by: DMatrix<f64>,
     /// Parameters to start from.
@@ -39,7 +39,7 @@ impl Coordinates {
         let change = from_centre(centre);
         let start = vector(&first.matrix, &first.apply(centre));
         Self {
-            block: Block::Triad(sensor),
+            block: ParameterBlock::Triad(sensor),
             about: DVector::zeros(12),
             by: DMatrix::from_fn(12, free.len(), |i, k| change[(i, free[k])] * unit(free[k])),
             start: DVector::from_fn(free.len(), |k, _| start[free[k]] / unit(free[k])),
@@ -48,7 +48,7 @@ impl Coordinates {
     }
 
     /// Of a block that moves from `about` along the columns of `by`. Residuals are linear in it, or taken to be.
-    pub fn linear(block: Block, about: DVector<f64>, by: DMatrix<f64>) -> Self {
+    pub fn linear(block: ParameterBlock, about: DVector<f64>, by: DMatrix<f64>) -> Self {
         Self {
             block,
             about,
@@ -59,7 +59,7 @@ impl Coordinates {
     }
 
     /// Of a block of numbers around zero.
-    pub fn around_zero(block: Block) -> Self {
+    pub fn around_zero(block: ParameterBlock) -> Self {
         let n = block.size();
         Self::linear(block, DVector::zeros(n), DMatrix::identity(n, n))
     }
@@ -68,7 +68,7 @@ impl Coordinates {
 /// A list of factors, and the blocks that are fitted to it.
 pub struct FactorFit<'a> {
     factors: Factors<'a>,
-    blocks: Vec<Block>,
+    blocks: Vec<ParameterBlock>,
     about: DVector<f64>,
     by: DMatrix<f64>,
     start: DVector<f64>,
@@ -81,7 +81,7 @@ pub struct FactorFit<'a> {
     pub lost: String,
     /// Covariance of an error of a block that is not fitted. It is common to all residuals: it goes into the size that these may have, but not into the
     /// weights.
-    pub common: Option<(Block, Covariance)>,
+    pub common: Option<(ParameterBlock, Covariance)>,
 }
 
 /// Rows that share one extra variance, if one is estimated.
@@ -255,7 +255,7 @@ impl<'a> FactorFit<'a> {
     }
 
     /// Unweighted derivatives by a block, whether it is fitted or not.
-    fn by_block(&self, block: Block, p: &DVector<f64>) -> DMatrix<f64> {
+    fn by_block(&self, block: ParameterBlock, p: &DVector<f64>) -> DMatrix<f64> {
         let all = self.by_values(p).jacobian;
         let columns = self.values(p).range(block).unwrap_or_default();
         all.columns_range(columns).into_owned()
@@ -306,14 +306,14 @@ fn update(
 
 impl Solved<'_> {
     /// Derivatives of the values of a block by the parameters.
-    fn change(&self, block: Block) -> DMatrix<f64> {
+    fn change(&self, block: ParameterBlock) -> DMatrix<f64> {
         let rows = self.values.range(block).unwrap_or_default();
         self.fit.by.rows_range(rows).into_owned()
     }
 
     /// What each group adds to the covariance of a triad.
     pub fn parts(&self, sensor: Sensor) -> Vec<Part> {
-        let change = self.change(Block::Triad(sensor));
+        let change = self.change(ParameterBlock::Triad(sensor));
         let part = |group: &Group| {
             let own = self.found.at.part(&self.covariance, &group.rows);
             let own = &change * own * change.transpose();
@@ -331,12 +331,12 @@ impl Solved<'_> {
     /// If the accelerometer is fitted too, beside what was known of it, it is the covariance of both times that `information`.
     pub fn gain(&self, information: Option<&DMatrix<f64>>) -> Covariance {
         let [gyro, accel] =
-            [Sensor::Gyro, Sensor::Accel].map(|sensor| self.change(Block::Triad(sensor)));
+            [Sensor::Gyro, Sensor::Accel].map(|sensor| self.change(ParameterBlock::Triad(sensor)));
         let gain = match information {
             Some(information) => gyro * &self.covariance * accel.transpose() * information,
             None => {
                 let p = &self.found.parameters;
-                let mut by = self.fit.by_block(Block::Triad(Sensor::Accel), p);
+                let mut by = self.fit.by_block(ParameterBlock::Triad(Sensor::Accel), p);
                 for (mut row, weight) in by.row_iter_mut().zip(&self.found.weights) {
                     row *= *weight;
                 }
@@ -377,5 +377,109 @@ impl Solved<'_> {
         let inverse = self.values.triad(sensor);
         let triad = inverse.and_then(|inverse| Triad::from_inverse(inverse, parts));
         triad.ok_or_else(|| Failure::NoSolution(singular.into()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+
+    use super::*;
+    use crate::factor::Kind;
+    use crate::factor::chains::Chains;
+    use crate::observation::closure::{Closure, Closures};
+    use crate::observation::turn::{Path, Rest, Turn, TurnError};
+    use crate::observation::{ALL, LOWER};
+    use crate::signal::increment::Increment;
+
+    /// A turn by `angle`, rad, in a second, read in SI by a gyro with the bias `bias`.
+    fn increment(angle: [f64; 3], bias: &Vector3<f64>) -> Increment {
+        let mut one = Increment::EMPTY;
+        one.duration_s = 1.0;
+        one.integral = (Vector3::from(angle) + bias).into();
+        one
+    }
+
+    #[test]
+    fn derivatives_by_every_parameter_are_those_of_differences() {
+        let bias = Vector3::new(5.0, -3.0, 4.0);
+        let (gyro, accel) = (
+            Affine {
+                matrix: Matrix3::identity(),
+                offset: -bias,
+            },
+            Affine::identity(),
+        );
+        let angles = [
+            [1.2, 0.3, -0.2],
+            [-0.4, 1.1, 0.5],
+            [0.2, -0.7, 1.0],
+            [-1.3, 0.2, 0.4],
+            [0.6, 0.8, -0.9],
+        ];
+        let pieces = angles.map(|angle| [increment(angle, &bias)]);
+        let mut force = Vector3::new(1.0, -2.0, 9.5);
+        let mut turns: Vec<Turn> = Vec::new();
+        for (from, increments) in pieces.iter().enumerate() {
+            let mut turn = Turn {
+                from,
+                to: from + 1,
+                steps: [0; 2],
+                increments,
+                before: force,
+                after: force,
+                raw: [force; 2],
+                direction_variance: 0.0,
+                earth_variance: 0.0,
+                integral_variance: 0.0,
+                duration_s: 1.0,
+            };
+            force = TurnError::at(&turn, &gyro).rotation * force;
+            (turn.after, turn.raw[1]) = (force, force);
+            turns.push(turn);
+        }
+        let rest = [0, 1, 2, 3, 4, 5].map(|dwell| Rest {
+            dwell,
+            raw: bias,
+            variance: Vector3::zeros(),
+            rate: Vector3::zeros(),
+            rate_variance: Vector3::zeros(),
+            vertical_variance: Vector3::zeros(),
+        });
+        let whole = Closures {
+            list: vec![Closure {
+                turns: 1..3,
+                path: Path::of(&turns[1..3], &gyro),
+            }],
+            ..Closures::default()
+        };
+        let mut factors = Factors::among(&turns, Chains::of(&turns, &rest));
+        factors.directions(Observable::Turns, |_| true);
+        factors.headings(&whole);
+        factors.rests(&rest);
+        let given = ParameterBlock::GivenMagnitude(0);
+        factors.magnitude(Sensor::Accel, (0, force), (9.7, Some(0)), 1.0);
+        let one = DMatrix::identity(1, 1);
+        factors.known(Kind::Stated(given, DVector::zeros(1), one, 1.0), None);
+        let coordinates = vec![
+            Coordinates::triad(Sensor::Gyro, &gyro, &ALL, &bias, 0.1),
+            Coordinates::triad(Sensor::Accel, &accel, &LOWER, &Vector3::zeros(), 9.8),
+            Coordinates::around_zero(ParameterBlock::LevelRate(0)),
+            Coordinates::around_zero(given),
+        ];
+        let fit = FactorFit::new(factors, coordinates, (1e-3, 1), "lost");
+        // The derivatives of directions are those of small errors.
+        let p = fit.start() + DVector::from_fn(24, |k, _| 1e-4 * (k as f64).sin());
+        let jacobian = fit.linearize(&p).jacobian;
+        for k in 0..p.len() {
+            let at = |step: f64| {
+                let mut moved = p.clone();
+                moved[k] += step;
+                fit.linearize(&moved).residuals
+            };
+            let column = (at(1e-5) - at(-1e-5)) / 2e-5;
+            let (off, size) = ((&column - jacobian.column(k)).norm(), column.norm());
+            assert!(size > 0.0 && off < 1e-3 * size, "{k}: {off:e} of {size:e}");
+        }
     }
 }

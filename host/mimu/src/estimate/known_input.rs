@@ -117,12 +117,12 @@ pub fn least_squares(
             observations: raw,
             errors,
         };
-        let (solution, [scatter]) = solve_groups(&[group])
+        let (solution, scatter) = solve_groups(&[group])
             .ok_or_else(|| Failure::NoSolution("the design is singular".into()))?;
         axes.push(AxisEstimate {
             parameters: solution.parameters,
             covariance: solution.covariance,
-            scatter: vec![(Observable::Axis(axis), scatter)],
+            scatter: vec![(Observable::Axis(axis), scatter[0])],
         });
     }
     let estimated = forward(&axes, span, observability.condition)?;

@@ -300,8 +300,8 @@ pub struct Group {
 
 /// Solves `observations = design * parameters + noise` of several groups of observations that are independent of each other. Each group gets the
 /// extra variance that its own residual shows. Its degrees of freedom are its observations, minus those that the parameters take.
-pub fn solve_groups<const N: usize>(groups: &[Group; N]) -> Option<(Solution, [Scatter; N])> {
-    let mut last: Option<(Solution, [Scatter; N])> = None;
+pub fn solve_groups(groups: &[Group]) -> Option<(Solution, Vec<Scatter>)> {
+    let mut last: Option<(Solution, Vec<Scatter>)> = None;
     // A chi-square at the limit may get and lose its extra variance with that of another group: either answer is as good.
     for _ in 0..30 {
         let extra = |g: usize| last.as_ref().map_or(0.0, |l| l.1[g].extra_variance);
@@ -319,8 +319,7 @@ pub fn solve_groups<const N: usize>(groups: &[Group; N]) -> Option<(Solution, [S
         }
         let solution = by_qr(&all)?;
         let mut from = 0;
-        let scatter: [Scatter; N] = std::array::from_fn(|g| {
-            let group = &groups[g];
+        let scatter = groups.iter().enumerate().map(|(g, group)| {
             let n = group.observations.len();
             let residuals = &group.observations - &group.design * &solution.parameters;
             let dof = degrees_of_freedom(n, solution.leverage.rows(from, n).sum());
@@ -329,8 +328,9 @@ pub fn solve_groups<const N: usize>(groups: &[Group; N]) -> Option<(Solution, [S
             let chi2 = last.as_ref().map_or(found.chi2, |l| l.1[g].chi2);
             Scatter { chi2, ..found }
         });
-        let converged = (0..N).all(|g| {
-            let (was, is) = (extra(g), scatter[g].extra_variance);
+        let scatter: Vec<Scatter> = scatter.collect();
+        let converged = scatter.iter().enumerate().all(|(g, is)| {
+            let (was, is) = (extra(g), is.extra_variance);
             (is - was).abs() <= 1e-6 * is.max(was)
         });
         last = Some((solution, scatter));

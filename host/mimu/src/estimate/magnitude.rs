@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::factor_fit::{Coordinates, FactorFit};
 use super::least_squares::{Observability, minimize};
 use super::{Estimated, Failure, Observation};
-use crate::factor::{Block, Factors, Kind, Linearized};
+use crate::factor::{Factors, Kind, Linearized, ParameterBlock};
 use crate::observation::turn::Rest;
 use crate::observation::{LOWER, place};
 use crate::prior::TriadPrior;
@@ -258,7 +258,7 @@ impl<'a> ByMagnitudes<'a> {
         let lower = Coordinates::triad(known.sensor, &first, &LOWER, &sphere.centre, unit);
         let mut coordinates = vec![lower];
         for level in (0..known.levels.len()).filter(|_| err) {
-            let block = Block::GivenMagnitude(level);
+            let block = ParameterBlock::GivenMagnitude(level);
             let (zero, one) = (DVector::zeros(1), DMatrix::identity(1, 1));
             let stated = Kind::Stated(block, zero, one, known.level_sigma.powi(2));
             factors.known(stated, None);

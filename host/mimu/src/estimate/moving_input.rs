@@ -56,7 +56,7 @@ impl Experiment<'_> {
         errors: &[Errors; 2],
         delay: f64,
         forward: Option<RowVector3<f64>>,
-    ) -> Option<(Solution, [Scatter; 2])> {
+    ) -> Option<(Solution, Vec<Scatter>)> {
         let groups = [0, 1].map(|part| {
             let all = self.parts[part];
             Group {

@@ -12,7 +12,7 @@ use super::factor_fit::{Coordinates, FactorFit, HALF_DEGREE, Minimum, Solved, me
 use super::least_squares::{Observability, root};
 use super::{Estimated, Failure};
 use crate::factor::chains::Chains;
-use crate::factor::{Block, Factors, Kind};
+use crate::factor::{Factors, Kind, ParameterBlock};
 use crate::observable::Observable;
 use crate::observation::ALL;
 use crate::observation::closure::Closures;
@@ -152,7 +152,7 @@ impl<'a> ByTurns<'a> {
         first: &Matrix3<f64>,
         (whole, prior): (&Closures, Option<&'a TriadPrior>),
     ) -> Self {
-        let [gyro, of_accel] = Sensor::BOTH.map(Block::Triad);
+        let [gyro, of_accel] = Sensor::BOTH.map(ParameterBlock::Triad);
         let at_rest = mean_at_rest(rest);
         let start = Affine {
             matrix: *first,
@@ -166,7 +166,7 @@ impl<'a> ByTurns<'a> {
             1.0,
         )];
         let chains = Chains::of(turns, rest);
-        let levels = (0..chains.count).map(Block::LevelRate);
+        let levels = (0..chains.count).map(ParameterBlock::LevelRate);
         coordinates.extend(levels.map(Coordinates::around_zero));
         let mut factors = Factors::among(turns, chains);
         // Whole turns are long, and errors of the model grow on the way, so that their directions scatter by themselves.

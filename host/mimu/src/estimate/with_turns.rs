@@ -15,7 +15,6 @@ use super::factor_fit::{Coordinates, FactorFit, HALF_DEGREE, mean_square};
 use super::rotation::mean_at_rest;
 use super::{Estimated, Failure, Observation};
 use crate::factor::Factors;
-use crate::factor::chains::Chains;
 use crate::observable::Observable;
 use crate::observation::turn::{Rest, Turn};
 use crate::observation::{ALL, LOWER};
@@ -47,12 +46,11 @@ impl JointFit<'_> {
         let singular = || Failure::NoSolution("C is singular".into());
         let centre = Forward::of(&self.accel).ok_or_else(singular)?.bias;
         let at_rest = mean_at_rest(self.rest);
-        let mut factors = Factors::among(self.turns, Chains::default());
+        let mut factors = Factors::of_turns(self.turns);
         for (o, variance) in self.poses.iter().zip(self.variances) {
             let known = (self.gravity, None);
             factors.magnitude(Sensor::Accel, (o.dwell, o.raw), known, *variance);
         }
-        factors.directions(Observable::Turns, |_| true);
         factors.rests(self.rest);
         let accel = Coordinates::triad(Sensor::Accel, &self.accel, &LOWER, &centre, self.gravity);
         let gyro = Coordinates::triad(Sensor::Gyro, &self.gyro, &ALL, &at_rest, 1.0);
@@ -72,9 +70,12 @@ impl JointFit<'_> {
         }
         // Of the accelerometer's parameters alone, whose columns share one unit. Those of the gyro have others.
         let condition = solved.condition(LOWER.len());
+        let scatter = solved
+            .scatter(true)
+            .filter(|s| s.0 == Observable::Magnitude);
         Ok(Estimated {
             notes: vec![Warning::WithTurns],
-            ..Estimated::new(triad, solved.scatter(true).take(1).collect(), condition)
+            ..Estimated::new(triad, scatter.collect(), condition)
         })
     }
 }

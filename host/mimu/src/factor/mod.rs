@@ -1,6 +1,6 @@
 //! One list of factors: what a recording says of the parameters of a unit, and how surely.
 //!
-//! A factor has residuals, their derivatives by named blocks of parameters ([`Block`]), their known variances, the group whose scatter is estimated, and
+//! A factor has residuals, their derivatives by named blocks of parameters ([`ParameterBlock`]), their known variances, the group whose scatter is estimated, and
 //! the dwells it comes from. Residuals and derivatives are those of [`crate::observation`]. A list is in groups: the factors of one stand together. A fit
 //! ([`crate::estimate::factor_fit`]) chooses which blocks are free and in which coordinates; a judgement evaluates the same list at given [`Values`].
 
@@ -24,7 +24,7 @@ use chains::Chains;
 
 /// A block of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Block {
+pub enum ParameterBlock {
     /// C by rows, then o of a triad, raw to SI: twelve.
     Triad(Sensor),
     /// The Earth's rate along the two level directions of a chain of dwells, rad/s.
@@ -33,7 +33,7 @@ pub enum Block {
     GivenMagnitude(usize),
 }
 
-impl Block {
+impl ParameterBlock {
     /// Number of its parameters.
     pub fn size(self) -> usize {
         match self {
@@ -47,27 +47,19 @@ impl Block {
 /// Values of blocks, one behind the other.
 #[derive(Debug, Clone)]
 pub struct Values {
-    blocks: Vec<Block>,
+    blocks: Vec<ParameterBlock>,
     /// The numbers.
     pub all: DVector<f64>,
 }
 
 impl Values {
     /// Of these blocks.
-    pub fn new(blocks: Vec<Block>, all: DVector<f64>) -> Self {
+    pub fn new(blocks: Vec<ParameterBlock>, all: DVector<f64>) -> Self {
         Self { blocks, all }
     }
 
-    /// Of triads alone.
-    pub fn of_triads(triads: &[(Sensor, &Affine<f64>)]) -> Self {
-        let numbers = triads.iter().map(|t| parameters(&t.1.matrix, &t.1.offset));
-        let numbers: Vec<f64> = numbers.flat_map(<[f64; 12]>::from).collect();
-        let blocks = triads.iter().map(|t| Block::Triad(t.0));
-        Self::new(blocks.collect(), DVector::from_vec(numbers))
-    }
-
     /// Where a block is, if it is among them.
-    pub fn range(&self, block: Block) -> Option<Range<usize>> {
+    pub fn range(&self, block: ParameterBlock) -> Option<Range<usize>> {
         let before = self.blocks.iter().take_while(|b| **b != block);
         let first = before.map(|b| b.size()).sum::<usize>();
         (first < self.all.len()).then(|| first..first + block.size())
@@ -75,7 +67,7 @@ impl Values {
 
     /// The calibration of a triad, raw to SI.
     pub fn triad(&self, sensor: Sensor) -> Option<Affine<f64>> {
-        let of = self.range(Block::Triad(sensor))?;
+        let of = self.range(ParameterBlock::Triad(sensor))?;
         Some(affine(&self.all.fixed_rows::<12>(of.start).into_owned()))
     }
 }
@@ -141,7 +133,7 @@ pub enum Kind<'a> {
     /// The heading after whole turns, which are neighbours, and the variance without the noise of the gyro, rad².
     Closure(Range<usize>, f64),
     /// Sums of a block's parameters that are known beforehand: values, matrix of the sums (a row for each) and variance of each.
-    Stated(Block, DVector<f64>, DMatrix<f64>, f64),
+    Stated(ParameterBlock, DVector<f64>, DMatrix<f64>, f64),
     /// The population of a triad's kind.
     Population(Sensor, &'a TriadPrior),
 }
@@ -198,6 +190,13 @@ impl<'a> Factors<'a> {
             chains,
             vertical: 0.0,
         }
+    }
+
+    /// The directions after `turns`, where the Earth's level rate is noise.
+    pub fn of_turns(turns: &[Turn<'a>]) -> Self {
+        let mut factors = Self::among(turns, Chains::default());
+        factors.directions(Observable::Turns, |_| true);
+        factors
     }
 
     fn push(&mut self, kind: Kind<'a>, group: Observable, dwells: [usize; 2]) {
@@ -268,14 +267,22 @@ impl<'a> Factors<'a> {
         });
     }
 
+    /// Values with these calibrations, raw to SI, in this order; the Earth's level rates behind them are zero.
+    pub fn values(&self, triads: &[(Sensor, &Affine<f64>)]) -> Values {
+        let levels = 0..self.chains.count;
+        let blocks = triads.iter().map(|t| ParameterBlock::Triad(t.0));
+        let numbers = triads.iter().map(|t| parameters(&t.1.matrix, &t.1.offset));
+        let numbers = numbers.flat_map(<[f64; 12]>::from);
+        let numbers: Vec<f64> = numbers
+            .chain(levels.clone().flat_map(|_| [0.0; 2]))
+            .collect();
+        let blocks = blocks.chain(levels.map(ParameterBlock::LevelRate));
+        Values::new(blocks.collect(), numbers.into())
+    }
+
     /// Number of residuals so far.
     pub fn rows(&self) -> usize {
         self.list.iter().map(Factor::rows).sum()
-    }
-
-    /// Number of chains.
-    pub fn chains(&self) -> usize {
-        self.chains.count
     }
 
     /// The rows of each factor.
@@ -351,7 +358,7 @@ impl Rows<'_> {
     /// Derivatives of all rows by a block.
     fn by<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
         &mut self,
-        block: Block,
+        block: ParameterBlock,
         by: &Matrix<f64, R, C, S>,
     ) {
         let columns = self.values.range(block).unwrap_or_default();
@@ -395,8 +402,8 @@ impl<'a> State<'a> {
 
     fn evaluate(&self, factors: &Factors, factor: &Factor, rows: &mut Rows) {
         let model = |sensor| rows.values.triad(sensor).unwrap_or_else(Affine::identity);
-        let of_gyro = Block::Triad(Sensor::Gyro);
-        let of_accel = Block::Triad(Sensor::Accel);
+        let of_gyro = ParameterBlock::Triad(Sensor::Gyro);
+        let of_accel = ParameterBlock::Triad(Sensor::Accel);
         match &factor.kind {
             Kind::Magnitude {
                 sensor,
@@ -407,9 +414,12 @@ impl<'a> State<'a> {
             } => {
                 let found = Magnitude::at(&model(*sensor), raw, *known);
                 rows.residuals(&[found.residual()]);
-                rows.by(Block::Triad(*sensor), &found.block.by);
+                rows.by(ParameterBlock::Triad(*sensor), &found.block.by);
                 if let Some(given) = given {
-                    rows.by(Block::GivenMagnitude(*given), &SMatrix::from([[-known]]));
+                    rows.by(
+                        ParameterBlock::GivenMagnitude(*given),
+                        &SMatrix::from([[-known]]),
+                    );
                 }
             }
             Kind::Rest(rest, chain) => {
@@ -417,7 +427,10 @@ impl<'a> State<'a> {
                 rows.residuals(found.residual.as_slice());
                 rows.by(of_gyro, &found.by);
                 if let Some((chain, level)) = chain.zip(self.level.get(&rest.dwell)) {
-                    rows.by(Block::LevelRate(chain), &-Matrix3x2::from_columns(level));
+                    rows.by(
+                        ParameterBlock::LevelRate(chain),
+                        &-Matrix3x2::from_columns(level),
+                    );
                 }
             }
             Kind::Turn(t, chain) => {
@@ -427,7 +440,7 @@ impl<'a> State<'a> {
                 rows.by(of_accel, &stacked(&error.by_accel(&turn.raw)));
                 if let Some((chain, level)) = chain.zip(self.level.get(&turn.to)) {
                     let by = error.by_level(level, turn.duration_s);
-                    rows.by(Block::LevelRate(chain), &by);
+                    rows.by(ParameterBlock::LevelRate(chain), &by);
                 }
             }
             Kind::Closure(turns, _) => {
@@ -450,7 +463,7 @@ impl<'a> State<'a> {
                 match prior.residuals(&model(*sensor)) {
                     Some((residuals, by)) => {
                         rows.residuals(residuals.as_slice());
-                        rows.by(Block::Triad(*sensor), &by);
+                        rows.by(ParameterBlock::Triad(*sensor), &by);
                     }
                     // No unit: a step that leads here is taken back.
                     None => rows.residuals(&vec![f64::INFINITY; prior.rows()]),

@@ -541,13 +541,13 @@ fn fit_turns(
         let own = turns
             .iter()
             .filter(|t| (parts.of)(held.split, t.to) == part);
-        let own: Vec<Turn> = own.map(|t| t.with(&accel.triad.inverse)).collect();
+        let own: Vec<Turn> = own.copied().collect();
         let mut both = Both::of(gyro, &accel.triad);
-        let matrix = &gyro.triad.inverse.matrix;
+        let models = [&gyro.triad.inverse, &accel.triad.inverse];
         both.gyro += prepared
             .noise
-            .between_parts(Sensor::Gyro, matrix, parts.count);
-        Some(predicted::directions(&own, &gyro.triad.inverse, &both))
+            .between_parts(Sensor::Gyro, &models[0].matrix, parts.count);
+        Some(predicted::directions(&own, models, &both))
     };
     let unseen: Vec<Unseen> = held.refits.iter().enumerate().filter_map(unseen).collect();
     let static_rms = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {

@@ -11,6 +11,7 @@ use super::sensor::{Residual, SensorFit, rms, typical};
 use super::{Options, finish, predicted, uncalibrated};
 use crate::estimate::magnitude::{self, KnownMagnitudes};
 use crate::estimate::{Estimated, Failure, Observation};
+use crate::factor::Factors;
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::Rest;
 use crate::prepared::{Prepared, si_covariance};
@@ -201,4 +202,14 @@ pub(crate) fn variances(inverse: &Affine<f64>, observations: &[Observation]) -> 
         up.dot(&(si_covariance(&inverse.matrix, &o.variance) * up))
     };
     observations.iter().map(along).collect()
+}
+
+/// The magnitudes of the turning dwells, with their noise by the `gyro`.
+pub(crate) fn magnitudes(dwells: &RatedDwells, gyro: &Affine<f64>) -> Factors<'static> {
+    let mut factors = Factors::default();
+    let known = dwells.turning.iter().zip(dwells.magnitudes());
+    for ((o, rate), variance) in known.zip(variances(gyro, &dwells.turning)) {
+        factors.magnitude(Sensor::Gyro, (o.dwell, o.raw), (rate, None), variance);
+    }
+    factors
 }

@@ -7,15 +7,14 @@
 mod deletion;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, Matrix3x2, Vector3};
+use nalgebra::Vector3;
 
 use super::by_gravity::{POOR_POSES, by_turns};
 use crate::estimate::whole_turns::Data;
 use crate::estimate::{Estimated, Observation, magnitude};
-use crate::observation::magnitude::Magnitude;
-use crate::observation::turn::{Turn, TurnError};
-use crate::observation::{LOWER, free, vector};
-use crate::prepared::{Prepared, si_covariance};
+use crate::factor::Factors;
+use crate::observation::{ALL, LOWER};
+use crate::prepared::Prepared;
 use crate::quantity::{AXES, Sensor};
 use crate::signal::blocks::quantile;
 use crate::signal::dwell::LeftOut;
@@ -140,27 +139,16 @@ fn fit_poses(prepared: &Prepared, poses: &[Observation]) -> Option<Estimated> {
 }
 
 fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {
-    let g = prepared.manifest.gravity_mps2;
-    let variances = prepared.magnitude_variances(accel, poses);
-    let each = poses.iter().map(|o| Magnitude::at(accel, &o.raw, g));
-    let errors: Vec<Magnitude> = each.collect();
-    let rows = errors.iter().zip(variances).map(|(error, variance)| {
-        let mut by = DMatrix::zeros(3, LOWER.len());
-        by.set_row(0, &free(&error.block.by(0), &LOWER).transpose());
-        Row {
-            error: Vector3::new(error.residual(), 0.0, 0.0),
-            by,
-            variance: variance.max((1e-9 * g).powi(2)),
-        }
-    });
-    let rows: Vec<Row> = rows.collect();
+    let factors = prepared.magnitudes(accel);
+    let rows = Row::of(&factors, (Sensor::Accel, accel), &LOWER);
     let Some(found) = against_others(&rows, rows.len(), 1.0) else {
         return Vec::new();
     };
+    let up: Vec<Vector3<f64>> = poses.iter().map(|o| accel.apply(&o.raw)).collect();
     // An effect that the model lacks shows in every pose near an axis, whichever end is up.
     let has_witness = |k: usize| {
         (0..poses.len()).any(|o| {
-            let cosine = errors[o].up.dot(&errors[k].up).abs();
+            let cosine = up[o].angle(&up[k]).cos().abs();
             o != k && cosine > NEAR && found[o].1 > WITNESS
         })
     };
@@ -201,28 +189,9 @@ pub(super) fn turns(prepared: &Prepared) -> Outlying {
     let Ok(gyro) = by_turns(prepared, &data) else {
         return out;
     };
-    let matrix = gyro.triad.inverse.matrix;
-    let mean_square = matrix.norm_squared() / 3.0;
-    let turned = |turn: &Turn| {
-        let error = TurnError::at(turn, &gyro.triad.inverse);
-        let sides = Matrix3x2::from_columns(&error.sides);
-        let by = sides * error.block.by;
-        Row {
-            error: error.vector(),
-            by: DMatrix::from_column_slice(3, 12, by.as_slice()),
-            variance: turn.variance(mean_square).max(1e-18),
-        }
-    };
-    let mut rows: Vec<Row> = turns.iter().map(turned).collect();
-    rows.extend(rest.iter().map(|o| {
-        let block = vector::at(&gyro.triad.inverse, &o.raw, &o.rate);
-        let noise = si_covariance(&matrix, &o.variance).trace() + o.rate_variance.sum();
-        Row {
-            error: block.residual,
-            by: DMatrix::from_column_slice(3, 12, block.by.as_slice()),
-            variance: (noise / 3.0).max(1e-24),
-        }
-    }));
+    let mut factors = Factors::of_turns(&turns);
+    factors.rests(&rest);
+    let rows = Row::of(&factors, (Sensor::Gyro, &gyro.triad.inverse), &ALL);
     let Some(found) = against_others(&rows, turns.len(), 2.0) else {
         return out;
     };

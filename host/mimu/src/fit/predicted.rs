@@ -1,30 +1,21 @@
 //! Held-out errors of a fit and their predicted covariances, for [`crate::unseen`].
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, RowDVector};
+use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::least_squares::{Errors, root};
 use crate::estimate::{Estimated, Observation};
-use crate::observation::ByTriad;
-use crate::observation::magnitude::Magnitude;
-use crate::observation::turn::{Turn, TurnError};
+use crate::factor::Factors;
+use crate::observation::turn::Turn;
+use crate::quantity::Sensor;
 use crate::triad::{Covariance, Triad};
 use crate::unseen::Unseen;
 
-/// Derivatives of errors by twelve parameters, as rows.
-fn rows(all: &[ByTriad]) -> DMatrix<f64> {
-    let rows: Vec<RowDVector<f64>> = all
-        .iter()
-        .map(|by| RowDVector::from_row_slice(by.as_slice()))
-        .collect();
-    match rows.is_empty() {
-        true => DMatrix::zeros(0, 12),
-        false => DMatrix::from_rows(&rows),
-    }
-}
-
-fn dynamic(covariance: &Covariance) -> DMatrix<f64> {
-    DMatrix::from_column_slice(12, 12, covariance.as_slice())
+/// Errors of `factors` by these calibrations, whose parameters have the covariance `root rootᵀ`.
+fn unseen(factors: &Factors, models: &[(Sensor, &Affine<f64>)], root: &DMatrix<f64>) -> Unseen {
+    let values = factors.values(models);
+    let (at, noise) = (factors.at(&values), factors.variances(&values));
+    Unseen::of(at.residuals, noise.into(), &at.jacobian, root)
 }
 
 /// Errors of magnitudes that are `known`, by a triad whose parameters have this `covariance`. `variances`: of the magnitudes by noise.
@@ -34,10 +25,12 @@ pub(crate) fn magnitudes<'a>(
     known: impl Iterator<Item = (&'a Observation, f64)>,
     variances: Vec<f64>,
 ) -> Unseen {
-    let each = known.map(|(o, size)| Magnitude::at(model, &o.raw, size).block);
-    let (errors, by): (Vec<f64>, Vec<ByTriad>) = each.map(|b| (b.residual[0], b.by(0))).unzip();
-    let factor = root(&dynamic(covariance));
-    Unseen::of(errors.into(), variances.into(), &rows(&by), &factor)
+    let mut factors = Factors::default();
+    for ((o, size), variance) in known.zip(variances) {
+        factors.magnitude(Sensor::Accel, (o.dwell, o.raw), (size, None), variance);
+    }
+    let models = [(Sensor::Accel, model)];
+    unseen(&factors, &models, &root(&covariance.resize(12, 12, 0.0)))
 }
 
 /// How uncertain a gyro and an accelerometer are by what is known: of one, of the other, and how the gyro follows the accelerometer.
@@ -73,24 +66,11 @@ impl Both {
     }
 }
 
-/// Errors of the directions after `turns`, two for each, by a `gyro` and the accelerometer that gave their forces.
-pub(crate) fn directions(turns: &[Turn], gyro: &Affine<f64>, of: &Both) -> Unseen {
-    let c2 = gyro.matrix.norm_squared() / 3.0;
-    let (mut errors, mut noise) = (Vec::new(), Vec::new());
-    let (mut by_gyro, mut by_accel) = (Vec::new(), Vec::new());
-    for turn in turns {
-        let error = TurnError::at(turn, gyro);
-        errors.extend_from_slice(error.block.residual.as_slice());
-        noise.extend([turn.variance(c2); 2]);
-        by_gyro.extend([0, 1].map(|k| error.block.by(k)));
-        by_accel.extend(error.by_accel(&turn.raw));
-    }
-    let (by_gyro, by_accel) = (rows(&by_gyro), rows(&by_accel));
-    let by = DMatrix::from_fn(errors.len(), 24, |i, j| match j < 12 {
-        true => by_gyro[(i, j)],
-        false => by_accel[(i, j - 12)],
-    });
-    Unseen::of(errors.into(), noise.into(), &by, &of.root())
+/// Errors of the directions after `turns`, two for each, by the gyro and the accelerometer.
+pub(crate) fn directions(turns: &[Turn], [gyro, accel]: [&Affine<f64>; 2], of: &Both) -> Unseen {
+    let factors = Factors::of_turns(turns);
+    let models = [(Sensor::Gyro, gyro), (Sensor::Accel, accel)];
+    unseen(&factors, &models, &of.root())
 }
 
 /// Readings of one axis that depend linearly on a few parameters, with their known errors, and how a fit weights them.

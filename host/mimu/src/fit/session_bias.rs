@@ -7,7 +7,6 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use crate::estimate::least_squares::{Errors, Group, Scatter, Solution, solve_groups};
 use crate::estimate::{Estimated, Failure, Observation, earth_shared};
 use crate::observable::Observable;
-use crate::observation::magnitude::Magnitude;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Part, Triad};
@@ -41,7 +40,7 @@ pub fn estimate(
     }
     let by_size = prepared.manifest.reference == Reference::Gravity && sensor == Sensor::Accel;
     let found = match by_size {
-        true => by_magnitudes(prepared, &observations, known),
+        true => by_magnitudes(prepared, known),
         false => by_inputs(&observations, known),
     };
     let Biases {
@@ -82,23 +81,15 @@ struct Biases {
 }
 
 /// Biases of an accelerometer by the magnitude of gravity.
-fn by_magnitudes(
-    prepared: &Prepared,
-    observations: &[Observation],
-    known: &Affine<f64>,
-) -> Option<Biases> {
-    let g = prepared.manifest.gravity_mps2;
+fn by_magnitudes(prepared: &Prepared, known: &Affine<f64>) -> Option<Biases> {
     let mut model = *known;
     let mut last: Option<(Solution, Scatter)> = None;
     let mut kept = DMatrix::zeros(3, 0);
     for _ in 0..STEPS {
-        let each = observations
-            .iter()
-            .map(|o| Magnitude::at(&model, &o.raw, g));
-        let errors: Vec<Magnitude> = each.collect();
-        let n = errors.len();
-        let design = DMatrix::from_fn(n, 3, |i, k| errors[i].block.by[(0, 9 + k)]);
-        let y = DVector::from_fn(n, |i, _| -errors[i].residual());
+        let factors = prepared.magnitudes(&model);
+        let values = factors.values(&[(Sensor::Accel, &model)]);
+        let at = factors.at(&values);
+        let design = at.jacobian.columns(9, 3).into_owned();
         // Directions of the bias that the poses show.
         let svd = design.clone().svd(false, true);
         let shown = svd.v_t?;
@@ -106,15 +97,14 @@ fn by_magnitudes(
             .filter(|k| svd.singular_values[*k] > 0.05 * svd.singular_values.max())
             .collect();
         kept = shown.select_rows(&strong).transpose();
-        let variances = prepared.magnitude_variances(&model, observations);
-        let (solution, [found]) = solve_groups(&[Group {
+        let (solution, found) = solve_groups(&[Group {
             design: &design * &kept,
-            observations: y,
-            errors: Errors::Independent(DVector::from_vec(variances)),
+            observations: -at.residuals,
+            errors: Errors::Independent(factors.variances(&values).into()),
         }])?;
         let step = &kept * &solution.parameters;
         model.offset += Vector3::new(step[0], step[1], step[2]);
-        last = Some((solution, found));
+        last = Some((solution, found[0]));
     }
     let (solution, found) = last?;
     let full = &kept * solution.covariance * kept.transpose();
@@ -147,7 +137,7 @@ fn by_inputs(observations: &[Observation], known: &Affine<f64>) -> Option<Biases
         });
         let in_si = Matrix3::identity();
         let factor = earth_shared::factor(observations, axis, &in_si, &mut variances);
-        let (solution, [scatter]) = solve_groups(&[Group {
+        let (solution, scatter) = solve_groups(&[Group {
             design: DMatrix::from_element(n, 1, 1.0),
             observations: y,
             errors: match factor.ncols() {
@@ -157,7 +147,7 @@ fn by_inputs(observations: &[Observation], known: &Affine<f64>) -> Option<Biases
         }])?;
         found.offset[axis] = solution.parameters[0];
         found.covariance[(9 + axis, 9 + axis)] = solution.covariance[(0, 0)];
-        found.scatter.push((Observable::Axis(axis), scatter));
+        found.scatter.push((Observable::Axis(axis), scatter[0]));
     }
     Some(found)
 }

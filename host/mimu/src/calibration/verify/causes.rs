@@ -8,17 +8,19 @@
 //! - for a gyro judged by gravity, the direction errors of the turns and the rates at rest. The directions come from the accelerometer,
 //!   so A and d of that are estimated too, from its magnitudes and from the turns.
 
+use std::ops::Range;
+
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, SVector};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
+use crate::estimate::earth_shared;
 use crate::estimate::least_squares::{Errors, Group, Observability, Solution, solve_groups};
-use crate::estimate::{Observation, earth_shared};
-use crate::fit::by_rate::variances;
-use crate::observation::magnitude::Magnitude;
-use crate::observation::turn::{Turn, TurnError};
-use crate::observation::{ByTriad, of_output, slope, vector};
+use crate::factor::Factors;
+use crate::fit::by_rate::magnitudes;
+use crate::observable::Observable;
+use crate::observation::{ByTriad, of_output, vector};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Forward};
@@ -66,6 +68,9 @@ struct Rows {
     variances: DVector<f64>,
 }
 
+/// A triad with its calibration, and the columns of its d and A.
+type Columns<'a> = (Sensor, &'a Affine<f64>, fn(&ByTriad) -> Vec<f64>);
+
 impl Rows {
     fn of(rows: Vec<(Vec<f64>, f64, f64)>, columns: usize) -> Self {
         let n = rows.len();
@@ -74,6 +79,36 @@ impl Rows {
             errors: DVector::from_fn(n, |i, _| rows[i].1),
             variances: DVector::from_fn(n, |i, _| rows[i].2),
         }
+    }
+
+    /// Those of each group of `factors`, by what the calibrations of `triads` err by: a calibration is (1 + A) C and (1 + A) o + d of the true one.
+    fn of_groups(factors: &Factors, triads: &[Columns]) -> Vec<Self> {
+        let models: Vec<_> = triads
+            .iter()
+            .map(|(sensor, model, _)| (*sensor, *model))
+            .collect();
+        let values = factors.values(&models);
+        let (at, variances) = (factors.at(&values), factors.variances(&values));
+        let row = |i: usize, at_rest: bool| {
+            let of_triad = |(k, (_, model, columns)): (usize, &Columns)| {
+                let by = at.jacobian.fixed_view::<1, 12>(i, 12 * k).transpose();
+                let mut by = of_output(&by, model);
+                if at_rest {
+                    // There is no input that A would multiply.
+                    by.fixed_rows_mut::<9>(0).fill(0.0);
+                }
+                columns(&by)
+            };
+            let by: Vec<f64> = triads.iter().enumerate().flat_map(of_triad).collect();
+            (by, at.residuals[i], variances[i])
+        };
+        let group = |(group, rows): (Option<Observable>, Range<usize>)| {
+            let at_rest = group == Some(Observable::Rest);
+            let rows: Vec<_> = rows.map(|i| row(i, at_rest)).collect();
+            let columns = rows.first().map_or(0, |row| row.0.len());
+            Self::of(rows, columns)
+        };
+        factors.groups().map(group).collect()
     }
 
     fn group(&self, kept: &[usize]) -> Group {
@@ -93,24 +128,17 @@ const OF_MAGNITUDE: usize = 9;
 const OF_TRIAD: usize = 12;
 
 /// Derivatives by d, then by A.
-fn all(by: &ByTriad) -> impl Iterator<Item = f64> {
-    (9..12).chain(0..9).map(|k| by[k])
+fn all(by: &ByTriad) -> Vec<f64> {
+    (9..12).chain(0..9).map(|k| by[k]).collect()
 }
 
 /// Derivatives by d and the symmetric part of A.
-fn symmetric(by: &ByTriad) -> impl Iterator<Item = f64> {
+fn symmetric(by: &ByTriad) -> Vec<f64> {
     let of_a = SYMMETRIC.map(|(i, j)| match i == j {
         true => by[4 * i],
         false => by[3 * i + j] + by[3 * j + i],
     });
-    (9..12).map(|k| by[k]).chain(of_a)
-}
-
-/// Row of the magnitude error of one observation. Its derivatives are at the known magnitude: the measured one contains the error.
-fn of_magnitude(model: &Affine<f64>, raw: &Vector3<f64>, size: f64) -> (Vec<f64>, f64) {
-    let error = Magnitude::at(model, raw, size);
-    let by = slope(&error.up, &(error.up * size));
-    (symmetric(&by).collect(), error.residual())
+    (9..12).map(|k| by[k]).chain(of_a).collect()
 }
 
 /// The causes of the errors of `sensor`; `None` if the recording does not distinguish them.
@@ -123,11 +151,13 @@ pub(super) fn of(
     match (prepared.manifest.reference, sensor) {
         (Reference::Table, _) => known(prepared, sensor, model),
         (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
-            let poses = prepared.observations(Sensor::Accel);
-            separate(&[gravity_rows(prepared, model, &poses)], &[0..3, 3..9])
+            separate(&by_gravity(prepared, model), &[0..3, 3..9])
         }
         (Reference::TurntableRate, Sensor::Gyro) => by_rate(prepared, model),
-        (Reference::Gravity, Sensor::Gyro) => by_turns(prepared, model, accel?),
+        (Reference::Gravity, Sensor::Gyro) => {
+            let rows = by_directions(prepared, model, accel?)?;
+            separate(&rows, &[0..3, 3..12, 12..21])
+        }
     }
 }
 
@@ -142,7 +172,7 @@ fn known_rows(prepared: &Prepared, sensor: Sensor, model: &Affine<f64>) -> Optio
         let error = vector::at(model, &o.raw, &o.input).residual;
         let by = vector::at(&Affine::identity(), &o.input, &o.input);
         let covariance = si_covariance(&model.matrix, &o.variance);
-        rows.extend([0, 1, 2].map(|k| (all(&by.by(k)).collect(), error[k], covariance[(k, k)])));
+        rows.extend([0, 1, 2].map(|k| (all(&by.by(k)), error[k], covariance[(k, k)])));
     }
     Some(Rows::of(rows, OF_TRIAD))
 }
@@ -165,21 +195,20 @@ pub(super) fn announced(
     let (rows, each) = match (prepared.manifest.reference, sensor) {
         (Reference::Table, _) => (known_rows(prepared, sensor, &model)?, 1.0),
         (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
-            let poses = prepared.observations(Sensor::Accel);
-            (gravity_rows(prepared, &model, &poses), 1.0)
+            (by_gravity(prepared, &model).pop()?, 1.0)
         }
         (Reference::TurntableRate, Sensor::Gyro) => {
             let dwells = RatedDwells::of(prepared).ok()?;
-            (turning_rows(&dwells, &model), 1.0)
+            let of_gyro = [(Sensor::Gyro, &model, symmetric as fn(&ByTriad) -> _)];
+            let rows = Rows::of_groups(&magnitudes(&dwells, &model), &of_gyro).pop()?;
+            (rows, 1.0)
         }
         (Reference::Gravity, Sensor::Gyro) => {
             let accel = calibration.inverse(Sensor::Accel)?;
             if let Some(known) = uncertainty(Sensor::Accel) {
                 of_accel = of_errors(&accel, known)?.0;
             }
-            let (turns, _) = prepared.turns(&accel);
-            let rows = turns.iter().flat_map(|t| turn_rows(t, &model, 1.0));
-            (Rows::of(rows.collect(), OF_TRIAD + OF_MAGNITUDE), 2.0)
+            (by_directions(prepared, &model, &accel)?.swap_remove(0), 2.0)
         }
     };
     let square = |row: &[f64]| {
@@ -207,23 +236,11 @@ fn of_errors(
     Some((by * covariance * by.transpose(), sigmas))
 }
 
-/// Derivatives of d and A by C by rows and o: for a unit with the model C and o, a calibration `C + dC, o + do` has `A = dC C⁻¹` and `d = do - A o`.
+/// Derivatives of d and A by C by rows and o.
 fn changes(model: &Affine<f64>) -> Option<Covariance> {
-    let inverse = model.matrix.try_inverse()?;
-    let mut out = Covariance::zeros();
-    for i in 0..3 {
-        for k in 0..3 {
-            // C_ik changes row i of A by row k of the inverse.
-            let column = 3 * i + k;
-            let row = inverse.row(k);
-            for j in 0..3 {
-                out[(3 + 3 * i + j, column)] = row[j];
-            }
-            out[(i, column)] = -row.transpose().dot(&model.offset);
-        }
-        out[(i, 9 + i)] = 1.0;
-    }
-    Some(out)
+    let rows: [Vec<f64>; 12] =
+        std::array::from_fn(|k| all(&of_output(&ByTriad::ith(k, 1.0), model)));
+    Covariance::from_fn(|k, j| rows[k][j]).try_inverse()
 }
 
 /// A row's derivatives by d and A; one by d and the symmetric part of A is spread over both halves. Columns of the accelerometer are left out.
@@ -241,86 +258,39 @@ fn spread(row: &[f64]) -> SVector<f64, 12> {
     by
 }
 
-fn gravity_rows(prepared: &Prepared, model: &Affine<f64>, poses: &[Observation]) -> Rows {
-    let g = prepared.manifest.gravity_mps2;
-    let noise = prepared.magnitude_variances(model, poses);
-    let rows = poses.iter().zip(noise).map(|(o, variance)| {
-        let (row, error) = of_magnitude(model, &o.raw, g);
-        (row, error, variance)
-    });
-    Rows::of(rows.collect(), OF_MAGNITUDE)
+fn by_gravity(prepared: &Prepared, accel: &Affine<f64>) -> Vec<Rows> {
+    Rows::of_groups(
+        &prepared.magnitudes(accel),
+        &[(Sensor::Accel, accel, symmetric)],
+    )
 }
 
-fn turning_rows(dwells: &RatedDwells, model: &Affine<f64>) -> Rows {
-    let noise = variances(model, &dwells.turning);
-    let turning = dwells.turning.iter().zip(dwells.magnitudes()).zip(noise);
-    let turning = turning.map(|((o, size), variance)| {
-        let (row, error) = of_magnitude(model, &o.raw, size);
-        (row, error, variance)
-    });
-    Rows::of(turning.collect(), OF_MAGNITUDE)
-}
-
-fn by_rate(prepared: &Prepared, model: &Affine<f64>) -> Option<Causes> {
+fn by_rate(prepared: &Prepared, gyro: &Affine<f64>) -> Option<Causes> {
     let dwells = RatedDwells::of(prepared).ok()?;
-    let turning = turning_rows(&dwells, model);
-    let rests = dwells.rests.iter().flat_map(|o| {
-        let covariance = si_covariance(&model.matrix, &o.variance);
-        let rate = model.apply(&o.raw);
-        [0, 1, 2].map(|k| {
-            let mut row = vec![0.0; OF_MAGNITUDE];
-            row[k] = 1.0;
-            (row, rate[k], covariance[(k, k)])
-        })
-    });
-    let rests = Rows::of(rests.collect(), OF_MAGNITUDE);
-    separate(&[turning, rests], &[0..3, 3..9])
+    let mut factors = magnitudes(&dwells, gyro);
+    factors.rests(&dwells.rests);
+    let rows = Rows::of_groups(&factors, &[(Sensor::Gyro, gyro, symmetric)]);
+    separate(&rows, &[0..3, 3..9])
 }
 
-fn by_turns(prepared: &Prepared, gyro: &Affine<f64>, accel: &Affine<f64>) -> Option<Causes> {
-    const ALL: usize = OF_TRIAD + OF_MAGNITUDE;
+/// Directions after turns, rates at rest, and magnitudes of gravity. `None` without a turn.
+fn by_directions(
+    prepared: &Prepared,
+    gyro: &Affine<f64>,
+    accel: &Affine<f64>,
+) -> Option<Vec<Rows>> {
     let (turns, _) = prepared.turns(accel);
-    let c2 = gyro.matrix.norm_squared() / 3.0;
-    let mut rows = Vec::new();
-    for turn in &turns {
-        rows.extend(turn_rows(turn, gyro, turn.variance(c2)));
-    }
-    let of_turns = Rows::of(rows, ALL);
-    let rests = prepared.rest(accel).into_iter().flat_map(|o| {
-        let covariance = si_covariance(&gyro.matrix, &o.variance);
-        let error = gyro.apply(&o.raw) - o.rate;
-        [0, 1, 2].map(|k| {
-            let mut row = vec![0.0; ALL];
-            row[k] = 1.0;
-            (row, error[k], covariance[(k, k)] + o.rate_variance[k])
-        })
-    });
-    let rests = Rows::of(rests.collect(), ALL);
-    let poses = prepared.observations(Sensor::Accel);
-    let mut of_poses = gravity_rows(prepared, accel, &poses);
-    of_poses.design = of_poses.design.insert_columns(0, OF_TRIAD, 0.0);
-    separate(&[of_turns, rests, of_poses], &[0..3, 3..12, 12..21])
-}
-
-/// Rows of the two components of a turn's direction error: gyro, then accelerometer.
-fn turn_rows(turn: &Turn, gyro: &Affine<f64>, variance: f64) -> [(Vec<f64>, f64, f64); 2] {
-    let error = TurnError::at(turn, gyro);
-    let by_accel = error.by_accel(&[turn.before, turn.after]);
-    [0, 1].map(|s| {
-        // The calibration is (1 + A) C and (1 + A) o + d of the true one.
-        let by_gyro = of_output(&error.block.by(s), gyro);
-        let row = all(&by_gyro).chain(symmetric(&by_accel[s])).collect();
-        (row, error.block.residual[s], variance)
-    })
+    let mut factors = Factors::of_turns(&turns);
+    factors.rests(&prepared.rest(accel));
+    factors.list.extend(prepared.magnitudes(accel).list);
+    let triads: [Columns; 2] = [(Sensor::Gyro, gyro, all), (Sensor::Accel, accel, symmetric)];
+    (!turns.is_empty()).then(|| Rows::of_groups(&factors, &triads))
 }
 
 /// Separates the mean square of the first group into what each range of columns explains: bias, matrix and, if there is a third, the accelerometer.
 /// Columns of inputs that the recording lacks are dropped.
-fn separate<const N: usize>(
-    groups: &[Rows; N],
-    causes: &[std::ops::Range<usize>],
-) -> Option<Causes> {
-    let columns = groups[0].design.ncols();
+fn separate(groups: &[Rows], causes: &[Range<usize>]) -> Option<Causes> {
+    let columns = groups.first()?.design.ncols();
     let size = |j: usize| {
         groups
             .iter()
@@ -332,10 +302,10 @@ fn separate<const N: usize>(
     if count <= kept.len() || groups[0].errors.is_empty() || !determined(groups, &kept) {
         return None;
     }
-    let by_group: [Group; N] = std::array::from_fn(|g| groups[g].group(&kept));
+    let by_group: Vec<Group> = groups.iter().map(|g| g.group(&kept)).collect();
     let (solution, _) = solve_groups(&by_group)?;
     let judged = &by_group[0];
-    let of = |range: &std::ops::Range<usize>| {
+    let of = |range: &Range<usize>| {
         let ours = (0..kept.len()).filter(|k| range.contains(&kept[*k]));
         Part::of(judged, &solution, &ours.collect::<Vec<_>>())
     };

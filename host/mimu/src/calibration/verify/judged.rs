@@ -122,7 +122,7 @@ pub(super) fn test(prepared: &Prepared, sensor: Sensor, calibration: &Calibratio
                 accel: calibration.known_covariance(Sensor::Accel),
                 follows: Covariance::zeros(),
             };
-            predicted::directions(&prepared.turns(&accel).0, &model, &both)
+            predicted::directions(&prepared.turns(&accel).0, [&model, &accel], &both)
         }
     };
     Test::of(&[unseen], (f64::INFINITY, 0.0))

@@ -6,9 +6,14 @@
 //! uncertainty of their parameters and is estimated from their scatter, with Student's distribution for their degrees of freedom (Belsley, Kuh and
 //! Welsch, 1980, section 2.1).
 
+use std::ops::Range;
+
+use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use crate::factor::Factors;
+use crate::quantity::Sensor;
 use crate::signal::blocks::quantile;
 
 /// An observation to judge: its error, the derivatives of the error by the parameters, and its variance by noise.
@@ -16,6 +21,28 @@ pub(super) struct Row {
     pub error: Vector3<f64>,
     pub by: DMatrix<f64>,
     pub variance: f64,
+}
+
+impl Row {
+    /// The factors of a list by the parameters `free` of a triad.
+    pub fn of(factors: &Factors, triad: (Sensor, &Affine<f64>), free: &[usize]) -> Vec<Self> {
+        let values = factors.values(&[triad]);
+        let (at, variances) = (factors.at(&values), factors.variances(&values));
+        let row = |rows: Range<usize>| {
+            let own = |i: usize, of: &dyn Fn(usize) -> f64| match i < rows.len() {
+                true => of(rows.start + i),
+                false => 0.0,
+            };
+            Self {
+                error: Vector3::from_fn(|i, _| own(i, &|row| at.residuals[row])),
+                by: DMatrix::from_fn(3, free.len(), |i, k| {
+                    own(i, &|row| at.jacobian[(row, free[k])])
+                }),
+                variance: variances[rows.clone()].iter().sum::<f64>() / rows.len() as f64,
+            }
+        };
+        factors.ranges().map(row).collect()
+    }
 }
 
 /// Error and standard deviations of each of the first `judged` rows against the prediction of the others; `dimensions` is the
