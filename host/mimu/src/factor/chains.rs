@@ -2,11 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::observation::turn::{Rest, Turn, TurnError, across};
-use crate::observation::{ByTriad, vector};
+use crate::observation::turn::{Rest, Turn, across};
 
 /// Dwells that turns connect one to the next. Within a chain the heading is known except for one angle. So the Earth's rate across the vertical is
 /// known except for two numbers, which are estimated.
@@ -23,60 +21,7 @@ pub struct Chains {
 /// Dwells from which on a chain estimates its two numbers; in shorter chains the Earth's rate across the vertical is noise.
 const CHAIN: usize = 6;
 
-/// A residual of a gyro by hand: a component of a turn's direction error, or of the rate at rest.
-#[derive(Debug, Clone, Copy)]
-pub struct GyroRow {
-    /// Residual, rad or rad/s.
-    pub residual: f64,
-    /// Derivatives by the gyro.
-    pub by: ByTriad,
-    /// Its chain, and the derivatives by the Earth's level rate in it.
-    level: Option<(usize, [f64; 2])>,
-}
-
-impl GyroRow {
-    /// Place of each level rate among those of all chains, and the derivative by it.
-    pub fn by_level(&self) -> impl Iterator<Item = (usize, f64)> {
-        let each = self.level.into_iter();
-        each.flat_map(|(chain, by)| [(2 * chain, by[0]), (2 * chain + 1, by[1])])
-    }
-}
-
 impl Chains {
-    /// Two rows of each turn, with these errors, then three of each rest under `model`, whose o is the rate at the reading `centre`.
-    pub fn rows(
-        &self,
-        turns: &[Turn],
-        errors: &[TurnError],
-        rest: &[Rest],
-        model: &Affine<f64>,
-        centre: &Vector3<f64>,
-    ) -> Vec<GyroRow> {
-        let level = self.level(turns, errors.iter().map(|e| e.rotation));
-        let mut rows = Vec::with_capacity(2 * turns.len() + 3 * rest.len());
-        for (t, (turn, error)) in turns.iter().zip(errors).enumerate() {
-            let earth = self.of_turn[t].zip(level.get(&turn.to));
-            rows.extend([0, 1].map(|k| GyroRow {
-                residual: error.block.residual[k],
-                by: error.block.by(k),
-                level: earth.map(|(chain, l)| {
-                    let by = error.by_level(l, turn.duration_s).row(k).transpose();
-                    (chain, by.into())
-                }),
-            }));
-        }
-        for (r, o) in rest.iter().enumerate() {
-            let block = vector::at(model, &(o.raw - centre), &o.rate);
-            let earth = self.of_rest[r].zip(level.get(&o.dwell));
-            rows.extend([0, 1, 2].map(|axis| GyroRow {
-                residual: block.residual[axis],
-                by: block.by(axis),
-                level: earth.map(|(chain, l)| (chain, l.map(|level| -level[axis]))),
-            }));
-        }
-        rows
-    }
-
     /// The chains of turns, which are in order of time.
     pub fn of(turns: &[Turn], rest: &[Rest]) -> Self {
         let mut out = Self {

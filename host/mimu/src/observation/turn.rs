@@ -42,12 +42,7 @@ impl Turn<'_> {
     /// Variance of one component of the direction error, rad², for a gyro with a mean square of `c2` per row of C: by noise, and by the Earth's rate about
     /// a heading that is unknown. A quiet gyro in turns of eight seconds errs by the Earth twice as much as by its noise.
     pub fn variance(&self, c2: f64) -> f64 {
-        self.variance_beside_earth(c2) + self.earth_variance
-    }
-
-    /// The same where the Earth's level rate is among the parameters.
-    pub fn variance_beside_earth(&self, c2: f64) -> f64 {
-        self.direction_variance + c2 * self.integral_variance
+        self.direction_variance + c2 * self.integral_variance + self.earth_variance
     }
 
     /// Size of the direction error (rad, two components) by noise and the Earth, with `c2` as for [`Self::variance`].

@@ -9,7 +9,8 @@ use super::build::{Builder, Part};
 use super::{ForceErrors, Row, RowFigure, Stratum, row_variances, shared_by_several};
 use crate::effects::quantity::Conditions;
 use crate::estimate::earth::poses;
-use crate::factor::chains::{Chains, GyroRow};
+use crate::factor::chains::Chains;
+use crate::factor::{Factors, Linearized};
 use crate::observable::{Observable, StratumName};
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::{Rest, Turn, TurnError};
@@ -155,9 +156,9 @@ impl Builder<'_> {
             .iter()
             .map(|d| self.dwell(*d, self.force(*d, accel)))
             .collect();
-        let found = by_hand.rows();
-        let nuisance = by_hand.nuisance(&found);
-        let mut y: Vec<f64> = found[..m].iter().map(|row| row.residual).collect();
+        let nuisance = by_hand.nuisance();
+        let residuals = &by_hand.at.residuals;
+        let mut y = residuals.as_slice()[..m].to_vec();
         let mut strata = Vec::new();
         if m > 0 {
             strata.push(by_hand.turn_stratum(forces));
@@ -167,7 +168,7 @@ impl Builder<'_> {
         for axis in 0..3 {
             for (i, dwell) in dwells.iter().enumerate() {
                 self.mean_row(*dwell, &conditions[i], body.row(axis).transpose());
-                y.push(found[m + 3 * i + axis].residual);
+                y.push(residuals[m + 3 * i + axis]);
             }
             strata.push(by_hand.rest_stratum(axis, wander.as_ref(), random_walk.as_ref()));
         }
@@ -250,7 +251,10 @@ struct ByHand<'a> {
     rest: Vec<Rest>,
     /// Mean reading of all dwells at rest, raw.
     at_rest: Vector3<f64>,
-    chains: Chains,
+    /// Residuals of the turns, then of the dwells at rest, and their derivatives by the gyro and the level rates of the chains.
+    at: Linearized,
+    /// Known variances of these.
+    variances: Vec<f64>,
     /// The pose of each dwell at rest whose heading is unknown. In one pose a bias absorbs the Earth's rate.
     poses: Vec<Option<usize>>,
 }
@@ -280,13 +284,18 @@ impl<'a> ByHand<'a> {
         let poses = of_chains
             .map(|(pose, chain)| (!in_one_pose && chain.is_none()).then_some(*pose))
             .collect();
+        let mut factors = Factors::among(&turns, chains);
+        factors.directions(Observable::Turns, |_| true);
+        factors.rests(&rest);
+        let values = factors.values(&[(Sensor::Gyro, &inverse)]);
         Self {
+            at: factors.at(&values),
+            variances: factors.variances(&values),
             inverse,
             turns,
             errors,
             at_rest: mean(rest.iter().map(|o| &o.raw)),
             rest,
-            chains,
             poses,
         }
     }
@@ -295,34 +304,17 @@ impl<'a> ByHand<'a> {
         2 * self.turns.len()
     }
 
-    fn rows(&self) -> Vec<GyroRow> {
-        self.chains.rows(
-            &self.turns,
-            &self.errors,
-            &self.rest,
-            &self.inverse,
-            &Vector3::zeros(),
-        )
-    }
-
-    /// Derivatives of the rows `found` by the gyro and the level rates of the chains. Here the rests are by axes.
-    fn nuisance(&self, found: &[GyroRow]) -> DMatrix<f64> {
+    /// Derivatives of the rows by the gyro and the level rates of the chains. Here the rests are by axes.
+    fn nuisance(&self) -> DMatrix<f64> {
         // The mean reading of all dwells at rest instead of each dwell's own, whose noise is in the row too. With the latter, a matrix
         // of zeros would explain that noise wholly, and `rate_x` with coefficient -1 would correct the turns for it.
-        let by_rest = vector::at(&self.inverse, &self.at_rest, &Vector3::zeros());
+        let by_rest = vector::at(&self.inverse, &self.at_rest, &Vector3::zeros()).by;
         let (m, n) = (self.turn_rows(), self.rest.len());
-        let mut nuisance = DMatrix::zeros(m + 3 * n, 12 + 2 * self.chains.count);
-        for (k, row) in found.iter().enumerate() {
-            let (to, by) = match k.checked_sub(m) {
-                None => (k, row.by),
-                Some(k) => (m + k % 3 * n + k / 3, by_rest.by(k % 3)),
-            };
-            nuisance
-                .view_mut((to, 0), (1, 12))
-                .copy_from(&by.transpose());
-            for (place, by) in row.by_level() {
-                nuisance[(to, 12 + place)] = by;
-            }
+        let mut nuisance = self.at.jacobian.clone();
+        for (i, axis) in (0..n).flat_map(|i| [0, 1, 2].map(|axis| (i, axis))) {
+            let mut row = self.at.jacobian.row(m + 3 * i + axis).into_owned();
+            row.columns_mut(0, 12).copy_from(&by_rest.row(axis));
+            nuisance.set_row(m + axis * n + i, &row);
         }
         nuisance
     }
@@ -339,7 +331,9 @@ impl<'a> ByHand<'a> {
             axis: None,
             session: 0,
             rows: 0..self.turn_rows(),
-            known: DMatrix::from_diagonal(&DVector::from_vec(self.turn_variances())),
+            known: DMatrix::from_diagonal(&DVector::from_column_slice(
+                &self.variances[..self.turn_rows()],
+            )),
             by_reference: by_reference.as_ref().map(row_variances),
             by_earth: None,
             open: by_reference,
@@ -347,19 +341,6 @@ impl<'a> ByHand<'a> {
             wander_known: true,
             within: false,
         }
-    }
-
-    fn turn_variances(&self) -> Vec<f64> {
-        let mean_square = self.inverse.matrix.norm_squared() / 3.0;
-        let chains = self.turns.iter().zip(&self.chains.of_turn);
-        let each = chains.flat_map(|(t, chain)| {
-            let variance = match chain {
-                Some(_) => t.variance_beside_earth(mean_square),
-                None => t.variance(mean_square),
-            };
-            [variance; 2]
-        });
-        each.collect()
     }
 
     /// With the wander of the biases, if that is known.
