@@ -1,6 +1,7 @@
 //! Units with known truth on the virtual bench, recorded and read as a user's recordings are.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use mimu::noise::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
@@ -172,12 +173,17 @@ pub fn hand_plan(poses: usize) -> String {
 
 /// The recording of a plan, in the folder `recording` of a temporary folder.
 pub fn written(plan: &str, file: &RigFile, seed: u64) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    written_in(&folder.path().join("recording"), plan, file, seed);
+    folder
+}
+
+/// The recording of a plan, in a folder that does not exist yet.
+pub fn written_in(folder: &Path, plan: &str, file: &RigFile, seed: u64) {
     let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
     let truth = RigTruth::resolve(file, seed).expect("a rig");
-    let folder = tempfile::tempdir().expect("a folder");
-    let output = Output::new(&folder.path().join("recording"), &plan).expect("a name");
+    let output = Output::new(folder, &plan).expect("a name");
     write(&plan, &truth, seed, &output).expect("written");
-    folder
 }
 
 /// The recording of a plan on a turntable: only the magnitudes of its rates are known.

@@ -83,7 +83,7 @@ pub struct Errors {
 }
 
 /// The unit of `experiment` with this seed: its rig file, and the true biases, V.
-fn unit(experiment: Experiment, random: &mut Random) -> (RigFile, Vector3<f64>) {
+pub fn unit(experiment: Experiment, random: &mut Random) -> (RigFile, Vector3<f64>) {
     let mut matrix = [[0.0; 3]; 3];
     for (i, row) in matrix.iter_mut().enumerate() {
         for (k, element) in row.iter_mut().enumerate() {
@@ -109,7 +109,7 @@ fn unit(experiment: Experiment, random: &mut Random) -> (RigFile, Vector3<f64>) 
 }
 
 /// The plan of `experiment` at a latitude, degrees, with the table turned by a random heading.
-fn plan(experiment: Experiment, latitude_deg: f64, random: &mut Random) -> String {
+pub fn plan(experiment: Experiment, latitude_deg: f64, random: &mut Random) -> String {
     let heading = random.within(180.0);
     let mut plan = format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = 50\ncarrier = \"table\"\nlatitude_deg = {latitude_deg}\n"

@@ -19,6 +19,7 @@
 //! | [`page`]               | tables in documents, between markers                              |
 //! | [`text_board`], [`stored_calibration`] | a board that writes text, in hands; its calibration file against its truth |
 //! | `tests/all/`           | agreement of estimators, intervals, diagnosis, published results  |
+//! | `frozen/`              | results of recordings of every kind, as they are: `tests/all/frozen.rs` compares them |
 //! | `papers/`, `blind/`    | figures of `docs/papers`; units with undeclared effects        |
 //! | `clumsy/`              | sessions of the wizard with a person who errs, on boards that err |
 //! | `board/`, `counted/`, `no_panic/` | separate crates: the firmware's image on the emulated board, the cost of its loops, freedom from panics |

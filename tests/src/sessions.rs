@@ -129,7 +129,7 @@ pub(crate) fn unit(seed: u64) -> RigFile {
 }
 
 /// A session of the unit `seed`, and the seed of its noise.
-pub(crate) fn session(seed: u64, life: Life, session: u32) -> (RigFile, u64) {
+pub fn session(seed: u64, life: Life, session: u32) -> (RigFile, u64) {
     let mut file = unit(seed);
     file.history = life.history(seed, session);
     (file, 1000 * seed + u64::from(session))

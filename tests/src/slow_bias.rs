@@ -81,7 +81,7 @@ impl Kind {
     }
 
     /// 3 to 5 minutes on a warm desk, or 9 minutes in which the unit warms by some 15 K and cools again.
-    fn plan(self, seed: u64) -> String {
+    pub fn plan(self, seed: u64) -> String {
         if !self.in_chamber() {
             return plan(seed);
         }
@@ -91,7 +91,8 @@ impl Kind {
             .into()
     }
 
-    fn unit(self, grade: Grade, seed: u64) -> RigFile {
+    /// A unit of `grade` with its effects.
+    pub fn unit(self, grade: Grade, seed: u64) -> RigFile {
         let mut file = unit(&[], grade, seed);
         if self.is_warm() {
             file.thermal.on_before_s = Some(3600.0);

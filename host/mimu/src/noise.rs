@@ -370,11 +370,11 @@ impl Noise {
         })
     }
 
-    /// Covariance of a change of the biases of `sensor` between parts of a session, if there are so many `parts` of equal length, by the noise over such a time:
-    /// twice its Allan variance. Of C by rows, then o, for readings that `matrix` converts to SI.
-    pub fn between_parts(&self, sensor: Sensor, matrix: &Matrix3<f64>, parts: usize) -> Covariance {
+    /// Covariance of a change of the biases of `sensor` from another session of this length to this one, by the noise over such a time: twice its Allan
+    /// variance. Of C by rows, then o, for readings that `matrix` converts to SI.
+    pub fn between_sessions(&self, sensor: Sensor, matrix: &Matrix3<f64>) -> Covariance {
         let from = sensor.channels().start;
-        let length_s = (self.session[1] - self.session[0]) / parts.max(1) as f64;
+        let length_s = self.session[1] - self.session[0];
         let mut covariance = Covariance::zeros();
         if self.of_table.is_none() && length_s > 0.0 {
             let raw = Vector3::from_fn(|i, _| 2.0 * self.variance(from + i, length_s, f64::NAN));

@@ -9,6 +9,7 @@ mod earth;
 mod few_poses;
 mod flaws;
 mod fleet;
+mod frozen;
 mod joint;
 mod judgement;
 mod led_whole_turns;

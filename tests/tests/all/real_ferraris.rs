@@ -95,7 +95,7 @@ impl Part {
 }
 
 /// One session: mimu's recording and imucal's calibration.
-struct Session {
+pub(crate) struct Session {
     foreign: Foreign<'static>,
     parts: Vec<Part>,
     turn_deg: f64,
@@ -112,11 +112,20 @@ impl Session {
 
     fn fit(&self, turns: bool, method: Method) -> Fit {
         let text = inputs(turns.then_some(self.turn_deg));
-        let foreign = Foreign {
-            inputs: Some(&text),
+        self.with(&text).fit(method).expect("it can be fitted")
+    }
+
+    fn with<'a>(&'a self, inputs: &'a str) -> Foreign<'a> {
+        Foreign {
+            inputs: Some(inputs),
             ..self.foreign.clone()
-        };
-        foreign.fit(method).expect("it can be fitted")
+        }
+    }
+
+    /// Imports it with its faces and turns.
+    pub(crate) fn import(&self, folder: &TempDir) {
+        let text = inputs(Some(self.turn_deg));
+        self.with(&text).import(folder).expect("importable");
     }
 }
 
@@ -125,7 +134,7 @@ fn temporary() -> TempDir {
 }
 
 /// The session whose samples are labelled with the name of their part. Raw counts.
-fn annotated() -> Option<Session> {
+pub(crate) fn annotated() -> Option<Session> {
     let data = data_set("imucal_ferraris")?;
     let file = data.join("annotated_session.csv");
     let text = std::fs::read_to_string(&file).expect("it is in the data set");
@@ -200,7 +209,7 @@ fn session_parts(data: &Path) -> Vec<(String, std::ops::Range<usize>)> {
     parts
 }
 
-fn uninterrupted() -> Option<(Session, Samples)> {
+pub(crate) fn uninterrupted() -> Option<(Session, Samples)> {
     let data = data_set("imucal_ferraris")?;
     let samples = session_samples(&data.join("example_ferraris_session.csv"));
     let folder = temporary();

@@ -132,6 +132,17 @@ pub fn first_guess(observations: &[Observation], gravity: f64) -> Option<Affine<
     Some(sphere.model(gravity))
 }
 
+/// The same for several magnitudes: one scale factor for all axes, by the spheres through the readings and the rests at their centre.
+pub fn rough(observations: &[Observation], known: &KnownMagnitudes) -> Option<Affine<f64>> {
+    let unit = known.levels.iter().copied().fold(0.0, f64::max);
+    let shares: Vec<f64> = known
+        .level_of
+        .iter()
+        .map(|l| known.levels[*l] / unit)
+        .collect();
+    Some(Sphere::through(observations, &shares, known.rests)?.model(unit))
+}
+
 /// Fits C and o of an accelerometer to `|C u + o| = gravity` (m/s²) over all observations, and to a `prior`; see [`estimate`].
 pub fn by_gravity(
     observations: &[Observation],
@@ -248,10 +259,13 @@ impl<'a> ByMagnitudes<'a> {
             .ok_or_else(|| Failure::NoSolution("the dwell means do not lie on a sphere".into()))?;
         let first = sphere.model(unit);
         let err = known.level_sigma > 0.0;
+        // A reading at the end of the range has no noise, and would be believed against all others.
+        let floor = 1e-12 * variances.iter().copied().fold(0.0, f64::max);
         let mut factors = Factors::default();
         for ((o, level), variance) in observations.iter().zip(known.level_of).zip(variances) {
             let magnitude = (known.levels[*level], err.then_some(*level));
-            factors.magnitude(known.sensor, (o.dwell, o.raw), magnitude, *variance);
+            let variance = variance.max(floor);
+            factors.magnitude(known.sensor, (o.dwell, o.raw), magnitude, variance);
         }
         factors.rests(known.rests);
         let of_dwells = factors.rows();

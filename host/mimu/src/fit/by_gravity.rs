@@ -97,12 +97,10 @@ pub(super) fn fit_gravity(
             .filter(|o| part_of(held_out.split, o.dwell) == part);
         let own: Vec<Observation> = own.copied().collect();
         let noise = prepared.magnitude_variances(&triad.inverse, &own);
-        let matrix = &triad.inverse.matrix;
-        let wander = prepared.noise.between_parts(Sensor::Accel, matrix, parts);
         let known = own.iter().map(|o| (o, g));
         Some(predicted::magnitudes(
             &triad.inverse,
-            &(triad.known_covariance() + wander),
+            &triad.known_covariance(),
             known,
             noise,
         ))
@@ -542,11 +540,8 @@ fn fit_turns(
             .iter()
             .filter(|t| (parts.of)(held.split, t.to) == part);
         let own: Vec<Turn> = own.copied().collect();
-        let mut both = Both::of(gyro, &accel.triad);
+        let both = Both::of(gyro, &accel.triad);
         let models = [&gyro.triad.inverse, &accel.triad.inverse];
-        both.gyro += prepared
-            .noise
-            .between_parts(Sensor::Gyro, &models[0].matrix, parts.count);
         Some(predicted::directions(&own, models, &both))
     };
     let unseen: Vec<Unseen> = held.refits.iter().enumerate().filter_map(unseen).collect();

@@ -63,14 +63,25 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         return Err(prepared.with_steps_as_given(error, Sensor::Gyro));
     }
     let estimate = |kept: &dyn Fn(usize) -> bool| estimate(dwells, kept);
-    let gyro = estimate(&|_| true).map_err(|f| prepared.refused(f, Sensor::Gyro))?;
+    let rates = |model: &Affine<f64>| -> Vec<f64> {
+        let turning = dwells.turning.iter();
+        turning.map(|o| model.apply(&o.raw).norm()).collect()
+    };
+    let gyro = match estimate(&|_| true) {
+        Ok(gyro) => gyro,
+        Err(failure) => {
+            // A fit to a wrong rate need not converge.
+            let known = known(dwells, &dwells.rate_of, &dwells.rests);
+            if let Failure::NoSolution(_) = failure
+                && let Some(rough) = magnitude::rough(&dwells.turning, &known)
+            {
+                dwells.refuse_other_rate(prepared, &rates(&rough))?;
+            }
+            return Err(prepared.refused(failure, Sensor::Gyro));
+        }
+    };
     let inverse = gyro.triad.inverse;
-    let fitted: Vec<f64> = dwells
-        .turning
-        .iter()
-        .map(|o| inverse.apply(&o.raw).norm())
-        .collect();
-    dwells.refuse_other_rate(prepared, &fitted)?;
+    dwells.refuse_other_rate(prepared, &rates(&inverse))?;
     let error = |triad: &Triad, o: &Observation, rate: f64| {
         Vector3::new(
             Magnitude::at(&triad.inverse, &o.raw, rate).residual(),
@@ -168,6 +179,22 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
     Ok(fit)
 }
 
+/// What is known of dwells with these rates, and of these rests.
+fn known<'a>(
+    dwells: &'a RatedDwells,
+    rate_of: &'a [usize],
+    rests: &'a [Rest],
+) -> KnownMagnitudes<'a> {
+    KnownMagnitudes {
+        prior: None,
+        sensor: Sensor::Gyro,
+        levels: &dwells.rates,
+        level_sigma: dwells.rate_sigma,
+        level_of: rate_of,
+        rests,
+    }
+}
+
 /// The gyro by the `kept` dwells.
 fn estimate(
     dwells: &RatedDwells,
@@ -180,14 +207,7 @@ fn estimate(
         .unzip();
     let rests = dwells.rests.iter().filter(|r| kept(r.dwell));
     let rests: Vec<Rest> = rests.copied().collect();
-    let known = KnownMagnitudes {
-        prior: None,
-        sensor: Sensor::Gyro,
-        levels: &dwells.rates,
-        level_sigma: dwells.rate_sigma,
-        level_of: &rate_of,
-        rests: &rests,
-    };
+    let known = known(dwells, &rate_of, &rests);
     // Noise is in raw units; a sphere through the readings converts it to SI well enough.
     let sphere = magnitude::first_guess(&turning, dwells.rates[0]);
     let rough = sphere.map_or_else(|| vec![0.0; turning.len()], |s| variances(&s, &turning));

@@ -87,7 +87,7 @@ fn figures(
 /// unknown, or if nothing judges the sensor.
 pub(super) fn test(prepared: &Prepared, sensor: Sensor, calibration: &Calibration) -> Option<Test> {
     let model = calibration.inverse(sensor)?;
-    let wander = prepared.noise.between_parts(sensor, &model.matrix, 1);
+    let wander = prepared.noise.between_sessions(sensor, &model.matrix);
     let covariance = calibration.known_covariance(sensor) + wander;
     let known = |s: &Sensor| prepared.noise.is_known(*s);
     let by_turns = prepared.manifest.reference == Reference::Gravity && sensor == Sensor::Gyro;
