@@ -10,6 +10,7 @@ mod few_poses;
 mod flaws;
 mod fleet;
 mod joint;
+mod judged;
 mod judgement;
 mod led_whole_turns;
 mod module_circles;
