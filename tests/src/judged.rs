@@ -7,7 +7,7 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
 use mimu::diagnose::{Recordings, diagnose};
-use mimu::fit::{Options, fit};
+use mimu::fit::{Fit, Options, fit};
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -356,18 +356,27 @@ impl Kind {
     }
 
     /// Rms that an effect leaves after the affine fit, over the noise, for the sensor with this effect. Not a number if one of the recordings is refused.
-    fn strength(&self, sensor: Sensor, with: &Prepared, without: &Prepared) -> f64 {
-        if matches!(self.setting, Setting::Table | Setting::Ramp) {
-            return blind::strength(with, without).1;
-        }
-        let [with, without] = [with, without].map(|p| fit(p.clone(), Options::IN_SAMPLE).ok());
+    fn strength(&self, sensor: Sensor, with: &Prepared, without: &Without) -> f64 {
+        let Some(fit_without) = &without.fit else {
+            return blind::strength(with, &without.prepared).1;
+        };
         let of = || {
-            let (with, without) = (with?, without?);
-            let (with, without) = (with.sensor(sensor)?, without.sensor(sensor)?);
+            let with = fit(with.clone(), Options::IN_SAMPLE).ok()?;
+            let (with, without) = (with.sensor(sensor)?, fit_without.sensor(sensor)?);
             let excess = with.rms().powi(2) - without.rms().powi(2);
             Some(excess.max(0.0).sqrt() / without.noise_floor())
         };
         of().unwrap_or(f64::NAN)
+    }
+
+    /// The first recording of the clean unit `seed`; `None` if it is refused.
+    fn without(&self, seed: u64) -> Option<Without> {
+        let prepared = self.recorded(&[], seed, 0);
+        let fit = match self.setting {
+            Setting::Table | Setting::Ramp => None,
+            _ => Some(fit(prepared.clone(), Options::IN_SAMPLE).ok()?),
+        };
+        Some(Without { prepared, fit })
     }
 
     /// The effect of the unit `seed`, and its strength in the first recording; `None` if no size has it.
@@ -388,7 +397,7 @@ impl Kind {
             true => Sensor::Gyro,
             false => Sensor::Accel,
         };
-        let without = self.recorded(&[], seed, 0);
+        let without = self.without(seed)?;
         for _ in 0..TRIES {
             let with = self.recorded(std::slice::from_ref(&effect), seed, 0);
             let strength = self.strength(sensor, &with, &without);
@@ -427,6 +436,12 @@ impl Kind {
             found,
         })
     }
+}
+
+/// A recording without an effect, and its fit where the inputs are not known.
+struct Without {
+    prepared: Prepared,
+    fit: Option<Fit>,
 }
 
 /// A calibration with its judgement.

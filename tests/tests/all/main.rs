@@ -11,6 +11,7 @@ mod flaws;
 mod fleet;
 mod frozen;
 mod joint;
+mod judged;
 mod judgement;
 mod led_whole_turns;
 mod module_circles;
