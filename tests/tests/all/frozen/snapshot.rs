@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use serde_json::{Map, Number, Value};
 
 /// Keys that are not frozen: where and when, what the recording states, and what other numbers give.
-const SKIPPED: [&str; 28] = [
+const SKIPPED: [&str; 31] = [
     "tool",
     "created",
     "sha256",
@@ -24,7 +24,7 @@ const SKIPPED: [&str; 28] = [
     "means",
     "reference",
     "detection",
-    // The dwells as they were read: `gyro_not_used` and the residuals show which are used.
+    // The dwells as they were read: `gyro_not_used` shows which are used.
     "averaged",
     "clipped",
     "first_row",
@@ -35,9 +35,15 @@ const SKIPPED: [&str; 28] = [
     "temp_c",
     // The parameters in another form, to first order.
     "small_angle",
+    // Their figures are `rms`, `held_out_rms`, `noise_floor` and `scatter`.
+    "residuals",
+    // `verify` on the same recording is a command of its own.
+    "second",
+    // The upper end is frozen.
+    "lower",
     // A plan for the effects that are not excited, which are frozen.
     "not_in_plan",
-    // A drawing: its points are the residuals, which are frozen.
+    // A drawing of the residuals.
     "picture",
 ];
 /// Lists that are longer than this and have no names are frozen as number, mean and rms of each quantity.
@@ -195,6 +201,9 @@ fn of_list(list: &[Value]) -> Value {
     }
     let mut columns = BTreeMap::new();
     list.iter().for_each(|v| gather("", v, &mut columns));
+    if let Some(numbers) = columns.remove("") {
+        return numbers.value();
+    }
     let columns = columns
         .into_iter()
         .map(|(key, column): (String, Column)| (key, column.value()));
