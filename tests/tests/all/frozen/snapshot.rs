@@ -189,7 +189,7 @@ fn of_list(list: &[Value]) -> Value {
                 .find(|p| !out.contains_key(p))
                 .expect("endless");
             let of = match of.len() == 1 {
-                true => of.remove("=").map_or_else(|| Value::Object(of), |v| v),
+                true => of.remove("=").unwrap_or(Value::Object(of)),
                 false => Value::Object(of),
             };
             out.insert(place, of);
