@@ -305,15 +305,7 @@ pub(super) fn forward(
             "the three sensors measure in one plane only (singular scale-factor matrix)".into(),
         )
     })?;
-    Ok(Estimated {
-        triad,
-        scatter,
-        condition,
-        delays: None,
-        earth: Vec::new(),
-        follows_accel: None,
-        notes: Vec::new(),
-    })
+    Ok(Estimated::new(triad, scatter, condition))
 }
 
 /// Variances, with a floor where a noiseless recording has none: 1e-12 of the largest, or of one.
@@ -480,13 +472,8 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
     let unpaired = (single > 0).then_some(Warning::NoOpposite { rates: single });
     Ok(Estimated {
-        triad,
-        scatter,
-        condition: observability.condition,
-        delays: None,
-        earth: Vec::new(),
-        follows_accel: None,
         notes: unpaired.into_iter().collect(),
+        ..Estimated::new(triad, scatter, observability.condition)
     })
 }
 
@@ -689,13 +676,5 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
         .collect();
     let triad = Triad::from_inverse(inverse, parts)
         .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
-    Ok(Estimated {
-        triad,
-        scatter,
-        condition: observability.condition,
-        delays: None,
-        earth: Vec::new(),
-        follows_accel: None,
-        notes: Vec::new(),
-    })
+    Ok(Estimated::new(triad, scatter, observability.condition))
 }
