@@ -7,13 +7,15 @@
 //! The true motion comes from the readings by data-sheet sensitivities, the bias of the gyro at rest, and a fit of three sensitivities and three
 //! biases of the accelerometer to the magnitude of gravity (`own_calibration`). It shares no code with the calibrations under test.
 
-use mimu::diagnose::{Diagnosis, diagnose};
+use std::collections::BTreeMap;
+
+use mimu::diagnose::{Diagnosis, Recordings, diagnose};
 use mimu::fit::{Fit, Options};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::error::Result;
-use mimu_recording::{Batch, Manifest, RawUnit};
+use mimu_recording::{Batch, Manifest, RawUnit, Recording};
 use mimu_rig::effects::{Condition, Disturbance, EffectTruth, Sensors, Shape, spec};
 use mimu_rig::motion::Motion;
 use mimu_rig::noise::Coefficients;
@@ -26,6 +28,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use tempfile::TempDir;
 
 use crate::recordings::{Foreign, mikoff_session, xsens_session};
+use crate::sessions::of_array_recorded;
 
 /// Made course of the temperature: it rises and falls by this much, K, in half a sine over the session. The recordings have no thermometer, and their
 /// units are as warm as they were; only the planted error follows the course.
@@ -144,18 +147,57 @@ pub fn grounds() -> Vec<Ground> {
     (0..5).map_while(mikoff).chain(xsens()).collect()
 }
 
-/// One of the five MPU-9150, in whole counts: the numbers of the file are 2048 counts per g and 16.4 counts per deg/s, written in SI.
-fn mikoff(unit: usize) -> Option<Ground> {
-    let reading = [(1.0 / 16.4_f64).to_radians(), 9.80665 / 2048.0];
-    let sheet = DataSheet {
-        sensitivity: reading.map(|si| [1.0 / si; 3]),
+/// SI per count of an MPU-9150 at its widest range: 16.4 counts per deg/s and 2048 per g.
+fn mpu9150() -> [f64; 2] {
+    [(1.0 / 16.4_f64).to_radians(), 9.80665 / 2048.0]
+}
+
+/// An MPU-9150 whose file has so many `reading`s per count.
+fn mpu9150_sheet(reading: [f64; 2]) -> DataSheet {
+    DataSheet {
+        sensitivity: mpu9150().map(|si| [1.0 / si; 3]),
         null: [[0.0; 3]; 2],
         code_low: -32768.0,
         analog: false,
         reading,
-    };
+    }
+}
+
+/// One of the five MPU-9150, in whole counts: the numbers of the file are counts written in SI.
+fn mikoff(unit: usize) -> Option<Ground> {
     let foreign = mikoff_session(unit)?;
+    let sheet = mpu9150_sheet(mpu9150());
     Some(Ground::of(format!("MPU-9150 {unit}"), &foreign, sheet))
+}
+
+/// Diagnosis of the first of two `sessions` of a unit of H. Carlsson's array, judged by the second, with the effect `id` of these `sizes` planted in both;
+/// `None` if the data are missing.
+///
+/// # Errors
+/// A recording is refused.
+pub fn in_two_sessions(
+    unit: usize,
+    sessions: [usize; 2],
+    id: &str,
+    sizes: BTreeMap<&'static str, Vec<f64>>,
+) -> Option<Result<Diagnosis>> {
+    let effect = EffectTruth::draw(id, sizes, 1.0, 0).expect("an effect");
+    let planted = |session: usize| {
+        let (_folder, recording) = of_array_recorded(unit, session)?;
+        let name = format!("MPU-9150 {unit} of the array, session {session}");
+        let ground = Ground::of_recording(name, recording, mpu9150_sheet([1.0; 2]));
+        let samples = ground.with(&effect, session as u64);
+        Some(Prepared::of(ground.manifest, &samples, STILL_FACTOR))
+    };
+    let [first, second] = [planted(sessions[0])?, planted(sessions[1])?];
+    let diagnosed = |first: Prepared, second: Prepared| {
+        let recordings = Recordings {
+            second: Some(second),
+            ..first.into()
+        };
+        diagnose(recordings, Options::IN_SAMPLE)
+    };
+    Some(first.and_then(|first| diagnosed(first, second?)))
 }
 
 /// The Xsens MTi, with the sensitivities and nulls of its maker.
@@ -175,6 +217,10 @@ impl Ground {
     fn of(name: String, foreign: &Foreign, sheet: DataSheet) -> Self {
         let folder = TempDir::new().expect("there is a temporary folder");
         let recording = foreign.import(&folder).expect("it can be imported");
+        Self::of_recording(name, recording, sheet)
+    }
+
+    fn of_recording(name: String, recording: Recording, sheet: DataSheet) -> Self {
         let mut samples = Batch::default();
         let collect = |batch: &Batch| {
             samples.t_s.extend(&batch.t_s);
