@@ -13,6 +13,7 @@
 //! | `blind joint-warm-up SETS FIRST SESSIONS` | the same for digital units by hand, whose only effect is a warm-up of the accelerometer |
 //! | `blind judged SESSIONS [NAME...]` | judgements of clean sessions of each kind, and of sessions with an effect of five times the noise: false alarms and power; NAMEs select kinds |
 //! | `blind judged array` | judgements of an array of eight units, recorded by other people in nine sessions, with a planted quadratic and without it |
+//! | `blind joint-cubics SETS FIRST [NAME...]` | one session by hand of accelerometers with a cubic of four sizes: its coefficients, and the file on another session |
 //! | `blind planted SEEDS TIMES [NAME...]` | each effect planted SEEDS times, at TIMES the size of data sheets, in recordings by other people; NAMEs also select recordings |
 
 mod by_hand;
@@ -116,9 +117,10 @@ fn main() {
     let turning = args.first().is_some_and(|a| a == "turning");
     let joint = args.first().is_some_and(|a| a == "joint");
     let joint_warm_up = args.first().is_some_and(|a| a == "joint-warm-up");
+    let cubics = args.first().is_some_and(|a| a == "joint-cubics");
     let slow = args.first().is_some_and(|a| a == "slow-bias");
     let planted = args.first().is_some_and(|a| a == "planted");
-    if in_hands || turning || slow || joint || joint_warm_up || planted {
+    if in_hands || turning || slow || joint || joint_warm_up || cubics || planted {
         args.remove(0);
     }
     if args.first().is_some_and(|a| a == "earth") {
@@ -145,6 +147,9 @@ fn main() {
         );
     }
     let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
+    if cubics {
+        return joint::run_cubics(number(0, 12), number(1, 0), &chosen);
+    }
     if planted {
         let times = args.get(1).and_then(|s| s.parse().ok()).unwrap_or(1.0);
         return planted::run(number(0, 1), times, &chosen);

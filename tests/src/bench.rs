@@ -171,6 +171,22 @@ pub fn hand_plan(poses: usize) -> String {
     )
 }
 
+/// The same with each face up in turn, tipped about a random axis by at most `most_deg`.
+pub fn near_faces_plan(poses: usize, most_deg: f64, random: &mut Random) -> String {
+    let mut plan =
+        String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\n");
+    for pose in 0..poses {
+        let (axis, sign) = (pose % 3, if pose / 3 % 2 == 0 { 1.0 } else { -1.0 });
+        let (tip, heading) = (random.within(most_deg).to_radians(), random.within(180.0));
+        let mut up = [0.0; 3];
+        up[axis] = sign * tip.cos();
+        up[(axis + 1) % 3] = tip.sin() * heading.to_radians().cos();
+        up[(axis + 2) % 3] = tip.sin() * heading.to_radians().sin();
+        let _ = writeln!(plan, "[[step]]\nup = {up:?}\ndwell_s = 3.0");
+    }
+    plan
+}
+
 /// The recording of a plan, in the folder `recording` of a temporary folder.
 pub fn written(plan: &str, file: &RigFile, seed: u64) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");

@@ -5,10 +5,12 @@
 
 use mimu::calibration::Calibration;
 use mimu::calibration::apply::apply;
+use mimu::calibration::verify::verify;
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::effects::fitted::FittedEffect;
 use mimu::fit::{Options, fit};
 use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::error::Result;
 use mimu_recording::{Recording, SampleFormat};
@@ -45,6 +47,10 @@ pub struct Set {
     pub on_table: bool,
     /// Share of the sessions that begin at power-on. The others begin an hour later.
     pub cold: f64,
+    /// Parameters of its first effect instead of drawn ones, as a file of the bench has them.
+    pub size: Option<&'static str>,
+    /// By hand: largest angle between the vertical and the nearest face, deg; `None`: poses of all directions.
+    pub near_faces_deg: Option<f64>,
     seed: u64,
 }
 
@@ -67,6 +73,10 @@ pub struct Case {
     pub set: Set,
     /// Accepted effects, each with those that the recordings do not distinguish from it.
     pub found: Vec<Vec<String>>,
+    /// Effects that were tried and not accepted, with the reasons.
+    pub rejected: Vec<String>,
+    /// Those of the unit that the file contains.
+    pub effects: Vec<FittedEffect>,
     /// Verdict, or why the set was refused.
     pub verdict: String,
     /// On a session with the biases of the first session, files as written.
@@ -75,6 +85,8 @@ pub struct Case {
     pub without_offset: Option<Judged>,
     /// On that session, files as written: both errors include the change of the biases.
     pub own_biases: Option<Judged>,
+    /// Direction of gravity after the turns of a session by hand with the biases of the first, by `mimu verify`, deg: without effects, and with them.
+    pub directions: Option<[f64; 2]>,
 }
 
 impl Set {
@@ -105,6 +117,8 @@ impl Set {
             sessions: 2 + ((seed / 6 + seed) % 8) as usize,
             on_table: random.uniform() < 1.0 / 3.0,
             cold: [0.0, 0.5, 1.0][(random.uniform() * 3.0) as usize],
+            size: None,
+            near_faces_deg: None,
             seed,
         }
     }
@@ -117,6 +131,27 @@ impl Set {
             sessions,
             on_table: false,
             cold: 1.0,
+            size: None,
+            near_faces_deg: None,
+            seed,
+        }
+    }
+
+    /// One session by hand of a unit of `grade` whose accelerometer has a cubic of this `size`, in poses of all directions or near the faces.
+    pub fn of_cubic(
+        size: &'static str,
+        near_faces_deg: Option<f64>,
+        grade: Grade,
+        seed: u64,
+    ) -> Self {
+        Self {
+            effects: vec!["accel_scale_cubic"],
+            grade,
+            sessions: 1,
+            on_table: false,
+            cold: 0.0,
+            size: Some(size),
+            near_faces_deg,
             seed,
         }
     }
@@ -126,8 +161,12 @@ impl Set {
         let plan = match self.on_table {
             true => bench::table_plan(Some(seed)),
             false => {
-                let poses = 26 + (Random::new(seed, "poses").uniform() * 17.0) as usize;
-                bench::hand_plan(poses)
+                let mut random = Random::new(seed, "poses");
+                let poses = 26 + (random.uniform() * 17.0) as usize;
+                match self.near_faces_deg {
+                    Some(most) => bench::near_faces_plan(poses, most, &mut random),
+                    None => bench::hand_plan(poses),
+                }
             }
         };
         format!("latitude_deg = 48.0\nlead_in_s = 5.0\n{plan}")
@@ -140,6 +179,9 @@ impl Set {
     /// The unit in a session, with the biases of session number `biases`.
     fn unit(&self, session: u64, biases: u64) -> RigFile {
         let mut file = unit(&self.effects, self.grade, self.seed);
+        if let Some(size) = self.size {
+            file.effect[0].parameters = toml::from_str(size).expect("parameters");
+        }
         let mut random = Random::new(self.session_seed(biases), "turn-on");
         let si = [TURN_ON[0].to_radians(), TURN_ON[1] * 9.80665e-3];
         let models = [&mut file.unit.gyro_affine, &mut file.unit.accel_affine];
@@ -369,10 +411,13 @@ pub fn case(set: &Set) -> Case {
     let mut case = Case {
         set: set.clone(),
         found: Vec::new(),
+        rejected: Vec::new(),
+        effects: Vec::new(),
         verdict: String::new(),
         as_written: None,
         without_offset: None,
         own_biases: None,
+        directions: None,
     };
     if let Err(refusal) = judge(&mut case) {
         case.verdict = format!("refused: {refusal}");
@@ -409,15 +454,31 @@ fn judge(case: &mut Case) -> Result<()> {
                 .collect()
         })
         .collect();
+    let rejected = diagnosis.sensors.iter().flat_map(|s| &s.decision.rejected);
+    case.rejected = rejected
+        .map(|r| format!("{}: {}", r.id, r.reason))
+        .collect();
     let mut effects: Vec<FittedEffect> = Vec::new();
     for accepted in accepted.filter(|a| a.of_unit) {
         let effect = accepted.effect.lasting();
         effect.join(&mut effects);
     }
     let with = written(&Calibration::of(&diagnosis.after, &effects, NOW)?)?;
+    case.effects = effects;
     let files = [without, with];
     let judge = set.sessions as u64;
-    case.as_written = Some(set.recorded(judge, 0).judge(&files)?[0]);
+    let unseen = set.recorded(judge, 0);
+    case.as_written = Some(unseen.judge(&files)?[0]);
+    if !set.on_table {
+        let prepared = unseen.prepared();
+        let turns = files.each_ref().map(|file| {
+            let gyro = verify(&prepared, file).ok()?.sensors[Sensor::Gyro]
+                .as_ref()?
+                .rms;
+            Some(gyro.to_degrees())
+        });
+        case.directions = turns[0].zip(turns[1]).map(|(a, b)| [a, b]);
+    }
     let [own, without_offset] = set.recorded(judge, judge).judge(&files)?;
     (case.own_biases, case.without_offset) = (Some(own), Some(without_offset));
     Ok(())

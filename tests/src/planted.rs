@@ -10,7 +10,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::diagnose::{Diagnosis, Recordings, diagnose};
 use mimu::fit::{Fit, Options};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -148,18 +148,57 @@ pub fn grounds() -> Vec<Ground> {
     (0..5).map_while(mikoff).chain(xsens()).collect()
 }
 
-/// One of the five MPU-9150, in whole counts: the numbers of the file are 2048 counts per g and 16.4 counts per deg/s, written in SI.
-fn mikoff(unit: usize) -> Option<Ground> {
-    let reading = [(1.0 / 16.4_f64).to_radians(), 9.80665 / 2048.0];
-    let sheet = DataSheet {
-        sensitivity: reading.map(|si| [1.0 / si; 3]),
+/// SI per count of an MPU-9150 at its widest range: 16.4 counts per deg/s and 2048 per g.
+fn mpu9150() -> [f64; 2] {
+    [(1.0 / 16.4_f64).to_radians(), 9.80665 / 2048.0]
+}
+
+/// An MPU-9150 whose file has so many `reading`s per count.
+fn mpu9150_sheet(reading: [f64; 2]) -> DataSheet {
+    DataSheet {
+        sensitivity: mpu9150().map(|si| [1.0 / si; 3]),
         null: [[0.0; 3]; 2],
         code_low: -32768.0,
         analog: false,
         reading,
-    };
+    }
+}
+
+/// One of the five MPU-9150, in whole counts: the numbers of the file are counts written in SI.
+fn mikoff(unit: usize) -> Option<Ground> {
     let foreign = mikoff_session(unit)?;
+    let sheet = mpu9150_sheet(mpu9150());
     Some(Ground::of(format!("MPU-9150 {unit}"), &foreign, sheet))
+}
+
+/// Diagnosis of the first of two `sessions` of a unit of H. Carlsson's array, judged by the second, with the effect `id` of these `sizes` planted in both;
+/// `None` if the data are missing.
+///
+/// # Errors
+/// A recording is refused.
+pub fn in_two_sessions(
+    unit: usize,
+    sessions: [usize; 2],
+    id: &str,
+    sizes: BTreeMap<&'static str, Vec<f64>>,
+) -> Option<Result<Diagnosis>> {
+    let effect = EffectTruth::draw(id, sizes, 1.0, 0).expect("an effect");
+    let planted = |session: usize| {
+        let (_folder, recording) = of_array_recorded(unit, session)?;
+        let name = format!("MPU-9150 {unit} of the array, session {session}");
+        let ground = Ground::of_recording(name, recording, mpu9150_sheet([1.0; 2]));
+        let samples = ground.with(&effect, session as u64);
+        Some(Prepared::of(ground.manifest, &samples, STILL_FACTOR))
+    };
+    let [first, second] = [planted(sessions[0])?, planted(sessions[1])?];
+    let diagnosed = |first: Prepared, second: Prepared| {
+        let recordings = Recordings {
+            second: Some(second),
+            ..first.into()
+        };
+        diagnose(recordings, Options::IN_SAMPLE)
+    };
+    Some(first.and_then(|first| diagnosed(first, second?)))
 }
 
 /// The Xsens MTi, with the sensitivities and nulls of its maker.

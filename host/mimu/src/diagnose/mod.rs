@@ -3,7 +3,7 @@
 //!
 //! | module          | what                                                                             |
 //! |-----------------|----------------------------------------------------------------------------------|
-//! | `as_written`    | whether the calibration file with the effects errs less on other recordings      |
+//! | `as_written`    | whether the calibration file with the effects errs more, by any kind of observation |
 //! | `candidate`     | which coefficients of an [effect](crate::effects) are tried, and their columns   |
 //! | [`rows`]        | residuals of dwells and turns after the affine model, as one linear problem      |
 //! | [`variance`]    | variance of the residuals: known noise, extra white variance, rate random walk   |
@@ -33,9 +33,9 @@ use std::cell::Cell;
 
 use decision::Decision;
 use mimu_core::compensation::Affine;
-use passes::{Pass, Passes, session};
+use passes::{Pass, Passes};
 use picture::Picture;
-use rows::{ForceErrors, FreeParameters, Rows};
+use rows::{ForceErrors, FreeParameters, Rows, Session};
 use serde::{Deserialize, Serialize};
 
 use crate::calibration::Calibration;
@@ -490,6 +490,7 @@ impl Found<'_> {
             free: self.calibrator.free(sensor),
             accept: &recordings.accept,
             calibrate: &|prepared| self.calibrator.calibrate(prepared),
+            hold_out: &|prepared| self.calibrator.judged(prepared),
             place: &recordings.first.place,
             heard,
             done: Cell::new(0),
@@ -500,7 +501,7 @@ impl Found<'_> {
     /// Errors of the forces that the accelerometer measures; `rows` are those of its magnitudes.
     fn forces_by(&self, rows: &Rows, decision: &Decision) -> Option<ForceErrors> {
         let models = Sensor::BOTH.map(|s| self.now.sensor(s).map(|f| f.estimated.triad.inverse));
-        let head = session(&self.now.prepared, models);
+        let head = Session::of(&self.now.prepared, models);
         match self.calibrator.held {
             None if !by_turns(&self.now) => uncertainty::of_forces(&head, rows, decision),
             // With the turns the fit knows the directions better than the poses alone do.

@@ -19,7 +19,7 @@ use super::rows::{ForceErrors, FreeParameters, RowFigure, Rows, Session};
 use super::{Heard, singular};
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
-use crate::fit::{Fit, session_bias};
+use crate::fit::Fit;
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use mimu_recording::error::Result;
@@ -53,27 +53,6 @@ fn dwell_ends(recordings: &[&Prepared]) -> (Vec<(usize, f64)>, usize) {
 /// Share of the work after so many passes. Nobody knows how many there will be: most sensors need one, and each further one is half as likely.
 fn share_of(passes: f64) -> f64 {
     1.0 - (-passes).exp2()
-}
-
-/// A recording with the calibrations of gyro and accelerometer.
-pub(super) fn session(prepared: &Prepared, [gyro, accel]: [Option<Affine<f64>>; 2]) -> Session<'_> {
-    Session {
-        prepared,
-        gyro,
-        accel,
-        forces: None,
-    }
-}
-
-/// A later recording with the calibration of the first: its matrices, and separate biases.
-fn later_session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) -> Session<'a> {
-    let own = [0, 1].map(|i| {
-        let known = models[i]?;
-        let accel = models[1].as_ref();
-        let own = session_bias::estimate(prepared, Sensor::BOTH[i], &known, accel);
-        Some(own.map_or(known, |e| e.triad.inverse))
-    });
-    session(prepared, own)
 }
 
 /// Accepted effects.
@@ -162,6 +141,8 @@ pub(super) struct Passes<'a> {
     /// See [`super::Recordings::accept`].
     pub accept: &'a [String],
     pub calibrate: &'a dyn Fn(Prepared) -> Result<Fit>,
+    /// The same with parts of the recording held out.
+    pub hold_out: &'a dyn Fn(Prepared) -> Result<Fit>,
     pub place: &'a str,
     /// Told the share of the search that is done.
     pub heard: Heard<'a>,
@@ -177,6 +158,7 @@ impl Passes<'_> {
             before: self.now,
             others: self.later,
             calibrate: self.calibrate,
+            hold_out: self.hold_out,
         };
         let mut without = Vec::new();
         loop {
@@ -268,7 +250,7 @@ impl Passes<'_> {
             .map(
                 |(prepared, s)| match std::ptr::eq(s.prepared, &self.now.prepared) {
                     true => Session { prepared, ..*s },
-                    false => later_session(prepared, models),
+                    false => Session::later(prepared, models),
                 },
             )
             .collect();
@@ -287,9 +269,9 @@ impl Passes<'_> {
         let sensor = self.sensor;
         let head = Session {
             forces: self.forces,
-            ..session(&self.now.prepared, models)
+            ..Session::of(&self.now.prepared, models)
         };
-        let others = self.later.iter().map(|p| later_session(p, &models));
+        let others = self.later.iter().map(|p| Session::later(p, &models));
         let sessions: Vec<Session> = std::iter::once(head).chain(others).collect();
         let (ours, unseen) = sessions.split_at(self.found_in);
         let rows = self.rows(ours, &models, about);

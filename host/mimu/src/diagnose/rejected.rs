@@ -3,13 +3,14 @@
 use std::fmt;
 
 use mimu_recording::error::Error;
+use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
 use super::rows::Rows;
 use crate::quantity::{Figure, Sensor, p_value, significant};
 
 /// An effect that was tried and not accepted.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Rejected {
     /// Public id.
     pub id: String,
@@ -19,8 +20,22 @@ pub struct Rejected {
     pub reason: Reason,
 }
 
-/// Why an effect is not accepted. JSON has the sentence. The first figure of a pair is without the effect, the second with it.
-#[derive(Debug, Clone, PartialEq)]
+impl Serialize for Rejected {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut out = serializer.serialize_struct("Rejected", 4)?;
+        out.serialize_field("id", &self.id)?;
+        out.serialize_field("sensor", &self.sensor)?;
+        out.serialize_field("reason", &self.reason.to_string())?;
+        let reason_id: &'static str = (&self.reason).into();
+        out.serialize_field("reason_id", reason_id)?;
+        out.end()
+    }
+}
+
+/// Why an effect is not accepted. JSON has the name, as `turns_err_more`, and the sentence. The first figure of a pair is without the effect, the second
+/// with it.
+#[derive(Debug, Clone, PartialEq, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Reason {
     /// One dwell contains this share of its information.
     OneDwell(f64),
@@ -43,8 +58,10 @@ pub enum Reason {
     RandomWalk(f64),
     /// It was not chosen in the search.
     NotChosen(NotChosen),
-    /// The calibration file with it errs more on this recording.
+    /// The calibration file with it errs more on this recording, whose biases are free.
     FileErrsMore(String, [ErrorRms; 2]),
+    /// With it the directions of gravity after held-out turns err more.
+    TurnsErrMore([ErrorRms; 2]),
     /// Without it another effect predicts better.
     OtherPredictsBetter,
     /// Readings without it cannot be calibrated.
@@ -140,6 +157,10 @@ impl fmt::Display for Reason {
                 f,
                 "the calibration file with it has a larger error on {recording}: {without} without effects, {with} with them"
             ),
+            Self::TurnsErrMore([without, with]) => write!(
+                f,
+                "the directions of gravity after held-out turns err more with it: {without} without, {with} with"
+            ),
             Self::OtherPredictsBetter => f.write_str(
                 "another effect predicts better, together with the calibration that then results",
             ),
@@ -149,12 +170,6 @@ impl fmt::Display for Reason {
                 error.refused().problem
             ),
         }
-    }
-}
-
-impl Serialize for Reason {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
     }
 }
 

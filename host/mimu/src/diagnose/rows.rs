@@ -33,6 +33,7 @@ use crate::estimate::earth::poses;
 pub use forces::ForceErrors;
 use terms::Quantities;
 
+use crate::fit::session_bias;
 use crate::observable::StratumName;
 use crate::prepared::Prepared;
 use crate::quantity;
@@ -163,7 +164,28 @@ impl Stratum {
     }
 }
 
-impl Session<'_> {
+impl<'a> Session<'a> {
+    /// A recording with the calibrations of gyro and accelerometer.
+    pub fn of(prepared: &'a Prepared, [gyro, accel]: [Option<Affine<f64>>; 2]) -> Self {
+        Self {
+            prepared,
+            gyro,
+            accel,
+            forces: None,
+        }
+    }
+
+    /// A later recording with the calibration of the first: its matrices, and separate biases.
+    pub fn later(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) -> Self {
+        let own = [0, 1].map(|i| {
+            let known = models[i]?;
+            let accel = models[1].as_ref();
+            let own = session_bias::estimate(prepared, Sensor::BOTH[i], &known, accel);
+            Some(own.map_or(known, |e| e.triad.inverse))
+        });
+        Self::of(prepared, own)
+    }
+
     /// Calibration of `sensor`.
     pub fn model(&self, sensor: Sensor) -> Option<Affine<f64>> {
         match sensor {

@@ -142,10 +142,62 @@ impl<'a> Search<'a> {
         self.by_dwell.conditions_without(&left)
     }
 
+    /// The prior of the coefficients of the chosen: column of the [model](Self::model), and standard deviation.
+    pub(super) fn prior(&self, chosen: &[Chosen]) -> Vec<(usize, f64)> {
+        let mut column = self.basis.ncols();
+        let mut all = Vec::new();
+        for one in chosen {
+            let columns = column..column + one.columns.ncols();
+            column = columns.end;
+            all.extend(
+                one.size
+                    .into_iter()
+                    .flat_map(|size| columns.clone().map(move |k| (k, size))),
+            );
+        }
+        all
+    }
+
+    /// The axes of a chosen nonlinearity stay together, as one law acts on all. The search chooses those that its score can pay for; with the others at
+    /// zero these take their share. Of an accelerometer's cubic of 12 mg/g³ along all axes, in poses within 15° of the faces, x came out as 21.9 ± 2.0
+    /// and z as 11.5 ± 4.0, without y.
+    fn join_axes(&self, chosen: &mut [Chosen], k: usize, now: &mut Fitted) {
+        let CandidateKind::Effect(effect) = chosen[k].candidate.kind else {
+            return;
+        };
+        let first: usize = chosen[..k].iter().map(|c| c.columns.ncols()).sum();
+        let own = now
+            .coefficients
+            .rows(self.basis.ncols() + first, chosen[k].columns.ncols());
+        let typical = effect.coefficients.iter().map(|c| c.typical);
+        let size = typical
+            .chain(own.iter().map(|v| v.abs()))
+            .fold(0.0, f64::max);
+        let before = chosen[k].clone();
+        // All of its coefficients together are no choice among them.
+        let candidate = Candidate {
+            choices: before.candidate.choices / before.candidate.choices_of_coefficients(),
+            ..before.candidate.with_all_offered()
+        };
+        chosen[k].columns = candidate.columns(self.rows, before.parameter);
+        chosen[k].candidate = candidate;
+        chosen[k].size = Some(size);
+        match self.fit(chosen) {
+            Some(fit) => *now = fit,
+            None => chosen[k] = before,
+        }
+    }
+
     /// Adds the [siblings](Candidate::siblings) of each chosen effect's coefficients, if the rows would show them at data-sheet size beside all
-    /// others.
+    /// others. A nonlinearity gets those of all axes.
     pub fn complete(&self, chosen: &mut [Chosen], now: &mut Fitted) {
         for k in 0..chosen.len() {
+            if chosen[k].candidate.is_nonlinearity() {
+                if chosen[k].size.is_none() {
+                    self.join_axes(chosen, k, now);
+                }
+                continue;
+            }
             let before = chosen[k].clone();
             let CandidateKind::Effect(effect) = before.candidate.kind else {
                 continue;
@@ -194,11 +246,12 @@ impl<'a> Search<'a> {
 
     /// The model with the chosen effects and separately estimated noise.
     pub fn fit(&self, chosen: &[Chosen]) -> Option<Fitted> {
-        self.variance.fit(
+        let fitted = self.variance.fit(
             &self.model(chosen),
             &self.variance.none(),
             LikelihoodKind::Likelihood,
-        )
+        )?;
+        Some(fitted.with_prior(self.prior(chosen)))
     }
 
     /// Residual degrees of freedom of a model with so many columns.
@@ -256,6 +309,7 @@ impl<'a> Search<'a> {
             unlikely: candidate.unlikely(&with.values),
             columns: with.columns,
             drop: with.drop,
+            size: None,
             candidate,
             parameter,
             p,

@@ -85,7 +85,8 @@ pub fn of_forces(session: &Session, magnitudes: &Rows, decision: &Decision) -> O
         slopes.push(one.candidate.slope(&rows, one.parameter, &values));
     }
     for one in &accepted {
-        add(&one.candidate, one.parameter, &|_| 0.0);
+        let known = one.size.map_or(0.0, |size| size.powi(-2));
+        add(&one.candidate, one.parameter, &|_| known);
     }
     for effect in effects::all().filter(|e| is_of_force(e)) {
         let candidate = Candidate::new(Sensor::Accel, CandidateKind::Effect(effect));

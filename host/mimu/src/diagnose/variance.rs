@@ -38,6 +38,23 @@ pub struct Fitted {
     pub covariance: DMatrix<f64>,
     /// Sum of the squares of the decorrelated residuals.
     pub chi2: f64,
+    /// Columns whose coefficients have a prior about zero, and its standard deviation. Coefficients and covariance include it; deviance and chi² are
+    /// those of the rows alone.
+    pub prior: Vec<(usize, f64)>,
+}
+
+impl Fitted {
+    /// The same with a prior about zero for some columns, each with its standard deviation.
+    pub fn with_prior(mut self, prior: Vec<(usize, f64)>) -> Self {
+        for &(column, sigma) in &prior {
+            let by = self.covariance.column(column).into_owned();
+            let gain = &by / (by[column] + sigma * sigma);
+            self.coefficients -= &gain * self.coefficients[column];
+            self.covariance -= gain * by.transpose();
+        }
+        self.prior = prior;
+        self
+    }
 }
 
 /// Which likelihood.
@@ -300,6 +317,7 @@ impl<'a> VarianceModel<'a> {
                 coefficients: DVector::zeros(0),
                 covariance: DMatrix::zeros(0, 0),
                 chi2: y2,
+                prior: Vec::new(),
             });
         }
         // Scaled, because the units of columns differ widely.
@@ -324,6 +342,7 @@ impl<'a> VarianceModel<'a> {
             coefficients: solution.component_div(&scale),
             covariance,
             chi2,
+            prior: Vec::new(),
         })
     }
 

@@ -1,7 +1,7 @@
 //! Accepts effects that were found. An effect has to lower the held-out error, also that of a second recording if there is one, and must not
 //! depend on one dwell.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::hold_out::{chance_without_a_dwell, held_out_by_part, leverage, parts_helped};
@@ -65,11 +65,25 @@ impl<'a> Acceptance<'a> {
         self.held(chosen, fit, split).map(|r| rms(self.rows, &r))
     }
 
-    fn split_of(&self, rest: &[Chosen], one: &Chosen, with: &Fitted) -> (f64, Split) {
-        let [dwell, block] = leverage(self.rows, &self.search.model(rest), &one.columns);
-        let mut all = rest.to_vec();
-        all.push(one.clone());
-        let alone = block > LEVERAGE || self.held_rms(&all, with, self.usual).is_none();
+    /// Columns of the kept effect `i` that the rows determine better than its prior does; all if there is no prior.
+    fn determined(&self, kept: &[Chosen], i: usize, with: &Fitted) -> DMatrix<f64> {
+        let one = &kept[i];
+        let before = kept[..i].iter().map(|c| c.columns.ncols());
+        let first = self.search.basis.ncols() + before.sum::<usize>();
+        let by_rows = |k: &usize| {
+            let variance = with.covariance[(first + k, first + k)];
+            one.size.is_none_or(|size| variance < 0.5 * size * size)
+        };
+        let columns: Vec<usize> = (0..one.columns.ncols()).filter(by_rows).collect();
+        one.columns.select_columns(&columns)
+    }
+
+    fn split_of(&self, kept: &[Chosen], i: usize, with: &Fitted) -> (f64, Split) {
+        let mut rest = kept.to_vec();
+        rest.remove(i);
+        let columns = self.determined(kept, i, with);
+        let [dwell, block] = leverage(self.rows, &self.search.model(&rest), &columns);
+        let alone = block > LEVERAGE || self.held_rms(kept, with, self.usual).is_none();
         let split = if alone {
             Split::Interleaved
         } else {
@@ -81,11 +95,7 @@ impl<'a> Acceptance<'a> {
     /// Largest share of one dwell in each of the `kept`, and one way of holding out for all. If only one block shows a warm-up, a model fitted
     /// without this block misses it by so much that no other effect would show.
     pub fn common(&self, kept: &[Chosen], with: &Fitted) -> (Vec<f64>, Split) {
-        let each = (0..kept.len()).map(|i| {
-            let mut rest = kept.to_vec();
-            let one = rest.remove(i);
-            self.split_of(&rest, &one, with)
-        });
+        let each = (0..kept.len()).map(|i| self.split_of(kept, i, with));
         let (shares, splits): (Vec<f64>, Vec<Split>) = each.unzip();
         let split = match splits.contains(&Split::Interleaved) {
             true => Split::Interleaved,

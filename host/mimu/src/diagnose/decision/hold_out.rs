@@ -37,6 +37,10 @@ pub(in crate::diagnose) fn held_out(
     let rows = search.rows;
     let parts_of = |r: usize| rows.dwells(r).map(|d| part(split, rows, d));
     let mut out = DVector::zeros(rows.y.len());
+    let prior = at.prior.iter();
+    let prior: Vec<(usize, f64)> = prior
+        .map(|(k, sigma)| (*k, 1.0 / (sigma * model.column(*k).norm())))
+        .collect();
     // Columns of length 1: a model must not seem undetermined because it has the square of a temperature far from the reference.
     let model = unit_columns(model);
     let variances = search.variance.variances(&at.components);
@@ -51,6 +55,12 @@ pub(in crate::diagnose) fn held_out(
         let parts = search.variance.kept(&at.components, &kept)?;
         let white = parts.whiten(&model.select_rows(&kept));
         let y = parts.whiten(&DMatrix::from_fn(kept.len(), 1, |i, _| rows.y[kept[i]]));
+        let (count, all) = (kept.len(), kept.len() + prior.len());
+        let mut white = white.resize_vertically(all, 0.0);
+        let y = y.resize_vertically(all, 0.0);
+        for (i, (column, weight)) in prior.iter().enumerate() {
+            white[(count + i, *column)] = *weight;
+        }
         let svd = white.svd(true, true);
         let most = svd.singular_values.max();
         if svd.singular_values.min() < 1e-7 * most {

@@ -32,6 +32,7 @@ impl Model {
         let columns = search.model(chosen);
         let variance = &search.variance;
         let fitted = variance.fit(&columns, &tested.components, LikelihoodKind::Restricted)?;
+        let fitted = fitted.with_prior(search.prior(chosen));
         let judged = match chosen.is_empty() {
             true => tested,
             false => &fitted,

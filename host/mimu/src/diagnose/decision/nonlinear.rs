@@ -129,6 +129,7 @@ impl Nonlinear {
             true => None,
             false => search.variance.fit_at(&tangent, components),
         };
+        let joint = joint.map(|joint| joint.with_prior(search.prior(kept)));
         let Some(joint) = joint else {
             // There is no parameter, or the coefficients compensate for it wholly, so that any value fits.
             let open = |k: usize| {

@@ -141,7 +141,10 @@ fn of_axis(
         return None;
     }
     let all = beside(&null, &steps);
-    let held = |m: &DMatrix<f64>, f: &Fitted| Some(rms(rows, &held_out(search, m, f, split)?));
+    let held = |m: &DMatrix<f64>, f: &Fitted| {
+        let f = f.clone().with_prior(last.prior.clone());
+        Some(rms(rows, &held_out(search, m, &f, split)?))
+    };
     if !(held(&all, &fitted)? < held(&null, &without)?) {
         return None;
     }

@@ -24,6 +24,10 @@ pub struct Chosen {
     /// By how much the deviance grows without it.
     #[serde(skip)]
     pub drop: f64,
+    /// Standard deviation that its coefficients have before the rows are seen, SI; `None` if nothing is assumed. The three axes of a nonlinearity stay
+    /// together, and one that the rows hardly show is as large as the others may be.
+    #[serde(skip)]
+    pub size: Option<f64>,
     /// Penalty for implausible sizes of its coefficients, in units of the deviance.
     #[serde(skip)]
     pub unlikely: f64,
