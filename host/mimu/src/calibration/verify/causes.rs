@@ -17,7 +17,7 @@ use serde::Serialize;
 use crate::calibration::Calibration;
 use crate::estimate::earth_shared;
 use crate::estimate::least_squares::{Errors, Group, Observability, Solution, solve_groups};
-use crate::factor::Factors;
+use crate::factor::{Factors, Kind};
 use crate::fit::by_rate::magnitudes;
 use crate::observable::Observable;
 use crate::observation::{ByTriad, of_output, vector};
@@ -89,22 +89,29 @@ impl Rows {
             .collect();
         let values = factors.values(&models);
         let (at, variances) = (factors.at(&values), factors.variances(&values));
-        let row = |i: usize, at_rest: bool| {
+        // A multiplies the true input: that of a known size, where the measured one contains the error, and none at rest.
+        let input = factors.list.iter().zip(factors.ranges());
+        let input = input.flat_map(|(factor, rows)| {
+            let share = match factor.kind {
+                Kind::Magnitude { known, .. } => known / (known + at.residuals[rows.start]),
+                Kind::Rest(..) => 0.0,
+                _ => 1.0,
+            };
+            std::iter::repeat_n(share, rows.len())
+        });
+        let input: Vec<f64> = input.collect();
+        let row = |i: usize| {
             let of_triad = |(k, (_, model, columns)): (usize, &Columns)| {
                 let by = at.jacobian.fixed_view::<1, 12>(i, 12 * k).transpose();
                 let mut by = of_output(&by, model);
-                if at_rest {
-                    // There is no input that A would multiply.
-                    by.fixed_rows_mut::<9>(0).fill(0.0);
-                }
+                by.fixed_rows_mut::<9>(0).scale_mut(input[i]);
                 columns(&by)
             };
             let by: Vec<f64> = triads.iter().enumerate().flat_map(of_triad).collect();
             (by, at.residuals[i], variances[i])
         };
-        let group = |(group, rows): (Option<Observable>, Range<usize>)| {
-            let at_rest = group == Some(Observable::Rest);
-            let rows: Vec<_> = rows.map(|i| row(i, at_rest)).collect();
+        let group = |(_, rows): (Option<Observable>, Range<usize>)| {
+            let rows: Vec<_> = rows.map(&row).collect();
             let columns = rows.first().map_or(0, |row| row.0.len());
             Self::of(rows, columns)
         };
