@@ -1,7 +1,7 @@
 //! Judges whether a calibration is as accurate as predicted, by dwells that were not used for it.
 
 use mimu::calibration::Calibration;
-use mimu::calibration::verify::{SensorVerification, WholeTurnsOfAxis, verify};
+use mimu::calibration::verify::{PowerOn, SensorVerification, WholeTurnsOfAxis, verify_since};
 use mimu::fit::Fit;
 use mimu::judgement::{Judgement, JudgementKind};
 use mimu::prepared::Prepared;
@@ -195,7 +195,7 @@ pub fn judge_all(by: &Prepared, calibration: &Calibration) -> Result<Judged> {
 }
 
 fn judged(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> Result<Judged> {
-    let found = verify(by, calibration)?;
+    let found = verify_since(by, calibration, PowerOn::Same)?;
     let of = |(sensor, s): (Sensor, &SensorVerification)| {
         let fitted = promised.and_then(|f| f.sensor(sensor));
         SensorJudged::of(sensor, s, fitted.and_then(|f| f.held_out_rms()))

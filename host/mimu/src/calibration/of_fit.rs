@@ -48,7 +48,8 @@ impl Calibration {
             judgement: Some(Judgement::of_fit(fit)),
             sensors: manifest.sensors().cloned(),
             recording: Origin {
-                sha256: Some(fit.prepared.condensed.sha256.clone()),
+                // A recording in memory has none.
+                sha256: Some(fit.prepared.condensed.sha256.clone()).filter(|sha| !sha.is_empty()),
                 reference: Some(manifest.reference),
                 raw_unit: manifest.raw_unit,
                 gravity_mps2: Some(manifest.gravity_mps2),

@@ -113,6 +113,27 @@ pub struct Verification {
 /// # Errors
 /// A recording of another unit, or in another unit of readings; means of poses with a calibration that has effects; no usable dwell.
 pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verification> {
+    verify_since(prepared, calibration, PowerOn::Another)
+}
+
+/// Whether a recording that judges a calibration was made after another power-on than the calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PowerOn {
+    /// The unit was switched off in between, which changes its biases.
+    Another,
+    /// It was not: its biases wander by their noise alone.
+    Same,
+}
+
+/// As [`verify`], if it is known whether the unit was switched off in between.
+///
+/// # Errors
+/// As [`verify`].
+pub fn verify_since(
+    prepared: &Prepared,
+    calibration: &Calibration,
+    power_on: PowerOn,
+) -> Result<Verification> {
     let same_recording = calibration.recording.sha256.as_ref() == Some(&prepared.condensed.sha256);
     let mut warnings = warnings_before(prepared, calibration, same_recording)?;
     refuse_effects_of_means(prepared, calibration)?;
@@ -120,7 +141,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let mut sensors = PerSensor::<Option<SensorVerification>>::default();
     for sensor in Sensor::BOTH {
         if calibration.inverse(sensor).is_some() && readings.as_read.has(sensor) {
-            sensors[sensor] = readings.verify(calibration, sensor, &mut warnings)?;
+            sensors[sensor] = readings.verify(calibration, sensor, power_on, &mut warnings)?;
         }
     }
     if sensors.present().next().is_none() {
@@ -215,15 +236,16 @@ impl<'a> Readings<'a> {
         &self,
         calibration: &Calibration,
         sensor: Sensor,
+        power_on: PowerOn,
         warnings: &mut Vec<Warning>,
     ) -> Result<Option<SensorVerification>> {
         let observations = self.as_read.observations(sensor);
         if !observations.is_empty() {
             refuse_wrong_gravity(&self.as_read, sensor, &observations)?;
         }
-        let affine = judge(&self.as_read, calibration, sensor);
+        let affine = judge(&self.as_read, calibration, sensor, power_on);
         let cleaned = self.without_effects.as_ref();
-        let with_effects = cleaned.and_then(|c| judge(c, calibration, sensor));
+        let with_effects = cleaned.and_then(|c| judge(c, calibration, sensor, power_on));
         let (judged, refused) = match (affine, with_effects) {
             // Without a calibration, the readings count as the unit gave them.
             (Some((affine, _)), Some((clean, refused))) => {
@@ -329,6 +351,7 @@ fn judge(
     prepared: &Prepared,
     calibration: &Calibration,
     sensor: Sensor,
+    power_on: PowerOn,
 ) -> Option<(SensorVerification, Vec<Warning>)> {
     let inverse = calibration.inverse(sensor)?;
     let mut warnings = Vec::new();
@@ -349,8 +372,8 @@ fn judge(
     let causes = causes::of(prepared, sensor, &inverse, accel.as_ref());
     let announced = |of| causes::announced(prepared, sensor, calibration, of);
     let judged = SensorVerification {
+        test: judged::test(prepared, sensor, calibration, (power_on, causes.as_ref())),
         causes,
-        test: judged::test(prepared, sensor, calibration),
         parameter_uncertainty: announced(&|s| calibration.uncertainty(s)),
         next_power_on: announced(&|s| calibration.next_power_on(s)),
         ..judged

@@ -85,6 +85,11 @@ impl PartClass {
         }
     }
 
+    /// Standard deviation of the change of a bias of `sensor` from one power-on to the next, SI.
+    pub fn bias_change(self, sensor: Sensor) -> f64 {
+        self.typical(sensor).bias
+    }
+
     /// The prior of a parameter of `sensor` whose axis has this scale factor, raw per SI.
     pub fn prior(self, sensor: Sensor, of: TriadParameter, scale: f64) -> VariancePrior {
         let typical = self.typical(sensor);

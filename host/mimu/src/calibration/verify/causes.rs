@@ -28,7 +28,7 @@ use crate::turntable::RatedDwells;
 use mimu_recording::Reference;
 
 /// Half-width of a 95 % interval in standard deviations.
-const INTERVAL: f64 = 1.96;
+pub(super) const INTERVAL: f64 = 1.96;
 /// Condition of the design above which bias and matrix look alike.
 const ALIKE: f64 = 300.0;
 

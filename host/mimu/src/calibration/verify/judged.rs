@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::causes::Causes;
-use super::{SensorVerification, Verification};
+use super::causes::{Causes, INTERVAL};
+use super::{PowerOn, SensorVerification, Verification};
 use crate::calibration::Calibration;
 use crate::estimate::earth_shared;
 use crate::estimate::least_squares::root;
@@ -16,9 +16,10 @@ use crate::observation::vector;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
 use crate::recording_problem::RecordingProblem;
+use crate::sessions::class::PartClass;
 use crate::triad::{Covariance, Forward};
 use crate::turntable::RatedDwells;
-use crate::unseen::{Test, Unseen};
+use crate::unseen::{Test, Unseen, limit};
 use crate::warning::Warning;
 use mimu_core::compensation::Affine;
 use mimu_recording::Reference;
@@ -84,11 +85,48 @@ fn figures(
 }
 
 /// How the errors of `sensor` in this recording compare with the noise and with what the calibration's parameters are known to err by. `None` if the noise is
-/// unknown, or if nothing judges the sensor.
-pub(super) fn test(prepared: &Prepared, sensor: Sensor, calibration: &Calibration) -> Option<Test> {
+/// unknown, or if nothing judges the sensor. A change of the biases is tested by itself too: three numbers show little among the errors of many dwells.
+pub(super) fn test(
+    prepared: &Prepared,
+    sensor: Sensor,
+    calibration: &Calibration,
+    (power_on, causes): (PowerOn, Option<&Causes>),
+) -> Option<Test> {
+    let covariance = covariance(prepared, sensor, calibration, power_on);
+    let of_errors = of_errors(prepared, sensor, calibration, (power_on, &covariance))?;
+    // Within a power-on the errors have all that the noise predicts of the biases already.
+    let causes = causes.filter(|_| power_on == PowerOn::Another);
+    let of_biases = causes.and_then(|causes| of_biases(causes, &covariance));
+    Some(match of_biases {
+        Some(test) if test.fails() && !of_errors.fails() => Test {
+            predicted: of_errors.predicted,
+            noise: of_errors.noise,
+            ..test
+        },
+        _ => of_errors,
+    })
+}
+
+/// The changes of the biases over what is predicted of them. `None` if the recording does not show them.
+fn of_biases(causes: &Causes, covariance: &Covariance) -> Option<Test> {
+    let squares = (0..3).filter_map(|k| {
+        let shown = causes.bias_change_interval[k] / INTERVAL;
+        let square = causes.bias_change[k].powi(2) / (covariance[(9 + k, 9 + k)] + shown * shown);
+        square.is_finite().then_some(square)
+    });
+    let squares: Vec<f64> = squares.collect();
+    let count = squares.len();
+    let ratio = (squares.iter().sum::<f64>() / count as f64).sqrt();
+    (count > 0).then(|| Test::of_ratio(ratio, limit(count as f64), count))
+}
+
+fn of_errors(
+    prepared: &Prepared,
+    sensor: Sensor,
+    calibration: &Calibration,
+    (power_on, covariance): (PowerOn, &Covariance),
+) -> Option<Test> {
     let model = calibration.inverse(sensor)?;
-    let wander = prepared.noise.between_sessions(sensor, &model.matrix);
-    let covariance = calibration.known_covariance(sensor) + wander;
     let known = |s: &Sensor| prepared.noise.is_known(*s);
     let by_turns = prepared.manifest.reference == Reference::Gravity && sensor == Sensor::Gyro;
     let of = if by_turns {
@@ -100,32 +138,55 @@ pub(super) fn test(prepared: &Prepared, sensor: Sensor, calibration: &Calibratio
         return None;
     }
     let unseen = match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => inputs(prepared, sensor, &model, &covariance)?,
+        (Reference::Table, _) => inputs(prepared, sensor, &model, covariance)?,
         (Reference::Gravity | Reference::TurntableRate, Sensor::Accel) => {
             let poses = prepared.observations(Sensor::Accel);
             let noise = prepared.magnitude_variances(&model, &poses);
             let g = prepared.manifest.gravity_mps2;
-            predicted::magnitudes(&model, &covariance, poses.iter().map(|o| (o, g)), noise)
+            predicted::magnitudes(&model, covariance, poses.iter().map(|o| (o, g)), noise)
         }
         (Reference::TurntableRate, Sensor::Gyro) => {
             let dwells = RatedDwells::of(prepared).ok()?;
             let noise = variances(&model, &dwells.turning);
             let known = dwells.turning.iter().zip(dwells.magnitudes());
-            predicted::magnitudes(&model, &covariance, known, noise)
+            predicted::magnitudes(&model, covariance, known, noise)
         }
         (Reference::Gravity, Sensor::Gyro) => {
             let accel = calibration
                 .inverse(Sensor::Accel)
                 .unwrap_or_else(Affine::identity);
             let both = Both {
-                gyro: covariance,
-                accel: calibration.known_covariance(Sensor::Accel),
+                gyro: *covariance,
+                accel: self::covariance(prepared, Sensor::Accel, calibration, power_on),
                 follows: Covariance::zeros(),
             };
             predicted::directions(&prepared.turns(&accel).0, [&model, &accel], &both)
         }
     };
     Test::of(&[unseen], (f64::INFINITY, 0.0))
+}
+
+/// Covariance of C by rows, then o, of `sensor` in this recording: what noise gives, and how biases change between sessions.
+///
+/// A calibration of one session does not say what a power-on changes. Without that, a bias that moved by a fraction of a milli-g would be an error of
+/// the calibration on quiet units: 3.1 times the noise of a tactical unit by its wander alone.
+fn covariance(
+    prepared: &Prepared,
+    sensor: Sensor,
+    calibration: &Calibration,
+    power_on: PowerOn,
+) -> Covariance {
+    let mut covariance = calibration.known_covariance(sensor);
+    if let Some(model) = calibration.inverse(sensor) {
+        covariance += prepared.noise.between_sessions(sensor, &model.matrix);
+    }
+    if power_on == PowerOn::Another && calibration.next_power_on(sensor).is_none() {
+        let sigma = PartClass::default().bias_change(sensor);
+        for k in 9..12 {
+            covariance[(k, k)] += sigma * sigma;
+        }
+    }
+    covariance
 }
 
 /// Errors at known inputs, three for each dwell.
