@@ -17,11 +17,11 @@ pub const FALSE_ALARM: f64 = 1.0 / 200.0;
 /// Tests of a session: the figures of gyro and accelerometer, rates at rest, and headings after whole turns.
 const TESTS: f64 = 4.0;
 /// An error counts only if it is also this many times the predicted one. The noise within dwells predicts that between them no better: it does not show how a
-/// bias moves while the unit is turned.
-pub const BEYOND_NOISE: f64 = 2.0;
+/// bias moves while the unit is turned. Of 600 clean sessions by hand of three grades one in a hundred reached 2.2, and none 2.5.
+pub const BEYOND_NOISE: f64 = 2.5;
 /// If an error of more than this many times the noise would pass, the data do not test the model. Of n errors that determine p parameters, the parameters follow
 /// the share p/n, so that eighteen poses for nine parameters are the fewest.
-pub const VISIBLE: f64 = 2.5;
+pub const VISIBLE: f64 = 3.3;
 
 /// Errors of one part of the unseen data.
 #[derive(Debug, Clone)]

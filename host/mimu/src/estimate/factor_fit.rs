@@ -58,6 +58,14 @@ impl Coordinates {
         }
     }
 
+    /// The same with the residuals evaluated where the block has moved to, for errors too large to be taken for linear.
+    pub fn evaluated(self) -> Self {
+        Self {
+            linear: false,
+            ..self
+        }
+    }
+
     /// Of a block of numbers around zero.
     pub fn around_zero(block: ParameterBlock) -> Self {
         let n = block.size();

@@ -200,7 +200,8 @@ impl<'a> ByTurns<'a> {
             let stated = Kind::Stated(of_accel, at.clone(), back, 1.0);
             factors.known(stated, Some(Observable::Force));
         }
-        coordinates.push(Coordinates::linear(of_accel, at, errors));
+        // An accelerometer as delivered errs by degrees: with derivatives at the start the fit to whole turns alone did not end.
+        coordinates.push(Coordinates::linear(of_accel, at, errors).evaluated());
         factors.rests(rest);
         if let Some(prior) = prior {
             factors.known(Kind::Population(Sensor::Gyro, prior), None);

@@ -168,10 +168,31 @@ fn turns_alone(
         accel_without: &|_, _| Ok(accel.clone()),
     };
     let fit = fit_turns(prepared, &accel, &parts, warnings)?;
+    let fit = fit.map(|mut fit| {
+        with_doubt(prepared, &mut fit, &accel);
+        fit
+    });
     warnings.push(Warning::AccelAsDelivered {
         doubt: DELIVERED.0.hypot(DELIVERED.1),
     });
     Ok(fit.into_iter().collect())
+}
+
+/// Adds to the floors of turns what the directions of `accel` err by. After whole turns the unit lies as before, so that these errors cancel; from pose to pose
+/// they are degrees, and would pass for outliers.
+fn with_doubt(prepared: &Prepared, fit: &mut SensorFit, accel: &Estimated) {
+    let models = [&fit.estimated.triad.inverse, &accel.triad.inverse];
+    let of_accel = Both {
+        gyro: Covariance::zeros(),
+        accel: accel.triad.inverse_covariance,
+        follows: Covariance::zeros(),
+    };
+    let (turns, _) = prepared.turns(models[1]);
+    let of_turns = fit.residuals.iter_mut().zip(&turns);
+    for (residual, turn) in of_turns.filter(|(residual, _)| residual.floor.is_finite()) {
+        let unseen = predicted::directions(std::slice::from_ref(turn), models, &of_accel);
+        residual.floor = residual.floor.max(unseen.predicted.variances().sum().sqrt());
+    }
 }
 
 /// The gyro by turns, and by whole turns if these are stated.

@@ -177,6 +177,10 @@ fn covariance(
     power_on: PowerOn,
 ) -> Covariance {
     let mut covariance = calibration.known_covariance(sensor);
+    if let Some((next, sigmas)) = calibration.next_power_on(sensor) {
+        // Few sessions show the variance between them roughly.
+        covariance = next * (sigmas / INTERVAL).powi(2);
+    }
     if let Some(model) = calibration.inverse(sensor) {
         covariance += prepared.noise.between_sessions(sensor, &model.matrix);
     }
