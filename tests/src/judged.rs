@@ -19,7 +19,7 @@ use mimu_recording::error::Result;
 use mimu_rig::rig_file::{EffectFile, RigFile};
 use mimu_thermal::fit::Estimator;
 use mimu_thermal::session::Session;
-use nalgebra::{Matrix3, SVector};
+use nalgebra::SVector;
 
 use crate::bench;
 use crate::blind::{self, resize, with_effects};
@@ -320,9 +320,10 @@ impl Kind {
                 .iter_mut()
                 .zip(ramp::bias_change(temp_c.unwrap_or(25.0)))
             {
-                let matrix = Matrix3::from_fn(|i, j| truth[3 * i + j]);
-                let moved = truth.fixed_rows::<3>(9) + matrix * change;
-                truth.fixed_rows_mut::<3>(9).copy_from(&moved);
+                for i in 0..3 {
+                    let sensitivity = truth.fixed_rows::<3>(3 * i).norm();
+                    truth[9 + i] += sensitivity * change[i];
+                }
             }
             let of = inside(triads.each_ref().map(Option::as_ref), &truths, own_frame);
             for (sum, of) in sums.iter_mut().flatten().zip(of.iter().flatten()) {

@@ -47,7 +47,7 @@ pub fn thermal(seed: u64) -> RigFile {
     file
 }
 
-/// Change of the true biases of [`thermal`] from 25 °C to `temp_c`, at the inputs of gyro and accelerometer, SI.
+/// Change of the true biases of [`thermal`] from 25 °C to `temp_c`, along the axes of the sensors of gyro and accelerometer, SI.
 pub fn bias_change(temp_c: f64) -> [Vector3<f64>; 2] {
     let si = [(1.0 / 3600.0_f64).to_radians(), 9.80665e-3];
     [0, 1].map(|k| si[k] * (temp_c - 25.0) * Vector3::from(SLOPES[k]))
