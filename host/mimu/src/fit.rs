@@ -9,6 +9,7 @@ mod earth;
 mod hold_out;
 mod known;
 mod lever_arm;
+mod magnitudes;
 mod reference_error;
 pub use reference_error::{Cause, Influence};
 mod of_temperature;

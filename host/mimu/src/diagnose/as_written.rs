@@ -93,6 +93,7 @@ fn models(fit: &Fit) -> [Option<Affine<f64>>; 2] {
 fn figure(observable: Observable) -> (Figure, f64) {
     match observable {
         Observable::Turns => (Figure::Direction, 2.0),
+        Observable::WholeTurns => (Figure::Direction, 1.0),
         Observable::Magnitude => (Figure::GravityMagnitude, 1.0),
         _ => (Figure::Input, 1.0),
     }

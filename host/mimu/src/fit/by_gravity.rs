@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::determined::{faces_not_up, unseen_poses};
 use super::hold_out::{Refits, Split, determined};
+use super::magnitudes::Magnitudes;
 use super::predicted::{self, Both};
 use super::sensor::{Residual, SensorFit, rms, typical};
 use super::{Options, finish, refuse_wrong_gravity, uncalibrated};
@@ -20,7 +21,6 @@ use crate::quantity::{AXES, Figure, Sensor};
 use crate::signal::blocks::quantile;
 use crate::signal::dwell::Fault;
 use crate::triad::{Covariance, Part, Triad};
-use crate::unseen::Unseen;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
@@ -55,30 +55,13 @@ pub(super) fn fit_gravity(
     let floors = prepared.magnitude_floors(&accel.triad.inverse, &poses);
     let parts = options.holdout_blocks.min(poses.len());
     let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
-    let size_error = |triad: &Triad, o: &Observation| {
-        Vector3::new(
-            Magnitude::at(&triad.inverse, &o.raw, g).residual(),
-            0.0,
-            0.0,
-        )
-    };
-    let mut residuals: Vec<Residual> = poses
-        .iter()
-        .zip(&floors)
-        .map(|(o, floor)| Residual {
-            dwell: o.dwell,
-            within: false,
-            value: size_error(&accel.triad, o),
-            held_out: None,
-            floor: *floor,
-        })
-        .collect();
+    let known = Magnitudes(poses.iter().map(|o| (o, g)).collect());
+    let mut residuals = known.residuals(&accel.triad, &floors);
     let typical = typical(Figure::GravityMagnitude, &residuals);
     let without = |split: Split, part: usize| {
-        let of_part = |o: &Observation| part_of(split, o.dwell) == part;
         let kept = |dwell: usize| part_of(split, dwell) != part;
         let refit = by_poses.without(&kept, with_turns.as_ref())?;
-        let open = poses.iter().filter(|o| of_part(o)).map(|o| {
+        let open = known.of_part((split, part), &part_of).map(|(o, g)| {
             let error = Magnitude::at(&accel.triad.inverse, &o.raw, g);
             refit.triad.variance(&error.block.by(0))
         });
@@ -86,31 +69,10 @@ pub(super) fn fit_gravity(
         Ok(refit)
     };
     let held_out = Refits::of(parts, without);
-    for (residual, o) in residuals.iter_mut().zip(&poses) {
-        let refit = held_out.without(part_of(held_out.split, o.dwell));
-        residual.held_out = refit.map(|refit| size_error(&refit.triad, o));
-    }
-    let unseen = |(part, refit): (usize, &Outcome<Estimated>)| {
-        let triad = &refit.as_ref().ok()?.triad;
-        let own = poses
-            .iter()
-            .filter(|o| part_of(held_out.split, o.dwell) == part);
-        let own: Vec<Observation> = own.copied().collect();
-        let noise = prepared.magnitude_variances(&triad.inverse, &own);
-        let known = own.iter().map(|o| (o, g));
-        Some(predicted::magnitudes(
-            &triad.inverse,
-            &triad.known_covariance(),
-            known,
-            noise,
-        ))
-    };
-    let unseen: Vec<Unseen> = held_out
-        .refits
-        .iter()
-        .enumerate()
-        .filter_map(unseen)
-        .collect();
+    known.hold_out(&mut residuals, &held_out, &part_of);
+    let of_noise =
+        |accel: &Affine<f64>, own: &[Observation]| prepared.magnitude_variances(accel, own);
+    let unseen = known.unseen(&held_out, &part_of, Triad::known_covariance, of_noise);
     let mut sensors = Vec::new();
     // A table of means has no turns; its warnings say so.
     if prepared.has(Sensor::Gyro) && options.wants(Sensor::Gyro) && !prepared.manifest.means {
@@ -138,8 +100,7 @@ pub(super) fn fit_gravity(
         None,
         (held_out.into(), &unseen),
     );
-    let known: Vec<(&Observation, f64)> = poses.iter().map(|o| (o, g)).collect();
-    fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::GravityMagnitude, &known);
+    fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::GravityMagnitude, &known.0);
     fit.warnings.extend(not_seen);
     sensors.push(fit);
     Ok(sensors)
@@ -191,7 +152,9 @@ fn with_doubt(prepared: &Prepared, fit: &mut SensorFit, accel: &Estimated) {
     let of_turns = fit.residuals.iter_mut().zip(&turns);
     for (residual, turn) in of_turns.filter(|(residual, _)| residual.floor.is_finite()) {
         let unseen = predicted::directions(std::slice::from_ref(turn), models, &of_accel);
-        residual.floor = residual.floor.max(unseen.predicted.variances().sum().sqrt());
+        residual.floor = residual
+            .floor
+            .max(unseen.predicted.variances().sum().sqrt());
     }
 }
 
@@ -554,17 +517,15 @@ fn fit_turns(
             TurnError::at(&turn.with(&accel.triad.inverse), &gyro.triad.inverse).vector()
         });
     }
-    let unseen = |(part, refit): (usize, &Outcome<(Estimated, Estimated)>)| {
-        let (gyro, accel) = refit.as_ref().ok()?;
+    let unseen = held.unseen(|part, (gyro, accel)| {
         let own = turns
             .iter()
             .filter(|t| (parts.of)(held.split, t.to) == part);
         let own: Vec<Turn> = own.copied().collect();
         let both = Both::of(gyro, &accel.triad);
         let models = [&gyro.triad.inverse, &accel.triad.inverse];
-        Some(predicted::directions(&own, models, &both))
-    };
-    let unseen: Vec<Unseen> = held.refits.iter().enumerate().filter_map(unseen).collect();
+        predicted::directions(&own, models, &both)
+    });
     let static_rms = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
         let all: Vec<_> = rest.iter().filter_map(rate).collect();
         (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))

@@ -7,8 +7,9 @@ use nalgebra::Vector3;
 
 use super::by_gravity::fit_gravity;
 use super::hold_out::{Refits, Split, determined};
-use super::sensor::{Residual, SensorFit, rms, typical};
-use super::{Options, finish, predicted, uncalibrated};
+use super::magnitudes::Magnitudes;
+use super::sensor::{SensorFit, rms, typical};
+use super::{Options, finish, uncalibrated};
 use crate::estimate::magnitude::{self, KnownMagnitudes};
 use crate::estimate::{Estimated, Failure, Observation};
 use crate::factor::Factors;
@@ -18,7 +19,6 @@ use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
 use crate::triad::{Triad, vector};
 use crate::turntable::RatedDwells;
-use crate::unseen::Unseen;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 
@@ -82,76 +82,40 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
     };
     let inverse = gyro.triad.inverse;
     dwells.refuse_other_rate(prepared, &rates(&inverse))?;
-    let error = |triad: &Triad, o: &Observation, rate: f64| {
-        Vector3::new(
-            Magnitude::at(&triad.inverse, &o.raw, rate).residual(),
-            0.0,
-            0.0,
-        )
-    };
-    let rated: Vec<(&Observation, f64)> = dwells.turning.iter().zip(dwells.magnitudes()).collect();
-    let floors = variances(&inverse, &dwells.turning);
-    let mut residuals: Vec<Residual> = rated
-        .iter()
-        .zip(floors)
-        .map(|((o, rate), variance)| Residual {
-            dwell: o.dwell,
-            within: false,
-            value: error(&gyro.triad, o, *rate),
-            held_out: None,
-            floor: prepared.if_noise_known(&[Sensor::Gyro], variance.sqrt()),
-        })
+    let rated = dwells.turning.iter().zip(dwells.magnitudes());
+    let rated = Magnitudes(rated.collect());
+    let floors = variances(&inverse, &dwells.turning).into_iter();
+    let floors: Vec<f64> = floors
+        .map(|v| prepared.if_noise_known(&[Sensor::Gyro], v.sqrt()))
         .collect();
+    let mut residuals = rated.residuals(&gyro.triad, &floors);
     let typical = typical(Figure::RateMagnitude, &residuals);
-    let parts = options.holdout_blocks.min(rated.len());
+    let parts = options.holdout_blocks.min(rated.0.len());
     let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
     // The error of the rates is common to kept and held-out dwells, so no refit is judged by it.
     let held_out = Refits::of(parts, |split, part| {
         let refit = estimate(&|dwell| part_of(split, dwell) != part)?;
-        let open = rated
-            .iter()
-            .filter(|(o, _)| part_of(split, o.dwell) == part);
         let scale = dwells.rate_sigma;
-        let open = open.map(|(o, rate)| {
-            let by = Magnitude::at(&inverse, &o.raw, *rate).block.by(0);
+        let open = rated.of_part((split, part), &part_of).map(|(o, rate)| {
+            let by = Magnitude::at(&inverse, &o.raw, rate).block.by(0);
             (refit.triad.variance(&by) - (scale * rate).powi(2)).max(0.0)
         });
         determined(open, typical, (Figure::RateMagnitude, Sensor::Gyro))?;
         Ok(refit)
     });
     let without = |dwell: usize| held_out.without(part_of(held_out.split, dwell));
-    for (residual, (o, rate)) in residuals.iter_mut().zip(&rated) {
-        residual.held_out = without(o.dwell).map(|refit| error(&refit.triad, o, *rate));
-    }
+    rated.hold_out(&mut residuals, &held_out, &part_of);
     let at_rest = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
         let all: Vec<Vector3<f64>> = dwells.rests.iter().filter_map(rate).collect();
         (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))
     };
     let static_rms = at_rest(&|r| Some(inverse.apply(&r.raw)));
     let static_held_out = at_rest(&|r| Some(without(r.dwell)?.triad.inverse.apply(&r.raw)));
-    let unseen = |(part, refit): (usize, &std::result::Result<Estimated, Failure>)| {
-        let triad = &refit.as_ref().ok()?.triad;
-        let own = || {
-            rated
-                .iter()
-                .filter(|(o, _)| part_of(held_out.split, o.dwell) == part)
-        };
-        let observations: Vec<Observation> = own().map(|(o, _)| **o).collect();
+    let beside_the_rates = |triad: &Triad| {
         let common = vector(&triad.inverse.matrix, &triad.inverse.offset) * dwells.rate_sigma;
-        let covariance = triad.known_covariance() - common * common.transpose();
-        Some(predicted::magnitudes(
-            &triad.inverse,
-            &covariance,
-            own().copied(),
-            variances(&triad.inverse, &observations),
-        ))
+        triad.known_covariance() - common * common.transpose()
     };
-    let unseen: Vec<Unseen> = held_out
-        .refits
-        .iter()
-        .enumerate()
-        .filter_map(unseen)
-        .collect();
+    let unseen = rated.unseen(&held_out, &part_of, beside_the_rates, variances);
     let mut fit = finish(
         Sensor::Gyro,
         gyro,
@@ -161,7 +125,7 @@ fn fit_gyro(prepared: &Prepared, dwells: &RatedDwells, options: Options) -> Resu
         static_rms.map(|r| (r, static_held_out)),
         (held_out.into(), &unseen),
     );
-    fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::RateMagnitude, &rated);
+    fit.uncalibrated_rms = uncalibrated::magnitudes(prepared, Figure::RateMagnitude, &rated.0);
     let rates_dps = dwells.rates.iter().map(|r| r.to_degrees()).collect();
     let error = prepared
         .manifest

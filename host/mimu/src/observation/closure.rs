@@ -51,6 +51,12 @@ pub struct ClosureError {
     pub by_force: [Vector3<f64>; 2],
 }
 
+/// What a rotation in the frame after a turn adds to the part of its `error` along the unit vector `after`, by its components: a row of the inverse Jacobian of a
+/// rotation, to second order in the error.
+fn along(after: &Vector3<f64>, error: &Vector3<f64>) -> Vector3<f64> {
+    after + after.cross(error) * 0.5 + error.cross(&error.cross(after)) / 12.0
+}
+
 impl ClosureError {
     /// Of neighbouring `turns` that together are whole, with the rotations of each by a gyro. `vertical` is the known rate of the Earth about the
     /// vertical, rad/s, with which the place itself turns.
@@ -62,8 +68,7 @@ impl ClosureError {
         let [before, after] = [first.before, last.after].map(|force| force.normalize());
         let error = attitude_error(&whole.rotation, &before, &after);
         let duration_s: f64 = turns.iter().map(|t| t.duration_s).sum();
-        // The inverse Jacobian of a rotation, to second order in the error.
-        let along = after + after.cross(&error) * 0.5 + error.cross(&error.cross(&after)) / 12.0;
+        let along = along(&after, &error);
         let slopes = whole.by.map(|by| by.tr_mul(&along));
         let by_gyro = SVector::<f64, 12>::from_fn(|k, _| match place(k) {
             (row, Some(column)) => slopes[column][row],
@@ -92,6 +97,25 @@ impl ClosureError {
         Self::of(turns, &turned, vertical)
     }
 
+    /// Derivatives of the error by the rotation vector of each increment of each turn, rad/rad, body frame.
+    pub fn by_increments(turns: &[Turn], gyro: &Affine<f64>) -> Option<Vec<Vec<Vector3<f64>>>> {
+        let each = turns.iter();
+        let each: Vec<_> = each
+            .map(|turn| Turned::with_increments(turn, gyro))
+            .collect();
+        let whole = Self::rotation(turns, gyro)?;
+        let [before, after] = [turns.first()?.before, turns.last()?.after].map(|f| f.normalize());
+        let mut along = along(&after, &attitude_error(&whole, &before, &after));
+        // Backwards: the later turns take each increment into the frame at the end.
+        let mut by = Vec::new();
+        for (turned, into) in each.iter().rev() {
+            by.push(into.iter().map(|into| into.tr_mul(&along)).collect());
+            along = turned.rotation.tr_mul(&along);
+        }
+        by.reverse();
+        Some(by)
+    }
+
     /// The rotation of `turns` together, which transforms a direction from the body frame before into that after them.
     pub fn rotation(turns: &[Turn], gyro: &Affine<f64>) -> Option<Matrix3<f64>> {
         let turned = turns.iter().map(|turn| Turned::at(turn, gyro));
@@ -104,5 +128,67 @@ impl ClosureError {
     pub fn by_accel(&self, raw: &[Vector3<f64>; 2]) -> ByTriad {
         let [before, after] = self.by_force;
         slope(&before, &raw[0]) + slope(&after, &raw[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::increment::Increment;
+
+    #[test]
+    fn derivatives_by_increments_are_those_of_differences() {
+        let gyro = Affine {
+            matrix: Matrix3::identity(),
+            offset: Vector3::zeros(),
+        };
+        let error = |moved: Option<(usize, usize, Vector3<f64>)>| {
+            let pieces: Vec<Vec<Increment>> = (0..2)
+                .map(|turn| {
+                    let of = |k: usize| {
+                        let mut one = Increment::EMPTY;
+                        one.duration_s = 1.0;
+                        let mut angle = Vector3::new(0.1 * k as f64, -0.2, 1.5 + turn as f64);
+                        if let Some((_, _, by)) = moved.filter(|m| (m.0, m.1) == (turn, k)) {
+                            angle += by;
+                        }
+                        one.integral = angle.into();
+                        one
+                    };
+                    (0..3).map(of).collect()
+                })
+                .collect();
+            let force = Vector3::new(1.0, -2.0, 9.5);
+            let turn = |k: usize| Turn {
+                from: k,
+                to: k + 1,
+                steps: [0; 2],
+                increments: &pieces[k],
+                before: force,
+                after: force,
+                raw: [force; 2],
+                direction_variance: 0.0,
+                earth_variance: 0.0,
+                integral_variance: 0.0,
+                duration_s: 3.0,
+            };
+            let turns = [turn(0), turn(1)];
+            let at = ClosureError::at(&turns, &gyro, 0.0).expect("two turns");
+            (
+                at.block.residual[0],
+                ClosureError::by_increments(&turns, &gyro).expect("two turns"),
+            )
+        };
+        let by = error(None).1;
+        for (turn, k, axis) in (0..18).map(|i| (i / 9, i / 3 % 3, i % 3)) {
+            let at = |step: f64| error(Some((turn, k, step * Vector3::ith(axis, 1.0)))).0;
+            let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
+            let off = (slope - by[turn][k][axis]).abs();
+            assert!(
+                off < 2e-3,
+                "{turn} {k} {axis}: {slope} {}",
+                by[turn][k][axis]
+            );
+        }
     }
 }

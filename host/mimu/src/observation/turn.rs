@@ -173,6 +173,13 @@ impl Turned {
         integrate(turn.pieces(), gyro, |_, _| ())
     }
 
+    /// The same, with the matrix for each increment that takes its rotation vector into the frame after the turn.
+    pub(super) fn with_increments(turn: &Turn, gyro: &Affine<f64>) -> (Self, Vec<Matrix3<f64>>) {
+        let mut into = vec![Matrix3::zeros(); turn.increments.len()];
+        let turned = integrate(turn.pieces(), gyro, |k, matrix| into[k] = *matrix);
+        (turned, into)
+    }
+
     /// This turn and the `next`, as one.
     pub(super) fn then(self, next: &Self) -> Self {
         let rotation = next.rotation;
@@ -343,25 +350,16 @@ impl TurnError {
 
     /// Under the calibration `gyro`, raw to rad/s.
     pub fn at(turn: &Turn, gyro: &Affine<f64>) -> Self {
-        Self::by_increments(turn, gyro, |_, _| ())
+        Self::of(turn, &Turned::at(turn, gyro))
     }
 
     /// The same with the derivatives of both components by the rotation vector of each increment, rad/rad, body frame.
     pub fn with_increments(turn: &Turn, gyro: &Affine<f64>) -> (Self, Vec<[Vector3<f64>; 2]>) {
-        let sides = across(&turn.after.normalize());
-        let mut by = vec![[Vector3::zeros(); 2]; turn.increments.len()];
-        let error = Self::by_increments(turn, gyro, |k, into| {
-            by[k] = sides.map(|side| into.tr_mul(&side));
-        });
-        (error, by)
-    }
-
-    fn by_increments(
-        turn: &Turn,
-        gyro: &Affine<f64>,
-        each: impl FnMut(usize, &Matrix3<f64>),
-    ) -> Self {
-        Self::of(turn, &integrate(turn.pieces(), gyro, each))
+        let (turned, into) = Turned::with_increments(turn, gyro);
+        let error = Self::of(turn, &turned);
+        let by = into.iter();
+        let by = by.map(|into| error.sides.map(|side| into.tr_mul(&side)));
+        (error, by.collect())
     }
 
     /// The error as a rotation vector in the body frame after the turn, rad.

@@ -88,7 +88,7 @@ impl Leftover {
     /// Quantity of the residuals.
     pub fn figure(&self) -> Figure {
         match self.stratum.0 {
-            Observable::Turns => Figure::Direction,
+            Observable::Turns | Observable::WholeTurns => Figure::Direction,
             _ => Figure::Input,
         }
     }

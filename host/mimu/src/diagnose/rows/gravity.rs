@@ -12,6 +12,7 @@ use crate::estimate::earth::poses;
 use crate::factor::chains::Chains;
 use crate::factor::{Factors, Linearized};
 use crate::observable::{Observable, StratumName};
+use crate::observation::closure::{ClosureError, Closures};
 use crate::observation::magnitude::Magnitude;
 use crate::observation::turn::{Rest, Turn, TurnError};
 use crate::observation::{ByTriad, LOWER, about, from_centre, vector};
@@ -147,8 +148,13 @@ impl Builder<'_> {
         let prepared = self.prepared;
         let body = self.to_body()?;
         let turns = accel.map_or(Vec::new(), |a| prepared.turns(a).0);
-        let turned = |t| self.turn(t, inverse, accel, &body);
-        let errors: Vec<TurnError> = turns.iter().map(turned).collect();
+        let mut errors = Vec::new();
+        let mut of_turns = Vec::new();
+        for turn in &turns {
+            let (error, conditions) = self.turn(turn, inverse, accel, &body);
+            errors.push(error);
+            of_turns.push(conditions);
+        }
         let by_hand = ByHand::of(&self, *inverse, accel, turns, errors);
         let (m, n) = (by_hand.turn_rows(), by_hand.rest.len());
         let dwells: Vec<usize> = by_hand.rest.iter().map(|o| o.dwell).collect();
@@ -172,6 +178,11 @@ impl Builder<'_> {
             }
             strata.push(by_hand.rest_stratum(axis, wander.as_ref(), random_walk.as_ref()));
         }
+        for closure in &by_hand.whole.list {
+            self.heading(&by_hand, closure.turns.clone(), &of_turns, &body);
+            y.push(residuals[y.len()]);
+        }
+        strata.extend(by_hand.heading_stratum());
         let figure = match m {
             0 => (RowFigure::Rest, 3 * n, 1),
             m => (RowFigure::Direction, m, 2),
@@ -186,14 +197,36 @@ impl Builder<'_> {
         self.finish(y, nuisance, own.collect(), strata, figure)
     }
 
-    /// Adds the two rows of a turn; returns its error.
+    /// Adds the row of the heading after the whole turns `own`, whose conditions are among `of_turns`.
+    fn heading(
+        &mut self,
+        by_hand: &ByHand,
+        own: Range<usize>,
+        of_turns: &[Range<usize>],
+        body: &Matrix3<f64>,
+    ) {
+        let turns = &by_hand.turns[own.clone()];
+        let by = ClosureError::by_increments(turns, &by_hand.inverse).unwrap_or_default();
+        let pieces = turns.iter().flat_map(|turn| turn.increments);
+        let weights = by.iter().flatten().zip(pieces);
+        let weights = weights.map(|(by, piece)| body.tr_mul(by) * piece.duration_s);
+        self.rows.push(Row {
+            // Neighbouring turns have neighbouring conditions.
+            conditions: of_turns[own.start].start..of_turns[own.end - 1].end,
+            weights: weights.collect(),
+            dwells: [turns[0].from, turns[turns.len() - 1].to],
+            moving: false,
+        });
+    }
+
+    /// Adds the two rows of a turn; returns its error and its conditions.
     fn turn(
         &mut self,
         turn: &Turn,
         inverse: &Affine<f64>,
         accel: Option<&Affine<f64>>,
         body: &Matrix3<f64>,
-    ) -> TurnError {
+    ) -> (TurnError, Range<usize>) {
         let conditions = self.increments(turn, inverse, accel);
         let (error, by) = TurnError::with_increments(turn, inverse);
         for side in 0..2 {
@@ -208,7 +241,7 @@ impl Builder<'_> {
                 moving: false,
             });
         }
-        error
+        (error, conditions)
     }
 
     /// The conditions of a turn, increment by increment.
@@ -243,15 +276,17 @@ impl Builder<'_> {
     }
 }
 
-/// What a gyro by hand is judged by: turns, and dwells at rest.
+/// What a gyro by hand is judged by: turns, dwells at rest, and headings after whole turns.
 struct ByHand<'a> {
     inverse: Affine<f64>,
     turns: Vec<Turn<'a>>,
     errors: Vec<TurnError>,
+    /// The whole ones among the turns.
+    whole: Closures,
     rest: Vec<Rest>,
     /// Mean reading of all dwells at rest, raw.
     at_rest: Vector3<f64>,
-    /// Residuals of the turns, then of the dwells at rest, and their derivatives by the gyro and the level rates of the chains.
+    /// Residuals of the turns, then of the dwells at rest, then of the headings, and their derivatives by the gyro and the level rates of the chains.
     at: Linearized,
     /// Known variances of these.
     variances: Vec<f64>,
@@ -287,6 +322,11 @@ impl<'a> ByHand<'a> {
         let mut factors = Factors::among(&turns, chains);
         factors.directions(Observable::Turns, |_| true);
         factors.rests(&rest);
+        // A turn that has not ended where it began beyond what the placement allows is none.
+        let stated = builder.prepared.whole_turns();
+        let found = stated.map(|stated| stated.find(&turns, &inverse, &|_, _| 0.0));
+        let whole = found.map(|found| found.closures).unwrap_or_default();
+        factors.headings(&whole);
         let values = factors.values(&[(Sensor::Gyro, &inverse)]);
         Self {
             at: factors.at(&values),
@@ -294,6 +334,7 @@ impl<'a> ByHand<'a> {
             inverse,
             turns,
             errors,
+            whole,
             at_rest: mean(rest.iter().map(|o| &o.raw)),
             rest,
             poses,
@@ -341,6 +382,27 @@ impl<'a> ByHand<'a> {
             wander_known: true,
             within: false,
         }
+    }
+
+    /// Headings after whole turns, if there are any.
+    fn heading_stratum(&self) -> Option<Stratum> {
+        let first = self.turn_rows() + 3 * self.rest.len();
+        let rows = first..self.variances.len();
+        (!rows.is_empty()).then(|| Stratum {
+            name: StratumName(Observable::WholeTurns, None),
+            axis: None,
+            session: 0,
+            known: DMatrix::from_diagonal(&DVector::from_column_slice(
+                &self.variances[rows.clone()],
+            )),
+            rows,
+            by_reference: None,
+            by_earth: None,
+            open: None,
+            random_walk: None,
+            wander_known: true,
+            within: false,
+        })
     }
 
     /// With the wander of the biases, if that is known.
