@@ -4,6 +4,9 @@
 //! `clumsy population PART UNITS SESSIONS [FOLDER]`: sessions of so many units of a part make its population (`mimu fleet --prior`), and as many further units as
 //! SESSIONS are calibrated with it and without it.
 //!
+//! `clumsy drift SESSIONS [FIRST [FOLDER]]`: the gyro of every board drifts by 0.3 deg/s a minute. A session is wrong if it stores a misfit without a question, which
+//! these people decline, or a calibration that is judged good.
+//!
 //! A session passes if it ends in a calibration that is right. One that ends in another way says why; a wrong calibration is an error of the wizard.
 
 mod person;
@@ -16,6 +19,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
+use mimu::{Calibration, JudgementKind};
 use mimu_cli::called::{Refusal, wizard};
 use mimu_tests::stored_calibration::{errors, half_widths};
 use mimu_wizard::event::{Event, Question, SessionState, UserRequest, View};
@@ -26,6 +30,8 @@ use rayon::prelude::*;
 use person::{Habits, Person};
 use sensors::Sensor;
 
+/// Drift of the boards of `clumsy drift`, rad/s a second: 0.3 deg/s a minute.
+const DRIFT: f64 = 0.005 * std::f64::consts::PI / 180.0;
 /// Longest session, s.
 const LONGEST_S: f64 = 3600.0;
 /// How often the person runs the same command again if it was refused.
@@ -90,6 +96,10 @@ fn main() -> ExitCode {
         };
         return population::run(part, *units, *sessions, kept.as_deref());
     }
+    let (drift, arguments) = match &arguments[..] {
+        [what, rest @ ..] if what == "drift" => (DRIFT, rest),
+        all => (0.0, all),
+    };
     let kept = arguments.get(2).map(PathBuf::from);
     let numbers: Result<Vec<u64>, _> = arguments.iter().take(2).map(|a| a.parse()).collect();
     let Ok([sessions, rest @ ..]) = numbers.as_deref() else {
@@ -100,7 +110,9 @@ fn main() -> ExitCode {
     let all: Vec<Session> = (first..first + sessions)
         .into_par_iter()
         .map(|seed| {
-            let session = session(seed, kept.as_deref(), "");
+            let mut sensor = Sensor::of(seed);
+            sensor.board.drift = drift;
+            let session = session(seed, sensor, kept.as_deref(), "");
             println!("{}", session.line());
             session
         })
@@ -138,8 +150,7 @@ impl Session {
 }
 
 /// The units and habits of a seed, and what became of them. `more`: further arguments.
-fn session(seed: u64, kept: Option<&Path>, more: &str) -> Session {
-    let sensor = Sensor::of(seed);
+fn session(seed: u64, sensor: Sensor, kept: Option<&Path>, more: &str) -> Session {
     let habits = Habits::of(seed);
     let folder = tempfile::tempdir().expect("a folder");
     let out = match kept {
@@ -210,7 +221,17 @@ fn run(sensor: &Sensor, person: &mut Person, out: &Path, more: &str) -> End {
                 format!("effects that are not there: {}", unit.effects.join(", ")),
             ),
             (Some(unit), _) if unit.stored.is_some() => {
-                judged(sensor, &out.join("calibration.toml"))
+                let file = out.join("calibration.toml");
+                match Calibration::read(&file).ok().and_then(|c| c.judgement) {
+                    // A drift has no bias to compare with.
+                    Some(judgement)
+                        if sensor.board.drift != 0.0
+                            && judgement.kind >= JudgementKind::Unexplained =>
+                    {
+                        End::Not(format!("stored, and judged {judgement}"))
+                    }
+                    _ => judged(sensor, &file),
+                }
             }
             (Some(unit), why) => {
                 let judged = unit.confirmed.or(unit.verified);

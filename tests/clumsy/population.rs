@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use rayon::prelude::*;
 
+use crate::sensors::Sensor;
 use crate::{End, Session, session};
 
 /// Sessions of `units` units of a part make its population, and `sessions` further units are calibrated with it and without it; `kept` keeps those with it.
@@ -15,7 +16,10 @@ pub fn run(part: u64, units: u64, sessions: u64, kept: Option<&Path>) -> ExitCod
     let seeds = |from: u64, count: u64| (from..from + count).map(move |k| part + 10 * k);
     let first: Vec<u64> = seeds(0, units).collect();
     first.par_iter().for_each(|seed| {
-        println!("population: {}", session(*seed, Some(&made), "").line());
+        println!(
+            "population: {}",
+            session(*seed, Sensor::of(*seed), Some(&made), "").line()
+        );
     });
     // Each session is a folder with the calibration and what else the wizard wrote; all boards have the same name.
     let fleet = ["fleet", "--labels"].map(OsString::from);
@@ -38,7 +42,8 @@ pub fn run(part: u64, units: u64, sessions: u64, kept: Option<&Path>) -> ExitCod
     let with = format!(" --prior {} --as-planned", prior.display());
     let further: Vec<u64> = seeds(units, sessions).collect();
     let each = further.par_iter().map(|seed| {
-        let both = [("", None), (&with[..], kept)].map(|(more, kept)| session(*seed, kept, more));
+        let both = [("", None), (&with[..], kept)]
+            .map(|(more, kept)| session(*seed, Sensor::of(*seed), kept, more));
         println!("without: {}\nwith:    {}", both[0].line(), both[1].line());
         both
     });

@@ -24,6 +24,8 @@ pub struct TextBoard {
     pub wired: [Matrix; 2],
     /// Cubic error of the accelerometer, as a fraction of its reading at gravity.
     pub cubic: f64,
+    /// Drift of the gyro's biases, rad/s a second.
+    pub drift: f64,
     /// Unit of its stamps, s.
     pub stamps_s: f64,
     /// Share of the lines that are lost.
@@ -84,6 +86,7 @@ impl TextBoard {
             steps: [1.0; 2],
             wired: [IDENTITY; 2],
             cubic: 0.0,
+            drift: 0.0,
             stamps_s: 1e-6,
             lost: 0.0,
             garbled_s: None,
@@ -107,7 +110,12 @@ impl TextBoard {
                 } else {
                     0.0
                 };
-                x + cubic + bias[i] + self.noise[k] * random.normal()
+                let drift = if k == 0 {
+                    matrix[i][i] * self.drift * t_s
+                } else {
+                    0.0
+                };
+                x + cubic + drift + bias[i] + self.noise[k] * random.normal()
             });
             for row in &self.wired[k] {
                 let read: f64 = row.iter().zip(&own).map(|(a, b)| a * b).sum();
