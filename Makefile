@@ -58,6 +58,8 @@ clippy:
 	$(CARGO) clippy --locked $(ON_PC) --exclude mimu-firmware --features mimu-tests/studies --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p mimu-recording --no-default-features -- -D warnings
 	$(CARGO) clippy --locked -p mimu-recording --no-default-features --target $(WEB_TARGET) -- -D warnings
+	@# The page's C libraries are not needed to check Rust: nothing is linked.
+	CC_wasm32_wasip1=true AR_wasm32_wasip1=true $(CARGO) clippy --locked -p mimu-web --target $(WEB_TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --profile image --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --profile image --features usb --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --profile image --features matek-h743 --target $(TARGET) -- -D warnings

@@ -33,8 +33,9 @@ fn near(setting: &Setting, aim: f64, random: &mut SplitMix) -> Setting {
 
 /// Two independent standard normal numbers (Box and Muller).
 fn normals(random: &mut SplitMix) -> [f64; 2] {
-    const STEPS: usize = 1 << 52;
-    let mut uniform = || (random.below(STEPS) as f64 + 0.5) / STEPS as f64;
+    // More than a `usize` has in the browser.
+    const STEPS: u64 = 1 << 52;
+    let mut uniform = || ((random.next() % STEPS) as f64 + 0.5) / STEPS as f64;
     let (radius, (sine, cosine)) = ((-2.0 * uniform().ln()).sqrt(), (TAU * uniform()).sin_cos());
     [radius * cosine, radius * sine]
 }

@@ -127,10 +127,15 @@ pub(super) struct SplitMix(pub(super) u64);
 impl SplitMix {
     /// A number below `end`. The remainder's bias, `end` in 2⁶⁴, is of no consequence here.
     pub(super) fn below(&mut self, end: usize) -> usize {
+        (self.next() % end as u64) as usize
+    }
+
+    /// A number of 64 bits.
+    pub(super) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % end as u64) as usize
+        z ^ (z >> 31)
     }
 }
