@@ -209,6 +209,63 @@ fn by_hand_intervals_that_count_the_error_of_gravity_hold_the_truth() {
     assert!(without[1] < 0.75, "{without:?}");
 }
 
+/// Each alone: an error that one of the sensors does not see leaves its intervals as they are.
+#[test]
+fn an_error_that_one_sensor_sees_changes_the_intervals_of_that_alone() {
+    let mut random = Random::new(1, "reference");
+    let file = bench::clean(bench::gyro(&mut random), bench::accel(&mut random));
+    let none = ReferenceError::default;
+    let all = [
+        (
+            Sensor::Gyro,
+            ReferenceError {
+                rate: 1e-2,
+                ..none()
+            },
+        ),
+        (
+            Sensor::Accel,
+            ReferenceError {
+                gravity_mps2: 0.1,
+                ..none()
+            },
+        ),
+        (
+            Sensor::Accel,
+            ReferenceError {
+                tilt_deg: 0.5,
+                ..none()
+            },
+        ),
+        (
+            Sensor::Accel,
+            ReferenceError {
+                level_deg: 0.5,
+                ..none()
+            },
+        ),
+    ];
+    let widths = |error: ReferenceError| {
+        let prepared = bench::recorded(&bench::table_plan(None), &file, 1);
+        let fitted = fit(prepared.with_reference_error(error), Options::default()).expect("a fit");
+        Sensor::BOTH.map(|sensor| {
+            let triad = &fitted.sensor(sensor).expect("both").estimated.triad;
+            triad.inverse_covariance.trace()
+        })
+    };
+    let without = widths(none());
+    for (sensor, error) in all {
+        let with = widths(error.clone());
+        for (k, each) in Sensor::BOTH.iter().enumerate() {
+            let wider = with[k] / without[k];
+            match *each == sensor {
+                true => assert!(wider > 1.2, "{each}: {wider}, {error:?}"),
+                false => assert!((wider - 1.0).abs() < 1e-6, "{each}: {wider}, {error:?}"),
+            }
+        }
+    }
+}
+
 #[test]
 fn errors_that_a_fit_cannot_count_are_refused_by_name() {
     let mut random = Random::new(1, "refused");

@@ -128,9 +128,10 @@ impl<'a> Known<'a> {
             && let Ok(first) = known.estimate(&known.weighed, &known.within)
         {
             let forward = first.triad.forward.matrix;
-            let influences = Influences::of(dwells, sensor, error, forward);
-            known.share(influences.covariance());
-            known.reference = Some(influences);
+            known.reference = Influences::of(prepared, sensor, error, forward);
+            if let Some(covariance) = known.reference.as_ref().map(Influences::covariance) {
+                known.share(covariance);
+            }
         }
         known
     }

@@ -70,21 +70,28 @@ pub(super) struct Influences {
 }
 
 impl Influences {
+    /// `None` if nothing stated is seen by `sensor`.
     pub(super) fn of(
-        dwells: &[Dwell],
+        prepared: &Prepared,
         sensor: Sensor,
         error: &ReferenceError,
         forward: Matrix3<f64>,
-    ) -> Self {
+    ) -> Option<Self> {
         let sigma = error.standard();
+        let dwells = &prepared.dwells.list;
+        // A body that is not mounted as it should be senses the Earth turned too.
+        let sensed = |i: usize| {
+            let input = dwells[i].input(sensor).unwrap_or_else(Vector3::zeros);
+            input + prepared.earth_rate(sensor, i, None).known
+        };
         let mut sources = Vec::new();
         let mut push = |cause, sigma: f64, by: &dyn Fn(&Dwell, &Vector3<f64>) -> Vector3<f64>| {
             if sigma > 0.0 {
-                let input = |dwell: &Dwell| {
-                    let input = dwell.input(sensor).unwrap_or_else(Vector3::zeros);
-                    by(dwell, &input) * sigma
+                let input = |(i, dwell): (usize, &Dwell)| match cause {
+                    Cause::Rate => dwell.input(sensor).unwrap_or_else(Vector3::zeros) * sigma,
+                    _ => by(dwell, &sensed(i)) * sigma,
                 };
-                let inputs = dwells.iter().map(input).collect();
+                let inputs = dwells.iter().enumerate().map(input).collect();
                 sources.push(Source { cause, inputs });
             }
         };
@@ -132,7 +139,7 @@ impl Influences {
                 in_body(dwell, &Vector3::y()).cross(x)
             });
         }
-        Self { sources, forward }
+        (!sources.is_empty()).then_some(Self { sources, forward })
     }
 
     /// Covariance of the mean readings over the dwells, raw units squared, axis by axis.

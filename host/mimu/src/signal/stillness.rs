@@ -301,11 +301,18 @@ impl Search<'_> {
     /// Whether the quietest windows, with these variances, are those of a hand.
     fn trembles(&self, floor: &[f64; 6]) -> bool {
         let accel = || Sensor::Accel.channels();
-        let force = |w: &Window| accel().map(|c| w.mean[c].powi(2)).sum::<f64>();
-        let mut forces: Vec<f64> = self.windows.iter().flatten().map(force).collect();
-        let force = quantile(&mut forces, 0.5).unwrap_or(0.0);
+        // Half of what an axis reads over all poses: volts have a zero that is no force.
+        let half = |c: usize| {
+            let windows = self.windows.iter().flatten();
+            let mut means: Vec<f64> = windows.map(|w| w.mean[c]).collect();
+            let [low, high] = [0.02, 0.98].map(|q| quantile(&mut means, q).unwrap_or(0.0));
+            0.5 * (high - low)
+        };
+        let gravity = accel().map(half).fold(0.0, f64::max);
         let noise = accel().map(|c| floor[c]).sum::<f64>();
-        self.by_hand() && noise > TREMOR * TREMOR * force
+        // In one pose all that differs is noise.
+        let turned = gravity > 10.0 * noise.sqrt();
+        self.by_hand() && turned && noise > (TREMOR * gravity).powi(2)
     }
 
     /// The blocks of a segment without those at its ends whose means the others contradict: the beginning of a turn hides in the variance of a hand that trembles,
