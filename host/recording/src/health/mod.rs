@@ -102,6 +102,8 @@ pub enum Fault {
     AtEnd,
     /// Rows with nothing but zeros.
     AllZero,
+    /// Rows whose six readings are one number.
+    NoAnswer,
     /// Rows in which the accelerometer alone has zeros.
     NoForce,
     /// A sensor has zeros in all rows.
@@ -196,6 +198,7 @@ impl Finding {
             Fault::CalmEnd { .. } => "calm_end",
             Fault::AtEnd => "at_end",
             Fault::AllZero => "all_zero",
+            Fault::NoAnswer => "no_answer",
             Fault::NoForce => "no_force",
             Fault::NotConnected => "not_connected",
             Fault::SeparateRows { .. } => "separate_rows",

@@ -116,6 +116,9 @@ impl Finding {
             ),
             Fault::AtEnd => "a reading is at the end of its range".into(),
             Fault::AllZero => format!("all readings are 0, in {rows}"),
+            Fault::NoAnswer => format!(
+                "all six readings are the same number, in {rows}: the sensor's bus did not answer"
+            ),
             Fault::NoForce => {
                 format!("it reads exactly 0 on all axes in {rows}, which is impossible at rest")
             }
@@ -232,7 +235,7 @@ impl Finding {
             Fault::AllZero => {
                 "check that the right columns were named, and that the sensor was connected"
             }
-            Fault::NoForce => "check its wiring",
+            Fault::NoForce | Fault::NoAnswer => "check its wiring",
             Fault::NotConnected => "leave the file out, or skip the columns",
             Fault::SeparateRows { .. } => {
                 "give a list of columns with the time for each, and they are joined on it"
@@ -280,6 +283,7 @@ impl Finding {
             }
             Fault::CalmEnd { .. } => "treated as a rail of the sensor",
             Fault::AllZero => "left out as padding",
+            Fault::NoAnswer => "left out",
             Fault::NoForce => "its cells are left empty",
             Fault::NotConnected => "left out",
             Fault::NoTemperatures { .. } | Fault::SilentThermometer => "left empty",

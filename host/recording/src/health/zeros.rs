@@ -1,4 +1,4 @@
-//! Zeros and empty cells in place of readings: padding, a sensor that is not connected, sensors in rows of their own.
+//! Zeros, failed reads and empty cells in place of readings: padding, a sensor that is not connected, sensors in rows of their own.
 
 use super::repeats::Constant;
 use super::{Fault, Finding};
@@ -24,6 +24,8 @@ pub(crate) struct Zeros {
     /// Whether the rows have gyro and accelerometer.
     has: [bool; 2],
     pub padding: u64,
+    /// Rows whose six readings are one number: of a bus that did not answer.
+    no_answer: u64,
     /// Rows in which only the accelerometer has zeros.
     no_force: u64,
     /// Rows in which only the gyro has a reading, and those in which only the accelerometer has one.
@@ -61,6 +63,11 @@ impl Zeros {
             self.padding += 1;
             return RowKind::Padding;
         }
+        // A bus that does not answer reads as ones, -1, or as the end of the range. No pose and rate make six numbers equal.
+        if self.has == [true; 2] && raw[1..].iter().all(|value| *value == raw[0]) {
+            self.no_answer += 1;
+            return RowKind::Padding;
+        }
         self.rows += 1;
         self.no_force += u64::from(zero[1]);
         for (c, (channel, value)) in self.channels.iter_mut().zip(raw).enumerate() {
@@ -85,7 +92,13 @@ impl Zeros {
 
     /// The finding that there is nothing but padding.
     pub fn nothing(&self) -> Option<Finding> {
-        self.padded().filter(|_| self.rows == 0)
+        let nothing = self.padded().or(self.unanswered());
+        nothing.filter(|_| self.rows == 0)
+    }
+
+    fn unanswered(&self) -> Option<Finding> {
+        let count = self.no_answer;
+        (count > 0).then(|| Finding::of_all(count, Fault::NoAnswer))
     }
 
     fn padded(&self) -> Option<Finding> {
@@ -100,6 +113,7 @@ impl Zeros {
         let separate = Finding::of_all(gyro + accel, Fault::SeparateRows { gyro, accel });
         let mut all = Vec::from_iter((apart(gyro) && apart(accel)).then_some(separate));
         all.extend(self.padded());
+        all.extend(self.unanswered());
         let not_connected = self.not_connected();
         if self.no_force > 0 && not_connected[1].is_none() {
             all.push(Finding::new("accel", self.no_force, Fault::NoForce));

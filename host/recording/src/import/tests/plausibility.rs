@@ -39,6 +39,27 @@ fn rows_of_zeros_are_padding_and_left_out_counted_wherever_they_are() {
 }
 
 #[test]
+fn rows_of_a_bus_that_did_not_answer_are_left_out_counted() {
+    let text = log(200, |i| match i {
+        20 | 50 => [-1; 6],
+        90..93 => [32767; 6],
+        _ => at_rest(i),
+    });
+    let (summary, batch, _) = one(&text, BOTH).unwrap();
+    assert_eq!((summary.padding, summary.rows), (0, 195));
+    assert!(
+        warned(
+            &summary,
+            "all six readings are the same number, in 5 rows: the sensor's bus did not answer: left out"
+        ),
+        "{summary:?}"
+    );
+    assert!(batch.raw.iter().flatten().all(|v| *v != 32767.0));
+    let error = one_refused(&log(50, |_| [-1; 6]), BOTH);
+    assert!(error.contains("in 50 rows"), "{error}");
+}
+
+#[test]
 fn a_sensor_that_was_not_connected_is_left_out_and_a_dead_axis_is_named() {
     let text = log(100, |i| {
         let [.., x, y, z] = at_rest(i);
