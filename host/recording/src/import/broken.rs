@@ -128,6 +128,8 @@ impl fmt::Display for BrokenKind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fault {
     Width,
+    /// The last row lacks its end: the card was pulled out, or the supply failed. It is left out without being asked.
+    Truncated,
     Reading,
     Time,
     Step,
@@ -137,6 +139,7 @@ impl Fault {
     fn words(self) -> &'static str {
         match self {
             Fault::Width => "another number of cells",
+            Fault::Truncated => "a cut end",
             Fault::Reading => "a cell that is not a reading",
             Fault::Time => "no time",
             Fault::Step => "an invalid number in step",
@@ -238,7 +241,11 @@ impl BrokenTally {
         let Some(first) = &self.first else {
             return Ok(());
         };
-        if self.limit.allows(self.broken, self.rows) {
+        let cut = self
+            .kinds
+            .iter()
+            .any(|(fault, _)| *fault == Fault::Truncated);
+        if self.limit.allows(self.broken - u64::from(cut), self.rows) {
             return Ok(());
         }
         let all = self

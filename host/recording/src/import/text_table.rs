@@ -267,7 +267,11 @@ impl TextTable {
                     }
                     if let Some(refusal) = self.misfit(&self.record, ended) {
                         let place = self.place(number);
-                        return Err(Unreadable::row(number, Fault::Width, place, refusal));
+                        let fault = match ended || self.record.len() > self.width {
+                            true => Fault::Width,
+                            false => Fault::Truncated,
+                        };
+                        return Err(Unreadable::row(number, fault, place, refusal));
                     }
                     self.parse(number, cells)?;
                     return Ok(Some(number));

@@ -44,6 +44,22 @@ fn all_kinds_of_broken_rows_are_named_at_once_and_the_option_that_leaves_them_ou
     assert_eq!(error.refused().arguments, [Argument::SkipBroken]);
 }
 
+/// A card that is pulled out while it is written.
+#[test]
+fn a_last_row_without_its_end_is_left_out_with_a_note_and_no_other_row_is() {
+    let whole = log(&[]);
+    let (summary, batch, _) = one(&(whole.clone() + "2.00,1,2"), NAMES).unwrap();
+    assert_eq!((summary.rows, batch.t_s.len()), (200, 200));
+    let note = summary.broken_rows[0].to_string();
+    assert_eq!(note, "1 of 201 rows are broken: 1 with a cut end (row 202)");
+    let error = one(&(log(&BROKEN[..1]) + "2.00,1,2"), NAMES).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("row 12") && text.contains("2 of 201"),
+        "{text}"
+    );
+}
+
 #[test]
 fn broken_rows_are_left_out_counted_and_listed_up_to_a_limit() {
     let (summary, batch, _) = limited(&log(&BROKEN), "3%").unwrap();
