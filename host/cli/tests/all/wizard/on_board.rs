@@ -57,6 +57,31 @@ pub fn errors(calibration: &Calibration, truth: &RigTruth) -> [f64; 2] {
     })
 }
 
+/// The largest error of an entry of C and o of gyro and accelerometer, in halves of its 95 % interval.
+fn half_intervals(calibration: &Calibration, truth: &RigTruth) -> [f64; 2] {
+    let unit = &truth.file.unit;
+    let models = [
+        unit.gyro_affine.as_ref().unwrap(),
+        unit.accel_affine.as_ref().unwrap(),
+    ];
+    let ratio = [2.5 / unit.gyro_reference_v.unwrap()[0], 1.0];
+    Sensor::BOTH.map(|sensor| {
+        let k = sensor as usize;
+        let forward = nalgebra::Matrix3::from_fn(|i, j| ratio[k] * models[k].matrix[i][j]);
+        let c = forward.try_inverse().unwrap();
+        let o = -c * nalgebra::Vector3::from(models[k].bias) * ratio[k];
+        let table = calibration.table(sensor).unwrap();
+        let [of_c, of_o] = [
+            table.interval_C.unwrap().concat(),
+            table.interval_o.unwrap().into(),
+        ];
+        let entries = (0..9).map(|i| (table.C[i / 3][i % 3] - c[(i / 3, i % 3)]) / of_c[i]);
+        let offsets = (0..3).map(|i| (table.o[i] - o[i]) / of_o[i]);
+        let all = entries.chain(offsets).map(f64::abs);
+        all.fold(0.0, f64::max)
+    })
+}
+
 /// Arguments that the sessions on this plan share.
 fn on_table(plan: &str) -> [&str; 9] {
     [
@@ -139,9 +164,12 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
 
     let calibration = Calibration::read(&bench.path("session/calibration.toml")).unwrap();
     let [gyro, accel] = errors(&calibration, &bench.truth);
+    // Dwells of one second give 0.11 deg/s and 0.5 mg. Which of them are repeated depends on the instant of the interruption, and so does the noise: the
+    // intervals tell whether the stored calibration holds the truth.
     println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²");
-    // Dwells of one second give 0.06 deg/s and 0.3 mg.
-    assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
+    let worst = half_intervals(&calibration, &bench.truth);
+    println!("worst: {worst:?} half intervals");
+    assert!(worst.into_iter().all(|w| w < 2.0), "{worst:?}");
     // The recording is an ordinary one.
     let manifest =
         std::fs::read_to_string(bench.path("session/calibration/recording.toml")).unwrap();
