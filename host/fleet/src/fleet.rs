@@ -48,23 +48,6 @@ pub fn fleet_and_prior(
 /// What the readings of the fleet are in, and what was known of their input.
 type Readings = (RawUnit, Option<Reference>);
 
-fn no_triad() -> Error {
-    Error::new(
-        "the calibrations",
-        "no triad has five units with a regular covariance",
-        "fit the recordings again, with more poses",
-    )
-}
-
-/// Which of so many measurements repeat a unit that was measured before.
-fn further(units: &[Vec<usize>], count: usize) -> Vec<bool> {
-    let mut is_further = vec![false; count];
-    for m in units.iter().flat_map(|unit| &unit[1..]) {
-        is_further[*m] = true;
-    }
-    is_further
-}
-
 fn analysed(
     mut tree: Tree,
     part: Option<&Part>,
@@ -90,13 +73,23 @@ fn analysed(
         .filter_map(|e| Triad::of(e, &constant))
         .collect();
     if triads.is_empty() {
-        return Err(no_triad());
+        let problem = "no triad has five units with a regular covariance";
+        return Err(Error::new(
+            "the calibrations",
+            problem,
+            "fit the recordings again, with more poses",
+        ));
     }
     let strangers = strangers(all, &triads);
     let contradicting = contradicting(all, &triads);
     let levels = all_levels(all);
     let is_stranger = of_strangers(all, &strangers);
-    let is_further = further(&units, all.len());
+    // Further measurements of a unit are no further units.
+    let mut is_further = vec![false; all.len()];
+    units
+        .iter()
+        .flat_map(|u| &u[1..])
+        .for_each(|m| is_further[*m] = true);
     let different = different(&triads, &levels, &is_stranger, &is_further);
     let is_left_out: Vec<bool> = is_stranger
         .iter()

@@ -34,7 +34,7 @@ pub use forces::ForceErrors;
 use terms::Quantities;
 
 use crate::fit::session_bias;
-use crate::observable::{Observable, StratumName};
+use crate::observable::StratumName;
 use crate::prepared::Prepared;
 use crate::quantity;
 use crate::quantity::Sensor;
@@ -67,25 +67,6 @@ pub struct Stratum {
     pub wander_known: bool,
     /// Whether its rows show how the reading follows an input that moves within a dwell, instead of dwell means.
     pub within: bool,
-}
-
-impl Stratum {
-    /// Rows of the first recording that err by known noise alone.
-    fn of_noise(of: Observable, rows: Range<usize>, known: DMatrix<f64>) -> Self {
-        Self {
-            name: StratumName(of, None),
-            axis: None,
-            session: 0,
-            rows,
-            known,
-            by_reference: None,
-            by_earth: None,
-            open: None,
-            random_walk: None,
-            wander_known: true,
-            within: false,
-        }
-    }
 }
 
 /// Quantity that error figures are about.

@@ -301,7 +301,7 @@ impl Search<'_> {
     /// Whether the quietest windows, with these variances, are those of a hand.
     fn trembles(&self, floor: &[f64; 6]) -> bool {
         let accel = || Sensor::Accel.channels();
-        // Half of what an axis reads over all poses, because readings in volts include the zero of the sensor.
+        // Half of what an axis reads over all poses: volts have a zero that is no force.
         let half = |c: usize| {
             let windows = self.windows.iter().flatten();
             let mut means: Vec<f64> = windows.map(|w| w.mean[c]).collect();

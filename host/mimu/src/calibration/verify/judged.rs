@@ -85,7 +85,7 @@ fn figures(
 }
 
 /// How the errors of `sensor` in this recording compare with the noise and with what the calibration's parameters are known to err by. `None` if the noise is
-/// unknown, or if nothing judges the sensor. A change of the biases has a second test: three numbers show little among the errors of many dwells.
+/// unknown, or if nothing judges the sensor. A change of the biases is tested by itself too: three numbers show little among the errors of many dwells.
 pub(super) fn test(
     prepared: &Prepared,
     sensor: Sensor,

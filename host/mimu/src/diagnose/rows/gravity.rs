@@ -115,11 +115,19 @@ impl Builder<'_> {
             .map(|o| vector::at(inverse, &o.raw, &Vector3::zeros()));
         let by: Vec<ByTriad> = errors.flat_map(|e| [0, 1, 2].map(|k| e.by(k))).collect();
         let shapes = Shapes::of(&by, &mean(observations.iter().map(|o| &o.raw)));
-        let strata = vec![Stratum::of_noise(
-            Observable::Force,
-            0..n,
-            DMatrix::identity(n, n),
-        )];
+        let strata = vec![Stratum {
+            name: StratumName(Observable::Force, None),
+            axis: None,
+            session: 0,
+            rows: 0..n,
+            known: DMatrix::identity(n, n),
+            by_reference: None,
+            by_earth: None,
+            open: None,
+            random_walk: None,
+            wander_known: true,
+            within: false,
+        }];
         let nuisance = (shapes.nuisance, shapes.parameters, shapes.by_matrix);
         self.finish(
             vec![0.0; n],
@@ -380,9 +388,21 @@ impl<'a> ByHand<'a> {
     fn heading_stratum(&self) -> Option<Stratum> {
         let first = self.turn_rows() + 3 * self.rest.len();
         let rows = first..self.variances.len();
-        let known = DVector::from_column_slice(&self.variances[rows.clone()]);
-        let known = DMatrix::from_diagonal(&known);
-        (!rows.is_empty()).then(|| Stratum::of_noise(Observable::WholeTurns, rows, known))
+        (!rows.is_empty()).then(|| Stratum {
+            name: StratumName(Observable::WholeTurns, None),
+            axis: None,
+            session: 0,
+            known: DMatrix::from_diagonal(&DVector::from_column_slice(
+                &self.variances[rows.clone()],
+            )),
+            rows,
+            by_reference: None,
+            by_earth: None,
+            open: None,
+            random_walk: None,
+            wander_known: true,
+            within: false,
+        })
     }
 
     /// With the wander of the biases, if that is known.
